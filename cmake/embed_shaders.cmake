@@ -1,0 +1,12 @@
+# Writes every file below SHADERS into OUTPUT as a table of name and text (raw literals, cut below the compilers' limit).
+file(GLOB_RECURSE files RELATIVE ${SHADERS} ${SHADERS}/*)
+list(SORT files)
+set(text "// Generated from shaders/.\n#include <string>\n#include <utility>\n#include <vector>\n\n")
+string(APPEND text "namespace tetpbd {\nconst std::vector<std::pair<std::string, std::string>>& embedded_shaders() {\n")
+string(APPEND text "  static const std::vector<std::pair<std::string, std::string>> files = {\n")
+foreach(name ${files})
+  file(READ ${SHADERS}/${name} content)
+  string(APPEND text "    {\"${name}\", R\"glsl(${content})glsl\"},\n")
+endforeach()
+string(APPEND text "  };\n  return files;\n}\n}  // namespace tetpbd\n")
+file(WRITE ${OUTPUT} "${text}")

@@ -1,0 +1,108 @@
+#include "sim/gl_context.h"
+
+#define EGL_NO_X11
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+
+#include <fmt/format.h>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+namespace {
+
+std::vector<EGLDeviceEXT> query_devices() {
+  const auto query =
+      reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
+  EGLint count = 0;
+  if (!query || !query(0, nullptr, &count)) return {};
+  std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(count));
+  query(count, devices.data(), &count);
+  return devices;
+}
+
+const char* device_extensions(EGLDeviceEXT device) {
+  const auto query =
+      reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
+  const char* text = query ? query(device, EGL_EXTENSIONS) : nullptr;
+  return text ? text : "";
+}
+
+std::string device_name(EGLDeviceEXT device) {
+  const std::string extensions = device_extensions(device);
+  if (extensions.find("NV_device_cuda") != std::string::npos) return "NVIDIA GPU";
+  if (extensions.find("MESA_device_software") != std::string::npos) return "software renderer (Mesa)";
+  const auto query =
+      reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
+  const char* file = query ? query(device, EGL_DRM_DEVICE_FILE_EXT) : nullptr;
+  return file ? fmt::format("GPU {}", file) : "GPU";
+}
+
+EGLDisplay platform_display(EGLenum platform, void* native) {
+  const auto get =
+      reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
+  if (!get) return EGL_NO_DISPLAY;
+  return get(platform, native, nullptr);
+}
+
+EGLContext make_context(EGLDisplay display, bool debug) {
+  if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
+  if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
+  const EGLint config_attributes[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
+  EGLConfig config = nullptr;
+  EGLint count = 0;
+  if (!eglChooseConfig(display, config_attributes, &config, 1, &count) || count == 0) config = nullptr;
+  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 3,
+                               EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                               EGL_CONTEXT_OPENGL_DEBUG, debug ? EGL_TRUE : EGL_FALSE, EGL_NONE};
+  return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
+}
+
+}  // namespace
+
+std::vector<std::string> list_devices() {
+  std::vector<std::string> names;
+  for (EGLDeviceEXT device : query_devices()) names.push_back(device_name(device));
+  return names;
+}
+
+HeadlessContext::HeadlessContext(int device, bool debug) {
+  const std::vector<EGLDeviceEXT> devices = query_devices();
+  if (device >= int(devices.size()))
+    throw Error("no such GPU", fmt::format("--gpu {}", device),
+                fmt::format("this machine has {}: see tetpbd info", devices.size()));
+  std::vector<EGLDisplay> displays;
+  if (device >= 0) {
+    displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, devices[std::size_t(device)]));
+  } else {
+    for (EGLDeviceEXT candidate : devices)  // hardware first: a software device names itself
+      if (std::string(device_extensions(candidate)).find("MESA_device_software") == std::string::npos)
+        displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
+    displays.push_back(platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY));
+    for (EGLDeviceEXT candidate : devices) displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
+  }
+  for (EGLDisplay display : displays) {
+    const EGLContext context = make_context(display, debug);
+    if (context == EGL_NO_CONTEXT) continue;
+    if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
+      eglDestroyContext(display, context);
+      continue;
+    }
+    display_ = display;
+    context_ = context;
+    capabilities_ = load_gl();
+    return;
+  }
+  throw Error("no OpenGL 4.3 context", device >= 0 ? fmt::format("--gpu {}", device) : "EGL, any device",
+              "install a driver, or libegl-mesa0 and libgl1-mesa-dri for software rendering", 1);
+}
+
+HeadlessContext::~HeadlessContext() {
+  if (!context_) return;
+  eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  eglDestroyContext(display_, context_);
+  // The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that driver.
+}
+
+}  // namespace tetpbd

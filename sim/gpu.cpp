@@ -1,0 +1,349 @@
+#include "sim/gpu.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+const std::vector<std::pair<std::string, std::string>>& embedded_shaders();
+
+namespace {
+
+std::atomic<int> error_count = 0;
+
+void GLAPIENTRY on_message(GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text, const void*) {
+  if (type != GL_DEBUG_TYPE_ERROR) return;
+  ++error_count;
+  std::fprintf(stderr, "GL error: %s\n", text);
+}
+
+std::string gl_string(GLenum name) {
+  const auto* text = reinterpret_cast<const char*>(glGetString(name));
+  return text ? text : "";
+}
+
+int gl_integer(GLenum name) {
+  GLint value = 0;
+  glGetIntegerv(name, &value);
+  return value;
+}
+
+void label_object(GLenum kind, GLuint id, const std::string& label) {
+  glObjectLabel(kind, id, GLsizei(label.size()), label.data());
+}
+
+}  // namespace
+
+int gl_error_count() { return error_count; }
+
+Capabilities load_gl() {
+  glewExperimental = GL_TRUE;
+  // GLEW built for GLX answers GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.
+  const GLenum result = glewInit();
+  if (result != GLEW_OK && result != GLEW_ERROR_NO_GLX_DISPLAY)
+    throw Error("OpenGL functions did not load", reinterpret_cast<const char*>(glewGetErrorString(result)),
+                "check the OpenGL driver", 1);
+  Capabilities caps;
+  caps.vendor = gl_string(GL_VENDOR);
+  caps.renderer = gl_string(GL_RENDERER);
+  caps.version = gl_string(GL_VERSION);
+  caps.shading_language = gl_string(GL_SHADING_LANGUAGE_VERSION);
+  if (gl_integer(GL_MAJOR_VERSION) * 10 + gl_integer(GL_MINOR_VERSION) < 43)
+    throw Error("OpenGL 4.3 is needed", "the driver offers " + caps.version, "use a newer driver or GPU", 1);
+  caps.storage_blocks = gl_integer(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS);
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &caps.storage_bytes);
+  caps.work_group_invocations = gl_integer(GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS);
+  caps.shared_bytes = gl_integer(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE);
+  caps.samples = gl_integer(GL_MAX_SAMPLES);
+  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR"})
+    caps.software |= caps.renderer.find(name) != std::string::npos;
+  caps.debug = gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT;
+  if (caps.debug) {
+    glEnable(GL_DEBUG_OUTPUT);
+    glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+    glDebugMessageCallback(on_message, nullptr);
+  }
+  return caps;
+}
+
+// ---------------------------------------------------------------------------------------------------------- buffers
+
+Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
+    : bytes_(bytes), label_(std::move(label)) {
+  while (glGetError() != GL_NO_ERROR) {}
+  glGenBuffers(1, &id_);
+  glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
+  glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
+  if (glGetError() == GL_OUT_OF_MEMORY) {
+    glDeleteBuffers(1, &id_);
+    throw Error("out of GPU memory", fmt::format("buffer '{}' of {} bytes", label_, bytes), "use a smaller mesh", 1);
+  }
+  label_object(GL_BUFFER, id_, label_);
+}
+
+Buffer::~Buffer() {
+  if (id_) glDeleteBuffers(1, &id_);
+}
+
+void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
+  glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
+  glBufferSubData(GL_COPY_WRITE_BUFFER, GLintptr(offset), GLsizeiptr(bytes), data);
+}
+
+void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glBindBuffer(GL_COPY_READ_BUFFER, id_);
+  glGetBufferSubData(GL_COPY_READ_BUFFER, GLintptr(offset), GLsizeiptr(bytes), data);
+}
+
+void Buffer::clear() const {
+  glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
+  glClearBufferData(GL_COPY_WRITE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+}
+
+// ---------------------------------------------------------------------------------------------------------- shaders
+
+namespace {
+
+std::string& folder_setting() {
+  static std::string folder = [] {
+    const char* variable = std::getenv("TETPBD_SHADERS");
+    return std::string(variable ? variable : "");
+  }();
+  return folder;
+}
+
+std::string read_shader_file(const std::string& name) {
+  if (const std::string& folder = shader_folder(); !folder.empty()) {
+    std::ifstream file(std::filesystem::path(folder) / name, std::ios::binary);
+    if (!file) throw Error("no such shader", folder + "/" + name, "point --shaders at a copy of shaders/");
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  for (const auto& [key, text] : embedded_shaders())
+    if (key == name) return text;
+  throw Error("no such shader", name, "it is not one of the files of shaders/", 1);
+}
+
+bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
+
+// Whole words only: KIND in "KIND_rest" stays.
+std::string substitute(const std::string& text, const Substitutions& words) {
+  if (words.empty()) return text;
+  std::string result;
+  for (std::size_t i = 0; i < text.size();) {
+    std::size_t end = i;
+    while (end < text.size() && is_word(text[end])) ++end;
+    if (end == i) {
+      result += text[i++];
+      continue;
+    }
+    const std::string word = text.substr(i, end - i);
+    const auto found = words.find(word);
+    result += found == words.end() ? word : found->second;
+    i = end;
+  }
+  return result;
+}
+
+}  // namespace
+
+void set_shader_folder(const std::string& folder) {
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw Error("no such shader folder", folder, "point --shaders at a copy of shaders/");
+  folder_setting() = folder;
+}
+
+const std::string& shader_folder() { return folder_setting(); }
+
+std::int64_t shader_folder_version() {
+  if (shader_folder().empty()) return 0;
+  std::int64_t newest = 0;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(shader_folder(), ignored))
+    if (entry.is_regular_file(ignored))
+      newest = std::max(newest, std::int64_t(entry.last_write_time(ignored).time_since_epoch().count()));
+  return newest;
+}
+
+namespace {
+
+// `files` collects the names in order; #line N I refers to files[I] (GLSL has numbers where C has names).
+std::string expand(const std::string& name, const Substitutions& words, std::vector<std::string>& files) {
+  if (files.size() > 100) throw Error("shader includes do not end", name, "remove the circular #include", 1);
+  const std::size_t index = files.size();
+  files.push_back(name);
+  std::istringstream lines(read_shader_file(name));
+  std::string line, result = fmt::format("#line 1 {}\n", index);
+  static const std::regex include(R"(^\s*#include\s+"([^"]+)\"(.*)$)");
+  for (int number = 1; std::getline(lines, line); ++number) {
+    std::smatch match;
+    if (line.find("#include") == std::string::npos || !std::regex_match(line, match, include)) {
+      result += substitute(line, words) + "\n";
+      continue;
+    }
+    Substitutions inner = words;
+    std::istringstream assignments(match[2].str());
+    for (std::string item; assignments >> item && item.find('=') != std::string::npos;) {
+      const std::size_t equals = item.find('=');
+      inner[item.substr(0, equals)] = substitute(item.substr(equals + 1), words);
+    }
+    result += expand(substitute(match[1].str(), inner), inner, files) + fmt::format("#line {} {}\n", number + 1, index);
+  }
+  return result;
+}
+
+// "0:12(3): error" (Mesa) and "2(17) : error" (NVIDIA) start with an index into `files`: put the name there.
+std::string name_files(const std::string& log, const std::vector<std::string>& files) {
+  std::istringstream lines(log);
+  std::string line, result;
+  static const std::regex position(R"(^(\d+)[:(](\d+)[^:]*:?\s*(.*)$)");
+  while (std::getline(lines, line)) {
+    std::smatch match;
+    if (std::regex_match(line, match, position) && std::stoul(match[1]) < files.size())
+      line = fmt::format("shaders/{}:{}: {}", files[std::stoul(match[1])], match[2].str(), match[3].str());
+    if (!line.empty()) result += (result.empty() ? "" : "; ") + line;
+    if (result.size() > 600) break;
+  }
+  return result;
+}
+
+GLuint compile_stage(GLenum type, const std::string& label, const std::string& text,
+                     const std::vector<std::string>& files) {
+  const GLuint shader = glCreateShader(type);
+  const char* pointer = text.c_str();
+  glShaderSource(shader, 1, &pointer, nullptr);
+  glCompileShader(shader);
+  GLint ok = 0;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+  if (!ok) {
+    std::string log(8192, '\0');
+    GLsizei length = 0;
+    glGetShaderInfoLog(shader, GLsizei(log.size()), &length, log.data());
+    log.resize(std::size_t(length));
+    glDeleteShader(shader);
+    throw Error("shader does not compile", label, name_files(log, files), 1);
+  }
+  return shader;
+}
+
+GLuint link_program(const std::string& label, const std::vector<GLuint>& shaders) {
+  const GLuint program = glCreateProgram();
+  for (GLuint shader : shaders) glAttachShader(program, shader);
+  glLinkProgram(program);
+  for (GLuint shader : shaders) glDetachShader(program, shader), glDeleteShader(shader);
+  GLint ok = 0;
+  glGetProgramiv(program, GL_LINK_STATUS, &ok);
+  if (!ok) {
+    std::string log(8192, '\0');
+    GLsizei length = 0;
+    glGetProgramInfoLog(program, GLsizei(log.size()), &length, log.data());
+    log.resize(std::size_t(length));
+    glDeleteProgram(program);
+    throw Error("shader program does not link", label, log, 1);
+  }
+  label_object(GL_PROGRAM, program, label);
+  return program;
+}
+
+constexpr const char* version_line = "#version 430 core\n";
+
+}  // namespace
+
+std::string shader_text(const std::string& name, const Substitutions& words) {
+  std::vector<std::string> files;
+  return expand(name, words, files);
+}
+
+Program::Program(std::string label, const std::vector<Stage>& stages, const Substitutions& words,
+                 const std::vector<std::string>& defines)
+    : label_(std::move(label)) {
+  std::string head = version_line;
+  for (const std::string& define : defines) head += "#define " + define + "\n";
+  std::vector<GLuint> shaders;
+  try {
+    for (const Stage& stage : stages) {
+      std::vector<std::string> files;
+      const std::string text = head + expand(stage.file, words, files);
+      shaders.push_back(compile_stage(stage.type, stage.file, text, files));
+    }
+  } catch (...) {
+    for (GLuint shader : shaders) glDeleteShader(shader);
+    throw;
+  }
+  id_ = link_program(label_, shaders);
+}
+
+Program Program::compute(const std::string& file, const Substitutions& words, const std::vector<std::string>& defines) {
+  std::string label = file;
+  for (const auto& [key, value] : words) label += " " + value;
+  return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
+}
+
+Program Program::compute_text(std::string label, const std::string& text) {
+  Program program;
+  program.id_ = link_program(label, {compile_stage(GL_COMPUTE_SHADER, label, version_line + text, {})});
+  program.label_ = std::move(label);
+  return program;
+}
+
+Program::~Program() {
+  if (id_) glDeleteProgram(id_);
+}
+
+GLint Program::location(const char* name) const {
+  const auto found = locations_.find(std::string_view(name));
+  if (found != locations_.end()) return found->second;
+  return locations_.emplace(name, glGetUniformLocation(id_, name)).first->second;
+}
+
+// ----------------------------------------------------------------------------------------------------------- timers
+
+Timer::~Timer() {
+  for (const auto* spans : {&free_}) for (const Span& span : *spans) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
+  for (const Span& span : pending_) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
+}
+
+void Timer::begin() {
+  Span span;
+  if (free_.empty()) {
+    glGenQueries(1, &span.begin);
+    glGenQueries(1, &span.end);
+  } else {
+    span = free_.back();
+    free_.pop_back();
+  }
+  span.ended = false;
+  glQueryCounter(span.begin, GL_TIMESTAMP);
+  pending_.push_back(span);
+}
+
+void Timer::end() {
+  glQueryCounter(pending_.back().end, GL_TIMESTAMP);
+  pending_.back().ended = true;
+}
+
+std::optional<double> Timer::poll(bool wait) {
+  if (pending_.empty() || !pending_.front().ended) return std::nullopt;
+  const Span span = pending_.front();
+  GLint available = 0;
+  if (!wait) glGetQueryObjectiv(span.end, GL_QUERY_RESULT_AVAILABLE, &available);
+  if (!wait && !available) return std::nullopt;
+  GLuint64 begin = 0, end = 0;
+  glGetQueryObjectui64v(span.begin, GL_QUERY_RESULT, &begin);
+  glGetQueryObjectui64v(span.end, GL_QUERY_RESULT, &end);
+  pending_.pop_front();
+  free_.push_back(span);
+  return double(end - begin) * 1e-6;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,92 @@
+// Surface and tetrahedral meshes in double precision (metres): loading, checking, tetrahedralising, writing.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+namespace tetpbd {
+
+using Triangle = std::array<std::uint32_t, 3>;
+using Tet = std::array<std::uint32_t, 4>;
+
+/// Triangles counter-clockwise seen from outside.
+struct SurfaceMesh {
+  std::vector<glm::dvec3> positions;
+  std::vector<Triangle> triangles;
+};
+
+/// Every tet has positive signed volume ((x1-x0)x(x2-x0)).(x3-x0)/6. `surface` holds the faces that belong to one tet,
+/// outward (counter-clockwise from outside), indexing `positions`.
+struct TetMesh {
+  std::vector<glm::dvec3> positions;
+  std::vector<Tet> tets;
+  std::vector<Triangle> surface;
+};
+
+/// PLY, OBJ, STL, OFF (through assimp, in a contained child process): vertices welded, polygons triangulated, vertices
+/// without a triangle dropped. Throws Error (status 2) for files that cannot be read or hold no triangle.
+SurfaceMesh load_surface(const std::filesystem::path& file);
+
+/// What stands in the way of tetrahedralising; empty strings mean sound.
+struct SurfaceCheck {
+  std::size_t non_finite = 0, degenerate = 0, open_edges = 0, non_manifold_edges = 0, non_manifold_vertices = 0,
+              duplicate_triangles = 0, misoriented_edges = 0, self_intersections = 0;
+  int components = 0;
+  int euler_characteristic = 0;
+  double volume = 0;     ///< signed
+  std::string defect;    ///< one line: which defect, how many, where (first place); empty when there is none
+};
+/// Orients triangles consistently and outward where possible, then checks: finite, not flat, closed, 2-manifold.
+/// `self_intersections` is filled by TetGen's own check, which tetrahedralise() runs.
+SurfaceCheck check_surface(SurfaceMesh& surface);
+
+/// Runs TetGen with `switches` (for example "pYq1.85o/140") in a contained child process with a time limit in seconds.
+/// Results are cached by content and switches in the user's cache folder. Throws Error naming the defect.
+TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, double time_limit = 600);
+
+/// TetGen .node/.ele (either name given) or Gmsh .msh (ASCII 2.2 and 4.1).
+TetMesh load_tets(const std::filesystem::path& file);
+/// Any supported file: surfaces are checked and tetrahedralised with `switches`, tetrahedra loaded as they are.
+TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches);
+bool is_surface_file(const std::filesystem::path& file);
+/// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Whole or not at all.
+void write_mesh(const std::filesystem::path& file, const TetMesh& mesh);
+
+/// Orients every tet, finds the boundary; throws Error for indices out of range, repeated vertices, no tet at all.
+void finish_tets(TetMesh& mesh, const std::string& source);
+/// A block of cells nx * ny * nz, each cut into six tets (Kuhn), size in metres, centred on the origin.
+TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);
+
+double tet_volume(const TetMesh& mesh, const Tet& tet);
+double mesh_volume(const TetMesh& mesh);  ///< m^3, sum of signed tet volumes
+/// kg per vertex: a quarter of each adjacent tet's mass (density in kg/m^3).
+std::vector<double> lumped_masses(const TetMesh& mesh, double density);
+/// Undirected edges of all tets, each once, sorted.
+std::vector<std::array<std::uint32_t, 2>> tet_edges(const TetMesh& mesh);
+
+struct Bounds {
+  glm::dvec3 low{0}, high{0};
+  glm::dvec3 centre() const { return (low + high) * 0.5; }
+  double size() const { return glm::length(high - low); }  ///< length of the diagonal
+};
+Bounds bounds(const std::vector<glm::dvec3>& positions);
+
+/// What `tetpbd mesh` prints and stats.json quotes.
+struct MeshReport {
+  std::size_t vertices, surface_vertices, surface_triangles, edges, bends, tets, faces;
+  int euler_characteristic;  ///< V - E + F - T
+  int genus;                 ///< of the boundary, summed over components
+  int components;            ///< of the tetrahedra (by shared vertices)
+  double volume, smallest_tet_volume, mean_tet_volume;
+  double min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg;
+  std::size_t slivers;       ///< tets with a dihedral angle under 5 or over 175 degrees
+  std::size_t inverted;
+};
+MeshReport report(const TetMesh& mesh);
+
+}  // namespace tetpbd

@@ -14,6 +14,32 @@ struct Velocity {
   vec3 low;
   float _1;
 };
+// A constraint: its vertices and rest value.
+struct Record2 {
+  uint vertices[2];
+  float rest;
+};
+struct Record4 {
+  uint vertices[4];
+  float rest;
+};
+
+#define MAX_PLANES 8
+// Everything of a step that does not change within it (a uniform block, std140).
+struct Step {
+  vec3 gravity;           // m/s^2
+  float h;                // s, one substep
+  float inverse_h;        // 1/s
+  float omega;            // over-relaxation of averaged corrections
+  float friction;
+  float keep;             // velocity kept by damping over a substep, exp(-damping * h)
+  float limit;            // m, largest single correction
+  float delta_unit;       // m, one unit of a fixed-point sum
+  uint vertex_count;
+  int plane_count;
+  vec4 stiffness[2];      // by constraint kind
+  vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
+};
 
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0      // the current ones; a double-buffered solver reads these
@@ -21,7 +47,7 @@ struct Velocity {
 #define BIND_PREDICTED 2
 #define BIND_VELOCITIES 3
 #define BIND_ADJACENCY 4
-#define BIND_DELTAS 4         // constraint mode (has no adjacency)
+#define BIND_DELTAS 4         // constraint mode (it has no adjacency)
 #define BIND_RECORDS 5        // + index of the constraint kind among those present
 // Uniform blocks.
 #define BIND_STEP 0

@@ -134,22 +134,16 @@ std::string read_shader_file(const std::string& name) {
   throw Error("no such shader", name, "it is not one of the files of shaders/", 1);
 }
 
-bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
+bool is_name(char c) { return (c >= 'A' && c <= 'Z') || c == '_' || (c >= '0' && c <= '9'); }
 
-// Whole words only: KIND in "KIND_rest" stays.
 std::string substitute(const std::string& text, const Substitutions& words) {
-  if (words.empty()) return text;
   std::string result;
   for (std::size_t i = 0; i < text.size();) {
-    std::size_t end = i;
-    while (end < text.size() && is_word(text[end])) ++end;
-    if (end == i) {
-      result += text[i++];
-      continue;
-    }
-    const std::string word = text.substr(i, end - i);
-    const auto found = words.find(word);
-    result += found == words.end() ? word : found->second;
+    std::size_t end = i + 1;
+    if (text[i] == '$')
+      while (end < text.size() && is_name(text[end])) ++end;
+    const auto found = text[i] == '$' ? words.find(text.substr(i + 1, end - i - 1)) : words.end();
+    result += found == words.end() ? text.substr(i, end - i) : found->second;
     i = end;
   }
   return result;
@@ -178,26 +172,34 @@ std::int64_t shader_folder_version() {
 namespace {
 
 // `files` collects the names in order; #line N I refers to files[I] (GLSL has numbers where C has names).
-std::string expand(const std::string& name, const Substitutions& words, std::vector<std::string>& files) {
+std::string expand(const std::string& name, const ShaderWords& words, std::vector<std::string>& files) {
   if (files.size() > 100) throw Error("shader includes do not end", name, "remove the circular #include", 1);
   const std::size_t index = files.size();
   files.push_back(name);
   std::istringstream lines(read_shader_file(name));
   std::string line, result = fmt::format("#line 1 {}\n", index);
-  static const std::regex include(R"(^\s*#include\s+"([^"]+)\"(.*)$)");
-  for (int number = 1; std::getline(lines, line); ++number) {
+  const auto expand_line = [&](const std::string& text, const ShaderWords& local, int number) {
+    static const std::regex include(R"re(^\s*#include\s+"([^"]+)"\s*$)re");
     std::smatch match;
-    if (line.find("#include") == std::string::npos || !std::regex_match(line, match, include)) {
-      result += substitute(line, words) + "\n";
+    const std::string filled = substitute(text, local.words);
+    if (filled.find("#include") == std::string::npos || !std::regex_match(filled, match, include))
+      result += filled + "\n";
+    else
+      result += expand(match[1], local, files) + fmt::format("#line {} {}\n", number + 1, index);
+  };
+  for (int number = 1; std::getline(lines, line); ++number) {
+    constexpr std::string_view foreach = "#foreach ";
+    const std::size_t start = line.find_first_not_of(' ');
+    if (start == std::string::npos || line.compare(start, foreach.size(), foreach) != 0) {
+      expand_line(line, words, number);
       continue;
     }
-    Substitutions inner = words;
-    std::istringstream assignments(match[2].str());
-    for (std::string item; assignments >> item && item.find('=') != std::string::npos;) {
-      const std::size_t equals = item.find('=');
-      inner[item.substr(0, equals)] = substitute(item.substr(equals + 1), words);
+    for (const Substitutions& item : words.each) {
+      ShaderWords local = words;
+      for (const auto& [key, value] : item) local.words[key] = value;
+      expand_line(line.substr(start + foreach.size()), local, number);
     }
-    result += expand(substitute(match[1].str(), inner), inner, files) + fmt::format("#line {} {}\n", number + 1, index);
+    result += fmt::format("#line {} {}\n", number + 1, index);
   }
   return result;
 }
@@ -259,12 +261,12 @@ constexpr const char* version_line = "#version 430 core\n";
 
 }  // namespace
 
-std::string shader_text(const std::string& name, const Substitutions& words) {
+std::string shader_text(const std::string& name, const ShaderWords& words) {
   std::vector<std::string> files;
   return expand(name, words, files);
 }
 
-Program::Program(std::string label, const std::vector<Stage>& stages, const Substitutions& words,
+Program::Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words,
                  const std::vector<std::string>& defines)
     : label_(std::move(label)) {
   std::string head = version_line;
@@ -283,17 +285,10 @@ Program::Program(std::string label, const std::vector<Stage>& stages, const Subs
   id_ = link_program(label_, shaders);
 }
 
-Program Program::compute(const std::string& file, const Substitutions& words, const std::vector<std::string>& defines) {
-  std::string label = file;
-  for (const auto& [key, value] : words) label += " " + value;
+Program Program::compute(const std::string& file, const ShaderWords& words, const std::vector<std::string>& defines) {
+  std::string label = file.substr(0, file.rfind('.'));
+  if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
   return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
-}
-
-Program Program::compute_text(std::string label, const std::string& text) {
-  Program program;
-  program.id_ = link_program(label, {compile_stage(GL_COMPUTE_SHADER, label, version_line + text, {})});
-  program.label_ = std::move(label);
-  return program;
 }
 
 Program::~Program() {
@@ -309,7 +304,7 @@ GLint Program::location(const char* name) const {
 // ----------------------------------------------------------------------------------------------------------- timers
 
 Timer::~Timer() {
-  for (const auto* spans : {&free_}) for (const Span& span : *spans) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
+  for (const Span& span : free_) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
   for (const Span& span : pending_) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
 }
 

@@ -75,8 +75,13 @@ class Buffer {
   std::string label_;
 };
 
-/// Words replaced in a shader's text before it is compiled: {"KIND", "stretch"}.
+/// Values of `$NAME` in a shader's text, put in before it is compiled: {"KIND", "stretch"} makes gather_$KIND gather_stretch.
 using Substitutions = std::map<std::string, std::string>;
+/// `words` for the whole text; `each`: a line that starts with #foreach is repeated once for every entry, with its words.
+struct ShaderWords {
+  Substitutions words;
+  std::vector<Substitutions> each;
+};
 
 /// Reads shaders from this folder instead of the ones inside the program (empty: inside). The variable TETPBD_SHADERS sets it at start.
 void set_shader_folder(const std::string& folder);
@@ -84,9 +89,8 @@ const std::string& shader_folder();
 /// A number that grows when a file below the shader folder changed; always 0 for embedded shaders.
 std::int64_t shader_folder_version();
 
-/// Text of shaders/`name` with whole words substituted and `#include "..."` expanded (a path is relative to shaders/).
-/// The same file may be included again with other substitutions: `#include "gather.glsl" KIND=stretch ARITY=2`.
-std::string shader_text(const std::string& name, const Substitutions& words = {});
+/// Text of shaders/`name` with `#include "..."` (a path relative to shaders/), `#foreach` and `$NAME` expanded.
+std::string shader_text(const std::string& name, const ShaderWords& words = {});
 
 /// A linked program. Errors name the shader file and line.
 class Program {
@@ -94,11 +98,9 @@ class Program {
   struct Stage { GLenum type; std::string file; };
   Program() = default;
   /// `#define`s and `#version 430 core` are put before each stage.
-  Program(std::string label, const std::vector<Stage>& stages, const Substitutions& words = {},
+  Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words = {},
           const std::vector<std::string>& defines = {});
-  /// A compute program whose whole body is given as text (already expanded).
-  static Program compute_text(std::string label, const std::string& text);
-  static Program compute(const std::string& file, const Substitutions& words = {},
+  static Program compute(const std::string& file, const ShaderWords& words = {},
                          const std::vector<std::string>& defines = {});
   Program(Program&& other) noexcept { swap(other); }
   Program& operator=(Program&& other) noexcept { swap(other); return *this; }

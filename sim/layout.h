@@ -4,8 +4,15 @@
 #include <glm/glm.hpp>
 
 namespace tetpbd {
-using glm::ivec3;
+namespace layout {
+using glm::uint;
 using glm::vec3;
 using glm::vec4;
 #include "shaders/layout.glsl"
+}  // namespace layout
+using layout::Position;
+using layout::Step;
+using layout::Velocity;
+static_assert(sizeof(Position) == 32 && sizeof(Velocity) == 32 && sizeof(layout::Record4) == 20);
+static_assert(sizeof(Step) == 48 + 32 + 16 * MAX_PLANES);
 }  // namespace tetpbd

@@ -1,0 +1,40 @@
+// Bending: C = angle - rest in radians, the signed dihedral angle of two triangles that share the edge x2 -> x3, with
+// wings x0 and x1 (paper eqs. 6-15 with the sign that arccos loses; method.md eqs. 7-9). atan of sine and cosine is exact to 2e-7 rad
+// near flat, where float arccos is wrong by 5e-4 and its derivative divides by zero.
+// |C| is clamped to 1 rad: an angle that has turned further is brought back in several iterations. Without it, projecting
+// bending at k = 1 can diverge even in double precision.
+real hinge_angle(vec3 x[4]) {
+  vec3 e = x[3] - x[2];
+  vec3 n0 = cross(x[2] - x[0], x[3] - x[0]);
+  vec3 n1 = cross(x[3] - x[1], x[2] - x[1]);
+  return atan(dot(cross(n0, n1), e), length(e) * dot(n0, n1));
+}
+
+Constraint4 bend(vec3 x[4], real rest) {
+  Constraint4 c;
+  c.C = real(0);
+  for (int j = 0; j < 4; ++j) c.gradient[j] = vec3(real(0));
+  c.floor = real(0);
+  vec3 e = x[3] - x[2];
+  vec3 n0 = cross(x[2] - x[0], x[3] - x[0]);
+  vec3 n1 = cross(x[3] - x[1], x[2] - x[1]);
+  real ee = dot(e, e);
+  real aa = dot(n0, n0);
+  real bb = dot(n1, n1);
+  real tiny = real(1e-12) * ee * ee;  // a wing closer to the edge than 1e-6 of its length has no angle
+  if (!(aa > tiny && bb > tiny)) return c;
+  real turn = hinge_angle(x) - rest;
+  const real pi = real(3.14159265358979323846);
+  if (turn > pi) turn -= real(2) * pi;
+  if (turn <= -pi) turn += real(2) * pi;
+  real l = sqrt(ee);
+  vec3 a = n0 / aa;
+  vec3 b = n1 / bb;
+  vec3 u = e / l;
+  c.C = clamp(resolved(turn, pi), real(-1), real(1));
+  c.gradient[0] = -l * a;
+  c.gradient[1] = -l * b;
+  c.gradient[2] = -a * dot(x[0] - x[3], u) - b * dot(x[1] - x[3], u);
+  c.gradient[3] = -a * dot(x[2] - x[0], u) - b * dot(x[2] - x[1], u);
+  return c;
+}

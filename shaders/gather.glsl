@@ -1,0 +1,25 @@
+// Sum of the corrections that the constraints of one kind on vertex i ask of it.
+layout(std430, binding = $BINDING) readonly buffer Records_$KIND { Record$ARITY records_$KIND[]; };
+vec3 gather_$KIND(uint i, Position own) {
+  uint row = $INDEXu * (params.vertex_count + 1u) + i;
+  uint end = adjacency[row + 1u];
+  vec3 sum = vec3(0.0);
+  for (uint entry = adjacency[row]; entry < end; ++entry) {
+    uint packed = adjacency[entry];
+    uint slot = packed & 3u;
+    Record$ARITY record = records_$KIND[packed >> 2];
+    vec3 x[$ARITY];
+    float w[$ARITY];
+    for (int j = 0; j < $ARITY; ++j) {
+      Position p = positions[record.vertices[j]];
+      x[j] = relative(p, own);
+      w[j] = p.inverse_mass;
+    }
+    Constraint$ARITY c = $KIND(x, record.rest);
+    vec3 gradient = c.gradient[0];
+    for (int j = 1; j < $ARITY; ++j)
+      if (slot == uint(j)) gradient = c.gradient[j];
+    sum += limited(params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w) * own.inverse_mass * gradient, params.limit);
+  }
+  return sum;
+}

@@ -1,0 +1,116 @@
+// PBD on the CPU, the same step as the GPU's, with the same formulas, in a precision of choice. State is in double, so no
+// small displacement is lost; constraints are evaluated in `real` from differences of positions.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "sim/constraints.h"
+#include "sim/model.h"
+#include "sim/settings.h"
+#include "sim/solver.h"
+
+namespace tetpbd {
+
+/// Constraints of one kind, contiguous, in the order they are projected.
+template <class Kind, class real>
+struct Batch {
+  struct Item {
+    std::array<std::uint32_t, std::size_t(Kind::arity)> vertices;
+    real rest;
+  };
+  std::vector<Item> items;
+};
+
+/// `jacobi`: all corrections from the same positions, averaged with omega / n_i. `gauss_seidel`: one after the other.
+enum class Sweep { jacobi, gauss_seidel };
+
+template <class real>
+class CpuPbd {
+ public:
+  CpuPbd(const Model& model, const ConstraintSystem& system) : model_(model), at_vertex_(system.at_vertex) {
+    for_each_kind([&](auto kind, int k) {
+      using Kind = decltype(kind);
+      auto& items = std::get<Batch<Kind, real>>(batches_).items;
+      const ConstraintList& list = system.lists[std::size_t(k)];
+      items.resize(list.count());
+      for (std::size_t c = 0; c < items.size(); ++c) {
+        std::copy_n(list.vertices.begin() + std::ptrdiff_t(c * Kind::arity), Kind::arity, items[c].vertices.begin());
+        items[c].rest = real(list.rest[c]);
+      }
+    });
+  }
+
+  /// One step of `settings.dt` (method.md eqs. 1-5), `settings.substeps` substeps.
+  void step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep) {
+    const double h = settings.dt / settings.substeps;
+    const glm::dvec3 gravity(0, -settings.gravity, 0);
+    std::vector<glm::dvec4> planes = model_.obstacles;
+    if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
+    const double keep = std::exp(-settings.damping * h);
+    auto& x = state.positions;
+    auto& v = state.velocities;
+    inverse_masses_.assign(inverse_masses.begin(), inverse_masses.end());
+    for (int s = 0; s < settings.substeps; ++s) {
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (inverse_masses[i] > 0) {
+          v[i] = (v[i] + h * gravity) * keep;
+          x[i] += h * v[i];
+        }
+      predicted_ = x;
+      for (int iteration = 0; iteration < settings.iterations; ++iteration) {
+        if (sweep == Sweep::jacobi) deltas_.assign(x.size(), glm::dvec3(0));
+        for_each_kind([&](auto kind, int) { project<decltype(kind)>(x, settings, sweep); });
+        for (std::size_t i = 0; i < x.size(); ++i) {
+          if (!(inverse_masses[i] > 0)) continue;
+          if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (settings.omega / at_vertex_[i]);
+          for (const glm::dvec4& plane : planes) {
+            const glm::dvec3 n(plane);
+            const double depth = glm::dot(n, x[i]) - plane.w;
+            if (depth < 0)
+              x[i] += Formulas<double>{}.plane_correction(n, depth, h * v[i] + (x[i] - predicted_[i]), settings.friction);
+          }
+        }
+      }
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (inverse_masses[i] > 0) v[i] += (x[i] - predicted_[i]) / h;
+    }
+  }
+
+ private:
+  template <class Kind>
+  void project(std::vector<glm::dvec3>& x, const Settings& settings, Sweep sweep) {
+    constexpr std::size_t arity = std::size_t(Kind::arity);
+    using vec = glm::vec<3, real>;
+    const real k = real(settings.*Kind::stiffness), limit = real(model_.size);
+    Formulas<real> formulas;
+    for (const auto& item : std::get<Batch<Kind, real>>(batches_).items) {
+      vec local[arity];
+      real w[arity];
+      for (std::size_t j = 0; j < arity; ++j) {
+        local[j] = vec(x[item.vertices[j]] - x[item.vertices[0]]);
+        w[j] = inverse_masses_[item.vertices[j]];
+      }
+      const auto c = Kind::template evaluate<real>(local, item.rest);
+      const real lambda = k * formulas.multiplier(c, w);
+      if (lambda == real(0)) continue;
+      for (std::size_t j = 0; j < arity; ++j) {
+        const glm::dvec3 correction(formulas.limited(lambda * w[j] * c.gradient[j], limit));
+        (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += correction;
+      }
+    }
+  }
+
+  template <class>
+  struct Batches;
+  template <class... Kind>
+  struct Batches<std::tuple<Kind...>> { using type = std::tuple<Batch<Kind, real>...>; };
+
+  const Model& model_;
+  std::vector<std::uint32_t> at_vertex_;
+  typename Batches<Kinds>::type batches_;
+  std::vector<glm::dvec3> predicted_, deltas_;
+  std::vector<real> inverse_masses_;
+};
+
+}  // namespace tetpbd

@@ -1,0 +1,99 @@
+#include "sim/model.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <random>
+
+#include <fmt/format.h>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
+              const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
+              const std::vector<std::uint32_t>& fixed) {
+  const std::uint32_t base = std::uint32_t(model.rest.positions.size());
+  Body body{name, base, mesh.positions.size(), model.rest.tets.size(), mesh.tets.size(), model.rest.surface.size(), mesh.surface.size()};
+  const auto shifted = [&](auto face) {
+    for (auto& v : face) v += base;
+    return face;
+  };
+  model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
+  for (const Tet& t : mesh.tets) model.rest.tets.push_back(shifted(t));
+  for (const Triangle& t : mesh.surface) model.rest.surface.push_back(shifted(t));
+  glm::dvec3 centre{0};
+  double total = 0;
+  const auto masses = lumped_masses(mesh, density);
+  for (std::size_t i = 0; i < masses.size(); ++i) centre += masses[i] * positions[i], total += masses[i];
+  centre /= total;
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    model.masses.push_back(masses[i]);
+    // A vertex of no tet has no mass; it belongs to nothing and stays where it is.
+    model.inverse_masses.push_back(masses[i] > 0 ? 1 / masses[i] : 0);
+    model.positions.push_back(positions[i]);
+    model.velocities.push_back(velocity + glm::cross(spin, positions[i] - centre));
+  }
+  for (std::uint32_t v : fixed) {
+    model.inverse_masses[base + v] = 0;
+    model.velocities[base + v] = glm::dvec3(0);
+  }
+  const double size = bounds(mesh.positions).size();
+  model.size = model.bodies.empty() ? size : std::max(model.size, size);
+  model.bodies.push_back(body);
+}
+
+namespace {
+
+double factor_of(const std::string& how) {
+  const std::string text = how.substr(how.find(':') + 1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value > 0) || value > 1e6)
+    throw Error("bad factor", "--deform " + how, "give a number above 0, at most 1e6, as in stretch:2");
+  return value;
+}
+
+}  // namespace
+
+void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& how, unsigned seed) {
+  if (how.empty() || how == "none") return;
+  const Bounds box = bounds(x);
+  const glm::dvec3 centre = box.centre();
+  if (how == "flatten") {
+    for (auto& p : x) p.y = centre.y;
+  } else if (how == "line") {
+    for (auto& p : x) p = {p.x, centre.y, centre.z};
+  } else if (how == "point") {
+    for (auto& p : x) p = centre;
+  } else if (how == "random") {
+    std::mt19937 generator(seed);
+    // Not std::uniform_real_distribution: its numbers differ from one standard library to the next.
+    const auto unit = [&] { return double(generator()) / 4294967296.0; };
+    for (auto& p : x)
+      for (int a = 0; a < 3; ++a) p[a] = box.low[a] + unit() * (box.high[a] - box.low[a]);
+  } else if (how == "mirror") {
+    for (auto& p : x) p.x = 2 * centre.x - p.x;
+  } else if (how.starts_with("stretch:") || how.starts_with("squash:")) {
+    const double factor = factor_of(how);
+    for (auto& p : x) p.y = centre.y + (p.y - centre.y) * factor;
+  } else if (how == "invert-one") {
+    // The tet nearest the middle: its first vertex goes through the opposite face.
+    const Tet* nearest = nullptr;
+    double best = 0;
+    for (const Tet& t : rest.tets) {
+      const double d = glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
+      if (!nearest || d < best) nearest = &t, best = d;
+    }
+    if (!nearest) return;
+    const Tet& t = *nearest;
+    const glm::dvec3 n = glm::normalize(glm::cross(x[t[2]] - x[t[1]], x[t[3]] - x[t[1]]));
+    x[t[0]] -= 2 * glm::dot(x[t[0]] - x[t[1]], n) * n;
+  } else {
+    throw Error("no such deformation", "--deform " + how,
+                "choose from none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
+  }
+}
+
+}  // namespace tetpbd

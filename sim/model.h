@@ -1,0 +1,37 @@
+// What a simulation starts from: one rest mesh of all bodies, masses, start positions and velocities.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim/tet_mesh.h"
+
+namespace tetpbd {
+
+/// A contiguous part of the rest mesh.
+struct Body {
+  std::string name;
+  std::size_t first_vertex = 0, vertices = 0, first_tet = 0, tets = 0, first_triangle = 0, triangles = 0;
+};
+
+struct Model {
+  TetMesh rest;                        ///< metres; bodies one after the other
+  std::vector<Body> bodies;
+  std::vector<double> inverse_masses;  ///< 1/kg, 0: fixed
+  std::vector<double> masses;          ///< kg, also of fixed vertices
+  std::vector<glm::dvec3> positions;   ///< m, where the run starts
+  std::vector<glm::dvec3> velocities;  ///< m/s
+  std::vector<glm::dvec4> obstacles;   ///< half spaces n.x >= d as (n, d), beside the ground
+  double size = 1;                     ///< m, diagonal of the largest body at rest
+};
+
+/// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices.
+void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
+              const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
+              const std::vector<std::uint32_t>& fixed);
+
+/// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one.
+/// Throws Error for anything else.
+void deform(std::vector<glm::dvec3>& positions, const TetMesh& rest, const std::string& how, unsigned seed);
+
+}  // namespace tetpbd

@@ -1,0 +1,132 @@
+#include "sim/settings.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "sim/constraints.h"
+#include "sim/error.h"
+#include "sim/solver.h"
+
+namespace tetpbd {
+
+const std::vector<Parameter>& parameters() {
+  using S = Settings;
+  using enum Effect;
+  static const std::vector<Parameter> rows = {
+      {"mode", "solver", &S::mode, 0, 0, false, "", "solver mode", rebuild},
+      {"constraints", "solver", &S::constraints, 0, 0, false, "", "constraint kinds, separated by commas", rebuild},
+      {"k_stretch", "solver", &S::k_stretch, 0, 1, false, "", "stiffness of stretch", live},
+      {"k_bend", "solver", &S::k_bend, 0, 1, false, "", "stiffness of bending", live},
+      {"k_volume", "solver", &S::k_volume, 0, 1, false, "", "stiffness of volume", live},
+      {"omega", "solver", &S::omega, 0, 4, false, "", "over-relaxation of averaged corrections, 1 to 2 recommended (Jacobi modes)", live},
+      {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations a substep", live},
+      {"substeps", "solver", &S::substeps, 1, 100000, true, "", "substeps a step", live},
+      {"dt", "solver", &S::dt, 1e-6, 1, true, "s", "time of one step", live},
+      {"damping", "solver", &S::damping, 0, 1000, false, "1/s", "velocity lost a second", live},
+      {"gravity", "world", &S::gravity, -1000, 1000, false, "m/s^2", "gravity, downwards", live},
+      {"ground", "world", &S::ground, 0, 1, false, "", "whether there is a ground plane", live},
+      {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane", live},
+      {"friction", "world", &S::friction, 0, 10, false, "", "Coulomb friction of ground and obstacles", live},
+      {"seed", "solver", &S::seed, 0, 2147483647, false, "", "seed of random start positions", restart},
+  };
+  return rows;
+}
+
+const Parameter* find_parameter(const std::string& name) {
+  std::string key = name;
+  std::replace(key.begin(), key.end(), '-', '_');
+  for (const Parameter& row : parameters())
+    if (key == row.name) return &row;
+  return nullptr;
+}
+
+std::string flag_name(const Parameter& parameter) {
+  std::string name = std::string("--") + parameter.name;
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, separator);)
+    if (!part.empty()) parts.push_back(part);
+  return parts;
+}
+
+std::vector<std::string> choices(const Parameter& parameter) {
+  std::vector<std::string> names;
+  if (std::string_view(parameter.name) == "mode")
+    for (const SolverMode& mode : solver_modes()) names.push_back(mode.name);
+  if (std::string_view(parameter.name) == "constraints")
+    for (const ConstraintKind& kind : constraint_kinds()) names.push_back(kind.name);
+  return names;
+}
+
+namespace {
+
+[[noreturn]] void refuse(const Parameter& row, const std::string& value, const std::string& where, const std::string& mend) {
+  throw Error(fmt::format("'{}' cannot be {}", row.name, value.empty() ? "empty" : value), where, mend);
+}
+
+std::string range_text(const Parameter& row) {
+  return fmt::format("give a number from {:g} to {:g}{}{}", row.low, row.high, *row.unit ? " " : "", row.unit);
+}
+
+void check_words(const Parameter& row, const std::string& text, const std::string& where) {
+  const auto allowed = choices(row);
+  const bool list = std::string_view(row.name) == "constraints";
+  const auto words = list ? split(text, ',') : std::vector<std::string>{text};
+  for (const std::string& word : words)
+    if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
+      refuse(row, "'" + text + "'", where, fmt::format("choose from {}", fmt::join(allowed, ", ")));
+  for (std::size_t i = 0; i < words.size(); ++i)
+    if (std::count(words.begin(), words.end(), words[i]) > 1) refuse(row, "'" + text + "'", where, "name each once");
+}
+
+}  // namespace
+
+void set_parameter(Settings& settings, const Parameter& row, const std::string& text, const std::string& where) {
+  const auto number = [&]<class T>(T& target) {
+    T value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(double(value)) ||
+        double(value) < row.low || double(value) > row.high)
+      refuse(row, text, where, range_text(row));
+    target = value;
+  };
+  if (const auto* member = std::get_if<double Settings::*>(&row.member)) number(settings.**member);
+  if (const auto* member = std::get_if<int Settings::*>(&row.member)) number(settings.**member);
+  if (const auto* member = std::get_if<bool Settings::*>(&row.member)) {
+    if (text != "true" && text != "false" && text != "1" && text != "0") refuse(row, text, where, "give true or false");
+    settings.**member = text == "true" || text == "1";
+  }
+  if (const auto* member = std::get_if<std::string Settings::*>(&row.member)) {
+    const std::string value = text == "none" && std::string_view(row.name) == "constraints" ? "" : text;
+    check_words(row, value, where);
+    settings.**member = value;
+  }
+}
+
+std::string parameter_text(const Settings& settings, const Parameter& row) {
+  return std::visit(
+      [&](auto member) -> std::string {
+        using T = std::remove_cvref_t<decltype(settings.*member)>;
+        if constexpr (std::is_same_v<T, bool>) return settings.*member ? "true" : "false";
+        else if constexpr (std::is_same_v<T, std::string>) return (settings.*member).empty() ? "none" : settings.*member;
+        else return fmt::format("{}", settings.*member);
+      },
+      row.member);
+}
+
+void check_settings(const Settings& settings, const std::string& where) {
+  Settings copy = settings;
+  for (const Parameter& row : parameters()) set_parameter(copy, row, parameter_text(settings, row), where);
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,37 @@
+// Bindings and results of the measuring kernels, read by GLSL and C++.
+#define METRICS_GROUPS 64      // work-groups of a reduction; sums are always taken in the same order
+#define METRICS_SIZE 256       // their size
+
+#define BIND_M_POSITIONS 0
+#define BIND_M_VELOCITIES 1
+#define BIND_M_REST 2          // vec4: rest position about the centre of mass, mass
+#define BIND_M_STRETCH 3
+#define BIND_M_BEND 4
+#define BIND_M_VOLUME 5
+#define BIND_M_PARTIALS 6
+#define BIND_M_ROW 7
+
+// Sums over one body, in this order in a row. The first group comes from constraints, the second from vertices, the third
+// from vertices once the centre and rotation are known.
+#define M_VOLUME_CHANGE 0      // sum V - V0, m^3
+#define M_TET_SQUARES 1        // sum ((V - V0)/V0)^2
+#define M_TET_MAX 2
+#define M_INVERTED 3           // tets with V <= 0
+#define M_STRETCH_SQUARES 4    // sum ((l - d)/d)^2
+#define M_STRETCH_MAX 5
+#define M_BEND_SQUARES 6       // sum of squared angle errors, rad^2
+#define M_MOMENT 7             // 3: sum m (x - x0), x0 the body's first vertex
+#define M_MOMENTUM 10          // 3: sum m v
+#define M_SPEED 13             // sum m |v|
+#define M_KINETIC 14           // J
+#define M_HEIGHT 15            // sum m y
+#define M_COVARIANCE 16        // 9: sum m (x - x0) X^T, column by column
+#define M_CONTACTS 25          // vertices on a half space
+#define M_NON_FINITE 26        // vertices with a position or velocity that is not finite
+#define M_ANGULAR 27           // 3: sum m r x u about the centre of mass
+#define M_RIGID_SQUARES 30     // sum m |x - c - R X|^2
+#define M_CENTRE 31            // 3: c - x0
+#define M_ROTATION 34          // 4: quaternion w, x, y, z
+#define M_ORIGIN 38            // 3: x0
+#define M_ROW 41
+#define M_STRIDE 64            // floats from one body's row to the next: a multiple of any driver's binding alignment

@@ -1,0 +1,38 @@
+#include "types.glsl"
+#include "pair.glsl"
+#include "metrics/layout.glsl"
+layout(local_size_x = METRICS_SIZE) in;
+layout(std430, binding = BIND_M_POSITIONS) readonly buffer Positions { Position positions[]; };
+layout(std430, binding = BIND_M_PARTIALS) buffer Partials { float partials[]; };  // [quantity][group]
+layout(std430, binding = BIND_M_ROW) buffer Row { float row[]; };
+shared float scratch[METRICS_SIZE];
+
+// A tree over the work-group; the result is in scratch[0] for every invocation until the next call.
+float reduce(float value, bool largest) {
+  uint me = gl_LocalInvocationIndex;
+  barrier();
+  scratch[me] = value;
+  barrier();
+  for (uint half_size = METRICS_SIZE / 2u; half_size > 0u; half_size /= 2u) {
+    if (me < half_size) scratch[me] = largest ? max(scratch[me], scratch[me + half_size]) : scratch[me] + scratch[me + half_size];
+    barrier();
+  }
+  return scratch[0];
+}
+
+void store_partial(int quantity, float value, bool largest) {
+  float total = reduce(value, largest);
+  if (gl_LocalInvocationIndex == 0u) partials[uint(quantity) * METRICS_GROUPS + gl_WorkGroupID.x] = total;
+}
+
+// Largest quantities are maxima, all others sums.
+bool is_maximum(int quantity) { return quantity == M_TET_MAX || quantity == M_STRETCH_MAX; }
+
+// Sums the groups' partials of one quantity, in order.
+float total_of(int quantity) {
+  uint base = uint(quantity) * METRICS_GROUPS;
+  float total = partials[base];
+  for (uint g = 1u; g < METRICS_GROUPS; ++g)
+    total = is_maximum(quantity) ? max(total, partials[base + g]) : total + partials[base + g];
+  return total;
+}

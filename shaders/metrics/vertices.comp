@@ -1,0 +1,38 @@
+// Moments of one body: mass, momentum, energy, and the covariance that gives its best-fitting rotation.
+#include "metrics/reduce.glsl"
+layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
+layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
+uniform uint first_vertex, end_vertex;
+uniform float touching;  // m, how near to a half space counts as contact
+
+void main() {
+  vec3 moment = vec3(0.0), momentum = vec3(0.0);
+  mat3 covariance = mat3(0.0);
+  float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, non_finite = 0.0;
+  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += METRICS_GROUPS * METRICS_SIZE) {
+    Position p = positions[i];
+    vec3 x = relative(p, positions[first_vertex]);
+    vec3 v = velocities[i].high + velocities[i].low;
+    vec4 at_rest = rest[i];
+    float m = at_rest.w;
+    if (any(isnan(p.high)) || any(isinf(p.high)) || any(isnan(v)) || any(isinf(v))) non_finite += 1.0;
+    moment += m * x;
+    momentum += m * v;
+    speed += m * length(v);
+    kinetic += 0.5 * m * dot(v, v);
+    height += m * p.high.y;
+    covariance += m * outerProduct(x, at_rest.xyz);
+    for (int k = 0; k < params.plane_count; ++k)
+      if ((dot(params.planes[k].xyz, p.high) - params.planes[k].w) + dot(params.planes[k].xyz, p.low) < touching) contacts += 1.0;
+  }
+  for (int a = 0; a < 3; ++a) {
+    store_partial(M_MOMENT + a, moment[a], false);
+    store_partial(M_MOMENTUM + a, momentum[a], false);
+    for (int b = 0; b < 3; ++b) store_partial(M_COVARIANCE + 3 * a + b, covariance[a][b], false);
+  }
+  store_partial(M_SPEED, speed, false);
+  store_partial(M_KINETIC, kinetic, false);
+  store_partial(M_HEIGHT, height, false);
+  store_partial(M_CONTACTS, contacts, false);
+  store_partial(M_NON_FINITE, non_finite, false);
+}

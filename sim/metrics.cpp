@@ -1,0 +1,221 @@
+#include "sim/metrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "shaders/metrics/layout.glsl"
+
+namespace tetpbd {
+
+namespace {
+
+constexpr std::size_t ring_size = 16;
+
+// Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
+Metrics::Range range_of(const ConstraintList& list, std::size_t first_vertex, std::size_t end_vertex) {
+  const auto vertex_of = [&](std::size_t c) { return list.vertices[c * std::size_t(list.arity)]; };
+  Metrics::Range range;
+  unsigned low = 0, high = unsigned(list.count());
+  while (low < high) {
+    const unsigned middle = (low + high) / 2;
+    if (vertex_of(middle) < first_vertex) low = middle + 1;
+    else high = middle;
+  }
+  range.first = low;
+  high = unsigned(list.count());
+  while (low < high) {
+    const unsigned middle = (low + high) / 2;
+    if (vertex_of(middle) < end_vertex) low = middle + 1;
+    else high = middle;
+  }
+  range.end = low;
+  return range;
+}
+
+}  // namespace
+
+Metrics create_metrics(const Model& model) {
+  Metrics m;
+  const ConstraintSystem system = build_constraints(model.rest, "stretch,bend,volume");
+  std::vector<Buffer> records;
+  // A mesh can lack hinges (no two surface triangles share an edge): keep an empty buffer for them.
+  for (std::size_t k = 0; k < system.lists.size(); ++k) {
+    ConstraintSystem one = system;
+    for (std::size_t other = 0; other < one.present.size(); ++other) one.present[other] = other == k;
+    records.push_back(std::move(record_buffers(one).front()));
+  }
+  m.stretch = std::move(records[0]);
+  m.bend = std::move(records[1]);
+  m.volume = std::move(records[2]);
+  m.edge_count = system.lists[0].count();
+  m.hinge_count = system.lists[1].count();
+  m.tet_count = system.lists[2].count();
+  std::vector<glm::vec4> rest(model.rest.positions.size());
+  for (const Body& body : model.bodies) {
+    Metrics::BodyRanges ranges;
+    const std::size_t end = body.first_vertex + body.vertices;
+    ranges.vertices = {unsigned(body.first_vertex), unsigned(end)};
+    ranges.edges = range_of(system.lists[0], body.first_vertex, end);
+    ranges.hinges = range_of(system.lists[1], body.first_vertex, end);
+    ranges.tets = {unsigned(body.first_tet), unsigned(body.first_tet + body.tets)};
+    glm::dvec3 centre{0};
+    std::vector<glm::dvec3> shape;
+    for (std::size_t i = body.first_vertex; i < end; ++i) {
+      ranges.mass += model.masses[i];
+      centre += model.masses[i] * model.rest.positions[i];
+      shape.push_back(model.rest.positions[i]);
+    }
+    centre /= ranges.mass;
+    for (std::size_t i = body.first_vertex; i < end; ++i)
+      rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
+    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)
+      ranges.volume += tet_volume(model.rest, model.rest.tets[t]);
+    ranges.size = bounds(shape).size();
+    m.bodies.push_back(ranges);
+  }
+  m.rest = Buffer("metrics rest", rest);
+  m.partials = Buffer("metrics partials", M_ROW * METRICS_GROUPS * sizeof(float));
+  for (std::size_t slot = 0; slot < ring_size; ++slot)
+    m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr, GL_STREAM_READ);
+  m.constraints = Program::compute("metrics/constraints.comp");
+  m.vertices = Program::compute("metrics/vertices.comp");
+  m.centre = Program::compute("metrics/centre.comp");
+  m.rigid = Program::compute("metrics/rigid.comp");
+  m.close = Program::compute("metrics/close.comp");
+  return m;
+}
+
+namespace {
+
+void dispatch(const Program& program, unsigned groups) {
+  program.use();
+  glDispatchCompute(groups, 1, 1);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+}
+
+Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
+  std::vector<float> floats(m.bodies.size() * M_STRIDE);
+  m.rows[pending.slot].read(0, floats.size() * sizeof(float), floats.data());
+  Measurement result;
+  result.step = pending.step;
+  result.time = pending.time;
+  double rest_volume = 0, mass = 0, tet_squares = 0, stretch_squares = 0, bend_squares = 0, rigid = 0, size = 0;
+  const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const Metrics::BodyRanges& body = m.bodies[b];
+    const float* row = floats.data() + b * M_STRIDE;
+    const auto vector = [&](int at) { return glm::dvec3(row[at], row[at + 1], row[at + 2]); };
+    rest_volume += body.volume;
+    mass += body.mass;
+    result.volume += body.volume + double(row[M_VOLUME_CHANGE]);
+    tet_squares += double(row[M_TET_SQUARES]);
+    stretch_squares += double(row[M_STRETCH_SQUARES]);
+    bend_squares += double(row[M_BEND_SQUARES]);
+    result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
+    result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
+    result.inverted_tets += double(row[M_INVERTED]);
+    result.momentum += vector(M_MOMENTUM);
+    result.angular_momentum += vector(M_ANGULAR);
+    result.speed += double(row[M_SPEED]);
+    result.centre += body.mass * (vector(M_ORIGIN) + vector(M_CENTRE));
+    result.kinetic += double(row[M_KINETIC]);
+    result.potential += pending.gravity * (double(row[M_HEIGHT]) - body.mass * pending.ground);
+    result.contacts += double(row[M_CONTACTS]);
+    result.non_finite += double(row[M_NON_FINITE]);
+    rigid += double(row[M_RIGID_SQUARES]);
+    size += body.mass * body.size;
+  }
+  const auto rms = [](double squares, std::size_t count) { return count ? std::sqrt(squares / double(count)) : 0.0; };
+  result.centre /= mass;
+  result.volume_error_percent = 100 * (result.volume - rest_volume) / rest_volume;
+  result.tet_volume_rms = rms(tet_squares, m.tet_count);
+  result.stretch_rms = rms(stretch_squares, m.edge_count);
+  result.bend_rms_rad = rms(bend_squares, m.hinge_count);
+  result.rigid_distance = std::sqrt(rigid / mass) / (size / mass);
+  return result;
+}
+
+}  // namespace
+
+void measure(Metrics& m, const Sim& sim) {
+  const std::size_t slot = m.next;
+  if (m.pending.size() == m.rows.size()) return;  // the caller has not collected: see collect()
+  m.next = (m.next + 1) % m.rows.size();
+  sim.step_block.bind_uniform(BIND_STEP);
+  sim.current_positions().bind_storage(BIND_M_POSITIONS);
+  sim.velocities.bind_storage(BIND_M_VELOCITIES);
+  m.rest.bind_storage(BIND_M_REST);
+  m.stretch.bind_storage(BIND_M_STRETCH);
+  m.bend.bind_storage(BIND_M_BEND);
+  m.volume.bind_storage(BIND_M_VOLUME);
+  m.partials.bind_storage(BIND_M_PARTIALS);
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const Metrics::BodyRanges& body = m.bodies[b];
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(), GLintptr(b * M_STRIDE * sizeof(float)),
+                      M_STRIDE * sizeof(float));
+    m.constraints.use();
+    m.constraints.set("first_edge", body.edges.first), m.constraints.set("end_edge", body.edges.end);
+    m.constraints.set("first_hinge", body.hinges.first), m.constraints.set("end_hinge", body.hinges.end);
+    m.constraints.set("first_tet", body.tets.first), m.constraints.set("end_tet", body.tets.end);
+    dispatch(m.constraints, METRICS_GROUPS);
+    m.vertices.use();
+    m.vertices.set("touching", float(1e-5 * body.size));
+    for (const Program* program : {&m.vertices, &m.rigid, &m.centre}) {
+      program->use();
+      program->set("first_vertex", body.vertices.first);
+      program->set("end_vertex", body.vertices.end);
+      program->set("mass", float(body.mass));
+    }
+    dispatch(m.vertices, METRICS_GROUPS);
+    dispatch(m.centre, 1);
+    dispatch(m.rigid, METRICS_GROUPS);
+    dispatch(m.close, 1);
+  }
+  m.pending.push_back({glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0), slot, sim.steps, double(sim.steps) * sim.settings.dt,
+                       sim.settings.ground ? sim.settings.ground_height : 0.0, sim.settings.gravity});
+}
+
+std::optional<Measurement> collect(Metrics& m, bool wait) {
+  // A full ring must give way, or the next measurement would be lost.
+  if (m.pending.empty()) return std::nullopt;
+  const bool must = wait || m.pending.size() == m.rows.size();
+  const GLenum state = glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, must ? GLuint64(60e9) : 0);
+  if (state == GL_TIMEOUT_EXPIRED && !must) return std::nullopt;
+  const Metrics::Pending pending = m.pending.front();
+  m.pending.pop_front();
+  glDeleteSync(pending.fence);
+  return read_row(m, pending);
+}
+
+Measurement measure_now(Metrics& m, const Sim& sim) {
+  while (collect(m, true)) {}
+  measure(m, sim);
+  return *collect(m, true);
+}
+
+void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) {
+  if (!errors.first) errors.first = now, errors.start_energy = errors.max_energy = now.energy();
+  errors.last = now;
+  errors.finite = errors.finite && now.finite();
+  errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
+  errors.max_energy = std::max(errors.max_energy, now.energy());
+  double mass = 0;
+  for (std::size_t i = 0; i < sim.inverse_masses.size(); ++i) {
+    mass += sim.model->masses[i];
+    if (!(sim.inverse_masses[i] > 0)) errors.free = false;
+  }
+  if (now.contacts > 0) errors.free = false;
+  if (!errors.free) return;
+  const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
+  const glm::dvec3 expected = errors.first->momentum + mass * gravity * (now.time - errors.first->time);
+  if (now.speed > 0) errors.linear_drift = std::max(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
+  // Relative to the angular momentum of a spinning body; of one that hardly spins, to size times sum m|v|.
+  const double spun = glm::length(errors.first->angular_momentum), moved = sim.model->size * now.speed;
+  const double scale = spun > 0.01 * moved ? spun : moved;
+  if (scale > 0)
+    errors.angular_drift = std::max(errors.angular_drift,
+                                    glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
+}
+
+}  // namespace tetpbd

@@ -1,1 +1,78 @@
-#include "sim/gpu.h"
+#include "render/camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+namespace tetpbd {
+
+namespace {
+
+// From the target to the eye.
+glm::vec3 backward(const Camera& camera) {
+  const float azimuth = glm::radians(camera.azimuth), elevation = glm::radians(camera.elevation);
+  return {std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
+          std::cos(elevation) * std::cos(azimuth)};
+}
+
+}  // namespace
+
+void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees) {
+  camera.azimuth = std::remainder(camera.azimuth + azimuth_degrees, 360.0f);
+  // Straight up or down, "up" on the screen has no direction.
+  camera.elevation = std::clamp(camera.elevation + elevation_degrees, -89.0f, 89.0f);
+}
+
+void pan(Camera& camera, float dx, float dy, int viewport_height) {
+  const float metres = 2.0f * camera.distance * std::tan(glm::radians(camera.fov) * 0.5f) /
+                       float(std::max(viewport_height, 1));
+  const glm::mat4 view = view_matrix(camera);
+  const glm::vec3 right{view[0][0], view[1][0], view[2][0]}, up{view[0][1], view[1][1], view[2][1]};
+  camera.target += metres * (-dx * right + dy * up);
+}
+
+void zoom(Camera& camera, float factor) {
+  camera.distance = std::clamp(camera.distance * factor, 1e-3f, 1e5f);
+}
+
+void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect, float margin) {
+  camera.target = 0.5f * (low + high);
+  const glm::mat3 rotation(view_matrix(camera));
+  const float tan_y = std::tan(glm::radians(camera.fov) * 0.5f), tan_x = tan_y * aspect;
+  float distance = 1e-3f;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::vec3 point{corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y,
+                          corner & 4 ? high.z : low.z};
+    const glm::vec3 p = rotation * (point - camera.target);  // z towards the eye
+    distance =
+        std::max({distance, p.z + margin * std::abs(p.x) / tan_x, p.z + margin * std::abs(p.y) / tan_y});
+  }
+  camera.distance = distance;
+}
+
+glm::vec3 eye(const Camera& camera) { return camera.target + camera.distance * backward(camera); }
+
+glm::mat4 view_matrix(const Camera& camera) {
+  return glm::lookAt(eye(camera), camera.target, glm::vec3(0.0f, 1.0f, 0.0f));
+}
+
+glm::mat4 projection_matrix(const Camera& camera, float aspect) {
+  return glm::perspective(glm::radians(camera.fov), aspect, camera.distance * 0.01f,
+                          camera.distance * 100.0f);
+}
+
+Ray pixel_ray(const Camera& camera, float x, float y, int width, int height) {
+  const float tan_y = std::tan(glm::radians(camera.fov) * 0.5f), tan_x = tan_y * float(width) / float(height);
+  const glm::vec3 seen{(2.0f * x / float(width) - 1.0f) * tan_x, (1.0f - 2.0f * y / float(height)) * tan_y,
+                       -1.0f};
+  return {eye(camera), glm::normalize(glm::transpose(glm::mat3(view_matrix(camera))) * seen)};
+}
+
+glm::vec3 project(const Camera& camera, const glm::vec3& point, int width, int height) {
+  const glm::vec4 clip =
+      projection_matrix(camera, float(width) / float(height)) * view_matrix(camera) * glm::vec4(point, 1.0f);
+  return {(clip.x / clip.w * 0.5f + 0.5f) * float(width), (0.5f - clip.y / clip.w * 0.5f) * float(height),
+          clip.z / clip.w};
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,38 @@
+// A camera that looks at a target from a distance. +y is up; lengths in metres, angles in degrees.
+#pragma once
+
+#include <glm/glm.hpp>
+
+namespace tetpbd {
+
+struct Camera {
+  glm::vec3 target{0.0f};
+  float distance = 3.0f;
+  float azimuth = 30.0f;    ///< about +y; 0 looks from +z, 90 from +x
+  float elevation = 18.0f;  ///< above the horizon, -89..89
+  float fov = 35.0f;        ///< vertical
+};
+
+struct Ray {
+  glm::vec3 origin{0.0f};
+  glm::vec3 direction{0.0f, 0.0f, -1.0f};  ///< unit length
+};
+
+void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees);
+/// Moves the target so that what lies at its depth follows a cursor by (dx, dy) pixels (y down).
+void pan(Camera& camera, float dx, float dy, int viewport_height);
+/// Multiplies the distance; less than 1 comes closer.
+void zoom(Camera& camera, float factor);
+/// Looks at the middle of a box and goes back until all of it is in view, with `margin` around it (1: none).
+void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect,
+               float margin = 1.15f);
+
+glm::vec3 eye(const Camera& camera);
+glm::mat4 view_matrix(const Camera& camera);
+glm::mat4 projection_matrix(const Camera& camera, float aspect);
+/// Through a point of the viewport in pixels from its top left (the middle of the first pixel is 0.5, 0.5).
+Ray pixel_ray(const Camera& camera, float x, float y, int width, int height);
+/// Where a point appears, in the same pixels; z: depth -1..1, outside that range not in view.
+glm::vec3 project(const Camera& camera, const glm::vec3& point, int width, int height);
+
+}  // namespace tetpbd

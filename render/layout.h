@@ -1,0 +1,10 @@
+// shaders/render/layout.glsl as C++: the same text, so the two cannot drift apart.
+#pragma once
+
+#include <glm/glm.hpp>
+
+namespace tetpbd {
+using glm::mat4;
+using glm::vec4;
+#include "shaders/render/layout.glsl"
+}  // namespace tetpbd

@@ -1,0 +1,82 @@
+#include "render/picking.h"
+
+#include <array>
+#include <bit>
+
+#include "render/layout.h"
+#include "sim/error.h"
+#include "sim/layout.h"
+
+namespace tetpbd {
+
+namespace {
+constexpr std::uint32_t none = 0xffffffffu;
+}
+
+Picker& Picker::operator=(Picker&& other) noexcept {
+  kernel = std::move(other.kernel);
+  triangles = std::move(other.triangles);
+  result = std::move(other.result);
+  count = other.count;
+  ray = other.ray;
+  std::swap(fence, other.fence);
+  return *this;
+}
+
+Picker::~Picker() {
+  if (fence) glDeleteSync(fence);
+}
+
+Picker make_picker(const TetMesh& mesh) {
+  Picker picker;
+  picker.kernel = Program::compute("render/pick.comp");
+  picker.triangles = Buffer("pick triangles", mesh.surface);
+  picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
+  picker.count = mesh.surface.size();
+  return picker;
+}
+
+void request(Picker& picker, GLuint positions, const Ray& ray) {
+  if (picker.fence) glDeleteSync(picker.fence);
+  picker.ray = ray;
+  const std::array<std::uint32_t, 3> start{none, none, none};
+  picker.result.write(0, sizeof start, start.data());
+  picker.kernel.use();
+  picker.kernel.set("count", unsigned(picker.count));
+  picker.kernel.set("origin", ray.origin);
+  picker.kernel.set("direction", ray.direction);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
+  picker.triangles.bind_storage(BIND_PICK_TRIANGLES);
+  picker.result.bind_storage(BIND_PICK_RESULT);
+  for (int stage = 0; stage < 3; ++stage) {
+    picker.kernel.set("stage", stage);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the stage before
+    glDispatchCompute(stage < 2 ? work_groups(picker.count, 128) : 1, 1, 1);
+  }
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  picker.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  glFlush();
+}
+
+std::optional<Pick> poll(Picker& picker, bool wait) {
+  if (!picker.fence) return std::nullopt;
+  const GLenum state =
+      glClientWaitSync(picker.fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? 10'000'000'000u : 0u);
+  if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
+  if (state == GL_TIMEOUT_EXPIRED || state == GL_WAIT_FAILED)
+    throw Error("the GPU does not answer", "picking", "use a smaller mesh", 1);
+  glDeleteSync(picker.fence);
+  picker.fence = nullptr;
+  std::array<std::uint32_t, 3> result;
+  picker.result.read(0, sizeof result, result.data());
+  Pick pick;
+  pick.ray = picker.ray;
+  pick.hit = result[1] != none;
+  if (!pick.hit) return pick;
+  pick.distance = std::bit_cast<float>(result[0]);
+  pick.triangle = result[1];
+  pick.vertex = result[2];
+  return pick;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,41 @@
+// Which vertex of the surface a ray meets, found on the GPU from the current positions and read back without
+// waiting.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "render/camera.h"
+#include "sim/gpu.h"
+#include "sim/tet_mesh.h"
+
+namespace tetpbd {
+
+struct Pick {
+  bool hit = false;
+  std::uint32_t triangle = 0;  ///< index into TetMesh::surface; the lowest of those equally near
+  std::uint32_t vertex = 0;    ///< its corner nearest to the hit
+  float distance = 0;          ///< metres along the ray
+  Ray ray;                     ///< the one asked for
+};
+
+/// One question at a time: a new one replaces one that has not been answered.
+struct Picker {
+  Picker() = default;
+  Picker(Picker&& other) noexcept { *this = std::move(other); }
+  Picker& operator=(Picker&& other) noexcept;
+  ~Picker();
+  Program kernel;
+  Buffer triangles, result;
+  std::size_t count = 0;
+  Ray ray;
+  GLsync fence = nullptr;
+};
+
+Picker make_picker(const TetMesh& mesh);
+void request(Picker& picker, GLuint positions, const Ray& ray);
+/// The answer, once, when it has arrived (with `wait`: when it has been waited for). None when nothing was
+/// asked.
+std::optional<Pick> poll(Picker& picker, bool wait = false);
+
+}  // namespace tetpbd

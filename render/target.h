@@ -1,0 +1,63 @@
+// An image to draw to without a window, and its way back to the CPU.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "render/handles.h"
+
+namespace tetpbd {
+
+/// 8-bit sRGB with alpha, top row first.
+struct Image {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgba;
+};
+
+/// Colour (sRGB8_ALPHA8) and depth (32F); with samples also the single-sample image they resolve to.
+struct Target {
+  int width = 0, height = 0, samples = 0;
+  Renderbuffer colour, depth, resolved_colour;
+  Framebuffer framebuffer, resolved;
+};
+
+/// Samples 0, 2, 4, 8, lowered to what the driver can do. Throws Error for sizes it cannot do.
+Target make_target(int width, int height, int samples = 0);
+/// The framebuffer to read from, after resolving samples where there are any.
+GLuint resolve(const Target& target);
+/// Waits for the GPU.
+Image read_rgba(const Target& target);
+/// Copies the image to another framebuffer (0: the window) as it is. The window needs no sRGB format for
+/// this.
+void present(const Target& target, GLuint framebuffer, int x, int y, int width, int height);
+
+/// Frames on their way to the CPU, in order. None of it waits until asked to.
+class ReadBack {
+ public:
+  ReadBack() = default;
+  ReadBack(ReadBack&&) noexcept = default;
+  ReadBack& operator=(ReadBack&& other) noexcept {
+    std::swap(free_, other.free_), std::swap(pending_, other.pending_);
+    return *this;
+  }
+  ~ReadBack();
+  /// Starts copying the image. A caller that never polls gets a buffer more for each frame: poll(true) from a
+  /// few frames on.
+  void push(const Target& target);
+  /// The oldest frame if it has arrived; with `wait`, once it has.
+  std::optional<Image> poll(bool wait = false);
+  std::size_t pending() const { return pending_.size(); }
+
+ private:
+  struct Slot {
+    Buffer pixels;
+    int width = 0, height = 0;
+    GLsync fence = nullptr;
+  };
+  std::vector<Slot> free_;
+  std::deque<Slot> pending_;
+};
+
+}  // namespace tetpbd

@@ -1,0 +1,22 @@
+// A vertex of a body straight from the simulation's buffer.
+#include "render/view.glsl"
+layout(location = ATTRIBUTE_HIGH) in vec3 high;
+layout(location = ATTRIBUTE_LOW) in vec3 low;
+layout(location = ATTRIBUTE_NORMAL) in vec3 normal;
+layout(location = ATTRIBUTE_VALUE) in float value;
+layout(location = ATTRIBUTE_VELOCITY) in vec3 velocity;
+layout(location = ATTRIBUTE_REST) in vec4 rest;  // w: body
+
+out Corner {
+  vec3 position;
+  vec3 normal;
+  float value;
+  vec4 rest;
+} corner;
+
+void main() {
+  corner.position = high + low;
+  corner.normal = normal;
+  corner.value = int(view.colour.x) == COLOUR_VELOCITY ? length(velocity) : value;
+  corner.rest = rest;
+}

@@ -1,0 +1,6 @@
+// By bits, since compilers may assume that no NaN exists. Beyond ten thousand kilometres a blown-up body has nothing to
+// show, and its products with a matrix would overflow.
+bool finite(vec3 p) {
+  uvec3 bits = floatBitsToUint(p) & 0x7fffffffu;
+  return all(lessThan(bits, uvec3(0x4b189680u)));  // 1e7
+}

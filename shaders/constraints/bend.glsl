@@ -31,7 +31,10 @@ Constraint4 bend(vec3 x[4], real rest) {
   vec3 a = n0 / aa;
   vec3 b = n1 / bb;
   vec3 u = e / l;
-  c.C = clamp(resolved(turn, pi), real(-1), real(1));
+  // A normal is a difference of products: its direction is known to rounding times |side| |side| / |normal|.
+  vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
+  real noise = pi + real(2) * sqrt(dot(a2, a2) * dot(a3, a3) / aa) + real(2) * sqrt(dot(b2, b2) * dot(b3, b3) / bb);
+  c.C = clamp(resolved(turn, noise), real(-1), real(1));
   c.gradient[0] = -l * a;
   c.gradient[1] = -l * b;
   c.gradient[2] = -a * dot(x[0] - x[3], u) - b * dot(x[1] - x[3], u);

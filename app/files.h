@@ -1,0 +1,43 @@
+// Files that are whole or not there: written under a temporary name, then renamed.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "render/target.h"
+#include "sim/tet_mesh.h"
+
+namespace tetpbd {
+
+/// Makes the folder and checks that it can be written to.
+void make_output_folder(const std::filesystem::path& folder);
+void write_file(const std::filesystem::path& file, const std::string& content);
+void write_png(const std::filesystem::path& file, const Image& image);
+/// numpy arrays: float32 N x 3, uint32 T x 4.
+void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);
+void write_npy(const std::filesystem::path& file, const std::vector<Tet>& rows);
+
+/// Frames piped into ffmpeg; the file appears under its name when close() has succeeded.
+class Video {
+ public:
+  Video(const std::filesystem::path& file, int width, int height, int frames_per_second);
+  ~Video();
+  Video(const Video&) = delete;
+  Video& operator=(const Video&) = delete;
+  void add(const Image& frame);
+  void close();
+
+ private:
+  void finish();
+  std::filesystem::path file_, temporary_, log_;
+  int width_, height_, pipe_ = -1;
+  pid_t child_ = -1;
+};
+
+}  // namespace tetpbd

@@ -1,0 +1,144 @@
+#include "app/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace tetpbd {
+
+using nlohmann::ordered_json;
+
+Percentiles percentiles(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double part) { return values[std::size_t(std::lround(part * double(values.size() - 1)))]; };
+  return {at(0.5), at(0.05), at(0.95)};
+}
+
+namespace {
+
+// Nothing non-finite is written as a number.
+ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+
+ordered_json vector(const glm::dvec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
+
+ordered_json times(const std::vector<double>& ms) {
+  if (ms.empty()) return nullptr;
+  const Percentiles p = percentiles(ms);
+  return {{"median", number(p.median)}, {"p05", number(p.p05)}, {"p95", number(p.p95)}};
+}
+
+ordered_json settings_json(const Scene& scene, const Settings& settings) {
+  ordered_json result;
+  for (const Parameter& row : parameters())
+    std::visit([&](auto member) { result[row.name] = settings.*member; }, row.member);
+  ordered_json bodies = ordered_json::array();
+  for (const BodyDescription& body : scene.bodies) {
+    ordered_json item = {{"name", body.name}};
+    if (body.block)
+      item["block"] = {{"size", vector(body.block->size)}, {"cells", {body.block->cells.x, body.block->cells.y, body.block->cells.z}}};
+    else
+      item["mesh"] = body.mesh.string(), item["tetgen"] = body.tetgen;
+    item["height"] = body.height;
+    item["position"] = vector(body.position);
+    item["rotation"] = vector(body.rotation);
+    item["density"] = body.density;
+    item["velocity"] = vector(body.velocity);
+    item["spin"] = vector(body.spin);
+    item["deform"] = body.deform;
+    bodies.push_back(item);
+  }
+  result["bodies"] = bodies;
+  return result;
+}
+
+}  // namespace
+
+std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device, const MeshReport& mesh,
+                            const Timing& timing, const RunErrors& errors, std::uint64_t hash) {
+  ordered_json j;
+  j["scene"] = scene.name;
+  j["settings"] = settings_json(scene, sim.settings);
+  j["mesh"] = {{"vertices", mesh.vertices}, {"surface_triangles", mesh.surface_triangles}, {"edges", mesh.edges},
+               {"bends", mesh.bends}, {"tets", mesh.tets}, {"volume", mesh.volume},
+               {"euler_characteristic", mesh.euler_characteristic}};
+  j["device"] = {{"gl_renderer", device.renderer}, {"gl_vendor", device.vendor}, {"gl_version", device.version},
+                 {"software", device.software}};
+  j["timing"] = {{"steps", sim.steps}, {"gpu_ms_per_step", times(timing.gpu_ms)}, {"wall_ms_per_step", times(timing.wall_ms)},
+                 {"fps", timing.total_s > 0 ? number(double(sim.steps) / timing.total_s) : ordered_json(nullptr)}};
+  const Measurement last = errors.last.value_or(Measurement{});
+  j["error"] = {{"max_volume_loss_percent", number(errors.max_volume_loss_percent)},
+                {"final_volume_error_percent", number(last.volume_error_percent)},
+                {"tet_volume_rms", number(last.tet_volume_rms)},
+                {"tet_volume_max", number(last.tet_volume_max)},
+                {"inverted_tets", std::isfinite(last.inverted_tets) ? ordered_json(long(last.inverted_tets)) : ordered_json(nullptr)},
+                {"stretch_rms", number(last.stretch_rms)},
+                {"stretch_max", number(last.stretch_max)},
+                {"bend_rms_rad", number(last.bend_rms_rad)},
+                {"rigid_distance", number(last.rigid_distance)}};
+  j["momentum"] = {{"linear_drift", number(errors.linear_drift)}, {"angular_drift", number(errors.angular_drift)},
+                   {"linear", vector(last.momentum)}, {"angular", vector(last.angular_momentum)}};
+  j["energy"] = {{"start", number(errors.start_energy)}, {"final", number(last.energy())}, {"max", number(errors.max_energy)},
+                 {"final_kinetic", number(last.kinetic)}, {"final_potential", number(last.potential)}};
+  j["finite"] = errors.finite;
+  j["state_hash"] = fmt::format("{:016x}", hash);
+  return j.dump(2) + "\n";
+}
+
+namespace {
+
+struct Column {
+  const char* name;
+  double (*value)(const Measurement&, const RunErrors&);
+};
+
+const std::vector<Column>& columns() {
+  using M = Measurement;
+  using E = RunErrors;
+  static const std::vector<Column> rows = {
+      {"step", [](const M& m, const E&) { return double(m.step); }},
+      {"time", [](const M& m, const E&) { return m.time; }},
+      {"volume_error_percent", [](const M& m, const E&) { return m.volume_error_percent; }},
+      {"max_volume_loss_percent", [](const M&, const E& e) { return e.max_volume_loss_percent; }},
+      {"tet_volume_rms", [](const M& m, const E&) { return m.tet_volume_rms; }},
+      {"tet_volume_max", [](const M& m, const E&) { return m.tet_volume_max; }},
+      {"inverted_tets", [](const M& m, const E&) { return m.inverted_tets; }},
+      {"stretch_rms", [](const M& m, const E&) { return m.stretch_rms; }},
+      {"stretch_max", [](const M& m, const E&) { return m.stretch_max; }},
+      {"bend_rms_rad", [](const M& m, const E&) { return m.bend_rms_rad; }},
+      {"rigid_distance", [](const M& m, const E&) { return m.rigid_distance; }},
+      {"linear_drift", [](const M&, const E& e) { return e.linear_drift; }},
+      {"angular_drift", [](const M&, const E& e) { return e.angular_drift; }},
+      {"kinetic_energy", [](const M& m, const E&) { return m.kinetic; }},
+      {"potential_energy", [](const M& m, const E&) { return m.potential; }},
+      {"energy", [](const M& m, const E&) { return m.energy(); }},
+      {"centre_x", [](const M& m, const E&) { return m.centre.x; }},
+      {"centre_y", [](const M& m, const E&) { return m.centre.y; }},
+      {"centre_z", [](const M& m, const E&) { return m.centre.z; }},
+      {"contacts", [](const M& m, const E&) { return m.contacts; }},
+      {"finite", [](const M& m, const E&) { return m.finite() ? 1.0 : 0.0; }},
+  };
+  return rows;
+}
+
+}  // namespace
+
+std::string csv_header() {
+  std::string text;
+  for (const Column& column : columns()) text += (text.empty() ? "" : ",") + std::string(column.name);
+  return text + "\n";
+}
+
+std::string csv_row(const Measurement& measurement, const RunErrors& so_far) {
+  std::string text;
+  for (const Column& column : columns()) {
+    const double value = column.value(measurement, so_far);
+    if (!text.empty()) text += ',';
+    if (std::isfinite(value)) text += fmt::format("{:.9g}", value);  // an empty field where it is no number
+  }
+  return text + "\n";
+}
+
+}  // namespace tetpbd

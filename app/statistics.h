@@ -1,0 +1,26 @@
+// stats.json and stats.csv: names that scripts rely on (docs/statistics.md).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/scene.h"
+#include "sim/metrics.h"
+
+namespace tetpbd {
+
+/// Times of the steps of a run, in milliseconds.
+struct Timing {
+  std::vector<double> gpu_ms, wall_ms;
+  double total_s = 0;  ///< of all steps, without what came between them
+};
+
+struct Percentiles { double median = 0, p05 = 0, p95 = 0; };
+Percentiles percentiles(std::vector<double> values);
+
+std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device, const MeshReport& mesh,
+                            const Timing& timing, const RunErrors& errors, std::uint64_t hash);
+std::string csv_header();
+std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
+
+}  // namespace tetpbd

@@ -5,15 +5,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <map>
 
 #include "render/layout.h"
-#include "render/picking.h"
-#include "render/renderer.h"
-#include "render/target.h"
 #include "sim/error.h"
-#include "sim/gl_context.h"
-#include "sim/layout.h"
+#include "tests/render_stage.h"
 
 namespace colour_maps {
 using glm::clamp, glm::mix, glm::vec3, std::abs, std::cos, std::sin;
@@ -24,116 +19,6 @@ using namespace tetpbd;
 
 namespace {
 
-constexpr int width = 240, height = 180;
-
-// A block of cells, each cut into the six tets around its diagonal, and its boundary.
-TetMesh cut_block(const glm::dvec3& size, int n, const glm::dvec3& centre = glm::dvec3(0.0)) {
-  TetMesh mesh;
-  const auto index = [&](const glm::ivec3& c) {
-    return std::uint32_t((c.z * (n + 1) + c.y) * (n + 1) + c.x);
-  };
-  for (int z = 0; z <= n; ++z)
-    for (int y = 0; y <= n; ++y)
-      for (int x = 0; x <= n; ++x)
-        mesh.positions.push_back(centre + size * (glm::dvec3(x, y, z) / double(n) - 0.5));
-  const int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-  for (int cell = 0; cell < n * n * n; ++cell)
-    for (int k = 0; k < 6; ++k) {
-      glm::ivec3 c{cell % n, cell / n % n, cell / n / n};
-      Tet tet{index(c)};
-      for (std::size_t i = 0; i < 3; ++i) ++c[orders[k][i]], tet[i + 1] = index(c);
-      if (k >= 3) std::swap(tet[2], tet[3]);
-      mesh.tets.push_back(tet);
-    }
-  std::map<Triangle, Triangle> faces;
-  for (const auto& [a, b, c, d] : mesh.tets)
-    for (const Triangle& face :
-         {Triangle{a, c, b}, Triangle{a, b, d}, Triangle{a, d, c}, Triangle{b, c, d}}) {
-      Triangle key = face;
-      std::sort(key.begin(), key.end());
-      if (!faces.emplace(key, face).second) faces.erase(key);
-    }
-  for (const auto& [key, face] : faces) mesh.surface.push_back(face);
-  return mesh;
-}
-
-std::vector<Position> positions_of(const TetMesh& mesh, double scale = 1.0,
-                                   const glm::dvec3& shift = glm::dvec3(0.0)) {
-  std::vector<Position> positions;
-  for (const glm::dvec3& p : mesh.positions) {
-    Position position{};
-    position.high = glm::vec3(p * scale + shift);
-    position.low = glm::vec3(p * scale + shift - glm::dvec3(position.high));
-    positions.push_back(position);
-  }
-  return positions;
-}
-
-// One body, a target and a frame that looks at it.
-struct Stage {
-  HeadlessContext context{-1, true};
-  TetMesh mesh;
-  Buffer positions;
-  Renderer renderer;
-  Target target;
-  Frame frame;
-  explicit Stage(TetMesh body = cut_block(glm::dvec3(1.0), 3), int samples = 0) : mesh(std::move(body)) {
-    positions = Buffer("positions", positions_of(mesh));
-    renderer = make_renderer(mesh);
-    target = make_target(width, height, samples);
-    frame.positions = positions.id();
-    frame.viewport = {0, 0, width, height};
-    frame.target = target.framebuffer.id();
-    frame.camera.distance = 4;
-    frame.options.shadow = false;
-  }
-  void move(double scale, const glm::dvec3& shift = glm::dvec3(0.0)) {
-    const auto moved = positions_of(mesh, scale, shift);
-    positions.write(0, moved.size() * sizeof(Position), moved.data());
-  }
-  Image image() {
-    draw(renderer, frame);
-    return read_rgba(target);
-  }
-  // The same without the body: every vertex is dropped.
-  Image empty() {
-    const auto kept = positions.read_all<Position>();
-    auto gone = kept;
-    for (Position& p : gone) p.high = glm::vec3(std::numeric_limits<float>::quiet_NaN());
-    positions.write(0, positions.bytes(), gone.data());
-    Image result = image();
-    positions.write(0, positions.bytes(), kept.data());
-    return result;
-  }
-};
-
-glm::vec3 pixel(const Image& image, int x, int y) {
-  const std::size_t i = (std::size_t(y) * std::size_t(image.width) + std::size_t(x)) * 4;
-  return {float(image.rgba[i]), float(image.rgba[i + 1]), float(image.rgba[i + 2])};
-}
-
-glm::vec3 pixel(const Image& image, const glm::vec3& at) { return pixel(image, int(at.x), int(at.y)); }
-
-float brightness(const glm::vec3& colour) { return (colour.x + colour.y + colour.z) / 3.0f; }
-
-// Bounds of, and number of, the pixels in which two images differ by more than `least` of 255.
-struct Difference {
-  int count = 0;
-  glm::ivec2 low{1 << 20}, high{-1};
-};
-Difference difference(const Image& a, const Image& b, float least = 6) {
-  Difference result;
-  for (int y = 0; y < a.height; ++y)
-    for (int x = 0; x < a.width; ++x) {
-      const glm::vec3 d = glm::abs(pixel(a, x, y) - pixel(b, x, y));
-      if (std::max({d.x, d.y, d.z}) < least) continue;
-      ++result.count;
-      result.low = glm::min(result.low, glm::ivec2(x, y));
-      result.high = glm::max(result.high, glm::ivec2(x, y));
-    }
-  return result;
-}
-
 float encoded(float linear) {
   return 255.0f * (linear <= 0.0031308f ? linear * 12.92f : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f);
 }
@@ -143,43 +28,6 @@ bool is_warm(const glm::vec3& c) { return c.x > 1.6f * c.z; }
 bool is_cold(const glm::vec3& c) { return c.z > 1.6f * c.x; }
 
 }  // namespace
-
-TEST_CASE("camera: pixels, rays and framing agree") {
-  Camera camera;
-  camera.target = {1, 2, 3};
-  orbit(camera, 40, 20);
-  CHECK(glm::length(eye(camera) - camera.target) == doctest::Approx(camera.distance));
-  const glm::vec3 point{1.3f, 2.2f, 2.9f};
-  const glm::vec3 seen = project(camera, point, width, height);
-  const Ray ray = pixel_ray(camera, seen.x, seen.y, width, height);
-  const glm::vec3 towards = point - ray.origin;
-  CHECK(glm::length(glm::cross(ray.direction, towards)) < 1e-4f);
-  CHECK(glm::length(ray.direction) == doctest::Approx(1.0f));
-
-  const glm::vec3 middle = project(camera, camera.target, width, height);
-  CHECK(middle.x == doctest::Approx(width * 0.5));
-  CHECK(middle.y == doctest::Approx(height * 0.5));
-  const glm::vec3 before = camera.target;
-  pan(camera, 30, -12, height);
-  const glm::vec3 panned = project(camera, before, width, height);
-  CHECK(panned.x == doctest::Approx(width * 0.5 + 30).epsilon(1e-3));
-  CHECK(panned.y == doctest::Approx(height * 0.5 - 12).epsilon(1e-3));
-
-  const glm::vec3 low{-1, 0, -4}, high{3, 1, 0.5f};
-  for (float aspect : {0.5f, 1.0f, 2.5f}) {
-    frame_box(camera, low, high, aspect, 1.1f);
-    const int w = int(200 * aspect), h = 200;
-    float reach = 0;
-    for (int i = 0; i < 8; ++i) {
-      const glm::vec3 p =
-          project(camera, {i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z}, w, h);
-      reach = std::max({reach, std::abs(p.x / float(w) - 0.5f) * 2, std::abs(p.y / float(h) - 0.5f) * 2});
-    }
-    CHECK(reach == doctest::Approx(1 / 1.1f).epsilon(0.02));
-  }
-  orbit(camera, 0, 500);
-  CHECK(camera.elevation == 89.0f);
-}
 
 TEST_CASE("render: a block covers the pixels that the camera predicts") {
   Stage stage;
@@ -368,7 +216,7 @@ TEST_CASE("render: velocity colours, and the legend's bar is the colour map") {
     const auto expect = [&](int y, float value, float low, float high) {
       const glm::vec3 want = colour_maps::scale_colour(int(colour), value, low, high);
       const glm::vec3 have = pixel(with, x, y);
-      for (int i = 0; i < 3; ++i) CHECK(std::abs(have[i] - encoded(want[i])) < 14);
+      for (int i = 0; i < 3; ++i) CHECK(std::abs(have[i] - encoded(want[i])) < 20);
     };
     const float low = colour == Colour::velocity ? 0.0f : -0.2f,
                 high = colour == Colour::velocity ? 5.0f : 0.2f;
@@ -507,48 +355,6 @@ TEST_CASE("render: frames come back without waiting, in order, the same") {
   const Target copy = make_target(width, height);
   present(stage.target, copy.framebuffer.id(), 0, 0, width, height);
   CHECK(read_rgba(copy).rgba == expected.back().rgba);
-  CHECK(gl_error_count() == 0);
-}
-
-TEST_CASE("picking: the first triangle along a ray and its nearest corner") {
-  Stage stage;
-  Picker picker = make_picker(stage.mesh);
-  CHECK_FALSE(poll(picker, true));
-  stage.move(1.0, {0.25, 0, 0});
-  const auto positions = stage.positions.read_all<Position>();
-  const auto x = [&](std::uint32_t v) { return positions[v].high; };
-  int hits = 0;
-  for (int py = 4; py < height; py += 24)
-    for (int px = 3; px < width; px += 27) {
-      const Ray ray = pixel_ray(stage.frame.camera, float(px), float(py), width, height);
-      request(picker, stage.positions.id(), ray);
-      const auto pick = poll(picker, true);
-      REQUIRE(pick);
-      // The reference: the planes of the block in double precision.
-      const glm::dvec3 o(ray.origin), d(ray.direction), low{-0.25, -0.5, -0.5}, high{0.75, 0.5, 0.5};
-      const glm::dvec3 a = (low - o) / d, b = (high - o) / d;
-      const double enter = std::max({std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)});
-      const double leave = std::min({std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)});
-      CHECK(pick->hit == (enter < leave));
-      if (!pick->hit) continue;
-      ++hits;
-      CHECK(pick->distance == doctest::Approx(enter).epsilon(1e-5));
-      const Triangle& triangle = stage.mesh.surface[pick->triangle];
-      const glm::vec3 point = ray.origin + pick->distance * ray.direction;
-      const glm::vec3 normal =
-          glm::normalize(glm::cross(x(triangle[1]) - x(triangle[0]), x(triangle[2]) - x(triangle[0])));
-      CHECK(std::abs(glm::dot(normal, point - x(triangle[0]))) < 1e-5f);
-      CHECK(glm::dot(normal, ray.direction) < 0);
-      CHECK(std::count(triangle.begin(), triangle.end(), pick->vertex) == 1);
-      for (std::uint32_t v : triangle)
-        CHECK(glm::distance(x(pick->vertex), point) <= glm::distance(x(v), point) + 1e-6f);
-    }
-  CHECK(hits > 5);
-  // Behind the eye there is nothing, and a question that was replaced is not answered.
-  request(picker, stage.positions.id(), {{0, 0, 4}, {0, 0, -1}});
-  request(picker, stage.positions.id(), {{0, 0, 4}, {0, 0, 1}});
-  CHECK_FALSE(poll(picker, true)->hit);
-  CHECK_FALSE(poll(picker, true));
   CHECK(gl_error_count() == 0);
 }
 

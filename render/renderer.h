@@ -39,7 +39,7 @@ struct ViewOptions {
   double cut =
       1;  ///< tets: only those whose centre at rest is below this part of the rest shape's extent ...
   int cut_axis = 0;                            ///< ... along x, y, z (0, 1, 2); 1 cuts nothing
-  glm::vec3 body_colour{0.79f, 0.46f, 0.34f};  ///< sRGB; further bodies turn its hue
+  glm::vec3 body_colour{0.74f, 0.50f, 0.41f};  ///< sRGB; further bodies turn its hue
   ColourRange volume{-0.2, 0.2};               ///< V/V0 - 1
   ColourRange stretch{-0.2, 0.2};              ///< L/L0 - 1
   ColourRange velocity{0, 5};                  ///< m/s

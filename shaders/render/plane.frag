@@ -23,8 +23,8 @@ void main() {
   float fade = 1.0 - smoothstep(0.25, 1.0, distance(position, middle) / extent);
   bool behind = dot(plane.xyz, view.eye.xyz) < plane.w;
   vec3 albedo = vec3(0.700, 0.700, 0.695);
-  albedo *= 1.0 - grid * max(0.16 * lines(across, 0.1, 1.0), 0.32 * lines(across, 1.0, 1.5));
+  albedo *= 1.0 - grid * max(0.10 * lines(across, 0.1, 1.0), 0.26 * lines(across, 1.0, 1.5));
   float lit = behind ? 1.0 : plane_shadow(position);
-  vec3 colour = albedo * mix(vec3(0.54, 0.55, 0.58), vec3(1.06), lit);
+  vec3 colour = albedo * mix(vec3(0.575, 0.585, 0.605), vec3(1.06), lit);
   result = vec4(colour, fade * opacity);
 }

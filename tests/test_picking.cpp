@@ -1,0 +1,89 @@
+// The camera's arithmetic, and rays through its pixels that meet the surface.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/picking.h"
+#include "tests/render_stage.h"
+
+using namespace tetpbd;
+
+TEST_CASE("camera: pixels, rays and framing agree") {
+  Camera camera;
+  camera.target = {1, 2, 3};
+  orbit(camera, 40, 20);
+  CHECK(glm::length(eye(camera) - camera.target) == doctest::Approx(camera.distance));
+  const glm::vec3 point{1.3f, 2.2f, 2.9f};
+  const glm::vec3 seen = project(camera, point, width, height);
+  const Ray ray = pixel_ray(camera, seen.x, seen.y, width, height);
+  const glm::vec3 towards = point - ray.origin;
+  CHECK(glm::length(glm::cross(ray.direction, towards)) < 1e-4f);
+  CHECK(glm::length(ray.direction) == doctest::Approx(1.0f));
+
+  const glm::vec3 middle = project(camera, camera.target, width, height);
+  CHECK(middle.x == doctest::Approx(width * 0.5));
+  CHECK(middle.y == doctest::Approx(height * 0.5));
+  const glm::vec3 before = camera.target;
+  pan(camera, 30, -12, height);
+  const glm::vec3 panned = project(camera, before, width, height);
+  CHECK(panned.x == doctest::Approx(width * 0.5 + 30).epsilon(1e-3));
+  CHECK(panned.y == doctest::Approx(height * 0.5 - 12).epsilon(1e-3));
+
+  const glm::vec3 low{-1, 0, -4}, high{3, 1, 0.5f};
+  for (float aspect : {0.5f, 1.0f, 2.5f}) {
+    frame_box(camera, low, high, aspect, 1.1f);
+    const int w = int(200 * aspect), h = 200;
+    float reach = 0;
+    for (int i = 0; i < 8; ++i) {
+      const glm::vec3 p =
+          project(camera, {i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z}, w, h);
+      reach = std::max({reach, std::abs(p.x / float(w) - 0.5f) * 2, std::abs(p.y / float(h) - 0.5f) * 2});
+    }
+    CHECK(reach == doctest::Approx(1 / 1.1f).epsilon(0.02));
+  }
+  orbit(camera, 0, 500);
+  CHECK(camera.elevation == 89.0f);
+}
+
+TEST_CASE("picking: the first triangle along a ray and its nearest corner") {
+  Stage stage;
+  Picker picker = make_picker(stage.mesh);
+  CHECK_FALSE(poll(picker, true));
+  stage.move(1.0, {0.25, 0, 0});
+  const auto positions = stage.positions.read_all<Position>();
+  const auto x = [&](std::uint32_t v) { return positions[v].high; };
+  int hits = 0;
+  for (int py = 4; py < height; py += 24)
+    for (int px = 3; px < width; px += 27) {
+      const Ray ray = pixel_ray(stage.frame.camera, float(px), float(py), width, height);
+      request(picker, stage.positions.id(), ray);
+      const auto pick = poll(picker, true);
+      REQUIRE(pick);
+      // The reference: the planes of the block in double precision.
+      const glm::dvec3 o(ray.origin), d(ray.direction), low{-0.25, -0.5, -0.5}, high{0.75, 0.5, 0.5};
+      const glm::dvec3 a = (low - o) / d, b = (high - o) / d;
+      const double enter = std::max({std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)});
+      const double leave = std::min({std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)});
+      CHECK(pick->hit == (enter < leave));
+      if (!pick->hit) continue;
+      ++hits;
+      CHECK(pick->distance == doctest::Approx(enter).epsilon(1e-5));
+      const Triangle& triangle = stage.mesh.surface[pick->triangle];
+      const glm::vec3 point = ray.origin + pick->distance * ray.direction;
+      const glm::vec3 normal =
+          glm::normalize(glm::cross(x(triangle[1]) - x(triangle[0]), x(triangle[2]) - x(triangle[0])));
+      CHECK(std::abs(glm::dot(normal, point - x(triangle[0]))) < 1e-5f);
+      CHECK(glm::dot(normal, ray.direction) < 0);
+      CHECK(std::count(triangle.begin(), triangle.end(), pick->vertex) == 1);
+      for (std::uint32_t v : triangle)
+        CHECK(glm::distance(x(pick->vertex), point) <= glm::distance(x(v), point) + 1e-6f);
+    }
+  CHECK(hits > 5);
+  // Behind the eye there is nothing, and a question that was replaced is not answered.
+  request(picker, stage.positions.id(), {{0, 0, 4}, {0, 0, -1}});
+  request(picker, stage.positions.id(), {{0, 0, 4}, {0, 0, 1}});
+  CHECK_FALSE(poll(picker, true)->hit);
+  CHECK_FALSE(poll(picker, true));
+  CHECK(gl_error_count() == 0);
+}

@@ -1,0 +1,376 @@
+// What the renderer draws, by pixels of small images on whatever EGL offers.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+#include "render/layout.h"
+#include "sim/error.h"
+#include "tests/render_stage.h"
+
+namespace colour_maps {
+using glm::clamp, glm::mix, glm::vec3, std::abs, std::cos, std::sin;
+#include "shaders/render/colour.glsl"
+}  // namespace colour_maps
+
+using namespace tetpbd;
+
+namespace {
+
+float encoded(float linear) {
+  return 255.0f * (linear <= 0.0031308f ? linear * 12.92f : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f);
+}
+
+// Red over blue of what a map gives, in the image's codes; lighting changes both alike, more or less.
+bool is_warm(const glm::vec3& c) { return c.x > 1.6f * c.z; }
+bool is_cold(const glm::vec3& c) { return c.z > 1.6f * c.x; }
+
+}  // namespace
+
+TEST_CASE("render: a block covers the pixels that the camera predicts") {
+  Stage stage;
+  stage.move(0.8, {0.3, 0.2, 0});
+  const Image empty = stage.empty(), image = stage.image();
+  glm::vec2 low{1e9f}, high{-1e9f};
+  for (const Position& p : stage.positions.read_all<Position>()) {
+    const glm::vec3 seen = project(stage.frame.camera, p.high, width, height);
+    low = glm::min(low, glm::vec2(seen));
+    high = glm::max(high, glm::vec2(seen));
+  }
+  const Difference body = difference(image, empty);
+  CHECK(std::abs(float(body.low.x) - low.x) < 2.5f);
+  CHECK(std::abs(float(body.low.y) - low.y) < 2.5f);
+  CHECK(std::abs(float(body.high.x + 1) - high.x) < 2.5f);
+  CHECK(std::abs(float(body.high.y + 1) - high.y) < 2.5f);
+  // Upright and lit from above: the block is moved up, and the background is lighter at the bottom.
+  CHECK(brightness(pixel(image, 2, height - 3)) > brightness(pixel(image, 2, 3)) + 5);
+  CHECK(image.rgba[3] == 255);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: the lit top is brighter than the side turned away") {
+  Stage stage;
+  stage.frame.options.smooth_normals = false;
+  stage.frame.camera.azimuth = -130;  // the light comes from azimuth 52
+  stage.frame.camera.elevation = 35;
+  for (bool shadow : {false, true}) {
+    stage.frame.options.shadow = shadow;
+    const Image image = stage.image();
+    const float top = brightness(pixel(image, project(stage.frame.camera, {0, 0.5f, 0}, width, height)));
+    const float side = brightness(pixel(image, project(stage.frame.camera, {-0.5f, 0, 0}, width, height)));
+    CHECK(top > side + 35);
+    // No acne: the lit top is even.
+    for (float x : {-0.4f, -0.2f, 0.0f, 0.2f, 0.4f})
+      for (float z : {-0.4f, 0.0f, 0.4f}) {
+        const float here = brightness(pixel(image, project(stage.frame.camera, {x, 0.5f, z}, width, height)));
+        CHECK(std::abs(here - top) < 12);
+      }
+  }
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: a shadow falls on the ground away from the light, and only there") {
+  Stage stage;
+  stage.move(0.5, {0, 0.6, 0});
+  stage.frame.ground = 0.0f;
+  stage.frame.options.grid = false;
+  stage.frame.camera.azimuth = 130;  // the light comes from azimuth 52
+  stage.frame.camera.elevation = 50;
+  stage.frame.camera.distance = 5;
+  const Image lit = stage.image();
+  stage.frame.options.shadow = true;
+  const Image shadowed = stage.image();
+  const auto darker = [&](const glm::vec3& p) {
+    const glm::vec3 at = project(stage.frame.camera, p, width, height);
+    return brightness(pixel(lit, at)) - brightness(pixel(shadowed, at));
+  };
+  const glm::vec3 away = -glm::vec3(0.4558f, 0, 0.3500f) / 0.8184f * 0.6f;  // where the block's centre falls
+  CHECK(darker(away) > 25);
+  CHECK(std::abs(darker(-2.0f * away)) < 3);
+  CHECK(std::abs(darker({1.0f, 0, -1.0f})) < 3);
+  // Seen from below, the ground does not hide the block.
+  stage.frame.camera.elevation = -40;
+  const Image below = stage.image();
+  CHECK(difference(below, stage.empty()).count > 300);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: the grid has lines where metres are") {
+  Stage stage;
+  stage.frame.ground = -0.5f;
+  stage.frame.camera.elevation = 70;
+  const Image with = stage.image();
+  stage.frame.options.grid = false;
+  const Image without = stage.image();
+  const glm::vec3 on = project(stage.frame.camera, {1.0f, -0.5f, 0.25f}, width, height);
+  float darkest = 0;
+  for (int dx = -1; dx <= 1; ++dx)
+    darkest = std::max(darkest, brightness(pixel(without, int(on.x) + dx, int(on.y))) -
+                                    brightness(pixel(with, int(on.x) + dx, int(on.y))));
+  CHECK(darkest > 8);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: wire shows edges, tets show gaps, flat differs from smooth") {
+  Stage stage;
+  const Image smooth = stage.image();
+  CHECK_FALSE(stage.renderer.tets);  // only what is drawn exists
+  CHECK_FALSE(stage.renderer.shadow.depth);
+  CHECK_FALSE(stage.renderer.volume_errors);
+  stage.frame.options.smooth_normals = false;
+  const Image flat = stage.image(), empty = stage.empty();
+  CHECK(difference(smooth, flat).count > 500);
+  const int solid = difference(flat, empty).count;
+
+  stage.frame.options.look = Look::wire;
+  const Image wire = stage.image();
+  const auto& camera = stage.frame.camera;
+  // The middle of a face of a cell's edge, against the middle of a triangle.
+  const float edge = brightness(pixel(wire, project(camera, {1.0f / 6, 0.0f, 0.5f}, width, height)));
+  const float face = brightness(pixel(wire, project(camera, {0.05f, 0.05f, 0.5f}, width, height)));
+  const float face2 = brightness(pixel(wire, project(camera, {-0.06f, 0.06f, 0.5f}, width, height)));
+  CHECK(edge < std::max(face, face2) - 30);
+
+  stage.frame.options.look = Look::tets;
+  stage.frame.options.shrink = 0.5;
+  const Image tets = stage.image();
+  CHECK(difference(tets, flat).count > solid / 4);
+  CHECK(difference(tets, empty).count < solid);
+  stage.frame.options.cut_axis = 0;
+  stage.frame.options.cut = 0.5;
+  const int half = difference(stage.image(), empty).count;
+  CHECK(half < difference(tets, empty).count);
+  CHECK(half > 0);
+  stage.frame.options.cut = -0.1;
+  CHECK(difference(stage.image(), empty).count == 0);
+  stage.frame.options.cut = 1;
+  stage.frame.options.explode = 0.5;
+  const Difference exploded = difference(stage.image(), empty), together = difference(flat, empty);
+  CHECK(exploded.high.x - exploded.low.x > together.high.x - together.low.x);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: volume and stretch errors reach the ends of their scales") {
+  Stage stage;
+  const glm::vec3 middle{width * 0.5f, height * 0.5f, 0};
+  for (Look look : {Look::surface, Look::tets}) {
+    stage.frame.options.look = look;
+    stage.frame.options.shrink = 0;
+    stage.frame.options.legend = false;
+    for (Colour colour : {Colour::volume, Colour::stretch}) {
+      stage.frame.options.colour = colour;
+      stage.move(1.3);
+      CHECK(is_warm(pixel(stage.image(), middle)));
+      stage.move(0.7);
+      CHECK(is_cold(pixel(stage.image(), middle)));
+      stage.move(1.0);
+      const glm::vec3 rest = pixel(stage.image(), middle);
+      CHECK_FALSE(is_warm(rest));
+      CHECK_FALSE(is_cold(rest));
+    }
+  }
+  // The numbers behind the colours: 1.1^3 - 1 and 0.1.
+  stage.frame.options.look = Look::surface;
+  stage.move(1.1);
+  stage.frame.options.colour = Colour::volume;
+  stage.image();
+  stage.frame.options.colour = Colour::stretch;
+  stage.image();
+  const auto volume = stage.renderer.volume_errors.values.read_all<float>();
+  const auto stretch = stage.renderer.stretch_errors.values.read_all<float>();
+  for (const Triangle& triangle : stage.mesh.surface)
+    for (std::uint32_t v : triangle) {
+      CHECK(volume[v] == doctest::Approx(0.331).epsilon(1e-4));
+      CHECK(stretch[v] == doctest::Approx(0.1).epsilon(1e-4));
+    }
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: velocity colours, and the legend's bar is the colour map") {
+  Stage stage;
+  std::vector<Velocity> velocities(stage.mesh.positions.size());
+  for (Velocity& v : velocities) v.high = {0, -5, 0};
+  const Buffer buffer("velocities", velocities);
+  stage.frame.velocities = buffer.id();
+  stage.frame.options.legend = false;
+  stage.frame.options.colour = Colour::velocity;
+  const Image plain = stage.image();
+  const glm::vec3 fast = pixel(plain, width / 2, height / 2);
+  CHECK(fast.x > 1.6f * fast.z);  // yellow
+  CHECK(fast.y > 1.6f * fast.z);
+  CHECK_FALSE(stage.renderer.legend);
+  for (Colour colour : {Colour::velocity, Colour::volume}) {
+    stage.frame.options.colour = colour;
+    stage.frame.options.legend = false;
+    const Image without = stage.image();
+    stage.frame.options.legend = true;
+    const Image with = stage.image();
+    const Difference legend = difference(with, without);
+    CHECK(legend.count > 500);
+    CHECK(legend.low.x > width / 3);
+    CHECK(legend.high.x < width - 10);
+    // Both ends of the bar, which begins 10 pixels inside the panel and ends as far above its lower edge.
+    const int x = legend.low.x + 10 + 5;
+    const auto expect = [&](int y, float value, float low, float high) {
+      const glm::vec3 want = colour_maps::scale_colour(int(colour), value, low, high);
+      const glm::vec3 have = pixel(with, x, y);
+      for (int i = 0; i < 3; ++i) CHECK(std::abs(have[i] - encoded(want[i])) < 20);
+    };
+    const float low = colour == Colour::velocity ? 0.0f : -0.2f,
+                high = colour == Colour::velocity ? 5.0f : 0.2f;
+    const int bottom = legend.high.y - 13, top = bottom - int(0.42 * height) + 1;
+    expect(bottom, low, low, high);
+    expect(top, high, low, high);
+    expect((bottom + top) / 2, 0.5f * (low + high), low, high);
+  }
+  stage.frame.options.colour = Colour::plain;
+  const Image bare = stage.image();
+  stage.frame.caption = "Gauss-Seidel";
+  const Difference caption = difference(stage.image(), bare);
+  CHECK(caption.count > 60);
+  CHECK(caption.high.y < 40);
+  CHECK(caption.low.x < 30);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: colour maps are even") {
+  const auto luminance = [](const glm::vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; };
+  for (int i = 0; i < 20; ++i) {
+    const float t = float(i) / 20, next = t + 0.05f;
+    CHECK(luminance(colour_maps::sequential_colour(t)) < luminance(colour_maps::sequential_colour(next)));
+    for (float sign : {-1.0f, 1.0f})
+      CHECK(luminance(colour_maps::diverging_colour(sign * t)) >
+            luminance(colour_maps::diverging_colour(sign * next)));
+  }
+}
+
+TEST_CASE("render: several bodies have hues of their own, marked vertices dots") {
+  TetMesh two = cut_block(glm::dvec3(0.6), 2, {-0.5, 0, 0});
+  const TetMesh other = cut_block(glm::dvec3(0.6), 2, {0.5, 0, 0});
+  const auto first = std::uint32_t(two.positions.size());
+  two.positions.insert(two.positions.end(), other.positions.begin(), other.positions.end());
+  for (Triangle face : other.surface)
+    two.surface.push_back({face[0] + first, face[1] + first, face[2] + first});
+  for (Tet tet : other.tets)
+    two.tets.push_back({tet[0] + first, tet[1] + first, tet[2] + first, tet[3] + first});
+  Stage stage(two);
+  stage.renderer = make_renderer(two, {{0, first}, {first, first}});
+  stage.frame.camera.azimuth = 0;
+  const Image image = stage.image();
+  const glm::vec3 left = pixel(image, project(stage.frame.camera, {-0.5f, 0, 0.3f}, width, height));
+  const glm::vec3 right = pixel(image, project(stage.frame.camera, {0.5f, 0, 0.3f}, width, height));
+  CHECK(left.x > left.z + 20);
+  CHECK(right.z > right.x + 20);
+  const std::vector<std::uint32_t> grabbed{first - 1};
+  stage.frame.grabbed = grabbed;
+  const Difference dot = difference(stage.image(), image);
+  const glm::vec3 at = project(stage.frame.camera, glm::vec3(two.positions[first - 1]), width, height);
+  CHECK(dot.count > 40);
+  CHECK(dot.count < 200);
+  CHECK(std::abs(float(dot.low.x + dot.high.x) * 0.5f - at.x) < 2);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: samples smooth edges, two viewports share a target") {
+  Stage stage(cut_block(glm::dvec3(1.0), 3), 4);
+  const Image smooth = stage.image();
+  const Target single = make_target(width, height, 0);
+  stage.frame.target = single.framebuffer.id();
+  draw(stage.renderer, stage.frame);
+  const Image hard = read_rgba(single);
+  const Difference edges = difference(smooth, hard);
+  CHECK(stage.target.samples > 0);
+  CHECK(edges.count > 40);
+  CHECK(edges.count < width * height / 10);
+
+  // Left half only: the right one stays as it was.
+  stage.frame.viewport = {0, 0, width / 2, height};
+  stage.frame.camera.azimuth = 80;
+  draw(stage.renderer, stage.frame);
+  CHECK(difference(read_rgba(single), hard).high.x < width / 2);
+  CHECK_THROWS_AS(make_target(0, 10), Error);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: a vertex that is not finite spills nothing") {
+  Stage stage;
+  const Image whole = stage.image(), empty = stage.empty();
+  const Difference body = difference(whole, empty);
+  auto positions = stage.positions.read_all<Position>();
+  for (Look look : {Look::surface, Look::wire, Look::tets})
+    for (float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e30f}) {
+      auto broken = positions;
+      broken.back().high.y = bad;
+      stage.positions.write(0, stage.positions.bytes(), broken.data());
+      stage.frame.options.look = look;
+      stage.frame.options.shadow = true;
+      const std::vector<std::uint32_t> pinned{std::uint32_t(broken.size() - 1)};
+      stage.frame.pinned = pinned;
+      const Difference rest = difference(stage.image(), empty);
+      CHECK(rest.count > body.count / 2);
+      CHECK(rest.low.x >= body.low.x);
+      CHECK(rest.low.y >= body.low.y);
+      CHECK(rest.high.x <= body.high.x);
+      CHECK(rest.high.y <= body.high.y);
+    }
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: drawing twice gives the same bits, shaders reload") {
+  Stage stage;
+  stage.frame.options.shadow = true;
+  stage.frame.ground = -0.5f;
+  const std::vector<glm::vec4> walls{{0, 0, 1, -1.5f}};
+  stage.frame.planes = walls;
+  const Image first = stage.image();
+  CHECK(stage.image().rgba == first.rgba);
+  reload_shaders(stage.renderer);
+  CHECK(stage.image().rgba == first.rgba);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: frames come back without waiting, in order, the same") {
+  Stage stage(cut_block(glm::dvec3(1.0), 2), 2);
+  ReadBack frames;
+  CHECK_FALSE(frames.poll(true));
+  std::vector<Image> expected;
+  for (int i = 0; i < 5; ++i) {
+    stage.frame.camera.azimuth = float(20 * i);
+    draw(stage.renderer, stage.frame);
+    frames.push(stage.target);
+    expected.push_back(read_rgba(stage.target));
+  }
+  CHECK(frames.pending() == 5);
+  for (const Image& image : expected) {
+    const auto arrived = frames.poll(true);
+    REQUIRE(arrived);
+    CHECK(arrived->width == width);
+    CHECK(arrived->rgba == image.rgba);
+  }
+  CHECK_FALSE(frames.poll());
+  // The window's way: as it is, with nothing converted.
+  const Target copy = make_target(width, height);
+  present(stage.target, copy.framebuffer.id(), 0, 0, width, height);
+  CHECK(read_rgba(copy).rgba == expected.back().rgba);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: block layouts are what the shaders see") {
+  Stage stage;
+  stage.frame.options.shadow = true;
+  stage.image();
+  const auto block_bytes = [](const Program& program, const char* name) {
+    const GLuint index = glGetProgramResourceIndex(program.id(), GL_UNIFORM_BLOCK, name);
+    REQUIRE(index != GL_INVALID_INDEX);
+    const GLenum property = GL_BUFFER_DATA_SIZE;
+    GLint bytes = 0;
+    glGetProgramResourceiv(program.id(), GL_UNIFORM_BLOCK, index, 1, &property, 1, nullptr, &bytes);
+    return std::size_t(bytes);
+  };
+  CHECK(block_bytes(stage.renderer.surface, "ViewBlock") == sizeof(View));
+  CHECK(block_bytes(stage.renderer.surface, "LightBlock") == sizeof(Light));
+  CHECK(gl_error_count() == 0);
+}

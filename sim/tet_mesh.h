@@ -4,10 +4,9 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <string>
 #include <vector>
-
-#include <glm/glm.hpp>
 
 namespace tetpbd {
 
@@ -20,44 +19,56 @@ struct SurfaceMesh {
   std::vector<Triangle> triangles;
 };
 
-/// Every tet has positive signed volume ((x1-x0)x(x2-x0)).(x3-x0)/6. `surface` holds the faces that belong to one tet,
-/// outward (counter-clockwise from outside), indexing `positions`.
+/// Every tet has positive signed volume ((x1-x0)x(x2-x0)).(x3-x0)/6. `surface` holds the faces that belong to
+/// one tet, outward (counter-clockwise from outside), indexing `positions`.
 struct TetMesh {
   std::vector<glm::dvec3> positions;
   std::vector<Tet> tets;
   std::vector<Triangle> surface;
 };
 
-/// PLY, OBJ, STL, OFF (through assimp, in a contained child process): vertices welded, polygons triangulated, vertices
-/// without a triangle dropped. Throws Error (status 2) for files that cannot be read or hold no triangle.
+/// PLY, OBJ, STL, OFF (through assimp, in a contained child process): vertices welded, polygons triangulated,
+/// vertices without a triangle dropped. Throws Error (status 2) for files that cannot be read or hold no
+/// triangle.
 SurfaceMesh load_surface(const std::filesystem::path& file);
 
-/// What stands in the way of tetrahedralising; empty strings mean sound.
+/// What stands in the way of tetrahedralising; an empty `defect` means sound.
 struct SurfaceCheck {
-  std::size_t non_finite = 0, degenerate = 0, open_edges = 0, non_manifold_edges = 0, non_manifold_vertices = 0,
-              duplicate_triangles = 0, misoriented_edges = 0, self_intersections = 0;
+  std::size_t bad_indices = 0, non_finite = 0, degenerate = 0, open_edges = 0, non_manifold_edges = 0,
+              non_manifold_vertices = 0, duplicate_triangles = 0, misoriented_edges = 0, flat_components = 0,
+              flipped_triangles = 0;
   int components = 0;
   int euler_characteristic = 0;
-  double volume = 0;     ///< signed
-  std::string defect;    ///< one line: which defect, how many, where (first place); empty when there is none
+  double volume = 0;   ///< of all parts, m^3
+  std::string defect;  ///< which defect; empty when there is none
+  std::string place;   ///< how many and where the first is
+  std::string mend;    ///< what to do about it
 };
-/// Orients triangles consistently and outward where possible, then checks: finite, not flat, closed, 2-manifold.
-/// `self_intersections` is filled by TetGen's own check, which tetrahedralise() runs.
+/// Orients triangles consistently and outward where possible (that is no defect), then checks: indices,
+/// finite, enough triangles, not degenerate, no duplicates, 2-manifold, closed, orientable, not flat. The
+/// first defect found is named. Self-intersections are not looked for here: TetGen finds them, and
+/// tetrahedralise() names them.
 SurfaceCheck check_surface(SurfaceMesh& surface);
 
-/// Runs TetGen with `switches` (for example "pYq1.85o/140") in a contained child process with a time limit in seconds.
-/// Results are cached by content and switches in the user's cache folder. Throws Error naming the defect.
-TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, double time_limit = 600);
+/// Runs TetGen with `switches` (for example "pYq1.85o/140") in a contained child process with a time limit in
+/// seconds. Results are cached by content and switches in the user's cache folder. Throws Error naming the
+/// defect of `source`.
+TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, double time_limit = 600,
+                       const std::string& source = "surface");
 
 /// TetGen .node/.ele (either name given) or Gmsh .msh (ASCII 2.2 and 4.1).
 TetMesh load_tets(const std::filesystem::path& file);
-/// Any supported file: surfaces are checked and tetrahedralised with `switches`, tetrahedra loaded as they are.
+/// Any supported file: surfaces are checked and tetrahedralised with `switches`, tetrahedra loaded as they
+/// are.
 TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches);
 bool is_surface_file(const std::filesystem::path& file);
-/// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Whole or not at all.
+/// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Whole
+/// or not at all.
 void write_mesh(const std::filesystem::path& file, const TetMesh& mesh);
 
-/// Orients every tet, finds the boundary; throws Error for indices out of range, repeated vertices, no tet at all.
+/// Orients every tet, drops vertices without one and finds the boundary. Throws Error naming `source` for
+/// positions that are not finite, indices out of range, repeated vertices, no volume, overlapping tets, no
+/// tet at all.
 void finish_tets(TetMesh& mesh, const std::string& source);
 /// A block of cells nx * ny * nz, each cut into six tets (Kuhn), size in metres, centred on the origin.
 TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);
@@ -74,17 +85,18 @@ struct Bounds {
   glm::dvec3 centre() const { return (low + high) * 0.5; }
   double size() const { return glm::length(high - low); }  ///< length of the diagonal
 };
+/// Of the finite positions.
 Bounds bounds(const std::vector<glm::dvec3>& positions);
 
 /// What `tetpbd mesh` prints and stats.json quotes.
 struct MeshReport {
   std::size_t vertices, surface_vertices, surface_triangles, edges, bends, tets, faces;
   int euler_characteristic;  ///< V - E + F - T
-  int genus;                 ///< of the boundary, summed over components
+  int genus;                 ///< of the boundary, summed over its components
   int components;            ///< of the tetrahedra (by shared vertices)
   double volume, smallest_tet_volume, mean_tet_volume;
   double min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg;
-  std::size_t slivers;       ///< tets with a dihedral angle under 5 or over 175 degrees
+  std::size_t slivers;  ///< tets with a dihedral angle under 5 or over 175 degrees
   std::size_t inverted;
 };
 MeshReport report(const TetMesh& mesh);

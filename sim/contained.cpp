@@ -110,7 +110,7 @@ int milliseconds_until(Clock::time_point deadline) {
 // Reads to the end of the pipe; false when the deadline comes first.
 bool read_until(int fd, Clock::time_point deadline, std::string& bytes) {
   std::string chunk(1 << 20, '\0');
-  for (;;) {
+  while (Clock::now() < deadline) {
     pollfd wanted{fd, POLLIN, 0};
     const int ready = ::poll(&wanted, 1, milliseconds_until(deadline));
     if (ready < 0 && errno != EINTR) return true;
@@ -119,10 +119,9 @@ bool read_until(int fd, Clock::time_point deadline, std::string& bytes) {
       if (n < 0 && errno == EINTR) continue;
       if (n <= 0) return true;
       bytes.append(chunk.data(), static_cast<std::size_t>(n));
-      continue;
     }
-    if (Clock::now() >= deadline) return false;
   }
+  return false;
 }
 
 // The pipe is closed, so the child is about to end; still give it no more than the deadline.

@@ -92,8 +92,10 @@ SurfaceMesh load_surface(const std::filesystem::path& file) {
     throw Error("not a surface format", file.string(), "use .ply, .obj, .stl or .off");
   require_readable(file);
   const SurfaceClaims claims = read_surface_claims(file);
+  // On a loaded machine a megabyte takes 0.1 s; damaged files can keep assimp busy for ever.
+  const double seconds = 20 + 1e-6 * static_cast<double>(std::filesystem::file_size(file));
   const ContainedResult answer =
-      run_contained([&] { return read_with_assimp(file, claims); }, {120, std::size_t{8} << 30});
+      run_contained([&] { return read_with_assimp(file, claims); }, {seconds, std::size_t{8} << 30});
   using End = ContainedResult::End;
   if (answer.end == End::refused)
     throw Error(fmt::format("file cannot be read ({})", answer.reason), file.string(),

@@ -33,11 +33,13 @@ SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, 
   SurfaceClaims claims;
   std::string line, element, claim;
   double count = 0, least = 0;
-  bool binary = false;
+  bool binary = false, first = true;
   while (std::getline(head, line)) {
     std::istringstream words(line);
     std::string word;
     words >> word;
+    if (first && word != "ply" && word != "PLY") return {};
+    first = false;
     if (word == "format") {
       words >> word;
       binary = word.starts_with("binary");
@@ -58,11 +60,15 @@ SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, 
       }
     } else if (word == "end_header") {
       const double body = size - static_cast<double>(head.tellg());
-      if (least > body + 1) throw_short(file, claim, least, body);
+      if (least > body + (binary ? 0 : 1))
+        throw_short  // text may lack its last line's end
+            (file, claim, least, body);
       return claims;
     }
   }
-  return {};
+  // assimp would search for the end of the header for minutes.
+  throw Error("PLY header has no end_header", file.string(),
+              "the file is incomplete: fetch or export it again");
 }
 
 SurfaceClaims off_claims(const std::filesystem::path& file, std::istream& head, double size) {

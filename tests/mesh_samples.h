@@ -1,0 +1,98 @@
+// Small surfaces and a temporary folder for the mesh tests.
+#pragma once
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "sim/error.h"
+#include "sim/tet_mesh.h"
+
+namespace samples {
+
+namespace fs = std::filesystem;
+
+/// A folder that goes with the test; TETPBD_CACHE points into it while it lives.
+struct Folder {
+  fs::path path;
+  std::string cache_before;
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "tetpbd_test_XXXXXX").string();
+    path = ::mkdtemp(name.data());
+    if (const char* cache = std::getenv("TETPBD_CACHE")) cache_before = cache;
+    ::setenv("TETPBD_CACHE", (path / "cache").c_str(), 1);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+    cache_before.empty() ? ::unsetenv("TETPBD_CACHE") : ::setenv("TETPBD_CACHE", cache_before.c_str(), 1);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  fs::path write(const std::string& name, const std::string& content) const {
+    std::ofstream(path / name, std::ios::binary) << content;
+    return path / name;
+  }
+  fs::path cache() const { return path / "cache"; }
+};
+
+/// What the Error says, with its exit status in front ("2 ..."); empty when there is none.
+template <class Action>
+std::string error_of(const Action& action) {
+  try {
+    action();
+  } catch (const tetpbd::Error& error) {
+    return fmt::format("{} {}", error.exit_status, error.what());
+  }
+  return "";
+}
+
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+inline tetpbd::SurfaceMesh tetrahedron(const glm::dvec3& at = glm::dvec3(0)) {
+  return {{at, at + glm::dvec3(1, 0, 0), at + glm::dvec3(0, 1, 0), at + glm::dvec3(0, 0, 1)},
+          {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+}
+
+/// Side 1, low corner at `at`, volume 1.
+inline tetpbd::SurfaceMesh cube(const glm::dvec3& at = glm::dvec3(0), double side = 1) {
+  tetpbd::SurfaceMesh s;
+  for (int i = 0; i < 8; ++i) s.positions.push_back(at + side * glm::dvec3(i & 1, (i >> 1) & 1, i >> 2));
+  s.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                 {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return s;
+}
+
+inline tetpbd::SurfaceMesh joined(tetpbd::SurfaceMesh a, const tetpbd::SurfaceMesh& b) {
+  const auto base = static_cast<std::uint32_t>(a.positions.size());
+  a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
+  for (const tetpbd::Triangle& t : b.triangles)
+    a.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+  return a;
+}
+
+inline double signed_volume(const tetpbd::SurfaceMesh& s) {
+  double volume = 0;
+  for (const auto& t : s.triangles)
+    volume += glm::dot(s.positions[t[0]], glm::cross(s.positions[t[1]], s.positions[t[2]])) / 6;
+  return volume;
+}
+
+inline std::string ascii_ply(const tetpbd::SurfaceMesh& s) {
+  std::string text = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float "
+      "z\nelement face {}\n"
+      "property list uchar int vertex_indices\nend_header\n",
+      s.positions.size(), s.triangles.size());
+  for (const auto& p : s.positions) text += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+  for (const auto& t : s.triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
+  return text;
+}
+
+}  // namespace samples

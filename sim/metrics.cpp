@@ -154,22 +154,25 @@ void measure(Metrics& m, const Sim& sim) {
     const Metrics::BodyRanges& body = m.bodies[b];
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(), GLintptr(b * M_STRIDE * sizeof(float)),
                       M_STRIDE * sizeof(float));
-    m.constraints.use();
-    m.constraints.set("first_edge", body.edges.first), m.constraints.set("end_edge", body.edges.end);
-    m.constraints.set("first_hinge", body.hinges.first), m.constraints.set("end_hinge", body.hinges.end);
-    m.constraints.set("first_tet", body.tets.first), m.constraints.set("end_tet", body.tets.end);
-    dispatch(m.constraints, METRICS_GROUPS);
-    m.vertices.use();
-    m.vertices.set("touching", float(1e-5 * body.size));
-    for (const Program* program : {&m.vertices, &m.rigid, &m.centre}) {
+    // About four tets an invocation before there are more groups.
+    const unsigned groups = std::min<unsigned>(METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE));
+    for (const Program* program : {&m.constraints, &m.vertices, &m.rigid, &m.centre, &m.close}) {
       program->use();
       program->set("first_vertex", body.vertices.first);
       program->set("end_vertex", body.vertices.end);
       program->set("mass", float(body.mass));
+      program->set("groups", groups);
     }
-    dispatch(m.vertices, METRICS_GROUPS);
+    m.constraints.use();
+    m.constraints.set("first_edge", body.edges.first), m.constraints.set("end_edge", body.edges.end);
+    m.constraints.set("first_hinge", body.hinges.first), m.constraints.set("end_hinge", body.hinges.end);
+    m.constraints.set("first_tet", body.tets.first), m.constraints.set("end_tet", body.tets.end);
+    dispatch(m.constraints, groups);
+    m.vertices.use();
+    m.vertices.set("touching", float(1e-5 * body.size));
+    dispatch(m.vertices, groups);
     dispatch(m.centre, 1);
-    dispatch(m.rigid, METRICS_GROUPS);
+    dispatch(m.rigid, groups);
     dispatch(m.close, 1);
   }
   m.pending.push_back({glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0), slot, sim.steps, double(sim.steps) * sim.settings.dt,

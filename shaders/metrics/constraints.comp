@@ -9,7 +9,7 @@ uniform uint first_edge, end_edge, first_hinge, end_hinge, first_tet, end_tet;
 
 void main() {
   uint start = gl_GlobalInvocationID.x;
-  const uint stride = METRICS_GROUPS * METRICS_SIZE;
+  uint stride = groups * METRICS_SIZE;
   float squares = 0.0, largest = 0.0;
   for (uint i = first_edge + start; i < end_edge; i += stride) {
     Record2 r = edges[i];

@@ -1,5 +1,5 @@
 // Bindings and results of the measuring kernels, read by GLSL and C++.
-#define METRICS_GROUPS 64      // work-groups of a reduction; sums are always taken in the same order
+#define METRICS_GROUPS 64      // most work-groups of a reduction; a mesh always gets the same number: sums keep their order
 #define METRICS_SIZE 256       // their size
 
 #define BIND_M_POSITIONS 0

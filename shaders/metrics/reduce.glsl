@@ -5,6 +5,7 @@ layout(local_size_x = METRICS_SIZE) in;
 layout(std430, binding = BIND_M_POSITIONS) readonly buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_M_PARTIALS) buffer Partials { float partials[]; };  // [quantity][group]
 layout(std430, binding = BIND_M_ROW) buffer Row { float row[]; };
+uniform uint groups;  // of the kernels that write partials
 shared float scratch[METRICS_SIZE];
 
 // A tree over the work-group; the result is in scratch[0] for every invocation until the next call.
@@ -32,7 +33,7 @@ bool is_maximum(int quantity) { return quantity == M_TET_MAX || quantity == M_ST
 float total_of(int quantity) {
   uint base = uint(quantity) * METRICS_GROUPS;
   float total = partials[base];
-  for (uint g = 1u; g < METRICS_GROUPS; ++g)
+  for (uint g = 1u; g < groups; ++g)
     total = is_maximum(quantity) ? max(total, partials[base + g]) : total + partials[base + g];
   return total;
 }

@@ -12,7 +12,7 @@ void main() {
   vec3 q = vec3(row[M_ROTATION + 1], row[M_ROTATION + 2], row[M_ROTATION + 3]);
   float squares = 0.0;
   vec3 angular = vec3(0.0);
-  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += METRICS_GROUPS * METRICS_SIZE) {
+  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += groups * METRICS_SIZE) {
     vec4 at_rest = rest[i];
     vec3 X = at_rest.xyz;
     vec3 r = relative(positions[i], positions[first_vertex]) - centre;

@@ -9,7 +9,7 @@ void main() {
   vec3 moment = vec3(0.0), momentum = vec3(0.0);
   mat3 covariance = mat3(0.0);
   float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, non_finite = 0.0;
-  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += METRICS_GROUPS * METRICS_SIZE) {
+  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += groups * METRICS_SIZE) {
     Position p = positions[i];
     vec3 x = relative(p, positions[first_vertex]);
     vec3 v = velocities[i].high + velocities[i].low;

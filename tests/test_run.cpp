@@ -1,0 +1,209 @@
+// The program itself, from its command line to the files it leaves.
+#include <doctest/doctest.h>
+
+#include <png.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+struct Folder {
+  fs::path path = fs::temp_directory_path() / ("tetpbd_run_" + std::to_string(getpid()));
+  Folder() { fs::create_directories(path); }
+  ~Folder() { fs::remove_all(path); }
+};
+
+std::string read(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+struct Outcome {
+  int status;
+  std::string out, err;
+};
+
+Outcome tetpbd(const std::string& arguments, const Folder& folder, const std::string& environment = "") {
+  const std::string out = (folder.path / "stdout").string(), err = (folder.path / "stderr").string();
+  const int status = std::system(("cd " + folder.path.string() + " && " + environment + " " TEST_PROGRAM " " + arguments + " >" + out + " 2>" + err).c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
+}
+
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<unsigned char> rgba;
+  const unsigned char* at(int x, int y) const { return &rgba[std::size_t(4 * (y * width + x))]; }
+};
+
+Picture read_png(const fs::path& file) {
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  REQUIRE(png_image_begin_read_from_file(&png, file.c_str()));
+  png.format = PNG_FORMAT_RGBA;
+  Picture picture{int(png.width), int(png.height), std::vector<unsigned char>(PNG_IMAGE_SIZE(png))};
+  REQUIRE(png_image_finish_read(&png, nullptr, picture.rgba.data(), 0, nullptr));
+  return picture;
+}
+
+// The body is warm clay on grey: where red exceeds blue by far.
+struct Blob { int count = 0; double y = 0; };
+Blob body_of(const Picture& picture) {
+  Blob blob;
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x)
+      if (picture.at(x, y)[0] > picture.at(x, y)[2] + 40) ++blob.count, blob.y += y;
+  if (blob.count) blob.y /= blob.count;
+  return blob;
+}
+
+}  // namespace
+
+TEST_CASE("run writes what it says, twice the same") {
+  const Folder folder;
+  const std::string arguments = "run --scene bunny-drop --steps 30 --iterations 3 --set bodies.0.position=[0,0.02,0] --size 320x240 --samples 0 "
+                                "--png-every 15 --video fall.mp4 --positions --out ";
+  const Outcome first = tetpbd(arguments + "a", folder), second = tetpbd(arguments + "b", folder);
+  CHECK(first.err == "");
+  REQUIRE(first.status == 0);
+  REQUIRE(second.status == 0);
+  const json a = json::parse(read(folder.path / "a/stats.json")), b = json::parse(read(folder.path / "b/stats.json"));
+  CHECK(a["state_hash"] == b["state_hash"]);
+  CHECK(a["scene"] == "bunny-drop");
+  CHECK(a["settings"]["iterations"] == 3);
+  CHECK(a["settings"]["omega"] == 1.5);
+  CHECK(a["mesh"]["vertices"] == 3474);
+  CHECK(a["mesh"]["surface_triangles"] == 5976);
+  CHECK(a["mesh"]["edges"] == 17266);
+  CHECK(a["mesh"]["bends"] == 8964);
+  CHECK(a["mesh"]["tets"] == 10805);
+  CHECK(a["mesh"]["euler_characteristic"] == 1);
+  CHECK(a["mesh"]["volume"].get<double>() == doctest::Approx(0.2087).epsilon(1e-3));
+  CHECK(a["device"]["gl_renderer"].get<std::string>() != "");
+  CHECK(a["timing"]["steps"] == 30);
+  for (const char* key : {"gpu_ms_per_step", "wall_ms_per_step"}) {
+    CHECK(a["timing"][key]["median"].get<double>() > 0);
+    CHECK(a["timing"][key]["p05"] <= a["timing"][key]["median"]);
+    CHECK(a["timing"][key]["p95"] >= a["timing"][key]["median"]);
+  }
+  CHECK(a["timing"]["fps"].get<double>() > 0);
+  for (const char* key : {"max_volume_loss_percent", "final_volume_error_percent", "tet_volume_rms", "tet_volume_max", "inverted_tets",
+                          "stretch_rms", "stretch_max", "bend_rms_rad", "rigid_distance"})
+    CHECK(a["error"][key].is_number());
+  CHECK(a["error"]["max_volume_loss_percent"] > 0);
+  CHECK(a["momentum"]["linear_drift"].get<double>() < 1e-4);
+  CHECK(a["momentum"]["angular_drift"].is_number());
+  CHECK(a["finite"] == true);
+  CHECK(a["energy"]["start"].get<double>() > a["energy"]["final"].get<double>());
+
+  std::istringstream csv(read(folder.path / "a/stats.csv"));
+  int rows = 0;
+  std::string line, header;
+  std::getline(csv, header);
+  while (std::getline(csv, line)) {
+    CHECK(std::count(line.begin(), line.end(), ',') == std::count(header.begin(), header.end(), ','));
+    ++rows;
+  }
+  CHECK(rows == 31);
+
+  const Picture start = read_png(folder.path / "a/frame_00000.png"), end = read_png(folder.path / "a/frame_00030.png");
+  CHECK(start.width == 320);
+  CHECK(start.height == 240);
+  CHECK(body_of(start).count > 1000);
+  CHECK(body_of(end).count > 1000);
+  CHECK(body_of(end).y > body_of(start).y + 1);  // it fell: further down in the picture
+  CHECK(fs::exists(folder.path / "a/frame_00015.png"));
+
+  CHECK(read(folder.path / "a/positions.npy").size() == 128 + 3474 * 12);
+  CHECK(read(folder.path / "a/positions.npy").substr(1, 5) == "NUMPY");
+  CHECK(read(folder.path / "a/tets.npy").size() == 128 + 10805 * 16);
+  CHECK(fs::file_size(folder.path / "fall.mp4") > 1000);
+  CHECK(read(folder.path / "fall.mp4").substr(4, 4) == "ftyp");
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path)) CHECK(entry.path().string().find(".part") == std::string::npos);
+}
+
+TEST_CASE("every look and colour draws a body") {
+  const Folder folder;
+  int number = 0;
+  for (const char* view : {"--look wire --flat", "--look tets --cut 0.6 --colour volume", "--colour stretch", "--colour velocity --no-shadow --no-grid", "--flat --no-legend"}) {
+    CAPTURE(view);
+    const std::string out = "v" + std::to_string(number++);
+    const Outcome run = tetpbd("run --scene beam --steps 8 --iterations 2 --size 320x240 --samples 0 --png-every 8 --out " + out + " " + view, folder);
+    CHECK(run.status == 0);
+    CHECK(run.err == "");
+    const Picture picture = read_png(folder.path / out / "frame_00008.png");
+    int different = 0;
+    const Picture first = read_png(folder.path / out / "frame_00000.png");
+    for (std::size_t i = 0; i < picture.rgba.size(); ++i) different += picture.rgba[i] != first.rgba[i];
+    CHECK(different > 100);
+  }
+}
+
+TEST_CASE("mistakes get one line, status 2 and no files") {
+  const Folder folder;
+  const auto fails = [&](const std::string& arguments, const std::string& word, int status = 2) {
+    CAPTURE(arguments);
+    const Outcome outcome = tetpbd(arguments, folder);
+    CHECK(outcome.status == status);
+    CHECK(outcome.err.starts_with("tetpbd: "));
+    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+    CAPTURE(outcome.err);
+    CHECK(outcome.err.find(word) != std::string::npos);
+    CHECK(!fs::exists(folder.path / "out/stats.json"));
+  };
+  fails("run --scene none-such", "bunny-drop");
+  fails("run --no-such-flag", "--no-such-flag");
+  fails("run --omega lots", "--omega");
+  fails("run --mode fast", "node, constraint, cpu");
+  fails("run --size 10", "--size");
+  fails("run --look nice", "surface, wire, tets");
+  fails("run --gpu 99", "--gpu 99");
+  fails("run --steps 0", "--steps");
+  fails("run --set a", "PATH=VALUE");
+  fails("run --mesh missing.ply", "missing.ply");
+  fails("run --scene beam --steps 1 --out /proc/nothing", "/proc/nothing");
+  fails("run --scene beam --steps 1 --video film.doc", "film.doc");
+  fails("--shaders /none info", "/none");
+  fails("mesh missing.obj", "missing.obj");
+  fails("wobble", "wobble");
+  std::ofstream(folder.path / "open.off") << "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  fails("mesh open.off", "open.off");
+  fails("run --mesh open.off", "open.off");
+}
+
+TEST_CASE("help, version, info and explain answer") {
+  const Folder folder;
+  CHECK(tetpbd("--version", folder).out.find('.') != std::string::npos);
+  const std::string help = tetpbd("run --help", folder).out;
+  for (const char* flag : {"--scene", "--mesh", "--tetgen", "--mode", "--constraints", "--k-stretch", "--k-bend", "--k-volume", "--omega", "--iterations",
+                           "--substeps", "--dt", "--gravity", "--seed", "--deform", "--gpu", "--size", "--set", "--explain", "--png-every", "--video", "--csv-every", "--positions"})
+    CHECK(help.find(flag) != std::string::npos);
+  CHECK(tetpbd("info", folder).out.find("OpenGL version") != std::string::npos);
+  const Outcome explained = tetpbd("run --scene beam --mode constraint --constraints stretch --explain", folder);
+  CHECK(explained.status == 0);
+  CHECK(explained.out.find("solve_constraint stretch") != std::string::npos);
+  CHECK(explained.out.find("volume") == std::string::npos);
+  const Outcome view = tetpbd("view", folder, "env -u DISPLAY -u WAYLAND_DISPLAY");
+  CHECK(view.status == 2);
+  CHECK(view.err.find("display") != std::string::npos);
+}
+
+TEST_CASE("an interrupted run leaves whole files") {
+  const Folder folder;
+  const std::string command = "cd " + folder.path.string() + " && timeout -s INT 6 " TEST_PROGRAM " run --scene beam --steps 1000000 --iterations 3 --out out 2>stderr >/dev/null";
+  const int status = std::system(command.c_str());
+  CHECK(WEXITSTATUS(status) != 0);
+  CHECK(read(folder.path / "stderr").find("interrupted") != std::string::npos);
+  const json stats = json::parse(read(folder.path / "out/stats.json"));
+  CHECK(stats["timing"]["steps"].get<long>() > 0);
+  CHECK(stats["timing"]["steps"].get<long>() < 1000000);
+}

@@ -1,0 +1,166 @@
+// Scenes are read strictly, and every shipped one builds and runs in every mode.
+#include <doctest/doctest.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "app/scene.h"
+#include "sim/error.h"
+#include "sim/metrics.h"
+#include "tests/gl_test.h"
+
+using namespace tetpbd;
+
+namespace {
+
+struct SceneFile {
+  std::filesystem::path path = std::filesystem::temp_directory_path() / ("tetpbd_scene_" + std::to_string(getpid()) + ".json");
+  explicit SceneFile(const std::string& text) { std::ofstream(path) << text; }
+  ~SceneFile() { std::filesystem::remove(path); }
+};
+
+std::string error_of(const std::string& text, const SceneOverrides& overrides = {}) {
+  const SceneFile file(text);
+  try {
+    build_model(load_scene(file.path.string(), overrides));
+  } catch (const Error& error) {
+    CHECK(error.exit_status == 2);
+    return error.what();
+  }
+  return "";
+}
+
+const std::string block = R"("bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}])";
+
+bool has(const std::string& text, const std::string& word) { return text.find(word) != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("wrong scenes are refused with the key and what is allowed") {
+  CHECK(error_of("{" + block + "}") == "");
+  CHECK(has(error_of("{" + block), "not valid JSON"));
+  CHECK(has(error_of("[]"), "object"));
+  CHECK(has(error_of("{}"), "'bodies'"));
+  CHECK(has(error_of(R"({"bodies": []})"), "'bodies'"));
+  CHECK(has(error_of("{" + block + R"(, "sover": {}})"), "'sover' is not known"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"omga": 1}})"), "'solver.omga' is not known"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"omega": 9}})"), "from 0 to 4"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"omega": "big"}})"), "'omega' cannot be big"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"iterations": 2.5}})"), "'iterations'"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"mode": "magic"}})"), "node, constraint, cpu"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "twist"]}})"), "stretch, bend, volume"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "stretch"]}})"), "once"));
+  CHECK(has(error_of("{" + block + R"(, "world": {"gravity": null}})"), "'gravity'"));
+  CHECK(has(error_of("{" + block + R"(, "world": {"obstacles": [{"point": [0,0,0], "normal": [0,0,0]}]}})"), "normal"));
+  CHECK(has(error_of("{" + block + R"(, "camera": {"fov": 1}})"), "camera.fov"));
+  CHECK(has(error_of("{" + block + R"(, "duration": -1})"), "duration"));
+  CHECK(has(error_of(R"({"bodies": [{"block": {"size": [1, 1], "cells": [2, 2, 2]}}]})"), "three numbers"));
+  CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [2, 2, 0]}}]})"), "block.cells"));
+  CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [2000, 2000, 2000]}}]})"), "2 million"));
+  CHECK(has(error_of(R"({"bodies": [{}]})"), "either"));
+  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "block": {}}]})"), "either"));
+  CHECK(has(error_of(R"({"bodies": [{"mesh": "no_such.ply"}]})"), "no_such.ply"));
+  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "height": 0}]})"), "height"));
+  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "colour": 1}]})"), "'bodies.0.colour' is not known"));
+}
+
+TEST_CASE("the command line overrides, and its errors name the flag") {
+  const std::string scene = "{" + block + "}";
+  const SceneFile file(scene);
+  SceneOverrides overrides;
+  overrides.parameters = {{"omega", "1.25"}, {"constraints", "stretch"}};
+  overrides.set = {"bodies.0.density=500", "world.friction=0.1", "name=other"};
+  overrides.deform = "flatten";
+  const Scene opened = load_scene(file.path.string(), overrides);
+  CHECK(opened.settings.omega == 1.25);
+  CHECK(opened.settings.constraints == "stretch");
+  CHECK(opened.settings.friction == 0.1);
+  CHECK(opened.bodies[0].density == 500);
+  CHECK(opened.name == "other");
+  const auto model = build_model(opened);
+  for (const auto& p : model->positions) CHECK(p.y == doctest::Approx(1.5));
+  CHECK(mesh_volume(model->rest) == doctest::Approx(1));
+
+  CHECK(has(error_of(scene, {{}, "", "", {{"omega", "x"}}, {}}), "--omega"));
+  CHECK(has(error_of(scene, {{}, "", "", {{"dt", "nan"}}, {}}), "--dt"));
+  CHECK(has(error_of(scene, {{}, "", "", {{"iterations", "1e3"}}, {}}), "--iterations"));
+  CHECK(has(error_of(scene, {{}, "", "", {}, {"nonsense"}}), "PATH=VALUE"));
+  CHECK(has(error_of(scene, {{}, "", "", {}, {"bodies.7.density=1"}}), "bodies.7"));
+  CHECK(has(error_of(scene, {{}, "", "", {}, {"bodies.0.density=-1"}}), "density"));
+  CHECK(has(error_of(scene, {{}, "", "melt", {}, {}}), "--deform melt"));
+  CHECK(has(error_of(scene, {{}, "", "stretch:0", {}, {}}), "factor"));
+  CHECK_THROWS_AS(load_scene("no-such-scene"), Error);
+}
+
+TEST_CASE("every deformation does what it says and leaves the rest shape") {
+  const TetMesh mesh = make_block({1, 2, 1}, {3, 3, 3});
+  const auto volume_of = [&](const std::vector<glm::dvec3>& x, int& inverted) {
+    TetMesh copy = mesh;
+    copy.positions = x;
+    double sum = 0;
+    inverted = 0;
+    for (const Tet& t : copy.tets) sum += tet_volume(copy, t), inverted += tet_volume(copy, t) < 0;
+    return sum;
+  };
+  const auto deformed = [&](const char* how) {
+    auto x = mesh.positions;
+    deform(x, mesh, how, 3);
+    return x;
+  };
+  int inverted = 0;
+  CHECK(volume_of(deformed("none"), inverted) == doctest::Approx(2));
+  CHECK(volume_of(deformed("stretch:10"), inverted) == doctest::Approx(20));
+  CHECK(volume_of(deformed("squash:0.01"), inverted) == doctest::Approx(0.02));
+  CHECK(volume_of(deformed("mirror"), inverted) == doctest::Approx(-2));
+  CHECK(inverted == int(mesh.tets.size()));
+  CHECK(volume_of(deformed("flatten"), inverted) == doctest::Approx(0));
+  CHECK(bounds(deformed("flatten")).size() > 1);
+  CHECK(bounds(deformed("line")).high.z - bounds(deformed("line")).low.z == 0);
+  CHECK(bounds(deformed("point")).size() == 0);
+  volume_of(deformed("invert-one"), inverted);
+  CHECK(inverted >= 1);
+  CHECK(deformed("random") == deformed("random"));
+  CHECK(bounds(deformed("random")).size() <= bounds(mesh.positions).size());
+}
+
+TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
+  const SceneFile file(R"({"bodies": [
+    {"block": {"size": [2, 1, 1], "cells": [2, 1, 1]}, "position": [0, 1, 0], "fixed": [{"low": [0, 0, 0], "high": [0, 1, 1]}]},
+    {"block": {"size": [1, 1, 1], "cells": [1, 1, 1]}, "height": 3, "rotation": [0, 0, 90], "position": [4, 2, 0], "velocity": [1, 0, 0], "spin": [0, 2, 0]}],
+    "world": {"obstacles": [{"point": [-3, 0, 0], "normal": [2, 0, 0]}]}})");
+  const auto model = build_model(load_scene(file.path.string()));
+  CHECK(model->bodies.size() == 2);
+  int fixed = 0;
+  for (double w : model->inverse_masses) fixed += w == 0;
+  CHECK(fixed == 4);
+  const std::vector<glm::dvec3> second(model->positions.begin() + std::ptrdiff_t(model->bodies[1].first_vertex), model->positions.end());
+  CHECK(bounds(second).low.y == doctest::Approx(2));
+  CHECK(bounds(second).high.y == doctest::Approx(5));
+  CHECK(bounds(second).centre().x == doctest::Approx(4));
+  CHECK(model->obstacles[0] == glm::dvec4(1, 0, 0, -3));
+  glm::dvec3 momentum(0);
+  double mass = 0;
+  for (std::size_t i = model->bodies[1].first_vertex; i < model->positions.size(); ++i) momentum += model->masses[i] * model->velocities[i], mass += model->masses[i];
+  CHECK(glm::length(momentum / mass - glm::dvec3(1, 0, 0)) < 1e-9);
+}
+
+TEST_CASE("every shipped scene runs in every mode") {
+  GlTest gl;
+  CHECK(scene_names() == std::vector<std::string>{"armadillo-drop", "beam", "bunny-drop", "dragon-drop"});
+  for (const std::string& name : scene_names())
+    for (const SolverMode& mode : solver_modes()) {
+      CAPTURE(name);
+      CAPTURE(mode.name);
+      const Scene scene = load_scene(name, {{}, "", "", {{"mode", mode.name}, {"iterations", "2"}}, {}});
+      const auto model = build_model(scene);
+      Sim sim = create_sim(model, scene.settings);
+      for (int s = 0; s < 4; ++s) step(sim);
+      Metrics metrics = create_metrics(*model);
+      const Measurement m = measure_now(metrics, sim);
+      CHECK(m.finite());
+      CHECK(m.kinetic > 0);
+      CHECK(std::abs(m.volume_error_percent) < 5);
+    }
+}

@@ -1,5 +1,5 @@
 # `cmake --install` and CPack make a folder that runs from anywhere: bin/tetpbd, lib/ with the libraries it needs except
-# libc's and OpenGL's own (those belong to the machine and its driver), share/tetpbd/models.
+# libc's and OpenGL's own (those belong to the machine and its driver; GLEW's X11 client libraries come along), share/tetpbd/models.
 set_target_properties(tetpbd PROPERTIES INSTALL_RPATH "$ORIGIN/../lib")
 target_link_options(tetpbd PRIVATE -Wl,--disable-new-dtags)
 install(TARGETS tetpbd RUNTIME DESTINATION bin)
@@ -9,8 +9,7 @@ install(CODE [[
   file(GET_RUNTIME_DEPENDENCIES EXECUTABLES "${CMAKE_INSTALL_PREFIX}/bin/tetpbd"
     RESOLVED_DEPENDENCIES_VAR found UNRESOLVED_DEPENDENCIES_VAR missing
     PRE_EXCLUDE_REGEXES "^ld-linux.*" "^lib(c|m|dl|rt|pthread|resolv)\\.so.*"
-                        "^lib(GL|EGL|OpenGL|GLX|GLdispatch)\\.so.*" "^libX.*" "^libxcb.*"
-    POST_EXCLUDE_REGEXES ".*/lib(bsd|md|Xau|Xdmcp)\\.so.*")
+                        "^lib(GL|EGL|OpenGL|GLX|GLdispatch)\\.so.*")
   if(missing)
     message(FATAL_ERROR "not found for the bundle: ${missing}")
   endif()

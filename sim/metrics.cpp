@@ -136,11 +136,21 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
   return result;
 }
 
+std::optional<Measurement> read_oldest(Metrics& m, bool wait) {
+  if (m.pending.empty()) return std::nullopt;
+  const GLenum state = glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? GLuint64(60e9) : 0);
+  if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
+  const Metrics::Pending pending = m.pending.front();
+  m.pending.pop_front();
+  glDeleteSync(pending.fence);
+  return read_row(m, pending);
+}
+
 }  // namespace
 
 void measure(Metrics& m, const Sim& sim) {
+  if (m.pending.size() == m.rows.size()) m.ready.push_back(*read_oldest(m, true));
   const std::size_t slot = m.next;
-  if (m.pending.size() == m.rows.size()) return;  // the caller has not collected: see collect()
   m.next = (m.next + 1) % m.rows.size();
   sim.step_block.bind_uniform(BIND_STEP);
   sim.current_positions().bind_storage(BIND_M_POSITIONS);
@@ -180,15 +190,10 @@ void measure(Metrics& m, const Sim& sim) {
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {
-  // A full ring must give way, or the next measurement would be lost.
-  if (m.pending.empty()) return std::nullopt;
-  const bool must = wait || m.pending.size() == m.rows.size();
-  const GLenum state = glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, must ? GLuint64(60e9) : 0);
-  if (state == GL_TIMEOUT_EXPIRED && !must) return std::nullopt;
-  const Metrics::Pending pending = m.pending.front();
-  m.pending.pop_front();
-  glDeleteSync(pending.fence);
-  return read_row(m, pending);
+  if (m.ready.empty()) return read_oldest(m, wait);
+  const Measurement result = m.ready.front();
+  m.ready.pop_front();
+  return result;
 }
 
 Measurement measure_now(Metrics& m, const Sim& sim) {

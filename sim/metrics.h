@@ -47,6 +47,7 @@ struct Metrics {
   Program constraints, vertices, centre, rigid, close;
   std::vector<Buffer> rows;      ///< a ring: a row a body in each
   std::deque<Pending> pending;
+  std::deque<Measurement> ready; ///< read because the ring was full
   std::size_t next = 0;
   std::size_t edge_count = 0, hinge_count = 0, tet_count = 0;
 };

@@ -39,11 +39,11 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(property(predict, GL_BUFFER_VARIABLE, "positions[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(Position));
   CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(Velocity));
 
-  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"}, {"BINDING", "7"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "2"}};
+  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"}, {"BINDING", "7"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "2"}};
   const Program volume = Program::compute("solve_constraint.comp", {words, {}});
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) == offsetof(layout::Record4, rest));
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(layout::Record4));
-  words = {{"KIND", "stretch"}, {"ARITY", "2"}, {"BINDING", "7"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}};
+  words = {{"KIND", "stretch"}, {"ARITY", "2"}, {"BINDING", "7"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "0"}};
   const Program stretch = Program::compute("solve_constraint.comp", {words, {}});
   CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(layout::Record2));
 
@@ -88,7 +88,7 @@ TEST_CASE("a shader that does not compile names its file and line") {
 }
 
 TEST_CASE("#include, #foreach and words expand") {
-  const std::string text = shader_text("solve_node.comp", {{}, {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}}, {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}}}});
+  const std::string text = shader_text("solve_node.comp", {{}, {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}, {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
   CHECK(text.find("gather_stretch(i, own)") != std::string::npos);
   CHECK(text.find("gather_bend(i, own)") != std::string::npos);
   CHECK(text.find("gather_volume") == std::string::npos);

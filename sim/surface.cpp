@@ -34,6 +34,8 @@ std::string one_line(std::string text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < ' ') c = ' ';
   while (!text.empty() && text.back() == ' ') text.pop_back();
+  for (std::size_t at; (at = text.find(": ")) != std::string::npos;)
+    text.erase(at, 1);  // parts our own error line
   return text.substr(0, 300);
 }
 

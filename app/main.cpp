@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/bench.h"
 #include "app/headless.h"
 #include "app/mesh_command.h"
 #include "app/scene.h"
@@ -73,18 +74,18 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
   command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches, and stop");
 }
 
-void parse_size(SceneArguments& a) {
-  const std::size_t cross = a.size.find('x');
+void parse_size(const std::string& size, int& width, int& height) {
+  const std::size_t cross = size.find('x');
   const auto whole = [](const std::string& text, int& target) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), target);
     return error == std::errc() && end == text.data() + text.size() && target >= 16 && target <= 16384;
   };
-  if (cross == std::string::npos || !whole(a.size.substr(0, cross), a.width) || !whole(a.size.substr(cross + 1), a.height))
-    throw Error("bad size", "--size " + a.size, "write WIDTHxHEIGHT, each from 16 to 16384, as in 1280x720");
+  if (cross == std::string::npos || !whole(size.substr(0, cross), width) || !whole(size.substr(cross + 1), height))
+    throw Error("bad size", "--size " + size, "write WIDTHxHEIGHT, each from 16 to 16384, as in 1280x720");
 }
 
 Scene scene_of(SceneArguments& a) {
-  parse_size(a);
+  parse_size(a.size, a.width, a.height);
   a.view.look = Look(index_of(look_names, a.look, "--look"));
   a.view.colour = Colour(index_of(colour_names, a.colour, "--colour"));
   a.view.smooth_normals = !a.flat;
@@ -120,6 +121,26 @@ int run_commands(int argc, char** argv) {
   run->add_flag("--positions", options.positions, "write positions.npy and tets.npy");
   run->add_flag("--progress", options.progress, "show progress even if standard error is no terminal");
 
+  auto* bench = app.add_subcommand("bench", "fps and ms a step, the paper's protocol and ours");
+  BenchOptions bench_options;
+  std::string bench_size = "1280x720";
+  bool no_render = false;
+  bench->add_option("--scenes,--scene", bench_options.scenes, "scenes, separated by commas")->delimiter(',')->capture_default_str();
+  bench->add_option("--modes,--mode", bench_options.modes, "solver modes")->delimiter(',')->capture_default_str();
+  bench->add_option("--constraint-sets", bench_options.constraint_sets, "sets of kinds joined by +")->delimiter(',')->capture_default_str();
+  bench->add_option("--iterations", bench_options.iterations, "iterations a substep")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
+  bench->add_option("--substeps", bench_options.substeps, "substeps a step")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
+  bench->add_option("--frames", bench_options.frames, "timed frames")->check(CLI::Range(1L, 1000000L))->capture_default_str();
+  bench->add_option("--warm-up", bench_options.warm_up, "frames before them")->check(CLI::Range(0L, 1000000L))->capture_default_str();
+  bench->add_option("--repeats", bench_options.repeats, "repetitions; the median counts")->check(CLI::Range(1, 100))->capture_default_str();
+  bench->add_option("--most-seconds", bench_options.most_seconds, "a repetition ends there with fewer frames; 12 times that bounds the error run")->check(CLI::Range(0.01, 1e6))->capture_default_str();
+  bench->add_option("--size", bench_size, "of the rendered frames, WxH")->capture_default_str();
+  bench->add_option("--samples", bench_options.samples, "of MSAA: 0, 2, 4, 8")->check(CLI::IsMember({0, 2, 4, 8}))->capture_default_str();
+  bench->add_flag("--no-render", no_render, "simulation alone");
+  bench->add_option("--tetgen", bench_options.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
+  bench->add_option("--gpu", bench_options.gpu, "which device")->check(CLI::NonNegativeNumber);
+  bench->add_option("--out", bench_options.out, "folder for bench.csv and bench.json")->capture_default_str();
+
   auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
   std::filesystem::path mesh_file, mesh_out;
   std::string mesh_switches = "pYq1.85o/140";
@@ -146,6 +167,11 @@ int run_commands(int argc, char** argv) {
 
   if (*info) return print_info(info_gpu);
   if (*mesh) return run_mesh_command(mesh_file, mesh_switches, mesh_out, mesh_json);
+  if (*bench) {
+    parse_size(bench_size, bench_options.width, bench_options.height);
+    bench_options.render = !no_render;
+    return run_bench(bench_options);
+  }
   if (*run || scene.explain) {
     const Scene opened = scene_of(scene);
     if (scene.explain) return print_explanation(opened, scene.gpu);

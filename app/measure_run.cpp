@@ -1,0 +1,36 @@
+#include "app/measure_run.h"
+
+#include <chrono>
+
+namespace tetpbd {
+
+MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::function<bool(long)>& go_on) {
+  using Clock = std::chrono::steady_clock;
+  MeasuredRun run;
+  sim.timed = true;
+  const auto take = [&](const std::optional<Measurement>& measurement) {
+    if (!measurement) return false;
+    add_measurement(run.errors, *measurement, sim);
+    run.measurements.push_back(*measurement);
+    return true;
+  };
+  measure(metrics, sim);
+  for (long s = 1; s <= steps; ++s) {
+    const auto begin = Clock::now();
+    step(sim);
+    glFinish();
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    run.timing.wall_ms.push_back(seconds * 1e3);
+    run.timing.total_s += seconds;
+    measure(metrics, sim);
+    while (take(collect(metrics))) {}
+    while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.push_back(*ms);
+    if (!run.errors.finite || (go_on && !go_on(s))) break;
+  }
+  while (take(collect(metrics, true))) {}
+  while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.push_back(*ms);
+  run.hash = state_hash(sim);
+  return run;
+}
+
+}  // namespace tetpbd

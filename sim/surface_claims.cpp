@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "sim/error.h"
 #include "sim/text_file.h"
@@ -29,8 +32,54 @@ double ply_type_size(const std::string& type) {
   return 4;
 }
 
+[[noreturn]] void throw_early_end(const std::filesystem::path& file, const std::string& element) {
+  throw Error(fmt::format("file ends before its last {}", element), file.string(),
+              "it is damaged or incomplete: fetch or export it again");
+}
+
+// Some readers go on with the last line they saw where text ends early, so its words are counted first.
+// `lists[k]`: is the element's k-th property a list, with its length in front?
+struct TextElement {
+  std::string name;
+  std::size_t count;
+  std::vector<bool> lists;
+};
+
+void require_words(const std::filesystem::path& file, std::istream& body,
+                   const std::vector<TextElement>& elements) {
+  std::string line;
+  std::string_view rest;
+  const auto next_word = [&]() -> std::string_view {
+    for (;;) {
+      const std::size_t first = rest.find_first_not_of(" \t\r");
+      if (first != std::string_view::npos && rest[first] != '#') {
+        rest.remove_prefix(first);
+        const std::string_view word = rest.substr(0, rest.find_first_of(" \t\r"));
+        rest.remove_prefix(word.size());
+        return word;
+      }
+      if (!std::getline(body, line)) return {};
+      rest = line;
+    }
+  };
+  for (const TextElement& element : elements)
+    for (std::size_t i = 0; i < element.count; ++i) {
+      for (const bool list : element.lists) {
+        const std::string_view word = next_word();
+        if (word.empty()) throw_early_end(file, element.name);
+        std::size_t entries = 0;
+        if (list && std::from_chars(word.data(), word.data() + word.size(), entries).ec != std::errc{})
+          return;
+        for (std::size_t k = 0; k < entries; ++k)
+          if (next_word().empty()) throw_early_end(file, element.name);
+      }
+      if (element.name.starts_with("OFF")) rest = {};  // colours may follow on the line
+    }
+}
+
 SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, double size) {
   SurfaceClaims claims;
+  std::vector<TextElement> elements;
   std::string line, element, claim;
   double count = 0, least = 0;
   bool binary = false, first = true;
@@ -47,10 +96,12 @@ SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, 
       if (!(words >> element >> count) || count < 0) return {};
       if (element == "vertex") claims.vertices = static_cast<std::size_t>(std::min(count, 1e15));
       if (element == "face") claims.faces = static_cast<std::size_t>(std::min(count, 1e15));
+      elements.push_back({element, static_cast<std::size_t>(std::min(count, 1e15)), {}});
       claim += fmt::format("{}{} {:.0f}", claim.empty() ? "" : ", ", element, count);
     } else if (word == "property") {
       std::string type, counter, entry;
       words >> type;
+      if (!elements.empty()) elements.back().lists.push_back(type == "list");
       if (type == "list") {
         words >> counter >> entry;
         const double entries = element == "face" ? 3 : 0;  // no face has fewer corners
@@ -63,6 +114,7 @@ SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, 
       if (least > body + (binary ? 0 : 1))
         throw_short  // text may lack its last line's end
             (file, claim, least, body);
+      if (!binary) require_words(file, head, elements);
       return claims;
     }
   }
@@ -83,7 +135,11 @@ SurfaceClaims off_claims(const std::filesystem::path& file, std::istream& head, 
     const double least = vertices * 6 + faces * 8;  // "0 0 0\n", "3 0 1 2\n"
     if (least > size + 1)
       throw_short(file, fmt::format("{:.0f} vertices, {:.0f} faces", vertices, faces), least, size);
-    return {static_cast<std::size_t>(vertices), static_cast<std::size_t>(faces)};
+    const SurfaceClaims claims{static_cast<std::size_t>(vertices), static_cast<std::size_t>(faces)};
+    require_words(
+        file, head,
+        {{"OFF vertex", *claims.vertices, {false, false, false}}, {"OFF face", *claims.faces, {true}}});
+    return claims;
   }
   return {};
 }

@@ -162,6 +162,18 @@ TEST_CASE("surface: welding") {
   CHECK(collapsing.triangles.size() == 10);
   CHECK(check_surface(collapsing).defect == "");
 
+  SurfaceMesh row;  // pairs 0.9 tolerances apart, wherever they stand in the grid
+  for (int i = 0; i < 300; ++i) {
+    const glm::dvec3 at(i * 3.7, i * 5.3, i * -7.1);
+    row.positions.insert(row.positions.end(),
+                         {at, at + glm::dvec3(0.5, 0.5, -0.5), at + glm::dvec3(9, 0, 0)});
+    row.positions.push_back(at + glm::dvec3(0, 9, 0));
+    const auto v = static_cast<std::uint32_t>(4 * i);
+    row.triangles.insert(row.triangles.end(), {{v, v + 2, v + 3}, {v + 1, v + 3, v + 2}});
+  }
+  weld(row, 1);
+  CHECK(row.positions.size() == 900);
+
   SurfaceMesh bad = cube();
   bad.positions[3].x = NAN;
   weld(bad, 1e-7);
@@ -230,6 +242,17 @@ TEST_CASE("surface files: polygons, comments, each format") {
   CHECK(volume_of("box.stl", stl + "endsolid box\n") == doctest::Approx(8));
 }
 
+TEST_CASE("surface files: OFF with colours and comments") {
+  Folder folder;
+  std::string text = "# colours\nOFF\n# counts\n8 12 0\n";
+  for (const auto& p : cube().positions) text += fmt::format("{} {} {} 255 0 0 255\n", p.x, p.y, p.z);
+  for (const auto& t : cube().triangles) text += fmt::format("3 {} {} {} 0.5 0.5 0.5\n", t[0], t[1], t[2]);
+  SurfaceMesh s;
+  const std::string error = error_of([&] { s = load_surface(folder.write("colours.off", text)); });
+  CHECK(error == "");
+  CHECK(check_surface(s).volume == doctest::Approx(1));
+}
+
 TEST_CASE("surface files: bad input is one clear line with status 2") {
   Folder folder;
   const auto error = [&](const fs::path& file) {
@@ -281,6 +304,17 @@ TEST_CASE("surface files: bad input is one clear line with status 2") {
   std::string lines = good;  // text cut in the middle of its faces
   lines.resize(lines.size() - 30);
   CHECK(error(folder.write("truncated_text.ply", lines)) != "");
+
+  lines = ascii_ply(cube({1000.25, 1000.25, 1000.25}));  // enough bytes for all it claims
+  const std::string off = "OFF\n8 12 0\n" + lines.substr(lines.find("end_header\n") + 11);
+  CHECK(load_surface(folder.write("whole.off", off)).triangles.size() == 12);
+  for (std::size_t cut = 2; cut < 70; ++cut) {  // through the last eight faces
+    CAPTURE(cut);
+    const std::string ply = error(folder.write("cut.ply", lines.substr(0, lines.size() - cut)));
+    CHECK(contains(ply, "file ends before its last face"));
+    CHECK(contains(error(folder.write("cut.off", off.substr(0, off.size() - cut))),
+                   "ends before its last OFF face"));
+  }
 
   SurfaceMesh nan = load_surface(folder.write("nan.off",
                                               "OFF\n4 4 0\nnan 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n"

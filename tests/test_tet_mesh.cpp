@@ -140,6 +140,10 @@ TEST_CASE("finish: what is no mesh is refused") {
   CHECK(contains(error(bad), "tets 0 and 12 overlap"));
   bad = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.1, 0.1, 0.5}}, {{0, 1, 2, 3}, {0, 1, 2, 4}}, {}};
   CHECK(contains(error(bad), "tets 0 and 1 overlap"));
+  bad = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}, {0.2, 0.2, -1}},
+         {{0, 1, 2, 3}, {0, 2, 1, 4}, {0, 2, 1, 5}},
+         {}};  // a face with three tets, the first two on opposite sides
+  CHECK(contains(error(bad), "overlap"));
 }
 
 TEST_CASE("finish: small and large units give the same mesh") {

@@ -51,6 +51,8 @@ TEST_CASE("tetgen: the shipped models' counts") {
               {"armadillo.ply", "pY", 6362, 12720, 32312, 45542, 19591, 894, 1, 0},
               {"armadillo.ply", "pYq1.85o/140", 7284, 12720, 35746, 50566, 22103, 0, 1, 0},
               {"dragon.ply", "pY", 5291, 10582, 27158, 38443, 16576, 455, 0, 1},
+              {"dragon.ply", "pYq1.85o/140", 5889, 10582, 28812, 40555, 17632, 0, 0, 1},
+              {"dragon_21k.ply", "pY", 10582, 21164, 55431, 79116, 34267, 1682, 0, 1},
               {"dragon_21k.ply", "-pYq1.85o/140Q", 12214, 21164, 61133, 87256, 38337, 0, 0, 1}};
   for (const auto& row : rows) {
     CAPTURE(row.name);

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "app/scene.h"
+#include "app/statistics.h"
 #include "render/renderer.h"
 
 namespace tetpbd {
@@ -26,7 +28,20 @@ struct BenchOptions {
   SceneOverrides overrides;    ///< for every scene
 };
 
+struct BenchRow {
+  std::string scene, mode, constraints, size;  ///< size empty: no rendering
+  int iterations = 1, substeps = 1;
+  std::size_t vertices = 0, tets = 0, gpu_bytes = 0;
+  Percentiles fps;                     ///< over repetitions: median, smallest (p05), largest (p95)
+  Percentiles gpu_ms, wall_ms;         ///< a step
+  long dispatches = 0;
+  double max_volume_loss_percent = 0;  ///< NaN where the error run was cut short
+};
+
+/// Every combination, in the current context; `report` is called after each row.
+std::vector<BenchRow> bench_rows(const BenchOptions& options, const std::function<void(const BenchRow&)>& report = {});
 /// Prints a table, writes bench.csv and bench.json.
 int run_bench(const BenchOptions& options);
+std::string bench_csv(const std::vector<BenchRow>& rows);
 
 }  // namespace tetpbd

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include "app/bench.h"
+#include "app/compare.h"
 #include "app/headless.h"
 #include "app/mesh_command.h"
 #include "app/scene.h"
@@ -84,6 +85,12 @@ void parse_size(const std::string& size, int& width, int& height) {
     throw Error("bad size", "--size " + size, "write WIDTHxHEIGHT, each from 16 to 16384, as in 1280x720");
 }
 
+void parse_shard(const std::string& text, int& shard, int& shards) {
+  int end = 0;
+  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &end) != 2 || end != int(text.size()) || shard < 1 || shards < shard)
+    throw Error("bad shard", "--shard " + text, "write i/n with i from 1 to n, as in 2/8");
+}
+
 Scene scene_of(SceneArguments& a) {
   parse_size(a.size, a.width, a.height);
   a.view.look = Look(index_of(look_names, a.look, "--look"));
@@ -141,6 +148,25 @@ int run_commands(int argc, char** argv) {
   bench->add_option("--gpu", bench_options.gpu, "which device")->check(CLI::NonNegativeNumber);
   bench->add_option("--out", bench_options.out, "folder for bench.csv and bench.json")->capture_default_str();
 
+  auto* compare = app.add_subcommand("compare", "speed against error over modes x iterations x substeps");
+  CompareOptions compare_options;
+  std::string shard = "1/1";
+  compare->add_option("--scene", compare_options.scene, "a scene")->capture_default_str();
+  compare->add_option("--mesh", compare_options.overrides.mesh, "mesh in place of the scene's first body");
+  compare->add_option("--tetgen", compare_options.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
+  compare->add_option("--set", compare_options.overrides.set, "PATH=VALUE for anything else in the scene")->expected(1)->take_all();
+  compare->add_option("--modes", compare_options.modes, "solver modes")->delimiter(',')->capture_default_str();
+  compare->add_option("--iterations", compare_options.iterations, "iterations a substep")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
+  compare->add_option("--substeps", compare_options.substeps, "substeps a step")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
+  compare->add_option("--omegas", compare_options.omegas, "over-relaxations (default: the scene's)")->delimiter(',')->check(CLI::Range(0.0, 4.0));
+  compare->add_option("--steps", compare_options.steps, "steps of each run")->check(CLI::Range(1L, 1000000000L))->capture_default_str();
+  compare->add_option("--budget-ms", compare_options.budget_ms, "print the best setting within that time a step")->check(CLI::PositiveNumber);
+  compare->add_option("--error", compare_options.error_percent, "print the cheapest setting that loses at most this volume, %")->check(CLI::PositiveNumber);
+  compare->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")->capture_default_str();
+  compare->add_option("--merge", compare_options.merge, "folders of finished shards, instead of running");
+  compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::NonNegativeNumber);
+  compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")->capture_default_str();
+
   auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
   std::filesystem::path mesh_file, mesh_out;
   std::string mesh_switches = "pYq1.85o/140";
@@ -171,6 +197,10 @@ int run_commands(int argc, char** argv) {
     parse_size(bench_size, bench_options.width, bench_options.height);
     bench_options.render = !no_render;
     return run_bench(bench_options);
+  }
+  if (*compare) {
+    parse_shard(shard, compare_options.shard, compare_options.shards);
+    return run_compare(compare_options);
   }
   if (*run || scene.explain) {
     const Scene opened = scene_of(scene);

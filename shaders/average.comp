@@ -1,4 +1,4 @@
-// Constraint-centric Jacobi, second half: p += omega * (sum of corrections) / n_i, then contacts; clears the sums.
+// Constraint-centric Jacobi, second half (method.md eqs. 13-14): p += omega * (sum of corrections) / n_i, then contacts; clears the sums.
 #include "types.glsl"
 #include "pair.glsl"
 layout(local_size_x = 256) in;

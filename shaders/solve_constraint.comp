@@ -1,4 +1,4 @@
-// Constraint-centric Jacobi (paper algorithm 3): one thread a constraint adds its corrections to its vertices' sums.
+// Constraint-centric Jacobi (paper algorithm 3; method.md eqs. 4, 14): one thread a constraint adds its corrections to its vertices' sums.
 // Sums are integers, so their order does not matter and the result is the same bits every time. A unit is params.delta_unit
 // times the vertex's number of constraints, and no correction exceeds params.limit = 2^30 units over that number: a sum cannot overflow.
 #include "types.glsl"

@@ -1,4 +1,4 @@
-// Node-centric Jacobi (paper algorithm 2): one thread a vertex gathers the corrections of all constraints on it, of every
+// Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): one thread a vertex gathers the corrections of all constraints on it, of every
 // kind present, averages, and writes the other buffer. Each constraint is evaluated once by each of its vertices.
 #include "types.glsl"
 #include "pair.glsl"

@@ -41,7 +41,7 @@ class CpuPbd {
     });
   }
 
-  /// One step of `settings.dt` (method.md eqs. 1-5), `settings.substeps` substeps.
+  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15), `settings.substeps` substeps.
   void step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep) {
     const double h = settings.dt / settings.substeps;
     const glm::dvec3 gravity(0, -settings.gravity, 0);

@@ -1,4 +1,4 @@
-// How right a state is: error, momentum and energy, reduced on the GPU and read back late.
+// How right a state is (method.md eqs. 16-24): error, momentum and energy, reduced on the GPU and read back late.
 #pragma once
 
 #include <deque>

@@ -1,4 +1,4 @@
-// Non-linear Gauss-Seidel on one CPU core, float: the paper's baseline, with contiguous constraints and everything inlined.
+// Non-linear Gauss-Seidel on one CPU core, float (method.md eq. 15): the paper's baseline, with contiguous constraints and everything inlined.
 #include <memory>
 
 #include "sim/cpu_pbd.h"

@@ -1,5 +1,5 @@
 // Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so an inverted tet is pushed back
-// (paper eqs. 16-20; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a regular tet's at rest)
+// (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a regular tet's at rest)
 // keeps the correction under about ten times the tet's size there.
 Constraint4 volume(vec3 x[4], real rest) {
   Constraint4 c;

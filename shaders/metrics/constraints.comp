@@ -1,4 +1,4 @@
-// How far edges, hinges and tets of one body are from rest.
+// How far edges, hinges and tets of one body are from rest (method.md eqs. 16-19).
 #include "metrics/reduce.glsl"
 #include "constraints/types.glsl"
 #include "constraints/bend.glsl"

@@ -1,4 +1,4 @@
-// Distance to the rigidly aligned rest shape, and angular momentum about the centre of mass, of one body.
+// Distance to the rigidly aligned rest shape (method.md eq. 20), and angular momentum about the centre of mass, of one body.
 #include "metrics/reduce.glsl"
 layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
 layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };

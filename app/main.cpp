@@ -14,6 +14,7 @@
 #include "app/compare.h"
 #include "app/headless.h"
 #include "app/mesh_command.h"
+#include "app/reproduce.h"
 #include "app/scene.h"
 #include "app/window.h"
 #include "sim/error.h"
@@ -167,6 +168,12 @@ int run_commands(int argc, char** argv) {
   compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::NonNegativeNumber);
   compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")->capture_default_str();
 
+  auto* reproduce = app.add_subcommand("reproduce", "the paper's table and figures, measured here, with plots and one report");
+  ReproduceOptions reproduce_options;
+  reproduce->add_option("--out", reproduce_options.out, "folder for report.html, figures, tables")->capture_default_str();
+  reproduce->add_flag("--quick", reproduce_options.quick, "bunny alone, few frames: checks the trends without a GPU");
+  reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(CLI::NonNegativeNumber);
+
   auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
   std::filesystem::path mesh_file, mesh_out;
   std::string mesh_switches = "pYq1.85o/140";
@@ -180,8 +187,13 @@ int run_commands(int argc, char** argv) {
   int info_gpu = -1;
   info->add_option("--gpu", info_gpu, "which device")->check(CLI::NonNegativeNumber);
 
+  // Options without a command belong to the window: tetpbd --scene beam.
+  std::vector<std::string> words(argv + 1, argv + argc);
+  if (!words.empty() && words[0].starts_with("--") && words[0] != "--help" && words[0] != "--version" && !words[0].starts_with("--shaders"))
+    words.insert(words.begin(), "view");
+  std::reverse(words.begin(), words.end());  // the order CLI11 takes them in
   try {
-    app.parse(argc, argv);
+    app.parse(words);
   } catch (const CLI::ParseError& problem) {
     if (problem.get_exit_code() == 0) return app.exit(problem);  // --help, --version
     std::string what = problem.what();
@@ -198,6 +210,7 @@ int run_commands(int argc, char** argv) {
     bench_options.render = !no_render;
     return run_bench(bench_options);
   }
+  if (*reproduce) return run_reproduce(reproduce_options);
   if (*compare) {
     parse_shard(shard, compare_options.shard, compare_options.shards);
     return run_compare(compare_options);

@@ -254,7 +254,7 @@ std::vector<std::string> scene_names() {
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides) {
   fs::path file = name_or_file;
   std::error_code error;
-  if (file.extension() != ".json" && !fs::exists(file, error)) file = models_folder() / "scenes" / (name_or_file + ".json");
+  if (!fs::is_regular_file(file, error) && file.extension() != ".json") file = models_folder() / "scenes" / (name_or_file + ".json");
   if (!fs::is_regular_file(file, error))
     throw Error("no such scene", name_or_file, fmt::format("give a .json file or one of {}", fmt::join(scene_names(), ", ")));
   if (fs::file_size(file, error) > (16u << 20)) throw Error("scene file is too large", file.string(), "a scene is a few kilobytes of JSON");

@@ -41,16 +41,26 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
       item["block"] = {{"size", vector(body.block->size)}, {"cells", {body.block->cells.x, body.block->cells.y, body.block->cells.z}}};
     else
       item["mesh"] = body.mesh.string(), item["tetgen"] = body.tetgen;
-    item["height"] = body.height;
+    if (body.height > 0) item["height"] = body.height;
     item["position"] = vector(body.position);
     item["rotation"] = vector(body.rotation);
     item["density"] = body.density;
     item["velocity"] = vector(body.velocity);
     item["spin"] = vector(body.spin);
     item["deform"] = body.deform;
+    if (!body.fixed.empty()) {
+      item["fixed"] = ordered_json::array();
+      for (const auto& box : body.fixed) item["fixed"].push_back({{"low", vector(box.low)}, {"high", vector(box.high)}});
+    }
     bodies.push_back(item);
   }
   result["bodies"] = bodies;
+  result["obstacles"] = ordered_json::array();
+  for (const glm::dvec4& plane : scene.obstacles) {
+    const glm::dvec3 normal(plane);
+    result["obstacles"].push_back({{"point", vector(normal * plane.w)}, {"normal", vector(normal)}});
+  }
+  result["duration"] = scene.duration;
   return result;
 }
 

@@ -10,9 +10,10 @@ vec3 gather_$KIND(uint i, Position own) {
     Record$ARITY record = records_$KIND[item >> 2];
     vec3 x[$ARITY];
     float w[$ARITY];
+    Position first = positions[record.vertices[0]];  // relative to the same vertex in every mode: the same bits of C
     for (int j = 0; j < $ARITY; ++j) {
       Position p = positions[record.vertices[j]];
-      x[j] = relative(p, own);
+      x[j] = relative(p, first);
       w[j] = p.inverse_mass;
     }
     Constraint$ARITY c = $KIND(x, record.rest);

@@ -127,7 +127,7 @@ std::string& folder_setting() {
 std::string read_shader_file(const std::string& name) {
   if (const std::string& folder = shader_folder(); !folder.empty()) {
     std::ifstream file(std::filesystem::path(folder) / name, std::ios::binary);
-    if (!file) throw Error("no such shader", folder + "/" + name, "point --shaders at a copy of shaders/");
+    if (!file) throw Error("no such shader", folder + "/" + name, "point --shaders or TETPBD_SHADERS at a copy of shaders/");
     return {std::istreambuf_iterator<char>(file), {}};
   }
   for (const auto& [key, text] : embedded_shaders())

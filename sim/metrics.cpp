@@ -45,6 +45,8 @@ Metrics create_metrics(const Model& model) {
     for (std::size_t other = 0; other < one.present.size(); ++other) one.present[other] = other == k;
     records.push_back(std::move(record_buffers(one).front()));
   }
+  static_assert(std::is_same_v<std::tuple_element_t<0, Kinds>, Stretch> && std::is_same_v<std::tuple_element_t<1, Kinds>, Bend> &&
+                std::is_same_v<std::tuple_element_t<2, Kinds>, Volume>);
   m.stretch = std::move(records[0]);
   m.bend = std::move(records[1]);
   m.volume = std::move(records[2]);
@@ -213,16 +215,16 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
     mass += sim.model->masses[i];
     if (!(sim.inverse_masses[i] > 0)) errors.free = false;
   }
-  if (now.contacts > 0) errors.free = false;
+  if (now.contacts > 0 || sim.settings.damping > 0) errors.free = false;
   if (!errors.free) return;
   const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
   const glm::dvec3 expected = errors.first->momentum + mass * gravity * (now.time - errors.first->time);
-  if (now.speed > 0) errors.linear_drift = std::max(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
+  if (now.speed > 0) errors.linear_drift = std::fmax(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
   // Relative to the angular momentum of a spinning body; of one that hardly spins, to size times sum m|v|.
   const double spun = glm::length(errors.first->angular_momentum), moved = sim.model->size * now.speed;
   const double scale = spun > 0.01 * moved ? spun : moved;
   if (scale > 0)
-    errors.angular_drift = std::max(errors.angular_drift,
+    errors.angular_drift = std::fmax(errors.angular_drift,
                                     glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
 }
 

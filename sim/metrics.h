@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -27,7 +28,7 @@ struct Measurement {
   double speed = 0;                 ///< sum m |v|, kg m/s: what drift is relative to
   glm::dvec3 centre{0};             ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
-  double contacts = 0;              ///< vertices that touch the ground or an obstacle
+  double contacts = 0;              ///< pairs of a vertex and a half space (ground, obstacle) that it touches
   double non_finite = 0;            ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }
   double energy() const { return kinetic + potential; }
@@ -63,8 +64,9 @@ Measurement measure_now(Metrics& metrics, const Sim& sim);
 /// What a run amounts to, from its measurements in order.
 struct RunErrors {
   double max_volume_loss_percent = 0;  ///< the paper's: largest 100 (V0 - V) / V0
-  double linear_drift = 0;             ///< largest |P - (P0 + M g t)| / sum m|v|, while no vertex was fixed or touched anything
-  double angular_drift = 0;            ///< largest |L - L0| / |L0| (of a body that hardly spins: / (size * sum m|v|)), likewise
+  /// NaN while there was nothing to measure: fixed vertices, damping, contact from the start.
+  double linear_drift = std::numeric_limits<double>::quiet_NaN();             ///< largest |P - (P0 + M g t)| / sum m|v|, while no vertex was fixed or touched anything
+  double angular_drift = std::numeric_limits<double>::quiet_NaN();            ///< largest |L - L0| / |L0| (of a body that hardly spins: / (size * sum m|v|)), likewise
   double start_energy = 0, max_energy = 0;  ///< J
   bool free = true;                    ///< so far no contact and no fixed vertex
   std::optional<Measurement> first, last;

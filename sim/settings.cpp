@@ -27,7 +27,7 @@ const std::vector<Parameter>& parameters() {
       {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations a substep", live},
       {"substeps", "solver", &S::substeps, 1, 100000, true, "", "substeps a step", live},
       {"dt", "solver", &S::dt, 1e-6, 1, true, "s", "time of one step", live},
-      {"damping", "solver", &S::damping, 0, 1000, false, "1/s", "velocity lost a second", live},
+      {"damping", "solver", &S::damping, 0, 1000, false, "1/s", "rate at which velocity decays, exp(-damping t)", live},
       {"gravity", "world", &S::gravity, -1000, 1000, false, "m/s^2", "gravity, downwards", live},
       {"ground", "world", &S::ground, 0, 1, false, "", "whether there is a ground plane", live},
       {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane", live},
@@ -75,7 +75,8 @@ namespace {
 }
 
 std::string range_text(const Parameter& row) {
-  return fmt::format("give a number from {:g} to {:g}{}{}", row.low, row.high, *row.unit ? " " : "", row.unit);
+  const char* kind = std::holds_alternative<int Settings::*>(row.member) ? "whole number" : "number";
+  return fmt::format("give a {} from {:g} to {:g}{}{}", kind, row.low, row.high, *row.unit ? " " : "", row.unit);
 }
 
 void check_words(const Parameter& row, const std::string& text, const std::string& where) {

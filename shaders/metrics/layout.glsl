@@ -26,7 +26,7 @@
 #define M_KINETIC 14           // J
 #define M_HEIGHT 15            // sum m y
 #define M_COVARIANCE 16        // 9: sum m (x - x0) X^T, column by column
-#define M_CONTACTS 25          // vertices on a half space
+#define M_CONTACTS 25          // pairs of a vertex and a half space that it touches
 #define M_NON_FINITE 26        // vertices with a position or velocity that is not finite
 #define M_ANGULAR 27           // 3: sum m r x u about the centre of mass
 #define M_RIGID_SQUARES 30     // sum m |x - c - R X|^2

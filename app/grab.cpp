@@ -10,13 +10,14 @@ namespace {
 
 constexpr std::size_t most_neighbours = 32;
 
-// The vertex may go this part of an edge in one step. A tet turns inside out when a vertex passes its opposite
-// face, about 0.8 of an edge away; a quarter leaves the solver several steps to answer, also while the read-back
-// that sets the pace is a few steps old. In metres a second it is edge / (4 dt): 1.5 m/s for a 1 m bunny.
+// The vertex may go this part of an edge in one step. A tet turns inside out when a vertex passes its
+// opposite face, about 0.8 of an edge away; a quarter leaves the solver several steps to answer, also while
+// the read-back that sets the pace is a few steps old. In metres a second it is edge / (4 dt): 1.5 m/s for a
+// 1 m bunny.
 constexpr double edges_a_step = 0.25;
 
-// So many edges from the mean of its neighbours the vertex stops, and beyond turns back: what does not follow is
-// held somewhere (a clamped end, another pin), and pulling on would only draw out a spike of flat tets.
+// So many edges from the mean of its neighbours the vertex stops, and beyond turns back: what does not follow
+// is held somewhere (a clamped end, another pin), and pulling on would only draw out a spike of flat tets.
 constexpr double edges_at_most = 2.5;
 
 std::vector<std::uint32_t> with_neighbours(const TetMesh& mesh, std::uint32_t vertex) {
@@ -101,7 +102,8 @@ Grab begin_grab(Sim& sim, const Pick& pick) {
   return grab;
 }
 
-void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor, std::span<const glm::vec4> planes) {
+void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
+         std::span<const glm::vec4> planes) {
   if (const auto now = poll(grab.watch)) {
     if (!grab.placed) {
       grab.start = grab.position = now->front();
@@ -113,9 +115,11 @@ void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor, st
     grab.pace = std::clamp((limit - apart) / std::max(limit - grab.resting, 0.1 * limit), -1.0, 1.0);
   }
   request(grab.watch, sim);
-  const glm::dvec3 forward(glm::normalize(camera.target - eye(camera))), origin(cursor.origin), along(cursor.direction);
+  const glm::dvec3 forward(glm::normalize(camera.target - eye(camera))), origin(cursor.origin),
+      along(cursor.direction);
   const double towards = glm::dot(along, forward);
-  if (towards > 1e-3) grab.target = origin + along * (glm::dot(grab.hit - origin, forward) / towards) + grab.offset;
+  if (towards > 1e-3)
+    grab.target = origin + along * (glm::dot(grab.hit - origin, forward) / towards) + grab.offset;
   // A pinned vertex has infinite mass and no contact, so it is kept out of the ground and walls here.
   for (const glm::vec4& plane : planes) {
     const glm::dvec3 normal{glm::vec3(plane)};

@@ -1,8 +1,8 @@
 #include "app/input.h"
 
-#include <cmath>
-
 #include <GLFW/glfw3.h>
+
+#include <cmath>
 
 namespace tetpbd {
 
@@ -17,13 +17,17 @@ Ray ray_at(const Session& s, const Rect& view, double x, double y) {
 }
 
 void press(Session& s, Mouse& mouse, const Event& event, const Rect& view) {
-  if (mouse.drag != Mouse::Drag::none || !view.contains(event.x, event.y) || ImGui::GetIO().WantCaptureMouse) return;
+  if (mouse.drag != Mouse::Drag::none || !view.contains(event.x, event.y) || ImGui::GetIO().WantCaptureMouse)
+    return;
   const bool left = event.code == GLFW_MOUSE_BUTTON_LEFT;
-  const bool twice = left && s.now - mouse.last_press < double_click && std::abs(event.x - mouse.press_x) < same_place &&
+  const bool twice = left && s.now - mouse.last_press < double_click &&
+                     std::abs(event.x - mouse.press_x) < same_place &&
                      std::abs(event.y - mouse.press_y) < same_place;
   mouse.button = event.code;
-  if (event.code == GLFW_MOUSE_BUTTON_MIDDLE || (left && (event.modifiers & GLFW_MOD_SHIFT))) mouse.drag = Mouse::Drag::pan;
-  else if (event.code == GLFW_MOUSE_BUTTON_RIGHT) mouse.drag = Mouse::Drag::orbit;
+  if (event.code == GLFW_MOUSE_BUTTON_MIDDLE || (left && (event.modifiers & GLFW_MOD_SHIFT)))
+    mouse.drag = Mouse::Drag::pan;
+  else if (event.code == GLFW_MOUSE_BUTTON_RIGHT)
+    mouse.drag = Mouse::Drag::orbit;
   else if (left) {
     mouse.pinning = twice || (event.modifiers & GLFW_MOD_CONTROL);
     mouse.drag = Mouse::Drag::asking;
@@ -36,9 +40,10 @@ void press(Session& s, Mouse& mouse, const Event& event, const Rect& view) {
 void release(Session& s, Mouse& mouse, const Event& event) {
   if (event.code != mouse.button) return;
   if (mouse.drag == Mouse::Drag::orbit || mouse.drag == Mouse::Drag::pan)
-    s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", s.camera.azimuth, s.camera.elevation, s.camera.distance,
-          s.camera.target.x, s.camera.target.y, s.camera.target.z);
-  // A press that the picker has not answered yet is a click: it still counts for pinning, but catches nothing.
+    s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", s.camera.azimuth, s.camera.elevation,
+          s.camera.distance, s.camera.target.x, s.camera.target.y, s.camera.target.z);
+  // A press that the picker has not answered yet is a click: it still counts for pinning, but catches
+  // nothing.
   if (mouse.drag == Mouse::Drag::grab) let_go(s);
   mouse.drag = Mouse::Drag::none;
   mouse.button = -1;
@@ -63,7 +68,8 @@ void key(Session& s, Ui& ui, const Event& event) {
   if (io.WantTextInput || io.WantCaptureKeyboard) return;
   for (const Shortcut& shortcut : shortcuts()) {
     if (event.code != shortcut.key && (!shortcut.alternative || event.code != shortcut.alternative)) continue;
-    if ((event.modifiers & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER)) != shortcut.modifiers) continue;
+    if ((event.modifiers & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER)) != shortcut.modifiers)
+      continue;
     shortcut.act(s, ui);
     return;
   }
@@ -75,8 +81,10 @@ void take_answer(Session& s, Mouse& mouse) {
   if (!pick) return;
   if (mouse.pinning) {
     mouse.pinning = false;
-    if (pick->hit) toggle_pin(s, pick->vertex);
-    else if (mouse.drag == Mouse::Drag::asking) mouse.drag = Mouse::Drag::orbit;
+    if (pick->hit)
+      toggle_pin(s, pick->vertex);
+    else if (mouse.drag == Mouse::Drag::asking)
+      mouse.drag = Mouse::Drag::orbit;
     return;
   }
   if (mouse.drag != Mouse::Drag::asking) return;
@@ -96,13 +104,17 @@ void handle_input(Session& s, Ui& ui, Mouse& mouse, const Rect& view) {
   }
   mouse.events.clear();
   take_answer(s, mouse);
-  if (mouse.drag == Mouse::Drag::grab && !s.grab) mouse.drag = Mouse::Drag::none;  // let go by a key or a new scene
+  if (mouse.drag == Mouse::Drag::grab && !s.grab)
+    mouse.drag = Mouse::Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
   std::vector<glm::vec4> planes = s.loaded.planes;
-  if (s.loaded.sim.settings.ground) planes.emplace_back(0.0f, 1.0f, 0.0f, float(s.loaded.sim.settings.ground_height));
+  if (s.loaded.sim.settings.ground)
+    planes.emplace_back(0.0f, 1.0f, 0.0f, float(s.loaded.sim.settings.ground_height));
   aim(*s.grab, s.loaded.sim, s.camera, ray_at(s, view, mouse.x, mouse.y), planes);
 }
 
-bool is_busy(const Mouse& mouse) { return mouse.drag != Mouse::Drag::none || mouse.pinning || !mouse.events.empty(); }
+bool is_busy(const Mouse& mouse) {
+  return mouse.drag != Mouse::Drag::none || mouse.pinning || !mouse.events.empty();
+}
 
 }  // namespace tetpbd

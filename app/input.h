@@ -17,9 +17,9 @@ struct Event {
 struct Mouse {
   /// `asking`: pressed, and the picker has not answered yet.
   enum class Drag { none, asking, grab, orbit, pan } drag = Drag::none;
-  bool pinning = false;      ///< the question is for a vertex to pin
-  int button = -1;           ///< that holds the drag
-  double x = 0, y = 0;       ///< cursor, as far as events have been handled
+  bool pinning = false;                              ///< the question is for a vertex to pin
+  int button = -1;                                   ///< that holds the drag
+  double x = 0, y = 0;                               ///< cursor, as far as events have been handled
   double last_press = -1, press_x = 0, press_y = 0;  ///< s, and where: for double clicks
   std::vector<Event> events;
 };

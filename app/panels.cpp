@@ -1,12 +1,12 @@
 // The panel at the right: run, scene, solver, world, view. Widgets of parameters are made from their rows.
+#include <fmt/ranges.h>
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
-
-#include <fmt/ranges.h>
-#include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include "app/ui.h"
 
@@ -41,11 +41,13 @@ template <class T>
 bool number_widget(const Parameter& row, T& value, ImGuiDataType type) {
   const T low = T(row.low), high = T(row.high);
   const std::string id = fmt::format("##{}", row.name);
-  const std::string format = (type == ImGuiDataType_Double ? "%.4g" : "%d") + std::string(*row.unit ? " " : "") + row.unit;
+  const std::string format =
+      (type == ImGuiDataType_Double ? "%.4g" : "%d") + std::string(*row.unit ? " " : "") + row.unit;
   // A linear slider over a wide range cannot be aimed: such a value is dragged, by a part of itself.
   if (!row.logarithmic && row.high - row.low > 20) {
     const float speed = type == ImGuiDataType_Double ? 0.01f * std::max(1.0f, std::abs(float(value))) : 1.0f;
-    return ImGui::DragScalar(id.c_str(), type, &value, speed, &low, &high, format.c_str(), ImGuiSliderFlags_AlwaysClamp);
+    return ImGui::DragScalar(id.c_str(), type, &value, speed, &low, &high, format.c_str(),
+                             ImGuiSliderFlags_AlwaysClamp);
   }
   const int flags = ImGuiSliderFlags_AlwaysClamp | (row.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   return ImGui::SliderScalar(id.c_str(), type, &value, &low, &high, format.c_str(), flags);
@@ -54,7 +56,8 @@ bool number_widget(const Parameter& row, T& value, ImGuiDataType type) {
 std::string help_text(const Parameter& row) {
   std::string text = row.help;
   if (choices(row).empty() && !std::holds_alternative<bool Settings::*>(row.member))
-    text += fmt::format("\n{:g} to {:g}{}{}; Ctrl+click to type", row.low, row.high, *row.unit ? " " : "", row.unit);
+    text += fmt::format("\n{:g} to {:g}{}{}; Ctrl+click to type", row.low, row.high, *row.unit ? " " : "",
+                        row.unit);
   if (row.effect == Effect::restart) text += "\ntakes effect at the next reset";
   return text + fmt::format("\n{}", flag_name(row));
 }
@@ -86,8 +89,10 @@ bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) 
     }
     if (ImGui::Checkbox(allowed[i].c_str(), &on)) {
       changed = true;
-      if (on) chosen.push_back(allowed[i]);
-      else std::erase(chosen, allowed[i]);
+      if (on)
+        chosen.push_back(allowed[i]);
+      else
+        std::erase(chosen, allowed[i]);
     }
     tooltip(help_text(row));
     mark(s, ui, allowed[i]);
@@ -162,7 +167,8 @@ void draw_scene(Session& s, Ui& ui) {
   begin_row("scene");
   if (ImGui::BeginCombo("##scene", s.loaded.scene.name.c_str(), ImGuiComboFlags_HeightLarge)) {
     for (const std::string& name : scene_names()) {
-      if (ImGui::Selectable(name.c_str(), name == s.loaded.name)) s.loading = LoadRequest{name, {}, false, false};
+      if (ImGui::Selectable(name.c_str(), name == s.loaded.name))
+        s.loading = LoadRequest{name, {}, false, false};
       mark(s, ui, "scene=" + name);
     }
     ImGui::EndCombo();
@@ -172,7 +178,8 @@ void draw_scene(Session& s, Ui& ui) {
   begin_row("mesh file");
   const float button = ImGui::CalcTextSize("Load").x + 2 * ImGui::GetStyle().FramePadding.x;
   ImGui::SetNextItemWidth(-button - ImGui::GetStyle().ItemSpacing.x);
-  bool load_it = ImGui::InputTextWithHint("##mesh", "path, Enter", &ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
+  bool load_it =
+      ImGui::InputTextWithHint("##mesh", "path, Enter", &ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
   tooltip("in place of the scene's first body: .ply .obj .stl .off surfaces, .node/.ele .msh tetrahedra");
   mark(s, ui, "mesh");
   ImGui::SameLine();
@@ -218,12 +225,14 @@ void draw_colour_range(Session& s, Ui& ui) {
   begin_row("colour range");
   if (view.colour == Colour::velocity) {
     float high = float(view.velocity.high);
-    if (ImGui::SliderFloat("##range", &high, 0.1f, 50, "0 .. %.2f m/s", ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
+    if (ImGui::SliderFloat("##range", &high, 0.1f, 50, "0 .. %.2f m/s",
+                           ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
       view.velocity = {0, double(high)};
   } else {
     ColourRange& range = view.colour == Colour::volume ? view.volume : view.stretch;
     float percent = float(range.high * 100);
-    if (ImGui::SliderFloat("##range", &percent, 0.1f, 100, "+/- %.1f %%", ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
+    if (ImGui::SliderFloat("##range", &percent, 0.1f, 100, "+/- %.1f %%",
+                           ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
       range = {-double(percent) / 100, double(percent) / 100};
   }
   mark(s, ui, "colour range");
@@ -232,7 +241,8 @@ void draw_colour_range(Session& s, Ui& ui) {
 void draw_view(Session& s, Ui& ui) {
   ViewOptions& view = s.view;
   int look = int(view.look), colour = int(view.colour);
-  if (name_combo(s, ui, "look", look_names, look)) view.look = Look(look), s.log("look {}", look_names[std::size_t(look)]);
+  if (name_combo(s, ui, "look", look_names, look))
+    view.look = Look(look), s.log("look {}", look_names[std::size_t(look)]);
   if (name_combo(s, ui, "colour", colour_names, colour))
     view.colour = Colour(colour), s.log("colour {}", colour_names[std::size_t(colour)]);
   draw_colour_range(s, ui);
@@ -289,8 +299,11 @@ void draw_panel(Session& s, Ui& ui, const Rect& place) {
   ImGui::SetNextWindowPos(ImVec2(place.x, place.y));
   ImGui::SetNextWindowSize(ImVec2(place.width, place.height));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
-  ImGui::Begin("panel", nullptr, (ImGuiWindowFlags_NoDecoration & ~ImGuiWindowFlags_NoScrollbar) | ImGuiWindowFlags_NoMove |
-                                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  ImGui::Begin("panel", nullptr,
+               (ImGuiWindowFlags_NoDecoration & ~ImGuiWindowFlags_NoScrollbar) | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  ImGui::GetWindowDrawList()->AddLine(ImVec2(place.x, place.y), ImVec2(place.x, place.y + place.height),
+                                      ImGui::GetColorU32(ImGuiCol_Border));
   draw_run(s, ui);
   if (section(s, ui, "Scene", true)) draw_scene(s, ui);
   if (section(s, ui, "Solver", true)) draw_parameters(s, ui, "solver");

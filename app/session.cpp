@@ -115,7 +115,8 @@ void change_settings(Session& s, const Settings& wanted) {
       const std::string text = parameter_text(wanted, row);
       if (text == parameter_text(old, row)) continue;
       s.log("set {} {}", row.name, text);
-      if (row.effect == Effect::restart) say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
+      if (row.effect == Effect::restart)
+        say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
       if (row.effect == Effect::rebuild) s.step_ms.values.clear();
     }
   });
@@ -203,9 +204,9 @@ void advance(Session& s, double elapsed) {
   if (!s.playing) return;
   const double dt = s.loaded.sim.settings.dt;
   clock.owed += std::min(elapsed, 0.25);
-  // A driver that queues work hides what a step costs until the frame is late: then the number of steps a frame is
-  // halved, and doubled while there is room. Where a step returns when it is done (CPU modes, software GL) the time
-  // spent here says it all.
+  // A driver that queues work hides what a step costs until the frame is late: then the number of steps a
+  // frame is halved, and doubled while there is room. Where a step returns when it is done (CPU modes,
+  // software GL) the time spent here says it all.
   const bool queued = !s.gl.software && !s.loaded.sim.solver.step_on_cpu;
   constexpr double patience = 0.04;  // s of stepping between two frames
   const auto begin = Steady::now();
@@ -217,7 +218,8 @@ void advance(Session& s, double elapsed) {
     if (seconds_since(begin) > patience) break;
   }
   if (queued && elapsed > 0.066) clock.most_steps = std::max(1, clock.most_steps / 2);
-  if (queued && elapsed < 0.033 && taken == clock.most_steps) clock.most_steps = std::min(clock.most_steps * 2, 1 << 14);
+  if (queued && elapsed < 0.033 && taken == clock.most_steps)
+    clock.most_steps = std::min(clock.most_steps * 2, 1 << 14);
   // What could not be simulated in time is dropped: the simulation then runs slower than real time.
   clock.owed = clock.fast ? 0 : std::min(clock.owed, dt);
 }
@@ -242,9 +244,10 @@ void measure_frame(Session& s, bool stepped) {
     if (!measurement->finite() && s.playing) {
       play(s, false);
       say(s,
-          fmt::format("the state is not finite: at step {}: reset, then use a smaller dt, more substeps or a lower "
-                      "stiffness",
-                      measurement->step),
+          fmt::format(
+              "the state is not finite: at step {}: reset, then use a smaller dt, more substeps or a lower "
+              "stiffness",
+              measurement->step),
           true, true);
     }
   }

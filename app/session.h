@@ -1,5 +1,8 @@
-// What the window shows and what can be done to it, without any widget: a loaded scene, its clock, its messages.
+// What the window shows and what can be done to it, without any widget: a loaded scene, its clock, its
+// messages.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <chrono>
 #include <fstream>
@@ -7,8 +10,6 @@
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "app/grab.h"
 #include "app/scene.h"
@@ -20,7 +21,8 @@
 
 namespace tetpbd {
 
-/// A scene with all that is made from it; replaced as a whole, so that one that fails to load changes nothing.
+/// A scene with all that is made from it; replaced as a whole, so that one that fails to load changes
+/// nothing.
 struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
@@ -41,7 +43,8 @@ struct Message {
   double since = 0;  ///< s
 };
 
-/// A line for each event, in the file that TETPBD_WINDOW_LOG names (docs/window.md), for tests and demonstrations.
+/// A line for each event, in the file that TETPBD_WINDOW_LOG names (docs/window.md), for tests and
+/// demonstrations.
 struct EventLog {
   std::ofstream file;
   template <class... T>
@@ -52,11 +55,11 @@ struct EventLog {
 
 /// Simulated against real time.
 struct Clock {
-  bool fast = false;       ///< as fast as possible instead of real time
-  double owed = 0;         ///< s of real time not yet simulated
-  int most_steps = 4;      ///< a frame; follows what the GPU can do
+  bool fast = false;               ///< as fast as possible instead of real time
+  double owed = 0;                 ///< s of real time not yet simulated
+  int most_steps = 4;              ///< a frame; follows what the GPU can do
   double real = 0, simulated = 0;  ///< s, since the factor was last worked out
-  double factor = 0;       ///< simulated seconds a real one
+  double factor = 0;               ///< simulated seconds a real one
 };
 
 /// The last values of something that changes from frame to frame.
@@ -82,7 +85,7 @@ struct Session {
   Camera camera;
   ViewOptions view;
   int samples = 4;
-  float aspect = 1;       ///< of the viewport
+  float aspect = 1;  ///< of the viewport
   bool playing = true, vsync = true;
   bool take_screenshot = false, quit = false;
   Clock clock;
@@ -93,7 +96,7 @@ struct Session {
   std::optional<Measurement> measured;
   std::size_t stale = 0;  ///< measurements under way that belong to before a reset
   History frames_per_second, step_ms, volume_error;
-  double now = 0;         ///< s since the start
+  double now = 0;  ///< s since the start
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool offer_reset = false);

@@ -1,17 +1,18 @@
 // Around the panel: plots, status line, messages, help, and how the window is shared out.
 #include "app/ui.h"
 
+#include <GLFW/glfw3.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include <GLFW/glfw3.h>
 
 namespace tetpbd {
 
 namespace {
 
-constexpr ImGuiWindowFlags fixed_window = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                                          ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing;
+constexpr ImGuiWindowFlags fixed_window =
+    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing;
 
 void set_look(Session& s, Look look) {
   s.view.look = look;
@@ -23,6 +24,8 @@ void begin_fixed(const char* name, const Rect& place) {
   ImGui::SetNextWindowSize(ImVec2(place.width, place.height));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
   ImGui::Begin(name, nullptr, fixed_window);
+  ImGui::GetWindowDrawList()->AddLine(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y),
+                                      ImGui::GetColorU32(ImGuiCol_Border));
 }
 
 void end_fixed() {
@@ -50,26 +53,26 @@ Range range_of(const History& history, bool is_signed) {
   return {low < 0 ? -most : 0, high > 0 ? most : 0};
 }
 
-void draw_plot(const char* title, const char* unit, const History& history, bool is_signed, float width, const char* absent) {
+void draw_plot(const char* title, const char* unit, const History& history, bool is_signed, float width) {
   ImGui::BeginGroup();
-  const float left = ImGui::GetCursorPosX();
   ImGui::TextDisabled("%s", title);
   const float current = history.values.empty() ? 0.0f : history.values.back();
-  const std::string value = history.values.empty() ? absent
+  const std::string value = history.values.empty() ? std::string()
                             : is_signed            ? fmt::format("{:+.3g} {}", current, unit)
                                                    : fmt::format("{:.3g} {}", current, unit);
-  ImGui::SameLine(left + width - ImGui::CalcTextSize(value.c_str()).x);
+  ImGui::SameLine(width - ImGui::CalcTextSize(value.c_str()).x);
   ImGui::TextUnformatted(value.c_str());
   const Range range = range_of(history, is_signed);
-  ImGui::PlotLines(fmt::format("##{}", title).c_str(), history.values.data(), int(history.values.size()), 0, nullptr, range.low,
-                   range.high, ImVec2(width, ImGui::GetContentRegionAvail().y));
+  ImGui::PlotLines(fmt::format("##{}", title).c_str(), history.values.data(), int(history.values.size()), 0,
+                   nullptr, range.low, range.high, ImVec2(width, ImGui::GetContentRegionAvail().y));
   // The scale, in the plot's own corners.
   ImDrawList* draw = ImGui::GetWindowDrawList();
   const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
   const ImU32 grey = ImGui::GetColorU32(ImGuiCol_TextDisabled, 0.85f);
   const float size = ImGui::GetFontSize() * 0.8f, pad = ImGui::GetStyle().FramePadding.x * 0.6f;
   draw->AddText(nullptr, size, ImVec2(low.x + pad, low.y + 1), grey, fmt::format("{:g}", range.high).c_str());
-  draw->AddText(nullptr, size, ImVec2(low.x + pad, high.y - size - 1), grey, fmt::format("{:g}", range.low).c_str());
+  draw->AddText(nullptr, size, ImVec2(low.x + pad, high.y - size - 1), grey,
+                fmt::format("{:g}", range.low).c_str());
   ImGui::EndGroup();
 }
 
@@ -77,12 +80,13 @@ void draw_plots(const Session& s, const Rect& place) {
   begin_fixed("plots", place);
   const float gap = 2 * ImGui::GetStyle().ItemSpacing.x;
   const float width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
-  draw_plot("frames a second", "fps", s.frames_per_second, false, width, "");
-  ImGui::SameLine(0, gap);
   const bool cpu = bool(s.loaded.sim.solver.step_on_cpu);
-  draw_plot(cpu ? "CPU time a step" : "GPU time a step", "ms", s.step_ms, false, width, "");
-  ImGui::SameLine(0, gap);
-  draw_plot("volume error", "%", s.volume_error, true, width, "");
+  const ImVec2 start = ImGui::GetCursorPos();
+  draw_plot("frames a second", "fps", s.frames_per_second, false, width);
+  ImGui::SetCursorPos(ImVec2(start.x + width + gap, start.y));
+  draw_plot(cpu ? "CPU time a step" : "GPU time a step", "ms", s.step_ms, false, width);
+  ImGui::SetCursorPos(ImVec2(start.x + 2 * (width + gap), start.y));
+  draw_plot("volume error", "%", s.volume_error, true, width);
   end_fixed();
 }
 
@@ -94,7 +98,8 @@ std::string short_renderer(const std::string& renderer) {
 }
 
 std::string counted(std::size_t count, const char* what) {
-  return count < 10000 ? fmt::format("{} {}", count, what) : fmt::format("{:.1f}k {}", double(count) / 1000, what);
+  return count < 10000 ? fmt::format("{} {}", count, what)
+                       : fmt::format("{:.1f}k {}", double(count) / 1000, what);
 }
 
 void draw_status(const Session& s, const Rect& place) {
@@ -133,8 +138,10 @@ void draw_status(const Session& s, const Rect& place) {
       ImGui::SameLine(0, 0);
     }
     const bool last = i + 1 == parts.size();
-    if (last && slow) ImGui::TextColored(ImVec4(0.72f, 0.33f, 0.05f, 1), "%s", parts[i].text.c_str());
-    else ImGui::TextUnformatted(parts[i].text.c_str());
+    if (last && slow)
+      ImGui::TextColored(ImVec4(0.72f, 0.33f, 0.05f, 1), "%s", parts[i].text.c_str());
+    else
+      ImGui::TextUnformatted(parts[i].text.c_str());
   }
   end_fixed();
 }
@@ -149,8 +156,10 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
     const Message message = s.messages[i];
     ImGui::SetNextWindowPos(ImVec2(view.x + margin, top));
     ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(width, view.height));
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, message.error ? ImVec4(0.995f, 0.925f, 0.905f, 0.97f) : ImVec4(1, 1, 1, 0.93f));
-    ImGui::PushStyleColor(ImGuiCol_Border, message.error ? ImVec4(0.80f, 0.36f, 0.26f, 0.8f) : ImVec4(0.80f, 0.82f, 0.84f, 1));
+    ImGui::PushStyleColor(ImGuiCol_WindowBg,
+                          message.error ? ImVec4(0.995f, 0.925f, 0.905f, 0.97f) : ImVec4(1, 1, 1, 0.93f));
+    ImGui::PushStyleColor(ImGuiCol_Border,
+                          message.error ? ImVec4(0.80f, 0.36f, 0.26f, 0.8f) : ImVec4(0.80f, 0.82f, 0.84f, 1));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
     ImGui::Begin(fmt::format("message {}", message.text).c_str(), nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
@@ -179,46 +188,46 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
   }
 }
 
-void help_rows(const char* id, const std::vector<std::pair<const char*, const char*>>& rows) {
-  if (!ImGui::BeginTable(id, 2, ImGuiTableFlags_SizingFixedFit)) return;
+using HelpRows = std::vector<std::pair<const char*, const char*>>;
+
+void help_rows(const char* title, const HelpRows& rows) {
+  float column = 0;
+  for (const auto& row : rows) column = std::max(column, ImGui::CalcTextSize(row.first).x);
+  ImGui::TextDisabled("%s", title);
   for (const auto& [keys, help] : rows) {
-    ImGui::TableNextColumn();
     ImGui::TextColored(ImVec4(0.18f, 0.42f, 0.60f, 1), "%s", keys);
-    ImGui::TableNextColumn();
+    ImGui::SameLine(column + 2 * ImGui::GetStyle().ItemSpacing.x);
     ImGui::TextUnformatted(help);
   }
-  ImGui::EndTable();
 }
 
 void draw_help(Ui& ui, const Layout& layout) {
-  const float width = layout.view.width + (ui.panels ? layout.panel.width : 0), height = layout.status.y + layout.status.height;
+  const float width = layout.view.width + (ui.panels ? layout.panel.width : 0),
+              height = layout.status.y + layout.status.height;
   ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(24 * ui.scale, 20 * ui.scale));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 10 * ui.scale);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
-  ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.99f, 0.99f, 0.995f, 0.97f));
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.99f, 0.99f, 0.995f, 1));
   ImGui::SetNextWindowFocus();
   ImGui::Begin("help", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_AlwaysAutoResize);
-  std::vector<std::pair<const char*, const char*>> rows;
+  HelpRows rows;
   for (const Shortcut& shortcut : shortcuts()) rows.emplace_back(shortcut.shown, shortcut.help);
-  if (ImGui::BeginTable("columns", 2, ImGuiTableFlags_SizingFixedFit)) {
-    ImGui::TableNextColumn();
-    ImGui::TextDisabled("Keys");
-    help_rows("keys", rows);
-    ImGui::TableNextColumn();
-    ImGui::TextDisabled("Mouse");
-    help_rows("mouse", {{"Left drag", "pull the body, or turn the view beside it"},
-                        {"Right drag", "turn the view"},
-                        {"Middle drag", "move the view (or Shift + drag)"},
-                        {"Wheel", "closer, farther"},
-                        {"Double click", "pin a vertex, or free it (or Ctrl + click)"}});
-    ImGui::Dummy(ImVec2(0, 10 * ui.scale));
-    ImGui::TextDisabled("Sliders");
-    help_rows("sliders", {{"Ctrl + click", "type a value"}, {"Hover", "what it means"}});
-    ImGui::EndTable();
-  }
+  ImGui::BeginGroup();
+  help_rows("Keys", rows);
+  ImGui::EndGroup();
+  ImGui::SameLine(0, 36 * ui.scale);
+  ImGui::BeginGroup();
+  help_rows("Mouse", {{"Left drag", "pull the body, or turn the view beside it"},
+                      {"Right drag", "turn the view"},
+                      {"Middle drag", "move the view (or Shift + drag)"},
+                      {"Wheel", "closer, farther"},
+                      {"Double click", "pin a vertex, or free it (or Ctrl + click)"}});
+  ImGui::Dummy(ImVec2(0, 10 * ui.scale));
+  help_rows("Sliders", {{"Ctrl + click", "type a value"}, {"Hover", "what it means"}});
+  ImGui::EndGroup();
   ImGui::End();
   ImGui::PopStyleColor();
   ImGui::PopStyleVar(3);
@@ -233,7 +242,8 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_R, 0, 0, "R", "reset", [](Session& s, Ui&) { restart(s); }},
       {GLFW_KEY_F, 0, 0, "F", "show all of the body", [](Session& s, Ui&) { frame_body(s); }},
       {GLFW_KEY_1, GLFW_KEY_KP_1, 0, "1", "surface", [](Session& s, Ui&) { set_look(s, Look::surface); }},
-      {GLFW_KEY_2, GLFW_KEY_KP_2, 0, "2", "surface with edges", [](Session& s, Ui&) { set_look(s, Look::wire); }},
+      {GLFW_KEY_2, GLFW_KEY_KP_2, 0, "2", "surface with edges",
+       [](Session& s, Ui&) { set_look(s, Look::wire); }},
       {GLFW_KEY_3, GLFW_KEY_KP_3, 0, "3", "tetrahedra", [](Session& s, Ui&) { set_look(s, Look::tets); }},
       {GLFW_KEY_C, 0, 0, "C", "next colour",
        [](Session& s, Ui&) {
@@ -264,9 +274,12 @@ const std::vector<Shortcut>& shortcuts() {
        }},
       {GLFW_KEY_ESCAPE, 0, 0, "Esc", "close help, messages; let go",
        [](Session& s, Ui& ui) {
-         if (ui.help) s.log("help false");
-         else if (s.grab) let_go(s);
-         else s.messages.clear();
+         if (ui.help)
+           s.log("help false");
+         else if (s.grab)
+           let_go(s);
+         else
+           s.messages.clear();
          ui.help = false;
        }},
       {GLFW_KEY_Q, 0, GLFW_MOD_CONTROL, "Ctrl + Q", "quit", [](Session& s, Ui&) { s.quit = true; }},
@@ -297,12 +310,6 @@ void draw_ui(Session& s, Ui& ui, const Layout& layout) {
     draw_status(s, layout.status);
     ImGui::PopStyleColor();
     ImGui::PopStyleVar();
-    // Hair lines between the parts.
-    ImDrawList* draw = ImGui::GetForegroundDrawList();
-    const ImU32 line = ImGui::GetColorU32(ImGuiCol_Border);
-    draw->AddLine(ImVec2(layout.panel.x, 0), ImVec2(layout.panel.x, layout.panel.height), line);
-    if (layout.plots.height > 0) draw->AddLine(ImVec2(0, layout.plots.y), ImVec2(layout.plots.width, layout.plots.y), line);
-    draw->AddLine(ImVec2(0, layout.status.y), ImVec2(layout.status.width, layout.status.y), line);
   }
   draw_messages(s, ui, layout.view);
   if (ui.help) draw_help(ui, layout);
@@ -310,7 +317,8 @@ void draw_ui(Session& s, Ui& ui, const Layout& layout) {
 
 void draw_loading(const Layout& layout, const std::string& what) {
   const Rect& view = layout.view;
-  ImGui::SetNextWindowPos(ImVec2(view.x + view.width / 2, view.y + view.height / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
+  ImGui::SetNextWindowPos(ImVec2(view.x + view.width / 2, view.y + view.height / 2), ImGuiCond_Always,
+                          ImVec2(0.5f, 0.5f));
   ImGui::Begin("loading", nullptr, fixed_window | ImGuiWindowFlags_AlwaysAutoResize);
   ImGui::Text("loading %s ...", what.c_str());
   ImGui::End();

@@ -1,11 +1,11 @@
 // The panels: what they show comes from a Session, what they change goes through its functions.
 #pragma once
 
+#include <imgui.h>
+
 #include <map>
 #include <string>
 #include <vector>
-
-#include <imgui.h>
 
 #include "app/session.h"
 
@@ -20,15 +20,16 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
-/// The window, cut up without overlap: the panel at the right, plots and status line below, the view in what is left.
+/// The window, cut up without overlap: the panel at the right, plots and status line below, the view in what
+/// is left.
 struct Layout {
   Rect view, panel, plots, status;
 };
 
 struct Ui {
   bool panels = true, plots = true, help = false;
-  float scale = 1;                    ///< of the display: 2 on a dense one
-  std::string mesh;                   ///< path being typed
+  float scale = 1;                     ///< of the display: 2 on a dense one
+  std::string mesh;                    ///< path being typed
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
 };
 
@@ -48,7 +49,8 @@ void draw_ui(Session& session, Ui& ui, const Layout& layout);
 /// Over the view while a scene loads.
 void draw_loading(const Layout& layout, const std::string& what);
 
-/// Colours, sizes and font for a display of this scale (ui_style.cpp). `density`: framebuffer pixels a window coordinate.
+/// Colours, sizes and font for a display of this scale (ui_style.cpp). `density`: framebuffer pixels a window
+/// coordinate.
 void set_style(float scale, float density);
 
 // Parts of draw_ui (panels.cpp)

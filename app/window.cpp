@@ -1,15 +1,15 @@
 #include "app/window.h"
 
+#include <GL/glew.h>
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-
-#include <GL/glew.h>
-#include <GLFW/glfw3.h>
-#include <imgui.h>
-#include <backends/imgui_impl_glfw.h>
-#include <backends/imgui_impl_opengl3.h>
 
 #include "app/files.h"
 #include "app/input.h"
@@ -39,7 +39,8 @@ struct Desktop {
   float scale = 0, density = 0;  ///< what the style was made for
 
   Desktop(int width, int height, const std::string& title) {
-    if (!glfwInit()) throw Error("no display", last_glfw_error(), "start it in a desktop session, or use tetpbd run");
+    if (!glfwInit())
+      throw Error("no display", last_glfw_error(), "start it in a desktop session, or use tetpbd run");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -77,7 +78,8 @@ void listen(GLFWwindow* window, Mouse& mouse) {
   glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
     // Held down, only the key that steps goes on.
     const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT);
-    if (action == GLFW_PRESS || again) mouse_of(w).events.push_back({Event::Kind::key, code, modifiers, 0, 0});
+    if (action == GLFW_PRESS || again)
+      mouse_of(w).events.push_back({Event::Kind::key, code, modifiers, 0, 0});
   });
   glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int code, int action, int modifiers) {
     double x = 0, y = 0;
@@ -238,12 +240,15 @@ void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, GLFWwindow* window
   take_screenshots(s, view);
   const std::optional<LoadRequest> before = s.loading;
   draw_ui(s, ui, layout);
-  if (s.loading) draw_loading(layout, s.loading->overrides.mesh.empty() ? s.loading->name : s.loading->overrides.mesh.string());
+  if (s.loading)
+    draw_loading(layout,
+                 s.loading->overrides.mesh.empty() ? s.loading->name : s.loading->overrides.mesh.string());
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glDisable(GL_SCISSOR_TEST);
   glClearColor(0.93f, 0.935f, 0.94f, 1);
   glClear(GL_COLOR_BUFFER_BIT);
-  if (view.target.framebuffer) present(view.target, 0, 0, pixels(float(extent.height)) - height, width, height);
+  if (view.target.framebuffer)
+    present(view.target, 0, 0, pixels(float(extent.height)) - height, width, height);
   end_imgui_frame(window, extent);
   if (before) finish_loading(s);  // its message has been on the screen for a frame
 }
@@ -273,6 +278,7 @@ int run_window(const Scene& scene, const WindowOptions& options) {
   bool vsync = !s.vsync;
   std::string title;
   Extent last;
+  long frames = 0;
   double before = glfwGetTime(), last_check = before, last_event = before;
   s.log("ready");
   while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
@@ -280,19 +286,23 @@ int run_window(const Scene& scene, const WindowOptions& options) {
     const bool idle = !s.playing && !is_busy(mouse) && !s.loading && view.read_back.pending() == 0 &&
                       glfwGetTime() - last_event > 0.5;
     const Extent extent = extent_of(desktop.window);
-    if (!extent.visible || idle) glfwWaitEventsTimeout(0.1);
-    else glfwPollEvents();
+    if (!extent.visible || idle)
+      glfwWaitEventsTimeout(0.1);
+    else
+      glfwPollEvents();
     s.now = glfwGetTime();
     if (!mouse.events.empty()) last_event = s.now;
     const double elapsed = s.now - before;
     before = s.now;
     if (!extent.visible) continue;
-    if (!idle && elapsed > 0) s.frames_per_second.add(1 / elapsed);
+    if (!idle && ++frames > 2)
+      s.frames_per_second.add(1 / std::max(elapsed, 1e-6));  // the first compile shaders
     if (extent.width != last.width || extent.height != last.height) {
       s.log("size {} {}", extent.width, extent.height);
       last = extent;
     }
-    if (s.loaded.scene.name != title) glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
+    if (s.loaded.scene.name != title)
+      glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
     if (s.vsync != vsync) glfwSwapInterval((vsync = s.vsync) ? 1 : 0);
     follow_scale(desktop, ui, extent);
     s.measuring = ui.panels && ui.plots;

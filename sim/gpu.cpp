@@ -21,8 +21,9 @@ namespace {
 
 std::atomic<int> error_count = 0;
 
-void GLAPIENTRY on_message(GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text, const void*) {
-  if (type != GL_DEBUG_TYPE_ERROR) return;
+void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text, const void*) {
+  // What the shader compiler finds is thrown as an Error with file and line.
+  if (type != GL_DEBUG_TYPE_ERROR || source == GL_DEBUG_SOURCE_SHADER_COMPILER) return;
   ++error_count;
   std::fprintf(stderr, "GL error: %s\n", text);
 }

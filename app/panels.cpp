@@ -21,7 +21,8 @@ std::string label_of(const char* name) {
 }
 
 void tooltip(const std::string& text) {
-  if (text.empty() || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+  if (text.empty() || ImGui::IsItemActive() || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
+    return;
   ImGui::BeginTooltip();
   ImGui::PushTextWrapPos(ImGui::GetFontSize() * 24);
   ImGui::TextUnformatted(text.c_str());
@@ -302,8 +303,7 @@ void draw_panel(Session& s, Ui& ui, const Rect& place) {
   ImGui::Begin("panel", nullptr,
                (ImGuiWindowFlags_NoDecoration & ~ImGuiWindowFlags_NoScrollbar) | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
-  ImGui::GetWindowDrawList()->AddLine(ImVec2(place.x, place.y), ImVec2(place.x, place.y + place.height),
-                                      ImGui::GetColorU32(ImGuiCol_Border));
+  draw_edge(place, place.x, place.y + place.height);
   draw_run(s, ui);
   if (section(s, ui, "Scene", true)) draw_scene(s, ui);
   if (section(s, ui, "Solver", true)) draw_parameters(s, ui, "solver");

@@ -24,8 +24,7 @@ void begin_fixed(const char* name, const Rect& place) {
   ImGui::SetNextWindowSize(ImVec2(place.width, place.height));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
   ImGui::Begin(name, nullptr, fixed_window);
-  ImGui::GetWindowDrawList()->AddLine(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y),
-                                      ImGui::GetColorU32(ImGuiCol_Border));
+  draw_edge(place, place.x + place.width, place.y);
 }
 
 void end_fixed() {
@@ -234,6 +233,13 @@ void draw_help(Ui& ui, const Layout& layout) {
 }
 
 }  // namespace
+
+void draw_edge(const Rect& place, float to_x, float to_y) {
+  ImDrawList* draw = ImGui::GetWindowDrawList();
+  draw->PushClipRectFullScreen();
+  draw->AddLine(ImVec2(place.x, place.y), ImVec2(to_x, to_y), ImGui::GetColorU32(ImGuiCol_Border));
+  draw->PopClipRect();
+}
 
 const std::vector<Shortcut>& shortcuts() {
   static const std::vector<Shortcut> rows = {

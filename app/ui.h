@@ -53,8 +53,10 @@ void draw_loading(const Layout& layout, const std::string& what);
 /// coordinate.
 void set_style(float scale, float density);
 
-// Parts of draw_ui (panels.cpp)
+// Parts of draw_ui
 void draw_panel(Session& session, Ui& ui, const Rect& place);
+/// A hair line from the place's upper left corner, between it and its neighbour.
+void draw_edge(const Rect& place, float to_x, float to_y);
 /// Notes where the last widget is, so that a test can find it: "at NAME x y width height".
 void mark(Session& session, Ui& ui, const std::string& name);
 void mark(Session& session, Ui& ui, const std::string& name, const Rect& place);

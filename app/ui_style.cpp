@@ -25,8 +25,8 @@ void set_colours(ImVec4* c) {
   c[ImGuiCol_FrameBgHovered] = ImVec4(0.85f, 0.875f, 0.90f, 1);
   c[ImGuiCol_FrameBgActive] = ImVec4(0.80f, 0.84f, 0.88f, 1);
   c[ImGuiCol_CheckMark] = accent;
-  c[ImGuiCol_SliderGrab] = tint(0.85f);
-  c[ImGuiCol_SliderGrabActive] = accent;
+  c[ImGuiCol_SliderGrab] = tint(0.5f);
+  c[ImGuiCol_SliderGrabActive] = tint(0.75f);
   c[ImGuiCol_Button] = ImVec4(0.875f, 0.888f, 0.902f, 1);
   c[ImGuiCol_ButtonHovered] = ImVec4(0.81f, 0.845f, 0.88f, 1);
   c[ImGuiCol_ButtonActive] = ImVec4(0.73f, 0.79f, 0.85f, 1);

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <regex>
 #include <sstream>
 
@@ -162,7 +163,7 @@ const std::string& shader_folder() { return folder_setting(); }
 
 std::int64_t shader_folder_version() {
   if (shader_folder().empty()) return 0;
-  std::int64_t newest = 0;
+  std::int64_t newest = std::numeric_limits<std::int64_t>::min();  // the file clock starts in 2174
   std::error_code ignored;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(shader_folder(), ignored))
     if (entry.is_regular_file(ignored))

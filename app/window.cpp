@@ -1,9 +1,325 @@
 #include "app/window.h"
 
+#include <GL/glew.h>
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "app/files.h"
+#include "app/input.h"
+#include "app/session.h"
+#include "app/ui.h"
+#include "render/target.h"
 #include "sim/error.h"
 
 namespace tetpbd {
 
-int run_window(const Scene&, const WindowOptions&) { throw Error("no window yet", "view", "use tetpbd run"); }
+namespace {
+
+const char* variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value && *value ? value : nullptr;
+}
+
+std::string last_glfw_error() {
+  const char* text = nullptr;
+  glfwGetError(&text);
+  return text ? text : "no reason given";
+}
+
+/// GLFW, a window with a GL 4.3 core context, and Dear ImGui in it.
+struct Desktop {
+  GLFWwindow* window = nullptr;
+  float scale = 0, density = 0;  ///< what the style was made for
+
+  Desktop(int width, int height, const std::string& title) {
+    if (!glfwInit())
+      throw Error("no display", last_glfw_error(), "start it in a desktop session, or use tetpbd run");
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    glfwWindowHint(GLFW_SAMPLES, 0);  // the view has its own target
+    glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+    const char* debug = variable("TETPBD_GL_DEBUG");
+    glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, debug && std::string(debug) != "0");
+    window = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+    if (!window) {
+      const std::string reason = last_glfw_error();
+      glfwTerminate();
+      throw Error("no window with OpenGL 4.3", reason, "use a newer driver, or tetpbd run", 1);
+    }
+    glfwSetWindowSizeLimits(window, 480, 320, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    glfwMakeContextCurrent(window);
+  }
+  ~Desktop() {
+    if (ImGui::GetCurrentContext()) {
+      ImGui_ImplOpenGL3_Shutdown();
+      ImGui_ImplGlfw_Shutdown();
+      ImGui::DestroyContext();
+    }
+    if (window) glfwDestroyWindow(window);
+    glfwTerminate();
+  }
+  Desktop(const Desktop&) = delete;
+  Desktop& operator=(const Desktop&) = delete;
+};
+
+Mouse& mouse_of(GLFWwindow* window) { return *static_cast<Mouse*>(glfwGetWindowUserPointer(window)); }
+
+// Installed before Dear ImGui's, which call them and then do their own.
+void listen(GLFWwindow* window, Mouse& mouse) {
+  glfwSetWindowUserPointer(window, &mouse);
+  glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
+    // Held down, only the key that steps goes on.
+    const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT);
+    if (action == GLFW_PRESS || again)
+      mouse_of(w).events.push_back({Event::Kind::key, code, modifiers, 0, 0});
+  });
+  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int code, int action, int modifiers) {
+    double x = 0, y = 0;
+    glfwGetCursorPos(w, &x, &y);
+    const auto kind = action == GLFW_PRESS ? Event::Kind::press : Event::Kind::release;
+    mouse_of(w).events.push_back({Event::Kind::move, 0, 0, x, y});
+    mouse_of(w).events.push_back({kind, code, modifiers, x, y});
+  });
+  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+    mouse_of(w).events.push_back({Event::Kind::move, 0, 0, x, y});
+  });
+  glfwSetScrollCallback(window, [](GLFWwindow* w, double x, double y) {
+    mouse_of(w).events.push_back({Event::Kind::wheel, 0, 0, x, y});
+  });
+}
+
+void start_imgui(GLFWwindow* window) {
+  IMGUI_CHECKVERSION();
+  ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // no file is left behind
+  ImGui_ImplGlfw_InitForOpenGL(window, true);
+  ImGui_ImplOpenGL3_Init("#version 430 core");
+}
+
+/// Sizes of this frame. Framebuffer pixels and window coordinates differ on some dense displays.
+struct Extent {
+  int width = 0, height = 0;  ///< window coordinates
+  float density = 1;          ///< pixels a window coordinate
+  bool visible = false;
+};
+
+Extent extent_of(GLFWwindow* window) {
+  Extent extent;
+  int pixels_x = 0, pixels_y = 0;
+  glfwGetWindowSize(window, &extent.width, &extent.height);
+  glfwGetFramebufferSize(window, &pixels_x, &pixels_y);
+  extent.visible = pixels_x > 0 && pixels_y > 0 && extent.width > 0 && extent.height > 0 &&
+                   !glfwGetWindowAttrib(window, GLFW_ICONIFIED);
+  if (extent.visible) extent.density = float(pixels_x) / float(extent.width);
+  return extent;
+}
+
+// Another monitor can have another scale.
+void follow_scale(Desktop& desktop, Ui& ui, const Extent& extent) {
+  float content = 1, vertical = 1;
+  glfwGetWindowContentScale(desktop.window, &content, &vertical);
+  const float scale = std::clamp(content / extent.density, 0.5f, 4.0f);
+  if (scale == desktop.scale && extent.density == desktop.density) return;
+  desktop.scale = scale;
+  desktop.density = extent.density;
+  ui.scale = scale;
+  set_style(scale, extent.density);
+  ImGui_ImplOpenGL3_DestroyFontsTexture();
+  ImGui_ImplOpenGL3_CreateFontsTexture();
+}
+
+/// The image of the view, without panels, and screenshots on their way to a file.
+struct View {
+  Target target;
+  int asked_samples = -1;
+  ViewOptions drawn;  ///< the last that could be drawn
+  ReadBack read_back;
+};
+
+void fit_target(Session& s, View& view, int width, int height) {
+  if (view.target.width == width && view.target.height == height && view.asked_samples == s.samples) return;
+  view.asked_samples = s.samples;
+  attempt(s, [&] {
+    view.target = {};  // first, so that a large window does not need both at once
+    view.target = make_target(width, height, s.samples);
+  });
+}
+
+void draw_view(Session& s, View& view) {
+  if (!view.target.framebuffer) return;
+  Frame frame;
+  frame.positions = s.loaded.sim.current_positions().id();
+  frame.velocities = s.loaded.sim.velocities.id();
+  frame.camera = s.camera;
+  frame.viewport = {0, 0, view.target.width, view.target.height};
+  frame.options = s.view;
+  if (s.loaded.sim.settings.ground) frame.ground = float(s.loaded.sim.settings.ground_height);
+  frame.planes = s.loaded.planes;
+  std::vector<std::uint32_t> pinned = s.loaded.fixed, grabbed;
+  pinned.insert(pinned.end(), s.loaded.pins.begin(), s.loaded.pins.end());
+  if (s.grab) grabbed.push_back(s.grab->vertex);
+  frame.pinned = pinned;
+  frame.grabbed = grabbed;
+  frame.target = view.target.framebuffer.id();
+  if (attempt(s, [&] { draw(s.loaded.renderer, frame); })) {
+    view.drawn = s.view;
+  } else {
+    s.view = view.drawn;  // a look whose shaders do not compile is left again
+  }
+}
+
+std::string next_screenshot() {
+  std::error_code ignored;
+  for (int i = 0;; ++i) {
+    const std::string name = fmt::format("screenshot_{:03}.png", i);
+    if (!std::filesystem::exists(name, ignored)) return name;
+  }
+}
+
+void take_screenshots(Session& s, View& view) {
+  if (s.take_screenshot && view.target.framebuffer) view.read_back.push(view.target);
+  s.take_screenshot = false;
+  attempt(s, [&] {
+    if (const auto image = view.read_back.poll()) {
+      const std::string name = next_screenshot();
+      write_png(name, *image);
+      s.log("screenshot {}", name);
+      say(s, "saved " + name);
+    }
+  });
+}
+
+void begin_imgui_frame() {
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+}
+
+void end_imgui_frame(GLFWwindow* window, const Extent& extent) {
+  ImGui::Render();
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, int(float(extent.width) * extent.density), int(float(extent.height) * extent.density));
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(window);
+}
+
+// The first scene loads before there is anything to show, so this says what is going on.
+void show_start(Desktop& desktop, Ui& ui, const std::string& what) {
+  for (int frame = 0; frame < 2; ++frame) {  // the first has no size for what it places
+    glfwPollEvents();
+    const Extent extent = extent_of(desktop.window);
+    if (!extent.visible) return;
+    follow_scale(desktop, ui, extent);
+    begin_imgui_frame();
+    draw_loading(make_layout(ui, float(extent.width), float(extent.height)), what);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glClearColor(0.93f, 0.935f, 0.94f, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+    end_imgui_frame(desktop.window, extent);
+  }
+}
+
+void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, GLFWwindow* window, const Extent& extent) {
+  begin_imgui_frame();
+  Layout layout = make_layout(ui, float(extent.width), float(extent.height));
+  handle_input(s, ui, mouse, layout.view);
+  layout = make_layout(ui, float(extent.width), float(extent.height));  // a key can hide the panels
+  const auto pixels = [&](float length) { return int(std::lround(length * extent.density)); };
+  const int width = std::max(pixels(layout.view.width), 1), height = std::max(pixels(layout.view.height), 1);
+  s.aspect = float(width) / float(height);
+  fit_target(s, view, width, height);
+  draw_view(s, view);
+  take_screenshots(s, view);
+  const std::optional<LoadRequest> before = s.loading;
+  draw_ui(s, ui, layout);
+  if (s.loading)
+    draw_loading(layout,
+                 s.loading->overrides.mesh.empty() ? s.loading->name : s.loading->overrides.mesh.string());
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glDisable(GL_SCISSOR_TEST);
+  glClearColor(0.93f, 0.935f, 0.94f, 1);
+  glClear(GL_COLOR_BUFFER_BIT);
+  if (view.target.framebuffer)
+    present(view.target, 0, 0, pixels(float(extent.height)) - height, width, height);
+  end_imgui_frame(window, extent);
+  if (before) finish_loading(s);  // its message has been on the screen for a frame
+}
+
+}  // namespace
+
+int run_window(const Scene& scene, const WindowOptions& options) {
+  Desktop desktop(options.width, options.height, "tetpbd");
+  Mouse mouse;
+  listen(desktop.window, mouse);
+  Session s;  // after the desktop: its GL objects go before the context does
+  s.gl = load_gl();
+  if (const char* file = variable("TETPBD_WINDOW_LOG")) s.log.file.open(file);
+  s.samples = options.samples;
+  s.view = options.view;
+  Ui ui;
+  ui.mesh = options.overrides.mesh.string();
+  start_imgui(desktop.window);
+  show_start(desktop, ui, scene.name);
+  const Extent first = extent_of(desktop.window);
+  const Layout layout = make_layout(ui, float(std::max(first.width, 1)), float(std::max(first.height, 1)));
+  s.aspect = layout.view.width / layout.view.height;
+  take_over(s, load(options.scene_name, options.overrides, scene), false);
+
+  View view;
+  view.drawn = s.view;
+  bool vsync = !s.vsync;
+  std::string title;
+  Extent last;
+  long frames = 0;
+  double before = glfwGetTime(), last_check = before, last_event = before;
+  s.log("ready");
+  while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
+    // With nothing moving, a few frames a second are enough and the processor can rest.
+    const bool idle = !s.playing && !is_busy(mouse) && !s.loading && view.read_back.pending() == 0 &&
+                      glfwGetTime() - last_event > 0.5;
+    const Extent extent = extent_of(desktop.window);
+    if (!extent.visible || idle)
+      glfwWaitEventsTimeout(0.1);
+    else
+      glfwPollEvents();
+    s.now = glfwGetTime();
+    if (!mouse.events.empty()) last_event = s.now;
+    const double elapsed = s.now - before;
+    before = s.now;
+    if (!extent.visible) continue;
+    if (!idle && ++frames > 2)
+      s.frames_per_second.add(1 / std::max(elapsed, 1e-6));  // the first compile shaders
+    if (extent.width != last.width || extent.height != last.height) {
+      s.log("size {} {}", extent.width, extent.height);
+      last = extent;
+    }
+    if (s.loaded.scene.name != title)
+      glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
+    if (s.vsync != vsync) glfwSwapInterval((vsync = s.vsync) ? 1 : 0);
+    follow_scale(desktop, ui, extent);
+    s.measuring = ui.panels && ui.plots;
+    const long steps = s.loaded.sim.steps;
+    if (!attempt(s, [&] {
+          advance(s, elapsed);
+          measure_frame(s, s.loaded.sim.steps != steps);
+        }))
+      ui.plots = false, play(s, false);  // said once, not every frame
+    if (s.now - last_check > 0.5) {
+      last_check = s.now;
+      follow_shaders(s);
+    }
+    draw_frame(s, ui, view, mouse, desktop.window, extent);
+  }
+  s.log("closed");
+  return 0;
+}
 
 }  // namespace tetpbd

@@ -22,8 +22,9 @@ namespace {
 
 std::atomic<int> error_count = 0;
 
-void GLAPIENTRY on_message(GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text, const void*) {
-  if (type != GL_DEBUG_TYPE_ERROR) return;
+void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text, const void*) {
+  // What the shader compiler finds is thrown as an Error with file and line.
+  if (type != GL_DEBUG_TYPE_ERROR || source == GL_DEBUG_SOURCE_SHADER_COMPILER) return;
   ++error_count;
   std::fprintf(stderr, "GL error: %s\n", text);
 }
@@ -162,7 +163,7 @@ const std::string& shader_folder() { return folder_setting(); }
 
 std::int64_t shader_folder_version() {
   if (shader_folder().empty()) return 0;
-  std::int64_t newest = std::numeric_limits<std::int64_t>::min();  // the file clock may start in the future
+  std::int64_t newest = std::numeric_limits<std::int64_t>::min();  // the file clock starts in 2174
   std::error_code ignored;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(shader_folder(), ignored))
     if (entry.is_regular_file(ignored))

@@ -1,0 +1,55 @@
+// A vertex held by the mouse: pinned, and led towards the cursor no faster than the body can follow.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/camera.h"
+#include "render/picking.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+/// Current positions of a few vertices, copied on the GPU and read once the copy has arrived.
+struct Watch {
+  Watch() = default;
+  Watch(Watch&& other) noexcept { *this = std::move(other); }
+  Watch& operator=(Watch&& other) noexcept;
+  ~Watch();
+  std::vector<std::uint32_t> vertices;
+  Buffer copy;
+  GLsync fence = nullptr;
+};
+Watch make_watch(std::vector<std::uint32_t> vertices);
+/// Starts a copy unless one is under way.
+void request(Watch& watch, const Sim& sim);
+/// The positions, once, when they have arrived; waits for nothing.
+std::optional<std::vector<glm::dvec3>> poll(Watch& watch);
+
+struct Grab {
+  std::uint32_t vertex = 0;
+  bool was_pinned = false;           ///< by the user: it stays so when let go
+  glm::dvec3 hit{0};                 ///< m, where the ray met the surface: the drag keeps this depth
+  bool placed = false;               ///< position, start and offset are known (a frame or two after the pick)
+  glm::dvec3 start{0}, position{0};  ///< m, of the vertex: when caught, and now
+  glm::dvec3 offset{0};              ///< m, from the hit to the vertex, so that catching it moves nothing
+  glm::dvec3 target{0};              ///< m, where the cursor wants it
+  double edge = 1;                   ///< m, mean rest length of the vertex's edges
+  double resting = 0;                ///< m, distance of the vertex from the mean of its neighbours, at rest
+  double pace = 1;                   ///< part of the full speed that the body can follow now, -1..1
+  glm::dvec3 neighbours{0};          ///< m, their mean a frame or so ago
+  Watch watch;                       ///< the vertex, then its neighbours
+};
+
+/// Pins the vertex that was picked.
+Grab begin_grab(Sim& sim, const Pick& pick);
+/// Takes in what has been read back, and aims at the point under the cursor at the depth of the hit.
+void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
+         std::span<const glm::vec4> planes);
+/// Before each step: leads the vertex on.
+void lead(Grab& grab, Sim& sim);
+/// Lets go: the vertex is free again unless it had been pinned.
+void end_grab(Grab& grab, Sim& sim);
+
+}  // namespace tetpbd

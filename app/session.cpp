@@ -1,0 +1,272 @@
+#include "app/session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+namespace {
+
+using Steady = std::chrono::steady_clock;
+
+double seconds_since(Steady::time_point begin) {
+  return std::chrono::duration<double>(Steady::now() - begin).count();
+}
+
+// Measurements under way belong to what was before.
+void forget_measurements(Session& s) {
+  s.measured.reset();
+  s.stale = s.loaded.metrics ? s.loaded.metrics->pending.size() : 0;
+  s.volume_error.values.clear();
+}
+
+bool needs_new_bodies(const Session& s) {
+  for (const Parameter& row : parameters())
+    if (row.effect == Effect::restart &&
+        parameter_text(s.loaded.scene.settings, row) != parameter_text(s.loaded.sim.settings, row))
+      return true;
+  return false;
+}
+
+void one_step(Session& s) {
+  Sim& sim = s.loaded.sim;
+  if (s.grab) lead(*s.grab, sim);
+  const auto begin = Steady::now();
+  step(sim);
+  if (sim.solver.step_on_cpu && s.measuring) s.step_ms.add(seconds_since(begin) * 1e3);
+  s.clock.simulated += sim.settings.dt;
+}
+
+}  // namespace
+
+Loaded load(const std::string& name, const SceneOverrides& overrides, const Scene& scene) {
+  const auto model = build_model(scene);
+  Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, {}, {}, {}};
+  std::vector<BodyRange> ranges;
+  for (const Body& body : model->bodies)
+    ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
+  loaded.renderer = make_renderer(model->rest, ranges);
+  loaded.picker = make_picker(model->rest);
+  for (const glm::dvec4& plane : model->obstacles) loaded.planes.emplace_back(plane);
+  for (std::uint32_t v = 0; v < model->inverse_masses.size(); ++v)
+    if (!(model->inverse_masses[v] > 0)) loaded.fixed.push_back(v);
+  return loaded;
+}
+
+void say(Session& s, const std::string& text, bool error, bool offer_reset) {
+  s.log("{} {}", error ? "error" : "message", text);
+  std::erase_if(s.messages, [&](const Message& m) { return m.text == text; });
+  constexpr std::size_t most = 5;  // what a small window has room for
+  if (s.messages.size() >= most) s.messages.erase(s.messages.begin());
+  s.messages.push_back({text, error, offer_reset, s.now});
+}
+
+bool attempt(Session& s, const std::function<void()>& action) {
+  try {
+    action();
+    return true;
+  } catch (const std::bad_alloc&) {
+    say(s, "out of memory: use a smaller mesh", true);
+  } catch (const std::exception& error) {
+    say(s, error.what(), true);
+  }
+  return false;
+}
+
+void play(Session& s, bool playing) {
+  if (s.playing == playing) return;
+  s.playing = playing;
+  s.clock.owed = 0;
+  s.log("{}", playing ? "play" : "pause");
+}
+
+void single_step(Session& s) {
+  play(s, false);
+  attempt(s, [&] {
+    one_step(s);
+    measure_frame(s, true);
+  });
+  s.log("step {}", s.loaded.sim.steps);
+}
+
+void restart(Session& s) {
+  let_go(s);
+  if (needs_new_bodies(s)) {
+    s.loading = LoadRequest{s.loaded.name, s.loaded.overrides, true, true};
+    return;
+  }
+  attempt(s, [&] { reset(s.loaded.sim); });
+  s.loaded.pins.clear();
+  s.clock.owed = 0;
+  std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+  forget_measurements(s);
+  s.log("reset");
+}
+
+void change_settings(Session& s, const Settings& wanted) {
+  const Settings old = s.loaded.sim.settings;
+  attempt(s, [&] {
+    check_settings(wanted, "window");
+    apply_settings(s.loaded.sim, wanted);
+    for (const Parameter& row : parameters()) {
+      const std::string text = parameter_text(wanted, row);
+      if (text == parameter_text(old, row)) continue;
+      s.log("set {} {}", row.name, text);
+      if (row.effect == Effect::restart)
+        say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
+      if (row.effect == Effect::rebuild) s.step_ms.values.clear();
+    }
+  });
+}
+
+void take_over(Session& s, Loaded loaded, bool keep_camera) {
+  s.grab.reset();
+  s.loaded = std::move(loaded);
+  if (!keep_camera) s.camera = scene_camera(s.loaded.scene, *s.loaded.sim.model, s.aspect);
+  s.clock.owed = 0;
+  s.step_ms.values.clear();
+  std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+  forget_measurements(s);
+  s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim.model->positions.size());
+}
+
+void finish_loading(Session& s) {
+  const LoadRequest request = *s.loading;
+  s.loading.reset();
+  attempt(s, [&] {
+    Scene scene = load_scene(request.name, request.overrides);
+    if (request.keep_settings) scene.settings = s.loaded.sim.settings;
+    take_over(s, load(request.name, request.overrides, scene), request.keep_camera);
+  });
+}
+
+// Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
+void frame_body(Session& s) {
+  glm::vec3 low{1e30f}, high{-1e30f};
+  for (const glm::dvec3& p : read_state(s.loaded.sim).positions) {
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
+    low = glm::min(low, glm::vec3(p));
+    high = glm::max(high, glm::vec3(p));
+  }
+  if (low.x > high.x) return;
+  frame_box(s.camera, low, high, s.aspect, 1.35f);
+  s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
+}
+
+namespace {
+bool is_fixed(const Session& s, std::uint32_t vertex) {
+  return std::binary_search(s.loaded.fixed.begin(), s.loaded.fixed.end(), vertex);
+}
+}  // namespace
+
+void toggle_pin(Session& s, std::uint32_t vertex) {
+  if (is_fixed(s, vertex)) {
+    say(s, fmt::format("vertex {} is fixed by the scene", vertex));
+    return;
+  }
+  if (std::erase(s.loaded.pins, vertex)) {
+    unpin(s.loaded.sim, vertex);
+    s.log("unpin {}", vertex);
+  } else {
+    pin(s.loaded.sim, vertex);
+    s.loaded.pins.push_back(vertex);
+    s.log("pin {}", vertex);
+  }
+}
+
+void catch_vertex(Session& s, const Pick& pick) {
+  if (is_fixed(s, pick.vertex)) {
+    say(s, fmt::format("vertex {} is fixed by the scene", pick.vertex));
+    return;
+  }
+  s.grab = begin_grab(s.loaded.sim, pick);
+  s.log("grab {}", pick.vertex);
+}
+
+void let_go(Session& s) {
+  if (!s.grab) return;
+  end_grab(*s.grab, s.loaded.sim);
+  s.log("release {} moved {:.4f}", s.grab->vertex, glm::length(s.grab->position - s.grab->start));
+  s.grab.reset();
+}
+
+void advance(Session& s, double elapsed) {
+  Clock& clock = s.clock;
+  clock.real += elapsed;
+  if (clock.real >= 0.5) {
+    clock.factor = clock.simulated / clock.real;
+    if (s.playing) s.log("running {} {:.3f}x", s.loaded.sim.steps, clock.factor);
+    clock.real = clock.simulated = 0;
+  }
+  if (!s.playing) return;
+  const double dt = s.loaded.sim.settings.dt;
+  clock.owed += std::min(elapsed, 0.25);
+  // A driver that queues work hides what a step costs until the frame is late: then the number of steps a
+  // frame is halved, and doubled while there is room. Where a step returns when it is done (CPU modes,
+  // software GL) the time spent here says it all.
+  const bool queued = !s.gl.software && !s.loaded.sim.solver.step_on_cpu;
+  constexpr double patience = 0.04;  // s of stepping between two frames
+  const auto begin = Steady::now();
+  int taken = 0;
+  while ((clock.fast || clock.owed >= dt) && (!queued || taken < clock.most_steps)) {
+    one_step(s);
+    clock.owed -= dt;
+    ++taken;
+    if (seconds_since(begin) > patience) break;
+  }
+  if (queued && elapsed > 0.066) clock.most_steps = std::max(1, clock.most_steps / 2);
+  if (queued && elapsed < 0.033 && taken == clock.most_steps)
+    clock.most_steps = std::min(clock.most_steps * 2, 1 << 14);
+  // What could not be simulated in time is dropped: the simulation then runs slower than real time.
+  clock.owed = clock.fast ? 0 : std::min(clock.owed, dt);
+}
+
+void measure_frame(Session& s, bool stepped) {
+  Sim& sim = s.loaded.sim;
+  sim.timed = s.measuring;
+  double total = 0;
+  int count = 0;
+  for (; const auto ms = sim.timer.poll(); ++count) total += *ms;
+  if (count && s.measuring) s.step_ms.add(total / count);
+  if (!s.measuring) return;
+  if (!s.loaded.metrics) s.loaded.metrics = create_metrics(*sim.model);
+  Metrics& metrics = *s.loaded.metrics;
+  while (const auto measurement = collect(metrics)) {
+    if (s.stale > 0) {
+      --s.stale;
+      continue;
+    }
+    s.measured = *measurement;
+    s.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
+    if (!measurement->finite() && s.playing) {
+      play(s, false);
+      say(s,
+          fmt::format(
+              "the state is not finite: at step {}: reset, then use a smaller dt, more substeps or a lower "
+              "stiffness",
+              measurement->step),
+          true, true);
+    }
+  }
+  // Half the ring of results: with more under way, asking again would wait for the oldest.
+  if (stepped && metrics.pending.size() < 8) measure(metrics, sim);
+}
+
+void follow_shaders(Session& s) {
+  const auto version = shader_folder_version();
+  if (version == s.loaded.sim.shader_version) return;
+  const bool done = attempt(s, [&] {
+    rebuild_shaders(s.loaded.sim);
+    reload_shaders(s.loaded.renderer);
+    s.loaded.picker = make_picker(s.loaded.sim.model->rest);
+    s.loaded.metrics.reset();
+    forget_measurements(s);
+  });
+  s.loaded.sim.shader_version = version;  // also after an error: said once an edit
+  if (done) say(s, "shaders compiled again");
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,126 @@
+// What the window shows and what can be done to it, without any widget: a loaded scene, its clock, its
+// messages.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/grab.h"
+#include "app/scene.h"
+#include "app/window.h"
+#include "render/picking.h"
+#include "render/renderer.h"
+#include "sim/metrics.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+/// A scene with all that is made from it; replaced as a whole, so that one that fails to load changes
+/// nothing.
+struct Loaded {
+  std::string name;  ///< as it was asked for
+  SceneOverrides overrides;
+  Scene scene;
+  Sim sim;
+  Renderer renderer;
+  Picker picker;
+  std::optional<Metrics> metrics;  ///< made when first shown
+  std::vector<glm::vec4> planes;
+  std::vector<std::uint32_t> fixed;  ///< by the scene
+  std::vector<std::uint32_t> pins;   ///< by the user
+};
+Loaded load(const std::string& name, const SceneOverrides& overrides, const Scene& scene);
+
+struct Message {
+  std::string text;
+  bool error = false, offer_reset = false;
+  double since = 0;  ///< s
+};
+
+/// A line for each event, in the file that TETPBD_WINDOW_LOG names (docs/window.md), for tests and
+/// demonstrations.
+struct EventLog {
+  std::ofstream file;
+  template <class... T>
+  void operator()(fmt::format_string<T...> text, T&&... values) {
+    if (file.is_open()) file << fmt::format(text, std::forward<T>(values)...) << std::endl;
+  }
+};
+
+/// Simulated against real time.
+struct Clock {
+  bool fast = false;               ///< as fast as possible instead of real time
+  double owed = 0;                 ///< s of real time not yet simulated
+  int most_steps = 4;              ///< a frame; follows what the GPU can do
+  double real = 0, simulated = 0;  ///< s, since the factor was last worked out
+  double factor = 0;               ///< simulated seconds a real one
+};
+
+/// The last values of something that changes from frame to frame.
+struct History {
+  std::vector<float> values;
+  void add(double value) {
+    if (values.size() >= 240) values.erase(values.begin());
+    values.push_back(float(value));
+  }
+};
+
+struct LoadRequest {
+  std::string name;
+  SceneOverrides overrides;
+  bool keep_settings = false;  ///< those of now instead of the scene's
+  bool keep_camera = false;
+};
+
+struct Session {
+  Capabilities gl;
+  EventLog log;
+  Loaded loaded;
+  Camera camera;
+  ViewOptions view;
+  int samples = 4;
+  float aspect = 1;  ///< of the viewport
+  bool playing = true, vsync = true;
+  bool take_screenshot = false, quit = false;
+  Clock clock;
+  std::optional<Grab> grab;
+  std::vector<Message> messages;
+  std::optional<LoadRequest> loading;
+  bool measuring = true;  ///< somebody looks at the measurements
+  std::optional<Measurement> measured;
+  std::size_t stale = 0;  ///< measurements under way that belong to before a reset
+  History frames_per_second, step_ms, volume_error;
+  double now = 0;  ///< s since the start
+};
+
+void say(Session& session, const std::string& text, bool error = false, bool offer_reset = false);
+/// Does it; what it throws becomes a message. Whether it went well.
+bool attempt(Session& session, const std::function<void()>& action);
+
+void play(Session& session, bool playing);
+void single_step(Session& session);
+/// To the start; with a parameter changed that needs it, the bodies are made again.
+void restart(Session& session);
+void change_settings(Session& session, const Settings& wanted);
+/// Loads what was asked for, in place of what there is if it succeeds.
+void finish_loading(Session& session);
+void take_over(Session& session, Loaded loaded, bool keep_camera);
+void frame_body(Session& session);
+void toggle_pin(Session& session, std::uint32_t vertex);
+void catch_vertex(Session& session, const Pick& pick);
+void let_go(Session& session);
+
+/// Steps as many times as `elapsed` seconds ask for and the machine allows.
+void advance(Session& session, double elapsed);
+/// Takes in measurements and timings that have arrived, and asks for the next.
+void measure_frame(Session& session, bool stepped);
+/// Compiles again what changed in the shader folder.
+void follow_shaders(Session& session);
+
+}  // namespace tetpbd

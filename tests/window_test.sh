@@ -1,0 +1,222 @@
+#!/usr/bin/env bash
+# Drives the real window under Xvfb with real clicks, drags and keys. What it did is read from the event log that
+# TETPBD_WINDOW_LOG names (docs/window.md); "at NAME x y width height" lines there say where widgets are.
+# Usage: window_test.sh PROGRAM SHADERS FOLDER
+set -uo pipefail
+if [[ ${1:-} != --inside ]]; then
+  exec xvfb-run -a -s "-screen 0 1280x800x24" "$0" --inside "$@"
+fi
+program=$(realpath "$2") shaders=$(realpath "$3") folder=$4
+rm -rf "$folder" && mkdir -p "$folder" && cd "$folder" || exit 1
+export TETPBD_GL_DEBUG=1 TETPBD_WINDOW_LOG=$PWD/events.log TETPBD_CACHE=$PWD/cache MESA_GL_VERSION_OVERRIDE=4.3
+log=$TETPBD_WINDOW_LOG
+cp -r "$shaders" shaders
+
+cat >block.json <<'JSON'
+{"name": "block", "bodies": [{"name": "block", "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}, "position": [0, 0, 0]}],
+ "solver": {"iterations": 4, "dt": 0.01}, "camera": {"target": [0, 0.5, 0], "distance": 3.2, "azimuth": 20, "elevation": 15}}
+JSON
+echo "this is no mesh" >bad.ply
+
+pid=
+fail() {
+  echo "FAILED: $*" >&2
+  echo "--- last events:" >&2
+  tail -n 15 "$log" >&2
+  cat output.txt >&2
+  import -window root failed.png
+  [[ -n $pid ]] && kill "$pid" 2>/dev/null
+  exit 1
+}
+mark=0  # lines of the log already dealt with
+forget() { mark=$(wc -l <"$log"); }
+new_events() { tail -n +$((mark + 1)) "$log"; }
+# Polls: how long an event takes depends on the machine.
+await() {
+  for _ in $(seq 600); do
+    new_events | grep -qE "$1" && return 0
+    kill -0 "$pid" 2>/dev/null || fail "the program ended while waiting for '$1'"
+    sleep 0.1
+  done
+  fail "no event '$1'"
+}
+pause_for_frame() { sleep 0.2; }
+key() {
+  forget
+  xdotool keydown "$1"
+  pause_for_frame
+  xdotool keyup "$1"
+}
+place() {  # NAME -> x y width height
+  local line
+  for _ in $(seq 100); do
+    line=$(grep -F "at $1 " "$log" | grep -E "^at $1 [0-9-]+ [0-9-]+ [0-9]+ [0-9]+\$" | tail -n 1)
+    [[ -n $line ]] && break
+    sleep 0.1
+  done
+  [[ -n $line ]] || fail "no widget '$1'"
+  awk '{print $(NF-3), $(NF-2), $(NF-1), $NF}' <<<"$line"
+}
+point() {  # NAME part-of-width part-of-height -> x y
+  read -r x y w h < <(place "$1")
+  awk -v x="$x" -v y="$y" -v w="$w" -v h="$h" -v a="$2" -v b="$3" 'BEGIN {printf "%d %d\n", x + a * w, y + b * h}'
+}
+to() { xdotool mousemove $(point "$@"); pause_for_frame; }
+press() { xdotool mousedown "$1"; pause_for_frame; }
+release() { xdotool mouseup "$1"; pause_for_frame; }
+click() {
+  forget
+  to "$1" "${2:-0.5}" 0.5
+  press 1
+  release 1
+}
+choose() {  # a combo's entry
+  click "$1"
+  await "^at $1=$2 "
+  click "$1=$2"
+}
+drag() {  # BUTTON from (x y) by (dx dy)
+  forget
+  xdotool mousemove "$2" "$3"; pause_for_frame
+  press "$1"
+  for _ in 1 2 3 4; do xdotool mousemove_relative -- $(($4 / 4)) $(($5 / 4)); pause_for_frame; done
+}
+shot() { import -window root "$1"; }
+differ() {  # pixels that differ by more than a little
+  local count
+  count=$(compare -metric AE -fuzz 4% "$1" "$2" null: 2>&1)
+  awk -v n="$count" -v least="$3" 'BEGIN {exit !(n >= least)}' || fail "$1 and $2 differ in $count pixels only: $4"
+}
+colours() { identify -format '%k' "$1"; }
+
+"$program" view --scene block.json --size 1000x760 --samples 0 --shaders shaders >output.txt 2>&1 &
+pid=$!
+for _ in $(seq 600); do [[ -e $log ]] && break; kill -0 $pid 2>/dev/null || break; sleep 0.1; done
+[[ -e $log ]] || fail "no window"
+await '^ready'
+await '^running [1-9]'
+window=$(xdotool search --onlyvisible --pid $pid | tail -n 1)
+[[ -n $window ]] || fail "no window on the display"
+xdotool windowfocus "$window"
+read -r vx vy vw vh < <(place view)
+cx=$((vx + vw / 2)) cy=$((vy + vh / 2))
+xdotool mousemove $((vx + 20)) $((vy + 20))
+
+# -------------------------------------------------------------------------------------------------- play, step, reset
+key space; await '^pause'
+key r; await '^reset'
+key s; await '^step 1$'
+key Right; await '^step 2$'
+click step; await '^step 3$'
+click reset; await '^reset'
+key s; await '^step 1$'
+click play; await '^play'; await '^running [1-9]'
+key space; await '^pause'
+
+# ------------------------------------------------------------------------------------------------------------ settings
+forget
+to omega 0.3 0.5; press 1
+xdotool mousemove $(point omega 0.5 0.5); pause_for_frame
+xdotool mousemove $(point omega 0.75 0.5); pause_for_frame
+release 1
+await '^set omega (2\.[5-9]|3)'
+forget  # typing into a slider
+xdotool keydown ctrl; to omega 0.5 0.5; press 1; release 1; xdotool keyup ctrl; pause_for_frame
+xdotool key ctrl+a; pause_for_frame
+for k in 1 period 2; do xdotool key $k; pause_for_frame; done
+new_events | grep -qE '^(look|step|colour)' && fail "typing into a slider worked a shortcut"
+xdotool keydown Return; pause_for_frame; xdotool keyup Return
+await '^set omega 1\.2'
+choose mode cpu; await '^set mode cpu'
+key s; await '^step'
+choose mode node; await '^set mode node'
+click bend 0.1; await '^set constraints stretch,volume'
+click bend 0.1; await '^set constraints stretch,bend,volume|^set constraints stretch,volume,bend'
+shot panels.png
+
+# ---------------------------------------------------------------------------------------------------------------- view
+for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
+for colour in volume stretch velocity plain; do key c; await "^colour $colour"; done
+key n; await '^normals flat'
+key n; await '^normals smooth'
+key g; await '^grid false'
+key g; await '^grid true'
+key h; await '^help true'; pause_for_frame; shot help.png
+differ panels.png help.png 20000 "the help overlay"
+key Escape; await '^help false'; pause_for_frame
+forget; shot before.png
+drag 3 $cx $cy 80 20; release 3; await '^camera'; shot turned.png
+differ before.png turned.png 5000 "turning the view"
+drag 1 $((vx + 15)) $((vy + 15)) -80 0; release 1; await '^camera'
+drag 2 $cx $cy 40 0; release 2; await '^camera'
+drag 2 $cx $cy -40 0; release 2; await '^camera'
+forget; xdotool click 4; await '^zoom'
+forget; xdotool click 5; await '^zoom'
+key f; await '^frame'
+
+# ------------------------------------------------------------------------------------------------------ pull the body
+click play; await '^play'
+forget; shot before.png
+drag 1 $cx $cy 20 -160; await '^grab [0-9]+'
+for _ in $(seq 100); do  # far enough, or long enough
+  sleep 0.3
+  shot pulled.png
+  n=$(compare -metric AE -fuzz 4% before.png pulled.png null: 2>&1)
+  awk -v n="$n" 'BEGIN {exit !(n > 15000)}' && break
+done
+release 1
+await '^release [0-9]+ moved'
+moved=$(new_events | sed -n 's/^release [0-9]* moved //p' | tail -n 1)
+awk -v m="$moved" 'BEGIN {exit !(m > 0.1)}' || fail "the body was pulled by $moved m only"
+click reset; await '^reset'
+key space; await '^pause'
+key f; await '^frame'
+
+# ---------------------------------------------------------------------------------------------------------------- pins
+forget; xdotool mousemove $cx $cy; pause_for_frame
+xdotool click --repeat 2 --delay 60 1; await '^pin [0-9]+'
+pinned=$(new_events | sed -n 's/^pin //p' | tail -n 1)
+sleep 0.5
+forget; xdotool keydown ctrl; press 1; release 1; xdotool keyup ctrl; await "^unpin $pinned\$"
+
+# ---------------------------------------------------------------------------------------------- screenshots, panels
+key p; await '^screenshot screenshot_000.png'
+[[ $(identify -format '%wx%h' screenshot_000.png) == "${vw}x$vh" ]] || fail "the screenshot's size is not the view's"
+[[ $(colours screenshot_000.png) -gt 100 ]] || fail "the screenshot is blank"
+key p; await '^screenshot screenshot_001.png'
+key Tab; await '^panels false'; await '^at view 0 0 1000 760'
+key Tab; await '^panels true'
+forget; xdotool windowsize "$window" 900 600; await '^size 900 600'; sleep 0.3; shot small.png
+forget; xdotool windowsize "$window" 1000 760; await '^size 1000 760'
+
+# ------------------------------------------------------------------------------------------------- errors, other scenes
+type_mesh() {
+  click mesh
+  xdotool key ctrl+a; pause_for_frame
+  xdotool type --delay 60 "$1"; pause_for_frame
+  new_events | grep -qE '^(look|step|colour|play|panels)' && fail "typing a path worked a shortcut"
+  xdotool keydown Return; pause_for_frame; xdotool keyup Return
+}
+type_mesh bad.ply; await '^error .*bad.ply'; sleep 0.5; shot error.png
+new_events | grep -q '^scene' && fail "a bad mesh was taken over"
+key s; await '^step [0-9]+'
+click dismiss; await '^dismissed'
+choose scene beam; await '^scene beam'
+key s; await '^step 1$'; shot beam.png
+
+# -------------------------------------------------------------------------------------------------------- shaders
+sleep 1.1  # the folder's version is the time of its newest file
+forget; cp shaders/predict.comp good.comp; echo "this is no shader" >>shaders/predict.comp; await '^error shader does not compile.*predict.comp:[0-9]+'
+key s; await '^step 2$'
+forget; sleep 1.1; cp good.comp shaders/predict.comp; await '^message shaders compiled again'
+key s; await '^step 3$'
+
+# ------------------------------------------------------------------------------------------------------------- the end
+xdotool key ctrl+q
+for _ in $(seq 300); do kill -0 $pid 2>/dev/null || break; sleep 0.1; done
+kill -0 $pid 2>/dev/null && fail "Ctrl+Q does not end it"
+wait $pid; status=$?
+[[ $status -eq 0 ]] || fail "exit status $status"
+[[ $(tail -n 1 "$log") == closed ]] || fail "it did not close in order"
+grep -i "GL error" output.txt && fail "GL errors"
+echo "window: passed in $SECONDS s"

@@ -1,10 +1,10 @@
-// Sum of the corrections that the constraints of one kind on vertex i ask of it.
+// Sum of the corrections that every $LANES-th of the constraints of one kind on vertex i, from the lane-th on, asks of it.
 layout(std430, binding = $BINDING) readonly buffer Records_$KIND { Record$ARITY records_$KIND[]; };
-vec3 gather_$KIND(uint i, Position own) {
+vec3 gather_$KIND(uint i, uint lane, Position own) {
   uint row = $INDEXu * (params.vertex_count + 1u) + i;
   uint end = adjacency[row + 1u];
   vec3 sum = vec3(0.0);
-  for (uint entry = adjacency[row]; entry < end; ++entry) {
+  for (uint entry = adjacency[row] + lane; entry < end; entry += $LANESu) {
     uint item = adjacency[entry];
     uint slot = item & 3u;
     Record$ARITY record = records_$KIND[item >> 2];

@@ -1,5 +1,5 @@
-// Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): one thread a vertex gathers the corrections of all constraints on it, of every
-// kind present, averages, and writes the other buffer. Each constraint is evaluated once by each of its vertices.
+// Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): $LANES invocations a vertex gather the corrections of all
+// constraints on it, of every kind present; one averages, and writes the other buffer. Each constraint is evaluated once by each of its vertices.
 #include "types.glsl"
 #include "pair.glsl"
 layout(local_size_x = 64) in;
@@ -13,13 +13,30 @@ layout(std430, binding = BIND_ADJACENCY) readonly buffer Adjacency { uint adjace
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "gather.glsl"
 
+#if $LANES > 1
+shared vec3 sums[gl_WorkGroupSize.x];
+#endif
+
 void main() {
-  uint i = gl_GlobalInvocationID.x;
-  if (i >= params.vertex_count) return;
-  Position own = positions[i];
+  uint i = gl_GlobalInvocationID.x / $LANESu;
+  uint lane = gl_GlobalInvocationID.x % $LANESu;
+  bool inside = i < params.vertex_count;
+  Position own = positions[inside ? i : 0u];
+  vec3 sum = vec3(0.0);
+  if (inside && own.inverse_mass > 0.0) {
+    #foreach sum += gather_$KIND(i, lane, own);
+  }
+#if $LANES > 1
+  sums[gl_LocalInvocationIndex] = sum;
+  barrier();
+  for (uint reach = $LANESu / 2u; reach > 0u; reach /= 2u) {
+    if (lane < reach) sums[gl_LocalInvocationIndex] += sums[gl_LocalInvocationIndex + reach];
+    barrier();
+  }
+  sum = sums[gl_LocalInvocationIndex];
+#endif
+  if (!inside || lane != 0u) return;
   if (own.inverse_mass > 0.0) {
-    vec3 sum = vec3(0.0);
-    #foreach sum += gather_$KIND(i, own);
     vec3 correction = own.constraints > 0.0 ? sum * (params.omega / own.constraints) : vec3(0.0);
     Pair x = pair_add(Pair(own.high, own.low), correction);
     vec3 moved = params.h * velocities[i].high + (relative(own, predicted[i]) + correction);

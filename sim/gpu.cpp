@@ -48,6 +48,13 @@ void label_object(GLenum kind, GLuint id, const std::string& label) {
 
 int gl_error_count() { return error_count; }
 
+bool is_software_renderer() {
+  const std::string renderer = gl_string(GL_RENDERER);
+  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR"})
+    if (renderer.find(name) != std::string::npos) return true;
+  return false;
+}
+
 Capabilities load_gl() {
   glewExperimental = GL_TRUE;
   // GLEW built for GLX answers GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.
@@ -67,8 +74,7 @@ Capabilities load_gl() {
   caps.work_group_invocations = gl_integer(GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS);
   caps.shared_bytes = gl_integer(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE);
   caps.samples = gl_integer(GL_MAX_SAMPLES);
-  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR"})
-    caps.software |= caps.renderer.find(name) != std::string::npos;
+  caps.software = is_software_renderer();
   caps.debug = gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT;
   if (caps.debug) {
     glEnable(GL_DEBUG_OUTPUT);

@@ -33,6 +33,8 @@ struct Capabilities {
 
 /// Loads GL functions for the current context and checks for GL 4.3. Throws Error with the version found.
 Capabilities load_gl();
+/// Whether the current context's GPU is a CPU (llvmpipe, softpipe, swrast).
+bool is_software_renderer();
 /// Number of GL debug messages of type ERROR since the start (only a debug context counts them).
 int gl_error_count();
 

@@ -85,7 +85,7 @@ void build_solver(Sim& sim) {
       predict.program = Program::compute("predict.comp");
       finish.program = Program::compute("finish.comp");
       predict.groups = finish.groups = work_groups(sim.model->positions.size(), group_size);
-      Solver solver = mode.create({*sim.model, sim.system});
+      Solver solver = mode.create({*sim.model, sim.system, is_software_renderer()});
       sim.predict = std::move(predict);
       sim.finish = std::move(finish);
       sim.solver = std::move(solver);

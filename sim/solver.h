@@ -36,6 +36,7 @@ struct Solver {
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
+  bool software = false;  ///< the "GPU" is a CPU
 };
 
 struct SolverMode {

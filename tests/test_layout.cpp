@@ -89,8 +89,8 @@ TEST_CASE("a shader that does not compile names its file and line") {
 
 TEST_CASE("#include, #foreach and words expand") {
   const std::string text = shader_text("solve_node.comp", {{}, {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}, {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
-  CHECK(text.find("gather_stretch(i, own)") != std::string::npos);
-  CHECK(text.find("gather_bend(i, own)") != std::string::npos);
+  CHECK(text.find("gather_stretch(i, lane, own)") != std::string::npos);
+  CHECK(text.find("gather_bend(i, lane, own)") != std::string::npos);
   CHECK(text.find("gather_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);

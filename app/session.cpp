@@ -266,7 +266,9 @@ void follow_shaders(Session& s) {
     forget_measurements(s);
   });
   s.loaded.sim.shader_version = version;  // also after an error: said once an edit
-  if (done) say(s, "shaders compiled again");
+  if (!done) return;
+  std::erase_if(s.messages, [](const Message& m) { return m.error && m.text.starts_with("shader "); });
+  say(s, "shaders compiled again");
 }
 
 }  // namespace tetpbd

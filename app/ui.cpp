@@ -57,7 +57,7 @@ void draw_plot(const char* title, const char* unit, const History& history, bool
   ImGui::TextDisabled("%s", title);
   const float current = history.values.empty() ? 0.0f : history.values.back();
   const std::string value = history.values.empty() ? std::string()
-                            : is_signed            ? fmt::format("{:+.3g} {}", current, unit)
+                            : is_signed            ? fmt::format("{:+.3f} {}", current, unit)
                                                    : fmt::format("{:.3g} {}", current, unit);
   ImGui::SameLine(width - ImGui::CalcTextSize(value.c_str()).x);
   ImGui::TextUnformatted(value.c_str());

@@ -211,6 +211,17 @@ key s; await '^step 2$'
 forget; sleep 1.1; cp good.comp shaders/predict.comp; await '^message shaders compiled again'
 key s; await '^step 3$'
 
+# A state that is not finite: said, paused, and mended by a reset.
+sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.comp >shaders/predict.comp
+cmp -s good.comp shaders/predict.comp && fail "predict.comp has no gravity to spoil"
+forget; sleep 1.1; touch shaders/predict.comp; await '^message shaders compiled again'
+key space; await '^error the state is not finite: at step [0-9]+'; new_events | grep -q '^pause' || fail "it did not pause"
+pause_for_frame; shot not_finite.png
+forget; sleep 1.1; cp good.comp shaders/predict.comp; await '^message shaders compiled again'
+key r; await '^reset'
+key space; await '^running [1-9]'
+new_events | grep -q '^error' && fail "an error after the reset"
+
 # ------------------------------------------------------------------------------------------------------------- the end
 xdotool key ctrl+q
 for _ in $(seq 300); do kill -0 $pid 2>/dev/null || break; sleep 0.1; done

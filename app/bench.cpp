@@ -1,10 +1,10 @@
 #include "app/bench.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/files.h"
@@ -26,7 +26,8 @@ Percentiles spread(std::vector<double> values) {
 }
 
 /// Frames as fast as they come: a step, and a picture of it if there is a target. One wait, at the end.
-void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer* renderer, const Frame& view) {
+void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer* renderer,
+                 const Frame& view) {
   std::vector<double> fps, gpu, wall;
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     reset(sim);
@@ -64,10 +65,13 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
 
 std::string csv_line(const BenchRow& r) {
   const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format("{},{},{},{},{},{},{},{},{:.6g},{},{:.6g},{},{},{},{}\n", r.scene, r.mode, r.constraints, r.iterations, r.substeps, r.size,
-                     r.vertices, r.tets, r.fps.median, on_gpu ? fmt::format("{:.6g}", r.gpu_ms.median) : "", r.wall_ms.median,
-                     on_gpu ? fmt::format("{:.6g}", 1e3 * r.gpu_ms.median / r.iterations / r.substeps) : "", r.dispatches, r.gpu_bytes,
-                     std::isfinite(r.max_volume_loss_percent) ? fmt::format("{:.6g}", r.max_volume_loss_percent) : "");
+  return fmt::format(
+      "{},{},{},{},{},{},{},{},{:.6g},{},{:.6g},{},{},{},{}\n", r.scene, r.mode, r.constraints, r.iterations,
+      r.substeps, r.size, r.vertices, r.tets, r.fps.median,
+      on_gpu ? fmt::format("{:.6g}", r.gpu_ms.median) : "", r.wall_ms.median,
+      on_gpu ? fmt::format("{:.6g}", 1e3 * r.gpu_ms.median / r.iterations / r.substeps) : "", r.dispatches,
+      r.gpu_bytes,
+      std::isfinite(r.max_volume_loss_percent) ? fmt::format("{:.6g}", r.max_volume_loss_percent) : "");
 }
 
 std::string kinds_of(std::string set) {
@@ -87,23 +91,29 @@ double loss_of(Sim& sim, const Model& model, const BenchOptions& options) {
 }
 
 nlohmann::ordered_json device_json(const Capabilities& device) {
-  return {{"gl_renderer", device.renderer}, {"gl_vendor", device.vendor}, {"gl_version", device.version}, {"software", device.software}};
+  return {{"gl_renderer", device.renderer},
+          {"gl_vendor", device.vendor},
+          {"gl_version", device.version},
+          {"software", device.software}};
 }
 
 }  // namespace
 
-std::vector<BenchRow> bench_rows(const BenchOptions& options, const std::function<void(const BenchRow&)>& report) {
+std::vector<BenchRow> bench_rows(const BenchOptions& options,
+                                 const std::function<void(const BenchRow&)>& report) {
   std::vector<std::pair<Scene, std::shared_ptr<const Model>>> scenes;
   for (const std::string& name : options.scenes) {
     Scene scene = load_scene(name, options.overrides);
-    for (const std::string& mode : options.modes) set_parameter(scene.settings, *find_parameter("mode"), mode, "--modes");
+    for (const std::string& mode : options.modes)
+      set_parameter(scene.settings, *find_parameter("mode"), mode, "--modes");
     for (const std::string& set : options.constraint_sets)
       set_parameter(scene.settings, *find_parameter("constraints"), kinds_of(set), "--constraint-sets");
     auto model = build_model(scene);
     scenes.emplace_back(std::move(scene), std::move(model));
   }
   std::vector<BenchRow> rows;
-  Progress progress("bench", long(scenes.size() * options.modes.size() * options.constraint_sets.size() * options.iterations.size() * options.substeps.size()));
+  Progress progress("bench", long(scenes.size() * options.modes.size() * options.constraint_sets.size() *
+                                  options.iterations.size() * options.substeps.size()));
   long done = 0;
   for (const auto& [scene, model] : scenes) {
     std::optional<Renderer> renderer;
@@ -148,7 +158,9 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options, const std::functio
 }
 
 std::string bench_csv(const std::vector<BenchRow>& rows) {
-  std::string csv = "scene,mode,constraints,iterations,substeps,size,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_step,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n";
+  std::string csv =
+      "scene,mode,constraints,iterations,substeps,size,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_step,"
+      "gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n";
   for (const BenchRow& row : rows) csv += csv_line(row);
   return csv;
 }
@@ -157,27 +169,55 @@ int run_bench(const BenchOptions& options) {
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
   const Capabilities& device = context.capabilities();
-  fmt::print("{}{}\n{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing waits between frames\n\n", device.renderer,
-             device.software ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers." : ", OpenGL " + device.version, options.frames, options.warm_up, options.repeats);
-  fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", "scene", "mode", "constraints", "iter", "sub", "size", "fps", "GPU us", "us/iter", "loss %");
+  fmt::print(
+      "{}{}\n{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing "
+      "waits between frames\n\n",
+      device.renderer,
+      device.software ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
+                      : ", OpenGL " + device.version,
+      options.frames, options.warm_up, options.repeats);
+  fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", "scene", "mode", "constraints",
+             "iter", "sub", "size", "fps", "GPU us", "us/iter", "loss %");
   const auto rows = bench_rows(options, [](const BenchRow& row) {
-    const auto gpu = [&](double value) { return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-"); };
-    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11.1f}{:>11}{:>10}{:>11}\n", row.scene, row.mode, row.constraints, row.iterations, row.substeps,
-               row.size.empty() ? "none" : row.size, row.fps.median, gpu(1e3 * row.gpu_ms.median), gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
-               std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent) : "-");
+    const auto gpu = [&](double value) {
+      return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
+    };
+    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11.1f}{:>11}{:>10}{:>11}\n", row.scene, row.mode,
+               row.constraints, row.iterations, row.substeps, row.size.empty() ? "none" : row.size,
+               row.fps.median, gpu(1e3 * row.gpu_ms.median),
+               gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
+               std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
+                                                          : "-");
     std::fflush(stdout);
   });
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  const auto triple = [](const Percentiles& p) { return nlohmann::ordered_json{{"median", p.median}, {"min", p.p05}, {"max", p.p95}}; };
+  const auto triple = [](const Percentiles& p) {
+    return nlohmann::ordered_json{{"median", p.median}, {"min", p.p05}, {"max", p.p95}};
+  };
   for (const BenchRow& r : rows) {
     nlohmann::ordered_json loss;
     if (std::isfinite(r.max_volume_loss_percent)) loss = r.max_volume_loss_percent;
-    list.push_back({{"scene", r.scene}, {"mode", r.mode}, {"constraints", r.constraints}, {"iterations", r.iterations}, {"substeps", r.substeps}, {"size", r.size},
-                    {"vertices", r.vertices}, {"tets", r.tets}, {"fps", triple(r.fps)}, {"gpu_ms_per_step", triple(r.gpu_ms)}, {"wall_ms_per_step", triple(r.wall_ms)},
-                    {"dispatches_per_step", r.dispatches}, {"gpu_bytes", r.gpu_bytes}, {"max_volume_loss_percent", loss}});
+    list.push_back({{"scene", r.scene},
+                    {"mode", r.mode},
+                    {"constraints", r.constraints},
+                    {"iterations", r.iterations},
+                    {"substeps", r.substeps},
+                    {"size", r.size},
+                    {"vertices", r.vertices},
+                    {"tets", r.tets},
+                    {"fps", triple(r.fps)},
+                    {"gpu_ms_per_step", triple(r.gpu_ms)},
+                    {"wall_ms_per_step", triple(r.wall_ms)},
+                    {"dispatches_per_step", r.dispatches},
+                    {"gpu_bytes", r.gpu_bytes},
+                    {"max_volume_loss_percent", loss}});
   }
   write_file(options.out / "bench.csv", bench_csv(rows));
-  const nlohmann::ordered_json document = {{"device", device_json(device)}, {"frames", options.frames}, {"warm_up", options.warm_up}, {"repeats", options.repeats}, {"rows", list}};
+  const nlohmann::ordered_json document = {{"device", device_json(device)},
+                                           {"frames", options.frames},
+                                           {"warm_up", options.warm_up},
+                                           {"repeats", options.repeats},
+                                           {"rows", list}};
   write_file(options.out / "bench.json", document.dump(1) + "\n");
   fmt::print("\n{}\n", (options.out / "bench.csv").string());
   return 0;

@@ -1,4 +1,5 @@
-// `tetpbd bench`: frames a second and milliseconds a step, by the paper's protocol, beside the error of the same setting.
+// `tetpbd bench`: frames a second and milliseconds a step, by the paper's protocol, beside the error of the
+// same setting.
 #pragma once
 
 #include <filesystem>
@@ -20,26 +21,27 @@ struct BenchOptions {
   std::vector<int> substeps = {1};
   long frames = 400, warm_up = 50;
   int repeats = 3;
-  double most_seconds = 5;     ///< a repetition stops there, with fewer frames (slow CPU modes)
-  bool render = true;          ///< also with rendering
+  double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)
+  bool render = true;       ///< also with rendering
   int width = 1280, height = 720, samples = 0;
   int gpu = -1;
   std::filesystem::path out = "bench";
-  SceneOverrides overrides;    ///< for every scene
+  SceneOverrides overrides;  ///< for every scene
 };
 
 struct BenchRow {
   std::string scene, mode, constraints, size;  ///< size empty: no rendering
   int iterations = 1, substeps = 1;
   std::size_t vertices = 0, tets = 0, gpu_bytes = 0;
-  Percentiles fps;                     ///< over repetitions: median, smallest (p05), largest (p95)
-  Percentiles gpu_ms, wall_ms;         ///< a step
+  Percentiles fps;              ///< over repetitions: median, smallest (p05), largest (p95)
+  Percentiles gpu_ms, wall_ms;  ///< a step
   long dispatches = 0;
   double max_volume_loss_percent = 0;  ///< NaN where the error run was cut short
 };
 
 /// Every combination, in the current context; `report` is called after each row.
-std::vector<BenchRow> bench_rows(const BenchOptions& options, const std::function<void(const BenchRow&)>& report = {});
+std::vector<BenchRow> bench_rows(const BenchOptions& options,
+                                 const std::function<void(const BenchRow&)>& report = {});
 /// Prints a table, writes bench.csv and bench.json.
 int run_bench(const BenchOptions& options);
 std::string bench_csv(const std::vector<BenchRow>& rows);

@@ -1,5 +1,6 @@
 #include "app/chart.h"
 
+#include <fmt/format.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,8 +9,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-
-#include <fmt/format.h>
 
 #include "app/files.h"
 #include "sim/solver.h"
@@ -27,27 +26,36 @@ constexpr const char* ink = "#222222";
 std::string escaped(const std::string& text) {
   std::string result;
   for (char c : text) {
-    if (c == '<') result += "&lt;";
-    else if (c == '>') result += "&gt;";
-    else if (c == '&') result += "&amp;";
-    else result += c;
+    if (c == '<')
+      result += "&lt;";
+    else if (c == '>')
+      result += "&gt;";
+    else if (c == '&')
+      result += "&amp;";
+    else
+      result += c;
   }
   return result;
 }
 
-std::string text(double x, double y, const std::string& what, const std::string& anchor = "start", double size = 13, const std::string& more = "") {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\" {}>{}</text>\n", x, y, size, anchor, ink, more, escaped(what));
+std::string text(double x, double y, const std::string& what, const std::string& anchor = "start",
+                 double size = 13, const std::string& more = "") {
+  return fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\" {}>{}</text>\n", x, y,
+      size, anchor, ink, more, escaped(what));
 }
 
 std::string line(double x1, double y1, double x2, double y2, const std::string& style) {
-  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x1, y1, x2, y2, style);
+  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x1, y1, x2, y2,
+                     style);
 }
 
 struct Axis {
   double low = 0, high = 1;
   bool log = false;
   double part(double value) const {
-    return log ? (std::log(value) - std::log(low)) / (std::log(high) - std::log(low)) : (value - low) / (high - low);
+    return log ? (std::log(value) - std::log(low)) / (std::log(high) - std::log(low))
+               : (value - low) / (high - low);
   }
   bool shows(double value) const { return std::isfinite(value) && (!log || value > 0); }
 };
@@ -86,8 +94,12 @@ std::vector<double> ticks(const Axis& axis) {
     return result;
   }
   const double raw = (axis.high - axis.low) / 6, power = std::pow(10, std::floor(std::log10(raw)));
-  const double step = raw / power < 1.5 ? power : raw / power < 3.5 ? 2 * power : raw / power < 7.5 ? 5 * power : 10 * power;
-  for (double v = std::ceil(axis.low / step - 1e-9) * step; v <= axis.high + 1e-9 * step; v += step) result.push_back(std::abs(v) < 1e-9 * step ? 0 : v);
+  const double step = raw / power < 1.5   ? power
+                      : raw / power < 3.5 ? 2 * power
+                      : raw / power < 7.5 ? 5 * power
+                                          : 10 * power;
+  for (double v = std::ceil(axis.low / step - 1e-9) * step; v <= axis.high + 1e-9 * step; v += step)
+    result.push_back(std::abs(v) < 1e-9 * step ? 0 : v);
   return result;
 }
 
@@ -96,8 +108,11 @@ std::string number(double value) {
 }
 
 std::string head(const std::string& title, const std::string& subtitle) {
-  std::string svg = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n"
-                                "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n", width, height);
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
+      "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n"
+      "<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n",
+      width, height);
   svg += text(left, 28, title, "start", 17, "font-weight=\"bold\"");
   svg += text(left, 48, subtitle, "start", 12);
   return svg;
@@ -111,20 +126,28 @@ std::string y_axis(const Axis& axis, const std::string& label) {
     svg += text(left - 8, y + 4, number(v), "end", 12);
   }
   const double middle = top + inner_height / 2;
-  return svg + text(22, middle, label, "middle", 13, fmt::format("transform=\"rotate(-90 22 {:.1f})\"", middle));
+  return svg +
+         text(22, middle, label, "middle", 13, fmt::format("transform=\"rotate(-90 22 {:.1f})\"", middle));
 }
 
 std::string frame() {
-  return fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888888\"/>\n", left, top, inner_width, inner_height);
+  return fmt::format(
+      "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888888\"/>\n", left, top,
+      inner_width, inner_height);
 }
 
 // Markers differ as well as colours, for print without colour.
 std::string marker(std::size_t index, double x, double y, const std::string& colour) {
   switch (index % 4) {
-    case 0: return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x, y, colour);
-    case 1: return fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"7.4\" height=\"7.4\" fill=\"{}\"/>\n", x - 3.7, y - 3.7, colour);
-    case 2: return fmt::format("<path d=\"M{:.1f} {:.1f}l4.6 8h-9.2z\" fill=\"{}\"/>\n", x, y - 5, colour);
-    default: return fmt::format("<path d=\"M{:.1f} {:.1f}l5 5l-5 5l-5 -5z\" fill=\"{}\"/>\n", x, y - 5, colour);
+    case 0:
+      return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x, y, colour);
+    case 1:
+      return fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"7.4\" height=\"7.4\" fill=\"{}\"/>\n",
+                         x - 3.7, y - 3.7, colour);
+    case 2:
+      return fmt::format("<path d=\"M{:.1f} {:.1f}l4.6 8h-9.2z\" fill=\"{}\"/>\n", x, y - 5, colour);
+    default:
+      return fmt::format("<path d=\"M{:.1f} {:.1f}l5 5l-5 5l-5 -5z\" fill=\"{}\"/>\n", x, y - 5, colour);
   }
 }
 
@@ -132,7 +155,8 @@ std::string marker(std::size_t index, double x, double y, const std::string& col
 
 std::string palette_colour(std::size_t index) {
   // Okabe and Ito: told apart with any colour vision.
-  static constexpr std::array colours = {"#0072b2", "#d55e00", "#555555", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
+  static constexpr std::array colours = {"#0072b2", "#d55e00", "#555555", "#009e73",
+                                         "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
   return colours[index % colours.size()];
 }
 
@@ -144,7 +168,8 @@ std::string mode_colour(const std::string& mode) {
 
 std::string to_svg(const Chart& chart) {
   std::vector<double> all_x, all_y;
-  for (const Series& s : chart.series) all_x.insert(all_x.end(), s.x.begin(), s.x.end()), all_y.insert(all_y.end(), s.y.begin(), s.y.end());
+  for (const Series& s : chart.series)
+    all_x.insert(all_x.end(), s.x.begin(), s.x.end()), all_y.insert(all_y.end(), s.y.begin(), s.y.end());
   const Axis x = fit(all_x, chart.log_x, false), y = fit(all_y, chart.log_y, true);
   const auto at_x = [&](double v) { return left + inner_width * x.part(v); };
   const auto at_y = [&](double v) { return top + inner_height * (1 - y.part(v)); };
@@ -164,7 +189,8 @@ std::string to_svg(const Chart& chart) {
       path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", at_x(s.x[i]), at_y(s.y[i]));
       if (s.markers) points += marker(k, at_x(s.x[i]), at_y(s.y[i]), s.colour);
     }
-    const std::string style = fmt::format("stroke=\"{}\" stroke-width=\"{}\" fill=\"none\"{}", s.colour, s.dashed ? 1.3 : 1.8, s.dashed ? " stroke-dasharray=\"6 4\"" : "");
+    const std::string style = fmt::format("stroke=\"{}\" stroke-width=\"{}\" fill=\"none\"{}", s.colour,
+                                          s.dashed ? 1.3 : 1.8, s.dashed ? " stroke-dasharray=\"6 4\"" : "");
     if (s.line && !path.empty()) svg += fmt::format("<path d=\"{}\" {}/>\n", path, style);
     svg += points;
     if (s.line) svg += line(left + inner_width + 14, legend, left + inner_width + 38, legend, style);
@@ -175,7 +201,8 @@ std::string to_svg(const Chart& chart) {
   for (const Chart::Note& note : chart.notes)
     if (x.shows(note.x) && y.shows(note.y)) {
       const bool far_right = x.part(note.x) > 0.75;
-      svg += text(at_x(note.x) + (far_right ? -8 : 8), at_y(note.y) - 7, note.text, far_right ? "end" : "start", 10.5);
+      svg += text(at_x(note.x) + (far_right ? -8 : 8), at_y(note.y) - 7, note.text,
+                  far_right ? "end" : "start", 10.5);
     }
   return svg + "</svg>\n";
 }
@@ -195,13 +222,17 @@ std::string to_svg(const BarChart& chart) {
       const double value = chart.series[k].values[g];
       if (!y.shows(value)) continue;
       const double bar_top = base - inner_height * std::clamp(y.part(value), 0.0, 1.0);
-      svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"/>\n", start + bar * double(k) + 1, bar_top, bar - 2, base - bar_top, chart.series[k].colour);
-      svg += text(start + bar * (double(k) + 0.5), bar_top - 4, value >= 100 ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value), "middle", 9.5);
+      svg +=
+          fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"/>\n",
+                      start + bar * double(k) + 1, bar_top, bar - 2, base - bar_top, chart.series[k].colour);
+      svg += text(start + bar * (double(k) + 0.5), bar_top - 4,
+                  value >= 100 ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value), "middle", 9.5);
     }
   }
   double legend = top + 10;
   for (const auto& s : chart.series) {
-    svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"14\" height=\"10\" fill=\"{}\"/>\n", left + inner_width + 14, legend - 5, s.colour);
+    svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"14\" height=\"10\" fill=\"{}\"/>\n",
+                       left + inner_width + 14, legend - 5, s.colour);
     svg += text(left + inner_width + 34, legend + 4, s.name, "start", 12);
     legend += 20;
   }
@@ -209,14 +240,19 @@ std::string to_svg(const BarChart& chart) {
 }
 
 void write_chart(const std::filesystem::path& name, const std::string& svg) {
-  const std::string svg_file = name.string() + ".svg", png_file = name.string() + ".png", part = name.string() + ".part.png";
+  const std::string svg_file = name.string() + ".svg", png_file = name.string() + ".png",
+                    part = name.string() + ".part.png";
   write_file(svg_file, svg);
   const char* arguments[] = {"rsvg-convert", "-z", "1.5", "-o", part.c_str(), svg_file.c_str(), nullptr};
   pid_t child = 0;
   int status = -1;
-  if (posix_spawnp(&child, "rsvg-convert", nullptr, nullptr, const_cast<char* const*>(arguments), environ) == 0) waitpid(child, &status, 0);
-  if (status == 0) std::filesystem::rename(part, png_file);
-  else fmt::print(stderr, "tetpbd: no {}: rsvg-convert did not run: install librsvg2-bin\n", png_file);
+  if (posix_spawnp(&child, "rsvg-convert", nullptr, nullptr, const_cast<char* const*>(arguments), environ) ==
+      0)
+    waitpid(child, &status, 0);
+  if (status == 0)
+    std::filesystem::rename(part, png_file);
+  else
+    fmt::print(stderr, "tetpbd: no {}: rsvg-convert did not run: install librsvg2-bin\n", png_file);
 }
 
 }  // namespace tetpbd

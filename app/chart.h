@@ -17,7 +17,10 @@ struct Chart {
   std::string title, subtitle, x_label, y_label;
   bool log_x = false, log_y = false;
   std::vector<Series> series;
-  struct Note { double x, y; std::string text; };
+  struct Note {
+    double x, y;
+    std::string text;
+  };
   std::vector<Note> notes;
 };
 
@@ -26,7 +29,10 @@ struct BarChart {
   std::string title, subtitle, y_label;
   bool log_y = true;
   std::vector<std::string> groups;
-  struct Bars { std::string name, colour; std::vector<double> values; };
+  struct Bars {
+    std::string name, colour;
+    std::vector<double> values;
+  };
   std::vector<Bars> series;
 };
 

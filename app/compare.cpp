@@ -1,10 +1,10 @@
 #include "app/compare.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/chart.h"
@@ -21,9 +21,25 @@ using nlohmann::ordered_json;
 namespace {
 
 // Columns of compare.csv in order; a row is a JSON object with these keys (null: not a number).
-const std::vector<std::string> columns = {"scene", "mode", "omega", "iterations", "substeps", "vertices", "tets", "gpu_ms_per_step", "wall_ms_per_step",
-                                          "max_volume_loss_percent", "tet_volume_rms", "stretch_rms", "rigid_distance", "reference_distance",
-                                          "linear_drift", "angular_drift", "inverted_tets", "finite", "pareto"};
+const std::vector<std::string> columns = {"scene",
+                                          "mode",
+                                          "omega",
+                                          "iterations",
+                                          "substeps",
+                                          "vertices",
+                                          "tets",
+                                          "gpu_ms_per_step",
+                                          "wall_ms_per_step",
+                                          "max_volume_loss_percent",
+                                          "tet_volume_rms",
+                                          "stretch_rms",
+                                          "rigid_distance",
+                                          "reference_distance",
+                                          "linear_drift",
+                                          "angular_drift",
+                                          "inverted_tets",
+                                          "finite",
+                                          "pareto"};
 
 ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(); }
 
@@ -34,18 +50,20 @@ double cost_ms(const ordered_json& row) {
 }
 double loss(const ordered_json& row) {
   const auto& value = row["max_volume_loss_percent"];
-  return value.is_number() && row["finite"] == true ? std::max(0.0, value.get<double>()) : std::numeric_limits<double>::infinity();
+  return value.is_number() && row["finite"] == true ? std::max(0.0, value.get<double>())
+                                                    : std::numeric_limits<double>::infinity();
 }
 
-/// One step from the rest shape stretched by 5 % without gravity or ground: the exact answer is the rest shape again, in
-/// place. What is left of the distance to it, as a part of what there was.
+/// One step from the rest shape stretched by 5 % without gravity or ground: the exact answer is the rest
+/// shape again, in place. What is left of the distance to it, as a part of what there was.
 double remaining_after_one_step(const std::shared_ptr<const Model>& model, Settings settings) {
   for (double w : model->inverse_masses)
     if (!(w > 0)) return std::nan("");  // a clamped body has another answer
   auto stretched = std::make_shared<Model>(*model);
   for (const Body& body : stretched->bodies) {
-    std::vector<glm::dvec3> shape(model->rest.positions.begin() + std::ptrdiff_t(body.first_vertex),
-                                  model->rest.positions.begin() + std::ptrdiff_t(body.first_vertex + body.vertices));
+    std::vector<glm::dvec3> shape(
+        model->rest.positions.begin() + std::ptrdiff_t(body.first_vertex),
+        model->rest.positions.begin() + std::ptrdiff_t(body.first_vertex + body.vertices));
     const double middle = bounds(shape).centre().y;
     for (std::size_t i = 0; i < shape.size(); ++i) {
       shape[i].y = middle + 1.05 * (shape[i].y - middle);
@@ -63,7 +81,8 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   return measure_now(metrics, sim).rigid_distance / before;
 }
 
-ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings, long steps) {
+ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings,
+                     long steps) {
   Sim sim = create_sim(model, settings);
   Metrics metrics = create_metrics(*model);
   const MeasuredRun run = measure_run(sim, metrics, steps);
@@ -76,7 +95,8 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   row["substeps"] = settings.substeps;
   row["vertices"] = model->positions.size();
   row["tets"] = model->rest.tets.size();
-  row["gpu_ms_per_step"] = run.timing.gpu_ms.empty() ? ordered_json() : number(percentiles(run.timing.gpu_ms).median);
+  row["gpu_ms_per_step"] =
+      run.timing.gpu_ms.empty() ? ordered_json() : number(percentiles(run.timing.gpu_ms).median);
   row["wall_ms_per_step"] = number(percentiles(run.timing.wall_ms).median);
   row["max_volume_loss_percent"] = number(run.errors.max_volume_loss_percent);
   row["tet_volume_rms"] = number(last.tet_volume_rms);
@@ -95,21 +115,24 @@ void mark_front(ordered_json& rows) {
   for (auto& row : rows) {
     bool beaten = !std::isfinite(loss(row));
     for (const auto& other : rows)
-      beaten |= cost_ms(other) <= cost_ms(row) && loss(other) <= loss(row) && (cost_ms(other) < cost_ms(row) || loss(other) < loss(row));
+      beaten |= cost_ms(other) <= cost_ms(row) && loss(other) <= loss(row) &&
+                (cost_ms(other) < cost_ms(row) || loss(other) < loss(row));
     row["pareto"] = !beaten;
   }
 }
 
 std::string setting_name(const ordered_json& row) {
-  return fmt::format("{} {} it x {} sub", row["mode"].get<std::string>(), row["iterations"].get<int>(), row["substeps"].get<int>());
+  return fmt::format("{} {} it x {} sub", row["mode"].get<std::string>(), row["iterations"].get<int>(),
+                     row["substeps"].get<int>());
 }
 
 Chart chart_of(const ordered_json& document) {
   Chart chart;
   const auto& rows = document["rows"];
   chart.title = fmt::format("Speed against error: {}", rows[0]["scene"].get<std::string>());
-  chart.subtitle = fmt::format("{} tets, {} steps of {} s, {}", rows[0]["tets"].get<long>(), document["steps"].get<long>(), document["dt"].get<double>(),
-                               document["device"]["gl_renderer"].get<std::string>());
+  chart.subtitle =
+      fmt::format("{} tets, {} steps of {} s, {}", rows[0]["tets"].get<long>(), document["steps"].get<long>(),
+                  document["dt"].get<double>(), document["device"]["gl_renderer"].get<std::string>());
   chart.x_label = "time of a step, ms (GPU; for cpu: one core)";
   chart.y_label = "largest volume loss, %";
   chart.log_x = chart.log_y = true;
@@ -125,7 +148,8 @@ Chart chart_of(const ordered_json& document) {
   for (const SolverMode& mode : solver_modes()) {
     Series series{mode.name, mode_colour(mode.name), {}, {}, false, true, false};
     for (const auto& row : rows)
-      if (row["mode"] == mode.name && std::isfinite(loss(row))) series.x.push_back(cost_ms(row)), series.y.push_back(loss(row));
+      if (row["mode"] == mode.name && std::isfinite(loss(row)))
+        series.x.push_back(cost_ms(row)), series.y.push_back(loss(row));
     if (!series.x.empty()) chart.series.push_back(series);
   }
   chart.series.push_back(front);
@@ -153,15 +177,19 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
   for (const auto& folder : folders) {
     std::ifstream stream(folder / "compare.json");
     const ordered_json part = ordered_json::parse(stream, nullptr, false);
-    if (!part.is_object() || !part.contains("rows")) throw Error("not a finished comparison", (folder / "compare.json").string(), "run that shard again");
+    if (!part.is_object() || !part.contains("rows"))
+      throw Error("not a finished comparison", (folder / "compare.json").string(), "run that shard again");
     if (document.is_null()) {
       document = part;
       continue;
     }
     for (const char* key : {"steps", "dt"})
-      if (part[key] != document[key]) throw Error("these shards differ", fmt::format("'{}' in {}", key, folder.string()), "merge runs of one command");
+      if (part[key] != document[key])
+        throw Error("these shards differ", fmt::format("'{}' in {}", key, folder.string()),
+                    "merge runs of one command");
     if (part["device"] != document["device"])
-      throw Error("these shards ran on different devices", folder.string(), "times can only be compared on one kind of GPU");
+      throw Error("these shards ran on different devices", folder.string(),
+                  "times can only be compared on one kind of GPU");
     for (const auto& row : part["rows"]) document["rows"].push_back(row);
   }
   return document;
@@ -175,7 +203,8 @@ ordered_json measured(const CompareOptions& options) {
       for (int iterations : options.iterations)
         for (int substeps : options.substeps) {
           Settings settings = scene.settings;
-          settings.mode = mode, settings.omega = omega, settings.iterations = iterations, settings.substeps = substeps;
+          settings.mode = mode, settings.omega = omega, settings.iterations = iterations,
+          settings.substeps = substeps;
           check_settings(settings, "compare");
           combinations.push_back(settings);
         }
@@ -184,28 +213,43 @@ ordered_json measured(const CompareOptions& options) {
   const Capabilities& device = context.capabilities();
   ordered_json rows = ordered_json::array();
   Progress progress("compare", long(combinations.size()) / options.shards);
-  for (std::size_t i = std::size_t(options.shard - 1); i < combinations.size(); i += std::size_t(options.shards)) {
+  for (std::size_t i = std::size_t(options.shard - 1); i < combinations.size();
+       i += std::size_t(options.shards)) {
     rows.push_back(run_one(scene, model, combinations[i], options.steps));
     progress.update(long(rows.size()));
   }
-  return {{"device", {{"gl_renderer", device.renderer}, {"gl_vendor", device.vendor}, {"gl_version", device.version}, {"software", device.software}}},
-          {"steps", options.steps}, {"dt", scene.settings.dt}, {"rows", rows}};
+  return {{"device",
+           {{"gl_renderer", device.renderer},
+            {"gl_vendor", device.vendor},
+            {"gl_version", device.version},
+            {"software", device.software}}},
+          {"steps", options.steps},
+          {"dt", scene.settings.dt},
+          {"rows", rows}};
 }
 
 void print_choice(const ordered_json& rows, const CompareOptions& options) {
   if (options.budget_ms) {
     const ordered_json* best = nullptr;
     for (const auto& row : rows)
-      if (cost_ms(row) <= *options.budget_ms && std::isfinite(loss(row)) && (!best || loss(row) < loss(*best))) best = &row;
-    if (best) fmt::print("best within {:g} ms a step: {} ({:.3g} ms, loss {:.3g} %)\n", *options.budget_ms, setting_name(*best), cost_ms(*best), loss(*best));
-    else fmt::print("nothing measured stays within {:g} ms a step\n", *options.budget_ms);
+      if (cost_ms(row) <= *options.budget_ms && std::isfinite(loss(row)) &&
+          (!best || loss(row) < loss(*best)))
+        best = &row;
+    if (best)
+      fmt::print("best within {:g} ms a step: {} ({:.3g} ms, loss {:.3g} %)\n", *options.budget_ms,
+                 setting_name(*best), cost_ms(*best), loss(*best));
+    else
+      fmt::print("nothing measured stays within {:g} ms a step\n", *options.budget_ms);
   }
   if (options.error_percent) {
     const ordered_json* best = nullptr;
     for (const auto& row : rows)
       if (loss(row) <= *options.error_percent && (!best || cost_ms(row) < cost_ms(*best))) best = &row;
-    if (best) fmt::print("cheapest with a loss of at most {:g} %: {} ({:.3g} ms, loss {:.3g} %)\n", *options.error_percent, setting_name(*best), cost_ms(*best), loss(*best));
-    else fmt::print("nothing measured loses at most {:g} %\n", *options.error_percent);
+    if (best)
+      fmt::print("cheapest with a loss of at most {:g} %: {} ({:.3g} ms, loss {:.3g} %)\n",
+                 *options.error_percent, setting_name(*best), cost_ms(*best), loss(*best));
+    else
+      fmt::print("nothing measured loses at most {:g} %\n", *options.error_percent);
   }
 }
 
@@ -215,14 +259,23 @@ int run_compare(const CompareOptions& options) {
   make_output_folder(options.out);
   ordered_json document = options.merge.empty() ? measured(options) : merged(options.merge);
   ordered_json& rows = document["rows"];
-  if (rows.empty()) throw Error("nothing to compare", fmt::format("--shard {}/{}", options.shard, options.shards), "there are fewer combinations than shards");
+  if (rows.empty())
+    throw Error("nothing to compare", fmt::format("--shard {}/{}", options.shard, options.shards),
+                "there are fewer combinations than shards");
   mark_front(rows);
-  if (document["device"]["software"] == true) fmt::print("{}: a SOFTWARE renderer on the CPU. These are not a GPU's numbers.\n", document["device"]["gl_renderer"].get<std::string>());
-  fmt::print("{:<12}{:>7}{:>6}{:>6}{:>12}{:>10}{:>12}{:>12}{:>12}\n", "mode", "omega", "iter", "sub", "ms a step", "loss %", "rigid dist", "one step", "front");
+  if (document["device"]["software"] == true)
+    fmt::print("{}: a SOFTWARE renderer on the CPU. These are not a GPU's numbers.\n",
+               document["device"]["gl_renderer"].get<std::string>());
+  fmt::print("{:<12}{:>7}{:>6}{:>6}{:>12}{:>10}{:>12}{:>12}{:>12}\n", "mode", "omega", "iter", "sub",
+             "ms a step", "loss %", "rigid dist", "one step", "front");
   for (const auto& row : rows) {
-    const auto value = [&](const char* key) { return row[key].is_number() ? fmt::format("{:.4g}", row[key].get<double>()) : std::string("-"); };
-    fmt::print("{:<12}{:>7}{:>6}{:>6}{:>12.4g}{:>10}{:>12}{:>12}{:>12}\n", row["mode"].get<std::string>(), value("omega"), value("iterations"), value("substeps"), cost_ms(row),
-               std::isfinite(loss(row)) ? fmt::format("{:.3g}", loss(row)) : "-", value("rigid_distance"), value("reference_distance"), row["pareto"] == true ? "*" : "");
+    const auto value = [&](const char* key) {
+      return row[key].is_number() ? fmt::format("{:.4g}", row[key].get<double>()) : std::string("-");
+    };
+    fmt::print("{:<12}{:>7}{:>6}{:>6}{:>12.4g}{:>10}{:>12}{:>12}{:>12}\n", row["mode"].get<std::string>(),
+               value("omega"), value("iterations"), value("substeps"), cost_ms(row),
+               std::isfinite(loss(row)) ? fmt::format("{:.3g}", loss(row)) : "-", value("rigid_distance"),
+               value("reference_distance"), row["pareto"] == true ? "*" : "");
   }
   write_file(options.out / "compare.json", document.dump(1) + "\n");
   write_file(options.out / "compare.csv", csv_of(rows));

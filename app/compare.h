@@ -16,11 +16,11 @@ struct CompareOptions {
   std::vector<std::string> modes = {"node", "constraint", "cpu"};
   std::vector<int> iterations = {1, 5, 10, 25};
   std::vector<int> substeps = {1};
-  std::vector<double> omegas;          ///< empty: the scene's
+  std::vector<double> omegas;  ///< empty: the scene's
   long steps = 400;
   int gpu = -1;
   std::filesystem::path out = "compare";
-  int shard = 1, shards = 1;           ///< this process does the combinations shard, shard + shards, ...
+  int shard = 1, shards = 1;  ///< this process does the combinations shard, shard + shards, ...
   std::vector<std::filesystem::path> merge;  ///< folders of finished shards, instead of running
   std::optional<double> budget_ms, error_percent;
 };

@@ -1,6 +1,7 @@
 #include "app/files.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <png.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -9,8 +10,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-
-#include <fmt/format.h>
 
 #include "sim/error.h"
 
@@ -22,7 +21,8 @@ namespace {
 
 fs::path temporary_name(const fs::path& file) {
   // Keeps the extension: ffmpeg chooses the container by it.
-  return file.parent_path() / fmt::format(".{}.{}.part{}", file.stem().string(), getpid(), file.extension().string());
+  return file.parent_path() /
+         fmt::format(".{}.{}.part{}", file.stem().string(), getpid(), file.extension().string());
 }
 
 void finish_file(const fs::path& temporary, const fs::path& file) {
@@ -35,7 +35,8 @@ void finish_file(const fs::path& temporary, const fs::path& file) {
 }
 
 std::string npy(const char* type, std::size_t rows, std::size_t columns, const void* data) {
-  std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", type, rows, columns);
+  std::string header =
+      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", type, rows, columns);
   header.resize((10 + header.size() + 1 + 63) / 64 * 64 - 10 - 1, ' ');
   header += '\n';
   std::string text = "\x93NUMPY\x01";
@@ -52,8 +53,11 @@ std::string npy(const char* type, std::size_t rows, std::size_t columns, const v
 void make_output_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder)) throw Error("cannot make the output folder", folder.string(), error ? error.message() : "a file is in the way");
-  if (access(folder.c_str(), W_OK) != 0) throw Error("cannot write to the output folder", folder.string(), std::strerror(errno));
+  if (error || !fs::is_directory(folder))
+    throw Error("cannot make the output folder", folder.string(),
+                error ? error.message() : "a file is in the way");
+  if (access(folder.c_str(), W_OK) != 0)
+    throw Error("cannot write to the output folder", folder.string(), std::strerror(errno));
 }
 
 void write_file(const fs::path& file, const std::string& content) {
@@ -92,21 +96,29 @@ void write_npy(const fs::path& file, const std::vector<Tet>& rows) {
   write_file(file, npy("<u4", rows.size(), 4, rows.data()));
 }
 
-// ------------------------------------------------------------------------------------------------------------ video
+// ------------------------------------------------------------------------------------------------------------
+// video
 
 Video::Video(const fs::path& file, int width, int height, int frames_per_second)
-    : file_(file), temporary_(temporary_name(file)), log_(temporary_.string() + ".log"), width_(width), height_(height) {
-  if (file.extension() != ".mp4" && file.extension() != ".mkv" && file.extension() != ".webm" && file.extension() != ".gif")
+    : file_(file),
+      temporary_(temporary_name(file)),
+      log_(temporary_.string() + ".log"),
+      width_(width),
+      height_(height) {
+  if (file.extension() != ".mp4" && file.extension() != ".mkv" && file.extension() != ".webm" &&
+      file.extension() != ".gif")
     throw Error("unknown video format", file.string(), "name it .mp4, .mkv, .webm or .gif");
-  if (width % 2 || height % 2) throw Error("video needs an even size", fmt::format("{}x{}", width, height), "change --size");
+  if (width % 2 || height % 2)
+    throw Error("video needs an even size", fmt::format("{}x{}", width, height), "change --size");
   signal(SIGPIPE, SIG_IGN);  // a dead ffmpeg is an error of write(), not of ours
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) throw Error("cannot start ffmpeg", file.string(), std::strerror(errno), 1);
   // Arguments are passed as they are: no shell sees the file name.
   const std::string size = fmt::format("{}x{}", width, height), rate = std::to_string(frames_per_second);
   const std::string target = "file:" + temporary_.string();
-  std::vector<const char*> arguments = {"ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgba", "-s", size.c_str(),
-                                        "-r", rate.c_str(), "-i", "-"};
+  std::vector<const char*> arguments = {"ffmpeg",   "-y",         "-loglevel", "error", "-f",
+                                        "rawvideo", "-pix_fmt",   "rgba",      "-s",    size.c_str(),
+                                        "-r",       rate.c_str(), "-i",        "-"};
   if (file.extension() != ".gif") arguments.insert(arguments.end(), {"-pix_fmt", "yuv420p"});
   if (file.extension() == ".mp4") arguments.insert(arguments.end(), {"-movflags", "+faststart"});
   arguments.insert(arguments.end(), {target.c_str(), nullptr});
@@ -128,7 +140,8 @@ Video::Video(const fs::path& file, int width, int height, int frames_per_second)
 void Video::finish() {
   if (pipe_ >= 0) ::close(pipe_), pipe_ = -1;
   int status = 0;
-  while (waitpid(child_, &status, 0) < 0 && errno == EINTR) {}
+  while (waitpid(child_, &status, 0) < 0 && errno == EINTR) {
+  }
   child_ = -1;
   const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
   std::string why = missing ? "install ffmpeg" : "ffmpeg ended early";

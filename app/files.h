@@ -5,10 +5,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <string>
 #include <vector>
-
-#include <glm/glm.hpp>
 
 #include "render/target.h"
 #include "sim/tet_mesh.h"

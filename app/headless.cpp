@@ -1,12 +1,12 @@
 #include "app/headless.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <optional>
-
-#include <fmt/format.h>
 
 #include "app/files.h"
 #include "app/progress.h"
@@ -33,7 +33,10 @@ struct FrameWriter {
   std::vector<std::uint32_t> pinned;
   std::optional<Video> video;
   ReadBack read_back;
-  struct Use { long png_step; bool video; };
+  struct Use {
+    long png_step;
+    bool video;
+  };
   std::deque<Use> uses;
 
   void draw_frame(const Sim& sim, long png_step, bool to_video) {
@@ -64,14 +67,16 @@ struct FrameWriter {
   }
 
   void finish() {
-    while (!uses.empty() && write_one(true)) {}
+    while (!uses.empty() && write_one(true)) {
+    }
     if (video) video->close();
   }
 };
 
 std::vector<BodyRange> body_ranges(const Model& model) {
   std::vector<BodyRange> ranges;
-  for (const Body& body : model.bodies) ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
+  for (const Body& body : model.bodies)
+    ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
   return ranges;
 }
 
@@ -85,13 +90,16 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   Sim sim = create_sim(model, scene.settings);
   sim.timed = true;
   Metrics metrics = create_metrics(*model);
-  const long steps = options.steps > 0 ? options.steps : std::max(1L, std::lround(scene.duration / scene.settings.dt));
-  const long video_every = options.video_every > 0 ? options.video_every : std::max(1L, std::lround(1.0 / 30 / scene.settings.dt));
+  const long steps =
+      options.steps > 0 ? options.steps : std::max(1L, std::lround(scene.duration / scene.settings.dt));
+  const long video_every =
+      options.video_every > 0 ? options.video_every : std::max(1L, std::lround(1.0 / 30 / scene.settings.dt));
 
   std::optional<FrameWriter> frames;
   if (options.png_every > 0 || !options.video.empty()) {
     frames.emplace(options, scene_camera(scene, *model, float(options.width) / float(options.height)),
-                   make_renderer(model->rest, body_ranges(*model)), make_target(options.width, options.height, options.samples));
+                   make_renderer(model->rest, body_ranges(*model)),
+                   make_target(options.width, options.height, options.samples));
     for (const glm::dvec4& plane : model->obstacles) frames->planes.emplace_back(plane);
     for (std::uint32_t v = 0; v < model->inverse_masses.size(); ++v)
       if (!(model->inverse_masses[v] > 0)) frames->pinned.push_back(v);
@@ -110,7 +118,8 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   const auto take = [&](const std::optional<Measurement>& measurement) {
     if (!measurement) return false;
     add_measurement(errors, *measurement, sim);
-    if (options.csv_every > 0 && measurement->step % options.csv_every == 0) csv += csv_row(*measurement, errors);
+    if (options.csv_every > 0 && measurement->step % options.csv_every == 0)
+      csv += csv_row(*measurement, errors);
     return true;
   };
   {
@@ -126,7 +135,8 @@ int run_headless(const Scene& scene, const RunOptions& options) {
       timing.total_s += seconds;
       while (const auto ms = sim.timer.poll()) timing.gpu_ms.push_back(*ms);
       measure(metrics, sim);
-      while (take(collect(metrics))) {}
+      while (take(collect(metrics))) {
+      }
       if (frames) {
         const bool png = options.png_every > 0 && s % options.png_every == 0;
         const bool film = frames->video && s % video_every == 0;
@@ -136,10 +146,13 @@ int run_headless(const Scene& scene, const RunOptions& options) {
       if (!errors.finite) break;
     }
   }
-  while (take(collect(metrics, true))) {}
+  while (take(collect(metrics, true))) {
+  }
   while (const auto ms = sim.timer.poll(true)) timing.gpu_ms.push_back(*ms);
   if (frames) frames->finish();
-  write_file(options.out / "stats.json", statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors, state_hash(sim)));
+  write_file(options.out / "stats.json",
+             statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
+                             state_hash(sim)));
   if (options.csv_every > 0) write_file(options.out / "stats.csv", csv);
   if (options.positions) {
     std::vector<glm::vec3> positions;
@@ -147,12 +160,15 @@ int run_headless(const Scene& scene, const RunOptions& options) {
     write_npy(options.out / "positions.npy", positions);
     write_npy(options.out / "tets.npy", model->rest.tets);
   }
-  fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name, sim.steps,
-             context.capabilities().renderer, errors.max_volume_loss_percent, percentiles(timing.wall_ms).median,
-             (options.out / "stats.json").string());
-  if (interrupted) throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
+  fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
+             sim.steps, context.capabilities().renderer, errors.max_volume_loss_percent,
+             percentiles(timing.wall_ms).median, (options.out / "stats.json").string());
+  if (interrupted)
+    throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
+                "what was finished is written", 1);
   if (!errors.finite)
-    throw Error("the state is not finite", fmt::format("at step {}", errors.last->step), "use a smaller --dt, more --substeps or a lower stiffness", 1);
+    throw Error("the state is not finite", fmt::format("at step {}", errors.last->step),
+                "use a smaller --dt, more --substeps or a lower stiffness", 1);
   return 0;
 }
 
@@ -161,14 +177,17 @@ int print_explanation(const Scene& scene, int gpu) {
   HeadlessContext context(gpu);
   const Sim sim = create_sim(model, scene.settings);
   const Explanation e = explain(sim);
-  fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(), model->rest.tets.size());
+  fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),
+             model->rest.tets.size());
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
     if (sim.system.present[k]) fmt::print(", {} {}", sim.system.lists[k].count(), constraint_kinds()[k].name);
   fmt::print("\n\n{:<28}{:>14}\n", "buffer", "bytes");
   for (const auto& buffer : e.buffers) fmt::print("{:<28}{:>14}\n", buffer.name, buffer.bytes);
-  fmt::print("{:<28}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes, double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
+  fmt::print("{:<28}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
+             double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
   fmt::print("{:<28}{:>14}{:>14}\n", "kernel", "work-groups", "a step");
-  for (const auto& dispatch : e.dispatches) fmt::print("{:<28}{:>14}{:>14}\n", dispatch.name, dispatch.groups, dispatch.per_step);
+  for (const auto& dispatch : e.dispatches)
+    fmt::print("{:<28}{:>14}{:>14}\n", dispatch.name, dispatch.groups, dispatch.per_step);
   fmt::print("{:<28}{:>14}{:>14}\n", "all", "", e.dispatches_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);
   return 0;
@@ -185,17 +204,21 @@ int print_info(int gpu) {
   for (std::size_t i = 0; i < devices.size(); ++i) fmt::print("--gpu {}: {}\n", i, devices[i]);
   HeadlessContext context(gpu);
   const Capabilities& c = context.capabilities();
-  fmt::print("OpenGL vendor:   {}\nOpenGL renderer: {}{}\nOpenGL version:  {}\nGLSL version:    {}\n", c.vendor, c.renderer,
-             c.software ? " (software: a CPU, not a GPU)" : "", c.version, c.shading_language);
-  fmt::print("storage blocks:  {} a compute stage, {} bytes each at most\n", c.storage_blocks, c.storage_bytes);
-  fmt::print("work-groups:     {} invocations, {} bytes of shared memory\nMSAA:            {} samples\n", c.work_group_invocations, c.shared_bytes, c.samples);
+  fmt::print("OpenGL vendor:   {}\nOpenGL renderer: {}{}\nOpenGL version:  {}\nGLSL version:    {}\n",
+             c.vendor, c.renderer, c.software ? " (software: a CPU, not a GPU)" : "", c.version,
+             c.shading_language);
+  fmt::print("storage blocks:  {} a compute stage, {} bytes each at most\n", c.storage_blocks,
+             c.storage_bytes);
+  fmt::print("work-groups:     {} invocations, {} bytes of shared memory\nMSAA:            {} samples\n",
+             c.work_group_invocations, c.shared_bytes, c.samples);
   fmt::print("extensions used: none beyond OpenGL 4.3 core\nmodels:          {}\n", models_folder().string());
   fmt::print("shaders:         {}\n", shader_folder().empty() ? "embedded" : shader_folder());
-  fmt::print("licences:        tetpbd MIT; "
+  fmt::print(
+      "licences:        tetpbd MIT; "
 #ifdef TETPBD_TETGEN
-             "TetGen AGPL-3+ (so this program as a whole is); "
+      "TetGen AGPL-3+ (so this program as a whole is); "
 #endif
-             "Stanford models: see models/README.md\n");
+      "Stanford models: see models/README.md\n");
   return 0;
 }
 

@@ -1,14 +1,14 @@
 // The command line: what it says becomes a scene, settings and options for one of the commands.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
-
-#include <CLI/CLI.hpp>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "app/bench.h"
 #include "app/compare.h"
@@ -42,33 +42,56 @@ template <class Names>
 int index_of(const Names& names, const std::string& name, const char* flag) {
   for (std::size_t i = 0; i < names.size(); ++i)
     if (name == names[i]) return int(i);
-  throw Error("unknown value", fmt::format("{} {}", flag, name), fmt::format("choose from {}", fmt::join(names, ", ")));
+  throw Error("unknown value", fmt::format("{} {}", flag, name),
+              fmt::format("choose from {}", fmt::join(names, ", ")));
 }
 
 void add_scene_options(CLI::App& command, SceneArguments& a) {
-  command.add_option("--scene", a.scene, fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")))->capture_default_str();
-  command.add_option("--mesh", a.overrides.mesh, "mesh in place of the scene's first body (.ply .obj .stl .off .node .ele .msh)");
+  command
+      .add_option("--scene", a.scene,
+                  fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")))
+      ->capture_default_str();
+  command.add_option("--mesh", a.overrides.mesh,
+                     "mesh in place of the scene's first body (.ply .obj .stl .off .node .ele .msh)");
   command.add_option("--tetgen", a.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
-  command.add_option("--deform", a.overrides.deform, "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
+  command.add_option(
+      "--deform", a.overrides.deform,
+      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
   a.values.resize(parameters().size());
   for (std::size_t i = 0; i < parameters().size(); ++i) {
     const Parameter& row = parameters()[i];
     const auto allowed = choices(row);
     std::string help = row.help;
-    if (!allowed.empty()) help += fmt::format(": {}", fmt::join(allowed, ", "));
-    else if (std::holds_alternative<bool Settings::*>(row.member)) help += ": true, false";
-    else help += fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit);
+    if (!allowed.empty())
+      help += fmt::format(": {}", fmt::join(allowed, ", "));
+    else if (std::holds_alternative<bool Settings::*>(row.member))
+      help += ": true, false";
+    else
+      help += fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit);
     command.add_option(flag_name(row), a.values[i], help)->group("Settings")->type_name("VALUE");
   }
-  command.add_option("--set", a.overrides.set, "PATH=VALUE for anything else in the scene, as in bodies.0.density=500")
-      ->expected(1)->take_all()->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command.add_option("--gpu", a.gpu, "which device of tetpbd info (default: the first GPU)")->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--set", a.overrides.set,
+                  "PATH=VALUE for anything else in the scene, as in bodies.0.density=500")
+      ->expected(1)
+      ->take_all()
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_option("--gpu", a.gpu, "which device of tetpbd info (default: the first GPU)")
+      ->check(CLI::NonNegativeNumber);
   command.add_option("--size", a.size, "of images and window, WxH")->capture_default_str();
-  command.add_option("--samples", a.samples, "of MSAA: 0, 2, 4, 8")->check(CLI::IsMember({0, 2, 4, 8}))->capture_default_str();
+  command.add_option("--samples", a.samples, "of MSAA: 0, 2, 4, 8")
+      ->check(CLI::IsMember({0, 2, 4, 8}))
+      ->capture_default_str();
   command.add_option("--look", a.look, "surface, wire, tets")->capture_default_str()->group("View");
-  command.add_option("--colour", a.colour, "plain, volume, stretch, velocity")->capture_default_str()->group("View");
-  command.add_option("--cut", a.view.cut, "tets: show those below this part of the body, 0 .. 1")->check(CLI::Range(0.0, 1.0))->group("View");
-  command.add_option("--cut-axis", a.view.cut_axis, "0: x, 1: y, 2: z")->check(CLI::Range(0, 2))->group("View");
+  command.add_option("--colour", a.colour, "plain, volume, stretch, velocity")
+      ->capture_default_str()
+      ->group("View");
+  command.add_option("--cut", a.view.cut, "tets: show those below this part of the body, 0 .. 1")
+      ->check(CLI::Range(0.0, 1.0))
+      ->group("View");
+  command.add_option("--cut-axis", a.view.cut_axis, "0: x, 1: y, 2: z")
+      ->check(CLI::Range(0, 2))
+      ->group("View");
   command.add_flag("--flat", a.flat, "flat normals, made in the geometry shader")->group("View");
   command.add_flag("--no-shadow", a.no_shadow, "no shadow")->group("View");
   command.add_flag("--no-grid", a.no_grid, "no lines on the ground")->group("View");
@@ -82,13 +105,15 @@ void parse_size(const std::string& size, int& width, int& height) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), target);
     return error == std::errc() && end == text.data() + text.size() && target >= 16 && target <= 16384;
   };
-  if (cross == std::string::npos || !whole(size.substr(0, cross), width) || !whole(size.substr(cross + 1), height))
+  if (cross == std::string::npos || !whole(size.substr(0, cross), width) ||
+      !whole(size.substr(cross + 1), height))
     throw Error("bad size", "--size " + size, "write WIDTHxHEIGHT, each from 16 to 16384, as in 1280x720");
 }
 
 void parse_shard(const std::string& text, int& shard, int& shards) {
   int end = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &end) != 2 || end != int(text.size()) || shard < 1 || shards < shard)
+  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &end) != 2 || end != int(text.size()) ||
+      shard < 1 || shards < shard)
     throw Error("bad shard", "--shard " + text, "write i/n with i from 1 to n, as in 2/8");
 }
 
@@ -111,7 +136,9 @@ int run_commands(int argc, char** argv) {
   app.require_subcommand(0, 1);
   app.fallthrough();
   std::string shaders;
-  app.add_option("--shaders", shaders, "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
+  app.add_option(
+      "--shaders", shaders,
+      "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
 
   SceneArguments scene;
   auto* view = app.add_subcommand("view", "a window (the default where there is a display)");
@@ -120,12 +147,19 @@ int run_commands(int argc, char** argv) {
   auto* run = app.add_subcommand("run", "headless: steps a scene, writes frames, video, statistics");
   add_scene_options(*run, scene);
   RunOptions options;
-  run->add_option("--steps", options.steps, "steps to take (default: the scene's duration)")->check(CLI::Range(1L, 1000000000L));
+  run->add_option("--steps", options.steps, "steps to take (default: the scene's duration)")
+      ->check(CLI::Range(1L, 1000000000L));
   run->add_option("--out", options.out, "folder for stats.json, stats.csv, frames")->capture_default_str();
-  run->add_option("--png-every", options.png_every, "write frame_NNNNN.png every K steps")->check(CLI::Range(1L, 1000000000L));
-  run->add_option("--video", options.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
-  run->add_option("--video-every", options.video_every, "steps a video frame (default: real time at 30 frames a second)")->check(CLI::Range(1L, 1000000000L));
-  run->add_option("--csv-every", options.csv_every, "a row of stats.csv every K steps, 0: none")->check(CLI::Range(0L, 1000000000L))->capture_default_str();
+  run->add_option("--png-every", options.png_every, "write frame_NNNNN.png every K steps")
+      ->check(CLI::Range(1L, 1000000000L));
+  run->add_option("--video", options.video,
+                  "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
+  run->add_option("--video-every", options.video_every,
+                  "steps a video frame (default: real time at 30 frames a second)")
+      ->check(CLI::Range(1L, 1000000000L));
+  run->add_option("--csv-every", options.csv_every, "a row of stats.csv every K steps, 0: none")
+      ->check(CLI::Range(0L, 1000000000L))
+      ->capture_default_str();
   run->add_flag("--positions", options.positions, "write positions.npy and tets.npy");
   run->add_flag("--progress", options.progress, "show progress even if standard error is no terminal");
 
@@ -133,19 +167,44 @@ int run_commands(int argc, char** argv) {
   BenchOptions bench_options;
   std::string bench_size = "1280x720";
   bool no_render = false;
-  bench->add_option("--scenes,--scene", bench_options.scenes, "scenes, separated by commas")->delimiter(',')->capture_default_str();
-  bench->add_option("--modes,--mode", bench_options.modes, "solver modes")->delimiter(',')->capture_default_str();
-  bench->add_option("--constraint-sets", bench_options.constraint_sets, "sets of kinds joined by +")->delimiter(',')->capture_default_str();
-  bench->add_option("--iterations", bench_options.iterations, "iterations a substep")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
-  bench->add_option("--substeps", bench_options.substeps, "substeps a step")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
-  bench->add_option("--frames", bench_options.frames, "timed frames")->check(CLI::Range(1L, 1000000L))->capture_default_str();
-  bench->add_option("--warm-up", bench_options.warm_up, "frames before them")->check(CLI::Range(0L, 1000000L))->capture_default_str();
-  bench->add_option("--repeats", bench_options.repeats, "repetitions; the median counts")->check(CLI::Range(1, 100))->capture_default_str();
-  bench->add_option("--most-seconds", bench_options.most_seconds, "a repetition ends there with fewer frames; 12 times that bounds the error run")->check(CLI::Range(0.01, 1e6))->capture_default_str();
+  bench->add_option("--scenes,--scene", bench_options.scenes, "scenes, separated by commas")
+      ->delimiter(',')
+      ->capture_default_str();
+  bench->add_option("--modes,--mode", bench_options.modes, "solver modes")
+      ->delimiter(',')
+      ->capture_default_str();
+  bench->add_option("--constraint-sets", bench_options.constraint_sets, "sets of kinds joined by +")
+      ->delimiter(',')
+      ->capture_default_str();
+  bench->add_option("--iterations", bench_options.iterations, "iterations a substep")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  bench->add_option("--substeps", bench_options.substeps, "substeps a step")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  bench->add_option("--frames", bench_options.frames, "timed frames")
+      ->check(CLI::Range(1L, 1000000L))
+      ->capture_default_str();
+  bench->add_option("--warm-up", bench_options.warm_up, "frames before them")
+      ->check(CLI::Range(0L, 1000000L))
+      ->capture_default_str();
+  bench->add_option("--repeats", bench_options.repeats, "repetitions; the median counts")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  bench
+      ->add_option("--most-seconds", bench_options.most_seconds,
+                   "a repetition ends there with fewer frames; 12 times that bounds the error run")
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
   bench->add_option("--size", bench_size, "of the rendered frames, WxH")->capture_default_str();
-  bench->add_option("--samples", bench_options.samples, "of MSAA: 0, 2, 4, 8")->check(CLI::IsMember({0, 2, 4, 8}))->capture_default_str();
+  bench->add_option("--samples", bench_options.samples, "of MSAA: 0, 2, 4, 8")
+      ->check(CLI::IsMember({0, 2, 4, 8}))
+      ->capture_default_str();
   bench->add_flag("--no-render", no_render, "simulation alone");
-  bench->add_option("--tetgen", bench_options.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
+  bench->add_option("--tetgen", bench_options.overrides.tetgen,
+                    "TetGen switches, pY for the paper's kind of mesh");
   bench->add_option("--gpu", bench_options.gpu, "which device")->check(CLI::NonNegativeNumber);
   bench->add_option("--out", bench_options.out, "folder for bench.csv and bench.json")->capture_default_str();
 
@@ -154,33 +213,61 @@ int run_commands(int argc, char** argv) {
   std::string shard = "1/1";
   compare->add_option("--scene", compare_options.scene, "a scene")->capture_default_str();
   compare->add_option("--mesh", compare_options.overrides.mesh, "mesh in place of the scene's first body");
-  compare->add_option("--tetgen", compare_options.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
-  compare->add_option("--set", compare_options.overrides.set, "PATH=VALUE for anything else in the scene")->expected(1)->take_all();
-  compare->add_option("--modes", compare_options.modes, "solver modes")->delimiter(',')->capture_default_str();
-  compare->add_option("--iterations", compare_options.iterations, "iterations a substep")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
-  compare->add_option("--substeps", compare_options.substeps, "substeps a step")->delimiter(',')->check(CLI::Range(1, 100000))->capture_default_str();
-  compare->add_option("--omegas", compare_options.omegas, "over-relaxations (default: the scene's)")->delimiter(',')->check(CLI::Range(0.0, 4.0));
-  compare->add_option("--steps", compare_options.steps, "steps of each run")->check(CLI::Range(1L, 1000000000L))->capture_default_str();
-  compare->add_option("--budget-ms", compare_options.budget_ms, "print the best setting within that time a step")->check(CLI::PositiveNumber);
-  compare->add_option("--error", compare_options.error_percent, "print the cheapest setting that loses at most this volume, %")->check(CLI::PositiveNumber);
-  compare->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")->capture_default_str();
+  compare->add_option("--tetgen", compare_options.overrides.tetgen,
+                      "TetGen switches, pY for the paper's kind of mesh");
+  compare->add_option("--set", compare_options.overrides.set, "PATH=VALUE for anything else in the scene")
+      ->expected(1)
+      ->take_all();
+  compare->add_option("--modes", compare_options.modes, "solver modes")
+      ->delimiter(',')
+      ->capture_default_str();
+  compare->add_option("--iterations", compare_options.iterations, "iterations a substep")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  compare->add_option("--substeps", compare_options.substeps, "substeps a step")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  compare->add_option("--omegas", compare_options.omegas, "over-relaxations (default: the scene's)")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 4.0));
+  compare->add_option("--steps", compare_options.steps, "steps of each run")
+      ->check(CLI::Range(1L, 1000000000L))
+      ->capture_default_str();
+  compare
+      ->add_option("--budget-ms", compare_options.budget_ms, "print the best setting within that time a step")
+      ->check(CLI::PositiveNumber);
+  compare
+      ->add_option("--error", compare_options.error_percent,
+                   "print the cheapest setting that loses at most this volume, %")
+      ->check(CLI::PositiveNumber);
+  compare
+      ->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")
+      ->capture_default_str();
   compare->add_option("--merge", compare_options.merge, "folders of finished shards, instead of running");
   compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::NonNegativeNumber);
-  compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")->capture_default_str();
+  compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")
+      ->capture_default_str();
 
-  auto* reproduce = app.add_subcommand("reproduce", "the paper's table and figures, measured here, with plots and one report");
+  auto* reproduce = app.add_subcommand(
+      "reproduce", "the paper's table and figures, measured here, with plots and one report");
   ReproduceOptions reproduce_options;
-  reproduce->add_option("--out", reproduce_options.out, "folder for report.html, figures, tables")->capture_default_str();
-  reproduce->add_flag("--quick", reproduce_options.quick, "bunny alone, few frames: checks the trends without a GPU");
+  reproduce->add_option("--out", reproduce_options.out, "folder for report.html, figures, tables")
+      ->capture_default_str();
+  reproduce->add_flag("--quick", reproduce_options.quick,
+                      "bunny alone, few frames: checks the trends without a GPU");
   reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(CLI::NonNegativeNumber);
 
   auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
   std::filesystem::path mesh_file, mesh_out;
   std::string mesh_switches = "pYq1.85o/140";
   bool mesh_json = false;
-  mesh->add_option("file", mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")->required();
+  mesh->add_option("file", mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")
+      ->required();
   mesh->add_option("--tetgen", mesh_switches, "TetGen switches")->capture_default_str();
-  mesh->add_option("--out", mesh_out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  mesh->add_option("--out", mesh_out,
+                   "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
   mesh->add_flag("--json", mesh_json, "print the report as JSON");
 
   auto* info = app.add_subcommand("info", "GL version, devices, limits, extensions used, build, licences");
@@ -189,7 +276,8 @@ int run_commands(int argc, char** argv) {
 
   // Options without a command belong to the window: tetpbd --scene beam.
   std::vector<std::string> words(argv + 1, argv + argc);
-  if (!words.empty() && words[0].starts_with("--") && words[0] != "--help" && words[0] != "--version" && !words[0].starts_with("--shaders"))
+  if (!words.empty() && words[0].starts_with("--") && words[0] != "--help" && words[0] != "--version" &&
+      !words[0].starts_with("--shaders"))
     words.insert(words.begin(), "view");
   std::reverse(words.begin(), words.end());  // the order CLI11 takes them in
   try {
@@ -224,10 +312,12 @@ int run_commands(int argc, char** argv) {
     return run_headless(opened, options);
   }
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
-    throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set", "start it in a desktop session, or use tetpbd run");
+    throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
+                "start it in a desktop session, or use tetpbd run");
   if (!*view) scene.values.resize(parameters().size());
   const Scene opened = scene_of(scene);
-  return run_window(opened, {scene.scene, scene.overrides, scene.width, scene.height, scene.samples, scene.view});
+  return run_window(opened,
+                    {scene.scene, scene.overrides, scene.width, scene.height, scene.samples, scene.view});
 }
 
 }  // namespace

@@ -23,11 +23,13 @@ MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::funct
     run.timing.wall_ms.push_back(seconds * 1e3);
     run.timing.total_s += seconds;
     measure(metrics, sim);
-    while (take(collect(metrics))) {}
+    while (take(collect(metrics))) {
+    }
     while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.push_back(*ms);
     if (!run.errors.finite || (go_on && !go_on(s))) break;
   }
-  while (take(collect(metrics, true))) {}
+  while (take(collect(metrics, true))) {
+  }
   while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.push_back(*ms);
   run.hash = state_hash(sim);
   return run;

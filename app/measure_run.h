@@ -17,8 +17,8 @@ struct MeasuredRun {
   std::uint64_t hash = 0;
 };
 
-/// Steps `steps` times and measures after each; GPU times are those of the step's passes alone. Ends early when the state is not
-/// finite or `go_on(step)` says so.
+/// Steps `steps` times and measures after each; GPU times are those of the step's passes alone. Ends early
+/// when the state is not finite or `go_on(step)` says so.
 MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::function<bool(long)>& go_on = {});
 
 }  // namespace tetpbd

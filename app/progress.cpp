@@ -1,17 +1,20 @@
 #include "app/progress.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
-
-#include <fmt/format.h>
 
 namespace tetpbd {
 
 using Clock = std::chrono::steady_clock;
 
 Progress::Progress(std::string label, long total, bool force)
-    : label_(std::move(label)), total_(total), shown_(force || isatty(2)), start_(Clock::now()), last_(start_ - std::chrono::seconds(1)) {}
+    : label_(std::move(label)),
+      total_(total),
+      shown_(force || isatty(2)),
+      start_(Clock::now()),
+      last_(start_ - std::chrono::seconds(1)) {}
 
 Progress::~Progress() {
   if (drawn_) std::fputs("\r\033[K", stderr);

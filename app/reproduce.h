@@ -11,7 +11,8 @@ struct ReproduceOptions {
   int gpu = -1;
 };
 
-/// Writes report.html (self-contained), figures/*.svg, tables/*.csv. Throws Error (status 1) if a trend of the paper does not show.
+/// Writes report.html (self-contained), figures/*.svg, tables/*.csv. Throws Error (status 1) if a trend of
+/// the paper does not show.
 int run_reproduce(const ReproduceOptions& options);
 
 }  // namespace tetpbd

@@ -1,16 +1,16 @@
 #include "app/scene.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <limits>
-#include <set>
-
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <glm/gtc/matrix_transform.hpp>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "sim/error.h"
 #include "sim/layout.h"
@@ -36,7 +36,8 @@ namespace {
 /// An object of the scene whose keys are taken one by one; what is left over is an error.
 class Keys {
  public:
-  Keys(const json& object, std::string where, std::string file) : object_(object), where_(std::move(where)), file_(std::move(file)) {
+  Keys(const json& object, std::string where, std::string file)
+      : object_(object), where_(std::move(where)), file_(std::move(file)) {
     if (!object.is_object()) fail(where_.empty() ? "the scene" : where_, "must be an object in braces");
   }
 
@@ -53,7 +54,8 @@ class Keys {
   }
 
   double number(const json& value, const std::string& key, double low, double high) const {
-    if (!value.is_number() || !std::isfinite(value.get<double>()) || value.get<double>() < low || value.get<double>() > high)
+    if (!value.is_number() || !std::isfinite(value.get<double>()) || value.get<double>() < low ||
+        value.get<double>() > high)
       fail(key, fmt::format("must be a number from {:g} to {:g}, not {}", low, high, shown(value)));
     return value.get<double>();
   }
@@ -75,7 +77,8 @@ class Keys {
   void read_vector(const std::string& key, Vector& target, double low, double high, bool whole = false) {
     const json* value = find(key);
     if (!value) return;
-    if (!value->is_array() || value->size() != 3) fail(path(key), "must be a list of three numbers, not " + shown(*value));
+    if (!value->is_array() || value->size() != 3)
+      fail(path(key), "must be a list of three numbers, not " + shown(*value));
     for (int a = 0; a < 3; ++a) {
       const double x = number((*value)[std::size_t(a)], fmt::format("{}.{}", path(key), a), low, high);
       if (whole && x != std::floor(x)) fail(path(key), "must be a list of three whole numbers");
@@ -84,7 +87,8 @@ class Keys {
   }
   void finish() const {
     for (const auto& [key, value] : object_.items())
-      if (!taken_.contains(key)) fail(path(key), fmt::format("is not known here; known are {}", fmt::join(taken_, ", ")));
+      if (!taken_.contains(key))
+        fail(path(key), fmt::format("is not known here; known are {}", fmt::join(taken_, ", ")));
   }
 
  private:
@@ -145,7 +149,8 @@ BodyDescription read_body(const json& value, const std::string& where, const std
       keys.fail(keys.path("block.cells"), "must be at most 2 million cells in all");
   }
   if (const json* fixed = keys.find("fixed")) {
-    if (!fixed->is_array()) keys.fail(keys.path("fixed"), "must be a list of boxes {\"low\": [x,y,z], \"high\": [x,y,z]}");
+    if (!fixed->is_array())
+      keys.fail(keys.path("fixed"), "must be a list of boxes {\"low\": [x,y,z], \"high\": [x,y,z]}");
     for (std::size_t i = 0; i < fixed->size(); ++i) {
       Keys box_keys((*fixed)[i], fmt::format("{}.{}", keys.path("fixed"), i), file);
       BodyDescription::Box box;
@@ -177,7 +182,8 @@ Scene read_scene(const json& document, const std::string& file) {
   keys.read("description", scene.description);
   keys.read("duration", scene.duration, 1e-6, 1e6);
   const json* bodies = keys.find("bodies");
-  if (!bodies || !bodies->is_array() || bodies->empty()) keys.fail("bodies", "must be a list with at least one body");
+  if (!bodies || !bodies->is_array() || bodies->empty())
+    keys.fail("bodies", "must be a list with at least one body");
   for (std::size_t i = 0; i < bodies->size(); ++i)
     scene.bodies.push_back(read_body((*bodies)[i], fmt::format("bodies.{}", i), file));
   for (const char* section : {"world", "solver"}) {
@@ -185,7 +191,8 @@ Scene read_scene(const json& document, const std::string& file) {
     if (!value) continue;
     Keys section_keys(*value, section, file);
     read_settings(section_keys, section, scene.settings);
-    if (const json* obstacles = std::string_view(section) == "world" ? section_keys.find("obstacles") : nullptr) {
+    if (const json* obstacles =
+            std::string_view(section) == "world" ? section_keys.find("obstacles") : nullptr) {
       if (!obstacles->is_array() || obstacles->size() > MAX_PLANES - 1)
         keys.fail("world.obstacles", fmt::format("must be a list of at most {} planes", MAX_PLANES - 1));
       for (std::size_t i = 0; i < obstacles->size(); ++i) {
@@ -227,14 +234,17 @@ void set_path(json& document, const std::string& assignment) {
   json* at = &document;
   for (const std::string& part : split(assignment.substr(0, equals), '.')) {
     if (at->is_array()) {
-      const bool number = !part.empty() && part.size() < 6 && std::all_of(part.begin(), part.end(), [](char c) { return c >= '0' && c <= '9'; });
+      const bool number = !part.empty() && part.size() < 6 &&
+                          std::all_of(part.begin(), part.end(), [](char c) { return c >= '0' && c <= '9'; });
       if (!number || std::stoul(part) >= at->size())
-        throw Error("no such place in the scene", "--set " + assignment, fmt::format("'{}' must be an index below {}", part, at->size()));
+        throw Error("no such place in the scene", "--set " + assignment,
+                    fmt::format("'{}' must be an index below {}", part, at->size()));
       at = &(*at)[std::stoul(part)];
     } else if (at->is_object() || at->is_null()) {
       at = &(*at)[part];
     } else {
-      throw Error("no such place in the scene", "--set " + assignment, fmt::format("what '{}' is looked up in is a value", part));
+      throw Error("no such place in the scene", "--set " + assignment,
+                  fmt::format("what '{}' is looked up in is a value", part));
     }
   }
   *at = std::move(value);
@@ -254,10 +264,13 @@ std::vector<std::string> scene_names() {
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides) {
   fs::path file = name_or_file;
   std::error_code error;
-  if (!fs::is_regular_file(file, error) && file.extension() != ".json") file = models_folder() / "scenes" / (name_or_file + ".json");
+  if (!fs::is_regular_file(file, error) && file.extension() != ".json")
+    file = models_folder() / "scenes" / (name_or_file + ".json");
   if (!fs::is_regular_file(file, error))
-    throw Error("no such scene", name_or_file, fmt::format("give a .json file or one of {}", fmt::join(scene_names(), ", ")));
-  if (fs::file_size(file, error) > (16u << 20)) throw Error("scene file is too large", file.string(), "a scene is a few kilobytes of JSON");
+    throw Error("no such scene", name_or_file,
+                fmt::format("give a .json file or one of {}", fmt::join(scene_names(), ", ")));
+  if (fs::file_size(file, error) > (16u << 20))
+    throw Error("scene file is too large", file.string(), "a scene is a few kilobytes of JSON");
   std::ifstream stream(file, std::ios::binary);
   json document;
   try {
@@ -288,7 +301,8 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
 std::shared_ptr<const Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   for (const BodyDescription& body : scene.bodies) {
-    TetMesh mesh = body.block ? make_block(body.block->size, body.block->cells) : load_mesh(body.mesh, body.tetgen);
+    TetMesh mesh =
+        body.block ? make_block(body.block->size, body.block->cells) : load_mesh(body.mesh, body.tetgen);
     glm::dmat4 turn(1);
     for (int axis = 2; axis >= 0; --axis) {
       glm::dvec3 direction(0);
@@ -299,9 +313,11 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     const Bounds own = bounds(mesh.positions);
     std::vector<std::uint32_t> fixed;
     for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
-      const glm::dvec3 part = (mesh.positions[i] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
+      const glm::dvec3 part =
+          (mesh.positions[i] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
       for (const BodyDescription::Box& box : body.fixed)
-        if (glm::all(glm::greaterThanEqual(part, box.low - 1e-9)) && glm::all(glm::lessThanEqual(part, box.high + 1e-9))) {
+        if (glm::all(glm::greaterThanEqual(part, box.low - 1e-9)) &&
+            glm::all(glm::lessThanEqual(part, box.high + 1e-9))) {
           fixed.push_back(i);
           break;
         }

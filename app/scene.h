@@ -15,23 +15,23 @@ namespace tetpbd {
 
 struct BodyDescription {
   struct Block {
-    glm::dvec3 size{1};   ///< m
+    glm::dvec3 size{1};  ///< m
     glm::ivec3 cells{1};
   };
   struct Box {
     glm::dvec3 low{0}, high{1};  ///< fractions of the body's bounding box
   };
   std::string name;
-  std::filesystem::path mesh;        ///< a file, or
-  std::optional<Block> block;        ///< a generated block
+  std::filesystem::path mesh;  ///< a file, or
+  std::optional<Block> block;  ///< a generated block
   std::string tetgen = "pYq1.85o/140";
-  double height = 0;                 ///< m, scales the mesh; 0 keeps its size
-  glm::dvec3 rotation{0};            ///< degrees about x, then y, then z
-  glm::dvec3 position{0};            ///< m, where the middle of the bottom of its bounding box goes
-  double density = 1000;             ///< kg/m^3
-  glm::dvec3 velocity{0};            ///< m/s
-  glm::dvec3 spin{0};                ///< rad/s about the centre of mass
-  std::vector<Box> fixed;            ///< vertices in any of these boxes are fixed
+  double height = 0;       ///< m, scales the mesh; 0 keeps its size
+  glm::dvec3 rotation{0};  ///< degrees about x, then y, then z
+  glm::dvec3 position{0};  ///< m, where the middle of the bottom of its bounding box goes
+  double density = 1000;   ///< kg/m^3
+  glm::dvec3 velocity{0};  ///< m/s
+  glm::dvec3 spin{0};      ///< rad/s about the centre of mass
+  std::vector<Box> fixed;  ///< vertices in any of these boxes are fixed
   std::string deform = "none";
 };
 
@@ -41,7 +41,7 @@ struct Scene {
   std::vector<glm::dvec4> obstacles;  ///< half spaces n.x >= d as (n, d), n of unit length
   Settings settings;
   std::optional<Camera> camera;
-  double duration = 2;                ///< s
+  double duration = 2;  ///< s
 };
 
 /// What the command line puts in place of a scene's own.
@@ -61,7 +61,8 @@ std::shared_ptr<const Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.
 Camera scene_camera(const Scene& scene, const Model& model, float aspect);
 
-/// Folder of the shipped meshes and scenes: $TETPBD_MODELS, beside the installed program, or the source folder.
+/// Folder of the shipped meshes and scenes: $TETPBD_MODELS, beside the installed program, or the source
+/// folder.
 std::filesystem::path models_folder();
 
 }  // namespace tetpbd

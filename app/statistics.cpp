@@ -1,9 +1,9 @@
 #include "app/statistics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace tetpbd {
@@ -13,14 +13,18 @@ using nlohmann::ordered_json;
 Percentiles percentiles(std::vector<double> values) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
-  const auto at = [&](double part) { return values[std::size_t(std::lround(part * double(values.size() - 1)))]; };
+  const auto at = [&](double part) {
+    return values[std::size_t(std::lround(part * double(values.size() - 1)))];
+  };
   return {at(0.5), at(0.05), at(0.95)};
 }
 
 namespace {
 
 // Nothing non-finite is written as a number.
-ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+ordered_json number(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
 
 ordered_json vector(const glm::dvec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
 
@@ -38,7 +42,8 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
   for (const BodyDescription& body : scene.bodies) {
     ordered_json item = {{"name", body.name}};
     if (body.block)
-      item["block"] = {{"size", vector(body.block->size)}, {"cells", {body.block->cells.x, body.block->cells.y, body.block->cells.z}}};
+      item["block"] = {{"size", vector(body.block->size)},
+                       {"cells", {body.block->cells.x, body.block->cells.y, body.block->cells.z}}};
     else
       item["mesh"] = body.mesh.string(), item["tetgen"] = body.tetgen;
     if (body.height > 0) item["height"] = body.height;
@@ -50,7 +55,8 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
     item["deform"] = body.deform;
     if (!body.fixed.empty()) {
       item["fixed"] = ordered_json::array();
-      for (const auto& box : body.fixed) item["fixed"].push_back({{"low", vector(box.low)}, {"high", vector(box.high)}});
+      for (const auto& box : body.fixed)
+        item["fixed"].push_back({{"low", vector(box.low)}, {"high", vector(box.high)}});
     }
     bodies.push_back(item);
   }
@@ -66,32 +72,48 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
 
 }  // namespace
 
-std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device, const MeshReport& mesh,
-                            const Timing& timing, const RunErrors& errors, std::uint64_t hash) {
+std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
+                            const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
+                            std::uint64_t hash) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
-  j["mesh"] = {{"vertices", mesh.vertices}, {"surface_triangles", mesh.surface_triangles}, {"edges", mesh.edges},
-               {"bends", mesh.bends}, {"tets", mesh.tets}, {"volume", mesh.volume},
+  j["mesh"] = {{"vertices", mesh.vertices},
+               {"surface_triangles", mesh.surface_triangles},
+               {"edges", mesh.edges},
+               {"bends", mesh.bends},
+               {"tets", mesh.tets},
+               {"volume", mesh.volume},
                {"euler_characteristic", mesh.euler_characteristic}};
-  j["device"] = {{"gl_renderer", device.renderer}, {"gl_vendor", device.vendor}, {"gl_version", device.version},
+  j["device"] = {{"gl_renderer", device.renderer},
+                 {"gl_vendor", device.vendor},
+                 {"gl_version", device.version},
                  {"software", device.software}};
-  j["timing"] = {{"steps", sim.steps}, {"gpu_ms_per_step", times(timing.gpu_ms)}, {"wall_ms_per_step", times(timing.wall_ms)},
-                 {"fps", timing.total_s > 0 ? number(double(sim.steps) / timing.total_s) : ordered_json(nullptr)}};
+  j["timing"] = {
+      {"steps", sim.steps},
+      {"gpu_ms_per_step", times(timing.gpu_ms)},
+      {"wall_ms_per_step", times(timing.wall_ms)},
+      {"fps", timing.total_s > 0 ? number(double(sim.steps) / timing.total_s) : ordered_json(nullptr)}};
   const Measurement last = errors.last.value_or(Measurement{});
   j["error"] = {{"max_volume_loss_percent", number(errors.max_volume_loss_percent)},
                 {"final_volume_error_percent", number(last.volume_error_percent)},
                 {"tet_volume_rms", number(last.tet_volume_rms)},
                 {"tet_volume_max", number(last.tet_volume_max)},
-                {"inverted_tets", std::isfinite(last.inverted_tets) ? ordered_json(long(last.inverted_tets)) : ordered_json(nullptr)},
+                {"inverted_tets", std::isfinite(last.inverted_tets) ? ordered_json(long(last.inverted_tets))
+                                                                    : ordered_json(nullptr)},
                 {"stretch_rms", number(last.stretch_rms)},
                 {"stretch_max", number(last.stretch_max)},
                 {"bend_rms_rad", number(last.bend_rms_rad)},
                 {"rigid_distance", number(last.rigid_distance)}};
-  j["momentum"] = {{"linear_drift", number(errors.linear_drift)}, {"angular_drift", number(errors.angular_drift)},
-                   {"linear", vector(last.momentum)}, {"angular", vector(last.angular_momentum)}};
-  j["energy"] = {{"start", number(errors.start_energy)}, {"final", number(last.energy())}, {"max", number(errors.max_energy)},
-                 {"final_kinetic", number(last.kinetic)}, {"final_potential", number(last.potential)}};
+  j["momentum"] = {{"linear_drift", number(errors.linear_drift)},
+                   {"angular_drift", number(errors.angular_drift)},
+                   {"linear", vector(last.momentum)},
+                   {"angular", vector(last.angular_momentum)}};
+  j["energy"] = {{"start", number(errors.start_energy)},
+                 {"final", number(last.energy())},
+                 {"max", number(errors.max_energy)},
+                 {"final_kinetic", number(last.kinetic)},
+                 {"final_potential", number(last.potential)}};
   j["finite"] = errors.finite;
   j["state_hash"] = fmt::format("{:016x}", hash);
   return j.dump(2) + "\n";

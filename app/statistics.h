@@ -15,11 +15,14 @@ struct Timing {
   double total_s = 0;  ///< of all steps, without what came between them
 };
 
-struct Percentiles { double median = 0, p05 = 0, p95 = 0; };
+struct Percentiles {
+  double median = 0, p05 = 0, p95 = 0;
+};
 Percentiles percentiles(std::vector<double> values);
 
-std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device, const MeshReport& mesh,
-                            const Timing& timing, const RunErrors& errors, std::uint64_t hash);
+std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
+                            const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
+                            std::uint64_t hash);
 std::string csv_header();
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 

@@ -9,8 +9,8 @@
 namespace tetpbd {
 
 struct WindowOptions {
-  std::string scene_name;      ///< as given: a name or a file
-  SceneOverrides overrides;    ///< stay in force when the same scene is reset
+  std::string scene_name;    ///< as given: a name or a file
+  SceneOverrides overrides;  ///< stay in force when the same scene is reset
   int width = 1280, height = 720, samples = 4;
   ViewOptions view;
 };

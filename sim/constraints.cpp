@@ -1,9 +1,9 @@
 #include "sim/constraints.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
-
-#include <fmt/format.h>
 
 #include "sim/error.h"
 
@@ -47,7 +47,8 @@ void Bend::build(const TetMesh& mesh, ConstraintList& list) {
     while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
     if (end - i == 2 && sides[i].forward != sides[i + 1].forward) {
       // Wing 0 sees the edge x2 -> x3 run forwards, so a convex hinge has the same sign everywhere.
-      const std::array<std::uint32_t, 4> hinge = {sides[i + 1].wing, sides[i].wing, sides[i].low, sides[i].high};
+      const std::array<std::uint32_t, 4> hinge = {sides[i + 1].wing, sides[i].wing, sides[i].low,
+                                                  sides[i].high};
       // The clamp of the formula to 1 rad is for errors, not for rest angles: measure the angle itself.
       std::array<glm::dvec3, 4> x;
       for (std::size_t j = 0; j < 4; ++j) x[j] = mesh.positions[hinge[j]] - mesh.positions[hinge[0]];

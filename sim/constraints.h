@@ -13,7 +13,8 @@
 
 namespace tetpbd {
 
-/// Constraints of one kind: `arity` vertices and one rest value each (m, rad or m^3), from positions in double.
+/// Constraints of one kind: `arity` vertices and one rest value each (m, rad or m^3), from positions in
+/// double.
 struct ConstraintList {
   int arity = 0;
   std::vector<std::uint32_t> vertices;  ///< arity * count
@@ -25,14 +26,17 @@ struct ConstraintList {
   }
 };
 
-// A kind is a formula in shaders/constraints/NAME.glsl, included in sim/formulas.h, and a row here: its name, arity,
-// stiffness, the formula as C++, and how a mesh gives its constraints. Order is the order of projection in Gauss-Seidel.
+// A kind is a formula in shaders/constraints/NAME.glsl, included in sim/formulas.h, and a row here: its name,
+// arity, stiffness, the formula as C++, and how a mesh gives its constraints. Order is the order of
+// projection in Gauss-Seidel.
 struct Stretch {
   static constexpr const char* name = "stretch";
   static constexpr int arity = 2;
   static constexpr double Settings::*stiffness = &Settings::k_stretch;
   template <class real>
-  static auto evaluate(glm::vec<3, real>* x, real rest) { return Formulas<real>{}.stretch(x, rest); }
+  static auto evaluate(glm::vec<3, real>* x, real rest) {
+    return Formulas<real>{}.stretch(x, rest);
+  }
   static void build(const TetMesh& mesh, ConstraintList& list);  ///< every edge of every tet
 };
 struct Bend {
@@ -40,15 +44,20 @@ struct Bend {
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_bend;
   template <class real>
-  static auto evaluate(glm::vec<3, real>* x, real rest) { return Formulas<real>{}.bend(x, rest); }
-  static void build(const TetMesh& mesh, ConstraintList& list);  ///< every edge that two surface triangles share
+  static auto evaluate(glm::vec<3, real>* x, real rest) {
+    return Formulas<real>{}.bend(x, rest);
+  }
+  static void build(const TetMesh& mesh,
+                    ConstraintList& list);  ///< every edge that two surface triangles share
 };
 struct Volume {
   static constexpr const char* name = "volume";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_volume;
   template <class real>
-  static auto evaluate(glm::vec<3, real>* x, real rest) { return Formulas<real>{}.volume(x, rest); }
+  static auto evaluate(glm::vec<3, real>* x, real rest) {
+    return Formulas<real>{}.volume(x, rest);
+  }
   static void build(const TetMesh& mesh, ConstraintList& list);  ///< every tet
 };
 using Kinds = std::tuple<Stretch, Bend, Volume>;
@@ -57,9 +66,8 @@ constexpr int kind_count = int(std::tuple_size_v<Kinds>);
 /// Calls f(Kind{}, index) for every kind, in order.
 template <class F>
 void for_each_kind(F&& f) {
-  [&]<std::size_t... I>(std::index_sequence<I...>) {
-    (f(std::tuple_element_t<I, Kinds>{}, int(I)), ...);
-  }(std::make_index_sequence<std::size_t(kind_count)>{});
+  [&]<std::size_t... I>(std::index_sequence<I...>) { (f(std::tuple_element_t<I, Kinds>{}, int(I)), ...); }
+  (std::make_index_sequence<std::size_t(kind_count)>{});
 }
 
 struct ConstraintKind {
@@ -71,9 +79,9 @@ const std::vector<ConstraintKind>& constraint_kinds();
 
 /// The constraints of a mesh of the kinds that `names` ("stretch,volume") lists.
 struct ConstraintSystem {
-  std::vector<ConstraintList> lists;        ///< one per kind, empty for a kind left out
-  std::vector<bool> present;                ///< by kind
-  std::vector<std::uint32_t> at_vertex;     ///< n_i, constraints of all kinds on vertex i
+  std::vector<ConstraintList> lists;     ///< one per kind, empty for a kind left out
+  std::vector<bool> present;             ///< by kind
+  std::vector<std::uint32_t> at_vertex;  ///< n_i, constraints of all kinds on vertex i
   std::size_t count() const;
 };
 ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names);

@@ -1,5 +1,6 @@
-// PBD on the CPU, the same step as the GPU's, with the same formulas, in a precision of choice. State is in double, so no
-// small displacement is lost; constraints are evaluated in `real` from differences of positions.
+// PBD on the CPU, the same step as the GPU's, with the same formulas, in a precision of choice. State is in
+// double, so no small displacement is lost; constraints are evaluated in `real` from differences of
+// positions.
 #pragma once
 
 #include <array>
@@ -22,7 +23,8 @@ struct Batch {
   std::vector<Item> items;
 };
 
-/// `jacobi`: all corrections from the same positions, averaged with omega / n_i. `gauss_seidel`: one after the other.
+/// `jacobi`: all corrections from the same positions, averaged with omega / n_i. `gauss_seidel`: one after
+/// the other.
 enum class Sweep { jacobi, gauss_seidel };
 
 template <class real>
@@ -35,7 +37,8 @@ class CpuPbd {
       const ConstraintList& list = system.lists[std::size_t(k)];
       items.resize(list.count());
       for (std::size_t c = 0; c < items.size(); ++c) {
-        std::copy_n(list.vertices.begin() + std::ptrdiff_t(c * Kind::arity), Kind::arity, items[c].vertices.begin());
+        std::copy_n(list.vertices.begin() + std::ptrdiff_t(c * Kind::arity), Kind::arity,
+                    items[c].vertices.begin());
         items[c].rest = real(list.rest[c]);
       }
     });
@@ -63,12 +66,14 @@ class CpuPbd {
         for_each_kind([&](auto kind, int) { project<decltype(kind)>(x, settings, sweep); });
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
-          if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (settings.omega / at_vertex_[i]);
+          if (sweep == Sweep::jacobi && at_vertex_[i] > 0)
+            x[i] += deltas_[i] * (settings.omega / at_vertex_[i]);
           for (const glm::dvec4& plane : planes) {
             const glm::dvec3 n(plane);
             const double depth = glm::dot(n, x[i]) - plane.w;
             if (depth < 0)
-              x[i] += Formulas<double>{}.plane_correction(n, depth, h * v[i] + (x[i] - predicted_[i]), settings.friction);
+              x[i] += Formulas<double>{}.plane_correction(n, depth, h * v[i] + (x[i] - predicted_[i]),
+                                                          settings.friction);
           }
         }
       }
@@ -104,7 +109,9 @@ class CpuPbd {
   template <class>
   struct Batches;
   template <class... Kind>
-  struct Batches<std::tuple<Kind...>> { using type = std::tuple<Batch<Kind, real>...>; };
+  struct Batches<std::tuple<Kind...>> {
+    using type = std::tuple<Batch<Kind, real>...>;
+  };
 
   const Model& model_;
   std::vector<std::uint32_t> at_vertex_;

@@ -1,9 +1,8 @@
 // The constraint formulas of shaders/ as C++: one text for GLSL, float and double.
 #pragma once
 
-#include <limits>
-
 #include <glm/glm.hpp>
+#include <limits>
 
 namespace tetpbd::glsl {
 
@@ -14,11 +13,11 @@ struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
-#include "shaders/constraints/types.glsl"
-#include "shaders/constraints/stretch.glsl"
-#include "shaders/constraints/bend.glsl"
-#include "shaders/constraints/volume.glsl"
 #include "shaders/collision.glsl"
+#include "shaders/constraints/bend.glsl"
+#include "shaders/constraints/stretch.glsl"
+#include "shaders/constraints/types.glsl"
+#include "shaders/constraints/volume.glsl"
 };
 
 }  // namespace tetpbd::glsl

@@ -3,7 +3,6 @@
 #define EGL_NO_X11
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
-
 #include <fmt/format.h>
 
 #include "sim/error.h"
@@ -13,8 +12,7 @@ namespace tetpbd {
 namespace {
 
 std::vector<EGLDeviceEXT> query_devices() {
-  const auto query =
-      reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
+  const auto query = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
   EGLint count = 0;
   if (!query || !query(0, nullptr, &count)) return {};
   std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(count));
@@ -53,9 +51,15 @@ EGLContext make_context(EGLDisplay display, bool debug) {
   EGLConfig config = nullptr;
   EGLint count = 0;
   if (!eglChooseConfig(display, config_attributes, &config, 1, &count) || count == 0) config = nullptr;
-  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 3,
-                               EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                               EGL_CONTEXT_OPENGL_DEBUG, debug ? EGL_TRUE : EGL_FALSE, EGL_NONE};
+  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                               4,
+                               EGL_CONTEXT_MINOR_VERSION,
+                               3,
+                               EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                               EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                               EGL_CONTEXT_OPENGL_DEBUG,
+                               debug ? EGL_TRUE : EGL_FALSE,
+                               EGL_NONE};
   return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
 }
 
@@ -80,7 +84,8 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
       if (std::string(device_extensions(candidate)).find("MESA_device_software") == std::string::npos)
         displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
     displays.push_back(platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY));
-    for (EGLDeviceEXT candidate : devices) displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
+    for (EGLDeviceEXT candidate : devices)
+      displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
   }
   for (EGLDisplay display : displays) {
     const EGLContext context = make_context(display, debug);
@@ -102,7 +107,8 @@ HeadlessContext::~HeadlessContext() {
   if (!context_) return;
   eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   eglDestroyContext(display_, context_);
-  // The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that driver.
+  // The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that
+  // driver.
 }
 
 }  // namespace tetpbd

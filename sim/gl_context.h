@@ -14,7 +14,8 @@ std::vector<std::string> list_devices();
 /// Makes a context current for the calling thread until destroyed. It draws to framebuffer objects only.
 class HeadlessContext {
  public:
-  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3 (a GPU before a software renderer).
+  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3 (a GPU before a software
+  /// renderer).
   explicit HeadlessContext(int device = -1, bool debug = false);
   ~HeadlessContext();
   HeadlessContext(const HeadlessContext&) = delete;

@@ -1,5 +1,7 @@
 #include "sim/gpu.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -9,8 +11,6 @@
 #include <limits>
 #include <regex>
 #include <sstream>
-
-#include <fmt/format.h>
 
 #include "sim/error.h"
 
@@ -22,7 +22,8 @@ namespace {
 
 std::atomic<int> error_count = 0;
 
-void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text, const void*) {
+void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text,
+                           const void*) {
   // What the shader compiler finds is thrown as an Error with file and line.
   if (type != GL_DEBUG_TYPE_ERROR || source == GL_DEBUG_SOURCE_SHADER_COMPILER) return;
   ++error_count;
@@ -84,17 +85,20 @@ Capabilities load_gl() {
   return caps;
 }
 
-// ---------------------------------------------------------------------------------------------------------- buffers
+// ----------------------------------------------------------------------------------------------------------
+// buffers
 
 Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
     : bytes_(bytes), label_(std::move(label)) {
-  while (glGetError() != GL_NO_ERROR) {}
+  while (glGetError() != GL_NO_ERROR) {
+  }
   glGenBuffers(1, &id_);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
   glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
   if (glGetError() == GL_OUT_OF_MEMORY) {
     glDeleteBuffers(1, &id_);
-    throw Error("out of GPU memory", fmt::format("buffer '{}' of {} bytes", label_, bytes), "use a smaller mesh", 1);
+    throw Error("out of GPU memory", fmt::format("buffer '{}' of {} bytes", label_, bytes),
+                "use a smaller mesh", 1);
   }
   label_object(GL_BUFFER, id_, label_);
 }
@@ -119,7 +123,8 @@ void Buffer::clear() const {
   glClearBufferData(GL_COPY_WRITE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
-// ---------------------------------------------------------------------------------------------------------- shaders
+// ----------------------------------------------------------------------------------------------------------
+// shaders
 
 namespace {
 
@@ -134,7 +139,9 @@ std::string& folder_setting() {
 std::string read_shader_file(const std::string& name) {
   if (const std::string& folder = shader_folder(); !folder.empty()) {
     std::ifstream file(std::filesystem::path(folder) / name, std::ios::binary);
-    if (!file) throw Error("no such shader", folder + "/" + name, "point --shaders or TETPBD_SHADERS at a copy of shaders/");
+    if (!file)
+      throw Error("no such shader", folder + "/" + name,
+                  "point --shaders or TETPBD_SHADERS at a copy of shaders/");
     return {std::istreambuf_iterator<char>(file), {}};
   }
   for (const auto& [key, text] : embedded_shaders())
@@ -293,7 +300,8 @@ Program::Program(std::string label, const std::vector<Stage>& stages, const Shad
   id_ = link_program(label_, shaders);
 }
 
-Program Program::compute(const std::string& file, const ShaderWords& words, const std::vector<std::string>& defines) {
+Program Program::compute(const std::string& file, const ShaderWords& words,
+                         const std::vector<std::string>& defines) {
   std::string label = file.substr(0, file.rfind('.'));
   if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
   return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
@@ -309,7 +317,8 @@ GLint Program::location(const char* name) const {
   return locations_.emplace(name, glGetUniformLocation(id_, name)).first->second;
 }
 
-// ----------------------------------------------------------------------------------------------------------- timers
+// -----------------------------------------------------------------------------------------------------------
+// timers
 
 Timer::~Timer() {
   for (const Span& span : free_) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);

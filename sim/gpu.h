@@ -1,5 +1,5 @@
-// The little OpenGL 4.3 core this program needs: move-only handles, labelled; shader sources with includes; timestamps.
-// No direct state access, no buffer storage, no vendor extension.
+// The little OpenGL 4.3 core this program needs: move-only handles, labelled; shader sources with includes;
+// timestamps. No direct state access, no buffer storage, no vendor extension.
 #pragma once
 
 #include <GL/glew.h>
@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <glm/glm.hpp>
 #include <map>
 #include <optional>
 #include <span>
@@ -15,20 +16,19 @@
 #include <utility>
 #include <vector>
 
-#include <glm/glm.hpp>
-
 namespace tetpbd {
 
-/// What the current context offers; everything the program asks a driver beyond GL 4.3's guarantees is listed here.
+/// What the current context offers; everything the program asks a driver beyond GL 4.3's guarantees is listed
+/// here.
 struct Capabilities {
   std::string vendor, renderer, version, shading_language;
-  int storage_blocks = 0;           ///< shader storage blocks a compute stage may use (8 guaranteed)
-  std::int64_t storage_bytes = 0;   ///< largest storage block
-  int work_group_invocations = 0;   ///< 1024 guaranteed
-  int shared_bytes = 0;             ///< shared memory of a work-group
-  int samples = 0;                  ///< largest MSAA sample count
-  bool software = false;            ///< a CPU pretends to be a GPU (llvmpipe, softpipe, swrast)
-  bool debug = false;               ///< a debug context: every GL error is reported
+  int storage_blocks = 0;          ///< shader storage blocks a compute stage may use (8 guaranteed)
+  std::int64_t storage_bytes = 0;  ///< largest storage block
+  int work_group_invocations = 0;  ///< 1024 guaranteed
+  int shared_bytes = 0;            ///< shared memory of a work-group
+  int samples = 0;                 ///< largest MSAA sample count
+  bool software = false;           ///< a CPU pretends to be a GPU (llvmpipe, softpipe, swrast)
+  bool debug = false;              ///< a debug context: every GL error is reported
 };
 
 /// Loads GL functions for the current context and checks for GL 4.3. Throws Error with the version found.
@@ -47,7 +47,10 @@ class Buffer {
   Buffer(std::string label, const std::vector<T>& data, GLenum usage = GL_STATIC_DRAW)
       : Buffer(std::move(label), data.size() * sizeof(T), data.data(), usage) {}
   Buffer(Buffer&& other) noexcept { swap(other); }
-  Buffer& operator=(Buffer&& other) noexcept { swap(other); return *this; }
+  Buffer& operator=(Buffer&& other) noexcept {
+    swap(other);
+    return *this;
+  }
   ~Buffer();
 
   GLuint id() const { return id_; }
@@ -77,27 +80,34 @@ class Buffer {
   std::string label_;
 };
 
-/// Values of `$NAME` in a shader's text, put in before it is compiled: {"KIND", "stretch"} makes gather_$KIND gather_stretch.
+/// Values of `$NAME` in a shader's text, put in before it is compiled: {"KIND", "stretch"} makes gather_$KIND
+/// gather_stretch.
 using Substitutions = std::map<std::string, std::string>;
-/// `words` for the whole text; `each`: a line that starts with #foreach is repeated once for every entry, with its words.
+/// `words` for the whole text; `each`: a line that starts with #foreach is repeated once for every entry,
+/// with its words.
 struct ShaderWords {
   Substitutions words;
   std::vector<Substitutions> each;
 };
 
-/// Reads shaders from this folder instead of the ones inside the program (empty: inside). The variable TETPBD_SHADERS sets it at start.
+/// Reads shaders from this folder instead of the ones inside the program (empty: inside). The variable
+/// TETPBD_SHADERS sets it at start.
 void set_shader_folder(const std::string& folder);
 const std::string& shader_folder();
 /// A number that grows when a file below the shader folder changed; always 0 for embedded shaders.
 std::int64_t shader_folder_version();
 
-/// Text of shaders/`name` with `#include "..."` (a path relative to shaders/), `#foreach` and `$NAME` expanded.
+/// Text of shaders/`name` with `#include "..."` (a path relative to shaders/), `#foreach` and `$NAME`
+/// expanded.
 std::string shader_text(const std::string& name, const ShaderWords& words = {});
 
 /// A linked program. Errors name the shader file and line.
 class Program {
  public:
-  struct Stage { GLenum type; std::string file; };
+  struct Stage {
+    GLenum type;
+    std::string file;
+  };
   Program() = default;
   /// `#define`s and `#version 430 core` are put before each stage.
   Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words = {},
@@ -105,7 +115,10 @@ class Program {
   static Program compute(const std::string& file, const ShaderWords& words = {},
                          const std::vector<std::string>& defines = {});
   Program(Program&& other) noexcept { swap(other); }
-  Program& operator=(Program&& other) noexcept { swap(other); return *this; }
+  Program& operator=(Program&& other) noexcept {
+    swap(other);
+    return *this;
+  }
   ~Program();
 
   GLuint id() const { return id_; }
@@ -119,7 +132,9 @@ class Program {
   void set(const char* name, const glm::vec2& value) const { glUniform2fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec4& value) const { glUniform4fv(location(name), 1, &value.x); }
-  void set(const char* name, const glm::mat4& value) const { glUniformMatrix4fv(location(name), 1, GL_FALSE, &value[0].x); }
+  void set(const char* name, const glm::mat4& value) const {
+    glUniformMatrix4fv(location(name), 1, GL_FALSE, &value[0].x);
+  }
 
  private:
   void swap(Program& other) noexcept {
@@ -139,7 +154,10 @@ class Timer {
  public:
   Timer() = default;
   Timer(Timer&&) noexcept = default;
-  Timer& operator=(Timer&& other) noexcept { std::swap(free_, other.free_), std::swap(pending_, other.pending_); return *this; }
+  Timer& operator=(Timer&& other) noexcept {
+    std::swap(free_, other.free_), std::swap(pending_, other.pending_);
+    return *this;
+  }
   ~Timer();
   void begin();
   void end();
@@ -147,7 +165,10 @@ class Timer {
   std::optional<double> poll(bool wait = false);
 
  private:
-  struct Span { GLuint begin = 0, end = 0; bool ended = false; };
+  struct Span {
+    GLuint begin = 0, end = 0;
+    bool ended = false;
+  };
   std::vector<Span> free_;
   std::deque<Span> pending_;
 };

@@ -1,4 +1,5 @@
-// shaders/layout.glsl as C++: the same text, so the two cannot drift apart (a test also asks GL for the offsets).
+// shaders/layout.glsl as C++: the same text, so the two cannot drift apart (a test also asks GL for the
+// offsets).
 #pragma once
 
 #include <glm/glm.hpp>

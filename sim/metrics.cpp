@@ -19,15 +19,19 @@ Metrics::Range range_of(const ConstraintList& list, std::size_t first_vertex, st
   unsigned low = 0, high = unsigned(list.count());
   while (low < high) {
     const unsigned middle = (low + high) / 2;
-    if (vertex_of(middle) < first_vertex) low = middle + 1;
-    else high = middle;
+    if (vertex_of(middle) < first_vertex)
+      low = middle + 1;
+    else
+      high = middle;
   }
   range.first = low;
   high = unsigned(list.count());
   while (low < high) {
     const unsigned middle = (low + high) / 2;
-    if (vertex_of(middle) < end_vertex) low = middle + 1;
-    else high = middle;
+    if (vertex_of(middle) < end_vertex)
+      low = middle + 1;
+    else
+      high = middle;
   }
   range.end = low;
   return range;
@@ -45,7 +49,8 @@ Metrics create_metrics(const Model& model) {
     for (std::size_t other = 0; other < one.present.size(); ++other) one.present[other] = other == k;
     records.push_back(std::move(record_buffers(one).front()));
   }
-  static_assert(std::is_same_v<std::tuple_element_t<0, Kinds>, Stretch> && std::is_same_v<std::tuple_element_t<1, Kinds>, Bend> &&
+  static_assert(std::is_same_v<std::tuple_element_t<0, Kinds>, Stretch> &&
+                std::is_same_v<std::tuple_element_t<1, Kinds>, Bend> &&
                 std::is_same_v<std::tuple_element_t<2, Kinds>, Volume>);
   m.stretch = std::move(records[0]);
   m.bend = std::move(records[1]);
@@ -79,7 +84,8 @@ Metrics create_metrics(const Model& model) {
   m.rest = Buffer("metrics rest", rest);
   m.partials = Buffer("metrics partials", M_ROW * METRICS_GROUPS * sizeof(float));
   for (std::size_t slot = 0; slot < ring_size; ++slot)
-    m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr, GL_STREAM_READ);
+    m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
+                        GL_STREAM_READ);
   m.constraints = Program::compute("metrics/constraints.comp");
   m.vertices = Program::compute("metrics/vertices.comp");
   m.centre = Program::compute("metrics/centre.comp");
@@ -102,7 +108,8 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
   Measurement result;
   result.step = pending.step;
   result.time = pending.time;
-  double rest_volume = 0, mass = 0, tet_squares = 0, stretch_squares = 0, bend_squares = 0, rigid = 0, size = 0;
+  double rest_volume = 0, mass = 0, tet_squares = 0, stretch_squares = 0, bend_squares = 0, rigid = 0,
+         size = 0;
   const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
@@ -128,7 +135,9 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
     rigid += double(row[M_RIGID_SQUARES]);
     size += body.mass * body.size;
   }
-  const auto rms = [](double squares, std::size_t count) { return count ? std::sqrt(squares / double(count)) : 0.0; };
+  const auto rms = [](double squares, std::size_t count) {
+    return count ? std::sqrt(squares / double(count)) : 0.0;
+  };
   result.centre /= mass;
   result.volume_error_percent = 100 * (result.volume - rest_volume) / rest_volume;
   result.tet_volume_rms = rms(tet_squares, m.tet_count);
@@ -140,7 +149,8 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
 
 std::optional<Measurement> read_oldest(Metrics& m, bool wait) {
   if (m.pending.empty()) return std::nullopt;
-  const GLenum state = glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? GLuint64(60e9) : 0);
+  const GLenum state =
+      glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? GLuint64(60e9) : 0);
   if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
   const Metrics::Pending pending = m.pending.front();
   m.pending.pop_front();
@@ -164,10 +174,11 @@ void measure(Metrics& m, const Sim& sim) {
   m.partials.bind_storage(BIND_M_PARTIALS);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(), GLintptr(b * M_STRIDE * sizeof(float)),
-                      M_STRIDE * sizeof(float));
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(),
+                      GLintptr(b * M_STRIDE * sizeof(float)), M_STRIDE * sizeof(float));
     // About four tets an invocation before there are more groups.
-    const unsigned groups = std::min<unsigned>(METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE));
+    const unsigned groups =
+        std::min<unsigned>(METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE));
     for (const Program* program : {&m.constraints, &m.vertices, &m.rigid, &m.centre, &m.close}) {
       program->use();
       program->set("first_vertex", body.vertices.first);
@@ -187,7 +198,8 @@ void measure(Metrics& m, const Sim& sim) {
     dispatch(m.rigid, groups);
     dispatch(m.close, 1);
   }
-  m.pending.push_back({glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0), slot, sim.steps, double(sim.steps) * sim.settings.dt,
+  m.pending.push_back({glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0), slot, sim.steps,
+                       double(sim.steps) * sim.settings.dt,
                        sim.settings.ground ? sim.settings.ground_height : 0.0, sim.settings.gravity});
 }
 
@@ -199,7 +211,8 @@ std::optional<Measurement> collect(Metrics& m, bool wait) {
 }
 
 Measurement measure_now(Metrics& m, const Sim& sim) {
-  while (collect(m, true)) {}
+  while (collect(m, true)) {
+  }
   measure(m, sim);
   return *collect(m, true);
 }
@@ -219,13 +232,14 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   if (!errors.free) return;
   const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
   const glm::dvec3 expected = errors.first->momentum + mass * gravity * (now.time - errors.first->time);
-  if (now.speed > 0) errors.linear_drift = std::fmax(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
+  if (now.speed > 0)
+    errors.linear_drift = std::fmax(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
   // Relative to the angular momentum of a spinning body; of one that hardly spins, to size times sum m|v|.
   const double spun = glm::length(errors.first->angular_momentum), moved = sim.model->size * now.speed;
   const double scale = spun > 0.01 * moved ? spun : moved;
   if (scale > 0)
-    errors.angular_drift = std::fmax(errors.angular_drift,
-                                    glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
+    errors.angular_drift = std::fmax(
+        errors.angular_drift, glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
 }
 
 }  // namespace tetpbd

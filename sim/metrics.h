@@ -1,4 +1,5 @@
-// How right a state is (method.md eqs. 16-24): error, momentum and energy, reduced on the GPU and read back late.
+// How right a state is (method.md eqs. 16-24): error, momentum and energy, reduced on the GPU and read back
+// late.
 #pragma once
 
 #include <deque>
@@ -10,7 +11,8 @@
 
 namespace tetpbd {
 
-/// One state, over all bodies. Errors are relative to the rest shape; 0 is exact where every constraint can be met.
+/// One state, over all bodies. Errors are relative to the rest shape; 0 is exact where every constraint can
+/// be met.
 struct Measurement {
   long step = 0;
   double time = 0;                  ///< s
@@ -19,36 +21,46 @@ struct Measurement {
   double tet_volume_rms = 0;        ///< of (V - V0) / V0 over tets
   double tet_volume_max = 0;        ///< largest |V - V0| / V0
   double inverted_tets = 0;
-  double stretch_rms = 0;           ///< of (l - d) / d over edges
+  double stretch_rms = 0;  ///< of (l - d) / d over edges
   double stretch_max = 0;
-  double bend_rms_rad = 0;          ///< of the angle error over hinges
-  double rigid_distance = 0;        ///< RMS (by mass) distance to the rigidly aligned rest shape, over the body's size
-  glm::dvec3 momentum{0};           ///< kg m/s
-  glm::dvec3 angular_momentum{0};   ///< kg m^2/s about each body's centre, summed
-  double speed = 0;                 ///< sum m |v|, kg m/s: what drift is relative to
-  glm::dvec3 centre{0};             ///< m, of mass
+  double bend_rms_rad = 0;  ///< of the angle error over hinges
+  double rigid_distance =
+      0;                   ///< RMS (by mass) distance to the rigidly aligned rest shape, over the body's size
+  glm::dvec3 momentum{0};  ///< kg m/s
+  glm::dvec3 angular_momentum{0};     ///< kg m^2/s about each body's centre, summed
+  double speed = 0;                   ///< sum m |v|, kg m/s: what drift is relative to
+  glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
-  double contacts = 0;              ///< pairs of a vertex and a half space (ground, obstacle) that it touches
-  double non_finite = 0;            ///< vertices with a position or velocity that is not finite
+  double contacts = 0;    ///< pairs of a vertex and a half space (ground, obstacle) that it touches
+  double non_finite = 0;  ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }
   double energy() const { return kinetic + potential; }
 };
 
 struct Metrics {
-  struct Range { unsigned first = 0, end = 0; };
+  struct Range {
+    unsigned first = 0, end = 0;
+  };
   struct BodyRanges {
     Range vertices, edges, hinges, tets;
     double mass = 0, volume = 0, size = 0;
     glm::dvec3 first_position{0};
   };
-  struct Pending { GLsync fence; std::size_t slot; long step; double time; double ground; double gravity; };
+  struct Pending {
+    GLsync fence;
+    std::size_t slot;
+    long step;
+    double time;
+    double ground;
+    double gravity;
+  };
 
   std::vector<BodyRanges> bodies;
   Buffer stretch, bend, volume, rest, partials;
   Program constraints, vertices, centre, rigid, close;
-  std::vector<Buffer> rows;      ///< a ring: a row a body in each
+  std::vector<Buffer> rows;  ///< a ring: a row a body in each
   std::deque<Pending> pending;
-  std::deque<Measurement> ready; ///< read because the ring was full
+  std::deque<Measurement> ready;  ///< read because the ring was full
   std::size_t next = 0;
   std::size_t edge_count = 0, hinge_count = 0, tet_count = 0;
 };
@@ -65,10 +77,14 @@ Measurement measure_now(Metrics& metrics, const Sim& sim);
 struct RunErrors {
   double max_volume_loss_percent = 0;  ///< the paper's: largest 100 (V0 - V) / V0
   /// NaN while there was nothing to measure: fixed vertices, damping, contact from the start.
-  double linear_drift = std::numeric_limits<double>::quiet_NaN();             ///< largest |P - (P0 + M g t)| / sum m|v|, while no vertex was fixed or touched anything
-  double angular_drift = std::numeric_limits<double>::quiet_NaN();            ///< largest |L - L0| / |L0| (of a body that hardly spins: / (size * sum m|v|)), likewise
-  double start_energy = 0, max_energy = 0;  ///< J
-  bool free = true;                    ///< so far no contact and no fixed vertex
+  double linear_drift =
+      std::numeric_limits<double>::quiet_NaN();  ///< largest |P - (P0 + M g t)| / sum m|v|, while no vertex
+                                                 ///< was fixed or touched anything
+  double angular_drift =
+      std::numeric_limits<double>::quiet_NaN();  ///< largest |L - L0| / |L0| (of a body that hardly spins: /
+                                                 ///< (size * sum m|v|)), likewise
+  double start_energy = 0, max_energy = 0;       ///< J
+  bool free = true;                              ///< so far no contact and no fixed vertex
   std::optional<Measurement> first, last;
   bool finite = true;
 };

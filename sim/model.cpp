@@ -1,11 +1,11 @@
 #include "sim/model.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <random>
-
-#include <fmt/format.h>
 
 #include "sim/error.h"
 
@@ -15,7 +15,13 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
               const std::vector<std::uint32_t>& fixed) {
   const std::uint32_t base = std::uint32_t(model.rest.positions.size());
-  Body body{name, base, mesh.positions.size(), model.rest.tets.size(), mesh.tets.size(), model.rest.surface.size(), mesh.surface.size()};
+  Body body{name,
+            base,
+            mesh.positions.size(),
+            model.rest.tets.size(),
+            mesh.tets.size(),
+            model.rest.surface.size(),
+            mesh.surface.size()};
   const auto shifted = [&](auto face) {
     for (auto& v : face) v += base;
     return face;

@@ -15,7 +15,7 @@ struct Body {
 };
 
 struct Model {
-  TetMesh rest;                        ///< metres; bodies one after the other
+  TetMesh rest;  ///< metres; bodies one after the other
   std::vector<Body> bodies;
   std::vector<double> inverse_masses;  ///< 1/kg, 0: fixed
   std::vector<double> masses;          ///< kg, also of fixed vertices
@@ -30,8 +30,8 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
               const std::vector<std::uint32_t>& fixed);
 
-/// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one.
-/// Throws Error for anything else.
+/// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F,
+/// squash:F, invert-one. Throws Error for anything else.
 void deform(std::vector<glm::dvec3>& positions, const TetMesh& rest, const std::string& how, unsigned seed);
 
 }  // namespace tetpbd

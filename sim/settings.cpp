@@ -1,12 +1,12 @@
 #include "sim/settings.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <sstream>
-
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "sim/constraints.h"
 #include "sim/error.h"
@@ -19,18 +19,22 @@ const std::vector<Parameter>& parameters() {
   using enum Effect;
   static const std::vector<Parameter> rows = {
       {"mode", "solver", &S::mode, 0, 0, false, "", "solver mode", rebuild},
-      {"constraints", "solver", &S::constraints, 0, 0, false, "", "constraint kinds, separated by commas", rebuild},
+      {"constraints", "solver", &S::constraints, 0, 0, false, "", "constraint kinds, separated by commas",
+       rebuild},
       {"k_stretch", "solver", &S::k_stretch, 0, 1, false, "", "stiffness of stretch", live},
       {"k_bend", "solver", &S::k_bend, 0, 1, false, "", "stiffness of bending", live},
       {"k_volume", "solver", &S::k_volume, 0, 1, false, "", "stiffness of volume", live},
-      {"omega", "solver", &S::omega, 0, 4, false, "", "over-relaxation of averaged corrections, 1 to 2 recommended (Jacobi modes)", live},
+      {"omega", "solver", &S::omega, 0, 4, false, "",
+       "over-relaxation of averaged corrections, 1 to 2 recommended (Jacobi modes)", live},
       {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations a substep", live},
       {"substeps", "solver", &S::substeps, 1, 100000, true, "", "substeps a step", live},
       {"dt", "solver", &S::dt, 1e-6, 1, true, "s", "time of one step", live},
-      {"damping", "solver", &S::damping, 0, 1000, false, "1/s", "rate at which velocity decays, exp(-damping t)", live},
+      {"damping", "solver", &S::damping, 0, 1000, false, "1/s",
+       "rate at which velocity decays, exp(-damping t)", live},
       {"gravity", "world", &S::gravity, -1000, 1000, false, "m/s^2", "gravity, downwards", live},
       {"ground", "world", &S::ground, 0, 1, false, "", "whether there is a ground plane", live},
-      {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane", live},
+      {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane",
+       live},
       {"friction", "world", &S::friction, 0, 10, false, "", "Coulomb friction of ground and obstacles", live},
       {"seed", "solver", &S::seed, 0, 2147483647, false, "", "seed of random start positions", restart},
   };
@@ -70,13 +74,15 @@ std::vector<std::string> choices(const Parameter& parameter) {
 
 namespace {
 
-[[noreturn]] void refuse(const Parameter& row, const std::string& value, const std::string& where, const std::string& mend) {
+[[noreturn]] void refuse(const Parameter& row, const std::string& value, const std::string& where,
+                         const std::string& mend) {
   throw Error(fmt::format("'{}' cannot be {}", row.name, value.empty() ? "empty" : value), where, mend);
 }
 
 std::string range_text(const Parameter& row) {
   const char* kind = std::holds_alternative<int Settings::*>(row.member) ? "whole number" : "number";
-  return fmt::format("give a {} from {:g} to {:g}{}{}", kind, row.low, row.high, *row.unit ? " " : "", row.unit);
+  return fmt::format("give a {} from {:g} to {:g}{}{}", kind, row.low, row.high, *row.unit ? " " : "",
+                     row.unit);
 }
 
 void check_words(const Parameter& row, const std::string& text, const std::string& where) {
@@ -87,12 +93,14 @@ void check_words(const Parameter& row, const std::string& text, const std::strin
     if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
       refuse(row, "'" + text + "'", where, fmt::format("choose from {}", fmt::join(allowed, ", ")));
   for (std::size_t i = 0; i < words.size(); ++i)
-    if (std::count(words.begin(), words.end(), words[i]) > 1) refuse(row, "'" + text + "'", where, "name each once");
+    if (std::count(words.begin(), words.end(), words[i]) > 1)
+      refuse(row, "'" + text + "'", where, "name each once");
 }
 
 }  // namespace
 
-void set_parameter(Settings& settings, const Parameter& row, const std::string& text, const std::string& where) {
+void set_parameter(Settings& settings, const Parameter& row, const std::string& text,
+                   const std::string& where) {
   const auto number = [&]<class T>(T& target) {
     T value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -104,13 +112,14 @@ void set_parameter(Settings& settings, const Parameter& row, const std::string& 
   if (const auto* member = std::get_if<double Settings::*>(&row.member)) number(settings.**member);
   if (const auto* member = std::get_if<int Settings::*>(&row.member)) number(settings.**member);
   if (const auto* member = std::get_if<bool Settings::*>(&row.member)) {
-    if (text != "true" && text != "false" && text != "1" && text != "0") refuse(row, text, where, "give true or false");
-    settings.**member = text == "true" || text == "1";
+    if (text != "true" && text != "false" && text != "1" && text != "0")
+      refuse(row, text, where, "give true or false");
+    settings.** member = text == "true" || text == "1";
   }
   if (const auto* member = std::get_if<std::string Settings::*>(&row.member)) {
     const std::string value = text == "none" && std::string_view(row.name) == "constraints" ? "" : text;
     check_words(row, value, where);
-    settings.**member = value;
+    settings.** member = value;
   }
 }
 
@@ -118,9 +127,12 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
   return std::visit(
       [&](auto member) -> std::string {
         using T = std::remove_cvref_t<decltype(settings.*member)>;
-        if constexpr (std::is_same_v<T, bool>) return settings.*member ? "true" : "false";
-        else if constexpr (std::is_same_v<T, std::string>) return (settings.*member).empty() ? "none" : settings.*member;
-        else return fmt::format("{}", settings.*member);
+        if constexpr (std::is_same_v<T, bool>)
+          return settings.*member ? "true" : "false";
+        else if constexpr (std::is_same_v<T, std::string>)
+          return (settings.*member).empty() ? "none" : settings.*member;
+        else
+          return fmt::format("{}", settings.*member);
       },
       row.member);
 }

@@ -1,4 +1,5 @@
-// Every number a user can set, each described once: the row gives the command-line flag, the scene key, the widget and the docs.
+// Every number a user can set, each described once: the row gives the command-line flag, the scene key, the
+// widget and the docs.
 #pragma once
 
 #include <string>
@@ -23,15 +24,16 @@ struct Settings {
   int seed = 1;
 };
 
-/// Live: takes effect at the next step. Rebuild: the solver is made again, the state stays. Restart: the scene starts anew.
+/// Live: takes effect at the next step. Rebuild: the solver is made again, the state stays. Restart: the
+/// scene starts anew.
 enum class Effect { live, rebuild, restart };
 
 struct Parameter {
-  const char* name;    ///< scene key; the flag is --name with - for _
-  const char* section; ///< scene section: "solver" or "world"
+  const char* name;     ///< scene key; the flag is --name with - for _
+  const char* section;  ///< scene section: "solver" or "world"
   std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*> member;
-  double low, high;    ///< allowed range; numbers only
-  bool logarithmic;    ///< slider scale
+  double low, high;  ///< allowed range; numbers only
+  bool logarithmic;  ///< slider scale
   const char* unit;
   const char* help;
   Effect effect;
@@ -41,11 +43,13 @@ const std::vector<Parameter>& parameters();
 const Parameter* find_parameter(const std::string& name);  ///< name with - or _; nullptr if there is none
 
 /// Sets one value given as text; throws Error naming the key, `where` and the allowed values.
-void set_parameter(Settings& settings, const Parameter& parameter, const std::string& text, const std::string& where);
+void set_parameter(Settings& settings, const Parameter& parameter, const std::string& text,
+                   const std::string& where);
 /// Value as text, the way set_parameter reads it.
 std::string parameter_text(const Settings& settings, const Parameter& parameter);
 std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
-/// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of them.
+/// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of
+/// them.
 std::vector<std::string> choices(const Parameter& parameter);
 /// Throws Error for values out of range; `where` names the file or flag.
 void check_settings(const Settings& settings, const std::string& where);

@@ -1,9 +1,9 @@
 #include "sim/sim.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstring>
-
-#include <fmt/format.h>
 
 #include "sim/error.h"
 
@@ -65,7 +65,8 @@ void check_limits(const ConstraintSystem& system) {
   glGetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
   const int needed = BIND_RECORDS + int(kind_words(system).size());
   if (needed > blocks)
-    throw Error("too few shader storage blocks", fmt::format("{} needed, the driver offers {}", needed, blocks),
+    throw Error("too few shader storage blocks",
+                fmt::format("{} needed, the driver offers {}", needed, blocks),
                 "leave out a constraint kind or use a newer driver", 1);
   GLint64 bytes = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
@@ -73,8 +74,8 @@ void check_limits(const ConstraintSystem& system) {
   for (const ConstraintList& list : system.lists)
     largest = std::max(largest, list.count() * std::size_t(list.arity + 1) * 4);
   if (largest > std::size_t(bytes))
-    throw Error("a storage buffer is too large", fmt::format("{} bytes, the driver allows {}", largest, bytes),
-                "use a smaller mesh", 1);
+    throw Error("a storage buffer is too large",
+                fmt::format("{} bytes, the driver allows {}", largest, bytes), "use a smaller mesh", 1);
 }
 
 void build_solver(Sim& sim) {
@@ -115,8 +116,8 @@ void allocate(Sim& sim) {
 
 State start_state(const Sim& sim) {
   State state{sim.model->positions, sim.model->velocities};
-  // Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a constant
-  // acceleration is integrated exactly (method.md eq. 3).
+  // Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
+  // constant acceleration is integrated exactly (method.md eq. 3).
   const double half = 0.5 * sim.settings.dt / sim.settings.substeps;
   for (std::size_t i = 0; i < state.velocities.size(); ++i)
     if (sim.model->inverse_masses[i] > 0) state.velocities[i].y += half * sim.settings.gravity;
@@ -125,7 +126,8 @@ State start_state(const Sim& sim) {
 
 void dispatch(const Pass& pass) {
   pass.program.use();
-  for (const auto& [binding, buffer] : pass.bindings) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
+  for (const auto& [binding, buffer] : pass.bindings)
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
   glDispatchCompute(pass.groups, 1, 1);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
@@ -242,7 +244,8 @@ std::uint64_t state_hash(const Sim& sim) {
   return hash;
 }
 
-// --------------------------------------------------------------------------------------------------------- pinning
+// ---------------------------------------------------------------------------------------------------------
+// pinning
 
 namespace {
 
@@ -250,7 +253,9 @@ void write_inverse_mass(Sim& sim, std::uint32_t vertex, double value) {
   sim.inverse_masses[vertex] = value;
   const float inverse_mass = float(value);
   for (const Buffer& buffer : sim.positions)
-    if (buffer) buffer.write(vertex * sizeof(Position) + offsetof(Position, inverse_mass), sizeof(float), &inverse_mass);
+    if (buffer)
+      buffer.write(vertex * sizeof(Position) + offsetof(Position, inverse_mass), sizeof(float),
+                   &inverse_mass);
 }
 
 void write_velocity(Sim& sim, std::uint32_t vertex, const glm::dvec3& velocity) {
@@ -267,7 +272,9 @@ void pin(Sim& sim, std::uint32_t vertex) {
   write_velocity(sim, vertex, glm::dvec3(0));
 }
 
-void unpin(Sim& sim, std::uint32_t vertex) { write_inverse_mass(sim, vertex, sim.model->inverse_masses[vertex]); }
+void unpin(Sim& sim, std::uint32_t vertex) {
+  write_inverse_mass(sim, vertex, sim.model->inverse_masses[vertex]);
+}
 
 bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }
 
@@ -277,7 +284,8 @@ void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
   if (on_cpu(sim)) sim.host.positions[vertex] = position;
 }
 
-// ------------------------------------------------------------------------------------------------------- explanation
+// -------------------------------------------------------------------------------------------------------
+// explanation
 
 Explanation explain(const Sim& sim) {
   Explanation result;

@@ -17,20 +17,20 @@ struct Sim {
   std::shared_ptr<const Model> model;
   Settings settings;
   ConstraintSystem system;
-  std::vector<double> inverse_masses;   ///< the model's, with pinned vertices 0
+  std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
 
-  Buffer positions[2];                  ///< Position, double buffered; `current` holds the state
-  Buffer predicted;                     ///< Position
-  Buffer velocities;                    ///< Velocity
-  Buffer step_block;                    ///< Step
+  Buffer positions[2];  ///< Position, double buffered; `current` holds the state
+  Buffer predicted;     ///< Position
+  Buffer velocities;    ///< Velocity
+  Buffer step_block;    ///< Step
   Pass predict, finish;
   Solver solver;
   int current = 0;
-  long steps = 0;                       ///< taken since the start
-  std::int64_t shader_version = 0;      ///< shader_folder_version() at the last build
+  long steps = 0;                   ///< taken since the start
+  std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
-  State host;                           ///< state of a CPU mode; the GPU buffers follow it
-  Timer timer;                          ///< around the GPU passes of each step, while `timed`
+  State host;   ///< state of a CPU mode; the GPU buffers follow it
+  Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
 
   const Buffer& current_positions() const { return positions[current]; }
@@ -39,7 +39,8 @@ struct Sim {
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings);
 /// Takes over new settings; the state stays. Rebuilds the solver if the mode or the constraint kinds changed.
 void apply_settings(Sim& sim, const Settings& settings);
-/// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do not compile.
+/// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
+/// not compile.
 void rebuild_shaders(Sim& sim);
 /// Queues one step on the GPU (CPU modes: steps, then uploads). Does not wait.
 void step(Sim& sim);
@@ -49,7 +50,8 @@ void reset(Sim& sim);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 void write_state(Sim& sim, const State& state);
-/// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes. Waits.
+/// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.
+/// Waits.
 std::uint64_t state_hash(const Sim& sim);
 
 /// A pinned vertex stays where it is or is put (infinite mass). Does not wait.
@@ -61,8 +63,15 @@ void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position);
 
 /// What the simulation allocates and dispatches.
 struct Explanation {
-  struct Item { std::string name; std::size_t bytes; };
-  struct Dispatch { std::string name; unsigned groups; long per_step; };
+  struct Item {
+    std::string name;
+    std::size_t bytes;
+  };
+  struct Dispatch {
+    std::string name;
+    unsigned groups;
+    long per_step;
+  };
   std::vector<Item> buffers;
   std::vector<Dispatch> dispatches;
   std::size_t bytes = 0;

@@ -1,4 +1,5 @@
-// Node-centric Jacobi: one dispatch an iteration, whatever the number of constraint kinds (paper algorithm 2).
+// Node-centric Jacobi: one dispatch an iteration, whatever the number of constraint kinds (paper algorithm
+// 2).
 #include "sim/layout.h"
 #include "sim/solver.h"
 
@@ -8,8 +9,9 @@ namespace {
 
 constexpr std::size_t group_size = 64;
 
-// Lanes a vertex. A small mesh waits for its longest serial gather, so many; a large one fills the GPU anyway, so few;
-// a software renderer runs them one after the other. By size, not by timing: the same mesh gives the same bits.
+// Lanes a vertex. A small mesh waits for its longest serial gather, so many; a large one fills the GPU
+// anyway, so few; a software renderer runs them one after the other. By size, not by timing: the same mesh
+// gives the same bits.
 std::size_t lanes_for(std::size_t vertices, bool software) {
   if (software) return 1;
   return vertices <= 15000 ? 16 : vertices <= 60000 ? 8 : 4;
@@ -26,7 +28,8 @@ Solver create_node_solver(const SolverInput& input) {
   Pass pass;
   pass.program = Program::compute("solve_node.comp", {{{"LANES", std::to_string(lanes)}}, kinds});
   pass.groups = work_groups(vertices * lanes, group_size);
-  for (std::size_t k = 0; k < kinds.size(); ++k) pass.bindings.push_back({BIND_RECORDS + int(k), solver.buffers[k].id()});
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    pass.bindings.push_back({BIND_RECORDS + int(k), solver.buffers[k].id()});
   solver.buffers.emplace_back("adjacency", vertex_adjacency(input.system));
   pass.bindings.push_back({BIND_ADJACENCY, solver.buffers.back().id()});
   solver.iteration.push_back(std::move(pass));

@@ -8,8 +8,10 @@ namespace tetpbd {
 
 const std::vector<SolverMode>& solver_modes() {
   static const std::vector<SolverMode> rows = {
-      {"node", "Jacobi on the GPU, a thread a vertex gathers all its constraints in one dispatch", create_node_solver},
-      {"constraint", "Jacobi on the GPU, a thread a constraint adds to its vertices with integer atomics", create_constraint_solver},
+      {"node", "Jacobi on the GPU, a thread a vertex gathers all its constraints in one dispatch",
+       create_node_solver},
+      {"constraint", "Jacobi on the GPU, a thread a constraint adds to its vertices with integer atomics",
+       create_constraint_solver},
       {"cpu", "non-linear Gauss-Seidel on one CPU core, the paper's baseline", create_cpu_solver},
   };
   return rows;

@@ -1,4 +1,5 @@
-// Solver modes: how one substep's constraints are solved. A mode is a solve_*.cpp and a row of solver_modes().
+// Solver modes: how one substep's constraints are solved. A mode is a solve_*.cpp and a row of
+// solver_modes().
 #pragma once
 
 #include <functional>
@@ -28,8 +29,8 @@ struct State {
 /// Passes or a function, never both.
 struct Solver {
   std::vector<Buffer> buffers;
-  std::vector<Pass> iteration;    ///< the dispatches of one iteration, in order
-  bool double_buffered = false;   ///< an iteration reads one position buffer and writes the other
+  std::vector<Pass> iteration;   ///< the dispatches of one iteration, in order
+  bool double_buffered = false;  ///< an iteration reads one position buffer and writes the other
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };
 
@@ -50,8 +51,8 @@ Solver create_constraint_solver(const SolverInput&);  ///< solve_constraint.cpp
 Solver create_node_solver(const SolverInput&);        ///< solve_node.cpp
 Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp
 
-/// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING, KIND_ROW and KIND_COLUMN (of
-/// the stiffness).
+/// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING, KIND_ROW
+/// and KIND_COLUMN (of the stiffness).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
 /// Record buffers of the kinds present, in the order of kind_words (layout.glsl: Record2, Record4).
 std::vector<Buffer> record_buffers(const ConstraintSystem& system);

@@ -1,4 +1,5 @@
-// Gradients of every constraint formula against finite differences, in float and double, at three mesh scales.
+// Gradients of every constraint formula against finite differences, in float and double, at three mesh
+// scales.
 #include <doctest/doctest.h>
 
 #include <random>
@@ -24,7 +25,8 @@ void check_gradients(double scale) {
     if (exact.C == -1 || exact.C == 1) continue;  // the clamp of bending: constant there
     glm::dvec3 sum(0);
     double largest = 0;
-    for (int j = 0; j < n; ++j) sum += exact.gradient[j], largest = std::max(largest, glm::length(exact.gradient[j]));
+    for (int j = 0; j < n; ++j)
+      sum += exact.gradient[j], largest = std::max(largest, glm::length(exact.gradient[j]));
     CHECK(glm::length(sum) <= 1e-12 * largest);  // translation changes nothing
     for (int j = 0; j < n; ++j)
       for (int a = 0; a < 3; ++a) {
@@ -32,8 +34,10 @@ void check_gradients(double scale) {
         auto low = x, high = x;
         low[std::size_t(j)][a] -= step, high[std::size_t(j)][a] += step;
         const double difference = (Kind::template evaluate<double>(high.data(), rest).C -
-                                   Kind::template evaluate<double>(low.data(), rest).C) / (2 * step);
-        // Needles make an angle's second derivative huge; a relative error of 1e-4 of the largest gradient still finds any wrong term.
+                                   Kind::template evaluate<double>(low.data(), rest).C) /
+                                  (2 * step);
+        // Needles make an angle's second derivative huge; a relative error of 1e-4 of the largest gradient
+        // still finds any wrong term.
         CHECK(std::abs(exact.gradient[j][a] - difference) <= 1e-4 * largest);
       }
     // Float agrees with double up to the conditioning of the shape.
@@ -56,17 +60,20 @@ TEST_CASE_TEMPLATE("gradients match finite differences", Kind, Stretch, Bend, Vo
   }
 }
 
-TEST_CASE("every constraint kind has a formula that is zero at rest and the value expected of a hand-made change") {
+TEST_CASE(
+    "every constraint kind has a formula that is zero at rest and the value expected of a hand-made change") {
   std::array<glm::dvec3, 2> edge = {glm::dvec3(0), glm::dvec3(3, 4, 0)};
   CHECK(Stretch::evaluate<double>(edge.data(), 4.0).C == doctest::Approx(1.0));
   // Two triangles on the edge z: one wing along x, the other at 90 degrees.
-  std::array<glm::dvec3, 4> hinge = {glm::dvec3(1, 0, 0.5), glm::dvec3(-1, 0, 0.5), glm::dvec3(0, 0, 0), glm::dvec3(0, 0, 1)};
+  std::array<glm::dvec3, 4> hinge = {glm::dvec3(1, 0, 0.5), glm::dvec3(-1, 0, 0.5), glm::dvec3(0, 0, 0),
+                                     glm::dvec3(0, 0, 1)};
   CHECK(Formulas<double>{}.hinge_angle(hinge.data()) == doctest::Approx(0.0));
   hinge[1] = {0, 1, 0.5};
   CHECK(std::abs(Formulas<double>{}.hinge_angle(hinge.data())) == doctest::Approx(std::acos(-1.0) / 2));
   const double quarter = Formulas<double>{}.hinge_angle(hinge.data());
   hinge[1].y = -1;
-  CHECK(Formulas<double>{}.hinge_angle(hinge.data()) == doctest::Approx(-quarter));  // the sign that arccos loses
+  CHECK(Formulas<double>{}.hinge_angle(hinge.data()) ==
+        doctest::Approx(-quarter));  // the sign that arccos loses
   CHECK(Bend::evaluate<double>(hinge.data(), -quarter + 0.25).C == doctest::Approx(-0.25));
   CHECK(Bend::evaluate<double>(hinge.data(), -quarter + 2.0).C == doctest::Approx(-1.0));  // clamped to 1 rad
   // Angles wrap: 175 and -175 degrees are 10 degrees apart.
@@ -78,14 +85,16 @@ TEST_CASE("every constraint kind has a formula that is zero at rest and the valu
     CHECK(std::abs(turned) == doctest::Approx(a));
     CHECK(std::abs(Bend::evaluate<double>(hinge.data(), -turned).C) == doctest::Approx(10.0 / 180 * pi));
   }
-  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
+  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0),
+                                   glm::dvec3(0, 0, 1)};
   CHECK(Volume::evaluate<double>(tet.data(), 0.0).C == doctest::Approx(1.0 / 6));
   tet[3].z = -1;
   CHECK(Volume::evaluate<double>(tet.data(), 1.0 / 6).C == doctest::Approx(-1.0 / 3));  // inverted: signed
 }
 
 TEST_CASE("one projection of one constraint meets it") {
-  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1.1, 0, 0), glm::dvec3(0, 1, 0.1), glm::dvec3(0, 0.2, 1)};
+  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1.1, 0, 0), glm::dvec3(0, 1, 0.1),
+                                   glm::dvec3(0, 0.2, 1)};
   double w[4] = {1, 2, 0.5, 1};
   const double rest = 0.15;
   for (int k = 0; k < 4; ++k) {
@@ -100,7 +109,8 @@ TEST_CASE("degenerate shapes give finite corrections") {
   std::array<glm::vec3, 4> x{};
   float w[4] = {1, 1, 1, 1};
   for (int shape = 0; shape < 3; ++shape) {
-    for (std::size_t j = 0; j < 4; ++j) x[j] = shape == 0 ? glm::vec3(0) : glm::vec3(float(j), 0, 0) * (shape == 1 ? 1.0f : 1e-20f);
+    for (std::size_t j = 0; j < 4; ++j)
+      x[j] = shape == 0 ? glm::vec3(0) : glm::vec3(float(j), 0, 0) * (shape == 1 ? 1.0f : 1e-20f);
     const auto tet = Volume::evaluate<float>(x.data(), 0.1f);
     const auto hinge = Bend::evaluate<float>(x.data(), 0.3f);
     CHECK(std::isfinite(Formulas<float>{}.multiplier(tet, w)));

@@ -1,6 +1,5 @@
 // The structs C++ writes lie where GL reads them.
 #include <doctest/doctest.h>
-
 #include <unistd.h>
 
 #include <cstddef>
@@ -30,24 +29,35 @@ GLint property(const Program& program, GLenum interface, const std::string& name
 TEST_CASE("struct offsets and strides are GL's") {
   GlTest gl;
   const Program predict = Program::compute("predict.comp");
-  const auto variable = [&](const std::string& name) { return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET); };
+  const auto variable = [&](const std::string& name) {
+    return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET);
+  };
   CHECK(variable("positions[0].high") == offsetof(Position, high));
   CHECK(variable("positions[0].inverse_mass") == offsetof(Position, inverse_mass));
   CHECK(variable("positions[0].low") == offsetof(Position, low));
   CHECK(variable("velocities[0].high") == offsetof(Velocity, high));
   CHECK(variable("velocities[0].low") == offsetof(Velocity, low));
-  CHECK(property(predict, GL_BUFFER_VARIABLE, "positions[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(Position));
-  CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(Velocity));
+  CHECK(property(predict, GL_BUFFER_VARIABLE, "positions[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
+        sizeof(Position));
+  CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
+        sizeof(Velocity));
 
-  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"}, {"BINDING", "7"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "2"}};
+  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"},       {"BINDING", "7"},
+                         {"KIND_ROW", "0"},  {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "2"}};
   const Program volume = Program::compute("solve_constraint.comp", {words, {}});
-  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) == offsetof(layout::Record4, rest));
-  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(layout::Record4));
-  words = {{"KIND", "stretch"}, {"ARITY", "2"}, {"BINDING", "7"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "0"}};
+  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
+        offsetof(layout::Record4, rest));
+  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
+        sizeof(layout::Record4));
+  words = {{"KIND", "stretch"}, {"ARITY", "2"},       {"BINDING", "7"},
+           {"KIND_ROW", "0"},   {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "0"}};
   const Program stretch = Program::compute("solve_constraint.comp", {words, {}});
-  CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(layout::Record2));
+  CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
+        sizeof(layout::Record2));
 
-  const auto uniform = [&](const char* name) { return property(predict, GL_UNIFORM, std::string("StepBlock.") + name, GL_OFFSET); };
+  const auto uniform = [&](const char* name) {
+    return property(predict, GL_UNIFORM, std::string("StepBlock.") + name, GL_OFFSET);
+  };
   const auto nested = [&](const char* name) {  // an instance-less block names its members plainly
     const GLint plain = property(predict, GL_UNIFORM, std::string("params.") + name, GL_OFFSET);
     return plain >= 0 ? plain : uniform(name);
@@ -70,7 +80,8 @@ TEST_CASE("a shader that does not compile names its file and line") {
   for (const char* name : {"types.glsl", "layout.glsl", "pair.glsl"}) {
     std::ofstream(folder + "/" + name) << "";
   }
-  std::ofstream(folder + "/predict.comp") << "layout(local_size_x = 1) in;\n#include \"pair.glsl\"\nvoid main() { float a = nonsense; }\n";
+  std::ofstream(folder + "/predict.comp")
+      << "layout(local_size_x = 1) in;\n#include \"pair.glsl\"\nvoid main() { float a = nonsense; }\n";
   set_shader_folder(folder);
   CHECK(shader_folder_version() != 0);
   std::string message;
@@ -88,7 +99,10 @@ TEST_CASE("a shader that does not compile names its file and line") {
 }
 
 TEST_CASE("#include, #foreach and words expand") {
-  const std::string text = shader_text("solve_node.comp", {{}, {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}, {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
+  const std::string text = shader_text(
+      "solve_node.comp", {{},
+                          {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
+                           {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
   CHECK(text.find("gather_stretch(i, lane, own)") != std::string::npos);
   CHECK(text.find("gather_bend(i, lane, own)") != std::string::npos);
   CHECK(text.find("gather_volume") == std::string::npos);

@@ -46,7 +46,8 @@ TEST_CASE("a rigid motion has no error, wherever it goes") {
       axis = glm::normalize(axis);
       State state{model->positions, model->velocities};
       for (auto& p : state.positions)
-        p = p * std::cos(angle) + glm::cross(axis, p) * std::sin(angle) + axis * glm::dot(axis, p) * (1 - std::cos(angle)) + glm::dvec3(30, -7, 4);
+        p = p * std::cos(angle) + glm::cross(axis, p) * std::sin(angle) +
+            axis * glm::dot(axis, p) * (1 - std::cos(angle)) + glm::dvec3(30, -7, 4);
       const Measurement m = measure_state(model, state);
       CHECK(std::abs(m.volume_error_percent) < 1e-4);
       CHECK(m.tet_volume_max < 1e-5);
@@ -79,7 +80,8 @@ TEST_CASE("a stretched spring, a folded hinge and a squeezed tet give what a han
   GlTest gl;
   const auto model = model_of(one_tet(), 0);
   State state{model->positions, model->velocities};
-  state.positions[3] = {0, 0, 0.5};  // half the height: half the volume; edge 0-3 halved, edges 1-3 and 2-3 shortened
+  state.positions[3] = {
+      0, 0, 0.5};  // half the height: half the volume; edge 0-3 halved, edges 1-3 and 2-3 shortened
   const Measurement m = measure_state(model, state);
   CHECK(m.volume_error_percent == doctest::Approx(-50));
   CHECK(m.tet_volume_rms == doctest::Approx(0.5));
@@ -87,7 +89,9 @@ TEST_CASE("a stretched spring, a folded hinge and a squeezed tet give what a han
   CHECK(m.stretch_rms == doctest::Approx(std::sqrt((0.25 + 2 * slope * slope) / 6)).epsilon(1e-5));
   CHECK(m.stretch_max == doctest::Approx(0.5));
   // Hinges 0-1 and 0-2 and 0-3 stay at 90 degrees; the other three change.
-  const auto angle = [](glm::dvec3 n1, glm::dvec3 n2) { return std::acos(glm::dot(glm::normalize(n1), glm::normalize(n2))); };
+  const auto angle = [](glm::dvec3 n1, glm::dvec3 n2) {
+    return std::acos(glm::dot(glm::normalize(n1), glm::normalize(n2)));
+  };
   const glm::dvec3 slanted_before(1, 1, 1), slanted_after(1, 1, 2);
   double squares = 0;
   for (glm::dvec3 side : {glm::dvec3(-1, 0, 0), glm::dvec3(0, -1, 0), glm::dvec3(0, 0, -1)})
@@ -119,7 +123,8 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
   glm::dvec3 centre(0), rest_centre(0), momentum(0), angular(0);
   for (std::size_t i = 0; i < state.positions.size(); ++i) {
     const double w = model->masses[i];
-    mass += w, centre += w * state.positions[i], rest_centre += w * model->rest.positions[i], momentum += w * state.velocities[i];
+    mass += w, centre += w * state.positions[i], rest_centre += w * model->rest.positions[i],
+        momentum += w * state.velocities[i];
     kinetic += 0.5 * w * glm::dot(state.velocities[i], state.velocities[i]);
     potential += w * 9.81 * state.positions[i].y, speed += w * glm::length(state.velocities[i]);
     contacts += state.positions[i].y < 1e-6;
@@ -128,8 +133,10 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   const auto eigen = [](glm::dvec3 v) { return Eigen::Vector3d(v.x, v.y, v.z); };
   for (std::size_t i = 0; i < state.positions.size(); ++i) {
-    angular += model->masses[i] * glm::cross(state.positions[i] - centre, state.velocities[i] - momentum / mass);
-    covariance += model->masses[i] * eigen(state.positions[i] - centre) * eigen(model->rest.positions[i] - rest_centre).transpose();
+    angular +=
+        model->masses[i] * glm::cross(state.positions[i] - centre, state.velocities[i] - momentum / mass);
+    covariance += model->masses[i] * eigen(state.positions[i] - centre) *
+                  eigen(model->rest.positions[i] - rest_centre).transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d fix = Eigen::Matrix3d::Identity();
@@ -137,7 +144,9 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
   const Eigen::Matrix3d rotation = svd.matrixU() * fix * svd.matrixV().transpose();
   double squares = 0;
   for (std::size_t i = 0; i < state.positions.size(); ++i)
-    squares += model->masses[i] * (eigen(state.positions[i] - centre) - rotation * eigen(model->rest.positions[i] - rest_centre)).squaredNorm();
+    squares += model->masses[i] *
+               (eigen(state.positions[i] - centre) - rotation * eigen(model->rest.positions[i] - rest_centre))
+                   .squaredNorm();
 
   CHECK(glm::length(m.momentum - momentum) < 1e-5 * speed);
   CHECK(glm::length(m.angular_momentum - angular) < 1e-5 * speed);
@@ -147,7 +156,8 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
   CHECK(glm::length(m.centre - centre) < 1e-5);
   CHECK(m.contacts == contacts);
   CHECK(m.contacts > 0);
-  CHECK(m.rigid_distance == doctest::Approx(std::sqrt(squares / mass) / bounds(model->rest.positions).size()).epsilon(1e-4));
+  CHECK(m.rigid_distance ==
+        doctest::Approx(std::sqrt(squares / mass) / bounds(model->rest.positions).size()).epsilon(1e-4));
 }
 
 TEST_CASE("several bodies are aligned each for itself") {
@@ -161,7 +171,8 @@ TEST_CASE("several bodies are aligned each for itself") {
   }
   State state{model->positions, model->velocities};
   const std::size_t n = block.positions.size();
-  for (std::size_t i = n; i < 2 * n; ++i) std::swap(state.positions[i].x, state.positions[i].z), state.positions[i].x *= -1;
+  for (std::size_t i = n; i < 2 * n; ++i)
+    std::swap(state.positions[i].x, state.positions[i].z), state.positions[i].x *= -1;
   Measurement m = measure_state(model, state);  // one turned a quarter: still no error
   CHECK(m.rigid_distance < 1e-6);
   CHECK(m.stretch_max < 1e-6);

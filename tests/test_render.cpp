@@ -32,7 +32,8 @@ bool is_cold(const glm::vec3& c) { return c.z > 1.6f * c.x; }
 TEST_CASE("render: a block covers the pixels that the camera predicts") {
   Stage stage;
   stage.move(0.8, {0.3, 0.2, 0});
-  // The picture first: NVIDIA 580 draws the old contents when a buffer is read, then written, before its first use as attributes.
+  // The picture first: NVIDIA 580 draws the old contents when a buffer is read, then written, before its
+  // first use as attributes.
   const Image image = stage.image(), empty = stage.empty();
   glm::vec2 low{1e9f}, high{-1e9f};
   for (const Position& p : stage.positions.read_all<Position>()) {

@@ -1,6 +1,5 @@
 // The program itself, from its command line to the files it leaves.
 #include <doctest/doctest.h>
-
 #include <png.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,9 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
-
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -35,7 +33,9 @@ struct Outcome {
 
 Outcome tetpbd(const std::string& arguments, const Folder& folder, const std::string& environment = "") {
   const std::string out = (folder.path / "stdout").string(), err = (folder.path / "stderr").string();
-  const int status = std::system(("cd " + folder.path.string() + " && " + environment + " " TEST_PROGRAM " " + arguments + " >" + out + " 2>" + err).c_str());
+  const int status = std::system(("cd " + folder.path.string() + " && " + environment + " " TEST_PROGRAM " " +
+                                  arguments + " >" + out + " 2>" + err)
+                                     .c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
 }
 
@@ -56,7 +56,10 @@ Picture read_png(const fs::path& file) {
 }
 
 // The body is warm clay on grey: where red exceeds blue by far.
-struct Blob { int count = 0; double y = 0; };
+struct Blob {
+  int count = 0;
+  double y = 0;
+};
 Blob body_of(const Picture& picture) {
   Blob blob;
   for (int y = 0; y < picture.height; ++y)
@@ -70,13 +73,16 @@ Blob body_of(const Picture& picture) {
 
 TEST_CASE("run writes what it says, twice the same") {
   const Folder folder;
-  const std::string arguments = "run --scene bunny-drop --steps 30 --iterations 3 --set bodies.0.position=[0,0.02,0] --size 320x240 --samples 0 "
-                                "--png-every 15 --video fall.mp4 --positions --out ";
+  const std::string arguments =
+      "run --scene bunny-drop --steps 30 --iterations 3 --set bodies.0.position=[0,0.02,0] --size 320x240 "
+      "--samples 0 "
+      "--png-every 15 --video fall.mp4 --positions --out ";
   const Outcome first = tetpbd(arguments + "a", folder), second = tetpbd(arguments + "b", folder);
   CHECK(first.err == "");
   REQUIRE(first.status == 0);
   REQUIRE(second.status == 0);
-  const json a = json::parse(read(folder.path / "a/stats.json")), b = json::parse(read(folder.path / "b/stats.json"));
+  const json a = json::parse(read(folder.path / "a/stats.json")),
+             b = json::parse(read(folder.path / "b/stats.json"));
   CHECK(a["state_hash"] == b["state_hash"]);
   CHECK(a["scene"] == "bunny-drop");
   CHECK(a["settings"]["iterations"] == 3);
@@ -96,8 +102,9 @@ TEST_CASE("run writes what it says, twice the same") {
     CHECK(a["timing"][key]["p95"] >= a["timing"][key]["median"]);
   }
   CHECK(a["timing"]["fps"].get<double>() > 0);
-  for (const char* key : {"max_volume_loss_percent", "final_volume_error_percent", "tet_volume_rms", "tet_volume_max", "inverted_tets",
-                          "stretch_rms", "stretch_max", "bend_rms_rad", "rigid_distance"})
+  for (const char* key :
+       {"max_volume_loss_percent", "final_volume_error_percent", "tet_volume_rms", "tet_volume_max",
+        "inverted_tets", "stretch_rms", "stretch_max", "bend_rms_rad", "rigid_distance"})
     CHECK(a["error"][key].is_number());
   CHECK(a["error"]["max_volume_loss_percent"] > 0);
   CHECK(a["momentum"]["linear_drift"].get<double>() < 1e-4);
@@ -115,7 +122,8 @@ TEST_CASE("run writes what it says, twice the same") {
   }
   CHECK(rows == 31);
 
-  const Picture start = read_png(folder.path / "a/frame_00000.png"), end = read_png(folder.path / "a/frame_00030.png");
+  const Picture start = read_png(folder.path / "a/frame_00000.png"),
+                end = read_png(folder.path / "a/frame_00030.png");
   CHECK(start.width == 320);
   CHECK(start.height == 240);
   CHECK(body_of(start).count > 1000);
@@ -128,16 +136,21 @@ TEST_CASE("run writes what it says, twice the same") {
   CHECK(read(folder.path / "a/tets.npy").size() == 128 + 10805 * 16);
   CHECK(fs::file_size(folder.path / "fall.mp4") > 1000);
   CHECK(read(folder.path / "fall.mp4").substr(4, 4) == "ftyp");
-  for (const auto& entry : fs::recursive_directory_iterator(folder.path)) CHECK(entry.path().string().find(".part") == std::string::npos);
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path))
+    CHECK(entry.path().string().find(".part") == std::string::npos);
 }
 
 TEST_CASE("every look and colour draws a body") {
   const Folder folder;
   int number = 0;
-  for (const char* view : {"--look wire --flat", "--look tets --cut 0.6 --colour volume", "--colour stretch", "--colour velocity --no-shadow --no-grid", "--flat --no-legend"}) {
+  for (const char* view : {"--look wire --flat", "--look tets --cut 0.6 --colour volume", "--colour stretch",
+                           "--colour velocity --no-shadow --no-grid", "--flat --no-legend"}) {
     CAPTURE(view);
     const std::string out = "v" + std::to_string(number++);
-    const Outcome run = tetpbd("run --scene beam --steps 8 --iterations 2 --size 320x240 --samples 0 --png-every 8 --out " + out + " " + view, folder);
+    const Outcome run =
+        tetpbd("run --scene beam --steps 8 --iterations 2 --size 320x240 --samples 0 --png-every 8 --out " +
+                   out + " " + view,
+               folder);
     CHECK(run.status == 0);
     CHECK(run.err == "");
     const Picture picture = read_png(folder.path / out / "frame_00008.png");
@@ -184,11 +197,15 @@ TEST_CASE("help, version, info and explain answer") {
   const Folder folder;
   CHECK(tetpbd("--version", folder).out.find('.') != std::string::npos);
   const std::string help = tetpbd("run --help", folder).out;
-  for (const char* flag : {"--scene", "--mesh", "--tetgen", "--mode", "--constraints", "--k-stretch", "--k-bend", "--k-volume", "--omega", "--iterations",
-                           "--substeps", "--dt", "--gravity", "--seed", "--deform", "--gpu", "--size", "--set", "--explain", "--png-every", "--video", "--csv-every", "--positions"})
+  for (const char* flag :
+       {"--scene",   "--mesh",      "--tetgen", "--mode",       "--constraints", "--k-stretch",
+        "--k-bend",  "--k-volume",  "--omega",  "--iterations", "--substeps",    "--dt",
+        "--gravity", "--seed",      "--deform", "--gpu",        "--size",        "--set",
+        "--explain", "--png-every", "--video",  "--csv-every",  "--positions"})
     CHECK(help.find(flag) != std::string::npos);
   CHECK(tetpbd("info", folder).out.find("OpenGL version") != std::string::npos);
-  const Outcome explained = tetpbd("run --scene beam --mode constraint --constraints stretch --explain", folder);
+  const Outcome explained =
+      tetpbd("run --scene beam --mode constraint --constraints stretch --explain", folder);
   CHECK(explained.status == 0);
   CHECK(explained.out.find("solve_constraint stretch") != std::string::npos);
   CHECK(explained.out.find("volume") == std::string::npos);
@@ -199,7 +216,10 @@ TEST_CASE("help, version, info and explain answer") {
 
 TEST_CASE("an interrupted run leaves whole files") {
   const Folder folder;
-  const std::string command = "cd " + folder.path.string() + " && timeout -s INT 6 " TEST_PROGRAM " run --scene beam --steps 1000000 --iterations 3 --out out 2>stderr >/dev/null";
+  const std::string command =
+      "cd " + folder.path.string() +
+      " && timeout -s INT 6 " TEST_PROGRAM
+      " run --scene beam --steps 1000000 --iterations 3 --out out 2>stderr >/dev/null";
   const int status = std::system(command.c_str());
   CHECK(WEXITSTATUS(status) != 0);
   CHECK(read(folder.path / "stderr").find("interrupted") != std::string::npos);

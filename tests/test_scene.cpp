@@ -1,6 +1,5 @@
 // Scenes are read strictly, and every shipped one builds and runs in every mode.
 #include <doctest/doctest.h>
-
 #include <unistd.h>
 
 #include <filesystem>
@@ -16,7 +15,8 @@ using namespace tetpbd;
 namespace {
 
 struct SceneFile {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / ("tetpbd_scene_" + std::to_string(getpid()) + ".json");
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("tetpbd_scene_" + std::to_string(getpid()) + ".json");
   explicit SceneFile(const std::string& text) { std::ofstream(path) << text; }
   ~SceneFile() { std::filesystem::remove(path); }
 };
@@ -32,7 +32,8 @@ std::string error_of(const std::string& text, const SceneOverrides& overrides = 
   return "";
 }
 
-const std::string block = R"("bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}])";
+const std::string block =
+    R"("bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}])";
 
 bool has(const std::string& text, const std::string& word) { return text.find(word) != std::string::npos; }
 
@@ -50,10 +51,12 @@ TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(has(error_of("{" + block + R"(, "solver": {"omega": "big"}})"), "'omega' cannot be big"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"iterations": 2.5}})"), "'iterations'"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"mode": "magic"}})"), "node, constraint, cpu"));
-  CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "twist"]}})"), "stretch, bend, volume"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "twist"]}})"),
+            "stretch, bend, volume"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "stretch"]}})"), "once"));
   CHECK(has(error_of("{" + block + R"(, "world": {"gravity": null}})"), "'gravity'"));
-  CHECK(has(error_of("{" + block + R"(, "world": {"obstacles": [{"point": [0,0,0], "normal": [0,0,0]}]}})"), "normal"));
+  CHECK(has(error_of("{" + block + R"(, "world": {"obstacles": [{"point": [0,0,0], "normal": [0,0,0]}]}})"),
+            "normal"));
   CHECK(has(error_of("{" + block + R"(, "camera": {"fov": 1}})"), "camera.fov"));
   CHECK(has(error_of("{" + block + R"(, "duration": -1})"), "duration"));
   CHECK(has(error_of(R"({"bodies": [{"block": {"size": [1, 1], "cells": [2, 2, 2]}}]})"), "three numbers"));
@@ -63,7 +66,8 @@ TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "block": {}}]})"), "either"));
   CHECK(has(error_of(R"({"bodies": [{"mesh": "no_such.ply"}]})"), "no_such.ply"));
   CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "height": 0}]})"), "height"));
-  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "colour": 1}]})"), "'bodies.0.colour' is not known"));
+  CHECK(
+      has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "colour": 1}]})"), "'bodies.0.colour' is not known"));
 }
 
 TEST_CASE("the command line overrides, and its errors name the flag") {
@@ -135,14 +139,16 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
   int fixed = 0;
   for (double w : model->inverse_masses) fixed += w == 0;
   CHECK(fixed == 4);
-  const std::vector<glm::dvec3> second(model->positions.begin() + std::ptrdiff_t(model->bodies[1].first_vertex), model->positions.end());
+  const std::vector<glm::dvec3> second(
+      model->positions.begin() + std::ptrdiff_t(model->bodies[1].first_vertex), model->positions.end());
   CHECK(bounds(second).low.y == doctest::Approx(2));
   CHECK(bounds(second).high.y == doctest::Approx(5));
   CHECK(bounds(second).centre().x == doctest::Approx(4));
   CHECK(model->obstacles[0] == glm::dvec4(1, 0, 0, -3));
   glm::dvec3 momentum(0);
   double mass = 0;
-  for (std::size_t i = model->bodies[1].first_vertex; i < model->positions.size(); ++i) momentum += model->masses[i] * model->velocities[i], mass += model->masses[i];
+  for (std::size_t i = model->bodies[1].first_vertex; i < model->positions.size(); ++i)
+    momentum += model->masses[i] * model->velocities[i], mass += model->masses[i];
   CHECK(glm::length(momentum / mass - glm::dvec3(1, 0, 0)) < 1e-9);
 }
 

@@ -14,11 +14,13 @@ namespace {
 
 // Irregular and asymmetric; 5*4*3 = 60 or 9*7*5 = 315 vertices, no multiple of any work-group.
 std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, double height = 0.2, double scale = 1,
-                                         const std::string& deformation = "none", glm::dvec3 spin = glm::dvec3(0)) {
+                                         const std::string& deformation = "none",
+                                         glm::dvec3 spin = glm::dvec3(0)) {
   TetMesh mesh = make_block(glm::dvec3(1.0, 0.7, 0.5) * scale, cells);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     auto& p = mesh.positions[i];
-    p += 0.02 * scale * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+    p += 0.02 * scale *
+         glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
     p.y += (0.35 + 0.02 + height) * scale;
     p.x += 0.15 * p.y * p.y / scale;
   }
@@ -49,7 +51,8 @@ State reference_after(const Sim& sim, int steps, Sweep sweep) {
 
 double distance(const State& a, const State& b) {
   double largest = 0;
-  for (std::size_t i = 0; i < a.positions.size(); ++i) largest = std::max(largest, glm::length(a.positions[i] - b.positions[i]));
+  for (std::size_t i = 0; i < a.positions.size(); ++i)
+    largest = std::max(largest, glm::length(a.positions[i] - b.positions[i]));
   return largest;
 }
 
@@ -72,7 +75,8 @@ TEST_CASE("one GPU step is the double CPU step, for each constraint kind, mode a
         const State after = read_state(sim);
         CHECK(distance(after, expected) < 2e-6 * sim.model->size);
         double dv = 0;
-        for (std::size_t i = 0; i < after.velocities.size(); ++i) dv = std::max(dv, glm::length(after.velocities[i] - expected.velocities[i]));
+        for (std::size_t i = 0; i < after.velocities.size(); ++i)
+          dv = std::max(dv, glm::length(after.velocities[i] - expected.velocities[i]));
         CHECK(dv < 1e-3);
         if (std::string(kinds) != "none") CHECK(distance(after, before) > 1e-3);
       }
@@ -129,7 +133,8 @@ TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
       const State state = read_state(sim);
       double worst = 0;
       for (std::size_t i = 0; i < state.positions.size(); ++i)
-        worst = std::max(worst, glm::length(state.positions[i] - (sim.model->positions[i] - glm::dvec3(0, fall, 0))));
+        worst = std::max(
+            worst, glm::length(state.positions[i] - (sim.model->positions[i] - glm::dvec3(0, fall, 0))));
       CHECK(worst < 1e-5 * fall);
     }
 }
@@ -166,7 +171,9 @@ TEST_CASE("a run moved and turned about the vertical is the same run, moved and 
     CAPTURE(mode.name);
     const auto model = block_model({4, 3, 2}, 0.05);
     auto moved = std::make_shared<Model>(*model);
-    const auto turn = [](glm::dvec3 p) { return glm::dvec3(0.6 * p.x + 0.8 * p.z, p.y, -0.8 * p.x + 0.6 * p.z) + glm::dvec3(5, 0, -3); };
+    const auto turn = [](glm::dvec3 p) {
+      return glm::dvec3(0.6 * p.x + 0.8 * p.z, p.y, -0.8 * p.x + 0.6 * p.z) + glm::dvec3(5, 0, -3);
+    };
     for (auto* list : {&moved->positions, &moved->rest.positions})
       for (auto& p : *list) p = turn(p);
     Sim a = create_sim(model, quick(mode.name, 10)), b = create_sim(moved, quick(mode.name, 10));
@@ -190,10 +197,13 @@ TEST_CASE("friction stops a sliding block and none does not") {
     for (int s = 0; s < 100; ++s) step(sim);
     const State state = read_state(sim);
     double travelled = 0;
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) travelled += (state.positions[i].x - mesh.positions[i].x) / double(mesh.positions.size());
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+      travelled += (state.positions[i].x - mesh.positions[i].x) / double(mesh.positions.size());
     // Coulomb: v^2 / (2 mu g) = 0.102 m with friction 0.5; 0.5 m in 0.5 s without.
-    if (friction == 0) CHECK(travelled == doctest::Approx(0.5).epsilon(0.05));
-    else CHECK(travelled == doctest::Approx(0.102).epsilon(0.25));
+    if (friction == 0)
+      CHECK(travelled == doctest::Approx(0.5).epsilon(0.05));
+    else
+      CHECK(travelled == doctest::Approx(0.102).epsilon(0.25));
   }
 }
 
@@ -246,8 +256,10 @@ TEST_CASE("only what a scene needs is allocated and dispatched") {
   GlTest gl;
   const auto model = block_model({4, 3, 2});
   const auto has = [](const Explanation& e, const std::string& word) {
-    for (const auto& b : e.buffers) if (b.name.find(word) != std::string::npos) return true;
-    for (const auto& d : e.dispatches) if (d.name.find(word) != std::string::npos) return true;
+    for (const auto& b : e.buffers)
+      if (b.name.find(word) != std::string::npos) return true;
+    for (const auto& d : e.dispatches)
+      if (d.name.find(word) != std::string::npos) return true;
     return false;
   };
   Settings settings = quick("constraint");

@@ -13,11 +13,13 @@ struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
-#include "shaders/collision.glsl"
-#include "shaders/constraints/bend.glsl"
-#include "shaders/constraints/stretch.glsl"
+  // clang-format off: in order of use
 #include "shaders/constraints/types.glsl"
+#include "shaders/constraints/stretch.glsl"
+#include "shaders/constraints/bend.glsl"
 #include "shaders/constraints/volume.glsl"
+#include "shaders/collision.glsl"
+  // clang-format on
 };
 
 }  // namespace tetpbd::glsl

@@ -214,8 +214,8 @@ Minimum newton(const Objective& o, Points start) {
     const double descent = slope.dot(step);  // < 0
     result.residual = std::sqrt(-descent / o.unit);
     result.converged = exact && result.residual <= minimum_tolerance;
-    if (result.converged) break;
-    if (result.residual <= 1e-4 * minimum_tolerance)
+    // The step at hand is taken even so: it squares what is left.
+    if (!exact && result.residual <= 1e-4 * minimum_tolerance)
       return result.reason = "not a stable, isolated minimum", result;
     if (result.iterations == newton_limit) return result.reason = "too many Newton steps", result;
     // Armijo; the last steps lower E by less than its rounding, which is allowed for.

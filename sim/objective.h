@@ -10,8 +10,8 @@
 namespace tetpbd {
 
 /// alpha of each kind, in the order of Kinds: a constraint's energy is C^2 / (2 alpha), so alpha is in
-/// unit(C)^2 / J. Stretch: m^2/J = m/N, one over a spring's stiffness; bend: rad^2/J; volume: m^6/J = m^4 /
-/// (Pa m^3) = m^3/Pa. Above 0 (rigid_step is the limit); infinity leaves the kind out.
+/// unit(C)^2 / J. Stretch: m^2/J = m/N, one over a spring's stiffness; bend: rad^2/J; volume: m^6/J = m^3/Pa.
+/// Above 0 (rigid_step is the limit); infinity leaves the kind out.
 using Compliances = std::array<double, std::size_t(kind_count)>;
 
 /// What is minimised, in joules, over the positions x of vertices with mass:
@@ -34,10 +34,10 @@ std::vector<glm::dvec3> gradient(const Objective& objective, const std::vector<g
 struct Minimum {
   std::vector<glm::dvec3> positions;  ///< m
   int iterations = 0;                 ///< Newton steps taken
-  /// Norm of the gradient g in the inverse Hessian, sqrt(g . H^-1 g / unit): a number without unit. In a
-  /// step, as H >= M/h^2, it bounds the RMS (by mass) distance to the minimiser over the body's size. |g|
-  /// over a typical force would not do: with stiff constraints rounding alone makes forces larger than
-  /// inertia's.
+  /// Norm of the gradient g in the inverse Hessian, sqrt(g . H^-1 g / unit): a number without unit. In a step
+  /// it bounds the RMS (by mass) distance to the minimiser over the body's size, as H >= M/h^2 but for
+  /// springs in compression. |g| over a typical force would not do: with stiff constraints rounding alone
+  /// makes forces larger than inertia's. Taken before the last step, which leaves about its square.
   double residual = 0;
   bool converged = false;   ///< residual <= minimum_tolerance, and the Hessian is positive definite
   const char* reason = "";  ///< why not

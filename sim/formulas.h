@@ -13,7 +13,8 @@ struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
-  // clang-format off: in order of use
+  // in order of use
+  // clang-format off
 #include "shaders/constraints/types.glsl"
 #include "shaders/constraints/stretch.glsl"
 #include "shaders/constraints/bend.glsl"

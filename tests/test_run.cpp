@@ -227,3 +227,88 @@ TEST_CASE("an interrupted run leaves whole files") {
   CHECK(stats["timing"]["steps"].get<long>() > 0);
   CHECK(stats["timing"]["steps"].get<long>() < 1000000);
 }
+
+TEST_CASE(
+    "bench writes a row a setting, with and without rendering, and calls a software renderer by its name") {
+  const Folder folder;
+  const Outcome run = tetpbd(
+      "bench --scenes beam --modes cpu,node --constraint-sets stretch,stretch+bend+volume --iterations 1,2 "
+      "--frames 5 "
+      "--warm-up 1 --repeats 1 --size 64x48 --out b",
+      folder);
+  REQUIRE(run.status == 0);
+  const json bench = json::parse(read(folder.path / "b/bench.json"));
+  CHECK(bench["rows"].size() == 2 * 2 * 2 * 2);
+  if (bench["device"]["software"] == true) CHECK(run.out.find("SOFTWARE") != std::string::npos);
+  const std::string csv = read(folder.path / "b/bench.csv");
+  CHECK(csv.starts_with(
+      "scene,mode,constraints,iterations,substeps,size,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_step,"
+      "gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n"));
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == 17);
+  for (const json& row : bench["rows"]) {
+    CHECK(row["fps"]["median"].get<double>() > 0);
+    CHECK(row["max_volume_loss_percent"].is_number());
+    CHECK(row["dispatches_per_step"] == (row["mode"] == "cpu" ? 0 : 2 + row["iterations"].get<int>()));
+    CHECK((row["gpu_ms_per_step"]["median"].get<double>() > 0) == (row["mode"] != "cpu"));
+  }
+}
+
+TEST_CASE("compare finds the front, and shards merge to the same rows") {
+  const Folder folder;
+  const std::string command =
+      "compare --scene beam --modes node,cpu --iterations 1,4 --substeps 1,2 --steps 12 ";
+  const Outcome whole = tetpbd(command + "--out whole --budget-ms 1e9 --error 1000", folder);
+  REQUIRE(whole.status == 0);
+  CHECK(whole.out.find("best within") != std::string::npos);
+  CHECK(whole.out.find("cheapest with") != std::string::npos);
+  for (const char* shard : {"1/3", "2/3", "3/3"})
+    REQUIRE(tetpbd(command + "--out part" + shard[0] + " --shard " + shard, folder).status == 0);
+  REQUIRE(tetpbd("compare --merge part1 part2 part3 --out merged", folder).status == 0);
+  const json a = json::parse(read(folder.path / "whole/compare.json")),
+             b = json::parse(read(folder.path / "merged/compare.json"));
+  CHECK(a["rows"].size() == 8);
+  CHECK(b["rows"].size() == 8);
+  int on_front = 0;
+  for (const json& row : a["rows"]) {
+    on_front += row["pareto"] == true;
+    int twins = 0;
+    for (const json& other : b["rows"])
+      twins += row["mode"] == other["mode"] && row["iterations"] == other["iterations"] &&
+               row["substeps"] == other["substeps"] &&
+               row["max_volume_loss_percent"] == other["max_volume_loss_percent"] &&
+               row["rigid_distance"] == other["rigid_distance"];
+    CHECK(twins == 1);
+    // Nothing on the front is beaten in both time and error.
+    const auto cost = [](const json& r) {
+      return (r["gpu_ms_per_step"].is_number() ? r["gpu_ms_per_step"] : r["wall_ms_per_step"]).get<double>();
+    };
+    for (const json& other : a["rows"])
+      if (row["pareto"] == true)
+        CHECK(
+            !(cost(other) < cost(row) && other["max_volume_loss_percent"] < row["max_volume_loss_percent"]));
+  }
+  CHECK(on_front >= 1);
+  CHECK(read(folder.path / "whole/compare.svg").starts_with("<svg"));
+  CHECK(read(folder.path / "whole/compare.png").substr(1, 3) == "PNG");
+  CHECK(read(folder.path / "whole/compare.csv")
+            .starts_with("scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step"));
+  CHECK(tetpbd("compare --shard 4/3", folder).status == 2);
+  CHECK(tetpbd("compare --merge nowhere --out x", folder).status == 2);
+}
+
+TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contained report") {
+  const Folder folder;
+  const Outcome run = tetpbd("reproduce --quick --out r", folder);
+  CHECK(run.err == "");
+  REQUIRE(run.status == 0);
+  const std::string html = read(folder.path / "r/report.html");
+  for (const char* part : {"Table 4", "Figure 6", "Figure 7", "Figure 8", "Figure 9", "Figure 12",
+                           "data:image/png;base64,iVBOR", "<svg", "drop height"})
+    CHECK(html.find(part) != std::string::npos);
+  CHECK(html.find("src=\"http") == std::string::npos);
+  for (const char* file : {"tables/table4.csv", "tables/volume_error_bunny.csv",
+                           "figures/volume_error_bunny_all.svg", "figures/fps_all_alone.svg"})
+    CHECK(fs::exists(folder.path / "r" / file));
+  CHECK(read(folder.path / "r/tables/table4.csv").find("31800,10582,42072,15419,36690,31709") ==
+        std::string::npos);  // quick: bunny alone
+}

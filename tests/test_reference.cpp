@@ -325,6 +325,10 @@ TEST_CASE("fixed vertices stay, substeps and damping are those of the solvers") 
     CHECK(step.state.velocities[i] == glm::dvec3(0));
   }
   CHECK(largest_distance(step.state.positions, scene.model.positions) > 1e-4);
+  auto guess = scene.model.positions;
+  for (auto& p : guess) p.x += 0.01;  // a guess does not move them either
+  const State guessed = implicit_euler_step(scene.input(), scene.start(), {1e-6, 1e-4, 1e-8}, &guess).state;
+  CHECK(largest_distance(guessed.positions, step.state.positions) < 1e-9 * scene.model.size);
 
   // Without constraints every solver's step is the prediction.
   Settings& settings = scene.settings;

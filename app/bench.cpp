@@ -143,6 +143,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
             row.iterations = iterations, row.substeps = substeps;
             row.vertices = model->positions.size(), row.tets = model->rest.tets.size();
             row.gpu_bytes = cost.bytes, row.dispatches = cost.dispatches_per_step;
+            row.bytes_per_step = cost.bytes_per_step;
             row.max_volume_loss_percent = loss_of(sim, *model, options);
             for (const bool render : {false, true}) {
               if (render && !options.render) continue;
@@ -209,6 +210,7 @@ int run_bench(const BenchOptions& options) {
                     {"gpu_ms_per_step", triple(r.gpu_ms)},
                     {"wall_ms_per_step", triple(r.wall_ms)},
                     {"dispatches_per_step", r.dispatches},
+                    {"bytes_per_step", r.bytes_per_step},
                     {"gpu_bytes", r.gpu_bytes},
                     {"max_volume_loss_percent", loss}});
   }

@@ -101,6 +101,7 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   row["max_volume_loss_percent"] = number(run.errors.max_volume_loss_percent);
   row["tet_volume_rms"] = number(last.tet_volume_rms);
   row["stretch_rms"] = number(last.stretch_rms);
+  row["bend_rms_rad"] = number(last.bend_rms_rad);
   row["rigid_distance"] = number(last.rigid_distance);
   row["reference_distance"] = number(remaining_after_one_step(model, settings));
   row["linear_drift"] = number(run.errors.linear_drift);

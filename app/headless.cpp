@@ -185,10 +185,11 @@ int print_explanation(const Scene& scene, int gpu) {
   for (const auto& buffer : e.buffers) fmt::print("{:<28}{:>14}\n", buffer.name, buffer.bytes);
   fmt::print("{:<28}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
              double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
-  fmt::print("{:<28}{:>14}{:>14}\n", "kernel", "work-groups", "a step");
+  fmt::print("{:<28}{:>14}{:>14}{:>16}\n", "kernel", "work-groups", "a step", "bytes a step");
   for (const auto& dispatch : e.dispatches)
-    fmt::print("{:<28}{:>14}{:>14}\n", dispatch.name, dispatch.groups, dispatch.per_step);
-  fmt::print("{:<28}{:>14}{:>14}\n", "all", "", e.dispatches_per_step);
+    fmt::print("{:<28}{:>14}{:>14}{:>16}\n", dispatch.name, dispatch.groups, dispatch.per_step,
+               dispatch.bytes * std::size_t(dispatch.per_step));
+  fmt::print("{:<28}{:>14}{:>14}{:>16}\n", "all", "", e.dispatches_per_step, e.bytes_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);
   return 0;
 }

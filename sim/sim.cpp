@@ -86,6 +86,8 @@ void build_solver(Sim& sim) {
       predict.program = Program::compute("predict.comp");
       finish.program = Program::compute("finish.comp");
       predict.groups = finish.groups = work_groups(sim.model->positions.size(), group_size);
+      predict.bytes = sim.model->positions.size() * (3 * sizeof(Position) + 2 * sizeof(Velocity));
+      finish.bytes = sim.model->positions.size() * (2 * sizeof(Position) + 2 * sizeof(Velocity));
       Solver solver = mode.create({*sim.model, sim.system, is_software_renderer()});
       sim.predict = std::move(predict);
       sim.finish = std::move(finish);
@@ -301,12 +303,17 @@ Explanation explain(const Sim& sim) {
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (!on_cpu(sim)) {
     const long substeps = sim.settings.substeps;
-    result.dispatches.push_back({sim.predict.program.label(), sim.predict.groups, substeps});
+    result.dispatches.push_back(
+        {sim.predict.program.label(), sim.predict.groups, substeps, sim.predict.bytes});
     for (const Pass& pass : sim.solver.iteration)
-      result.dispatches.push_back({pass.program.label(), pass.groups, substeps * sim.settings.iterations});
-    result.dispatches.push_back({sim.finish.program.label(), sim.finish.groups, substeps});
+      result.dispatches.push_back(
+          {pass.program.label(), pass.groups, substeps * sim.settings.iterations, pass.bytes});
+    result.dispatches.push_back({sim.finish.program.label(), sim.finish.groups, substeps, sim.finish.bytes});
   }
-  for (const auto& dispatch : result.dispatches) result.dispatches_per_step += dispatch.per_step;
+  for (const auto& dispatch : result.dispatches) {
+    result.dispatches_per_step += dispatch.per_step;
+    result.bytes_per_step += dispatch.bytes * std::size_t(dispatch.per_step);
+  }
   return result;
 }
 

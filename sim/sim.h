@@ -71,11 +71,13 @@ struct Explanation {
     std::string name;
     unsigned groups;
     long per_step;
+    std::size_t bytes;  ///< of one dispatch
   };
   std::vector<Item> buffers;
   std::vector<Dispatch> dispatches;
   std::size_t bytes = 0;
   long dispatches_per_step = 0;
+  std::size_t bytes_per_step = 0;  ///< read and written by all dispatches; caches may serve part of it
 };
 Explanation explain(const Sim& sim);
 

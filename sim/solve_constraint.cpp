@@ -17,6 +17,8 @@ Solver create_constraint_solver(const SolverInput& input) {
     pass.program.use();
     pass.program.set("count", unsigned(count));
     pass.groups = work_groups(count, 256);
+    const std::size_t arity = std::stoul(words.at("ARITY"));  // an atomic reads and writes
+    pass.bytes = count * (4 * (arity + 1) + arity * (sizeof(Position) + 2 * 12));
     pass.bindings = {{BIND_DELTAS, deltas.id()}, {BIND_RECORDS + int(index), solver.buffers[index].id()}};
     solver.iteration.push_back(std::move(pass));
     ++index;
@@ -24,6 +26,7 @@ Solver create_constraint_solver(const SolverInput& input) {
   Pass average;
   average.program = Program::compute("average.comp");
   average.groups = work_groups(input.model.positions.size(), 256);
+  average.bytes = input.model.positions.size() * (3 * sizeof(Position) + sizeof(Velocity) + 2 * 16);
   average.bindings = {{BIND_DELTAS, deltas.id()}};
   solver.iteration.push_back(std::move(average));
   solver.buffers.push_back(std::move(deltas));

@@ -32,6 +32,15 @@ Solver create_node_solver(const SolverInput& input) {
     pass.bindings.push_back({BIND_RECORDS + int(k), solver.buffers[k].id()});
   solver.buffers.emplace_back("adjacency", vertex_adjacency(input.system));
   pass.bindings.push_back({BIND_ADJACENCY, solver.buffers.back().id()});
+  // Two offsets, itself, predicted, velocity and the write; for each entry the entry, its record and that
+  // record's vertices.
+  pass.bytes = vertices * (3 * sizeof(Position) + sizeof(Velocity) + 8 * kinds.size());
+  for (std::size_t k = 0; k < input.system.lists.size(); ++k) {
+    const ConstraintList& list = input.system.lists[k];
+    if (input.system.present[k])
+      pass.bytes += list.vertices.size() *
+                    (4 + 4 * std::size_t(list.arity + 1) + std::size_t(list.arity) * sizeof(Position));
+  }
   solver.iteration.push_back(std::move(pass));
   return solver;
 }

@@ -17,6 +17,7 @@ namespace tetpbd {
 struct Pass {
   Program program;
   unsigned groups = 0;
+  std::size_t bytes = 0;  ///< read and written by all invocations together; caches may serve part of it
   std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every pass shares
 };
 

@@ -262,6 +262,8 @@ TEST_CASE("the implicit-Euler step does not depend on the starting guess and is 
       CHECK(largest_distance(other.state.positions, x) < 1e-9 * scene.model.size);
       CHECK(largest_distance(other.state.positions, guess) > 1e-4 * scene.model.size);
     }
+    CHECK(implicit_euler_step(scene.input(), scene.start(), compliances, &x).iterations ==
+          1);  // the guess is used
     // Forces balance: what is left of each is rounding of the forces that cancel.
     const double h = scene.settings.dt;
     const Objective o = step_objective(scene.input(), scene.start(), compliances, h);

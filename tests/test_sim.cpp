@@ -5,6 +5,7 @@
 
 #include "sim/cpu_pbd.h"
 #include "sim/metrics.h"
+#include "sim/reference.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 
@@ -300,4 +301,36 @@ TEST_CASE("iterations and the volume constraint lower the volume lost in a fall"
     previous = now;
   }
   CHECK(loss("stretch,bend", 10) > loss("stretch,bend,volume", 10));
+}
+
+TEST_CASE("the float GPU solvers converge to the exact step as the double ones do") {
+  GlTest gl;
+  // A free body stretched by 5 %: the exact step is the rest shape, best placed.
+  const auto model = block_model({8, 6, 4}, 0.2, 1, "stretch:1.05");
+  double previous = 1;
+  for (int iterations : {10, 100, 1000, 10000}) {
+    double left[3];
+    State states[3];
+    for (int solver = 0; solver < 3; ++solver) {
+      Settings settings = quick(solver == 2 ? "constraint" : "node", iterations);
+      settings.gravity = 0;
+      settings.ground = false;
+      Sim sim = create_sim(model, settings);
+      const State start = start_of(sim);
+      const State exact = rigid_step({*model, sim.system, settings, sim.inverse_masses}, start);
+      states[solver] = solver == 0 ? reference_after(sim, 1, Sweep::jacobi) : (step(sim), read_state(sim));
+      left[solver] = error_to(*model, exact, states[solver]) / error_to(*model, exact, start);
+    }
+    const double node = error_to(*model, states[0], states[1]),
+                 constraint = error_to(*model, states[0], states[2]);
+    MESSAGE(iterations << " iterations: left of the stretch: double " << left[0] << ", node " << left[1]
+                       << ", constraint " << left[2] << "; distance to double over size: node " << node
+                       << ", constraint " << constraint);
+    CHECK(left[1] == doctest::Approx(left[0]).epsilon(0.01));
+    CHECK(left[2] == doctest::Approx(left[0]).epsilon(0.01));
+    CHECK(node < 2e-6);
+    CHECK(constraint < 2e-6);
+    CHECK(left[1] < previous);
+    previous = left[1];
+  }
 }

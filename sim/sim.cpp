@@ -13,9 +13,14 @@ namespace {
 
 constexpr unsigned group_size = 256;  // of predict and finish
 
-void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
-  high = glm::vec3(value);
-  low = glm::vec3(value - glm::dvec3(high));
+// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements, so that
+// their low parts are lost (a test guards against it).
+[[gnu::noinline]] void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
+  for (int a = 0; a < 3; ++a) {
+    const volatile float rounded = float(value[a]);
+    high[a] = rounded;
+    low[a] = float(value[a] - double(rounded));
+  }
 }
 
 Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constraints) {

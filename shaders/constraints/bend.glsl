@@ -31,9 +31,12 @@ Constraint4 bend(vec3 x[4], real rest) {
   vec3 a = n0 / aa;
   vec3 b = n1 / bb;
   vec3 u = e / l;
-  // A normal is a difference of products: its direction is known to rounding times |side| |side| / |normal|.
-  vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
-  real noise = pi + real(2) * sqrt(dot(a2, a2) * dot(a3, a3) / aa) + real(2) * sqrt(dot(b2, b2) * dot(b3, b3) / bb);
+  // Sides are differences of positions relative to x0, so each is known to rounding times the hinge's extent; a normal's
+  // direction then to that times a side over the normal's length.
+  vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b0 = x[1] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
+  real a22 = dot(a2, a2), a33 = dot(a3, a3), b22 = dot(b2, b2), b33 = dot(b3, b3);
+  real extent = max(max(a22, a33), dot(b0, b0));
+  real noise = pi + real(2) * (sqrt(extent * max(a22, a33) / aa) + sqrt(extent * max(b22, b33) / bb));
   c.C = clamp(resolved(turn, noise), real(-1), real(1));
   c.gradient[0] = -l * a;
   c.gradient[1] = -l * b;

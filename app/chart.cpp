@@ -180,6 +180,8 @@ std::string to_svg(const Chart& chart) {
   }
   svg += text(left + inner_width / 2, height - 18, chart.x_label, "middle");
   svg += frame();
+  if (chart.log_y && std::none_of(all_y.begin(), all_y.end(), [](double v) { return v > 0; }))
+    svg += text(left + inner_width / 2, top + inner_height / 2, "every value is 0", "middle", 15);
   double legend = top + 10;
   for (std::size_t k = 0; k < chart.series.size(); ++k) {
     const Series& s = chart.series[k];

@@ -1,6 +1,7 @@
 #include "app/compare.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -112,12 +113,14 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   return row;
 }
 
+// Losses that agree to a thousandth are the same: two Jacobi modes differ by rounding.
 void mark_front(ordered_json& rows) {
   for (auto& row : rows) {
     bool beaten = !std::isfinite(loss(row));
-    for (const auto& other : rows)
-      beaten |= cost_ms(other) <= cost_ms(row) && loss(other) <= loss(row) &&
-                (cost_ms(other) < cost_ms(row) || loss(other) < loss(row));
+    for (const auto& other : rows) {
+      const bool as_good = loss(other) <= 1.001 * loss(row), better = 1.001 * loss(other) < loss(row);
+      beaten |= (cost_ms(other) < cost_ms(row) && as_good) || (cost_ms(other) <= cost_ms(row) && better);
+    }
     row["pareto"] = !beaten;
   }
 }
@@ -184,7 +187,7 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
       document = part;
       continue;
     }
-    for (const char* key : {"steps", "dt"})
+    for (const char* key : {"steps", "dt", "combinations", "shards"})
       if (part[key] != document[key])
         throw Error("these shards differ", fmt::format("'{}' in {}", key, folder.string()),
                     "merge runs of one command");
@@ -192,7 +195,17 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
       throw Error("these shards ran on different devices", folder.string(),
                   "times can only be compared on one kind of GPU");
     for (const auto& row : part["rows"]) document["rows"].push_back(row);
+    for (const auto& shard : part["shard"]) document["shard"].push_back(shard);
   }
+  auto shards = document["shard"].get<std::vector<int>>();
+  std::sort(shards.begin(), shards.end());
+  if (std::adjacent_find(shards.begin(), shards.end()) != shards.end())
+    throw Error("a shard was given twice", fmt::format("--merge, shards {}", fmt::join(shards, ", ")),
+                "name each folder once");
+  if (document["rows"].size() < document["combinations"].get<std::size_t>())
+    fmt::print(stderr, "tetpbd: only {} of {} combinations: shards {} of {}\n", document["rows"].size(),
+               document["combinations"].get<std::size_t>(), fmt::join(shards, ", "),
+               document["shards"].get<int>());
   return document;
 }
 
@@ -226,31 +239,37 @@ ordered_json measured(const CompareOptions& options) {
             {"software", device.software}}},
           {"steps", options.steps},
           {"dt", scene.settings.dt},
+          {"combinations", combinations.size()},
+          {"shard", std::vector<int>{options.shard}},
+          {"shards", options.shards},
           {"rows", rows}};
 }
 
 void print_choice(const ordered_json& rows, const CompareOptions& options) {
-  if (options.budget_ms) {
-    const ordered_json* best = nullptr;
+  // The better of two by `first`, then by `second`; rows that do not qualify are left out.
+  const auto best = [&](auto qualifies, auto first, auto second) -> const ordered_json* {
+    const ordered_json* found = nullptr;
     for (const auto& row : rows)
-      if (cost_ms(row) <= *options.budget_ms && std::isfinite(loss(row)) &&
-          (!best || loss(row) < loss(*best)))
-        best = &row;
-    if (best)
-      fmt::print("best within {:g} ms a step: {} ({:.3g} ms, loss {:.3g} %)\n", *options.budget_ms,
-                 setting_name(*best), cost_ms(*best), loss(*best));
+      if (std::isfinite(loss(row)) && qualifies(row) &&
+          (!found || std::pair(first(row), second(row)) < std::pair(first(*found), second(*found))))
+        found = &row;
+    return found;
+  };
+  if (options.budget_ms) {
+    const double budget = *options.budget_ms;
+    if (const auto* row = best([&](const auto& r) { return cost_ms(r) <= budget; }, loss, cost_ms))
+      fmt::print("best within {:g} ms a step: {} ({:.3g} ms, loss {:.3g} %)\n", budget, setting_name(*row),
+                 cost_ms(*row), loss(*row));
     else
-      fmt::print("nothing measured stays within {:g} ms a step\n", *options.budget_ms);
+      fmt::print("nothing measured stays within {:g} ms a step\n", budget);
   }
   if (options.error_percent) {
-    const ordered_json* best = nullptr;
-    for (const auto& row : rows)
-      if (loss(row) <= *options.error_percent && (!best || cost_ms(row) < cost_ms(*best))) best = &row;
-    if (best)
-      fmt::print("cheapest with a loss of at most {:g} %: {} ({:.3g} ms, loss {:.3g} %)\n",
-                 *options.error_percent, setting_name(*best), cost_ms(*best), loss(*best));
+    const double error = *options.error_percent;
+    if (const auto* row = best([&](const auto& r) { return loss(r) <= error; }, cost_ms, loss))
+      fmt::print("cheapest with a loss of at most {:g} %: {} ({:.3g} ms, loss {:.3g} %)\n", error,
+                 setting_name(*row), cost_ms(*row), loss(*row));
     else
-      fmt::print("nothing measured loses at most {:g} %\n", *options.error_percent);
+      fmt::print("nothing measured loses at most {:g} %\n", error);
   }
 }
 
@@ -278,6 +297,9 @@ int run_compare(const CompareOptions& options) {
                std::isfinite(loss(row)) ? fmt::format("{:.3g}", loss(row)) : "-", value("rigid_distance"),
                value("reference_distance"), row["pareto"] == true ? "*" : "");
   }
+  if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return loss(row) == 0; }))
+    fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
+               document["steps"].get<long>());
   write_file(options.out / "compare.json", document.dump(1) + "\n");
   write_file(options.out / "compare.csv", csv_of(rows));
   write_chart(options.out / "compare", to_svg(chart_of(document)));

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <optional>
 
 #include "app/bench.h"
 #include "app/compare.h"
@@ -28,7 +29,7 @@ namespace {
 struct SceneArguments {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  std::vector<std::string> values;  ///< text by row of parameters()
+  std::vector<std::optional<std::string>> values;  ///< text by row of parameters()
   int gpu = -1;
   std::string size = "1280x720";
   int width = 1280, height = 720, samples = 4;
@@ -46,14 +47,21 @@ int index_of(const Names& names, const std::string& name, const char* flag) {
               fmt::format("choose from {}", fmt::join(names, ", ")));
 }
 
+// An unset shell variable must not run another experiment than was meant.
+const CLI::Validator not_empty(
+    [](std::string& text) { return text.empty() ? std::string("must not be empty") : std::string(); }, "");
+
 void add_scene_options(CLI::App& command, SceneArguments& a) {
   command
       .add_option("--scene", a.scene,
                   fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")))
       ->capture_default_str();
-  command.add_option("--mesh", a.overrides.mesh,
-                     "mesh in place of the scene's first body (.ply .obj .stl .off .node .ele .msh)");
-  command.add_option("--tetgen", a.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
+  command
+      .add_option("--mesh", a.overrides.mesh,
+                  "mesh in place of the scene's first body (.ply .obj .stl .off .node .ele .msh)")
+      ->check(not_empty);
+  command.add_option("--tetgen", a.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh")
+      ->check(not_empty);
   command.add_option(
       "--deform", a.overrides.deform,
       "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
@@ -77,7 +85,7 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
       ->take_all()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command.add_option("--gpu", a.gpu, "which device of tetpbd info (default: the first GPU)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 1023));
   command.add_option("--size", a.size, "of images and window, WxH")->capture_default_str();
   command.add_option("--samples", a.samples, "of MSAA: 0, 2, 4, 8")
       ->check(CLI::IsMember({0, 2, 4, 8}))
@@ -126,13 +134,14 @@ Scene scene_of(SceneArguments& a) {
   a.view.grid = !a.no_grid;
   a.view.legend = !a.no_legend;
   for (std::size_t i = 0; i < parameters().size(); ++i)
-    if (!a.values[i].empty()) a.overrides.parameters.emplace_back(parameters()[i].name, a.values[i]);
+    if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
   return load_scene(a.scene, a.overrides);
 }
 
 int run_commands(int argc, char** argv) {
   CLI::App app("tetpbd: Position-Based Dynamics of tetrahedral soft bodies on a GPU");
   app.set_version_flag("--version", TETPBD_VERSION);
+  app.name("tetpbd");
   app.require_subcommand(0, 1);
   app.fallthrough();
   std::string shaders;
@@ -205,7 +214,7 @@ int run_commands(int argc, char** argv) {
   bench->add_flag("--no-render", no_render, "simulation alone");
   bench->add_option("--tetgen", bench_options.overrides.tetgen,
                     "TetGen switches, pY for the paper's kind of mesh");
-  bench->add_option("--gpu", bench_options.gpu, "which device")->check(CLI::NonNegativeNumber);
+  bench->add_option("--gpu", bench_options.gpu, "which device")->check(CLI::Range(0, 1023));
   bench->add_option("--out", bench_options.out, "folder for bench.csv and bench.json")->capture_default_str();
 
   auto* compare = app.add_subcommand("compare", "speed against error over modes x iterations x substeps");
@@ -237,16 +246,16 @@ int run_commands(int argc, char** argv) {
       ->capture_default_str();
   compare
       ->add_option("--budget-ms", compare_options.budget_ms, "print the best setting within that time a step")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-9, 1e9));
   compare
       ->add_option("--error", compare_options.error_percent,
                    "print the cheapest setting that loses at most this volume, %")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1e-9, 1e9));
   compare
       ->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")
       ->capture_default_str();
   compare->add_option("--merge", compare_options.merge, "folders of finished shards, instead of running");
-  compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::NonNegativeNumber);
+  compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::Range(0, 1023));
   compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")
       ->capture_default_str();
 
@@ -257,7 +266,7 @@ int run_commands(int argc, char** argv) {
       ->capture_default_str();
   reproduce->add_flag("--quick", reproduce_options.quick,
                       "bunny alone, few frames: checks the trends without a GPU");
-  reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(CLI::NonNegativeNumber);
+  reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(CLI::Range(0, 1023));
 
   auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
   std::filesystem::path mesh_file, mesh_out;
@@ -272,7 +281,7 @@ int run_commands(int argc, char** argv) {
 
   auto* info = app.add_subcommand("info", "GL version, devices, limits, extensions used, build, licences");
   int info_gpu = -1;
-  info->add_option("--gpu", info_gpu, "which device")->check(CLI::NonNegativeNumber);
+  info->add_option("--gpu", info_gpu, "which device")->check(CLI::Range(0, 1023));
 
   // Options without a command belong to the window: tetpbd --scene beam.
   std::vector<std::string> words(argv + 1, argv + argc);
@@ -286,7 +295,9 @@ int run_commands(int argc, char** argv) {
     if (problem.get_exit_code() == 0) return app.exit(problem);  // --help, --version
     std::string what = problem.what();
     std::replace(what.begin(), what.end(), '\n', ' ');
-    fmt::print(stderr, "tetpbd: {}: command line: see tetpbd --help\n", what);
+    const auto parsed = app.get_subcommands();
+    const std::string command = parsed.empty() ? "" : " " + parsed[0]->get_name();
+    fmt::print(stderr, "tetpbd: {}: command line: see tetpbd{} --help\n", what, command);
     return 2;
   }
   if (!shaders.empty()) set_shader_folder(shaders);
@@ -324,7 +335,10 @@ int run_commands(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return run_commands(argc, argv);
+    const int status = run_commands(argc, argv);
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+      throw Error("cannot write", "standard output", "is the disk full?", 1);
+    return status;
   } catch (const Error& error) {
     std::fflush(stdout);
     fmt::print(stderr, "tetpbd: {}\n", error.what());

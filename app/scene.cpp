@@ -266,6 +266,9 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   std::error_code error;
   if (!fs::is_regular_file(file, error) && file.extension() != ".json")
     file = models_folder() / "scenes" / (name_or_file + ".json");
+  if (!fs::is_regular_file(file, error) && scene_names().empty())
+    throw Error("no scenes", (models_folder() / "scenes").string(),
+                "point TETPBD_MODELS at the folder models/");
   if (!fs::is_regular_file(file, error))
     throw Error("no such scene", name_or_file,
                 fmt::format("give a .json file or one of {}", fmt::join(scene_names(), ", ")));

@@ -200,11 +200,12 @@ std::string to_svg(const Chart& chart) {
     svg += text(left + inner_width + 44, legend + 4, s.name, "start", 12);
     legend += 20;
   }
+  // Below and to the left, where a front leaves room; at the left edge there is none.
   for (const Chart::Note& note : chart.notes)
     if (x.shows(note.x) && y.shows(note.y)) {
-      const bool far_right = x.part(note.x) > 0.75;
-      svg += text(at_x(note.x) + (far_right ? -8 : 8), at_y(note.y) - 7, note.text,
-                  far_right ? "end" : "start", 10.5);
+      const bool at_edge = x.part(note.x) < 0.16;
+      svg += text(at_x(note.x) + (at_edge ? 9 : -7), at_y(note.y) + (at_edge ? -6 : 14), note.text,
+                  at_edge ? "start" : "end", 10.5);
     }
   return svg + "</svg>\n";
 }

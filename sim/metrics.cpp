@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <ranges>
 
 #include "shaders/metrics/layout.glsl"
 
@@ -14,27 +15,14 @@ constexpr std::size_t ring_size = 16;
 
 // Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
 Metrics::Range range_of(const ConstraintList& list, std::size_t first_vertex, std::size_t end_vertex) {
-  const auto vertex_of = [&](std::size_t c) { return list.vertices[c * std::size_t(list.arity)]; };
-  Metrics::Range range;
-  unsigned low = 0, high = unsigned(list.count());
-  while (low < high) {
-    const unsigned middle = (low + high) / 2;
-    if (vertex_of(middle) < first_vertex)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  range.first = low;
-  high = unsigned(list.count());
-  while (low < high) {
-    const unsigned middle = (low + high) / 2;
-    if (vertex_of(middle) < end_vertex)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  range.end = low;
-  return range;
+  const auto first_at_least = [&](std::size_t vertex) {
+    const auto constraints = std::views::iota(0u, unsigned(list.count()));
+    return unsigned(std::ranges::lower_bound(
+                        constraints, vertex, {},
+                        [&](unsigned c) { return std::size_t(list.vertices[c * std::size_t(list.arity)]); }) -
+                    constraints.begin());
+  };
+  return {first_at_least(first_vertex), first_at_least(end_vertex)};
 }
 
 }  // namespace

@@ -159,6 +159,9 @@ TEST_CASE("every shipped scene runs in every mode") {
     for (const SolverMode& mode : solver_modes()) {
       CAPTURE(name);
       CAPTURE(mode.name);
+#ifndef TETPBD_TETGEN
+      if (name != "beam") continue;  // the others start from surfaces
+#endif
       const Scene scene = load_scene(name, {{}, "", "", {{"mode", mode.name}, {"iterations", "2"}}, {}});
       const auto model = build_model(scene);
       Sim sim = create_sim(model, scene.settings);

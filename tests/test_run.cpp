@@ -60,7 +60,7 @@ struct Blob {
   int count = 0;
   double y = 0;
 };
-Blob body_of(const Picture& picture) {
+[[maybe_unused]] Blob body_of(const Picture& picture) {
   Blob blob;
   for (int y = 0; y < picture.height; ++y)
     for (int x = 0; x < picture.width; ++x)

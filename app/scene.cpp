@@ -125,7 +125,9 @@ void read_settings(Keys& keys, const char* section, Settings& settings) {
   }
 }
 
-BodyDescription read_body(const json& value, const std::string& where, const std::string& file) {
+// `file` names the scene in errors; meshes are looked for in `folder` first.
+BodyDescription read_body(const json& value, const std::string& where, const std::string& file,
+                          const fs::path& folder) {
   Keys keys(value, where, file);
   BodyDescription body;
   std::string mesh;
@@ -166,7 +168,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
     // Beside the scene, or one of the shipped meshes.
     body.mesh = mesh;
     if (body.mesh.is_relative()) {
-      const fs::path beside = fs::path(file).parent_path() / mesh;
+      const fs::path beside = folder / mesh;
       body.mesh = fs::exists(beside) ? beside : models_folder() / mesh;
     }
   }
@@ -174,10 +176,10 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   return body;
 }
 
-Scene read_scene(const json& document, const std::string& file) {
+Scene read_scene(const json& document, const std::string& file, const fs::path& path) {
   Keys keys(document, "", file);
   Scene scene;
-  scene.name = fs::path(file).stem().string();
+  scene.name = path.stem().string();
   keys.read("name", scene.name);
   keys.read("description", scene.description);
   keys.read("duration", scene.duration, 1e-6, 1e6);
@@ -185,7 +187,7 @@ Scene read_scene(const json& document, const std::string& file) {
   if (!bodies || !bodies->is_array() || bodies->empty())
     keys.fail("bodies", "must be a list with at least one body");
   for (std::size_t i = 0; i < bodies->size(); ++i)
-    scene.bodies.push_back(read_body((*bodies)[i], fmt::format("bodies.{}", i), file));
+    scene.bodies.push_back(read_body((*bodies)[i], fmt::format("bodies.{}", i), file, path.parent_path()));
   for (const char* section : {"world", "solver"}) {
     const json* value = keys.find(section);
     if (!value) continue;
@@ -284,7 +286,9 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     throw Error("not valid JSON", file.string(), text);
   }
   for (const std::string& assignment : overrides.set) set_path(document, assignment);
-  Scene scene = read_scene(document, file.string());
+  std::string shown = file.string();
+  if (!overrides.set.empty()) shown += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));
+  Scene scene = read_scene(document, shown, file);
   for (const auto& [name, text] : overrides.parameters) {
     const Parameter& row = *find_parameter(name);
     set_parameter(scene.settings, row, text, flag_name(row));

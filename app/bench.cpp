@@ -90,13 +90,6 @@ double loss_of(Sim& sim, const Model& model, const BenchOptions& options) {
   return whole ? run.errors.max_volume_loss_percent : std::nan("");
 }
 
-nlohmann::ordered_json device_json(const Capabilities& device) {
-  return {{"gl_renderer", device.renderer},
-          {"gl_vendor", device.vendor},
-          {"gl_version", device.version},
-          {"software", device.software}};
-}
-
 }  // namespace
 
 std::vector<BenchRow> bench_rows(const BenchOptions& options,

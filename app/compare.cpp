@@ -232,11 +232,7 @@ ordered_json measured(const CompareOptions& options) {
     rows.push_back(run_one(scene, model, combinations[i], options.steps));
     progress.update(long(rows.size()));
   }
-  return {{"device",
-           {{"gl_renderer", device.renderer},
-            {"gl_vendor", device.vendor},
-            {"gl_version", device.version},
-            {"software", device.software}}},
+  return {{"device", device_json(device)},
           {"steps", options.steps},
           {"dt", scene.settings.dt},
           {"combinations", combinations.size()},

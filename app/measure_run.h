@@ -14,7 +14,6 @@ struct MeasuredRun {
   RunErrors errors;
   Timing timing;
   std::vector<Measurement> measurements;  ///< one a step, the start first
-  std::uint64_t hash = 0;
 };
 
 /// Steps `steps` times and measures after each; GPU times are those of the step's passes alone. Ends early

@@ -72,6 +72,13 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
 
 }  // namespace
 
+ordered_json device_json(const Capabilities& device) {
+  return {{"gl_renderer", device.renderer},
+          {"gl_vendor", device.vendor},
+          {"gl_version", device.version},
+          {"software", device.software}};
+}
+
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
                             std::uint64_t hash) {
@@ -85,10 +92,7 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                {"tets", mesh.tets},
                {"volume", mesh.volume},
                {"euler_characteristic", mesh.euler_characteristic}};
-  j["device"] = {{"gl_renderer", device.renderer},
-                 {"gl_vendor", device.vendor},
-                 {"gl_version", device.version},
-                 {"software", device.software}};
+  j["device"] = device_json(device);
   j["timing"] = {
       {"steps", sim.steps},
       {"gpu_ms_per_step", times(timing.gpu_ms)},

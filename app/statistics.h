@@ -1,6 +1,7 @@
 // stats.json and stats.csv: names that scripts rely on (docs/statistics.md).
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ Percentiles percentiles(std::vector<double> values);
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
                             std::uint64_t hash);
+/// The device as stats.json, bench.json and compare.json name it.
+nlohmann::ordered_json device_json(const Capabilities& device);
 std::string csv_header();
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 

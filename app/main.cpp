@@ -13,6 +13,7 @@
 
 #include "app/bench.h"
 #include "app/compare.h"
+#include "app/hard_cases.h"
 #include "app/headless.h"
 #include "app/mesh_command.h"
 #include "app/reproduce.h"
@@ -64,7 +65,7 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
       ->check(not_empty);
   command.add_option(
       "--deform", a.overrides.deform,
-      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
+      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, twist:DEGREES, invert-one, coincident, fold");
   a.values.resize(parameters().size());
   for (std::size_t i = 0; i < parameters().size(); ++i) {
     const Parameter& row = parameters()[i];
@@ -254,6 +255,15 @@ int run_commands(int argc, char** argv) {
   compare
       ->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")
       ->capture_default_str();
+  HardCaseOptions hard;
+  bool hard_cases = false;
+  auto* hard_flag = compare->add_flag("--hard-cases", hard_cases,
+                                      "instead: which mode recovers from the scenes of models/scenes/hard, and when");
+  compare->add_option("--cases", hard.cases, "hard cases to run (default: all)")->delimiter(',')->needs(hard_flag);
+  compare->add_option("--meshes", hard.meshes, "hard cases: bunny, block, tet")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->needs(hard_flag);
   compare->add_option("--merge", compare_options.merge, "folders of finished shards, instead of running");
   compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::Range(0, 1023));
   compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")
@@ -312,6 +322,14 @@ int run_commands(int argc, char** argv) {
   if (*reproduce) return run_reproduce(reproduce_options);
   if (*compare) {
     parse_shard(shard, compare_options.shard, compare_options.shards);
+    if (hard_cases) {
+      if (compare->count("--modes")) hard.modes = compare_options.modes;
+      if (compare->count("--steps")) hard.steps = compare_options.steps;
+      if (compare->count("--out")) hard.out = compare_options.out;
+      hard.gpu = compare_options.gpu, hard.merge = compare_options.merge;
+      hard.shard = compare_options.shard, hard.shards = compare_options.shards;
+      return run_hard_cases(hard);
+    }
     return run_compare(compare_options);
   }
   if (*run || scene.explain) {

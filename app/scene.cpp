@@ -10,6 +10,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 
 #include "sim/error.h"
@@ -134,6 +135,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   keys.read("name", body.name);
   keys.read("mesh", mesh);
   keys.read("tetgen", body.tetgen);
+  keys.read_vector("scale", body.scale, 1e-6, 1e6);
   keys.read("height", body.height, 1e-6, far);
   keys.read_vector("rotation", body.rotation, -3600, 3600);
   keys.read_vector("position", body.position, -far, far);
@@ -150,20 +152,38 @@ BodyDescription read_body(const json& value, const std::string& where, const std
     if (double(body.block->cells.x) * body.block->cells.y * body.block->cells.z > 2e6)
       keys.fail(keys.path("block.cells"), "must be at most 2 million cells in all");
   }
-  if (const json* fixed = keys.find("fixed")) {
-    if (!fixed->is_array())
-      keys.fail(keys.path("fixed"), "must be a list of boxes {\"low\": [x,y,z], \"high\": [x,y,z]}");
-    for (std::size_t i = 0; i < fixed->size(); ++i) {
-      Keys box_keys((*fixed)[i], fmt::format("{}.{}", keys.path("fixed"), i), file);
+  // A list of boxes, for fixed and heavy vertices; `more` reads what else an entry holds.
+  const auto read_boxes = [&](const char* key, auto more) {
+    const json* list = keys.find(key);
+    if (!list) return;
+    if (!list->is_array())
+      keys.fail(keys.path(key), "must be a list of boxes {\"low\": [x,y,z], \"high\": [x,y,z]}");
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      Keys box_keys((*list)[i], fmt::format("{}.{}", keys.path(key), i), file);
       BodyDescription::Box box;
       box_keys.read_vector("low", box.low, -1, 2);
       box_keys.read_vector("high", box.high, -1, 2);
+      more(box_keys, box);
       box_keys.finish();
-      body.fixed.push_back(box);
     }
+  };
+  read_boxes("fixed", [&](Keys&, const BodyDescription::Box& box) { body.fixed.push_back(box); });
+  read_boxes("heavy", [&](Keys& box_keys, const BodyDescription::Box& box) {
+    BodyDescription::Heavy heavy{box, 1, 1};
+    box_keys.read("ratio", heavy.ratio, 1e-9, 1e9);
+    box_keys.read("share", heavy.share, 0, 1);
+    body.heavy.push_back(heavy);
+  });
+  if (const json* tet = keys.find("tet")) {
+    if (!tet->is_array() || tet->size() != 4) keys.fail(keys.path("tet"), "must be a list of four points");
+    json points = {{"0", (*tet)[0]}, {"1", (*tet)[1]}, {"2", (*tet)[2]}, {"3", (*tet)[3]}};
+    Keys tet_keys(points, keys.path("tet"), file);
+    body.tet.emplace();
+    for (std::size_t j = 0; j < 4; ++j) tet_keys.read_vector(std::to_string(j), (*body.tet)[j], -far, far);
   }
   keys.finish();
-  if (mesh.empty() == !body.block) keys.fail(where, "needs either \"mesh\" or \"block\"");
+  if (!mesh.empty() + bool(body.block) + bool(body.tet) != 1)
+    keys.fail(where, "needs one of \"mesh\", \"block\" and \"tet\"");
   if (!mesh.empty()) {
     // Beside the scene, or one of the shipped meshes.
     body.mesh = mesh;
@@ -172,7 +192,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
       body.mesh = fs::exists(beside) ? beside : models_folder() / mesh;
     }
   }
-  if (body.name.empty()) body.name = mesh.empty() ? "block" : fs::path(mesh).stem().string();
+  if (body.name.empty()) body.name = body.block ? "block" : body.tet ? "tet" : fs::path(mesh).stem().string();
   return body;
 }
 
@@ -296,6 +316,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   if (!overrides.mesh.empty()) {
     scene.bodies[0].mesh = overrides.mesh;
     scene.bodies[0].block.reset();
+    scene.bodies[0].tet.reset();
     scene.bodies[0].name = overrides.mesh.stem().string();
   }
   for (BodyDescription& body : scene.bodies) {
@@ -308,26 +329,41 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
 std::shared_ptr<const Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   for (const BodyDescription& body : scene.bodies) {
-    TetMesh mesh =
-        body.block ? make_block(body.block->size, body.block->cells) : load_mesh(body.mesh, body.tetgen);
+    TetMesh mesh;
+    if (body.block) {
+      mesh = make_block(body.block->size, body.block->cells);
+    } else if (body.tet) {
+      mesh.positions.assign(body.tet->begin(), body.tet->end());
+      mesh.tets = {{0, 1, 2, 3}};
+      finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene.name));
+    } else {
+      mesh = load_mesh(body.mesh, body.tetgen);
+    }
+    for (auto& p : mesh.positions) p *= body.scale;
     glm::dmat4 turn(1);
     for (int axis = 2; axis >= 0; --axis) {
       glm::dvec3 direction(0);
       direction[axis] = 1;
       turn = glm::rotate(turn, glm::radians(body.rotation[axis]), direction);
     }
-    // Fixed vertices are chosen in the mesh's own frame, before it is turned.
+    // Fixed and heavy vertices are chosen in the mesh's own frame, before it is turned.
     const Bounds own = bounds(mesh.positions);
-    std::vector<std::uint32_t> fixed;
-    for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
+    const auto is_in = [&](std::size_t vertex, const BodyDescription::Box& box) {
       const glm::dvec3 part =
-          (mesh.positions[i] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
-      for (const BodyDescription::Box& box : body.fixed)
-        if (glm::all(glm::greaterThanEqual(part, box.low - 1e-9)) &&
-            glm::all(glm::lessThanEqual(part, box.high + 1e-9))) {
-          fixed.push_back(i);
-          break;
-        }
+          (mesh.positions[vertex] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
+      return glm::all(glm::greaterThanEqual(part, box.low - 1e-9)) &&
+             glm::all(glm::lessThanEqual(part, box.high + 1e-9));
+    };
+    std::vector<std::uint32_t> fixed;
+    std::vector<double> mass_factors(mesh.positions.size(), 1);
+    std::mt19937 generator{std::uint32_t(scene.settings.seed)};
+    for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
+      if (std::any_of(body.fixed.begin(), body.fixed.end(), [&](const auto& box) { return is_in(i, box); }))
+        fixed.push_back(i);
+      for (const BodyDescription::Heavy& heavy : body.heavy) {
+        const bool chosen = double(generator()) / 4294967296.0 < heavy.share;
+        if (chosen && is_in(i, heavy.box)) mass_factors[i] *= heavy.ratio;
+      }
     }
     const double scale = body.height > 0 ? body.height / (own.high.y - own.low.y) : 1.0;
     for (auto& p : mesh.positions) p = glm::dvec3(turn * glm::dvec4((p - own.centre()) * scale, 0));
@@ -336,7 +372,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     for (auto& p : mesh.positions) p += body.position - bottom;
     std::vector<glm::dvec3> start = mesh.positions;
     deform(start, mesh, body.deform, unsigned(scene.settings.seed));
-    add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed);
+    add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   model->obstacles = scene.obstacles;
   return model;

@@ -1,6 +1,7 @@
 // Scenes: JSON with strict checking (docs/scenes.md), and how a scene becomes a model.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -21,10 +22,17 @@ struct BodyDescription {
   struct Box {
     glm::dvec3 low{0}, high{1};  ///< fractions of the body's bounding box
   };
+  /// Vertices in a box of which some, a pseudo-random `share`, have `ratio` times the mass of the material.
+  struct Heavy {
+    Box box;
+    double ratio = 1, share = 1;
+  };
   std::string name;
   std::filesystem::path mesh;  ///< a file, or
-  std::optional<Block> block;  ///< a generated block
+  std::optional<Block> block;  ///< a generated block, or
+  std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m
   std::string tetgen = "pYq1.85o/140";
+  glm::dvec3 scale{1};     ///< along the mesh's own axes, before all else
   double height = 0;       ///< m, scales the mesh; 0 keeps its size
   glm::dvec3 rotation{0};  ///< degrees about x, then y, then z
   glm::dvec3 position{0};  ///< m, where the middle of the bottom of its bounding box goes
@@ -32,6 +40,7 @@ struct BodyDescription {
   glm::dvec3 velocity{0};  ///< m/s
   glm::dvec3 spin{0};      ///< rad/s about the centre of mass
   std::vector<Box> fixed;  ///< vertices in any of these boxes are fixed
+  std::vector<Heavy> heavy;
   std::string deform = "none";
 };
 

@@ -16,11 +16,13 @@ vec3 gather_$KIND(uint i, uint lane, Position own) {
       x[j] = relative(p, first);
       w[j] = p.inverse_mass;
     }
-    Constraint$ARITY c = $KIND(x, record.rest);
+    Constraint$ARITY c = $KIND(x, record.rest, record.vertices);
     vec3 gradient = c.gradient[0];
     for (int j = 1; j < $ARITY; ++j)
       if (slot == uint(j)) gradient = c.gradient[j];
-    sum += limited(params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w) * own.inverse_mass * gradient, params.limit);
+    vec3 correction = params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w) * own.inverse_mass * gradient;
+    sum += limited(correction, params.limit);
+    count_guards(guards_of(c, w) | guards_of(correction, params.limit));
   }
   return sum;
 }

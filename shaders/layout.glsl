@@ -41,6 +41,16 @@ struct Step {
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
 };
 
+// Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in the order
+// of their counters.
+#define GUARD_DIRECTION 1u    // stretch: coincident vertices part along a pseudo-random direction
+#define GUARD_HINGE 2u        // bend: a wing on its edge has no angle: skipped
+#define GUARD_ANGLE 4u        // bend: the error was clamped to 1 rad
+#define GUARD_FLOOR 8u        // volume: the floor under sum w |gradient|^2 took over
+#define GUARD_LIMIT 16u       // a correction was longer than the body: shortened
+#define GUARD_NOT_FINITE 32u  // a correction was not a number: dropped
+#define GUARDS 6
+
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0      // the current ones; a double-buffered solver reads these
 #define BIND_POSITIONS_OUT 1  // ... and writes these
@@ -51,3 +61,5 @@ struct Step {
 #define BIND_RECORDS 5        // + index of the constraint kind among those present
 // Uniform blocks.
 #define BIND_STEP 0
+// Atomic counters.
+#define BIND_GUARDS 0

@@ -9,6 +9,7 @@ layout(std430, binding = BIND_DELTAS) buffer Deltas { int deltas[]; };
 layout(std430, binding = $BINDING) readonly buffer Records { Record$ARITY records[]; };
 uniform uint count;
 #include "constraints/types.glsl"
+#include "guards.glsl"
 #include "constraints/$KIND.glsl"
 
 void main() {
@@ -23,12 +24,16 @@ void main() {
     x[j] = relative(p[j], p[0]);
     w[j] = p[j].inverse_mass;
   }
-  Constraint$ARITY c = $KIND(x, record.rest);
+  Constraint$ARITY c = $KIND(x, record.rest, record.vertices);
   float lambda = params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w);
+  uint guards = guards_of(c, w);
   for (int j = 0; j < $ARITY; ++j) {
-    vec3 correction = limited(lambda * w[j] * c.gradient[j], params.limit);
+    vec3 correction = lambda * w[j] * c.gradient[j];
+    guards |= guards_of(correction, params.limit);
+    correction = limited(correction, params.limit);
     ivec3 units = ivec3(round(correction / (params.delta_unit * p[j].constraints)));
     for (int a = 0; a < 3; ++a)
       if (units[a] != 0) atomicAdd(deltas[4u * record.vertices[j] + uint(a)], units[a]);
   }
+  count_guards(guards);
 }

@@ -10,6 +10,7 @@ layout(std430, binding = BIND_VELOCITIES) readonly buffer Velocities { Velocity 
 layout(std430, binding = BIND_ADJACENCY) readonly buffer Adjacency { uint adjacency[]; };
 #include "constraints/types.glsl"
 #include "contact.glsl"
+#include "guards.glsl"
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "gather.glsl"
 

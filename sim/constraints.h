@@ -26,6 +26,9 @@ struct ConstraintList {
   }
 };
 
+/// For whoever evaluates a constraint without a mesh.
+inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
+
 // A kind is a formula in shaders/constraints/NAME.glsl, included in sim/formulas.h, and a row here: its name,
 // arity, stiffness, the formula as C++, and how a mesh gives its constraints. Order is the order of
 // projection in Gauss-Seidel.
@@ -34,8 +37,8 @@ struct Stretch {
   static constexpr int arity = 2;
   static constexpr double Settings::*stiffness = &Settings::k_stretch;
   template <class real>
-  static auto evaluate(glm::vec<3, real>* x, real rest) {
-    return Formulas<real>{}.stretch(x, rest);
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real>{}.stretch(x, rest, id);
   }
   static void build(const TetMesh& mesh, ConstraintList& list);  ///< every edge of every tet
 };
@@ -44,8 +47,8 @@ struct Bend {
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_bend;
   template <class real>
-  static auto evaluate(glm::vec<3, real>* x, real rest) {
-    return Formulas<real>{}.bend(x, rest);
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real>{}.bend(x, rest, id);
   }
   static void build(const TetMesh& mesh,
                     ConstraintList& list);  ///< every edge that two surface triangles share
@@ -55,8 +58,8 @@ struct Volume {
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_volume;
   template <class real>
-  static auto evaluate(glm::vec<3, real>* x, real rest) {
-    return Formulas<real>{}.volume(x, rest);
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real>{}.volume(x, rest, id);
   }
   static void build(const TetMesh& mesh, ConstraintList& list);  ///< every tet
 };

@@ -44,6 +44,9 @@ class CpuPbd {
     });
   }
 
+  /// How often each guard triggered so far.
+  GuardCounts guards{};
+
   /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15), `settings.substeps` substeps.
   void step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep) {
     const double h = settings.dt / settings.substeps;
@@ -96,13 +99,17 @@ class CpuPbd {
         local[j] = vec(x[item.vertices[j]] - x[item.vertices[0]]);
         w[j] = inverse_masses_[item.vertices[j]];
       }
-      const auto c = Kind::template evaluate<real>(local, item.rest);
+      const auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
       const real lambda = k * formulas.multiplier(c, w);
-      if (lambda == real(0)) continue;
+      std::uint32_t triggered = formulas.guards_of(c, w);
       for (std::size_t j = 0; j < arity; ++j) {
-        const glm::dvec3 correction(formulas.limited(lambda * w[j] * c.gradient[j], limit));
+        const vec full = lambda * w[j] * c.gradient[j];
+        triggered |= formulas.guards_of(full, limit);
+        const glm::dvec3 correction(formulas.limited(full, limit));
         (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += correction;
       }
+      if (triggered)
+        for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
     }
   }
 

@@ -4,6 +4,8 @@
 #include <glm/glm.hpp>
 #include <limits>
 
+#include "sim/layout.h"
+
 namespace tetpbd::glsl {
 
 using namespace glm;
@@ -15,11 +17,14 @@ struct Formulas {
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
   // in order of use
   // clang-format off
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
 #include "shaders/constraints/types.glsl"
 #include "shaders/constraints/stretch.glsl"
 #include "shaders/constraints/bend.glsl"
 #include "shaders/constraints/volume.glsl"
 #include "shaders/collision.glsl"
+#pragma GCC diagnostic pop
   // clang-format on
 };
 

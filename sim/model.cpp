@@ -7,13 +7,14 @@
 #include <cmath>
 #include <random>
 
+#include "sim/constraints.h"
 #include "sim/error.h"
 
 namespace tetpbd {
 
 void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
-              const std::vector<std::uint32_t>& fixed) {
+              const std::vector<std::uint32_t>& fixed, const std::vector<double>& mass_factors) {
   const std::uint32_t base = std::uint32_t(model.rest.positions.size());
   Body body{name,
             base,
@@ -31,7 +32,8 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   for (const Triangle& t : mesh.surface) model.rest.surface.push_back(shifted(t));
   glm::dvec3 centre{0};
   double total = 0;
-  const auto masses = lumped_masses(mesh, density);
+  auto masses = lumped_masses(mesh, density);
+  for (std::size_t i = 0; i < mass_factors.size(); ++i) masses[i] *= mass_factors[i];
   for (std::size_t i = 0; i < masses.size(); ++i) centre += masses[i] * positions[i], total += masses[i];
   centre /= total;
   for (std::size_t i = 0; i < masses.size(); ++i) {
@@ -61,6 +63,17 @@ double factor_of(const std::string& how) {
   return value;
 }
 
+// Of the tet nearest the middle.
+const Tet* middle_tet(const std::vector<glm::dvec3>& x, const TetMesh& rest, const glm::dvec3& centre) {
+  const Tet* nearest = nullptr;
+  double best = 0;
+  for (const Tet& t : rest.tets) {
+    const double d = glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
+    if (!nearest || d < best) nearest = &t, best = d;
+  }
+  return nearest;
+}
+
 }  // namespace
 
 void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& how, unsigned seed) {
@@ -86,19 +99,34 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
     for (auto& p : x) p.y = centre.y + (p.y - centre.y) * factor;
   } else if (how == "invert-one") {
     // The tet nearest the middle: its first vertex goes through the opposite face.
-    const Tet* nearest = nullptr;
-    double best = 0;
-    for (const Tet& t : rest.tets) {
-      const double d = glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
-      if (!nearest || d < best) nearest = &t, best = d;
-    }
+    const Tet* nearest = middle_tet(x, rest, centre);
     if (!nearest) return;
     const Tet& t = *nearest;
     const glm::dvec3 n = glm::normalize(glm::cross(x[t[2]] - x[t[1]], x[t[3]] - x[t[1]]));
     x[t[0]] -= 2 * glm::dot(x[t[0]] - x[t[1]], n) * n;
+  } else if (how == "coincident") {
+    if (const Tet* t = middle_tet(x, rest, centre)) x[(*t)[0]] = x[(*t)[1]];
+  } else if (how.starts_with("twist:")) {
+    const double turn = glm::radians(factor_of(how));
+    for (auto& p : x) {
+      const double angle = turn * (p.y - box.low.y) / std::max(box.high.y - box.low.y, 1e-300);
+      const double s = std::sin(angle), c = std::cos(angle), dx = p.x - centre.x, dz = p.z - centre.z;
+      p.x = centre.x + c * dx + s * dz, p.z = centre.z - s * dx + c * dz;
+    }
+  } else if (how == "fold") {
+    // The first surface hinge: one wing is laid onto the other triangle.
+    ConstraintList hinges;
+    Bend::build(rest, hinges);
+    if (hinges.vertices.empty()) return;
+    const auto* v = hinges.vertices.data();
+    const glm::dvec3 e = glm::normalize(x[v[3]] - x[v[2]]);
+    const auto across = [&](const glm::dvec3& p) { return (p - x[v[2]]) - e * glm::dot(p - x[v[2]], e); };
+    const glm::dvec3 a = across(x[v[0]]), b = across(x[v[1]]);
+    x[v[1]] += glm::normalize(a) * glm::length(b) - b;
   } else {
     throw Error("no such deformation", "--deform " + how,
-                "choose from none, flatten, line, point, random, mirror, stretch:F, squash:F, invert-one");
+                "choose from none, flatten, line, point, random, mirror, stretch:F, squash:F, twist:DEGREES, "
+                "invert-one, coincident, fold");
   }
 }
 

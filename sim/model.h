@@ -25,13 +25,14 @@ struct Model {
   double size = 1;                     ///< m, diagonal of the largest body at rest
 };
 
-/// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices.
+/// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices; `mass_factors`, if not
+/// empty, multiply the masses of its vertices.
 void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
-              const std::vector<std::uint32_t>& fixed);
+              const std::vector<std::uint32_t>& fixed, const std::vector<double>& mass_factors = {});
 
 /// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F,
-/// squash:F, invert-one. Throws Error for anything else.
+/// squash:F, twist:DEGREES, invert-one, coincident, fold. Throws Error for anything else.
 void deform(std::vector<glm::dvec3>& positions, const TetMesh& rest, const std::string& how, unsigned seed);
 
 }  // namespace tetpbd

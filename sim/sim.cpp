@@ -93,7 +93,7 @@ void build_solver(Sim& sim) {
       predict.groups = finish.groups = work_groups(sim.model->positions.size(), group_size);
       predict.bytes = sim.model->positions.size() * (3 * sizeof(Position) + 2 * sizeof(Velocity));
       finish.bytes = sim.model->positions.size() * (2 * sizeof(Position) + 2 * sizeof(Velocity));
-      Solver solver = mode.create({*sim.model, sim.system, is_software_renderer()});
+      Solver solver = mode.create({*sim.model, sim.system, is_software_renderer(), bool(sim.guard_counts)});
       sim.predict = std::move(predict);
       sim.finish = std::move(finish);
       sim.solver = std::move(solver);
@@ -141,7 +141,7 @@ void dispatch(const Pass& pass) {
 
 }  // namespace
 
-Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings) {
+Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, bool count_guards) {
   if (model->obstacles.size() + 1 > MAX_PLANES)
     throw Error("too many obstacles", fmt::format("{} planes", model->obstacles.size()),
                 fmt::format("at most {} beside the ground", MAX_PLANES - 1));
@@ -151,6 +151,7 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings) {
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = build_constraints(sim.model->rest, settings.constraints);
   check_limits(sim.system);
+  if (count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   build_solver(sim);
   allocate(sim);
   sim.step_block = Buffer("step", sizeof(Step));
@@ -161,6 +162,8 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings) {
 
 void reset(Sim& sim) {
   sim.steps = 0;
+  if (sim.guard_counts) sim.guard_counts.clear();
+  sim.guards_read = on_cpu(sim) ? sim.solver.guards_on_cpu() : GuardCounts{};
   sim.inverse_masses = sim.model->inverse_masses;
   write_state(sim, start_state(sim));
 }
@@ -207,6 +210,12 @@ void step(Sim& sim) {
     ++sim.steps;
     return;
   }
+  if (sim.guard_counts) {
+    // Counters have 32 bits: read before they can wrap.
+    const double a_step = 4.0 * double(sim.system.count()) * s.iterations * s.substeps;
+    if (sim.steps % std::max(1L, long(2e9 / std::max(a_step, 1.0))) == 0) guard_counts(sim);
+    glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
+  }
   if (sim.timed) sim.timer.begin();
   sim.step_block.bind_uniform(BIND_STEP);
   sim.predicted.bind_storage(BIND_PREDICTED);
@@ -227,6 +236,20 @@ void step(Sim& sim) {
   // Whoever reads positions next may be a vertex fetch or a copy.
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   ++sim.steps;
+}
+
+GuardCounts guard_counts(Sim& sim) {
+  GuardCounts counts{};
+  if (on_cpu(sim)) {
+    counts = sim.solver.guards_on_cpu();
+    for (std::size_t g = 0; g < GUARDS; ++g) counts[g] -= sim.guards_read[g];
+  } else if (sim.guard_counts) {
+    glMemoryBarrier(GL_ATOMIC_COUNTER_BARRIER_BIT);
+    const auto now = sim.guard_counts.read_all<GLuint>();
+    for (std::size_t g = 0; g < GUARDS; ++g) counts[g] = sim.guards_read[g] += now[g];
+    sim.guard_counts.clear();
+  }
+  return counts;
 }
 
 State read_state(const Sim& sim) {
@@ -305,6 +328,7 @@ Explanation explain(const Sim& sim) {
   add(sim.predicted);
   add(sim.velocities);
   add(sim.step_block);
+  add(sim.guard_counts);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (!on_cpu(sim)) {
     const long substeps = sim.settings.substeps;

@@ -23,6 +23,7 @@ struct Sim {
   Buffer predicted;     ///< Position
   Buffer velocities;    ///< Velocity
   Buffer step_block;    ///< Step
+  Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Pass predict, finish;
   Solver solver;
   int current = 0;
@@ -32,11 +33,15 @@ struct Sim {
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
+  GuardCounts guards_read{};  ///< GPU: counted as of the last reading; CPU modes: the count at the start
 
   const Buffer& current_positions() const { return positions[current]; }
 };
 
-Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings);
+/// With `count_guards` the kernels count how often each guard triggers.
+Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, bool count_guards = false);
+/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count. Waits.
+GuardCounts guard_counts(Sim& sim);
 /// Takes over new settings; the state stays. Rebuilds the solver if the mode or the constraint kinds changed.
 void apply_settings(Sim& sim, const Settings& settings);
 /// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do

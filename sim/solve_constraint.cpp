@@ -10,7 +10,8 @@ Solver create_constraint_solver(const SolverInput& input) {
   Buffer deltas("deltas", input.model.positions.size() * 16);
   deltas.clear();
   std::size_t index = 0;
-  for (const Substitutions& words : kind_words(input.system)) {
+  for (Substitutions words : kind_words(input.system)) {
+    words["COUNT_GUARDS"] = input.count_guards ? "1" : "0";
     const std::size_t count = solver.buffers[index].bytes() / (4 * (std::stoul(words.at("ARITY")) + 1));
     Pass pass;
     pass.program = Program::compute("solve_constraint.comp", {words, {}});

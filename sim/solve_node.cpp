@@ -26,7 +26,7 @@ Solver create_node_solver(const SolverInput& input) {
   solver.buffers = record_buffers(input.system);
   const std::size_t vertices = input.model.positions.size(), lanes = lanes_for(vertices, input.software);
   Pass pass;
-  pass.program = Program::compute("solve_node.comp", {{{"LANES", std::to_string(lanes)}}, kinds});
+  pass.program = Program::compute("solve_node.comp", {{{"LANES", std::to_string(lanes)}, {"COUNT_GUARDS", input.count_guards ? "1" : "0"}}, kinds});
   pass.groups = work_groups(vertices * lanes, group_size);
   for (std::size_t k = 0; k < kinds.size(); ++k)
     pass.bindings.push_back({BIND_RECORDS + int(k), solver.buffers[k].id()});

@@ -2,11 +2,13 @@
 // solver_modes().
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "sim/constraints.h"
+#include "sim/layout.h"
 #include "sim/gpu.h"
 #include "sim/model.h"
 #include "sim/settings.h"
@@ -27,18 +29,26 @@ struct State {
   std::vector<glm::dvec3> velocities;  ///< m/s
 };
 
+/// How often each guard of layout.glsl triggered, in its order. A projection counts once where each constraint is evaluated once
+/// (constraint and cpu modes), and once a vertex of it in node mode.
+using GuardCounts = std::array<std::uint64_t, GUARDS>;
+inline constexpr std::array<const char*, GUARDS> guard_names = {"direction",    "hinge", "angle",
+                                                               "volume_floor", "limit", "not_finite"};
+
 /// Passes or a function, never both.
 struct Solver {
   std::vector<Buffer> buffers;
   std::vector<Pass> iteration;   ///< the dispatches of one iteration, in order
   bool double_buffered = false;  ///< an iteration reads one position buffer and writes the other
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
+  std::function<GuardCounts()> guards_on_cpu;
 };
 
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
-  bool software = false;  ///< the "GPU" is a CPU
+  bool software = false;      ///< the "GPU" is a CPU
+  bool count_guards = false;  ///< GPU kernels count into the counters at BIND_GUARDS; CPU modes always count
 };
 
 struct SolverMode {
@@ -50,7 +60,8 @@ const std::vector<SolverMode>& solver_modes();
 
 Solver create_constraint_solver(const SolverInput&);  ///< solve_constraint.cpp
 Solver create_node_solver(const SolverInput&);        ///< solve_node.cpp
-Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp
+Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp, float
+Solver create_cpu_double_solver(const SolverInput&);  ///< solve_cpu.cpp, double
 
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING, KIND_ROW
 /// and KIND_COLUMN (of the stiffness).

@@ -10,11 +10,12 @@ real hinge_angle(vec3 x[4]) {
   return atan(dot(cross(n0, n1), e), length(e) * dot(n0, n1));
 }
 
-Constraint4 bend(vec3 x[4], real rest) {
+Constraint4 bend(vec3 x[4], real rest, const uint id[4]) {
   Constraint4 c;
   c.C = real(0);
   for (int j = 0; j < 4; ++j) c.gradient[j] = vec3(real(0));
   c.floor = real(0);
+  c.guards = GUARD_HINGE;
   vec3 e = x[3] - x[2];
   vec3 n0 = cross(x[2] - x[0], x[3] - x[0]);
   vec3 n1 = cross(x[3] - x[1], x[2] - x[1]);
@@ -38,6 +39,7 @@ Constraint4 bend(vec3 x[4], real rest) {
   real extent = max(max(a22, a33), dot(b0, b0));
   real noise = pi + real(2) * (sqrt(extent * max(a22, a33) / aa) + sqrt(extent * max(b22, b33) / bb));
   c.C = clamp(resolved(turn, noise), real(-1), real(1));
+  c.guards = abs(turn) > real(1) ? GUARD_ANGLE : 0u;
   c.gradient[0] = -l * a;
   c.gradient[1] = -l * b;
   c.gradient[2] = -a * dot(x[0] - x[3], u) - b * dot(x[1] - x[3], u);

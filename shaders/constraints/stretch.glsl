@@ -1,10 +1,12 @@
 // Stretch: C = |x0 - x1| - rest, in metres (paper eqs. 4-5; method.md eq. 6).
-// Coincident vertices have no direction: the gradient is zero and other constraints have to part them.
-Constraint2 stretch(vec3 x[2], real rest) {
+// Coincident vertices have no direction: they part along a pseudo-random one of their own.
+Constraint2 stretch(vec3 x[2], real rest, const uint id[2]) {
   Constraint2 c;
   vec3 d = x[0] - x[1];
   real l = length(d);
-  vec3 n = l > real(1e-6) * rest ? d / l : vec3(real(0));
+  bool apart = l > real(1e-6) * rest;
+  vec3 n = apart ? d / l : any_direction(id[0], id[1]);
+  c.guards = apart ? 0u : GUARD_DIRECTION;
   c.C = resolved(l - rest, rest);
   c.gradient[0] = n;
   c.gradient[1] = -n;

@@ -1,7 +1,7 @@
 // Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so an inverted tet is pushed back
 // (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a regular tet's at rest)
 // keeps the correction under about ten times the tet's size there.
-Constraint4 volume(vec3 x[4], real rest) {
+Constraint4 volume(vec3 x[4], real rest, const uint id[4]) {
   Constraint4 c;
   vec3 a = x[1] - x[0];
   vec3 b = x[2] - x[0];
@@ -12,6 +12,7 @@ Constraint4 volume(vec3 x[4], real rest) {
   c.gradient[3] = cross(a, b) * sixth;
   c.gradient[0] = -(c.gradient[1] + c.gradient[2] + c.gradient[3]);
   c.C = resolved(dot(c.gradient[3], d) - rest, sqrt(dot(a, a) * dot(b, b) * dot(d, d)) * sixth);
+  c.guards = 0u;
   c.floor = real(0.01) * pow(abs(rest), real(4) / real(3));
   return c;
 }

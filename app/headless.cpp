@@ -87,7 +87,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
-  Sim sim = create_sim(model, scene.settings);
+  Sim sim = create_sim(model, scene.settings, true);
   sim.timed = true;
   Metrics metrics = create_metrics(*model);
   const long steps =
@@ -152,7 +152,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   if (frames) frames->finish();
   write_file(options.out / "stats.json",
              statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
-                             state_hash(sim)));
+                             guard_counts(sim), state_hash(sim)));
   if (options.csv_every > 0) write_file(options.out / "stats.csv", csv);
   if (options.positions) {
     std::vector<glm::vec3> positions;

@@ -44,8 +44,11 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
     if (body.block)
       item["block"] = {{"size", vector(body.block->size)},
                        {"cells", {body.block->cells.x, body.block->cells.y, body.block->cells.z}}};
+    else if (body.tet)
+      for (const glm::dvec3& point : *body.tet) item["tet"].push_back(vector(point));
     else
       item["mesh"] = body.mesh.string(), item["tetgen"] = body.tetgen;
+    if (body.scale != glm::dvec3(1)) item["scale"] = vector(body.scale);
     if (body.height > 0) item["height"] = body.height;
     item["position"] = vector(body.position);
     item["rotation"] = vector(body.rotation);
@@ -58,6 +61,11 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
       for (const auto& box : body.fixed)
         item["fixed"].push_back({{"low", vector(box.low)}, {"high", vector(box.high)}});
     }
+    for (const auto& heavy : body.heavy)
+      item["heavy"].push_back({{"low", vector(heavy.box.low)},
+                               {"high", vector(heavy.box.high)},
+                               {"ratio", heavy.ratio},
+                               {"share", heavy.share}});
     bodies.push_back(item);
   }
   result["bodies"] = bodies;
@@ -81,7 +89,7 @@ ordered_json device_json(const Capabilities& device) {
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
-                            std::uint64_t hash) {
+                            const GuardCounts& guards, std::uint64_t hash) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -118,6 +126,7 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                  {"max", number(errors.max_energy)},
                  {"final_kinetic", number(last.kinetic)},
                  {"final_potential", number(last.potential)}};
+  for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
   j["finite"] = errors.finite;
   j["state_hash"] = fmt::format("{:016x}", hash);
   return j.dump(2) + "\n";

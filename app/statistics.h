@@ -23,7 +23,7 @@ Percentiles percentiles(std::vector<double> values);
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
-                            std::uint64_t hash);
+                            const GuardCounts& guards, std::uint64_t hash);
 /// The device as stats.json, bench.json and compare.json name it.
 nlohmann::ordered_json device_json(const Capabilities& device);
 std::string csv_header();

@@ -47,9 +47,10 @@ struct Step {
 #define GUARD_HINGE 2u        // bend: a wing on its edge has no angle: skipped
 #define GUARD_ANGLE 4u        // bend: the error was clamped to 1 rad
 #define GUARD_FLOOR 8u        // volume: the floor under sum w |gradient|^2 took over
-#define GUARD_LIMIT 16u       // a correction was longer than the body: shortened
-#define GUARD_NOT_FINITE 32u  // a correction was not a number: dropped
-#define GUARDS 6
+#define GUARD_COLLAPSED 16u   // volume: a tet on a line or in a point parts along pseudo-random directions
+#define GUARD_LIMIT 32u       // a correction was longer than the body: shortened
+#define GUARD_NOT_FINITE 64u  // a correction was not a number: dropped
+#define GUARDS 7
 
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0      // the current ones; a double-buffered solver reads these

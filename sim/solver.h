@@ -33,7 +33,8 @@ struct State {
 /// (constraint and cpu modes), and once a vertex of it in node mode.
 using GuardCounts = std::array<std::uint64_t, GUARDS>;
 inline constexpr std::array<const char*, GUARDS> guard_names = {"direction",    "hinge", "angle",
-                                                               "volume_floor", "limit", "not_finite"};
+                                                               "volume_floor", "collapsed", "limit",
+                                                               "not_finite"};
 
 /// Passes or a function, never both.
 struct Solver {

@@ -124,3 +124,41 @@ TEST_CASE("degenerate shapes give finite corrections") {
   CHECK(glm::length(Formulas<float>{}.limited(glm::vec3(3, 4, 0), 1.0f)) == doctest::Approx(1));
   CHECK(Formulas<float>{}.limited(glm::vec3(0.3f, 0.4f, 0), 1.0f) == glm::vec3(0.3f, 0.4f, 0));
 }
+
+TEST_CASE("guards: what triggers them, and where vertices without a direction go") {
+  Formulas<double> formulas;
+  const std::uint32_t id[4] = {7, 3, 12, 5}, swapped[2] = {3, 7};
+  std::array<glm::dvec3, 2> edge = {glm::dvec3(1), glm::dvec3(1)};
+  const auto stretch = Stretch::evaluate<double>(edge.data(), 0.5, id);
+  CHECK(stretch.guards == GUARD_DIRECTION);
+  CHECK(glm::length(stretch.gradient[0]) == doctest::Approx(1));
+  CHECK(stretch.gradient[0] == -stretch.gradient[1]);
+  // The same pair named the other way round parts the same way; another pair does not.
+  CHECK(Stretch::evaluate<double>(edge.data(), 0.5, swapped).gradient[0] == -stretch.gradient[0]);
+  CHECK(glm::length(Stretch::evaluate<double>(edge.data(), 0.5, id + 1).gradient[0] - stretch.gradient[0]) > 0.01);
+
+  std::array<glm::dvec3, 4> line;
+  for (int j = 0; j < 4; ++j) line[std::size_t(j)] = glm::dvec3(j, 0, 0);
+  const double rest = 0.1;
+  const auto tet = Volume::evaluate<double>(line.data(), rest, id);
+  double w[4] = {1, 2, 3, 0};
+  CHECK(tet.guards == GUARD_COLLAPSED);
+  glm::dvec3 sum(0);
+  for (const auto& g : tet.gradient) sum += g;
+  CHECK(glm::length(sum) < 1e-12);
+  const double lambda = formulas.multiplier(tet, w);
+  for (int j = 0; j < 4; ++j) CHECK(glm::length(lambda * w[j] * tet.gradient[j]) < 3 * std::cbrt(rest));
+  line[2].y = 0.01;  // a sliver of a triangle: a gradient again, under the floor
+  const auto open = Volume::evaluate<double>(line.data(), rest, id);
+  CHECK(open.guards == 0);
+  CHECK(formulas.guards_of(open, w) == GUARD_FLOOR);
+  std::array<glm::dvec3, 4> point{};
+  CHECK(Bend::evaluate<double>(point.data(), 0.0, id).guards == GUARD_HINGE);
+  std::array<glm::dvec3, 4> hinge = {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 0), glm::dvec3(0, 0, 1)};
+  const double angle = formulas.hinge_angle(hinge.data());
+  CHECK(Bend::evaluate<double>(hinge.data(), angle - 0.9, id).guards == 0);
+  CHECK(Bend::evaluate<double>(hinge.data(), angle - 1.1, id).guards == GUARD_ANGLE);
+  CHECK(formulas.guards_of(glm::dvec3(0, 2, 0), 1.0) == GUARD_LIMIT);
+  CHECK(formulas.guards_of(glm::dvec3(0, std::nan(""), 0), 1.0) == GUARD_NOT_FINITE);
+  CHECK(formulas.guards_of(glm::dvec3(0, 1, 0), 1.0) == 0);
+}

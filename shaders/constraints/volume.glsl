@@ -1,6 +1,7 @@
 // Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so an inverted tet is pushed back
 // (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a regular tet's at rest)
-// keeps the correction under about ten times the tet's size there.
+// keeps the correction under about ten times the tet's size there. A tet on a line has no gradient at all: its vertices part in
+// pseudo-random directions.
 Constraint4 volume(vec3 x[4], real rest, const uint id[4]) {
   Constraint4 c;
   vec3 a = x[1] - x[0];
@@ -13,6 +14,20 @@ Constraint4 volume(vec3 x[4], real rest, const uint id[4]) {
   c.gradient[0] = -(c.gradient[1] + c.gradient[2] + c.gradient[3]);
   c.C = resolved(dot(c.gradient[3], d) - rest, sqrt(dot(a, a) * dot(b, b) * dot(d, d)) * sixth);
   c.guards = 0u;
-  c.floor = real(0.01) * pow(abs(rest), real(4) / real(3));
+  real area = pow(abs(rest), real(2) / real(3));
+  c.floor = real(0.01) * area * area;
+  real sum = real(0);
+  for (int j = 0; j < 4; ++j) sum += dot(c.gradient[j], c.gradient[j]);
+  if (sum <= real(1e-10) * c.floor) {
+    // Pairs push each other apart, so momentum stays. Large, so that the step is small, a few hundredths of the tet: it is to
+    // break the symmetry, and the true gradient takes over.
+    for (int j = 0; j < 4; ++j) {
+      vec3 push = vec3(real(0));
+      for (int other = 0; other < 4; ++other)
+        if (other != j) push += any_direction(id[j], id[other]);
+      c.gradient[j] = push * (real(5) * area);
+    }
+    c.guards = GUARD_COLLAPSED;
+  }
   return c;
 }

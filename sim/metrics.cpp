@@ -137,9 +137,7 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
 
 std::optional<Measurement> read_oldest(Metrics& m, bool wait) {
   if (m.pending.empty()) return std::nullopt;
-  const GLenum state =
-      glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? GLuint64(60e9) : 0);
-  if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
+  if (!reached(m.pending.front().fence, wait, "measuring")) return std::nullopt;
   const Metrics::Pending pending = m.pending.front();
   m.pending.pop_front();
   glDeleteSync(pending.fence);
@@ -169,10 +167,19 @@ void measure(Metrics& m, const Sim& sim) {
         std::min<unsigned>(METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE));
     for (const Program* program : {&m.constraints, &m.vertices, &m.rigid, &m.centre, &m.close}) {
       program->use();
-      program->set("first_vertex", body.vertices.first);
-      program->set("end_vertex", body.vertices.end);
-      program->set("mass", float(body.mass));
       program->set("groups", groups);
+    }
+    for (const Program* program : {&m.vertices, &m.rigid, &m.centre}) {
+      program->use();
+      program->set("first_vertex", body.vertices.first);
+    }
+    for (const Program* program : {&m.vertices, &m.rigid}) {
+      program->use();
+      program->set("end_vertex", body.vertices.end);
+    }
+    for (const Program* program : {&m.rigid, &m.centre}) {
+      program->use();
+      program->set("mass", float(body.mass));
     }
     m.constraints.use();
     m.constraints.set("first_edge", body.edges.first), m.constraints.set("end_edge", body.edges.end);

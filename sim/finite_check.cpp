@@ -170,6 +170,7 @@ void start_check(Sim& sim, const State& given) {
   FiniteCheck& check = sim.check;
   forget(check, sim.steps);
   check.kept = false;
+  check.reloaded = -1;
   if (const auto vertex = first_bad(given))
     find(sim, sim.steps, *vertex);
   else

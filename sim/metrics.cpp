@@ -212,10 +212,22 @@ Measurement measure_now(Metrics& m, const Sim& sim) {
   return *collect(m, true);
 }
 
+Measurement nothing_measured() {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  Measurement m;
+  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
+                        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
+                        &m.potential, &m.contacts})
+    *value = nan;
+  m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
+  return m;
+}
+
 void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) {
+  errors.finite = errors.finite && now.finite();
+  if (!errors.finite) return;  // numbers stay those of the last good state
   if (!errors.first) errors.first = now, errors.start_energy = errors.max_energy = now.energy();
   errors.last = now;
-  errors.finite = errors.finite && now.finite();
   errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
   errors.max_energy = std::max(errors.max_energy, now.energy());
   double mass = 0;

@@ -204,6 +204,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const bool kinds = settings.constraints != sim.settings.constraints;
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   if (kinds || settings.mode != sim.settings.mode) {
+    if (check_finite(sim, true)) return_to_kept(sim);  // a solver made anew has nothing better to start from
     const State state = read_state(sim);
     // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
     Sim fresh = make_sim(sim.model, settings,

@@ -77,10 +77,11 @@ std::string csv_line(const BenchRow& r) {
     return known && std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string();
   };
   const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", r.scene, r.mode, r.constraints, r.iterations,
-                     r.substeps, r.size, r.vertices, r.tets, number(r.fps.median), number(r.gpu_ms.median, on_gpu),
-                     number(r.wall_ms.median), number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu),
-                     r.dispatches, r.gpu_bytes, number(r.max_volume_loss_percent));
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", r.scene, r.mode, r.constraints,
+                     r.iterations, r.substeps, r.size, r.vertices, r.tets, number(r.fps.median),
+                     number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
+                     number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu), r.dispatches,
+                     r.gpu_bytes, number(r.max_volume_loss_percent));
 }
 
 std::string kinds_of(std::string set) {
@@ -188,9 +189,8 @@ int run_bench(const BenchOptions& options) {
     };
     const std::string fps = row.non_finite ? "-" : fmt::format("{:.1f}", row.fps.median);
     fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", row.scene, row.mode,
-               row.constraints, row.iterations, row.substeps, row.size.empty() ? "none" : row.size,
-               fps, gpu(1e3 * row.gpu_ms.median),
-               gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
+               row.constraints, row.iterations, row.substeps, row.size.empty() ? "none" : row.size, fps,
+               gpu(1e3 * row.gpu_ms.median), gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
                std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
                                                           : "-");
     std::fflush(stdout);
@@ -230,8 +230,8 @@ int run_bench(const BenchOptions& options) {
   fmt::print("\n{}\n", (options.out / "bench.csv").string());
   for (const BenchRow& r : rows)
     if (r.non_finite)
-      throw error_of(*r.non_finite, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", r.scene, r.mode,
-                                                r.constraints, r.iterations, r.substeps));
+      throw error_of(*r.non_finite, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", r.scene,
+                                                r.mode, r.constraints, r.iterations, r.substeps));
   return 0;
 }
 

@@ -151,7 +151,8 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   while (take(collect(metrics, true))) {
   }
   while (const auto ms = sim.timer.poll(true)) timing.gpu_ms.push_back(*ms);
-  timing.gpu_ms.resize(std::min(timing.gpu_ms.size(), timing.wall_ms.size()));  // without the step that went wrong
+  timing.gpu_ms.resize(
+      std::min(timing.gpu_ms.size(), timing.wall_ms.size()));  // without the step that went wrong
   if (frames) frames->finish();
   errors.non_finite = check_finite(sim, true);
   errors.finite = errors.finite && !errors.non_finite;
@@ -174,7 +175,8 @@ int run_headless(const Scene& scene, const RunOptions& options) {
                 "what was finished is written", 1);
   if (errors.non_finite) throw error_of(*errors.non_finite);
   if (!errors.finite)
-    throw Error("a measurement is not finite", fmt::format("after step {}", errors.last ? errors.last->step : 0),
+    throw Error("a measurement is not finite",
+                fmt::format("after step {}", errors.last ? errors.last->step : 0),
                 "use a smaller --dt, more --substeps or a lower stiffness", 1);
   return 0;
 }

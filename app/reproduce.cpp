@@ -112,7 +112,8 @@ MeasuredRun fall_run(const Scene& scene, const std::shared_ptr<const Model>& mod
   Metrics metrics = create_metrics(*model);
   MeasuredRun run = measure_run(sim, metrics, steps);
   if (run.errors.non_finite)
-    throw error_of(*run.errors.non_finite, fmt::format("{}, {}, {} iterations", scene.name, kinds, iterations));
+    throw error_of(*run.errors.non_finite,
+                   fmt::format("{}, {}, {} iterations", scene.name, kinds, iterations));
   return run;
 }
 

@@ -40,7 +40,7 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, const Scen
 struct Message {
   std::string text;
   bool error = false, offer_reset = false;  ///< the latter where the state is not finite: also the way back
-  double since = 0;  ///< s
+  double since = 0;                         ///< s
 };
 
 /// A line for each event, in the file that TETPBD_WINDOW_LOG names (docs/window.md), for tests and

@@ -180,7 +180,8 @@ std::string csv_row(const Measurement& measurement, const RunErrors& so_far) {
   for (const Column& column : columns()) {
     if (!text.empty()) text += ',';
     const double value = column.value(measurement, so_far);
-    if (std::isfinite(value) && (column.always || measurement.finite())) text += fmt::format("{:.9g}", value);  // an empty field where it is no number
+    if (std::isfinite(value) && (column.always || measurement.finite()))
+      text += fmt::format("{:.9g}", value);  // an empty field where it is no number
   }
   return text + "\n";
 }

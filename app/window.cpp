@@ -45,7 +45,7 @@ struct Desktop {
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);  // where the driver can
-    glfwWindowHint(GLFW_SAMPLES, 0);  // the view has its own target
+    glfwWindowHint(GLFW_SAMPLES, 0);                                      // the view has its own target
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
     const char* debug = variable("TETPBD_GL_DEBUG");
     glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, debug && std::string(debug) != "0");

@@ -13,7 +13,8 @@ namespace tetpbd {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffu;
-constexpr long ask_every = CHECK_STEPS / 2;  // steps; unasked, an answer is waited for only when it is this old
+constexpr long ask_every =
+    CHECK_STEPS / 2;  // steps; unasked, an answer is waited for only when it is this old
 constexpr long keep_every = CHECK_STEPS;
 
 bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
@@ -77,7 +78,8 @@ Cause likely_cause(const Sim& sim, long step) {
   const double h = s.dt / s.substeps, size = sim.model->size;
   if (!check.kept) return {"it was given like that", "look at where its numbers come from"};
   if (check.reloaded >= check.base && check.reloaded < step)
-    return {fmt::format("the shaders of {}, loaded again at step {}", shader_folder(), check.reloaded), "mend them"};
+    return {fmt::format("the shaders of {}, loaded again at step {}", shader_folder(), check.reloaded),
+            "mend them"};
   // Squared areas go with the fourth power of a length, and float ends at 3e38 and at 1e-38.
   if (size > 1e9 || size < 1e-9)
     return {fmt::format("a body of {:.3g} m, whose squared areas float cannot hold", size), "scale the body"};
@@ -89,13 +91,14 @@ Cause likely_cause(const Sim& sim, long step) {
   }
   const double most = std::max(fast, std::abs(s.gravity) * h);
   const char* calmer = "use a smaller dt or more substeps";
-  if (far > 1e9 && far > 1e3 * size)
-    return {fmt::format("positions that had reached {:.3g} m", far), calmer};
+  if (far > 1e9 && far > 1e3 * size) return {fmt::format("positions that had reached {:.3g} m", far), calmer};
   if (most * h > size)
-    return {fmt::format("{:.3g} m/s, which is {:.3g} body sizes in a substep of {:.3g} s", most, most * h / size, h),
+    return {fmt::format("{:.3g} m/s, which is {:.3g} body sizes in a substep of {:.3g} s", most,
+                        most * h / size, h),
             calmer};
   if (s.omega > 2 && !on_cpu(sim))
-    return {fmt::format("omega {:g}, above 2 where corrections can grow", s.omega), "use an omega from 1 to 2"};
+    return {fmt::format("omega {:g}, above 2 where corrections can grow", s.omega),
+            "use an omega from 1 to 2"};
   if (h > 1.0 / 30) return {fmt::format("a substep of {:.3g} s", h), calmer};
   if (!shader_folder().empty())
     return {"a shader of " + shader_folder(), "run without --shaders and TETPBD_SHADERS to see"};
@@ -236,9 +239,10 @@ bool return_to_last_good(Sim& sim) {
 }
 
 Error error_of(const NonFinite& found, const std::string& where) {
-  return Error("the state is not finite",
-               fmt::format("{}{}at step {}, vertex {}", where, where.empty() ? "" : ", ", found.step, found.vertex),
-               fmt::format("likely cause: {}; {}", found.cause, found.mend), 1);
+  return Error(
+      "the state is not finite",
+      fmt::format("{}{}at step {}, vertex {}", where, where.empty() ? "" : ", ", found.step, found.vertex),
+      fmt::format("likely cause: {}; {}", found.cause, found.mend), 1);
 }
 
 }  // namespace tetpbd

@@ -1,5 +1,6 @@
-// Whether a simulation is still made of numbers. The last kernel of a step notes the first vertex that is not finite
-// (shaders/first_bad.glsl); the answer comes back through a fence, and the last good state is kept on the GPU.
+// Whether a simulation is still made of numbers. The last kernel of a step notes the first vertex that is not
+// finite (shaders/first_bad.glsl); the answer comes back through a fence, and the last good state is kept on
+// the GPU.
 #pragma once
 
 #include <cstdint>
@@ -28,9 +29,9 @@ struct FiniteCheck {
   Buffer positions, velocities;  ///< the kept state; of a CPU mode it is in `host`
   State host;
   GLsync fence = nullptr;
-  long base = 0;     ///< step of the state that was last given
-  long checked = 0;  ///< what is known: steps up to this one are finite
-  long asked = 0;    ///< steps that the copy under way tells of
+  long base = 0;       ///< step of the state that was last given
+  long checked = 0;    ///< what is known: steps up to this one are finite
+  long asked = 0;      ///< steps that the copy under way tells of
   long reloaded = -1;  ///< step at which shaders were last compiled again
   bool kept = false;   ///< there is a good state to go back to
   std::optional<NonFinite> found;
@@ -41,12 +42,13 @@ struct FiniteCheck {
   ~FiniteCheck();
 };
 
-/// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws ContextLost.
+/// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
+/// ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
 /// Back to the kept state, at most 64 steps before the one found, and to its step; false where there is none.
 bool return_to_kept(Sim& sim);
-/// To the state just before the one found: from the kept one by the same steps again, the same bits. For runs whose
-/// settings, shaders and pins did not change; false as above. `found` stays.
+/// To the state just before the one found: from the kept one by the same steps again, the same bits. For runs
+/// whose settings, shaders and pins did not change; false as above. `found` stays.
 bool return_to_last_good(Sim& sim);
 /// What users are told; `where` names the run if there are several.
 Error error_of(const NonFinite& found, const std::string& where = "");

@@ -44,8 +44,8 @@ EGLDisplay platform_display(EGLenum platform, void* native) {
   return get(platform, native, nullptr);
 }
 
-/// `version`: major and minor; 0: whatever the driver makes. With `reset`, the driver tells of a GPU that was reset (and
-/// of nothing else: bounds checks in shaders would cost time).
+/// `version`: major and minor; 0: whatever the driver makes. With `reset`, the driver tells of a GPU that was
+/// reset (and of nothing else: bounds checks in shaders would cost time).
 EGLContext make_context(EGLDisplay display, bool debug, int version = 43, bool reset = true) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
@@ -54,14 +54,10 @@ EGLContext make_context(EGLDisplay display, bool debug, int version = 43, bool r
   EGLint count = 0;
   if (!eglChooseConfig(display, config_attributes, &config, 1, &count) || count == 0) config = nullptr;
   if (version == 0) return eglCreateContext(display, config, EGL_NO_CONTEXT, nullptr);
-  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,
-                                    version / 10,
-                                    EGL_CONTEXT_MINOR_VERSION,
-                                    version % 10,
-                                    EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                    EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                    EGL_CONTEXT_OPENGL_DEBUG,
-                                    debug ? EGL_TRUE : EGL_FALSE};
+  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,       version / 10,
+                                    EGL_CONTEXT_MINOR_VERSION,       version % 10,
+                                    EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                    EGL_CONTEXT_OPENGL_DEBUG,        debug ? EGL_TRUE : EGL_FALSE};
   if (reset)
     attributes.insert(attributes.end(),
                       {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});

@@ -88,17 +88,19 @@ void check_context() {
   else if (GLEW_ARB_robustness)
     status = glGetGraphicsResetStatusARB();
   if (status == GL_NO_ERROR) return;
-  const char* whose = status == GL_GUILTY_CONTEXT_RESET     ? "by what this program did (a step too long for it?)"
+  const char* whose = status == GL_GUILTY_CONTEXT_RESET ? "by what this program did (a step too long for it?)"
                       : status == GL_INNOCENT_CONTEXT_RESET ? "by another program"
                                                             : "for an unknown reason";
-  throw ContextLost("the GPU was reset", whose,
-                    "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look "
-                    "into the system's log",
-                    1);
+  throw ContextLost(
+      "the GPU was reset", whose,
+      "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look "
+      "into the system's log",
+      1);
 }
 
 bool reached(GLsync fence, bool wait, const char* what) {
-  constexpr GLuint64 slice = 1'000'000'000u;  // ns; a step may take as long as it likes, a lost GPU is noticed
+  constexpr GLuint64 slice =
+      1'000'000'000u;  // ns; a step may take as long as it likes, a lost GPU is noticed
   for (;;) {
     const GLenum state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? slice : 0u);
     if (state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED) return true;

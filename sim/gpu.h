@@ -52,10 +52,11 @@ void check_work_groups(const std::string& kernel, unsigned groups, const Limits&
 
 /// Throws ContextLost if the GPU was reset. Cheap, but not free: once a frame, not once a dispatch.
 void check_context();
-/// Answers check_context() in place of the driver: provokes in tests what no software renderer does. Null: the driver.
+/// Answers check_context() in place of the driver: provokes in tests what no software renderer does. Null:
+/// the driver.
 void set_reset_status(GLenum (*answer)());
-/// Whether the GPU has come to the fence; with `wait`, once it has. Where waiting fails: ContextLost, or an Error that
-/// names what was waited for.
+/// Whether the GPU has come to the fence; with `wait`, once it has. Where waiting fails: ContextLost, or an
+/// Error that names what was waited for.
 bool reached(GLsync fence, bool wait, const char* what);
 /// Throws Error naming what did not fit if the last GL call was out of memory.
 void check_memory(const std::string& what, std::size_t bytes);
@@ -149,8 +150,8 @@ class Program {
   const std::string& label() const { return label_; }
   explicit operator bool() const { return id_ != 0; }
   void use() const { glUseProgram(id_); }
-  /// Sets a uniform of the program in use. One that the linker dropped is ignored; one that its text does not declare
-  /// throws Error.
+  /// Sets a uniform of the program in use. One that the linker dropped is ignored; one that its text does not
+  /// declare throws Error.
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }

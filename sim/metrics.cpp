@@ -215,9 +215,9 @@ Measurement measure_now(Metrics& m, const Sim& sim) {
 Measurement nothing_measured() {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Measurement m;
-  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
-                        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
-                        &m.potential, &m.contacts})
+  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max,
+                        &m.inverted_tets, &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance,
+                        &m.speed, &m.kinetic, &m.potential, &m.contacts})
     *value = nan;
   m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
   return m;

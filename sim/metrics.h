@@ -88,7 +88,7 @@ struct RunErrors {
                                                  ///< (size * sum m|v|)), likewise
   double start_energy = 0, max_energy = 0;       ///< J
   bool free = true;                              ///< so far no contact and no fixed vertex
-  std::optional<Measurement> first, last;  ///< of states that were finite
+  std::optional<Measurement> first, last;        ///< of states that were finite
   bool finite = true;
   std::optional<NonFinite> non_finite;  ///< what check_finite() found, if the caller asked it
 };

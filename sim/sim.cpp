@@ -13,8 +13,8 @@ namespace {
 
 constexpr unsigned group_size = 256;  // of predict and finish
 
-// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements, so that
-// their low parts are lost (a test guards against it).
+// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
+// so that their low parts are lost (a test guards against it).
 [[gnu::noinline]] void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
   for (int a = 0; a < 3; ++a) {
     const volatile float rounded = float(value[a]);
@@ -146,7 +146,8 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, Const
 
 double half_substep_fall(const Settings& s) { return 0.5 * s.dt / s.substeps * s.gravity; }
 
-// Stored velocities are half a substep old (start_state): with another substep or gravity they are those of another time.
+// Stored velocities are half a substep old (start_state): with another substep or gravity they are those of
+// another time.
 void shift_velocities(Sim& sim, double upwards) {
   if (upwards == 0) return;
   const auto moved = [&](std::size_t i) { return sim.inverse_masses[i] > 0; };
@@ -157,7 +158,8 @@ void shift_velocities(Sim& sim, double upwards) {
   auto velocities = sim.velocities.read_all<Velocity>();
   for (std::size_t i = 0; i < velocities.size(); ++i) {
     Velocity& v = velocities[i];
-    if (moved(i)) split_pair(glm::dvec3(v.high) + glm::dvec3(v.low) + glm::dvec3(0, upwards, 0), v.high, v.low);
+    if (moved(i))
+      split_pair(glm::dvec3(v.high) + glm::dvec3(v.low) + glm::dvec3(0, upwards, 0), v.high, v.low);
   }
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
@@ -175,7 +177,8 @@ void check_limits(const ConstraintSystem& system, const Limits& limits) {
     largest = std::max(largest, list.count() * std::size_t(list.arity + 1) * 4);
   if (largest > std::size_t(limits.storage_bytes))
     throw Error("a storage buffer is too large",
-                fmt::format("{} bytes, the driver allows {}", largest, limits.storage_bytes), "use a smaller mesh", 1);
+                fmt::format("{} bytes, the driver allows {}", largest, limits.storage_bytes),
+                "use a smaller mesh", 1);
 }
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings) {
@@ -336,7 +339,8 @@ Explanation explain(const Sim& sim) {
   add(sim.predicted);
   add(sim.velocities);
   add(sim.step_block);
-  for (const Buffer* buffer : {&sim.check.words, &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
+  for (const Buffer* buffer :
+       {&sim.check.words, &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (!on_cpu(sim)) {

@@ -1,4 +1,5 @@
-// What goes wrong on a GPU: states that stop being numbers, and drivers that refuse. Each is provoked and has to be said.
+// What goes wrong on a GPU: states that stop being numbers, and drivers that refuse. Each is provoked and has
+// to be said.
 #include <doctest/doctest.h>
 #include <unistd.h>
 
@@ -24,7 +25,8 @@ namespace {
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::dvec3(0), double height = 0.2) {
+std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::dvec3(0),
+                                   double height = 0.2) {
   TetMesh mesh = make_block(glm::dvec3(size, 0.6 * size, 0.5 * size), {5, 3, 2});
   for (auto& p : mesh.positions) p.y += (0.3 + height) * size;
   auto model = std::make_shared<Model>();
@@ -38,7 +40,6 @@ Settings quick(const std::string& mode) {
   s.iterations = 3;
   return s;
 }
-
 
 bool is_finite(const State& state) {
   for (const auto* list : {&state.positions, &state.velocities})
@@ -93,7 +94,8 @@ TEST_CASE("a given state that is not finite is found at once, with its lowest ve
       }
 }
 
-TEST_CASE("what stops being a number on the GPU is found in its step, and the step before comes back bit for bit") {
+TEST_CASE(
+    "what stops being a number on the GPU is found in its step, and the step before comes back bit for bit") {
   GlTest gl;
   for (const char* mode : {"node", "constraint"})
     for (const bool velocity : {false, true})
@@ -152,9 +154,12 @@ TEST_CASE("absurd settings either stay numbers or are found, and the message say
     double size, speed, dt, omega, gravity;
   };
   for (const SolverMode& mode : solver_modes())
-    for (const Absurd& a : {Absurd{"fast", 1, 1e5, 1, 1.5, 9.81}, {"heavy", 1, 0, 1, 1.5, 1000},
-                            {"omega", 1, 0, 0.005, 4, 9.81}, {"large", 1e6, 1e5, 1, 4, 1000},
-                            {"huge", 1e11, 0, 0.005, 1.5, 9.81}, {"tiny", 1e-12, 1e5, 1, 4, 1000}}) {
+    for (const Absurd& a : {Absurd{"fast", 1, 1e5, 1, 1.5, 9.81},
+                            {"heavy", 1, 0, 1, 1.5, 1000},
+                            {"omega", 1, 0, 0.005, 4, 9.81},
+                            {"large", 1e6, 1e5, 1, 4, 1000},
+                            {"huge", 1e11, 0, 0.005, 1.5, 9.81},
+                            {"tiny", 1e-12, 1e5, 1, 4, 1000}}) {
       CAPTURE(mode.name);
       CAPTURE(a.name);
       Settings settings = quick(mode.name);
@@ -244,7 +249,8 @@ TEST_CASE("nothing that is not finite is drawn, in any look or colour, and none 
         for (auto& p : bad.positions) p.y = value;
         write_state(sim, bad);
         CHECK(picture() == empty);
-        request(picker, sim.current_positions().id(), {eye(frame.camera), glm::normalize(frame.camera.target - eye(frame.camera))});
+        request(picker, sim.current_positions().id(),
+                {eye(frame.camera), glm::normalize(frame.camera.target - eye(frame.camera))});
         CHECK(!poll(picker, true)->hit);
       }
       if (colour != Colour::velocity) continue;
@@ -293,7 +299,8 @@ TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode chan
     double worst = 0;
     for (std::size_t i = 0; i < state.positions.size(); ++i)
       if (i != 3)
-        worst = std::max(worst, glm::length(state.positions[i] - sim.model->positions[i] + glm::dvec3(0, fallen, 0)));
+        worst = std::max(
+            worst, glm::length(state.positions[i] - sim.model->positions[i] + glm::dvec3(0, fallen, 0)));
     CHECK(worst < 1e-5 * fallen);
     CHECK(glm::length(state.positions[3] - held) < 1e-6);
     CHECK(glm::length(state.velocities[3]) == 0);
@@ -309,11 +316,14 @@ TEST_CASE("limits of a driver are named with what is needed and what there is") 
   check_limits(system, real);
   Limits few = real;
   few.storage_blocks = 7;
-  CHECK(has(what_of([&] { check_limits(system, few); }), "too few shader storage blocks: 8 needed, the driver offers 7"));
+  CHECK(has(what_of([&] { check_limits(system, few); }),
+            "too few shader storage blocks: 8 needed, the driver offers 7"));
   few = real;
   few.storage_bytes = 100;
   CHECK(has(what_of([&] { check_limits(system, few); }), "a storage buffer is too large"));
-  CHECK(has(what_of([&] { check_work_groups("predict", 70000, {8, 0, 65535}); }),
+  CHECK(has(what_of([&] {
+              check_work_groups("predict", 70000, {8, 0, 65535});
+            }),
             "too many work-groups: predict needs 70000, the driver allows 65535"));
   check_work_groups("predict", 65535, {8, 0, 65535});
   CHECK(has(what_of([&] { make_target(100000, 10); }), "bad image size: 100000x10"));
@@ -339,10 +349,14 @@ TEST_CASE("a GPU that was reset ends the program, whatever it was doing") {
     answer = reason;
     set_reset_status([] { return answer; });
     CHECK_THROWS_AS(check_finite(sim), ContextLost);
-    CHECK_THROWS_AS(([&] { for (int s = 0; s < CHECK_STEPS; ++s) step(sim); }()), ContextLost);  // nobody asks
+    CHECK_THROWS_AS(([&] {
+                      for (int s = 0; s < CHECK_STEPS; ++s) step(sim);
+                    }()),
+                    ContextLost);  // nobody asks
     CHECK(has(what_of([&] { check_context(); }), "the GPU was reset: "));
     Session session;
-    CHECK_THROWS_AS(attempt(session, [] { check_context(); }), ContextLost);  // no message: there is no window left
+    CHECK_THROWS_AS(attempt(session, [] { check_context(); }),
+                    ContextLost);  // no message: there is no window left
     set_reset_status(nullptr);
   }
   CHECK(!attempt(*std::make_unique<Session>(), [] { throw Error("a", "b", "c"); }));
@@ -381,8 +395,10 @@ TEST_CASE("shader faults name file and line, or the uniform") {
   };
   CHECK(with("finish.comp", "void main", "void main") == "");
   CHECK(has(with("finish.comp", "uint i = gl_", "uint i = nothing + gl_"), "shaders/finish.comp:"));
-  CHECK(has(with("finish.comp", "\"pair.glsl\"", "\"pears.glsl\""), "no such shader: " + folder.string() + "/pears.glsl"));
-  CHECK(has(with("first_bad.glsl", "uniform uint step_slot", "const uint step_slot = 0u"), "no such uniform: 'step_slot' in finish"));
+  CHECK(has(with("finish.comp", "\"pair.glsl\"", "\"pears.glsl\""),
+            "no such shader: " + folder.string() + "/pears.glsl"));
+  CHECK(has(with("first_bad.glsl", "uniform uint step_slot", "const uint step_slot = 0u"),
+            "no such uniform: 'step_slot' in finish"));
   CHECK(has(with("render/surface.geom", "vec3 edge;", "vec2 edge;"), "surface"));
   CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
   const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");
@@ -394,7 +410,9 @@ TEST_CASE("shader faults name file and line, or the uniform") {
     std::string text{std::istreambuf_iterator<char>(stream), {}};
     const std::string end = "predicted[i] = p;";
     REQUIRE(has(text, end));
-    text.replace(text.find(end), end.size(), "if (i == 12u && p.high.y < 0.45) p.high.x = sqrt(p.high.y - 1.0);\n  positions[i] = p;\n  " + end);
+    text.replace(
+        text.find(end), end.size(),
+        "if (i == 12u && p.high.y < 0.45) p.high.x = sqrt(p.high.y - 1.0);\n  positions[i] = p;\n  " + end);
     std::ofstream(folder / "predict.comp") << text;
   }
   set_shader_folder(folder.string());

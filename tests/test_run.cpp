@@ -244,7 +244,10 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   const std::string end = "predicted[i] = p;";
   REQUIRE(text.find(end) != std::string::npos);
   // The free end of the beam hangs: at a certain depth its numbers end.
-  text.replace(text.find(end), end.size(), "float v_now = velocities[i].high.y;\n  if (p.inverse_mass > 0.0 && v_now < -0.2) velocities[i].high.x = sqrt(v_now);\n  " + end);
+  text.replace(text.find(end), end.size(),
+               "float v_now = velocities[i].high.y;\n  if (p.inverse_mass > 0.0 && v_now < -0.2) "
+               "velocities[i].high.x = sqrt(v_now);\n  " +
+                   end);
   std::ofstream(folder.path / "shaders/predict.comp") << text;
   const std::string common = "--scene beam --iterations 2 ";
   const Outcome bad = tetpbd("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
@@ -260,7 +263,8 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   CHECK(stats["non_finite"]["vertex"].is_number_unsigned());
   CHECK(stats["timing"]["steps"] == step - 1);
   // The same run without the fault, up to that step: the same numbers.
-  const Outcome good = tetpbd("run " + common + "--steps " + std::to_string(step - 1) + " --positions --out good", folder);
+  const Outcome good =
+      tetpbd("run " + common + "--steps " + std::to_string(step - 1) + " --positions --out good", folder);
   REQUIRE(good.status == 0);
   const json right = json::parse(read(folder.path / "good/stats.json"));
   CHECK(right["finite"] == true);
@@ -273,14 +277,20 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   CHECK(csv.ends_with(",0\n"));
   CHECK(std::count(csv.begin(), csv.end(), '\n') == step + 2);
 
-  const Outcome compared = tetpbd("--shaders shaders compare --scene beam --modes node,cpu --iterations 2 --substeps 1 --steps 60 --out c", folder);
+  const Outcome compared = tetpbd(
+      "--shaders shaders compare --scene beam --modes node,cpu --iterations 2 --substeps 1 --steps 60 --out "
+      "c",
+      folder);
   CHECK(compared.status == 0);
   CHECK(compared.err.find("the state is not finite: mode node, ") != std::string::npos);
   const json rows = json::parse(read(folder.path / "c/compare.json"))["rows"];
   CHECK(rows[0]["finite"] == false);
   CHECK(rows[0]["non_finite"]["step"] == step);
   CHECK(rows[1]["finite"] == true);
-  const Outcome benched = tetpbd("--shaders shaders bench --scenes beam --modes node --constraint-sets stretch+bend+volume --iterations 2 --frames 60 --warm-up 0 --repeats 1 --no-render --out b", folder);
+  const Outcome benched = tetpbd(
+      "--shaders shaders bench --scenes beam --modes node --constraint-sets stretch+bend+volume --iterations "
+      "2 --frames 60 --warm-up 0 --repeats 1 --no-render --out b",
+      folder);
   CHECK(benched.status == 1);
   CHECK(benched.err.find("tetpbd: the state is not finite: beam, mode node") == 0);
   const json row = json::parse(read(folder.path / "b/bench.json"))["rows"][0];

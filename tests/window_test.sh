@@ -73,6 +73,7 @@ click() {
 choose() {  # a combo's entry
   click "$1"
   await "^at $1=$2 "
+  sleep 0.7  # a list opens in one place and is moved to another in its next frame
   click "$1=$2"
 }
 drag() {  # BUTTON from (x y) by (dx dy)

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "app/files.h"
@@ -23,6 +24,13 @@ using Clock = std::chrono::steady_clock;
 Percentiles spread(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return {values[values.size() / 2], values.front(), values.back()};
+}
+
+void mark_non_finite(BenchRow& row, const NonFinite& found) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  row.non_finite = found;
+  row.fps = row.gpu_ms = row.wall_ms = {nan, nan, nan};
+  row.max_volume_loss_percent = nan;
 }
 
 /// Frames as fast as they come: a step, and a picture of it if there is a target. One wait, at the end.
@@ -54,6 +62,7 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
     glFinish();
     const double seconds = elapsed();
     while (const auto ms = sim.timer.poll(true)) steps.push_back(*ms);
+    if (check_finite(sim, true)) return mark_non_finite(row, *sim.check.found);
     fps.push_back(double(frames) / seconds);
     wall.push_back(seconds * 1e3 / double(frames));
     if (!steps.empty()) gpu.push_back(percentiles(steps).median);
@@ -64,14 +73,15 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
 }
 
 std::string csv_line(const BenchRow& r) {
+  const auto number = [](double value, bool known = true) {
+    return known && std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string();
+  };
   const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format(
-      "{},{},{},{},{},{},{},{},{:.6g},{},{:.6g},{},{},{},{}\n", r.scene, r.mode, r.constraints, r.iterations,
-      r.substeps, r.size, r.vertices, r.tets, r.fps.median,
-      on_gpu ? fmt::format("{:.6g}", r.gpu_ms.median) : "", r.wall_ms.median,
-      on_gpu ? fmt::format("{:.6g}", 1e3 * r.gpu_ms.median / r.iterations / r.substeps) : "", r.dispatches,
-      r.gpu_bytes,
-      std::isfinite(r.max_volume_loss_percent) ? fmt::format("{:.6g}", r.max_volume_loss_percent) : "");
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", r.scene, r.mode, r.constraints,
+                     r.iterations, r.substeps, r.size, r.vertices, r.tets, number(r.fps.median),
+                     number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
+                     number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu), r.dispatches,
+                     r.gpu_bytes, number(r.max_volume_loss_percent));
 }
 
 std::string kinds_of(std::string set) {
@@ -80,14 +90,15 @@ std::string kinds_of(std::string set) {
 }
 
 // Over the same frames, but NaN where time ran out: an error over part of the run would be another quantity.
-double loss_of(Sim& sim, const Model& model, const BenchOptions& options) {
+void error_run(BenchRow& row, Sim& sim, const Model& model, const BenchOptions& options) {
   Metrics metrics = create_metrics(model);
   const auto begin = Clock::now();
   bool whole = true;
   const MeasuredRun run = measure_run(sim, metrics, options.frames, [&](long) {
     return whole = std::chrono::duration<double>(Clock::now() - begin).count() < 12 * options.most_seconds;
   });
-  return whole ? run.errors.max_volume_loss_percent : std::nan("");
+  row.max_volume_loss_percent = whole ? run.errors.max_volume_loss_percent : std::nan("");
+  if (run.errors.non_finite) mark_non_finite(row, *run.errors.non_finite);
 }
 
 }  // namespace
@@ -137,11 +148,11 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
             row.vertices = model->positions.size(), row.tets = model->rest.tets.size();
             row.gpu_bytes = cost.bytes, row.dispatches = cost.dispatches_per_step;
             row.bytes_per_step = cost.bytes_per_step;
-            row.max_volume_loss_percent = loss_of(sim, *model, options);
+            error_run(row, sim, *model, options);
             for (const bool render : {false, true}) {
               if (render && !options.render) continue;
               row.size = render ? fmt::format("{}x{}", options.width, options.height) : "";
-              time_frames(row, sim, options, render ? &*renderer : nullptr, view);
+              if (!row.non_finite) time_frames(row, sim, options, render ? &*renderer : nullptr, view);
               rows.push_back(row);
               if (report) report(row);
             }
@@ -176,10 +187,10 @@ int run_bench(const BenchOptions& options) {
     const auto gpu = [&](double value) {
       return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
     };
-    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11.1f}{:>11}{:>10}{:>11}\n", row.scene, row.mode,
-               row.constraints, row.iterations, row.substeps, row.size.empty() ? "none" : row.size,
-               row.fps.median, gpu(1e3 * row.gpu_ms.median),
-               gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
+    const std::string fps = row.non_finite ? "-" : fmt::format("{:.1f}", row.fps.median);
+    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", row.scene, row.mode,
+               row.constraints, row.iterations, row.substeps, row.size.empty() ? "none" : row.size, fps,
+               gpu(1e3 * row.gpu_ms.median), gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
                std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
                                                           : "-");
     std::fflush(stdout);
@@ -189,7 +200,7 @@ int run_bench(const BenchOptions& options) {
     return nlohmann::ordered_json{{"median", p.median}, {"min", p.p05}, {"max", p.p95}};
   };
   for (const BenchRow& r : rows) {
-    nlohmann::ordered_json loss;
+    nlohmann::ordered_json loss;  // null; so is what is not a number below
     if (std::isfinite(r.max_volume_loss_percent)) loss = r.max_volume_loss_percent;
     list.push_back({{"scene", r.scene},
                     {"mode", r.mode},
@@ -205,7 +216,9 @@ int run_bench(const BenchOptions& options) {
                     {"dispatches_per_step", r.dispatches},
                     {"bytes_per_step", r.bytes_per_step},
                     {"gpu_bytes", r.gpu_bytes},
-                    {"max_volume_loss_percent", loss}});
+                    {"max_volume_loss_percent", loss},
+                    {"finite", !r.non_finite},
+                    {"non_finite", non_finite_json(r.non_finite)}});
   }
   write_file(options.out / "bench.csv", bench_csv(rows));
   const nlohmann::ordered_json document = {{"device", device_json(device)},
@@ -215,6 +228,10 @@ int run_bench(const BenchOptions& options) {
                                            {"rows", list}};
   write_file(options.out / "bench.json", document.dump(1) + "\n");
   fmt::print("\n{}\n", (options.out / "bench.csv").string());
+  for (const BenchRow& r : rows)
+    if (r.non_finite)
+      throw error_of(*r.non_finite, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", r.scene,
+                                                r.mode, r.constraints, r.iterations, r.substeps));
   return 0;
 }
 

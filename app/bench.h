@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,8 +37,9 @@ struct BenchRow {
   Percentiles fps;              ///< over repetitions: median, smallest (p05), largest (p95)
   Percentiles gpu_ms, wall_ms;  ///< a step
   long dispatches = 0;
-  std::size_t bytes_per_step = 0;      ///< read and written by all dispatches; caches may serve part of it
-  double max_volume_loss_percent = 0;  ///< NaN where the error run was cut short
+  std::size_t bytes_per_step = 0;       ///< read and written by all dispatches; caches may serve part of it
+  double max_volume_loss_percent = 0;   ///< NaN where the error run was cut short
+  std::optional<NonFinite> non_finite;  ///< then times and loss are NaN: they say nothing
 };
 
 /// Every combination, in the current context; `report` is called after each row.

@@ -79,6 +79,7 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   Metrics metrics = create_metrics(*stretched);
   const double before = measure_now(metrics, sim).rigid_distance;
   step(sim);
+  if (check_finite(sim, true)) return std::nan("");
   return measure_now(metrics, sim).rigid_distance / before;
 }
 
@@ -87,7 +88,12 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   Sim sim = create_sim(model, settings);
   Metrics metrics = create_metrics(*model);
   const MeasuredRun run = measure_run(sim, metrics, steps);
-  const Measurement last = *run.errors.last;
+  if (run.errors.non_finite) {
+    const std::string where = fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", settings.mode,
+                                          settings.omega, settings.iterations, settings.substeps);
+    fmt::print(stderr, "tetpbd: {}\n", error_of(*run.errors.non_finite, where).what());
+  }
+  const Measurement last = run.errors.last.value_or(nothing_measured());  // of the last good step
   ordered_json row;
   row["scene"] = scene.name;
   row["mode"] = settings.mode;
@@ -109,6 +115,7 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   row["angular_drift"] = number(run.errors.angular_drift);
   row["inverted_tets"] = number(last.inverted_tets);
   row["finite"] = run.errors.finite;
+  row["non_finite"] = non_finite_json(run.errors.non_finite);
   row["pareto"] = false;
   return row;
 }

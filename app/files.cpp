@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -90,6 +91,10 @@ void write_png(const fs::path& file, const Image& image) {
 }
 
 void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (!std::isfinite(rows[i].x) || !std::isfinite(rows[i].y) || !std::isfinite(rows[i].z))
+      throw Error("positions are not finite", fmt::format("{}, vertex {}", file.string(), i),
+                  "nothing is written", 1);
   write_file(file, npy("<f4", rows.size(), 3, rows.data()));
 }
 void write_npy(const fs::path& file, const std::vector<Tet>& rows) {

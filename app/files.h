@@ -18,7 +18,7 @@ namespace tetpbd {
 void make_output_folder(const std::filesystem::path& folder);
 void write_file(const std::filesystem::path& file, const std::string& content);
 void write_png(const std::filesystem::path& file, const Image& image);
-/// numpy arrays: float32 N x 3, uint32 T x 4.
+/// numpy arrays: float32 N x 3 (throws Error for numbers that are not finite), uint32 T x 4.
 void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);
 void write_npy(const std::filesystem::path& file, const std::vector<Tet>& rows);
 

@@ -125,16 +125,19 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   {
     Progress progress("stepping", steps, options.progress);
     measure(metrics, sim);
-    if (frames) frames->draw_frame(sim, options.png_every > 0 ? 0 : -1, bool(frames->video));
-    for (long s = 1; s <= steps && !interrupted; ++s) {
+    if (frames && !check_finite(sim))
+      frames->draw_frame(sim, options.png_every > 0 ? 0 : -1, bool(frames->video));
+    for (long s = 1; s <= steps && !interrupted && !check_finite(sim); ++s) {
       const auto begin = Clock::now();
       step(sim);
       if (sim.solver.step_on_cpu == nullptr) glFinish();  // wall time of the work itself, not of queueing it
       const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+      const bool bad = check_finite(sim, true).has_value();  // the step is done, so this waits for nothing
+      measure(metrics, sim);
+      if (bad) break;
       timing.wall_ms.push_back(seconds * 1e3);
       timing.total_s += seconds;
       while (const auto ms = sim.timer.poll()) timing.gpu_ms.push_back(*ms);
-      measure(metrics, sim);
       while (take(collect(metrics))) {
       }
       if (frames) {
@@ -143,18 +146,22 @@ int run_headless(const Scene& scene, const RunOptions& options) {
         if (png || film) frames->draw_frame(sim, png ? s : -1, film);
       }
       progress.update(s);
-      if (!errors.finite) break;
     }
   }
   while (take(collect(metrics, true))) {
   }
   while (const auto ms = sim.timer.poll(true)) timing.gpu_ms.push_back(*ms);
+  timing.gpu_ms.resize(
+      std::min(timing.gpu_ms.size(), timing.wall_ms.size()));  // without the step that went wrong
   if (frames) frames->finish();
+  errors.non_finite = check_finite(sim, true);
+  errors.finite = errors.finite && !errors.non_finite;
+  const bool good = !errors.non_finite || return_to_last_good(sim);
   write_file(options.out / "stats.json",
              statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
-                             guard_counts(sim), state_hash(sim)));
+                             guard_counts(sim), good ? std::optional(state_hash(sim)) : std::nullopt));
   if (options.csv_every > 0) write_file(options.out / "stats.csv", csv);
-  if (options.positions) {
+  if (options.positions && good) {
     std::vector<glm::vec3> positions;
     for (const glm::dvec3& p : read_state(sim).positions) positions.emplace_back(p);
     write_npy(options.out / "positions.npy", positions);
@@ -166,8 +173,10 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   if (interrupted)
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);
+  if (errors.non_finite) throw error_of(*errors.non_finite);
   if (!errors.finite)
-    throw Error("the state is not finite", fmt::format("at step {}", errors.last->step),
+    throw Error("a measurement is not finite",
+                fmt::format("after step {}", errors.last ? errors.last->step : 0),
                 "use a smaller --dt, more --substeps or a lower stiffness", 1);
   return 0;
 }

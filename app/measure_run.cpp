@@ -1,5 +1,6 @@
 #include "app/measure_run.h"
 
+#include <algorithm>
 #include <chrono>
 
 namespace tetpbd {
@@ -20,6 +21,7 @@ MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::funct
     step(sim);
     glFinish();
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    if (check_finite(sim, true)) break;
     run.timing.wall_ms.push_back(seconds * 1e3);
     run.timing.total_s += seconds;
     measure(metrics, sim);
@@ -31,6 +33,9 @@ MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::funct
   while (take(collect(metrics, true))) {
   }
   while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.push_back(*ms);
+  run.timing.gpu_ms.resize(std::min(run.timing.gpu_ms.size(), run.timing.wall_ms.size()));
+  run.errors.non_finite = check_finite(sim, true);
+  run.errors.finite = run.errors.finite && !run.errors.non_finite;
   return run;
 }
 

@@ -17,7 +17,7 @@ struct MeasuredRun {
 };
 
 /// Steps `steps` times and measures after each; GPU times are those of the step's passes alone. Ends early
-/// when the state is not finite or `go_on(step)` says so.
+/// when the state is not finite (its errors then say so) or `go_on(step)` says so.
 MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::function<bool(long)>& go_on = {});
 
 }  // namespace tetpbd

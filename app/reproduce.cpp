@@ -110,7 +110,11 @@ MeasuredRun fall_run(const Scene& scene, const std::shared_ptr<const Model>& mod
   settings.iterations = iterations;
   Sim sim = create_sim(model, settings);
   Metrics metrics = create_metrics(*model);
-  return measure_run(sim, metrics, steps);
+  MeasuredRun run = measure_run(sim, metrics, steps);
+  if (run.errors.non_finite)
+    throw error_of(*run.errors.non_finite,
+                   fmt::format("{}, {}, {} iterations", scene.name, kinds, iterations));
+  return run;
 }
 
 std::string percent(double value) { return fmt::format("{:.2f}", value); }
@@ -291,6 +295,7 @@ void snapshots(Report& report, const Fall& fall, const Published& paper) {
   report.html += "<div class=\"row\">";
   for (int s = 0; s <= 150; ++s) {
     if (s % 25 == 0) {
+      if (check_finite(sim, true)) throw error_of(*sim.check.found, scene.name);
       frame.positions = sim.current_positions().id();
       frame.velocities = sim.velocities.id();
       frame.caption = fmt::format("t = {:.3f} s", s * settings.dt);
@@ -311,6 +316,8 @@ void speed(Report& report, const BenchOptions& options, const std::string& title
            const std::string& what) {
   report.section(title);
   const std::vector<BenchRow> rows = bench_rows(options);
+  for (const BenchRow& row : rows)
+    if (row.non_finite) throw error_of(*row.non_finite, fmt::format("{}, mode {}", row.scene, row.mode));
   std::vector<std::vector<std::string>> table = {
       {"scene", "mode", "size", "fps", "fps / cpu", "GPU ms a step", "wall ms a frame", "volume loss %"}};
   for (const bool rendered : {true, false}) {

@@ -68,6 +68,8 @@ bool attempt(Session& s, const std::function<void()>& action) {
   try {
     action();
     return true;
+  } catch (const ContextLost&) {
+    throw;  // nothing that could be shown is left
   } catch (const std::bad_alloc&) {
     say(s, "out of memory: use a smaller mesh", true);
   } catch (const std::exception& error) {
@@ -104,6 +106,31 @@ void restart(Session& s) {
   std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
   forget_measurements(s);
   s.log("reset");
+}
+
+void go_back(Session& s) {
+  let_go(s);
+  attempt(s, [&] {
+    if (!check_finite(s.loaded.sim, true)) return;
+    if (!return_to_kept(s.loaded.sim)) return say(s, "no good state is kept: reset (R)");
+    s.clock.owed = 0;
+    std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+    forget_measurements(s);
+    s.log("back {}", s.loaded.sim.steps);
+  });
+}
+
+void watch_state(Session& s) {
+  const auto& found = check_finite(s.loaded.sim);
+  if (!found && s.told_non_finite) {  // mended by a reset, another scene or a new solver
+    s.told_non_finite = false;
+    std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+  }
+  if (!found || (s.told_non_finite && !s.playing)) return;
+  s.told_non_finite = true;
+  let_go(s);
+  play(s, false);
+  say(s, error_of(*found).what(), true, true);
 }
 
 void change_settings(Session& s, const Settings& wanted) {
@@ -241,15 +268,6 @@ void measure_frame(Session& s, bool stepped) {
     }
     s.measured = *measurement;
     s.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
-    if (!measurement->finite() && s.playing) {
-      play(s, false);
-      say(s,
-          fmt::format(
-              "the state is not finite: at step {}: reset, then use a smaller dt, more substeps or a lower "
-              "stiffness",
-              measurement->step),
-          true, true);
-    }
   }
   // Half the ring of results: with more under way, asking again would wait for the oldest.
   if (stepped && metrics.pending.size() < 8) measure(metrics, sim);

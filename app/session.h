@@ -39,8 +39,8 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, const Scen
 
 struct Message {
   std::string text;
-  bool error = false, offer_reset = false;
-  double since = 0;  ///< s
+  bool error = false, offer_reset = false;  ///< the latter where the state is not finite: also the way back
+  double since = 0;                         ///< s
 };
 
 /// A line for each event, in the file that TETPBD_WINDOW_LOG names (docs/window.md), for tests and
@@ -94,13 +94,14 @@ struct Session {
   std::optional<LoadRequest> loading;
   bool measuring = true;  ///< somebody looks at the measurements
   std::optional<Measurement> measured;
+  bool told_non_finite = false;
   std::size_t stale = 0;  ///< measurements under way that belong to before a reset
   History frames_per_second, step_ms, volume_error;
   double now = 0;  ///< s since the start
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool offer_reset = false);
-/// Does it; what it throws becomes a message. Whether it went well.
+/// Does it; what it throws becomes a message, but for ContextLost. Whether it went well.
 bool attempt(Session& session, const std::function<void()>& action);
 
 void play(Session& session, bool playing);
@@ -116,6 +117,10 @@ void toggle_pin(Session& session, std::uint32_t vertex);
 void catch_vertex(Session& session, const Pick& pick);
 void let_go(Session& session);
 
+/// To the last good state, once the state is not finite.
+void go_back(Session& session);
+/// Pauses and says so when the state is found not to be finite.
+void watch_state(Session& session);
 /// Steps as many times as `elapsed` seconds ask for and the machine allows.
 void advance(Session& session, double elapsed);
 /// Takes in measurements and timings that have arrived, and asks for the next.

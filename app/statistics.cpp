@@ -87,9 +87,14 @@ ordered_json device_json(const Capabilities& device) {
           {"software", device.software}};
 }
 
+ordered_json non_finite_json(const std::optional<NonFinite>& found) {
+  if (!found) return nullptr;
+  return {{"step", found->step}, {"vertex", found->vertex}, {"cause", found->cause}};
+}
+
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
-                            const GuardCounts& guards, std::uint64_t hash) {
+                            const GuardCounts& guards, std::optional<std::uint64_t> hash) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -106,8 +111,9 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
       {"gpu_ms_per_step", times(timing.gpu_ms)},
       {"wall_ms_per_step", times(timing.wall_ms)},
       {"fps", timing.total_s > 0 ? number(double(sim.steps) / timing.total_s) : ordered_json(nullptr)}};
-  const Measurement last = errors.last.value_or(Measurement{});
-  j["error"] = {{"max_volume_loss_percent", number(errors.max_volume_loss_percent)},
+  const Measurement last = errors.last.value_or(nothing_measured());
+  const auto measured = [&](double value) { return errors.last ? number(value) : ordered_json(nullptr); };
+  j["error"] = {{"max_volume_loss_percent", measured(errors.max_volume_loss_percent)},
                 {"final_volume_error_percent", number(last.volume_error_percent)},
                 {"tet_volume_rms", number(last.tet_volume_rms)},
                 {"tet_volume_max", number(last.tet_volume_max)},
@@ -121,14 +127,15 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                    {"angular_drift", number(errors.angular_drift)},
                    {"linear", vector(last.momentum)},
                    {"angular", vector(last.angular_momentum)}};
-  j["energy"] = {{"start", number(errors.start_energy)},
+  j["energy"] = {{"start", measured(errors.start_energy)},
                  {"final", number(last.energy())},
-                 {"max", number(errors.max_energy)},
+                 {"max", measured(errors.max_energy)},
                  {"final_kinetic", number(last.kinetic)},
                  {"final_potential", number(last.potential)}};
   for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
   j["finite"] = errors.finite;
-  j["state_hash"] = fmt::format("{:016x}", hash);
+  j["non_finite"] = non_finite_json(errors.non_finite);
+  j["state_hash"] = hash ? ordered_json(fmt::format("{:016x}", *hash)) : ordered_json(nullptr);
   return j.dump(2) + "\n";
 }
 
@@ -137,16 +144,17 @@ namespace {
 struct Column {
   const char* name;
   double (*value)(const Measurement&, const RunErrors&);
+  bool always = false;  ///< also says something about a state that is not finite
 };
 
 const std::vector<Column>& columns() {
   using M = Measurement;
   using E = RunErrors;
   static const std::vector<Column> rows = {
-      {"step", [](const M& m, const E&) { return double(m.step); }},
-      {"time", [](const M& m, const E&) { return m.time; }},
+      {"step", [](const M& m, const E&) { return double(m.step); }, true},
+      {"time", [](const M& m, const E&) { return m.time; }, true},
       {"volume_error_percent", [](const M& m, const E&) { return m.volume_error_percent; }},
-      {"max_volume_loss_percent", [](const M&, const E& e) { return e.max_volume_loss_percent; }},
+      {"max_volume_loss_percent", [](const M&, const E& e) { return e.max_volume_loss_percent; }, true},
       {"tet_volume_rms", [](const M& m, const E&) { return m.tet_volume_rms; }},
       {"tet_volume_max", [](const M& m, const E&) { return m.tet_volume_max; }},
       {"inverted_tets", [](const M& m, const E&) { return m.inverted_tets; }},
@@ -154,8 +162,8 @@ const std::vector<Column>& columns() {
       {"stretch_max", [](const M& m, const E&) { return m.stretch_max; }},
       {"bend_rms_rad", [](const M& m, const E&) { return m.bend_rms_rad; }},
       {"rigid_distance", [](const M& m, const E&) { return m.rigid_distance; }},
-      {"linear_drift", [](const M&, const E& e) { return e.linear_drift; }},
-      {"angular_drift", [](const M&, const E& e) { return e.angular_drift; }},
+      {"linear_drift", [](const M&, const E& e) { return e.linear_drift; }, true},
+      {"angular_drift", [](const M&, const E& e) { return e.angular_drift; }, true},
       {"kinetic_energy", [](const M& m, const E&) { return m.kinetic; }},
       {"potential_energy", [](const M& m, const E&) { return m.potential; }},
       {"energy", [](const M& m, const E&) { return m.energy(); }},
@@ -163,7 +171,7 @@ const std::vector<Column>& columns() {
       {"centre_y", [](const M& m, const E&) { return m.centre.y; }},
       {"centre_z", [](const M& m, const E&) { return m.centre.z; }},
       {"contacts", [](const M& m, const E&) { return m.contacts; }},
-      {"finite", [](const M& m, const E&) { return m.finite() ? 1.0 : 0.0; }},
+      {"finite", [](const M& m, const E&) { return m.finite() ? 1.0 : 0.0; }, true},
   };
   return rows;
 }
@@ -179,9 +187,10 @@ std::string csv_header() {
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far) {
   std::string text;
   for (const Column& column : columns()) {
-    const double value = column.value(measurement, so_far);
     if (!text.empty()) text += ',';
-    if (std::isfinite(value)) text += fmt::format("{:.9g}", value);  // an empty field where it is no number
+    const double value = column.value(measurement, so_far);
+    if (std::isfinite(value) && (column.always || measurement.finite()))
+      text += fmt::format("{:.9g}", value);  // an empty field where it is no number
   }
   return text + "\n";
 }

@@ -23,7 +23,9 @@ Percentiles percentiles(std::vector<double> values);
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
-                            const GuardCounts& guards, std::uint64_t hash);
+                            const GuardCounts& guards, std::optional<std::uint64_t> hash);
+/// {"step", "vertex", "cause"}, or null.
+nlohmann::ordered_json non_finite_json(const std::optional<NonFinite>& found);
 /// The device as stats.json, bench.json and compare.json name it.
 nlohmann::ordered_json device_json(const Capabilities& device);
 std::string csv_header();

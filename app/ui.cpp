@@ -172,6 +172,10 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
       if (message.offer_reset) {
         ImGui::SameLine();
         if (ImGui::SmallButton("Reset")) restart(s);
+        mark(s, ui, "reset after error");
+        ImGui::SameLine();
+        if (ImGui::SmallButton("Back to the last good state")) go_back(s);
+        mark(s, ui, "back");
       }
     } else {
       ImGui::TextUnformatted(message.text.c_str());

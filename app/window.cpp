@@ -44,7 +44,8 @@ struct Desktop {
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-    glfwWindowHint(GLFW_SAMPLES, 0);  // the view has its own target
+    glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);  // where the driver can
+    glfwWindowHint(GLFW_SAMPLES, 0);                                      // the view has its own target
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
     const char* debug = variable("TETPBD_GL_DEBUG");
     glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, debug && std::string(debug) != "0");
@@ -309,6 +310,7 @@ int run_window(const Scene& scene, const WindowOptions& options) {
     const long steps = s.loaded.sim.steps;
     if (!attempt(s, [&] {
           advance(s, elapsed);
+          watch_state(s);
           measure_frame(s, s.loaded.sim.steps != steps);
         }))
       ui.plots = false, play(s, false);  // said once, not every frame

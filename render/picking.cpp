@@ -4,7 +4,6 @@
 #include <bit>
 
 #include "render/layout.h"
-#include "sim/error.h"
 #include "sim/layout.h"
 
 namespace tetpbd {
@@ -33,6 +32,7 @@ Picker make_picker(const TetMesh& mesh) {
   picker.triangles = Buffer("pick triangles", mesh.surface);
   picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
   picker.count = mesh.surface.size();
+  check_work_groups(picker.kernel.label(), work_groups(picker.count, 128));
   return picker;
 }
 
@@ -60,11 +60,7 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
 
 std::optional<Pick> poll(Picker& picker, bool wait) {
   if (!picker.fence) return std::nullopt;
-  const GLenum state =
-      glClientWaitSync(picker.fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? 10'000'000'000u : 0u);
-  if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
-  if (state == GL_TIMEOUT_EXPIRED || state == GL_WAIT_FAILED)
-    throw Error("the GPU does not answer", "picking", "use a smaller mesh", 1);
+  if (!reached(picker.fence, wait, "picking")) return std::nullopt;
   glDeleteSync(picker.fence);
   picker.fence = nullptr;
   std::array<std::uint32_t, 3> result;

@@ -1,6 +1,7 @@
 #include "render/shadow.h"
 
 #include <array>
+#include <utility>
 
 #include "render/layout.h"
 
@@ -14,9 +15,12 @@ void make_bounds(Shadow& shadow) {
 }
 
 void make_map(Shadow& shadow) {
-  shadow.depth = Texture::make("shadow depth");
+  Texture depth = Texture::make("shadow depth");
+  clear_errors();
   glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, Shadow::size, Shadow::size, 0, GL_DEPTH_COMPONENT,
                GL_FLOAT, nullptr);
+  check_memory("the shadow map", std::size_t(Shadow::size) * Shadow::size * 4);
+  shadow.depth = std::move(depth);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
   shadow.framebuffer = Framebuffer::make("shadow");
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, shadow.depth.id(), 0);

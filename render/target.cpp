@@ -13,7 +13,10 @@ namespace {
 
 Renderbuffer storage(const char* label, int width, int height, int samples, GLenum format) {
   Renderbuffer buffer = Renderbuffer::make(label);
+  clear_errors();
   glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height);
+  check_memory(fmt::format("image '{}', {}x{} with {} samples,", label, width, height, samples),
+               std::size_t(width) * std::size_t(height) * std::size_t(std::max(samples, 1)) * 4);
   return buffer;
 }
 
@@ -36,8 +39,10 @@ Image flipped(int width, int height, const std::uint8_t* rows) {
 }  // namespace
 
 Target make_target(int width, int height, int samples) {
-  GLint largest = 0, most = 0;
+  GLint largest = 0, most = 0, viewport[2] = {0, 0};
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &largest);
+  glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
+  largest = std::min({largest, viewport[0], viewport[1]});
   glGetIntegerv(GL_MAX_SAMPLES, &most);
   if (width < 1 || height < 1 || width > largest || height > largest)
     throw Error("bad image size", fmt::format("{}x{}", width, height),
@@ -125,11 +130,7 @@ void ReadBack::push(const Target& target) {
 std::optional<Image> ReadBack::poll(bool wait) {
   if (pending_.empty()) return std::nullopt;
   Slot& slot = pending_.front();
-  const GLuint64 patience = wait ? 10'000'000'000u : 0u;  // ns
-  const GLenum state = glClientWaitSync(slot.fence, GL_SYNC_FLUSH_COMMANDS_BIT, patience);
-  if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
-  if (state == GL_TIMEOUT_EXPIRED || state == GL_WAIT_FAILED)
-    throw Error("the GPU does not answer", "reading a frame back", "use a smaller image or mesh", 1);
+  if (!reached(slot.fence, wait, "reading a frame back")) return std::nullopt;
   glBindBuffer(GL_PIXEL_PACK_BUFFER, slot.pixels.id());
   const void* rows =
       glMapBufferRange(GL_PIXEL_PACK_BUFFER, 0, GLsizeiptr(slot.pixels.bytes()), GL_MAP_READ_BIT);

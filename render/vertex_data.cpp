@@ -43,6 +43,7 @@ VertexGather gather(const TetMesh& mesh, std::string label, std::size_t value_by
     ((*place++ = others), ...);
   });
   result.kernel = std::move(kernel);
+  check_work_groups(result.kernel.label(), work_groups(result.count, 128));
   result.vertices = Buffer(label + " vertices", surface.vertices);
   result.offsets = Buffer(label + " offsets", offsets);
   result.items = Buffer(label + " items", items);

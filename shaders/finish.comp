@@ -6,11 +6,17 @@ layout(std430, binding = BIND_POSITIONS) readonly buffer Positions { Position po
 layout(std430, binding = BIND_PREDICTED) readonly buffer Predicted { Position predicted[]; };
 layout(std430, binding = BIND_VELOCITIES) buffer Velocities { Velocity velocities[]; };
 
+#include "first_bad.glsl"
+
 void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= params.vertex_count) return;
   Position p = positions[i];
-  if (!(p.inverse_mass > 0.0)) return;
+  if (!(p.inverse_mass > 0.0)) {
+    note_unless_finite(i, p.high + p.low, vec3(0.0));
+    return;
+  }
   Pair v = pair_add(Pair(velocities[i].high, velocities[i].low), relative(p, predicted[i]) * params.inverse_h);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+  note_unless_finite(i, p.high + p.low, v.high + v.low);
 }

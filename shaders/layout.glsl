@@ -60,6 +60,10 @@ struct Step {
 #define BIND_ADJACENCY 4
 #define BIND_DELTAS 4         // constraint mode (it has no adjacency)
 #define BIND_RECORDS 5        // + index of the constraint kind among those present
+#define BIND_CHECK 1          // finish and keep: which vertex is not finite
+#define BIND_KEEP_FROM 0
+#define BIND_KEEP_TO 2
+#define CHECK_STEPS 64        // steps whose checks are under way at most
 // Uniform blocks.
 #define BIND_STEP 0
 // Atomic counters.

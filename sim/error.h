@@ -13,4 +13,9 @@ struct Error : std::runtime_error {
   int exit_status;
 };
 
+/// The GPU was reset and everything on it is lost: nothing but ending the program is left.
+struct ContextLost : Error {
+  using Error::Error;
+};
+
 }  // namespace tetpbd

@@ -44,23 +44,41 @@ EGLDisplay platform_display(EGLenum platform, void* native) {
   return get(platform, native, nullptr);
 }
 
-EGLContext make_context(EGLDisplay display, bool debug) {
+/// `version`: major and minor; 0: whatever the driver makes. With `reset`, the driver tells of a GPU that was
+/// reset (and of nothing else: bounds checks in shaders would cost time).
+EGLContext make_context(EGLDisplay display, bool debug, int version = 43, bool reset = true) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
   const EGLint config_attributes[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
   if (!eglChooseConfig(display, config_attributes, &config, 1, &count) || count == 0) config = nullptr;
-  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                               4,
-                               EGL_CONTEXT_MINOR_VERSION,
-                               3,
-                               EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                               EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                               EGL_CONTEXT_OPENGL_DEBUG,
-                               debug ? EGL_TRUE : EGL_FALSE,
-                               EGL_NONE};
-  return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
+  if (version == 0) return eglCreateContext(display, config, EGL_NO_CONTEXT, nullptr);
+  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,       version / 10,
+                                    EGL_CONTEXT_MINOR_VERSION,       version % 10,
+                                    EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                    EGL_CONTEXT_OPENGL_DEBUG,        debug ? EGL_TRUE : EGL_FALSE};
+  if (reset)
+    attributes.insert(attributes.end(),
+                      {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
+  attributes.push_back(EGL_NONE);
+  const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
+  return context == EGL_NO_CONTEXT && reset ? make_context(display, debug, version, false) : context;
+}
+
+/// Of the first display that makes any context.
+std::string offered_version(const std::vector<EGLDisplay>& displays) {
+  for (EGLDisplay display : displays) {
+    const EGLContext context = make_context(display, false, 0);
+    if (context == EGL_NO_CONTEXT) continue;
+    std::string text;
+    if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
+      if (const GLubyte* version = glGetString(GL_VERSION)) text = reinterpret_cast<const char*>(version);
+    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    eglDestroyContext(display, context);
+    if (!text.empty()) return text;
+  }
+  return {};
 }
 
 }  // namespace
@@ -99,7 +117,11 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
     capabilities_ = load_gl();
     return;
   }
-  throw Error("no OpenGL 4.3 context", device >= 0 ? fmt::format("--gpu {}", device) : "EGL, any device",
+  const std::string which = device >= 0 ? fmt::format("--gpu {}", device) : "EGL, any device";
+  if (const std::string version = offered_version(displays); !version.empty())
+    throw Error("OpenGL 4.3 is needed", fmt::format("{}: the driver offers {}", which, version),
+                "use a newer driver or another GPU (tetpbd info lists them)", 1);
+  throw Error("no OpenGL 4.3 context", devices.empty() ? "EGL finds no device and no driver" : which,
               "install a driver, or libegl-mesa0 and libgl1-mesa-dri for software rendering", 1);
 }
 

@@ -56,6 +56,73 @@ bool is_software_renderer() {
   return false;
 }
 
+Limits gl_limits() {
+  Limits limits;
+  limits.storage_blocks = gl_integer(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS);
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limits.storage_bytes);
+  GLint groups = 0;
+  glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
+  limits.work_groups = unsigned(groups);
+  return limits;
+}
+
+void check_work_groups(const std::string& kernel, unsigned groups, const Limits& limits) {
+  if (groups > limits.work_groups)
+    throw Error("too many work-groups",
+                fmt::format("{} needs {}, the driver allows {}", kernel, groups, limits.work_groups),
+                "use a smaller mesh or another GPU (tetpbd info lists them)", 1);
+}
+
+namespace {
+GLenum (*given_reset_status)() = nullptr;
+}
+
+void set_reset_status(GLenum (*answer)()) { given_reset_status = answer; }
+
+void check_context() {
+  GLenum status = GL_NO_ERROR;
+  if (given_reset_status)
+    status = given_reset_status();
+  else if (GLEW_KHR_robustness || GLEW_VERSION_4_5)
+    status = glGetGraphicsResetStatus();
+  else if (GLEW_ARB_robustness)
+    status = glGetGraphicsResetStatusARB();
+  if (status == GL_NO_ERROR) return;
+  const char* whose = status == GL_GUILTY_CONTEXT_RESET ? "by what this program did (a step too long for it?)"
+                      : status == GL_INNOCENT_CONTEXT_RESET ? "by another program"
+                                                            : "for an unknown reason";
+  throw ContextLost(
+      "the GPU was reset", whose,
+      "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look "
+      "into the system's log",
+      1);
+}
+
+bool reached(GLsync fence, bool wait, const char* what) {
+  constexpr GLuint64 slice =
+      1'000'000'000u;  // ns; a step may take as long as it likes, a lost GPU is noticed
+  for (;;) {
+    const GLenum state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? slice : 0u);
+    if (state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED) return true;
+    if (state == GL_TIMEOUT_EXPIRED && !wait) return false;
+    check_context();
+    if (state == GL_WAIT_FAILED) break;
+  }
+  throw Error("the GPU does not answer", what, "use fewer iterations or substeps, or a smaller mesh", 1);
+}
+
+void clear_errors() {
+  // A lost context answers an error for ever.
+  for (int i = 0; i < 100 && glGetError() != GL_NO_ERROR; ++i) {
+  }
+}
+
+void check_memory(const std::string& what, std::size_t bytes) {
+  if (glGetError() == GL_OUT_OF_MEMORY)
+    throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
+                "use a smaller mesh, a smaller image or fewer samples", 1);
+}
+
 Capabilities load_gl() {
   glewExperimental = GL_TRUE;
   // GLEW built for GLX answers GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.
@@ -76,6 +143,7 @@ Capabilities load_gl() {
   caps.shared_bytes = gl_integer(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE);
   caps.samples = gl_integer(GL_MAX_SAMPLES);
   caps.software = is_software_renderer();
+  caps.reset_status = GLEW_KHR_robustness || GLEW_VERSION_4_5 || GLEW_ARB_robustness;
   caps.debug = gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT;
   if (caps.debug) {
     glEnable(GL_DEBUG_OUTPUT);
@@ -90,15 +158,15 @@ Capabilities load_gl() {
 
 Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
     : bytes_(bytes), label_(std::move(label)) {
-  while (glGetError() != GL_NO_ERROR) {
-  }
+  clear_errors();
   glGenBuffers(1, &id_);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
   glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
-  if (glGetError() == GL_OUT_OF_MEMORY) {
+  try {
+    check_memory(fmt::format("buffer '{}'", label_), bytes);
+  } catch (...) {
     glDeleteBuffers(1, &id_);
-    throw Error("out of GPU memory", fmt::format("buffer '{}' of {} bytes", label_, bytes),
-                "use a smaller mesh", 1);
+    throw;
   }
   label_object(GL_BUFFER, id_, label_);
 }
@@ -266,13 +334,22 @@ GLuint link_program(const std::string& label, const std::vector<GLuint>& shaders
     glGetProgramInfoLog(program, GLsizei(log.size()), &length, log.data());
     log.resize(std::size_t(length));
     glDeleteProgram(program);
-    throw Error("shader program does not link", label, log, 1);
+    throw Error("shader program does not link", label, name_files(log, {}), 1);
   }
   label_object(GL_PROGRAM, program, label);
   return program;
 }
 
 constexpr const char* version_line = "#version 430 core\n";
+
+// Where `set` looks for names: a uniform that nothing uses has no location and yet is no mistake.
+std::string uniform_lines(const std::string& text) {
+  std::istringstream lines(text);
+  std::string line, result;
+  while (std::getline(lines, line))
+    if (line.find("uniform ") != std::string::npos) result += line + "\n";
+  return result;
+}
 
 }  // namespace
 
@@ -292,6 +369,7 @@ Program::Program(std::string label, const std::vector<Stage>& stages, const Shad
       std::vector<std::string> files;
       const std::string text = head + expand(stage.file, words, files);
       shaders.push_back(compile_stage(stage.type, stage.file, text, files));
+      declarations_ += uniform_lines(text);
     }
   } catch (...) {
     for (GLuint shader : shaders) glDeleteShader(shader);
@@ -314,6 +392,9 @@ Program::~Program() {
 GLint Program::location(const char* name) const {
   const auto found = locations_.find(std::string_view(name));
   if (found != locations_.end()) return found->second;
+  if (!std::regex_search(declarations_, std::regex(fmt::format("\\b{}\\b", name))))
+    throw Error("no such uniform", fmt::format("'{}' in {}", name, label_),
+                shader_folder().empty() ? "declare it in the shader" : "declare it in " + shader_folder(), 1);
   return locations_.emplace(name, glGetUniformLocation(id_, name)).first->second;
 }
 

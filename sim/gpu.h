@@ -29,6 +29,7 @@ struct Capabilities {
   int samples = 0;                 ///< largest MSAA sample count
   bool software = false;           ///< a CPU pretends to be a GPU (llvmpipe, softpipe, swrast)
   bool debug = false;              ///< a debug context: every GL error is reported
+  bool reset_status = false;       ///< the driver tells when the GPU was reset
 };
 
 /// Loads GL functions for the current context and checks for GL 4.3. Throws Error with the version found.
@@ -37,6 +38,30 @@ Capabilities load_gl();
 bool is_software_renderer();
 /// Number of GL debug messages of type ERROR since the start (only a debug context counts them).
 int gl_error_count();
+
+/// What a driver may refuse; tests make their own.
+struct Limits {
+  int storage_blocks = 0;
+  std::int64_t storage_bytes = 0;
+  unsigned work_groups = 0;  ///< of one dispatch (65535 guaranteed)
+};
+/// The current context's.
+Limits gl_limits();
+/// Throws Error if a kernel needs more work-groups than one dispatch may have.
+void check_work_groups(const std::string& kernel, unsigned groups, const Limits& limits = gl_limits());
+
+/// Throws ContextLost if the GPU was reset. Cheap, but not free: once a frame, not once a dispatch.
+void check_context();
+/// Answers check_context() in place of the driver: provokes in tests what no software renderer does. Null:
+/// the driver.
+void set_reset_status(GLenum (*answer)());
+/// Whether the GPU has come to the fence; with `wait`, once it has. Where waiting fails: ContextLost, or an
+/// Error that names what was waited for.
+bool reached(GLsync fence, bool wait, const char* what);
+/// Throws Error naming what did not fit if the last GL call was out of memory.
+void check_memory(const std::string& what, std::size_t bytes);
+/// Forgets GL errors of earlier calls, so that check_memory judges the next alone.
+void clear_errors();
 
 /// A buffer object of fixed size in bytes.
 class Buffer {
@@ -125,7 +150,8 @@ class Program {
   const std::string& label() const { return label_; }
   explicit operator bool() const { return id_ != 0; }
   void use() const { glUseProgram(id_); }
-  /// Sets a uniform of the program in use; a name the linker dropped is ignored.
+  /// Sets a uniform of the program in use. One that the linker dropped is ignored; one that its text does not
+  /// declare throws Error.
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }
@@ -139,10 +165,12 @@ class Program {
  private:
   void swap(Program& other) noexcept {
     std::swap(id_, other.id_), std::swap(label_, other.label_), std::swap(locations_, other.locations_);
+    std::swap(declarations_, other.declarations_);
   }
   GLint location(const char* name) const;
   GLuint id_ = 0;
   std::string label_;
+  std::string declarations_;  ///< the lines that declare uniforms
   mutable std::map<std::string, GLint, std::less<>> locations_;
 };
 

@@ -137,9 +137,7 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
 
 std::optional<Measurement> read_oldest(Metrics& m, bool wait) {
   if (m.pending.empty()) return std::nullopt;
-  const GLenum state =
-      glClientWaitSync(m.pending.front().fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? GLuint64(60e9) : 0);
-  if (state == GL_TIMEOUT_EXPIRED && !wait) return std::nullopt;
+  if (!reached(m.pending.front().fence, wait, "measuring")) return std::nullopt;
   const Metrics::Pending pending = m.pending.front();
   m.pending.pop_front();
   glDeleteSync(pending.fence);
@@ -169,10 +167,19 @@ void measure(Metrics& m, const Sim& sim) {
         std::min<unsigned>(METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE));
     for (const Program* program : {&m.constraints, &m.vertices, &m.rigid, &m.centre, &m.close}) {
       program->use();
-      program->set("first_vertex", body.vertices.first);
-      program->set("end_vertex", body.vertices.end);
-      program->set("mass", float(body.mass));
       program->set("groups", groups);
+    }
+    for (const Program* program : {&m.vertices, &m.rigid, &m.centre}) {
+      program->use();
+      program->set("first_vertex", body.vertices.first);
+    }
+    for (const Program* program : {&m.vertices, &m.rigid}) {
+      program->use();
+      program->set("end_vertex", body.vertices.end);
+    }
+    for (const Program* program : {&m.rigid, &m.centre}) {
+      program->use();
+      program->set("mass", float(body.mass));
     }
     m.constraints.use();
     m.constraints.set("first_edge", body.edges.first), m.constraints.set("end_edge", body.edges.end);
@@ -205,10 +212,22 @@ Measurement measure_now(Metrics& m, const Sim& sim) {
   return *collect(m, true);
 }
 
+Measurement nothing_measured() {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  Measurement m;
+  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max,
+                        &m.inverted_tets, &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance,
+                        &m.speed, &m.kinetic, &m.potential, &m.contacts})
+    *value = nan;
+  m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
+  return m;
+}
+
 void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) {
+  errors.finite = errors.finite && now.finite();
+  if (!errors.finite) return;  // numbers stay those of the last good state
   if (!errors.first) errors.first = now, errors.start_energy = errors.max_energy = now.energy();
   errors.last = now;
-  errors.finite = errors.finite && now.finite();
   errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
   errors.max_energy = std::max(errors.max_energy, now.energy());
   double mass = 0;

@@ -73,6 +73,9 @@ std::optional<Measurement> collect(Metrics& metrics, bool wait = false);
 /// Measures now and waits.
 Measurement measure_now(Metrics& metrics, const Sim& sim);
 
+/// Where there was nothing to measure: NaN, which files show as null.
+Measurement nothing_measured();
+
 /// What a run amounts to, from its measurements in order.
 struct RunErrors {
   double max_volume_loss_percent = 0;  ///< the paper's: largest 100 (V0 - V) / V0
@@ -85,8 +88,9 @@ struct RunErrors {
                                                  ///< (size * sum m|v|)), likewise
   double start_energy = 0, max_energy = 0;       ///< J
   bool free = true;                              ///< so far no contact and no fixed vertex
-  std::optional<Measurement> first, last;
+  std::optional<Measurement> first, last;        ///< of states that were finite
   bool finite = true;
+  std::optional<NonFinite> non_finite;  ///< what check_finite() found, if the caller asked it
 };
 void add_measurement(RunErrors& errors, const Measurement& measurement, const Sim& sim);
 

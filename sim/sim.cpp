@@ -13,8 +13,8 @@ namespace {
 
 constexpr unsigned group_size = 256;  // of predict and finish
 
-// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements, so that
-// their low parts are lost (a test guards against it).
+// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
+// so that their low parts are lost (a test guards against it).
 [[gnu::noinline]] void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
   for (int a = 0; a < 3; ++a) {
     const volatile float rounded = float(value[a]);
@@ -65,24 +65,6 @@ void write_step_block(Sim& sim) {
   sim.step_block.write(0, sizeof block, &block);
 }
 
-void check_limits(const ConstraintSystem& system) {
-  GLint blocks = 0;
-  glGetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
-  const int needed = BIND_RECORDS + int(kind_words(system).size());
-  if (needed > blocks)
-    throw Error("too few shader storage blocks",
-                fmt::format("{} needed, the driver offers {}", needed, blocks),
-                "leave out a constraint kind or use a newer driver", 1);
-  GLint64 bytes = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-  std::size_t largest = system.at_vertex.size() * sizeof(Position);
-  for (const ConstraintList& list : system.lists)
-    largest = std::max(largest, list.count() * std::size_t(list.arity + 1) * 4);
-  if (largest > std::size_t(bytes))
-    throw Error("a storage buffer is too large",
-                fmt::format("{} bytes, the driver allows {}", largest, bytes), "use a smaller mesh", 1);
-}
-
 void build_solver(Sim& sim) {
   for (const SolverMode& mode : solver_modes())
     if (sim.settings.mode == mode.name) {
@@ -93,9 +75,15 @@ void build_solver(Sim& sim) {
       predict.groups = finish.groups = work_groups(sim.model->positions.size(), group_size);
       predict.bytes = sim.model->positions.size() * (3 * sizeof(Position) + 2 * sizeof(Velocity));
       finish.bytes = sim.model->positions.size() * (2 * sizeof(Position) + 2 * sizeof(Velocity));
+      finish.bindings = {{BIND_CHECK, sim.check.words.id()}};
+      Program keep = Program::compute("keep.comp");
       Solver solver = mode.create({*sim.model, sim.system, is_software_renderer(), bool(sim.guard_counts)});
+      const Limits limits = gl_limits();
+      check_work_groups(predict.program.label(), predict.groups, limits);
+      for (const Pass& pass : solver.iteration) check_work_groups(pass.program.label(), pass.groups, limits);
       sim.predict = std::move(predict);
       sim.finish = std::move(finish);
+      sim.check.keep = std::move(keep);
       sim.solver = std::move(solver);
       sim.shader_version = shader_folder_version();
       return;
@@ -139,24 +127,69 @@ void dispatch(const Pass& pass) {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
+// Everything but the state.
+Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, ConstraintSystem system,
+             bool count_guards) {
+  Sim sim;
+  sim.model = std::move(model);
+  sim.settings = settings;
+  sim.inverse_masses = sim.model->inverse_masses;
+  sim.system = std::move(system);
+  check_limits(sim.system, gl_limits());
+  make_check_words(sim.check);
+  if (count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
+  build_solver(sim);
+  allocate(sim);
+  make_kept(sim);
+  sim.step_block = Buffer("step", sizeof(Step));
+  write_step_block(sim);
+  return sim;
+}
+
+double half_substep_fall(const Settings& s) { return 0.5 * s.dt / s.substeps * s.gravity; }
+
+// Stored velocities are half a substep old (start_state): with another substep or gravity they are those of
+// another time.
+void shift_velocities(Sim& sim, double upwards) {
+  if (upwards == 0) return;
+  const auto moved = [&](std::size_t i) { return sim.inverse_masses[i] > 0; };
+  if (on_cpu(sim)) {
+    for (std::size_t i = 0; i < sim.host.velocities.size(); ++i)
+      if (moved(i)) sim.host.velocities[i].y += upwards;
+  }
+  auto velocities = sim.velocities.read_all<Velocity>();
+  for (std::size_t i = 0; i < velocities.size(); ++i) {
+    Velocity& v = velocities[i];
+    if (moved(i))
+      split_pair(glm::dvec3(v.high) + glm::dvec3(v.low) + glm::dvec3(0, upwards, 0), v.high, v.low);
+  }
+  sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
+}
+
 }  // namespace
+
+void check_limits(const ConstraintSystem& system, const Limits& limits) {
+  const int needed = BIND_RECORDS + int(kind_words(system).size());
+  if (needed > limits.storage_blocks)
+    throw Error("too few shader storage blocks",
+                fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),
+                "leave out a constraint kind or use a newer driver", 1);
+  std::size_t largest = system.at_vertex.size() * sizeof(Position);
+  for (const ConstraintList& list : system.lists)
+    largest = std::max(largest, list.count() * std::size_t(list.arity + 1) * 4);
+  if (largest > std::size_t(limits.storage_bytes))
+    throw Error("a storage buffer is too large",
+                fmt::format("{} bytes, the driver allows {}", largest, limits.storage_bytes),
+                "use a smaller mesh", 1);
+}
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, bool count_guards) {
   if (model->obstacles.size() + 1 > MAX_PLANES)
     throw Error("too many obstacles", fmt::format("{} planes", model->obstacles.size()),
                 fmt::format("at most {} beside the ground", MAX_PLANES - 1));
-  Sim sim;
-  sim.model = std::move(model);
-  sim.settings = settings;
-  sim.inverse_masses = sim.model->inverse_masses;
-  sim.system = build_constraints(sim.model->rest, settings.constraints);
-  check_limits(sim.system);
-  if (count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
-  build_solver(sim);
-  allocate(sim);
-  sim.step_block = Buffer("step", sizeof(Step));
+  ConstraintSystem system = build_constraints(model->rest, settings.constraints);
+  Sim sim = make_sim(std::move(model), settings, std::move(system), count_guards);
   reset(sim);
-  write_step_block(sim);
   return sim;
 }
 
@@ -171,35 +204,34 @@ void reset(Sim& sim) {
 void write_state(Sim& sim, const State& state) {
   if (on_cpu(sim)) sim.host = state;
   write_both(sim, state);
+  start_check(sim, state);
 }
 
 void apply_settings(Sim& sim, const Settings& settings) {
   const bool kinds = settings.constraints != sim.settings.constraints;
-  const bool rebuild = kinds || settings.mode != sim.settings.mode;
-  const Settings old = sim.settings;
-  if (rebuild) {
+  const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
+  if (kinds || settings.mode != sim.settings.mode) {
+    if (check_finite(sim, true)) return_to_kept(sim);  // a solver made anew has nothing better to start from
     const State state = read_state(sim);
-    ConstraintSystem old_system = sim.system;
-    try {
-      if (kinds) sim.system = build_constraints(sim.model->rest, settings.constraints);
-      check_limits(sim.system);
-      sim.settings = settings;
-      build_solver(sim);
-    } catch (...) {
-      sim.settings = old;
-      sim.system = std::move(old_system);
-      throw;
-    }
-    allocate(sim);
-    write_state(sim, state);
+    // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
+    Sim fresh = make_sim(sim.model, settings,
+                         kinds ? build_constraints(sim.model->rest, settings.constraints) : sim.system,
+                         bool(sim.guard_counts));
+    fresh.inverse_masses = sim.inverse_masses;
+    fresh.steps = sim.steps;
+    fresh.timed = sim.timed;
+    write_state(fresh, state);
+    sim = std::move(fresh);
   }
   sim.settings = settings;
   write_step_block(sim);
+  shift_velocities(sim, upwards);
 }
 
 void rebuild_shaders(Sim& sim) {
   sim.shader_version = shader_folder_version();
   build_solver(sim);
+  sim.check.reloaded = sim.steps;
 }
 
 void step(Sim& sim) {
@@ -208,6 +240,7 @@ void step(Sim& sim) {
     sim.solver.step_on_cpu(sim.host, s, sim.inverse_masses);
     upload(sim, sim.host);
     ++sim.steps;
+    check_step(sim);
     return;
   }
   if (sim.guard_counts) {
@@ -220,6 +253,8 @@ void step(Sim& sim) {
   sim.step_block.bind_uniform(BIND_STEP);
   sim.predicted.bind_storage(BIND_PREDICTED);
   sim.velocities.bind_storage(BIND_VELOCITIES);
+  sim.finish.program.use();
+  sim.finish.program.set("step_slot", check_slot(sim.steps + 1));
   for (int substep = 0; substep < s.substeps; ++substep) {
     sim.positions[sim.current].bind_storage(BIND_POSITIONS);
     dispatch(sim.predict);
@@ -236,6 +271,7 @@ void step(Sim& sim) {
   // Whoever reads positions next may be a vertex fetch or a copy.
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   ++sim.steps;
+  check_step(sim);
 }
 
 GuardCounts guard_counts(Sim& sim) {
@@ -329,6 +365,9 @@ Explanation explain(const Sim& sim) {
   add(sim.velocities);
   add(sim.step_block);
   add(sim.guard_counts);
+  for (const Buffer* buffer :
+       {&sim.check.words, &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
+    add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (!on_cpu(sim)) {
     const long substeps = sim.settings.substeps;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/finite_check.h"
 #include "sim/gpu.h"
 #include "sim/layout.h"
 #include "sim/model.h"
@@ -34,6 +35,7 @@ struct Sim {
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
   GuardCounts guards_read{};  ///< GPU: counted as of the last reading; CPU modes: the count at the start
+  FiniteCheck check;  ///< ask check_finite()
 
   const Buffer& current_positions() const { return positions[current]; }
 };
@@ -42,7 +44,11 @@ struct Sim {
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, bool count_guards = false);
 /// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count. Waits.
 GuardCounts guard_counts(Sim& sim);
-/// Takes over new settings; the state stays. Rebuilds the solver if the mode or the constraint kinds changed.
+/// Throws Error naming what the driver's limits do not allow.
+void check_limits(const ConstraintSystem& system, const Limits& limits);
+/// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
+/// solver again if the mode or the constraint kinds changed; where that fails, throws and leaves the
+/// simulation as it was.
 void apply_settings(Sim& sim, const Settings& settings);
 /// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
 /// not compile.
@@ -54,6 +60,7 @@ void reset(Sim& sim);
 
 /// Waits for the GPU.
 State read_state(const Sim& sim);
+/// A state that is not finite is taken, and found by check_finite() at once.
 void write_state(Sim& sim, const State& state);
 /// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.
 /// Waits.

@@ -217,6 +217,88 @@ TEST_CASE("help, version, info and explain answer") {
   CHECK(view.err.find("display") != std::string::npos);
 }
 
+TEST_CASE("a driver that is not there, or too old, gets one line and status 1") {
+  const Folder folder;
+  const auto fails = [&](const std::string& environment, const std::string& word, int status = 1) {
+    CAPTURE(environment);
+    const Outcome outcome = tetpbd("run --scene beam --steps 1 --out out", folder, environment);
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == status);
+    CHECK(outcome.err.starts_with("tetpbd: "));
+    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+    CHECK(outcome.err.find(word) != std::string::npos);
+    CHECK(!fs::exists(folder.path / "out/stats.json"));
+  };
+  fails("__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent", "no OpenGL 4.3 context");
+  const std::string info = tetpbd("info", folder).out;
+  if (info.find("Mesa") != std::string::npos)  // others take no orders about their version
+    for (const char* version : {"4.2", "3.3"})
+      fails(std::string("MESA_GL_VERSION_OVERRIDE=") + version, std::string("the driver offers ") + version);
+  fails("TETPBD_SHADERS=/nonexistent", "/nonexistent/predict.comp", 2);
+}
+
+TEST_CASE("a run that stops being numbers leaves those of the last good step, and says where and why") {
+  const Folder folder;
+  fs::copy(TEST_MODELS "/../shaders", folder.path / "shaders", fs::copy_options::recursive);
+  std::string text = read(folder.path / "shaders/predict.comp");
+  const std::string end = "predicted[i] = p;";
+  REQUIRE(text.find(end) != std::string::npos);
+  // The free end of the beam hangs: at a certain depth its numbers end.
+  text.replace(text.find(end), end.size(),
+               "float v_now = velocities[i].high.y;\n  if (p.inverse_mass > 0.0 && v_now < -0.2) "
+               "velocities[i].high.x = sqrt(v_now);\n  " +
+                   end);
+  std::ofstream(folder.path / "shaders/predict.comp") << text;
+  const std::string common = "--scene beam --iterations 2 ";
+  const Outcome bad = tetpbd("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
+  CAPTURE(bad.err);
+  CHECK(bad.status == 1);
+  CHECK(std::count(bad.err.begin(), bad.err.end(), '\n') == 1);
+  CHECK(bad.err.find("tetpbd: the state is not finite: at step ") == 0);
+  CHECK(bad.err.find("likely cause: a shader of shaders") != std::string::npos);
+  const json stats = json::parse(read(folder.path / "bad/stats.json"));
+  CHECK(stats["finite"] == false);
+  const long step = stats["non_finite"]["step"];
+  REQUIRE(step > 3);
+  CHECK(stats["non_finite"]["vertex"].is_number_unsigned());
+  CHECK(stats["timing"]["steps"] == step - 1);
+  // The same run without the fault, up to that step: the same numbers.
+  const Outcome good =
+      tetpbd("run " + common + "--steps " + std::to_string(step - 1) + " --positions --out good", folder);
+  REQUIRE(good.status == 0);
+  const json right = json::parse(read(folder.path / "good/stats.json"));
+  CHECK(right["finite"] == true);
+  CHECK(right["non_finite"].is_null());
+  for (const char* key : {"error", "momentum", "energy", "state_hash"}) CHECK(stats[key] == right[key]);
+  CHECK(read(folder.path / "bad/positions.npy") == read(folder.path / "good/positions.npy"));
+  for (const char* file : {"bad/stats.json", "bad/stats.csv"})
+    for (const char* word : {"nan", "inf"}) CHECK(read(folder.path / file).find(word) == std::string::npos);
+  const std::string csv = read(folder.path / "bad/stats.csv");
+  CHECK(csv.ends_with(",0\n"));
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == step + 2);
+
+  const Outcome compared = tetpbd(
+      "--shaders shaders compare --scene beam --modes node,cpu --iterations 2 --substeps 1 --steps 60 --out "
+      "c",
+      folder);
+  CHECK(compared.status == 0);
+  CHECK(compared.err.find("the state is not finite: mode node, ") != std::string::npos);
+  const json rows = json::parse(read(folder.path / "c/compare.json"))["rows"];
+  CHECK(rows[0]["finite"] == false);
+  CHECK(rows[0]["non_finite"]["step"] == step);
+  CHECK(rows[1]["finite"] == true);
+  const Outcome benched = tetpbd(
+      "--shaders shaders bench --scenes beam --modes node --constraint-sets stretch+bend+volume --iterations "
+      "2 --frames 60 --warm-up 0 --repeats 1 --no-render --out b",
+      folder);
+  CHECK(benched.status == 1);
+  CHECK(benched.err.find("tetpbd: the state is not finite: beam, mode node") == 0);
+  const json row = json::parse(read(folder.path / "b/bench.json"))["rows"][0];
+  CHECK(row["finite"] == false);
+  CHECK(row["fps"]["median"].is_null());
+  CHECK(read(folder.path / "b/bench.csv").find("nan") == std::string::npos);
+}
+
 TEST_CASE("an interrupted run leaves whole files") {
   const Folder folder;
   const std::string command =

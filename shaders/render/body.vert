@@ -17,6 +17,8 @@ out Corner {
 void main() {
   corner.position = high + low;
   corner.normal = normal;
+  // A speed that is no number has no colour: such a corner goes the way of one without a place, and takes its faces along.
+  if (int(view.colour.x) == COLOUR_VELOCITY && !finite(velocity)) corner.position = vec3(uintBitsToFloat(0x7f800000u));
   corner.value = int(view.colour.x) == COLOUR_VELOCITY ? length(velocity) : value;
   corner.rest = rest;
 }

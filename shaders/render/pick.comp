@@ -50,7 +50,7 @@ void main() {
   }
   if (i >= count) return;
   float t = hit(i);
-  if (!(t > 0.0)) return;
+  if (!(t > 0.0 && t < 1e8)) return;  // beyond what is drawn: a triangle seen edge-on
   if (stage == 0) atomicMin(distance_bits, floatBitsToUint(t));
   else if (floatBitsToUint(t) == distance_bits) atomicMin(triangle, i);
 }

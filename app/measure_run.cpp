@@ -20,17 +20,17 @@ MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::funct
     step(sim);
     glFinish();
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    run.timing.wall_ms.push_back(seconds * 1e3);
+    run.timing.wall_ms.add(seconds * 1e3);
     run.timing.total_s += seconds;
     measure(metrics, sim);
     while (take(collect(metrics))) {
     }
-    while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.push_back(*ms);
+    while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.add(*ms);
     if (!run.errors.finite || (go_on && !go_on(s))) break;
   }
   while (take(collect(metrics, true))) {
   }
-  while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.push_back(*ms);
+  while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.add(*ms);
   return run;
 }
 

@@ -76,11 +76,20 @@ bool attempt(Session& s, const std::function<void()>& action) {
   return false;
 }
 
+namespace {
+// What a run without a window of as many steps must give, too. Waits for the GPU, so only where somebody
+// reads it.
+void log_state(Session& s) {
+  if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
+}
+}  // namespace
+
 void play(Session& s, bool playing) {
   if (s.playing == playing) return;
   s.playing = playing;
   s.clock.owed = 0;
   s.log("{}", playing ? "play" : "pause");
+  if (!playing) log_state(s);
 }
 
 void single_step(Session& s) {
@@ -90,6 +99,7 @@ void single_step(Session& s) {
     measure_frame(s, true);
   });
   s.log("step {}", s.loaded.sim.steps);
+  log_state(s);
 }
 
 void restart(Session& s) {

@@ -38,6 +38,15 @@ bool is_software_renderer();
 /// Number of GL debug messages of type ERROR since the start (only a debug context counts them).
 int gl_error_count();
 
+/// What the program holds of GL right now, over all contexts: buffers, programs, queries, fences of
+/// measurements, and what render/handles.h makes. Textures' and renderbuffers' bytes are not counted.
+struct GlLive {
+  long objects = 0;
+  std::int64_t buffer_bytes = 0;
+};
+GlLive gl_live();
+void count_gl_objects(long change, std::int64_t buffer_bytes = 0);
+
 /// A buffer object of fixed size in bytes.
 class Buffer {
  public:
@@ -144,6 +153,23 @@ class Program {
   GLuint id_ = 0;
   std::string label_;
   mutable std::map<std::string, GLint, std::less<>> locations_;
+};
+
+/// A place in the GPU's queue.
+class Fence {
+ public:
+  Fence() = default;
+  static Fence here();
+  Fence(Fence&& other) noexcept { std::swap(sync_, other.sync_); }
+  Fence& operator=(Fence&& other) noexcept {
+    std::swap(sync_, other.sync_);
+    return *this;
+  }
+  ~Fence();
+  GLsync sync() const { return sync_; }
+
+ private:
+  GLsync sync_ = nullptr;
 };
 
 /// Number of work-groups of `size` invocations that cover `count`.

@@ -116,8 +116,25 @@ void restart(Session& s) {
   s.log("reset");
 }
 
-void change_settings(Session& s, const Settings& wanted) {
+namespace {
+// Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a step
+// takes minutes. A scene or the command line can.
+void bound_passes(Session& s, Settings& wanted, const Settings& old) {
+  constexpr long most = 10000;
+  if (long(wanted.iterations) * wanted.substeps <= std::max(most, long(old.iterations) * old.substeps))
+    return;
+  if (wanted.iterations != old.iterations)
+    wanted.iterations = int(std::max(1L, most / wanted.substeps));
+  else
+    wanted.substeps = int(std::max(1L, most / wanted.iterations));
+  say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
+}
+}  // namespace
+
+void change_settings(Session& s, const Settings& asked) {
   const Settings old = s.loaded.sim.settings;
+  Settings wanted = asked;
+  bound_passes(s, wanted, old);
   attempt(s, [&] {
     check_settings(wanted, "window");
     apply_settings(s.loaded.sim, wanted);
@@ -150,6 +167,7 @@ void finish_loading(Session& s) {
     Scene scene = load_scene(request.name, request.overrides);
     if (request.keep_settings) scene.settings = s.loaded.sim.settings;
     take_over(s, load(request.name, request.overrides, scene), request.keep_camera);
+    s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);  // what was there before is gone
   });
 }
 

@@ -73,6 +73,7 @@ click() {
 choose() {  # a combo's entry
   click "$1"
   await "^at $1=$2 "
+  sleep 0.5  # a popup is placed elsewhere in its first frame
   click "$1=$2"
 }
 drag() {  # BUTTON from (x y) by (dx dy)

@@ -211,7 +211,7 @@ void step(Sim& sim) {
   sim.step_block.bind_uniform(BIND_STEP);
   sim.predicted.bind_storage(BIND_PREDICTED);
   sim.velocities.bind_storage(BIND_VELOCITIES);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what is overwritten now
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
   for (int substep = 0; substep < s.substeps; ++substep) {
     sim.positions[sim.current].bind_storage(BIND_POSITIONS);
     dispatch(sim.predict);

@@ -24,7 +24,7 @@ scene held '{"name": "a", "block": {"size": [2, 0.5, 0.5], "cells": [6, 2, 2]}, 
   "fixed": [{"low": [0, 0, 0], "high": [0.01, 1, 1]}]}' ""
 scene two '{"name": "a", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 0, 0]},
   {"name": "b", "block": {"size": [0.5, 1, 0.5], "cells": [1, 3, 1]}, "position": [1.5, 0.5, 0], "deform": "random"}' \
-  ', "obstacles": [{"point": [0, 0, -1], "normal": [0, 0, 1]}]'
+  ', "world": {"obstacles": [{"point": [0, 0, -1], "normal": [0, 0, 1]}]}'
 cat >cube.off <<'END'
 OFF
 8 12 0
@@ -103,9 +103,9 @@ follow() {
   done
 }
 # Shows the window again in a size it has not had, and waits until the program says so: it is neither gone nor stuck.
-width=480
+width=483
 answer() {
-  width=$((width == 480 ? 482 : 480)) size_seen=
+  width=$((width == 483 ? 485 : 483))  # of which no action asks size_seen=
   send "windowmap WINDOW"
   send "windowfocus WINDOW"
   send "windowsize WINDOW $width 360"

@@ -149,7 +149,7 @@ key n; await '^normals flat'
 key n; await '^normals smooth'
 key g; await '^grid false'
 key g; await '^grid true'
-key h; await '^help true'; pause_for_frame; shot help.png
+key h; await '^help true'; sleep 1; shot help.png
 differ panels.png help.png 20000 "the help overlay"
 key Escape; await '^help false'; pause_for_frame
 forget; shot before.png

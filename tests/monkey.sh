@@ -105,7 +105,7 @@ follow() {
 # Shows the window again in a size it has not had, and waits until the program says so: it is neither gone nor stuck.
 width=483
 answer() {
-  width=$((width == 483 ? 485 : 483))  # of which no action asks size_seen=
+  width=$((width == 483 ? 485 : 483)) size_seen=  # no action asks for these
   send "windowmap WINDOW"
   send "windowfocus WINDOW"
   send "windowsize WINDOW $width 360"

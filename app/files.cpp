@@ -61,18 +61,40 @@ void make_output_folder(const fs::path& folder) {
     throw Error("cannot write to the output folder", folder.string(), std::strerror(errno));
 }
 
+GrowingFile::GrowingFile(const fs::path& file)
+    : file_(file), temporary_(temporary_name(file)), stream_(temporary_, std::ios::binary) {
+  check();
+}
+
+GrowingFile::~GrowingFile() {
+  if (!stream_.is_open()) return;
+  std::error_code ignored;
+  fs::remove(temporary_, ignored);
+}
+
+void GrowingFile::add(const std::string& text) {
+  stream_ << text;
+  check();
+}
+
+void GrowingFile::close() {
+  stream_.close();
+  check();
+  finish_file(temporary_, file_);
+}
+
+void GrowingFile::check() {
+  if (stream_) return;
+  const std::string why = std::strerror(errno);
+  std::error_code ignored;
+  fs::remove(temporary_, ignored);
+  throw Error("cannot write", file_.string(), why, 1);
+}
+
 void write_file(const fs::path& file, const std::string& content) {
-  const fs::path temporary = temporary_name(file);
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << content;
-  stream.close();
-  if (!stream) {
-    const std::string why = std::strerror(errno);
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw Error("cannot write", file.string(), why, 1);
-  }
-  finish_file(temporary, file);
+  GrowingFile growing(file);
+  growing.add(content);
+  growing.close();
 }
 
 void write_png(const fs::path& file, const Image& image) {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <glm/glm.hpp>
 #include <string>
 #include <vector>
@@ -18,6 +19,21 @@ namespace tetpbd {
 void make_output_folder(const std::filesystem::path& folder);
 void write_file(const std::filesystem::path& file, const std::string& content);
 void write_png(const std::filesystem::path& file, const Image& image);
+/// Text that is written as it comes; the file appears under its name when close() has succeeded.
+class GrowingFile {
+ public:
+  explicit GrowingFile(const std::filesystem::path& file);
+  ~GrowingFile();
+  GrowingFile(const GrowingFile&) = delete;
+  GrowingFile& operator=(const GrowingFile&) = delete;
+  void add(const std::string& text);
+  void close();
+
+ private:
+  void check();
+  std::filesystem::path file_, temporary_;
+  std::ofstream stream_;
+};
 /// numpy arrays: float32 N x 3 (throws Error for numbers that are not finite), uint32 T x 4.
 void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);
 void write_npy(const std::filesystem::path& file, const std::vector<Tet>& rows);

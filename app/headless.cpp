@@ -112,14 +112,14 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
   interrupted = 0;
-  std::string csv = csv_header();
+  std::optional<GrowingFile> csv;
+  if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
   RunErrors errors;
   Timing timing;
   const auto take = [&](const std::optional<Measurement>& measurement) {
     if (!measurement) return false;
     add_measurement(errors, *measurement, sim);
-    if (options.csv_every > 0 && measurement->step % options.csv_every == 0)
-      csv += csv_row(*measurement, errors);
+    if (csv && measurement->step % options.csv_every == 0) csv->add(csv_row(*measurement, errors));
     return true;
   };
   {
@@ -133,11 +133,11 @@ int run_headless(const Scene& scene, const RunOptions& options) {
       if (sim.solver.step_on_cpu == nullptr) glFinish();  // wall time of the work itself, not of queueing it
       const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
       const bool bad = check_finite(sim, true).has_value();  // the step is done, so this waits for nothing
-      measure(metrics, sim);
+      if (bad || s % options.measure_every == 0 || s == steps) measure(metrics, sim);
       if (bad) break;
-      timing.wall_ms.push_back(seconds * 1e3);
+      timing.wall_ms.add(seconds * 1e3);
       timing.total_s += seconds;
-      while (const auto ms = sim.timer.poll()) timing.gpu_ms.push_back(*ms);
+      while (const auto ms = sim.timer.poll()) timing.gpu_ms.add(*ms);
       while (take(collect(metrics))) {
       }
       if (frames) {
@@ -150,9 +150,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   }
   while (take(collect(metrics, true))) {
   }
-  while (const auto ms = sim.timer.poll(true)) timing.gpu_ms.push_back(*ms);
-  timing.gpu_ms.resize(
-      std::min(timing.gpu_ms.size(), timing.wall_ms.size()));  // without the step that went wrong
+  while (const auto ms = sim.timer.poll(true)) timing.gpu_ms.add(*ms);
   if (frames) frames->finish();
   errors.non_finite = check_finite(sim, true);
   errors.finite = errors.finite && !errors.non_finite;
@@ -160,7 +158,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   write_file(options.out / "stats.json",
              statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
                              guard_counts(sim), good ? std::optional(state_hash(sim)) : std::nullopt));
-  if (options.csv_every > 0) write_file(options.out / "stats.csv", csv);
+  if (csv) csv->close();
   if (options.positions && good) {
     std::vector<glm::vec3> positions;
     for (const glm::dvec3& p : read_state(sim).positions) positions.emplace_back(p);
@@ -169,7 +167,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   }
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
              sim.steps, context.capabilities().renderer, errors.max_volume_loss_percent,
-             percentiles(timing.wall_ms).median, (options.out / "stats.json").string());
+             percentiles(timing.wall_ms.values).median, (options.out / "stats.json").string());
   if (interrupted)
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);

@@ -16,6 +16,7 @@ struct RunOptions {
   std::filesystem::path video;  ///< empty: none
   long video_every = 0;         ///< steps a video frame; 0: real time at 30 frames a second
   long csv_every = 1;           ///< steps; 0: no stats.csv
+  long measure_every = 1;       ///< steps between measurements; the last step is measured in any case
   bool positions = false;       ///< positions.npy and tets.npy
   int gpu = -1;
   int width = 1280, height = 720, samples = 4;

@@ -18,6 +18,7 @@
 #include "app/mesh_command.h"
 #include "app/reproduce.h"
 #include "app/scene.h"
+#include "app/soak.h"
 #include "app/window.h"
 #include "sim/error.h"
 #include "sim/gpu.h"
@@ -170,8 +171,25 @@ int run_commands(int argc, char** argv) {
   run->add_option("--csv-every", options.csv_every, "a row of stats.csv every K steps, 0: none")
       ->check(CLI::Range(0L, 1000000000L))
       ->capture_default_str();
+  run->add_option("--measure-every", options.measure_every,
+                  "measure errors every K steps and at the end; largest values are over the measured steps")
+      ->check(CLI::Range(1L, 1000000000L))
+      ->capture_default_str();
   run->add_flag("--positions", options.positions, "write positions.npy and tets.npy");
   run->add_flag("--progress", options.progress, "show progress even if standard error is no terminal");
+
+  auto* soak = app.add_subcommand(
+      "soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down");
+  add_scene_options(*soak, scene);
+  SoakOptions soak_options;
+  soak->add_option("--settle", soak_options.settle, "steps before the watch begins")
+      ->check(CLI::Range(0L, 1000000000L))
+      ->capture_default_str();
+  soak->add_option("--steps", soak_options.steps, "steps watched")
+      ->check(CLI::Range(10L, 1000000000L))
+      ->capture_default_str();
+  soak->add_option("--out", soak_options.out, "folder for soak.json and soak.csv")->capture_default_str();
+  soak->add_flag("--progress", soak_options.progress, "show progress even if standard error is no terminal");
 
   auto* bench = app.add_subcommand("bench", "fps and ms a step, the paper's protocol and ours");
   BenchOptions bench_options;
@@ -339,6 +357,10 @@ int run_commands(int argc, char** argv) {
     options.width = scene.width, options.height = scene.height, options.samples = scene.samples;
     options.view = scene.view;
     return run_headless(opened, options);
+  }
+  if (*soak) {
+    soak_options.gpu = scene.gpu;
+    return run_soak(scene_of(scene), soak_options);
   }
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
     throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",

@@ -22,18 +22,17 @@ MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::funct
     glFinish();
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     if (check_finite(sim, true)) break;
-    run.timing.wall_ms.push_back(seconds * 1e3);
+    run.timing.wall_ms.add(seconds * 1e3);
     run.timing.total_s += seconds;
     measure(metrics, sim);
     while (take(collect(metrics))) {
     }
-    while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.push_back(*ms);
+    while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.add(*ms);
     if (!run.errors.finite || (go_on && !go_on(s))) break;
   }
   while (take(collect(metrics, true))) {
   }
-  while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.push_back(*ms);
-  run.timing.gpu_ms.resize(std::min(run.timing.gpu_ms.size(), run.timing.wall_ms.size()));
+  while (const auto ms = sim.timer.poll(true)) run.timing.gpu_ms.add(*ms);
   run.errors.non_finite = check_finite(sim, true);
   run.errors.finite = run.errors.finite && !run.errors.non_finite;
   return run;

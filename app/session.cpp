@@ -78,11 +78,20 @@ bool attempt(Session& s, const std::function<void()>& action) {
   return false;
 }
 
+namespace {
+// What a run without a window of as many steps must give, too. Waits for the GPU, so only where somebody
+// reads it.
+void log_state(Session& s) {
+  if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
+}
+}  // namespace
+
 void play(Session& s, bool playing) {
   if (s.playing == playing) return;
   s.playing = playing;
   s.clock.owed = 0;
   s.log("{}", playing ? "play" : "pause");
+  if (!playing) log_state(s);
 }
 
 void single_step(Session& s) {
@@ -92,6 +101,7 @@ void single_step(Session& s) {
     measure_frame(s, true);
   });
   s.log("step {}", s.loaded.sim.steps);
+  log_state(s);
 }
 
 void restart(Session& s) {
@@ -133,8 +143,25 @@ void watch_state(Session& s) {
   say(s, error_of(*found).what(), true, true);
 }
 
-void change_settings(Session& s, const Settings& wanted) {
+namespace {
+// Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a step
+// takes minutes. A scene or the command line can.
+void bound_passes(Session& s, Settings& wanted, const Settings& old) {
+  constexpr long most = 10000;
+  if (long(wanted.iterations) * wanted.substeps <= std::max(most, long(old.iterations) * old.substeps))
+    return;
+  if (wanted.iterations != old.iterations)
+    wanted.iterations = int(std::max(1L, most / wanted.substeps));
+  else
+    wanted.substeps = int(std::max(1L, most / wanted.iterations));
+  say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
+}
+}  // namespace
+
+void change_settings(Session& s, const Settings& asked) {
   const Settings old = s.loaded.sim.settings;
+  Settings wanted = asked;
+  bound_passes(s, wanted, old);
   attempt(s, [&] {
     check_settings(wanted, "window");
     apply_settings(s.loaded.sim, wanted);
@@ -167,6 +194,7 @@ void finish_loading(Session& s) {
     Scene scene = load_scene(request.name, request.overrides);
     if (request.keep_settings) scene.settings = s.loaded.sim.settings;
     take_over(s, load(request.name, request.overrides, scene), request.keep_camera);
+    s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);  // what was there before is gone
   });
 }
 

@@ -108,7 +108,8 @@ void play(Session& session, bool playing);
 void single_step(Session& session);
 /// To the start; with a parameter changed that needs it, the bodies are made again.
 void restart(Session& session);
-void change_settings(Session& session, const Settings& wanted);
+/// As asked for, but without steps that would stop the window for minutes.
+void change_settings(Session& session, const Settings& asked);
 /// Loads what was asked for, in place of what there is if it succeeds.
 void finish_loading(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);

@@ -10,6 +10,15 @@ namespace tetpbd {
 
 using nlohmann::ordered_json;
 
+void Samples::add(double value) {
+  ++count;
+  if (values.size() < most) {
+    values.push_back(value);
+  } else if (const std::uint64_t place = random() % count; place < most) {
+    values[place] = value;
+  }
+}
+
 Percentiles percentiles(std::vector<double> values) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
@@ -28,9 +37,9 @@ ordered_json number(double value) {
 
 ordered_json vector(const glm::dvec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
 
-ordered_json times(const std::vector<double>& ms) {
-  if (ms.empty()) return nullptr;
-  const Percentiles p = percentiles(ms);
+ordered_json times(const Samples& ms) {
+  if (ms.values.empty()) return nullptr;
+  const Percentiles p = percentiles(ms.values);
   return {{"median", number(p.median)}, {"p05", number(p.p05)}, {"p95", number(p.p95)}};
 }
 

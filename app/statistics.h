@@ -1,7 +1,9 @@
 // stats.json and stats.csv: names that scripts rely on (docs/statistics.md).
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -10,9 +12,19 @@
 
 namespace tetpbd {
 
+/// Numbers in bounded memory: all of them up to `most`, then a random choice of `most` among all so far
+/// (reservoir sampling, always the same seed). Percentiles are exact up to there and estimates beyond.
+struct Samples {
+  static constexpr std::size_t most = 1 << 16;
+  std::vector<double> values;
+  std::uint64_t count = 0;  ///< added
+  std::mt19937_64 random;
+  void add(double value);
+};
+
 /// Times of the steps of a run, in milliseconds.
 struct Timing {
-  std::vector<double> gpu_ms, wall_ms;
+  Samples gpu_ms, wall_ms;
   double total_s = 0;  ///< of all steps, without what came between them
 };
 

@@ -160,7 +160,8 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
     ImGui::PushStyleColor(ImGuiCol_Border,
                           message.error ? ImVec4(0.80f, 0.36f, 0.26f, 0.8f) : ImVec4(0.80f, 0.82f, 0.84f, 1));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
-    ImGui::Begin(fmt::format("message {}", message.text).c_str(), nullptr,
+    // By place, not by text: Dear ImGui keeps every window it has ever been told of.
+    ImGui::Begin(fmt::format("message {}", i).c_str(), nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing);
     if (message.error) {

@@ -31,6 +31,7 @@ class Handle {
     if constexpr (kind == Named::sampler)
       glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0), space = GL_SAMPLER;
     glObjectLabel(space, id, GLsizei(label.size()), label.data());
+    count_gl_objects(1);
     return handle;
   }
   Handle(Handle&& other) noexcept { std::swap(id_, other.id_); }
@@ -40,6 +41,7 @@ class Handle {
   }
   ~Handle() {
     if (!id_) return;
+    count_gl_objects(-1);
     if constexpr (kind == Named::vertex_array) glDeleteVertexArrays(1, &id_);
     if constexpr (kind == Named::texture) glDeleteTextures(1, &id_);
     if constexpr (kind == Named::renderbuffer) glDeleteRenderbuffers(1, &id_);

@@ -21,6 +21,8 @@ const std::vector<std::pair<std::string, std::string>>& embedded_shaders();
 namespace {
 
 std::atomic<int> error_count = 0;
+std::atomic<long> live_objects = 0;
+std::atomic<std::int64_t> live_buffer_bytes = 0;
 
 void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text,
                            const void*) {
@@ -48,6 +50,13 @@ void label_object(GLenum kind, GLuint id, const std::string& label) {
 }  // namespace
 
 int gl_error_count() { return error_count; }
+
+GlLive gl_live() { return {live_objects, live_buffer_bytes}; }
+
+void count_gl_objects(long change, std::int64_t buffer_bytes) {
+  live_objects += change;
+  live_buffer_bytes += buffer_bytes;
+}
 
 bool is_software_renderer() {
   const std::string renderer = gl_string(GL_RENDERER);
@@ -169,13 +178,18 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
     throw;
   }
   label_object(GL_BUFFER, id_, label_);
+  count_gl_objects(1, std::int64_t(bytes_));
 }
 
 Buffer::~Buffer() {
-  if (id_) glDeleteBuffers(1, &id_);
+  if (!id_) return;
+  glDeleteBuffers(1, &id_);
+  count_gl_objects(-1, -std::int64_t(bytes_));
 }
 
+// Kernels queued before may still read or write the buffer (docs/barriers.md).
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
   glBufferSubData(GL_COPY_WRITE_BUFFER, GLintptr(offset), GLsizeiptr(bytes), data);
 }
@@ -187,6 +201,7 @@ void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
 }
 
 void Buffer::clear() const {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
   glClearBufferData(GL_COPY_WRITE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
@@ -376,6 +391,7 @@ Program::Program(std::string label, const std::vector<Stage>& stages, const Shad
     throw;
   }
   id_ = link_program(label_, shaders);
+  count_gl_objects(1);
 }
 
 Program Program::compute(const std::string& file, const ShaderWords& words,
@@ -386,7 +402,9 @@ Program Program::compute(const std::string& file, const ShaderWords& words,
 }
 
 Program::~Program() {
-  if (id_) glDeleteProgram(id_);
+  if (!id_) return;
+  glDeleteProgram(id_);
+  count_gl_objects(-1);
 }
 
 GLint Program::location(const char* name) const {
@@ -399,11 +417,25 @@ GLint Program::location(const char* name) const {
 }
 
 // -----------------------------------------------------------------------------------------------------------
-// timers
+// fences and timers
+
+Fence Fence::here() {
+  Fence fence;
+  fence.sync_ = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  count_gl_objects(1);
+  return fence;
+}
+
+Fence::~Fence() {
+  if (!sync_) return;
+  glDeleteSync(sync_);
+  count_gl_objects(-1);
+}
 
 Timer::~Timer() {
   for (const Span& span : free_) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
   for (const Span& span : pending_) glDeleteQueries(1, &span.begin), glDeleteQueries(1, &span.end);
+  count_gl_objects(-2 * long(free_.size() + pending_.size()));
 }
 
 void Timer::begin() {
@@ -411,6 +443,7 @@ void Timer::begin() {
   if (free_.empty()) {
     glGenQueries(1, &span.begin);
     glGenQueries(1, &span.end);
+    count_gl_objects(2);
   } else {
     span = free_.back();
     free_.pop_back();

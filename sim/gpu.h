@@ -62,6 +62,14 @@ bool reached(GLsync fence, bool wait, const char* what);
 void check_memory(const std::string& what, std::size_t bytes);
 /// Forgets GL errors of earlier calls, so that check_memory judges the next alone.
 void clear_errors();
+/// What the program holds of GL right now, over all contexts: buffers, programs, queries, fences of
+/// measurements, and what render/handles.h makes. Textures' and renderbuffers' bytes are not counted.
+struct GlLive {
+  long objects = 0;
+  std::int64_t buffer_bytes = 0;
+};
+GlLive gl_live();
+void count_gl_objects(long change, std::int64_t buffer_bytes = 0);
 
 /// A buffer object of fixed size in bytes.
 class Buffer {
@@ -172,6 +180,23 @@ class Program {
   std::string label_;
   std::string declarations_;  ///< the lines that declare uniforms
   mutable std::map<std::string, GLint, std::less<>> locations_;
+};
+
+/// A place in the GPU's queue.
+class Fence {
+ public:
+  Fence() = default;
+  static Fence here();
+  Fence(Fence&& other) noexcept { std::swap(sync_, other.sync_); }
+  Fence& operator=(Fence&& other) noexcept {
+    std::swap(sync_, other.sync_);
+    return *this;
+  }
+  ~Fence();
+  GLsync sync() const { return sync_; }
+
+ private:
+  GLsync sync_ = nullptr;
 };
 
 /// Number of work-groups of `size` invocations that cover `count`.

@@ -137,10 +137,9 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
 
 std::optional<Measurement> read_oldest(Metrics& m, bool wait) {
   if (m.pending.empty()) return std::nullopt;
-  if (!reached(m.pending.front().fence, wait, "measuring")) return std::nullopt;
-  const Metrics::Pending pending = m.pending.front();
+  if (!reached(m.pending.front().fence.sync(), wait, "measuring")) return std::nullopt;
+  const Metrics::Pending pending = std::move(m.pending.front());
   m.pending.pop_front();
-  glDeleteSync(pending.fence);
   return read_row(m, pending);
 }
 
@@ -193,8 +192,7 @@ void measure(Metrics& m, const Sim& sim) {
     dispatch(m.rigid, groups);
     dispatch(m.close, 1);
   }
-  m.pending.push_back({glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0), slot, sim.steps,
-                       double(sim.steps) * sim.settings.dt,
+  m.pending.push_back({Fence::here(), slot, sim.steps, double(sim.steps) * sim.settings.dt,
                        sim.settings.ground ? sim.settings.ground_height : 0.0, sim.settings.gravity});
 }
 

@@ -47,7 +47,7 @@ struct Metrics {
     glm::dvec3 first_position{0};
   };
   struct Pending {
-    GLsync fence;
+    Fence fence;
     std::size_t slot;
     long step;
     double time;

@@ -255,6 +255,7 @@ void step(Sim& sim) {
   sim.velocities.bind_storage(BIND_VELOCITIES);
   sim.finish.program.use();
   sim.finish.program.set("step_slot", check_slot(sim.steps + 1));
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
   for (int substep = 0; substep < s.substeps; ++substep) {
     sim.positions[sim.current].bind_storage(BIND_POSITIONS);
     dispatch(sim.predict);

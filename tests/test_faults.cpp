@@ -195,7 +195,7 @@ TEST_CASE("a measured run ends with the numbers of the last good step and never 
     CHECK(run.errors.last->step == 6);
     CHECK(run.errors.last->finite());
     CHECK(std::isfinite(run.errors.max_volume_loss_percent));
-    CHECK(run.timing.wall_ms.size() == 6);
+    CHECK(run.timing.wall_ms.count == 6);
     const auto text = non_finite_json(run.errors.non_finite).dump();
     CHECK(has(text, "\"step\":7"));
     CHECK(has(text, "\"cause\":\""));

@@ -313,6 +313,60 @@ TEST_CASE("an interrupted run leaves whole files") {
   CHECK(stats["timing"]["steps"].get<long>() < 1000000);
 }
 
+TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does not pass") {
+  const Folder folder;
+  std::ofstream(folder.path / "rest.json")
+      << R"({"name": "rest", "bodies": [{"name": "block", "block": {"size": [1, 0.5, 0.5], "cells": [4, 2, 2]},
+             "position": [0, 0.02, 0]}], "solver": {"iterations": 10}})";
+  for (const char* mode : {"node", "constraint"}) {
+    CAPTURE(mode);
+    tetpbd("soak --scene rest.json --settle 600 --steps 400 --out s --mode " + std::string(mode), folder);
+    const json soak = json::parse(read(folder.path / "s/soak.json"));
+    CHECK(soak["steps"] == 400);
+    CHECK(soak["finite"] == true);
+    CHECK(soak["gl_buffer_bytes"]["start"].get<long>() > 10000);
+    int seen = 0;
+    for (const json& check : soak["checks"]) {
+      const std::string name = check["name"];
+      CAPTURE(name);
+      CAPTURE(check["value"].dump());
+      if (name == "speed_ratio") continue;  // of this machine, with whatever else runs on it
+      CHECK(check["passed"] == true);
+      ++seen;
+    }
+    CHECK(seen == 4);
+    const std::string csv = read(folder.path / "s/soak.csv");
+    CHECK(std::count(csv.begin(), csv.end(), '\n') == 402);
+  }
+  const Outcome falling = tetpbd("soak --scene rest.json --settle 0 --steps 100 --out f", folder);
+  CHECK(falling.status == 1);
+  CHECK(falling.err.find("drift") != std::string::npos);
+  CHECK(json::parse(read(folder.path / "f/soak.json"))["passed"] == false);
+}
+
+TEST_CASE("a run that measures every tenth step has the same state, rows and end as one that measures all") {
+  const Folder folder;
+  const std::string command = "run --scene beam --iterations 2 --steps 25 ";
+  REQUIRE(tetpbd(command + "--out all", folder).status == 0);
+  REQUIRE(tetpbd(command + "--measure-every 10 --out some", folder).status == 0);
+  const json all = json::parse(read(folder.path / "all/stats.json")),
+             some = json::parse(read(folder.path / "some/stats.json"));
+  CHECK(all["state_hash"] == some["state_hash"]);
+  CHECK(all["error"]["tet_volume_rms"] == some["error"]["tet_volume_rms"]);
+  CHECK(all["energy"]["final"] == some["energy"]["final"]);
+  std::istringstream csv_all(read(folder.path / "all/stats.csv")),
+      csv_some(read(folder.path / "some/stats.csv"));
+  std::vector<std::string> rows, few;
+  for (std::string line; std::getline(csv_all, line);) rows.push_back(line);
+  for (std::string line; std::getline(csv_some, line);) few.push_back(line);
+  REQUIRE(rows.size() == 27);
+  REQUIRE(few.size() == 5);  // header, 0, 10, 20, 25
+  CHECK(few[0] == rows[0]);
+  CHECK(few[1] == rows[1]);
+  CHECK(few[2].substr(0, few[2].find(',')) == "10");
+  CHECK(few[4].substr(0, few[4].find(',')) == "25");
+}
+
 TEST_CASE(
     "bench writes a row a setting, with and without rendering, and calls a software renderer by its name") {
   const Folder folder;

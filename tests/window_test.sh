@@ -114,6 +114,13 @@ key s; await '^step 1$'
 click play; await '^play'; await '^running [1-9]'
 key space; await '^pause'
 
+# ---------------------------------------------------------------------------------- the same bits as without a window
+await '^state [0-9]+ [0-9a-f]{16}$'
+read -r _ steps hash < <(grep '^state ' "$log" | tail -n 1)
+"$program" run --scene block.json --shaders shaders --steps "$steps" --csv-every 0 --out headless >/dev/null || fail "no run without a window"
+grep -q "\"state_hash\": \"$hash\"" headless/stats.json || fail "after $steps steps the window has another state than a run without it"
+[[ $steps -gt 3 ]] || fail "only $steps steps were compared"
+
 # ------------------------------------------------------------------------------------------------------------ settings
 forget
 to omega 0.3 0.5; press 1
@@ -142,7 +149,7 @@ key n; await '^normals flat'
 key n; await '^normals smooth'
 key g; await '^grid false'
 key g; await '^grid true'
-key h; await '^help true'; pause_for_frame; shot help.png
+key h; await '^help true'; sleep 1; shot help.png
 differ panels.png help.png 20000 "the help overlay"
 key Escape; await '^help false'; pause_for_frame
 forget; shot before.png

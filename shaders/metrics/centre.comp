@@ -7,11 +7,9 @@ uniform uint first_vertex;
 void main() {
   int me = int(gl_LocalInvocationIndex);
   if (me < M_ANGULAR) row[me] = total_of(me);
-  barrier();
-  memoryBarrierBuffer();
-  if (me != 0) return;
+  if (me != 0) return;  // works from the partial sums, not from what its neighbours write
   vec3 centre;
-  for (int a = 0; a < 3; ++a) centre[a] = row[M_MOMENT + a] / mass;
+  for (int a = 0; a < 3; ++a) centre[a] = total_of(M_MOMENT + a) / mass;
   // covariance[b][a] = sum m x_a X_b. The rest positions are about their centre of mass, so x needs no centring.
   float s[9];
   float scale = 0.0;

@@ -304,6 +304,8 @@ Program Program::compute(const std::string& file, const ShaderWords& words,
                          const std::vector<std::string>& defines) {
   std::string label = file.substr(0, file.rfind('.'));
   if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
+  for (const Substitutions& item : words.each)
+    if (const auto kind = item.find("KIND"); kind != item.end()) label += " " + kind->second;
   return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
 }
 

@@ -129,6 +129,8 @@ class Program {
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }
+  /// The same by a location that the shader states.
+  void set(int location, const glm::uvec3& value) const { glUniform3ui(location, value.x, value.y, value.z); }
   void set(const char* name, const glm::vec2& value) const { glUniform2fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec4& value) const { glUniform4fv(location(name), 1, &value.x); }
@@ -147,7 +149,7 @@ class Program {
 };
 
 /// Number of work-groups of `size` invocations that cover `count`.
-inline unsigned work_groups(std::size_t count, unsigned size) { return unsigned((count + size - 1) / size); }
+inline std::size_t work_groups(std::size_t count, unsigned size) { return (count + size - 1) / size; }
 
 /// GPU time between begin and end by pairs of timestamps, read back when ready (never waits unless asked).
 class Timer {

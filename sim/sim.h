@@ -19,13 +19,17 @@ struct Sim {
   ConstraintSystem system;
   std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
 
-  Buffer positions[2];  ///< Position, double buffered; `current` holds the state
-  Buffer predicted;     ///< Position
-  Buffer velocities;    ///< Velocity
-  Buffer step_block;    ///< Step
-  Pass predict, finish;
+  Buffer positions;   ///< Position
+  Buffer velocities;  ///< Velocity
+  Buffer predicted;   ///< Velocity (a pair as well), from the first iteration of a substep to the last
+  Buffer places;      ///< what neighbours see (places.glsl); of a double-buffered solver twice as many
+  Buffer step_block;  ///< Step
+  Pass predict;       ///< makes the places of the next step, after a change from outside
   Solver solver;
-  int current = 0;
+  Tuning tuning;
+  double unit = 1;                  ///< m, of places
+  bool stale = true;                ///< the places are not those of the next step
+  unsigned half = 0;                ///< which half of the places is read next
   long steps = 0;                   ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
@@ -33,10 +37,11 @@ struct Sim {
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
 
-  const Buffer& current_positions() const { return positions[current]; }
+  const Buffer& current_positions() const { return positions; }
 };
 
-Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings);
+Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
+               const Tuning& tuning = tuning_from_environment());
 /// Takes over new settings; the state stays. Rebuilds the solver if the mode or the constraint kinds changed.
 void apply_settings(Sim& sim, const Settings& settings);
 /// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
@@ -69,8 +74,8 @@ struct Explanation {
   };
   struct Dispatch {
     std::string name;
-    unsigned groups;
-    long per_step;
+    std::size_t groups;
+    long per_step;      ///< 0: only after a change from outside
     std::size_t bytes;  ///< of one dispatch
   };
   std::vector<Item> buffers;

@@ -5,7 +5,7 @@ Constraint2 stretch(vec3 x[2], real rest) {
   vec3 d = x[0] - x[1];
   real l = length(d);
   vec3 n = l > real(1e-6) * rest ? d / l : vec3(real(0));
-  c.C = resolved(l - rest, rest);
+  c.C = resolved(l - rest, rest + grain);
   c.gradient[0] = n;
   c.gradient[1] = -n;
   c.floor = real(0);

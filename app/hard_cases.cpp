@@ -73,7 +73,9 @@ ordered_json number(double value) { return std::isfinite(value) ? ordered_json(v
 
 ordered_json run_one(const HardCase& hard, const Scene& scene, long steps) {
   const auto model = build_model(scene);
-  Sim sim = create_sim(model, settings_of(scene, hard.mode), true);
+  Tuning tuning;
+  tuning.count_guards = true;
+  Sim sim = create_sim(model, settings_of(scene, hard.mode), tuning);
   Metrics metrics = create_metrics(*model);
   if (steps == 0) steps = std::max(1L, std::lround(scene.duration / scene.settings.dt));
   const MeasuredRun run = measure_run(sim, metrics, steps);

@@ -87,7 +87,9 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
-  Sim sim = create_sim(model, scene.settings, true);
+  Tuning tuning = tuning_from_environment();
+  tuning.count_guards = true;
+  Sim sim = create_sim(model, scene.settings, tuning);
   sim.timed = true;
   Metrics metrics = create_metrics(*model);
   const long steps =
@@ -161,9 +163,10 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   if (csv) csv->close();
   if (options.positions && good) {
     std::vector<glm::vec3> positions;
-    for (const glm::dvec3& p : read_state(sim).positions) positions.emplace_back(p);
+    for (const glm::dvec3& p : in_original_order(*model, read_state(sim).positions))
+      positions.emplace_back(p);
     write_npy(options.out / "positions.npy", positions);
-    write_npy(options.out / "tets.npy", model->rest.tets);
+    write_npy(options.out / "tets.npy", original_tets(*model));
   }
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
              sim.steps, context.capabilities().renderer, errors.max_volume_loss_percent,
@@ -188,15 +191,15 @@ int print_explanation(const Scene& scene, int gpu) {
              model->rest.tets.size());
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
     if (sim.system.present[k]) fmt::print(", {} {}", sim.system.lists[k].count(), constraint_kinds()[k].name);
-  fmt::print("\n\n{:<28}{:>14}\n", "buffer", "bytes");
-  for (const auto& buffer : e.buffers) fmt::print("{:<28}{:>14}\n", buffer.name, buffer.bytes);
-  fmt::print("{:<28}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
+  fmt::print("\n\n{:<52}{:>14}\n", "buffer", "bytes");
+  for (const auto& buffer : e.buffers) fmt::print("{:<52}{:>14}\n", buffer.name, buffer.bytes);
+  fmt::print("{:<52}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
              double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
-  fmt::print("{:<28}{:>14}{:>14}{:>16}\n", "kernel", "work-groups", "a step", "bytes a step");
+  fmt::print("{:<52}{:>14}{:>14}{:>16}\n", "kernel", "work-groups", "a step", "bytes a step");
   for (const auto& dispatch : e.dispatches)
-    fmt::print("{:<28}{:>14}{:>14}{:>16}\n", dispatch.name, dispatch.groups, dispatch.per_step,
+    fmt::print("{:<52}{:>14}{:>14}{:>16}\n", dispatch.name, dispatch.groups, dispatch.per_step,
                dispatch.bytes * std::size_t(dispatch.per_step));
-  fmt::print("{:<28}{:>14}{:>14}{:>16}\n", "all", "", e.dispatches_per_step, e.bytes_per_step);
+  fmt::print("{:<52}{:>14}{:>14}{:>16}\n", "all", "", e.dispatches_per_step, e.bytes_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);
   return 0;
 }

@@ -375,6 +375,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   model->obstacles = scene.obstacles;
+  renumber(*model);
   return model;
 }
 

@@ -51,7 +51,7 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
   for (int stage = 0; stage < 3; ++stage) {
     picker.kernel.set("stage", stage);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the stage before
-    glDispatchCompute(stage < 2 ? work_groups(picker.count, 128) : 1, 1, 1);
+    glDispatchCompute(stage < 2 ? unsigned(work_groups(picker.count, 128)) : 1, 1, 1);
   }
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   picker.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);

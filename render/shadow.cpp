@@ -50,7 +50,7 @@ void fit(const Shadow& shadow, GLuint positions, std::size_t vertices, const glm
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
   shadow.bounds.bind_storage(BIND_RENDER_BOUNDS);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
-  glDispatchCompute(work_groups(vertices, 128), 1, 1);
+  glDispatchCompute(unsigned(work_groups(vertices, 128)), 1, 1);
 
   shadow.fit_kernel.use();
   shadow.fit_kernel.set("map_size", float(Shadow::size));

@@ -102,7 +102,7 @@ void update(VertexGather& gather, GLuint positions, const Buffer& rest) {
   gather.items.bind_storage(BIND_RENDER_ITEMS);
   gather.values.bind_storage(BIND_RENDER_VALUES);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
-  glDispatchCompute(work_groups(gather.count, 128), 1, 1);
+  glDispatchCompute(unsigned(work_groups(gather.count, 128)), 1, 1);
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
 }
 

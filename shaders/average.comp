@@ -1,23 +1,27 @@
-// Constraint-centric Jacobi, second half (method.md eqs. 13-14): p += omega * (sum of corrections) / n_i, then contacts; clears the sums.
+// Second half of constraint-centric Jacobi (method.md eqs. 13-14): p += omega * (sum of corrections) / n_i, then contacts; clears the
+// sums. One thread a vertex.
 #include "types.glsl"
 #include "pair.glsl"
-layout(local_size_x = 256) in;
-layout(std430, binding = BIND_POSITIONS) buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_PREDICTED) readonly buffer Predicted { Position predicted[]; };
-layout(std430, binding = BIND_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
+#include "places.glsl"
+layout(local_size_x = $GROUP) in;
 layout(std430, binding = BIND_DELTAS) buffer Deltas { ivec4 deltas[]; };
-#include "contact.glsl"
+#include "vertex.glsl"
 
 void main() {
-  uint i = gl_GlobalInvocationID.x;
+  uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
   if (i >= params.vertex_count) return;
   Position own = positions[i];
-  if (!(own.inverse_mass > 0.0)) return;
-  vec3 correction = vec3(deltas[i].xyz) * (params.delta_unit * params.omega);
-  deltas[i] = ivec4(0);
-  Pair x = pair_add(Pair(own.high, own.low), correction);
-  vec3 moved = params.h * velocities[i].high + (relative(own, predicted[i]) + correction);
-  x = resolve_contacts(x, moved);
-  positions[i].high = x.high;
-  positions[i].low = x.low;
+  Velocity speed;
+  if ((turn.z & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+  vec3 correction = vec3(0.0);
+  if ((turn.z & PHASE_SOLVE) != 0u) {
+    ivec4 sum = deltas[i];
+    deltas[i] = ivec4(0);
+#if $FLOAT_SUMS
+    if (own.constraints > 0.0) correction = intBitsToFloat(sum).xyz * (params.omega / own.constraints);
+#else
+    correction = vec3(sum.xyz) * (params.delta_unit * params.omega);
+#endif
+  }
+  advance(i, own, speed, correction);
 }

@@ -1,9 +1,15 @@
 #include "collision.glsl"
+float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
+bool touches(Pair x) {
+  for (int k = 0; k < params.plane_count; ++k)
+    if (depth_of(x, params.planes[k]) < 0.0) return true;
+  return false;
+}
 // Corrects a vertex out of all half spaces; `moved`: its displacement in this substep before the correction.
 Pair resolve_contacts(Pair x, vec3 moved) {
   for (int k = 0; k < params.plane_count; ++k) {
     vec4 plane = params.planes[k];
-    float depth = (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low);
+    float depth = depth_of(x, plane);
     if (depth < 0.0) {
       vec3 correction = plane_correction(plane.xyz, depth, moved, params.friction);
       x = pair_add(x, correction);

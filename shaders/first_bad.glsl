@@ -4,9 +4,8 @@ layout(std430, binding = BIND_CHECK) buffer Check {
   uint first_bad;               // of any step: what guards the kept state
   uint step_bad[CHECK_STEPS];   // by step modulo CHECK_STEPS; ~0: none
 };
-uniform uint step_slot;
 
-void note_unless_finite(uint i, vec3 position, vec3 velocity) {
+void note_unless_finite(uint i, uint step_slot, vec3 position, vec3 velocity) {
   const uint exponent = 0x7f800000u;  // by bits, since compilers may assume that no NaN exists
   uvec3 p = floatBitsToUint(position) & exponent, v = floatBitsToUint(velocity) & exponent;
   if (any(equal(p, uvec3(exponent))) || any(equal(v, uvec3(exponent)))) {

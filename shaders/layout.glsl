@@ -14,7 +14,7 @@ struct Velocity {
   vec3 low;
   float _1;
 };
-// A constraint: its vertices and rest value.
+// A constraint: its vertices and rest value (error measures; the solvers have streams or patches).
 struct Record2 {
   uint vertices[2];
   float rest;
@@ -37,6 +37,10 @@ struct Step {
   float delta_unit;       // m, one unit of a fixed-point sum
   uint vertex_count;
   int plane_count;
+  float unit;             // m, one unit of a place: a power of two
+  float inverse_unit;     // 1/m
+  float position_grain;   // m, the size whose rounding is one unit (constraints/types.glsl)
+  float _0;
   vec4 stiffness[2];      // by constraint kind
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
 };
@@ -52,16 +56,26 @@ struct Step {
 #define GUARD_NOT_FINITE 64u  // a correction was not a number: dropped
 #define GUARDS 7
 
+// What a dispatch that moves vertices does with them beside the corrections (vertex.glsl); bits.
+#define PHASE_PREDICT 1u  // before: v += h g, p = x + h v
+#define PHASE_SOLVE 2u    // corrections and contacts
+#define PHASE_FINISH 4u   // after: v += (p - predicted) / h
+
 // Storage bindings of the simulation.
-#define BIND_POSITIONS 0      // the current ones; a double-buffered solver reads these
-#define BIND_POSITIONS_OUT 1  // ... and writes these
+#define BIND_POSITIONS 0
+#define BIND_VELOCITIES 1
 #define BIND_PREDICTED 2
-#define BIND_VELOCITIES 3
-#define BIND_ADJACENCY 4
-#define BIND_DELTAS 4         // constraint mode (it has no adjacency)
-#define BIND_RECORDS 5        // + index of the constraint kind among those present
-#define BIND_CHECK 1          // finish and keep: which vertex is not finite
-#define BIND_KEEP_FROM 0
+#define BIND_PLACES 3         // ivec4: what the neighbours of a vertex see of it (places.glsl)
+#define BIND_TABLE 4          // mode node: where each vertex's entries start
+#define BIND_DELTAS 4         // constraint modes: sums of corrections
+#define BIND_STREAMS 5        // mode node: entries, + index of the constraint kind among those present
+#define BIND_PATCHES 5        // mode constraint
+#define BIND_PATCH_VERTICES 6
+#define BIND_PATCH_RECORDS 7
+#define BIND_RECORDS 5        // mode paper: + index of the constraint kind among those present
+#define BIND_CHECK 8          // which vertex is not finite
+#define STORAGE_BINDINGS 9
+#define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most
 // Uniform blocks.

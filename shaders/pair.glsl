@@ -17,3 +17,7 @@ vec3 relative(Position a, Position b) {
   precise vec3 d = (a.high - b.high) + (a.low - b.low);
   return d;
 }
+vec3 relative(Pair a, Pair b) {
+  precise vec3 d = (a.high - b.high) + (a.low - b.low);
+  return d;
+}

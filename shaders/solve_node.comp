@@ -1,49 +1,57 @@
 // Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): $LANES invocations a vertex gather the corrections of all
-// constraints on it, of every kind present; one averages, and writes the other buffer. Each constraint is evaluated once by each of its vertices.
+// constraints on it, of every kind present; the first adds them up and moves the vertex. Places are read from one half of their
+// buffer and written to the other. Each constraint is evaluated once by each of its vertices.
 #include "types.glsl"
 #include "pair.glsl"
-layout(local_size_x = 64) in;
-layout(std430, binding = BIND_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_POSITIONS_OUT) writeonly buffer PositionsOut { Position positions_out[]; };
-layout(std430, binding = BIND_PREDICTED) readonly buffer Predicted { Position predicted[]; };
-layout(std430, binding = BIND_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
-layout(std430, binding = BIND_ADJACENCY) readonly buffer Adjacency { uint adjacency[]; };
+#include "places.glsl"
+layout(local_size_x = $GROUP) in;
+layout(std430, binding = BIND_TABLE) restrict readonly buffer Table { uint table[]; };
+#include "vertex.glsl"
 #include "constraints/types.glsl"
-#include "contact.glsl"
 #include "guards.glsl"
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "gather.glsl"
 
 #if $LANES > 1
-shared vec3 sums[gl_WorkGroupSize.x];
+shared vec3 sums[$GROUP];
 #endif
 
 void main() {
-  uint i = gl_GlobalInvocationID.x / $LANESu;
-  uint lane = gl_GlobalInvocationID.x % $LANESu;
-  bool inside = i < params.vertex_count;
-  Position own = positions[inside ? i : 0u];
+  uint me = gl_LocalInvocationIndex;
+  uint thread = group_index() * $GROUPu + me;
+  uint i = thread / $LANESu, lane = thread % $LANESu;
+  bool mine = i < params.vertex_count && lane == 0u;
+  Position own;
+  Velocity speed;
+  if (mine) {
+    own = positions[i];
+    if ((turn.z & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+  }
   vec3 sum = vec3(0.0);
-  if (inside && own.inverse_mass > 0.0) {
-    #foreach sum += gather_$KIND(i, lane, own);
+  if (i < params.vertex_count && (turn.z & PHASE_SOLVE) != 0u) {
+    ivec4 self = places[turn.x + i];
+    // The first entries of all kinds are on their way before the first one is used.
+    uint row = $KINDSu * i;
+    #foreach uint at_$KIND = table[row + $INDEXu] + lane, end_$KIND = table[row + $KINDSu + $INDEXu];
+    #foreach uvec$ARITY entry_$KIND; if (at_$KIND < end_$KIND) entry_$KIND = stream_$KIND[at_$KIND];
+    if (inverse_mass_of(self) > 0.0) {
+      #foreach sum += gather_$KIND(i, at_$KIND, end_$KIND, entry_$KIND, self);
+    }
   }
 #if $LANES > 1
-  sums[gl_LocalInvocationIndex] = sum;
+  sums[me] = sum;
   barrier();
-  for (uint reach = $LANESu / 2u; reach > 0u; reach /= 2u) {
-    if (lane < reach) sums[gl_LocalInvocationIndex] += sums[gl_LocalInvocationIndex + reach];
-    barrier();
+  // Four at a time, in an order that does not depend on who is first.
+  for (uint reach = $LANESu; reach > 1u;) {
+    uint part = max(reach / 4u, 1u);
+    if (lane < part) {
+      sum = sums[me];
+      for (uint other = lane + part; other < reach; other += part) sum += sums[me - lane + other];
+      sums[me] = sum;
+    }
+    reach = part;
+    if (reach > 1u) barrier();
   }
-  sum = sums[gl_LocalInvocationIndex];
 #endif
-  if (!inside || lane != 0u) return;
-  if (own.inverse_mass > 0.0) {
-    vec3 correction = own.constraints > 0.0 ? sum * (params.omega / own.constraints) : vec3(0.0);
-    Pair x = pair_add(Pair(own.high, own.low), correction);
-    vec3 moved = params.h * velocities[i].high + (relative(own, predicted[i]) + correction);
-    x = resolve_contacts(x, moved);
-    own.high = x.high;
-    own.low = x.low;
-  }
-  positions_out[i] = own;
+  if (mine) advance(i, own, speed, own.constraints > 0.0 ? sum * (params.omega / own.constraints) : vec3(0.0));
 }

@@ -1,11 +1,7 @@
 #include "sim/constraints.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
-
-#include "sim/error.h"
 
 namespace tetpbd {
 
@@ -65,7 +61,11 @@ void Volume::build(const TetMesh& mesh, ConstraintList& list) {
 const std::vector<ConstraintKind>& constraint_kinds() {
   static const std::vector<ConstraintKind> rows = [] {
     std::vector<ConstraintKind> result;
-    for_each_kind([&](auto kind, int) { result.push_back({kind.name, kind.arity, kind.stiffness}); });
+    for_each_kind([&]<class Kind>(Kind, int) {
+      const int* turned = nullptr;
+      if constexpr (requires { Kind::turned; }) turned = &Kind::turned[0][0];
+      result.push_back({Kind::name, Kind::arity, Kind::stiffness, turned});
+    });
     return result;
   }();
   return rows;
@@ -91,32 +91,6 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names
     system.lists.push_back(std::move(list));
   });
   return system;
-}
-
-std::vector<std::uint32_t> vertex_adjacency(const ConstraintSystem& system) {
-  const std::size_t vertices = system.at_vertex.size();
-  std::vector<const ConstraintList*> lists;
-  std::size_t entries = 0;
-  for (std::size_t k = 0; k < system.lists.size(); ++k)
-    if (system.present[k]) lists.push_back(&system.lists[k]), entries += system.lists[k].vertices.size();
-  std::vector<std::uint32_t> table(lists.size() * (vertices + 1) + entries);
-  if (table.size() > (std::size_t(1) << 32) - 1)
-    throw Error("too many constraints", fmt::format("{} of them", system.count()), "use a smaller mesh");
-  std::uint32_t next = std::uint32_t(lists.size() * (vertices + 1));
-  for (std::size_t k = 0; k < lists.size(); ++k) {
-    const ConstraintList& list = *lists[k];
-    std::uint32_t* offsets = table.data() + k * (vertices + 1);
-    for (std::uint32_t v : list.vertices) ++offsets[v + 1];
-    offsets[0] = next;
-    for (std::size_t i = 0; i < vertices; ++i) offsets[i + 1] += offsets[i];
-    next = offsets[vertices];
-    std::vector<std::uint32_t> cursor(offsets, offsets + vertices);
-    const std::size_t arity = std::size_t(list.arity);
-    for (std::size_t c = 0; c < list.count(); ++c)
-      for (std::size_t j = 0; j < arity; ++j)
-        table[cursor[list.vertices[c * arity + j]]++] = std::uint32_t(4 * c + j);
-  }
-  return table;
 }
 
 }  // namespace tetpbd

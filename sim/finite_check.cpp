@@ -38,7 +38,7 @@ void copy_unless_bad(const Sim& sim, const Buffer& from, const Buffer& to) {
   check.words.bind_storage(BIND_CHECK);
   from.bind_storage(BIND_KEEP_FROM);
   to.bind_storage(BIND_KEEP_TO);
-  glDispatchCompute(std::min(work_groups(words, 256), 1024u), 1, 1);
+  glDispatchCompute(GLuint(std::min<std::size_t>(work_groups(words, 256), 1024)), 1, 1);
 }
 
 void keep_state(Sim& sim) {
@@ -220,9 +220,9 @@ bool return_to_kept(Sim& sim) {
   auto positions = check.positions.read_all<Position>();
   for (std::size_t i = 0; i < positions.size(); ++i) positions[i].inverse_mass = float(sim.inverse_masses[i]);
   const auto velocities = check.velocities.read_all<Velocity>();
-  for (const Buffer& buffer : sim.positions)
-    if (buffer) buffer.write(0, buffer.bytes(), positions.data());
+  sim.positions.write(0, sim.positions.bytes(), positions.data());
   sim.velocities.write(0, sim.velocities.bytes(), velocities.data());
+  sim.stale = true;
   forget(check, sim.steps);
   return true;
 }

@@ -15,6 +15,7 @@ struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
+  static constexpr real grain = 0;  // positions are kept in full here
   // in order of use
   // clang-format off
 #pragma GCC diagnostic push

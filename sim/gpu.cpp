@@ -75,7 +75,7 @@ Limits gl_limits() {
   return limits;
 }
 
-void check_work_groups(const std::string& kernel, unsigned groups, const Limits& limits) {
+void check_work_groups(const std::string& kernel, std::size_t groups, const Limits& limits) {
   if (groups > limits.work_groups)
     throw Error("too many work-groups",
                 fmt::format("{} needs {}, the driver allows {}", kernel, groups, limits.work_groups),
@@ -398,6 +398,8 @@ Program Program::compute(const std::string& file, const ShaderWords& words,
                          const std::vector<std::string>& defines) {
   std::string label = file.substr(0, file.rfind('.'));
   if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
+  for (const Substitutions& item : words.each)
+    if (const auto kind = item.find("KIND"); kind != item.end()) label += " " + kind->second;
   return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
 }
 

@@ -48,7 +48,7 @@ struct Limits {
 /// The current context's.
 Limits gl_limits();
 /// Throws Error if a kernel needs more work-groups than one dispatch may have.
-void check_work_groups(const std::string& kernel, unsigned groups, const Limits& limits = gl_limits());
+void check_work_groups(const std::string& kernel, std::size_t groups, const Limits& limits = gl_limits());
 
 /// Throws ContextLost if the GPU was reset. Cheap, but not free: once a frame, not once a dispatch.
 void check_context();
@@ -163,6 +163,8 @@ class Program {
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }
+  /// The same by a location that the shader states.
+  void set(int location, const glm::uvec4& value) const { glUniform4uiv(location, 1, &value.x); }
   void set(const char* name, const glm::vec2& value) const { glUniform2fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec4& value) const { glUniform4fv(location(name), 1, &value.x); }
@@ -200,7 +202,7 @@ class Fence {
 };
 
 /// Number of work-groups of `size` invocations that cover `count`.
-inline unsigned work_groups(std::size_t count, unsigned size) { return unsigned((count + size - 1) / size); }
+inline std::size_t work_groups(std::size_t count, unsigned size) { return (count + size - 1) / size; }
 
 /// GPU time between begin and end by pairs of timestamps, read back when ready (never waits unless asked).
 class Timer {

@@ -162,8 +162,8 @@ void measure(Metrics& m, const Sim& sim) {
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(),
                       GLintptr(b * M_STRIDE * sizeof(float)), M_STRIDE * sizeof(float));
     // About four tets an invocation before there are more groups.
-    const unsigned groups =
-        std::min<unsigned>(METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE));
+    const unsigned groups = unsigned(std::min<std::size_t>(
+        METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE)));
     for (const Program* program : {&m.constraints, &m.vertices, &m.rigid, &m.centre, &m.close}) {
       program->use();
       program->set("groups", groups);

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "sim/constraints.h"
 #include "sim/error.h"
+#include "sim/hilbert.h"
 
 namespace tetpbd {
 
@@ -37,6 +39,7 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   for (std::size_t i = 0; i < masses.size(); ++i) centre += masses[i] * positions[i], total += masses[i];
   centre /= total;
   for (std::size_t i = 0; i < masses.size(); ++i) {
+    model.original.push_back(std::uint32_t(model.original.size()));
     model.masses.push_back(masses[i]);
     // A vertex of no tet has no mass; it belongs to nothing and stays where it is.
     model.inverse_masses.push_back(masses[i] > 0 ? 1 / masses[i] : 0);
@@ -50,6 +53,43 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   const double size = bounds(mesh.positions).size();
   model.size = model.bodies.empty() ? size : std::max(model.size, size);
   model.bodies.push_back(body);
+}
+
+void renumber(Model& model) {
+  const std::size_t count = model.rest.positions.size();
+  std::vector<std::uint64_t> keys(count);
+  std::vector<std::uint32_t> old(count), now(count);  // vertex i was old[i]; vertex i is now now[i]
+  std::iota(old.begin(), old.end(), 0u);
+  for (const Body& body : model.bodies) {
+    const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
+    const Bounds box = bounds({model.rest.positions.begin() + first, model.rest.positions.begin() + end});
+    for (auto i = std::size_t(first); i < std::size_t(end); ++i)
+      keys[i] = hilbert_key(model.rest.positions[i], box);
+    std::stable_sort(old.begin() + first, old.begin() + end,
+                     [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+  }
+  for (std::uint32_t i = 0; i < count; ++i) now[old[i]] = i;
+  const auto reorder = [&](auto& rows) {
+    auto from = rows;
+    for (std::size_t i = 0; i < count; ++i) rows[i] = from[old[i]];
+  };
+  reorder(model.rest.positions);
+  reorder(model.inverse_masses);
+  reorder(model.masses);
+  reorder(model.positions);
+  reorder(model.velocities);
+  reorder(model.original);
+  for (Tet& tet : model.rest.tets)
+    for (std::uint32_t& v : tet) v = now[v];
+  for (Triangle& triangle : model.rest.surface)
+    for (std::uint32_t& v : triangle) v = now[v];
+}
+
+std::vector<Tet> original_tets(const Model& model) {
+  std::vector<Tet> tets = model.rest.tets;
+  for (Tet& tet : tets)
+    for (std::uint32_t& v : tet) v = model.original[v];
+  return tets;
 }
 
 namespace {

@@ -23,6 +23,8 @@ struct Model {
   std::vector<glm::dvec3> velocities;  ///< m/s
   std::vector<glm::dvec4> obstacles;   ///< half spaces n.x >= d as (n, d), beside the ground
   double size = 1;                     ///< m, diagonal of the largest body at rest
+  /// The number a vertex had when its body was added; what leaves the program is in that order.
+  std::vector<std::uint32_t> original;
 };
 
 /// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices; `mass_factors`, if not
@@ -30,6 +32,20 @@ struct Model {
 void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
               const std::vector<std::uint32_t>& fixed, const std::vector<double>& mass_factors = {});
+
+/// Numbers each body's vertices along a Hilbert curve through its rest shape, so that neighbours in space are
+/// neighbours in memory: a large mesh reads its positions from nearer caches. Tets and triangles keep their
+/// order.
+void renumber(Model& model);
+/// Rows of a per-vertex list in the order of `original`.
+template <class T>
+std::vector<T> in_original_order(const Model& model, const std::vector<T>& rows) {
+  std::vector<T> result(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) result[model.original[i]] = rows[i];
+  return result;
+}
+/// The tets with the vertices' original numbers.
+std::vector<Tet> original_tets(const Model& model);
 
 /// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F,
 /// squash:F, twist:DEGREES, invert-one, coincident, fold. Throws Error for anything else.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "sim/error.h"
 
@@ -11,7 +12,7 @@ namespace tetpbd {
 
 namespace {
 
-constexpr unsigned group_size = 256;  // of predict and finish
+constexpr unsigned group_size = 256;  // of predict
 
 // Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
 // so that their low parts are lost (a test guards against it).
@@ -39,8 +40,9 @@ void upload(Sim& sim, const State& state) {
     positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
     split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
   }
-  sim.positions[sim.current].write(0, count * sizeof(Position), positions.data());
+  sim.positions.write(0, count * sizeof(Position), positions.data());
   sim.velocities.write(0, count * sizeof(Velocity), velocities.data());
+  sim.stale = true;
 }
 
 bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
@@ -57,56 +59,72 @@ void write_step_block(Sim& sim) {
   block.keep = float(std::exp(-s.damping * h));
   block.limit = float(sim.model->size);
   block.delta_unit = float(sim.model->size / double(1 << 30));
+  block.unit = float(sim.unit);
+  block.inverse_unit = float(1 / sim.unit);
+  block.position_grain = float(sim.unit / double(std::numeric_limits<float>::epsilon()));
   block.vertex_count = unsigned(sim.model->positions.size());
   if (s.ground) block.planes[block.plane_count++] = {0, 1, 0, float(s.ground_height)};
   for (const glm::dvec4& plane : sim.model->obstacles) block.planes[block.plane_count++] = glm::vec4(plane);
   for (std::size_t k = 0; k < constraint_kinds().size(); ++k)
     block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.*constraint_kinds()[k].stiffness);
   sim.step_block.write(0, sizeof block, &block);
+  sim.stale = true;  // the places hold a prediction with the old h and gravity
+}
+
+// The unit of places: a power of two, so that multiplying by it is exact, and small, with room for vertices
+// of a constraint 16 sizes apart (of the largest body, or of what the state stretches most). Everything that
+// is computed from places is blurred by it.
+double unit_of(const Sim& sim, const State& state) {
+  double reach = sim.model->size;
+  for (const ConstraintList& list : sim.system.lists)
+    for (std::size_t c = 0; c < list.vertices.size(); c += std::size_t(list.arity))
+      for (int j = 1; j < list.arity; ++j) {
+        const double apart = glm::length(state.positions[list.vertices[c + std::size_t(j)]] -
+                                         state.positions[list.vertices[c]]);
+        if (apart > reach && std::isfinite(apart)) reach = apart;
+      }
+  return std::exp2(std::ceil(std::log2(reach)) - 27);
+}
+
+// What the driver allows, where nothing lower is asked for.
+Tuning within_limits(Tuning tuning) {
+  GLint row = 0;
+  glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &row);
+  if (tuning.row == 0 || tuning.row > unsigned(row)) tuning.row = unsigned(row);
+  GLint64 bytes = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+  if (tuning.storage == 0 || tuning.storage > std::size_t(bytes)) tuning.storage = std::size_t(bytes);
+  return tuning;
 }
 
 void build_solver(Sim& sim) {
-  for (const SolverMode& mode : solver_modes())
-    if (sim.settings.mode == mode.name) {
-      // Made first, then put in place: a shader that does not compile leaves the old solver running.
-      Pass predict, finish;
-      predict.program = Program::compute("predict.comp");
-      finish.program = Program::compute("finish.comp");
-      predict.groups = finish.groups = work_groups(sim.model->positions.size(), group_size);
-      predict.bytes = sim.model->positions.size() * (3 * sizeof(Position) + 2 * sizeof(Velocity));
-      finish.bytes = sim.model->positions.size() * (2 * sizeof(Position) + 2 * sizeof(Velocity));
-      finish.bindings = {{BIND_CHECK, sim.check.words.id()}};
-      Program keep = Program::compute("keep.comp");
-      Solver solver = mode.create({*sim.model, sim.system, is_software_renderer(), bool(sim.guard_counts)});
-      const Limits limits = gl_limits();
-      check_work_groups(predict.program.label(), predict.groups, limits);
-      for (const Pass& pass : solver.iteration) check_work_groups(pass.program.label(), pass.groups, limits);
-      sim.predict = std::move(predict);
-      sim.finish = std::move(finish);
-      sim.check.keep = std::move(keep);
-      sim.solver = std::move(solver);
-      sim.shader_version = shader_folder_version();
-      return;
-    }
-  throw Error("no such mode", sim.settings.mode, "see tetpbd run --help");
-}
-
-// Positions of a double-buffered solver and of pins need inverse masses and counts in both buffers.
-void write_both(Sim& sim, const State& state) {
-  for (int b = 0; b < 2; ++b) {
-    if (!sim.positions[b]) continue;
-    sim.current = b;
-    upload(sim, state);
-  }
-  sim.current = 0;
+  const SolverMode* mode = find_solver_mode(sim.settings.mode);
+  if (!mode) throw Error("no such mode", sim.settings.mode, "see tetpbd run --help");
+  // Made first, then put in place: a shader that does not compile leaves the old solver running.
+  Pass predict;
+  predict.program = Program::compute("predict.comp");
+  predict.groups = work_groups(sim.model->positions.size(), group_size);
+  predict.bytes = sim.model->positions.size() * (sizeof(Position) + sizeof(Velocity) + 16);
+  Solver solver = mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning});
+  Program keep = Program::compute("keep.comp");
+  sim.predict = std::move(predict);
+  sim.check.keep = std::move(keep);
+  sim.solver = std::move(solver);
+  sim.stale = true;
+  sim.shader_version = shader_folder_version();
 }
 
 void allocate(Sim& sim) {
   const std::size_t count = sim.model->positions.size();
-  sim.positions[0] = Buffer("positions 0", count * sizeof(Position));
-  sim.positions[1] = sim.solver.double_buffered ? Buffer("positions 1", count * sizeof(Position)) : Buffer();
-  sim.velocities = Buffer("velocities", count * sizeof(Velocity));
-  sim.predicted = on_cpu(sim) ? Buffer() : Buffer("predicted", count * sizeof(Position));
+  const auto buffer = [&](const char* label, std::size_t bytes) {
+    check_storage(sim.tuning, label, bytes);
+    return Buffer(label, bytes);
+  };
+  sim.positions = buffer("positions", count * sizeof(Position));
+  sim.velocities = buffer("velocities", count * sizeof(Velocity));
+  sim.predicted = on_cpu(sim) ? Buffer() : buffer("predicted", count * sizeof(Velocity));
+  sim.places = on_cpu(sim) ? Buffer() : buffer("places", count * (sim.solver.double_buffered ? 32 : 16));
+  sim.half = 0;
 }
 
 State start_state(const Sim& sim) {
@@ -119,30 +137,37 @@ State start_state(const Sim& sim) {
   return state;
 }
 
-void dispatch(const Pass& pass) {
-  pass.program.use();
-  for (const auto& [binding, buffer] : pass.bindings)
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
-  glDispatchCompute(pass.groups, 1, 1);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-}
+// A step's dispatches one after the other. Whatever does not change from one to the next is not set again: at
+// a few microseconds a dispatch, every call counts.
+struct Dispatcher {
+  const Tuning& tuning;
+  GLuint program = 0;
+  // `barriers`: who reads what it wrote, beside the next dispatch.
+  void run(Pass& pass, const glm::uvec4& turn, GLbitfield barriers = 0) {
+    if (pass.program.id() != program) pass.program.use(), program = pass.program.id();
+    if (pass.turn != turn) pass.program.set(0, turn), pass.turn = turn;
+    const std::size_t row = std::min<std::size_t>(pass.groups, tuning.row);
+    glDispatchCompute(GLuint(row), GLuint((pass.groups + row - 1) / row), 1);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | barriers);
+  }
+};
 
 // Everything but the state.
-Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, ConstraintSystem system,
-             bool count_guards) {
+Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning,
+             ConstraintSystem system) {
   Sim sim;
   sim.model = std::move(model);
   sim.settings = settings;
+  sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
   check_limits(sim.system, gl_limits());
   make_check_words(sim.check);
-  if (count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
+  if (tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   build_solver(sim);
   allocate(sim);
   make_kept(sim);
   sim.step_block = Buffer("step", sizeof(Step));
-  write_step_block(sim);
   return sim;
 }
 
@@ -169,7 +194,7 @@ void shift_velocities(Sim& sim, double upwards) {
 }  // namespace
 
 void check_limits(const ConstraintSystem& system, const Limits& limits) {
-  const int needed = BIND_RECORDS + int(kind_words(system).size());
+  const int needed = STORAGE_BINDINGS;
   if (needed > limits.storage_blocks)
     throw Error("too few shader storage blocks",
                 fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),
@@ -183,12 +208,12 @@ void check_limits(const ConstraintSystem& system, const Limits& limits) {
                 "use a smaller mesh", 1);
 }
 
-Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, bool count_guards) {
+Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
   if (model->obstacles.size() + 1 > MAX_PLANES)
     throw Error("too many obstacles", fmt::format("{} planes", model->obstacles.size()),
                 fmt::format("at most {} beside the ground", MAX_PLANES - 1));
   ConstraintSystem system = build_constraints(model->rest, settings.constraints);
-  Sim sim = make_sim(std::move(model), settings, std::move(system), count_guards);
+  Sim sim = make_sim(std::move(model), settings, tuning, std::move(system));
   reset(sim);
   return sim;
 }
@@ -203,7 +228,9 @@ void reset(Sim& sim) {
 
 void write_state(Sim& sim, const State& state) {
   if (on_cpu(sim)) sim.host = state;
-  write_both(sim, state);
+  upload(sim, state);
+  sim.unit = unit_of(sim, state);
+  write_step_block(sim);
   start_check(sim, state);
 }
 
@@ -214,9 +241,8 @@ void apply_settings(Sim& sim, const Settings& settings) {
     if (check_finite(sim, true)) return_to_kept(sim);  // a solver made anew has nothing better to start from
     const State state = read_state(sim);
     // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
-    Sim fresh = make_sim(sim.model, settings,
-                         kinds ? build_constraints(sim.model->rest, settings.constraints) : sim.system,
-                         bool(sim.guard_counts));
+    Sim fresh = make_sim(sim.model, settings, sim.tuning,
+                         kinds ? build_constraints(sim.model->rest, settings.constraints) : sim.system);
     fresh.inverse_masses = sim.inverse_masses;
     fresh.steps = sim.steps;
     fresh.timed = sim.timed;
@@ -251,26 +277,44 @@ void step(Sim& sim) {
   }
   if (sim.timed) sim.timer.begin();
   sim.step_block.bind_uniform(BIND_STEP);
-  sim.predicted.bind_storage(BIND_PREDICTED);
+  sim.positions.bind_storage(BIND_POSITIONS);
   sim.velocities.bind_storage(BIND_VELOCITIES);
-  sim.finish.program.use();
-  sim.finish.program.set("step_slot", check_slot(sim.steps + 1));
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
+  sim.predicted.bind_storage(BIND_PREDICTED);
+  sim.places.bind_storage(BIND_PLACES);
+  sim.check.words.bind_storage(BIND_CHECK);
+  for (const auto& [binding, buffer] : sim.solver.bindings)
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
+  Dispatcher dispatcher{sim.tuning};
+  const unsigned count = unsigned(sim.model->positions.size());
+  const auto turn = [&](unsigned phase) {  // read this half, write the other
+    const unsigned to = sim.solver.double_buffered ? 1 - sim.half : 0;
+    return glm::uvec4(sim.half * count, to * count, phase, phase & PHASE_FINISH ? check_slot(sim.steps + 1) : 0);
+  };
+  Pass& move = sim.solver.iteration.back();
+  // The last dispatch of all is read by vertex fetches and copies.
+  const auto move_vertices = [&](unsigned phase, bool last) {
+    const GLbitfield readers = GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT;
+    dispatcher.run(move, turn(phase), last ? readers : 0);
+    if (sim.solver.double_buffered) sim.half = 1 - sim.half;
+  };
+  if (sim.stale) dispatcher.run(sim.predict, {0, sim.half * count, 0, 0});
+  sim.stale = false;
+  const bool separate = sim.solver.separate || s.iterations == 0;
   for (int substep = 0; substep < s.substeps; ++substep) {
-    sim.positions[sim.current].bind_storage(BIND_POSITIONS);
-    dispatch(sim.predict);
+    const bool end = substep + 1 == s.substeps;
+    if (separate) move_vertices(PHASE_PREDICT, false);
     for (int iteration = 0; iteration < s.iterations; ++iteration) {
-      sim.positions[sim.current].bind_storage(BIND_POSITIONS);
-      if (sim.solver.double_buffered) sim.positions[1 - sim.current].bind_storage(BIND_POSITIONS_OUT);
-      for (const Pass& pass : sim.solver.iteration) dispatch(pass);
-      if (sim.solver.double_buffered) sim.current = 1 - sim.current;
+      for (std::size_t p = 0; p + 1 < sim.solver.iteration.size(); ++p)
+        dispatcher.run(sim.solver.iteration[p], turn(PHASE_SOLVE));
+      unsigned phase = PHASE_SOLVE;
+      if (!separate && iteration == 0) phase |= PHASE_PREDICT;
+      if (!separate && iteration + 1 == s.iterations) phase |= PHASE_FINISH;
+      move_vertices(phase, end && !separate && iteration + 1 == s.iterations);
     }
-    sim.positions[sim.current].bind_storage(BIND_POSITIONS);
-    dispatch(sim.finish);
+    if (separate) move_vertices(PHASE_FINISH, end);
   }
   if (sim.timed) sim.timer.end();
-  // Whoever reads positions next may be a vertex fetch or a copy.
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   ++sim.steps;
   check_step(sim);
 }
@@ -319,10 +363,9 @@ namespace {
 void write_inverse_mass(Sim& sim, std::uint32_t vertex, double value) {
   sim.inverse_masses[vertex] = value;
   const float inverse_mass = float(value);
-  for (const Buffer& buffer : sim.positions)
-    if (buffer)
-      buffer.write(vertex * sizeof(Position) + offsetof(Position, inverse_mass), sizeof(float),
-                   &inverse_mass);
+  sim.positions.write(vertex * sizeof(Position) + offsetof(Position, inverse_mass), sizeof(float),
+                      &inverse_mass);
+  sim.stale = true;
 }
 
 void write_velocity(Sim& sim, std::uint32_t vertex, const glm::dvec3& velocity) {
@@ -347,7 +390,8 @@ bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_mass
 
 void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
   const Position p = to_gpu(position, sim.inverse_masses[vertex], sim.system.at_vertex[vertex]);
-  sim.positions[sim.current].write(vertex * sizeof(Position), sizeof p, &p);
+  sim.positions.write(vertex * sizeof(Position), sizeof p, &p);
+  sim.stale = true;
   if (on_cpu(sim)) sim.host.positions[vertex] = position;
 }
 
@@ -361,23 +405,33 @@ Explanation explain(const Sim& sim) {
     result.buffers.push_back({buffer.label(), buffer.bytes()});
     result.bytes += buffer.bytes();
   };
-  for (const Buffer& buffer : sim.positions) add(buffer);
-  add(sim.predicted);
-  add(sim.velocities);
-  add(sim.step_block);
-  add(sim.guard_counts);
   for (const Buffer* buffer :
-       {&sim.check.words, &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
+       {&sim.positions, &sim.velocities, &sim.predicted, &sim.places, &sim.step_block, &sim.guard_counts,
+        &sim.check.words, &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (!on_cpu(sim)) {
-    const long substeps = sim.settings.substeps;
-    result.dispatches.push_back(
-        {sim.predict.program.label(), sim.predict.groups, substeps, sim.predict.bytes});
-    for (const Pass& pass : sim.solver.iteration)
-      result.dispatches.push_back(
-          {pass.program.label(), pass.groups, substeps * sim.settings.iterations, pass.bytes});
-    result.dispatches.push_back({sim.finish.program.label(), sim.finish.groups, substeps, sim.finish.bytes});
+    const long substeps = sim.settings.substeps, iterations = sim.settings.iterations;
+    const std::size_t vertices = sim.model->positions.size();
+    const bool separate = sim.solver.separate || iterations == 0;
+    const auto dispatch = [&](const Pass& pass, const char* what, long per_step, std::size_t more) {
+      result.dispatches.push_back({pass.program.label() + what, pass.groups, per_step, pass.bytes + more});
+    };
+    dispatch(sim.predict, "", 0, 0);
+    for (const Pass& pass : sim.solver.iteration) {
+      const bool moves = &pass == &sim.solver.iteration.back();
+      // The first and the last iteration also read or write velocities and predicted positions.
+      const long ends = moves && !separate ? (iterations == 1 ? 1 : 2) : 0;
+      const std::size_t more = iterations == 1 ? 2 * sizeof(Velocity) : 3 * sizeof(Velocity);
+      dispatch(pass, "", substeps * (iterations - ends), 0);
+      if (ends > 0)
+        dispatch(pass, ends == 1 ? ", whole substep" : ", first and last", substeps * ends, vertices * more);
+      if (moves && separate)
+        dispatch(pass, ", before and after", 2 * substeps, vertices * 3 * sizeof(Velocity));
+    }
+    std::erase_if(result.dispatches, [&](const Explanation::Dispatch& d) {
+      return d.per_step == 0 && d.name != sim.predict.program.label();
+    });
   }
   for (const auto& dispatch : result.dispatches) {
     result.dispatches_per_step += dispatch.per_step;

@@ -20,14 +20,18 @@ struct Sim {
   ConstraintSystem system;
   std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
 
-  Buffer positions[2];  ///< Position, double buffered; `current` holds the state
-  Buffer predicted;     ///< Position
-  Buffer velocities;    ///< Velocity
-  Buffer step_block;    ///< Step
+  Buffer positions;   ///< Position
+  Buffer velocities;  ///< Velocity
+  Buffer predicted;   ///< Velocity (a pair as well), from the first iteration of a substep to the last
+  Buffer places;      ///< what neighbours see (places.glsl); of a double-buffered solver twice as many
+  Buffer step_block;  ///< Step
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
-  Pass predict, finish;
+  Pass predict;       ///< makes the places of the next step, after a change from outside
   Solver solver;
-  int current = 0;
+  Tuning tuning;
+  double unit = 1;                  ///< m, of places
+  bool stale = true;                ///< the places are not those of the next step
+  unsigned half = 0;                ///< which half of the places is read next
   long steps = 0;                   ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
@@ -37,11 +41,11 @@ struct Sim {
   GuardCounts guards_read{};  ///< GPU: counted as of the last reading; CPU modes: the count at the start
   FiniteCheck check;  ///< ask check_finite()
 
-  const Buffer& current_positions() const { return positions[current]; }
+  const Buffer& current_positions() const { return positions; }
 };
 
-/// With `count_guards` the kernels count how often each guard triggers.
-Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, bool count_guards = false);
+Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
+               const Tuning& tuning = tuning_from_environment());
 /// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count. Waits.
 GuardCounts guard_counts(Sim& sim);
 /// Throws Error naming what the driver's limits do not allow.
@@ -81,8 +85,8 @@ struct Explanation {
   };
   struct Dispatch {
     std::string name;
-    unsigned groups;
-    long per_step;
+    std::size_t groups;
+    long per_step;      ///< 0: only after a change from outside
     std::size_t bytes;  ///< of one dispatch
   };
   std::vector<Item> buffers;

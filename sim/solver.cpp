@@ -1,7 +1,12 @@
 #include "sim/solver.h"
 
-#include <bit>
+#include <fmt/format.h>
 
+#include <bit>
+#include <charconv>
+#include <cstdlib>
+
+#include "sim/error.h"
 #include "sim/layout.h"
 
 namespace tetpbd {
@@ -18,6 +23,42 @@ const std::vector<SolverMode>& solver_modes() {
   return rows;
 }
 
+const SolverMode* find_solver_mode(const std::string& name) {
+  static const SolverMode paper = {
+      "paper", "the paper's GPU pipeline: a kernel a kind, floats added by compare-and-swap",
+      create_paper_solver};
+  for (const SolverMode& mode : solver_modes())
+    if (name == mode.name) return &mode;
+  return name == paper.name ? &paper : nullptr;
+}
+
+Tuning tuning_from_environment() {
+  Tuning tuning;
+  const char* variable = std::getenv("TETPBD_TUNE");
+  for (const std::string& assignment : split(variable ? variable : "", ',')) {
+    unsigned* target = nullptr;
+    for (const auto& [name, member] : {std::pair("lanes=", &tuning.lanes), std::pair("group=", &tuning.group),
+                                       std::pair("patch=", &tuning.patch), std::pair("row=", &tuning.row)})
+      if (assignment.starts_with(name)) target = member;
+    const char* end = assignment.data() + assignment.size();
+    const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
+    if (!target || std::from_chars(number, end, *target).ptr != end)
+      throw Error(fmt::format("'{}' is no tuning", assignment), "TETPBD_TUNE",
+                  "write lanes=N, group=N, patch=N or row=N, separated by commas");
+  }
+  return tuning;
+}
+
+namespace {
+
+bool every_vertex_first(const ConstraintKind& kind) {
+  for (int j = 0; j < kind.arity; ++j)
+    if (!kind.turned || kind.turned[j * kind.arity] != j) return false;
+  return true;
+}
+
+}  // namespace
+
 std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   std::vector<Substitutions> rows;
   for (std::size_t k = 0; k < system.lists.size(); ++k) {
@@ -26,7 +67,8 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
     rows.push_back({{"KIND", constraint_kinds()[k].name},
                     {"ARITY", std::to_string(constraint_kinds()[k].arity)},
                     {"INDEX", std::to_string(index)},
-                    {"BINDING", std::to_string(BIND_RECORDS + index)},
+                    {"BINDING", std::to_string(BIND_STREAMS + index)},
+                    {"FIRST", every_vertex_first(constraint_kinds()[k]) ? "true" : "false"},
                     {"KIND_ROW", std::to_string(k / 4)},
                     {"KIND_COLUMN", std::to_string(k % 4)}});
   }
@@ -49,6 +91,23 @@ std::vector<Buffer> record_buffers(const ConstraintSystem& system) {
     buffers.emplace_back(std::string("records ") + constraint_kinds()[k].name, words);
   }
   return buffers;
+}
+
+void check_storage(const Tuning& tuning, const std::string& label, std::size_t bytes) {
+  if (tuning.storage > 0 && bytes > tuning.storage)
+    throw Error("a storage buffer is too large",
+                fmt::format("'{}' of {} bytes, the driver allows {}", label, bytes, tuning.storage),
+                "use a smaller mesh", 1);
+}
+
+Pass average_pass(const SolverInput& input, unsigned group, bool float_sums) {
+  const std::size_t vertices = input.model.positions.size();
+  Pass pass;
+  pass.program = Program::compute(
+      "average.comp", {{{"GROUP", std::to_string(group)}, {"FLOAT_SUMS", float_sums ? "1" : "0"}}, {}});
+  pass.groups = work_groups(vertices, group);
+  pass.bytes = vertices * (2 * sizeof(Position) + 3 * 16);  // itself, its sum there and back, its place
+  return pass;
 }
 
 }  // namespace tetpbd

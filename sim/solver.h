@@ -18,9 +18,9 @@ namespace tetpbd {
 /// One dispatch. The barrier for its storage writes stands behind it.
 struct Pass {
   Program program;
-  unsigned groups = 0;
+  std::size_t groups = 0;
   std::size_t bytes = 0;  ///< read and written by all invocations together; caches may serve part of it
-  std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every pass shares
+  glm::uvec4 turn{~0u};   ///< the uniform `turn` (places.glsl) as it was last set
 };
 
 /// State on the CPU, in double: what CPU modes step and what tests compare.
@@ -39,17 +39,33 @@ inline constexpr std::array<const char*, GUARDS> guard_names = {"direction",    
 /// Passes or a function, never both.
 struct Solver {
   std::vector<Buffer> buffers;
-  std::vector<Pass> iteration;   ///< the dispatches of one iteration, in order
-  bool double_buffered = false;  ///< an iteration reads one position buffer and writes the other
+  std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every mode shares
+  std::vector<Pass>
+      iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
+  bool double_buffered = false;  ///< an iteration reads one half of the places and writes the other
+  bool separate = false;         ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
 };
 
+/// How kernels are cut into invocations; 0: by the mesh's size or the driver's limit. For measurements and
+/// tests.
+struct Tuning {
+  unsigned lanes = 0;       ///< invocations a vertex in mode node, a power of two up to `group`
+  unsigned group = 0;       ///< invocations of a work-group of the solving kernel, a power of two up to 1024
+  unsigned patch = 0;       ///< constraints of a patch in mode constraint
+  unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
+  std::size_t storage = 0;  ///< most bytes of a storage buffer
+  bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
+};
+/// From the variable TETPBD_TUNE, as in "lanes=8,group=128"; throws Error for anything else.
+Tuning tuning_from_environment();
+
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
-  bool software = false;      ///< the "GPU" is a CPU
-  bool count_guards = false;  ///< GPU kernels count into the counters at BIND_GUARDS; CPU modes always count
+  bool software = false;  ///< the "GPU" is a CPU
+  Tuning tuning;          ///< `row` and `storage` filled in
 };
 
 struct SolverMode {
@@ -58,16 +74,30 @@ struct SolverMode {
   Solver (*create)(const SolverInput&);
 };
 const std::vector<SolverMode>& solver_modes();
+/// Also finds what is not offered but for `bench`: "paper". nullptr if there is none.
+const SolverMode* find_solver_mode(const std::string& name);
 
 Solver create_constraint_solver(const SolverInput&);  ///< solve_constraint.cpp
 Solver create_node_solver(const SolverInput&);        ///< solve_node.cpp
 Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp, float
 Solver create_cpu_double_solver(const SolverInput&);  ///< solve_cpu.cpp, double
+Solver create_paper_solver(const SolverInput&);       ///< solve_paper.cpp
 
-/// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING, KIND_ROW
-/// and KIND_COLUMN (of the stiffness).
+/// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING (of its
+/// stream or records), FIRST (whether each vertex can be its first), KIND_ROW and KIND_COLUMN (of the
+/// stiffness).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
 /// Record buffers of the kinds present, in the order of kind_words (layout.glsl: Record2, Record4).
 std::vector<Buffer> record_buffers(const ConstraintSystem& system);
+/// Throws Error if a buffer is larger than a storage block may be.
+void check_storage(const Tuning& tuning, const std::string& label, std::size_t bytes);
+template <class T>
+Buffer storage_buffer(const Tuning& tuning, const std::string& label, const std::vector<T>& data) {
+  check_storage(tuning, label, data.size() * sizeof(T));
+  return Buffer(label, data);
+}
+
+/// The dispatch that averages sums of corrections and moves the vertices (average.comp).
+Pass average_pass(const SolverInput& input, unsigned group, bool float_sums);
 
 }  // namespace tetpbd

@@ -42,16 +42,15 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(Velocity));
 
-  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"},       {"BINDING", "7"},
-                         {"KIND_ROW", "0"},  {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "2"}};
-  const Program volume = Program::compute("solve_constraint.comp", {words, {}});
+  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"},    {"BINDING", "7"},
+                         {"KIND_ROW", "0"},  {"GROUP", "1024"}, {"KIND_COLUMN", "2"}};
+  const Program volume = Program::compute("solve_paper.comp", {words, {}});
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
         offsetof(layout::Record4, rest));
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(layout::Record4));
-  words = {{"KIND", "stretch"}, {"ARITY", "2"},       {"BINDING", "7"},
-           {"KIND_ROW", "0"},   {"KIND_COLUMN", "0"}, {"KIND_COLUMN", "0"}};
-  const Program stretch = Program::compute("solve_constraint.comp", {words, {}});
+  words["KIND"] = "stretch", words["ARITY"] = "2", words["KIND_COLUMN"] = "0";
+  const Program stretch = Program::compute("solve_paper.comp", {words, {}});
   CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(layout::Record2));
 
@@ -67,6 +66,8 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(nested("keep") == offsetof(Step, keep));
   CHECK(nested("limit") == offsetof(Step, limit));
   CHECK(nested("vertex_count") == offsetof(Step, vertex_count));
+  CHECK(nested("unit") == offsetof(Step, unit));
+  CHECK(nested("position_grain") == offsetof(Step, position_grain));
   CHECK(nested("plane_count") == offsetof(Step, plane_count));
   CHECK(nested("stiffness[0]") == offsetof(Step, stiffness));
   CHECK(nested("planes[0]") == offsetof(Step, planes));
@@ -100,11 +101,11 @@ TEST_CASE("a shader that does not compile names its file and line") {
 
 TEST_CASE("#include, #foreach and words expand") {
   const std::string text = shader_text(
-      "solve_node.comp", {{},
+      "solve_node.comp", {{{"KINDS", "2"}},
                           {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
                            {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
-  CHECK(text.find("gather_stretch(i, lane, own)") != std::string::npos);
-  CHECK(text.find("gather_bend(i, lane, own)") != std::string::npos);
+  CHECK(text.find("gather_stretch(at_stretch, end_stretch, entry_stretch, self)") != std::string::npos);
+  CHECK(text.find("gather_bend(at_bend, end_bend, entry_bend, self)") != std::string::npos);
   CHECK(text.find("gather_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);

@@ -371,24 +371,28 @@ TEST_CASE(
     "bench writes a row a setting, with and without rendering, and calls a software renderer by its name") {
   const Folder folder;
   const Outcome run = tetpbd(
-      "bench --scenes beam --modes cpu,node --constraint-sets stretch,stretch+bend+volume --iterations 1,2 "
+      "bench --scenes beam --modes cpu,node,paper --constraint-sets stretch,stretch+bend+volume --iterations "
+      "1,2 "
       "--frames 5 "
       "--warm-up 1 --repeats 1 --size 64x48 --out b",
       folder);
   REQUIRE(run.status == 0);
   const json bench = json::parse(read(folder.path / "b/bench.json"));
-  CHECK(bench["rows"].size() == 2 * 2 * 2 * 2);
+  CHECK(bench["rows"].size() == 3 * 2 * 2 * 2);
   if (bench["device"]["software"] == true) CHECK(run.out.find("SOFTWARE") != std::string::npos);
   const std::string csv = read(folder.path / "b/bench.csv");
   CHECK(csv.starts_with(
       "scene,mode,constraints,iterations,substeps,size,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_step,"
       "gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n"));
-  CHECK(std::count(csv.begin(), csv.end(), '\n') == 17);
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == 25);
   for (const json& row : bench["rows"]) {
+    const int iterations = row["iterations"], kinds = row["constraints"] == "stretch" ? 1 : 3;
     CHECK(row["fps"]["median"].get<double>() > 0);
     CHECK(row["max_volume_loss_percent"].is_number());
     CHECK((row["bytes_per_step"].get<long>() > 0) == (row["mode"] != "cpu"));
-    CHECK(row["dispatches_per_step"] == (row["mode"] == "cpu" ? 0 : 2 + row["iterations"].get<int>()));
+    CHECK(row["dispatches_per_step"] == (row["mode"] == "cpu"    ? 0
+                                         : row["mode"] == "node" ? iterations
+                                                                 : 2 + iterations * (kinds + 1)));
     CHECK((row["gpu_ms_per_step"]["median"].get<double>() > 0) == (row["mode"] != "cpu"));
   }
 }

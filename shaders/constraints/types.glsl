@@ -29,6 +29,7 @@ vec3 any_direction(uint a, uint b) {
 
 // A constraint error that rounding alone can make is no error: without this, rounding noise of 1e-9 m divided by a
 // substep of 1e-6 s becomes a velocity (method.md, "What float drops").
+// `noise`: the size that C is known to rounding of. Positions themselves are known to rounding * grain (0 where they are kept in full).
 real resolved(real C, real noise) { return abs(C) <= real(4) * rounding * noise ? real(0) : C; }
 
 // lambda / k (method.md eq. 4). 0 where nothing can move.

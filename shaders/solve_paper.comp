@@ -1,0 +1,39 @@
+// The paper's constraint-centric kernel as it is published (algorithm 3), the baseline of `bench`: one kind a dispatch, one thread a
+// constraint, and sums of floats by compare-and-swap on their bits, since GL 4.3 has no atomic addition of floats. In whatever
+// order threads arrive, so the last bits differ from run to run.
+#include "types.glsl"
+#include "pair.glsl"
+#include "places.glsl"
+layout(local_size_x = $GROUP) in;
+layout(std430, binding = BIND_DELTAS) buffer Deltas { uint deltas[]; };
+layout(std430, binding = $BINDING) restrict readonly buffer Records { Record$ARITY records[]; };
+uniform uint count;
+#include "constraints/types.glsl"
+#include "constraints/$KIND.glsl"
+
+void add(uint at, float value) {
+  uint expected = deltas[at], found;
+  while ((found = atomicCompSwap(deltas[at], expected, floatBitsToUint(uintBitsToFloat(expected) + value))) != expected)
+    expected = found;
+}
+
+void main() {
+  uint index = group_index() * $GROUPu + gl_LocalInvocationIndex;
+  if (index >= count) return;
+  Record$ARITY record = records[index];
+  vec3 x[$ARITY];
+  float w[$ARITY];
+  ivec4 first = places[turn.x + record.vertices[0]];
+  for (int j = 0; j < $ARITY; ++j) {
+    ivec4 p = places[turn.x + record.vertices[j]];
+    x[j] = between(p, first);
+    w[j] = inverse_mass_of(p);
+  }
+  Constraint$ARITY c = $KIND(x, record.rest, record.vertices);
+  float lambda = params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w);
+  for (int j = 0; j < $ARITY; ++j) {
+    vec3 correction = limited(lambda * w[j] * c.gradient[j], params.limit);
+    for (int a = 0; a < 3; ++a)
+      if (correction[a] != 0.0) add(4u * record.vertices[j] + uint(a), correction[a]);
+  }
+}

@@ -1,0 +1,37 @@
+// The paper's GPU pipeline as published, the baseline of `bench`: predict, a dispatch a constraint kind with
+// float atomics made of compare-and-swap, average, update; work-groups of 1024; one thread a vertex.
+#include "sim/layout.h"
+#include "sim/solver.h"
+
+namespace tetpbd {
+
+Solver create_paper_solver(const SolverInput& input) {
+  constexpr unsigned group = 1024;
+  Solver solver;
+  solver.separate = true;
+  solver.buffers = record_buffers(input.system);
+  std::size_t index = 0;
+  for (Substitutions words : kind_words(input.system)) {
+    const std::size_t arity = std::stoul(words.at("ARITY"));
+    const std::size_t count = solver.buffers[index].bytes() / (4 * (arity + 1));
+    check_storage(input.tuning, solver.buffers[index].label(), solver.buffers[index].bytes());
+    words["GROUP"] = std::to_string(group);
+    Pass pass;
+    pass.program = Program::compute("solve_paper.comp", {words, {}});
+    pass.program.use();
+    pass.program.set("count", unsigned(count));
+    pass.groups = work_groups(count, group);
+    pass.bytes = count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
+    solver.bindings.push_back({BIND_RECORDS + int(index), solver.buffers[index].id()});
+    solver.iteration.push_back(std::move(pass));
+    ++index;
+  }
+  solver.iteration.push_back(average_pass(input, group, true));
+  Buffer deltas("deltas", input.model.positions.size() * 16);
+  deltas.clear();
+  solver.bindings.push_back({BIND_DELTAS, deltas.id()});
+  solver.buffers.push_back(std::move(deltas));
+  return solver;
+}
+
+}  // namespace tetpbd

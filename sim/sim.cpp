@@ -291,10 +291,10 @@ void step(Sim& sim) {
     const unsigned to = sim.solver.double_buffered ? 1 - sim.half : 0;
     return glm::uvec4(sim.half * count, to * count, phase, phase & PHASE_FINISH ? check_slot(sim.steps + 1) : 0);
   };
-  Pass& move = sim.solver.iteration.back();
   // The last dispatch of all is read by vertex fetches and copies.
   const auto move_vertices = [&](unsigned phase, bool last) {
     const GLbitfield readers = GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT;
+    Pass& move = sim.half && sim.solver.other_way ? *sim.solver.other_way : sim.solver.iteration.back();
     dispatcher.run(move, turn(phase), last ? readers : 0);
     if (sim.solver.double_buffered) sim.half = 1 - sim.half;
   };

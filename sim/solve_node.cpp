@@ -83,15 +83,22 @@ Solver create_node_solver(const SolverInput& input) {
   }
   solver.buffers.push_back(storage_buffer(input.tuning, "stream table", table));
   solver.bindings.push_back({BIND_TABLE, solver.buffers.back().id()});
+  const ShaderWords words = {{{"LANES", std::to_string(lanes)},
+                              {"GROUP", std::to_string(group)},
+                              {"KINDS", std::to_string(kinds.size())},
+                               {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
+                             kinds};
   Pass pass;
-  pass.program = Program::compute("solve_node.comp", {{{"LANES", std::to_string(lanes)},
-                                                       {"GROUP", std::to_string(group)},
-                                                        {"KINDS", std::to_string(kinds.size())}, {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
-                                                      kinds});
+  pass.program = Program::compute("solve_node.comp", words);
   pass.groups = work_groups(vertices * lanes, group);
   // Position there and back, its place there and back, two rows of the table; entries; the neighbours'
   // places.
   pass.bytes = vertices * (2 * sizeof(Position) + 2 * 16 + 8 * kinds.size()) + entries + 16 * neighbours;
+  if (input.tuning.twice) {
+    solver.other_way.emplace();
+    solver.other_way->program = Program::compute("solve_node.comp", words);
+    solver.other_way->groups = pass.groups;
+  }
   solver.iteration.push_back(std::move(pass));
   return solver;
 }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,8 +43,9 @@ struct Solver {
   std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every mode shares
   std::vector<Pass>
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
-  bool double_buffered = false;  ///< an iteration reads one half of the places and writes the other
-  bool separate = false;         ///< prediction and velocities in dispatches of their own
+  bool double_buffered = false;   ///< an iteration reads one half of the places and writes the other
+  std::optional<Pass> other_way;  ///< the last dispatch again, used from the second half to the first
+  bool separate = false;          ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
 };
@@ -51,10 +53,11 @@ struct Solver {
 /// How kernels are cut into invocations; 0: by the mesh's size or the driver's limit. For measurements and
 /// tests.
 struct Tuning {
-  unsigned lanes = 0;       ///< invocations a vertex in mode node, a power of two up to `group`
-  unsigned group = 0;       ///< invocations of a work-group of the solving kernel, a power of two up to 1024
-  unsigned patch = 0;       ///< constraints of a patch in mode constraint
-  unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
+  unsigned lanes = 0;  ///< invocations a vertex in mode node, a power of two up to `group`
+  unsigned group = 0;  ///< invocations of a work-group of the solving kernel, a power of two up to 1024
+  unsigned patch = 0;  ///< constraints of a patch in mode constraint
+  unsigned twice = 0;  ///< 1: mode node's kernel as two programs, one for each direction between the halves
+  unsigned row = 0;    ///< most work-groups in a dispatch's first dimension
   std::size_t storage = 0;  ///< most bytes of a storage buffer
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };

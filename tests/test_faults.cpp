@@ -310,14 +310,14 @@ TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode chan
 TEST_CASE("limits of a driver are named with what is needed and what there is") {
   GlTest gl;
   const Limits real = gl_limits();
-  CHECK(real.storage_blocks >= 8);
+  CHECK(real.storage_blocks >= STORAGE_BINDINGS);
   CHECK(real.work_groups >= 65535);
   const ConstraintSystem system = build_constraints(block()->rest, "stretch,bend,volume");
   check_limits(system, real);
   Limits few = real;
-  few.storage_blocks = 7;
+  few.storage_blocks = 8;
   CHECK(has(what_of([&] { check_limits(system, few); }),
-            "too few shader storage blocks: 8 needed, the driver offers 7"));
+            "too few shader storage blocks: 9 needed, the driver offers 8"));
   few = real;
   few.storage_bytes = 100;
   CHECK(has(what_of([&] { check_limits(system, few); }), "a storage buffer is too large"));
@@ -393,27 +393,25 @@ TEST_CASE("shader faults name file and line, or the uniform") {
     CHECK(!has(what, "\n"));
     return what;
   };
-  CHECK(with("finish.comp", "void main", "void main") == "");
-  CHECK(has(with("finish.comp", "uint i = gl_", "uint i = nothing + gl_"), "shaders/finish.comp:"));
-  CHECK(has(with("finish.comp", "\"pair.glsl\"", "\"pears.glsl\""),
+  CHECK(with("average.comp", "void main", "void main") == "");
+  CHECK(has(with("average.comp", "uint i = group", "uint i = nothing + group"), "shaders/average.comp:"));
+  CHECK(has(with("average.comp", "\"pair.glsl\"", "\"pears.glsl\""),
             "no such shader: " + folder.string() + "/pears.glsl"));
-  CHECK(has(with("first_bad.glsl", "uniform uint step_slot", "const uint step_slot = 0u"),
-            "no such uniform: 'step_slot' in finish"));
+  CHECK(has(with("solve_constraint.comp", "uniform uint patch_count", "const uint patch_count = 1u"),
+            "no such uniform: 'patch_count' in solve_constraint"));
   CHECK(has(with("render/surface.geom", "vec3 edge;", "vec2 edge;"), "surface"));
   CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
   const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");
   CAPTURE(unlinked);
-  CHECK(has(unlinked, "shader program does not link: surface: "));
+  if (is_software_renderer()) CHECK(has(unlinked, "shader program does not link: surface: "));  // others may link it
   // A kernel that goes wrong in a certain step: blamed, and the last good state stands.
   {
-    std::ifstream stream(folder / "predict.comp");
+    std::ifstream stream(folder / "vertex.glsl");
     std::string text{std::istreambuf_iterator<char>(stream), {}};
-    const std::string end = "predicted[i] = p;";
+    const std::string end = "positions[i] = Position(";
     REQUIRE(has(text, end));
-    text.replace(
-        text.find(end), end.size(),
-        "if (i == 12u && p.high.y < 0.45) p.high.x = sqrt(p.high.y - 1.0);\n  positions[i] = p;\n  " + end);
-    std::ofstream(folder / "predict.comp") << text;
+    text.insert(text.find(end), "if (i == 12u && x.high.y < 0.45) x.high.x = sqrt(x.high.y - 1.0);\n  ");
+    std::ofstream(folder / "vertex.glsl") << text;
   }
   set_shader_folder(folder.string());
   for (const char* mode : {"node", "constraint"}) {

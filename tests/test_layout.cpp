@@ -104,8 +104,8 @@ TEST_CASE("#include, #foreach and words expand") {
       "solve_node.comp", {{{"KINDS", "2"}},
                           {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
                            {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
-  CHECK(text.find("gather_stretch(at_stretch, end_stretch, entry_stretch, self)") != std::string::npos);
-  CHECK(text.find("gather_bend(at_bend, end_bend, entry_bend, self)") != std::string::npos);
+  CHECK(text.find("gather_stretch(i, at_stretch, end_stretch, entry_stretch, self)") != std::string::npos);
+  CHECK(text.find("gather_bend(i, at_bend, end_bend, entry_bend, self)") != std::string::npos);
   CHECK(text.find("gather_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);

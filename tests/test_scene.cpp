@@ -62,8 +62,8 @@ TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(has(error_of(R"({"bodies": [{"block": {"size": [1, 1], "cells": [2, 2, 2]}}]})"), "three numbers"));
   CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [2, 2, 0]}}]})"), "block.cells"));
   CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [2000, 2000, 2000]}}]})"), "2 million"));
-  CHECK(has(error_of(R"({"bodies": [{}]})"), "either"));
-  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "block": {}}]})"), "either"));
+  CHECK(has(error_of(R"({"bodies": [{}]})"), "needs one of"));
+  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "block": {}}]})"), "needs one of"));
   CHECK(has(error_of(R"({"bodies": [{"mesh": "no_such.ply"}]})"), "no_such.ply"));
   CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "height": 0}]})"), "height"));
   CHECK(

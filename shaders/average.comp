@@ -12,9 +12,9 @@ void main() {
   if (i >= params.vertex_count) return;
   Position own = positions[i];
   Velocity speed;
-  if ((turn.z & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+  if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
   vec3 correction = vec3(0.0);
-  if ((turn.z & PHASE_SOLVE) != 0u) {
+  if ((turn.x & PHASE_SOLVE) != 0u) {
     ivec4 sum = deltas[i];
     deltas[i] = ivec4(0);
 #if $FLOAT_SUMS

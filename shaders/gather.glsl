@@ -8,7 +8,7 @@ vec3 share_$KIND(uint i, uvec$ARITY entry, ivec4 self) {
   id[1] = entry[0] & 0x3fffffffu;
   for (int j = 2; j < $ARITY; ++j) id[j] = entry[j - 1];
   p[0] = self;
-  for (int j = 1; j < $ARITY; ++j) p[j] = places[turn.x + id[j]];
+  for (int j = 1; j < $ARITY; ++j) p[j] = places[id[j]];
   uint slot = $FIRST ? 0u : entry[0] >> 30;
   for (int j = 1; j < $ARITY; ++j)
     if (slot >= uint(j)) {

@@ -74,7 +74,8 @@ struct Step {
 #define BIND_PATCH_RECORDS 7
 #define BIND_RECORDS 5        // mode paper: + index of the constraint kind among those present
 #define BIND_CHECK 8          // which vertex is not finite
-#define STORAGE_BINDINGS 9
+#define BIND_PLACES_OUT 9
+#define STORAGE_BINDINGS 10
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most

@@ -1,9 +1,11 @@
 // A place: a position in whole units, modulo 2^32 in each component, with the inverse mass as float bits. Differences of
 // places wrap as well, so they are exact wherever the body is, as long as the vertices of a constraint are within 2^31 units
 // of each other (method.md, "What neighbours see").
-layout(std430, binding = BIND_PLACES) buffer Places { ivec4 places[]; };
-// Index of the first place read and of the first one written, PHASE_ bits, where to note what is not finite (first_bad.glsl).
-layout(location = 0) uniform uvec4 turn;
+// Read from one buffer and written to another (or the same, where nobody reads in the dispatch that writes).
+layout(std430, binding = BIND_PLACES) restrict readonly buffer Places { ivec4 places[]; };
+layout(std430, binding = BIND_PLACES_OUT) restrict writeonly buffer PlacesOut { ivec4 places_out[]; };
+// PHASE_ bits, and where to note what is not finite (first_bad.glsl).
+layout(location = 0) uniform uvec2 turn;
 
 // Halves of 16 bits: a float holds neither 2^32 nor a small negative number plus 2^32.
 ivec4 place_of(Pair x, float inverse_mass) {

@@ -9,5 +9,5 @@ layout(local_size_x = 256) in;
 void main() {
   uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
   if (i >= params.vertex_count) return;
-  places[turn.y + i] = predicted_place(positions[i], velocities[i]);
+  places_out[i] = predicted_place(positions[i], velocities[i]);
 }

@@ -31,7 +31,7 @@ void main() {
   for (uint k = me; k < count; k += $GROUPu) {
     uvec2 vertex = vertices[first + k];
     names[k] = vertex.x;
-    here[k] = places[turn.x + vertex.x];
+    here[k] = places[vertex.x];
     units_per_metre[k] = 1.0 / (params.delta_unit * uintBitsToFloat(vertex.y));
     sums[3u * k] = sums[3u * k + 1u] = sums[3u * k + 2u] = 0;
   }

@@ -25,11 +25,11 @@ void main() {
   Velocity speed;
   if (mine) {
     own = positions[i];
-    if ((turn.z & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+    if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
   }
   vec3 sum = vec3(0.0);
-  if (i < params.vertex_count && (turn.z & PHASE_SOLVE) != 0u) {
-    ivec4 self = places[turn.x + i];
+  if (i < params.vertex_count && (turn.x & PHASE_SOLVE) != 0u) {
+    ivec4 self = places[i];
     // The first entries of all kinds are on their way before the first one is used.
     uint row = $KINDSu * i;
     #foreach uint at_$KIND = table[row + $INDEXu] + lane, end_$KIND = table[row + $KINDSu + $INDEXu];

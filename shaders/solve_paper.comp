@@ -23,9 +23,9 @@ void main() {
   Record$ARITY record = records[index];
   vec3 x[$ARITY];
   float w[$ARITY];
-  ivec4 first = places[turn.x + record.vertices[0]];
+  ivec4 first = places[record.vertices[0]];
   for (int j = 0; j < $ARITY; ++j) {
-    ivec4 p = places[turn.x + record.vertices[j]];
+    ivec4 p = places[record.vertices[j]];
     x[j] = between(p, first);
     w[j] = inverse_mass_of(p);
   }

@@ -22,11 +22,11 @@ ivec4 predicted_place(Position own, Velocity speed) {
 
 // Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phase predicts or finishes.
 void advance(uint i, Position own, Velocity speed, vec3 correction) {
-  uint phase = turn.z;
+  uint phase = turn.x;
   Pair x = Pair(own.high, own.low), v = Pair(speed.high, speed.low), start = x;
   if (!(own.inverse_mass > 0.0)) {
-    if ((phase & PHASE_FINISH) != 0u) note_unless_finite(i, turn.w, x.high + x.low, vec3(0.0));
-    places[turn.y + i] = place_of(x, own.inverse_mass);
+    if ((phase & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
+    places_out[i] = place_of(x, own.inverse_mass);
     return;
   }
   if ((phase & PHASE_PREDICT) != 0u) {
@@ -47,12 +47,12 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
   if ((phase & PHASE_FINISH) != 0u) {
     if ((phase & PHASE_PREDICT) == 0u) start = Pair(predicted[i].high, predicted[i].low);
     v = pair_add(v, relative(x, start) * params.inverse_h);
-    note_unless_finite(i, turn.w, x.high + x.low, v.high + v.low);
+    note_unless_finite(i, turn.y, x.high + x.low, v.high + v.low);
   } else if ((phase & PHASE_PREDICT) != 0u) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
   }
   if ((phase & (PHASE_PREDICT | PHASE_FINISH)) != 0u) velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
   // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
   if ((phase & PHASE_FINISH) != 0u) x = predict_position(x, predict_velocity(v));
-  places[turn.y + i] = place_of(x, own.inverse_mass);
+  places_out[i] = place_of(x, own.inverse_mass);
 }

@@ -127,7 +127,7 @@ void clear_errors() {
 }
 
 void check_memory(const std::string& what, std::size_t bytes) {
-  if (glGetError() == GL_OUT_OF_MEMORY)
+  if (glGetError() != GL_NO_ERROR)  // drivers call an absurd size by other names than GL_OUT_OF_MEMORY
     throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
                 "use a smaller mesh, a smaller image or fewer samples", 1);
 }
@@ -173,6 +173,11 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
   glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
   try {
     check_memory(fmt::format("buffer '{}'", label_), bytes);
+    GLint64 made = 0;  // some drivers say nothing
+    glGetBufferParameteri64v(GL_COPY_WRITE_BUFFER, GL_BUFFER_SIZE, &made);
+    if (std::size_t(made) < bytes)
+      throw Error("out of GPU memory", fmt::format("buffer '{}' of {} bytes", label_, bytes),
+                  "use a smaller mesh, a smaller image or fewer samples", 1);
   } catch (...) {
     glDeleteBuffers(1, &id_);
     throw;
@@ -190,8 +195,15 @@ Buffer::~Buffer() {
 // Kernels queued before may still read or write the buffer (docs/barriers.md).
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  // Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old bytes, whatever
+  // barriers stand between, unless something flushes (docs/decisions.md).
+  GLuint staging = 0;
+  glGenBuffers(1, &staging);
+  glBindBuffer(GL_COPY_READ_BUFFER, staging);
+  glBufferData(GL_COPY_READ_BUFFER, GLsizeiptr(bytes), data, GL_STREAM_DRAW);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
-  glBufferSubData(GL_COPY_WRITE_BUFFER, GLintptr(offset), GLsizeiptr(bytes), data);
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, GLintptr(offset), GLsizeiptr(bytes));
+  glDeleteBuffers(1, &staging);
 }
 
 void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {

@@ -123,8 +123,11 @@ void allocate(Sim& sim) {
   sim.positions = buffer("positions", count * sizeof(Position));
   sim.velocities = buffer("velocities", count * sizeof(Velocity));
   sim.predicted = on_cpu(sim) ? Buffer() : buffer("predicted", count * sizeof(Velocity));
-  sim.places = on_cpu(sim) ? Buffer() : buffer("places", count * (sim.solver.double_buffered ? 32 : 16));
-  sim.half = 0;
+  for (int side = 0; side < 2; ++side)
+    sim.places[side] = on_cpu(sim) || (side == 1 && !sim.solver.double_buffered)
+                           ? Buffer()
+                           : buffer(side == 0 ? "places" : "places, other side", count * 16);
+  sim.side = 0;
 }
 
 State start_state(const Sim& sim) {
@@ -143,7 +146,7 @@ struct Dispatcher {
   const Tuning& tuning;
   GLuint program = 0;
   // `barriers`: who reads what it wrote, beside the next dispatch.
-  void run(Pass& pass, const glm::uvec4& turn, GLbitfield barriers = 0) {
+  void run(Pass& pass, const glm::uvec2& turn, GLbitfield barriers = 0) {
     if (pass.program.id() != program) pass.program.use(), program = pass.program.id();
     if (pass.turn != turn) pass.program.set(0, turn), pass.turn = turn;
     const std::size_t row = std::min<std::size_t>(pass.groups, tuning.row);
@@ -281,25 +284,30 @@ void step(Sim& sim) {
   sim.velocities.bind_storage(BIND_VELOCITIES);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
   sim.predicted.bind_storage(BIND_PREDICTED);
-  sim.places.bind_storage(BIND_PLACES);
   sim.check.words.bind_storage(BIND_CHECK);
   for (const auto& [binding, buffer] : sim.solver.bindings)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
   Dispatcher dispatcher{sim.tuning};
-  const unsigned count = unsigned(sim.model->positions.size());
-  const auto turn = [&](unsigned phase) {  // read this half, write the other
-    const unsigned to = sim.solver.double_buffered ? 1 - sim.half : 0;
-    return glm::uvec4(sim.half * count, to * count, phase, phase & PHASE_FINISH ? check_slot(sim.steps + 1) : 0);
+  const auto turn = [&](unsigned phase) {
+    return glm::uvec2(phase, phase & PHASE_FINISH ? check_slot(sim.steps + 1) : 0);
   };
+  const auto bind_places = [&] {  // read these, write the others
+    sim.places[sim.side].bind_storage(BIND_PLACES);
+    sim.places[sim.solver.double_buffered ? 1 - sim.side : 0].bind_storage(BIND_PLACES_OUT);
+  };
+  Pass& move = sim.solver.iteration.back();
   // The last dispatch of all is read by vertex fetches and copies.
   const auto move_vertices = [&](unsigned phase, bool last) {
     const GLbitfield readers = GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT;
-    Pass& move = sim.half && sim.solver.other_way ? *sim.solver.other_way : sim.solver.iteration.back();
     dispatcher.run(move, turn(phase), last ? readers : 0);
-    if (sim.solver.double_buffered) sim.half = 1 - sim.half;
+    if (sim.solver.double_buffered) sim.side = 1 - sim.side, bind_places();
   };
-  if (sim.stale) dispatcher.run(sim.predict, {0, sim.half * count, 0, 0});
+  if (sim.stale) {
+    sim.places[sim.side].bind_storage(BIND_PLACES_OUT);
+    dispatcher.run(sim.predict, {0, 0});
+  }
   sim.stale = false;
+  bind_places();
   const bool separate = sim.solver.separate || s.iterations == 0;
   for (int substep = 0; substep < s.substeps; ++substep) {
     const bool end = substep + 1 == s.substeps;
@@ -406,7 +414,7 @@ Explanation explain(const Sim& sim) {
     result.bytes += buffer.bytes();
   };
   for (const Buffer* buffer :
-       {&sim.positions, &sim.velocities, &sim.predicted, &sim.places, &sim.step_block, &sim.guard_counts,
+       {&sim.positions, &sim.velocities, &sim.predicted, &sim.places[0], &sim.places[1], &sim.step_block, &sim.guard_counts,
         &sim.check.words, &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);

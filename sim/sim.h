@@ -23,7 +23,7 @@ struct Sim {
   Buffer positions;   ///< Position
   Buffer velocities;  ///< Velocity
   Buffer predicted;   ///< Velocity (a pair as well), from the first iteration of a substep to the last
-  Buffer places;      ///< what neighbours see (places.glsl); of a double-buffered solver twice as many
+  Buffer places[2];   ///< what neighbours see (places.glsl); a double-buffered solver reads one and writes the other
   Buffer step_block;  ///< Step
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Pass predict;       ///< makes the places of the next step, after a change from outside
@@ -31,7 +31,7 @@ struct Sim {
   Tuning tuning;
   double unit = 1;                  ///< m, of places
   bool stale = true;                ///< the places are not those of the next step
-  unsigned half = 0;                ///< which half of the places is read next
+  unsigned side = 0;                ///< which of `places` is read next
   long steps = 0;                   ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 

@@ -94,11 +94,6 @@ Solver create_node_solver(const SolverInput& input) {
   // Position there and back, its place there and back, two rows of the table; entries; the neighbours'
   // places.
   pass.bytes = vertices * (2 * sizeof(Position) + 2 * 16 + 8 * kinds.size()) + entries + 16 * neighbours;
-  if (input.tuning.twice) {
-    solver.other_way.emplace();
-    solver.other_way->program = Program::compute("solve_node.comp", words);
-    solver.other_way->groups = pass.groups;
-  }
   solver.iteration.push_back(std::move(pass));
   return solver;
 }

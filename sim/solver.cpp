@@ -38,14 +38,13 @@ Tuning tuning_from_environment() {
   for (const std::string& assignment : split(variable ? variable : "", ',')) {
     unsigned* target = nullptr;
     for (const auto& [name, member] : {std::pair("lanes=", &tuning.lanes), std::pair("group=", &tuning.group),
-                                       std::pair("patch=", &tuning.patch), std::pair("row=", &tuning.row),
-                                       std::pair("twice=", &tuning.twice)})
+                                       std::pair("patch=", &tuning.patch), std::pair("row=", &tuning.row)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
     if (!target || std::from_chars(number, end, *target).ptr != end)
       throw Error(fmt::format("'{}' is no tuning", assignment), "TETPBD_TUNE",
-                  "write lanes=N, group=N, patch=N, row=N or twice=1, separated by commas");
+                  "write lanes=N, group=N, patch=N or row=N, separated by commas");
   }
   return tuning;
 }

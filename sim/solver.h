@@ -21,7 +21,7 @@ struct Pass {
   Program program;
   std::size_t groups = 0;
   std::size_t bytes = 0;  ///< read and written by all invocations together; caches may serve part of it
-  glm::uvec4 turn{~0u};   ///< the uniform `turn` (places.glsl) as it was last set
+  glm::uvec2 turn{~0u};   ///< the uniform `turn` (places.glsl) as it was last set
 };
 
 /// State on the CPU, in double: what CPU modes step and what tests compare.
@@ -44,7 +44,6 @@ struct Solver {
   std::vector<Pass>
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
   bool double_buffered = false;   ///< an iteration reads one half of the places and writes the other
-  std::optional<Pass> other_way;  ///< the last dispatch again, used from the second half to the first
   bool separate = false;          ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
@@ -56,7 +55,6 @@ struct Tuning {
   unsigned lanes = 0;  ///< invocations a vertex in mode node, a power of two up to `group`
   unsigned group = 0;  ///< invocations of a work-group of the solving kernel, a power of two up to 1024
   unsigned patch = 0;  ///< constraints of a patch in mode constraint
-  unsigned twice = 0;  ///< 1: mode node's kernel as two programs, one for each direction between the halves
   unsigned row = 0;    ///< most work-groups in a dispatch's first dimension
   std::size_t storage = 0;  ///< most bytes of a storage buffer
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)

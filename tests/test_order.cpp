@@ -80,7 +80,7 @@ struct ShaderVariant {
       }
       if (order.enlarged > 1) text = replaced(text, "$GROUP", "1024");
       const std::string row = "return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;";
-      if (entry.path().filename() == "types.glsl") {
+      if (entry.path() == folder / "types.glsl") {
         REQUIRE(text.find(row) != std::string::npos);
         text = replaced(text, row,
                         "uint g = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, n = gl_NumWorkGroups.x * "

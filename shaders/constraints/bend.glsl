@@ -36,8 +36,8 @@ Constraint4 bend(vec3 x[4], real rest, const uint id[4]) {
   // direction then to that times a side over the normal's length.
   vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b0 = x[1] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
   real a22 = dot(a2, a2), a33 = dot(a3, a3), b22 = dot(b2, b2), b33 = dot(b3, b3);
-  real extent = sqrt(max(max(a22, a33), dot(b0, b0))) + grain;
-  real noise = pi + real(2) * extent * (sqrt(max(a22, a33) / aa) + sqrt(max(b22, b33) / bb));
+  real longest = max(max(max(a22, a33), max(b22, b33)), dot(b0, b0));
+  real noise = pi + real(4) * (longest + grain * sqrt(longest)) / sqrt(min(aa, bb));
   c.C = clamp(resolved(turn, noise), real(-1), real(1));
   c.guards = abs(turn) > real(1) ? GUARD_ANGLE : 0u;
   c.gradient[0] = -l * a;

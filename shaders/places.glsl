@@ -2,7 +2,7 @@
 // places wrap as well, so they are exact wherever the body is, as long as the vertices of a constraint are within 2^31 units
 // of each other (method.md, "What neighbours see").
 layout(std430, binding = BIND_PLACES) buffer Places { ivec4 places[]; };
-// Index of the first place read and of the first one written, PHASE_ bits, where to note what is not finite (first_bad.glsl).
+// Index of the first place read and of the first one written, PHASE_ bits and group, where to note what is not finite (first_bad.glsl).
 layout(location = 0) uniform uvec4 turn;
 
 // Halves of 16 bits: a float holds neither 2^32 nor a small negative number plus 2^32.

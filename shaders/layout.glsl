@@ -58,8 +58,10 @@ struct Step {
 
 // What a dispatch that moves vertices does with them beside the corrections (vertex.glsl); bits.
 #define PHASE_PREDICT 1u  // before: v += h g, p = x + h v
-#define PHASE_SOLVE 2u    // corrections and contacts
+#define PHASE_SOLVE 2u    // corrections
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
+#define PHASE_CONTACT 8u  // contacts after the corrections: once an iteration
+#define PHASE_BITS 4      // above them: which group of constraints (mode groups)
 
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0

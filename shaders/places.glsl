@@ -4,7 +4,7 @@
 // Read from one buffer and written to another (or the same, where nobody reads in the dispatch that writes).
 layout(std430, binding = BIND_PLACES) restrict readonly buffer Places { ivec4 places[]; };
 layout(std430, binding = BIND_PLACES_OUT) restrict writeonly buffer PlacesOut { ivec4 places_out[]; };
-// PHASE_ bits, and where to note what is not finite (first_bad.glsl).
+// PHASE_ bits and group, and where to note what is not finite (first_bad.glsl).
 layout(location = 0) uniform uvec2 turn;
 
 // Halves of 16 bits: a float holds neither 2^32 nor a small negative number plus 2^32.

@@ -1,6 +1,7 @@
 // Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): $LANES invocations a vertex gather the corrections of all
 // constraints on it, of every kind present; the first adds them up and moves the vertex. Places are read from one half of their
-// buffer and written to the other. Each constraint is evaluated once by each of its vertices.
+// buffer and written to the other. Each constraint is evaluated once by each of its vertices. Mode groups takes the constraints of
+// one group, and averages by the number of those on the vertex, without ever exceeding the full correction.
 #include "types.glsl"
 #include "pair.glsl"
 #include "places.glsl"
@@ -28,12 +29,18 @@ void main() {
     if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
   }
   vec3 sum = vec3(0.0);
+#if $GROUPED
+  uint here = 0u;
+#endif
   if (i < params.vertex_count && (turn.x & PHASE_SOLVE) != 0u) {
     ivec4 self = places[i];
     // The first entries of all kinds are on their way before the first one is used.
-    uint row = $KINDSu * i;
+    uint row = $KINDSu * ((turn.x >> PHASE_BITS) * params.vertex_count + i);
     #foreach uint at_$KIND = table[row + $INDEXu] + lane, end_$KIND = table[row + $KINDSu + $INDEXu];
     #foreach uvec$ARITY entry_$KIND; if (at_$KIND < end_$KIND) entry_$KIND = stream_$KIND[at_$KIND];
+#if $GROUPED
+    #foreach here += end_$KIND - at_$KIND;  // of lane 0, which begins at the first
+#endif
     if (inverse_mass_of(self) > 0.0) {
       #foreach sum += gather_$KIND(i, at_$KIND, end_$KIND, entry_$KIND, self);
     }
@@ -53,5 +60,10 @@ void main() {
     if (reach > 1u) barrier();
   }
 #endif
-  if (mine) advance(i, own, speed, own.constraints > 0.0 ? sum * (params.omega / own.constraints) : vec3(0.0));
+#if $GROUPED
+  float share = here > 0u ? min(params.omega / float(here), 1.0) : 0.0;
+#else
+  float share = own.constraints > 0.0 ? params.omega / own.constraints : 0.0;
+#endif
+  if (mine) advance(i, own, speed, share > 0.0 ? sum * share : vec3(0.0));
 }

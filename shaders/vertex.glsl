@@ -35,7 +35,7 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
   }
   if ((phase & PHASE_SOLVE) != 0u) {
     Pair corrected = pair_add(x, correction);
-    if (touches(corrected)) {
+    if ((phase & PHASE_CONTACT) != 0u && touches(corrected)) {
       vec3 moved = correction;
       if ((phase & PHASE_PREDICT) != 0u) moved += params.h * v.high;
       else moved += params.h * velocities[i].high + relative(x, Pair(predicted[i].high, predicted[i].low));

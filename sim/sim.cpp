@@ -105,7 +105,8 @@ void build_solver(Sim& sim) {
   predict.program = Program::compute("predict.comp");
   predict.groups = work_groups(sim.model->positions.size(), group_size);
   predict.bytes = sim.model->positions.size() * (sizeof(Position) + sizeof(Velocity) + 16);
-  Solver solver = mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning});
+  Solver solver =
+      mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning, sim.settings.groups});
   Program keep = Program::compute("keep.comp");
   sim.predict = std::move(predict);
   sim.check.keep = std::move(keep);
@@ -240,7 +241,8 @@ void write_state(Sim& sim, const State& state) {
 void apply_settings(Sim& sim, const Settings& settings) {
   const bool kinds = settings.constraints != sim.settings.constraints;
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
-  if (kinds || settings.mode != sim.settings.mode) {
+  const bool groups = settings.groups != sim.settings.groups && settings.mode == "groups";
+  if (kinds || groups || settings.mode != sim.settings.mode) {
     if (check_finite(sim, true)) return_to_kept(sim);  // a solver made anew has nothing better to start from
     const State state = read_state(sim);
     // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
@@ -315,10 +317,14 @@ void step(Sim& sim) {
     for (int iteration = 0; iteration < s.iterations; ++iteration) {
       for (std::size_t p = 0; p + 1 < sim.solver.iteration.size(); ++p)
         dispatcher.run(sim.solver.iteration[p], turn(PHASE_SOLVE));
-      unsigned phase = PHASE_SOLVE;
-      if (!separate && iteration == 0) phase |= PHASE_PREDICT;
-      if (!separate && iteration + 1 == s.iterations) phase |= PHASE_FINISH;
-      move_vertices(phase, end && !separate && iteration + 1 == s.iterations);
+      for (int group = 0; group < sim.solver.groups; ++group) {
+        const bool last = group + 1 == sim.solver.groups, finish = last && iteration + 1 == s.iterations;
+        unsigned phase = PHASE_SOLVE | unsigned(group) << PHASE_BITS;
+        if (!separate && iteration == 0 && group == 0) phase |= PHASE_PREDICT;
+        if (!separate && finish) phase |= PHASE_FINISH;
+        if (last) phase |= PHASE_CONTACT;
+        move_vertices(phase, end && !separate && finish);
+      }
     }
     if (separate) move_vertices(PHASE_FINISH, end);
   }
@@ -428,10 +434,11 @@ Explanation explain(const Sim& sim) {
     dispatch(sim.predict, "", 0, 0);
     for (const Pass& pass : sim.solver.iteration) {
       const bool moves = &pass == &sim.solver.iteration.back();
-      // The first and the last iteration also read or write velocities and predicted positions.
-      const long ends = moves && !separate ? (iterations == 1 ? 1 : 2) : 0;
-      const std::size_t more = iterations == 1 ? 2 * sizeof(Velocity) : 3 * sizeof(Velocity);
-      dispatch(pass, "", substeps * (iterations - ends), 0);
+      const long runs = moves ? iterations * sim.solver.groups : iterations;
+      // The first and the last of a substep also read or write velocities and predicted positions.
+      const long ends = moves && !separate ? (runs == 1 ? 1 : 2) : 0;
+      const std::size_t more = runs == 1 ? 2 * sizeof(Velocity) : 3 * sizeof(Velocity);
+      dispatch(pass, "", substeps * (runs - ends), 0);
       if (ends > 0)
         dispatch(pass, ends == 1 ? ", whole substep" : ", first and last", substeps * ends, vertices * more);
       if (moves && separate)

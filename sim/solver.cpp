@@ -18,7 +18,10 @@ const std::vector<SolverMode>& solver_modes() {
       {"constraint", "Jacobi on the GPU, a thread a constraint adds to its vertices with integer atomics",
        create_constraint_solver},
       {"cpu", "non-linear Gauss-Seidel on one CPU core, the paper's baseline", create_cpu_solver},
-      {"cpu-double", "the same in double precision: what stability is held against", create_cpu_double_solver},
+      {"cpu-double", "the same in double precision: what stability is held against",
+       create_cpu_double_solver},
+      {"groups", "Gauss-Seidel on the GPU between K groups of constraints, averaged inside each",
+       create_groups_solver},
   };
   return rows;
 }

@@ -44,6 +44,7 @@ struct Solver {
   std::vector<Pass>
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
   bool double_buffered = false;   ///< an iteration reads one half of the places and writes the other
+  int groups = 1;  ///< the last dispatch runs once for each group of constraints, swapping sides every time
   bool separate = false;          ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
@@ -67,6 +68,7 @@ struct SolverInput {
   const ConstraintSystem& system;
   bool software = false;  ///< the "GPU" is a CPU
   Tuning tuning;          ///< `row` and `storage` filled in
+  int groups = 1;         ///< of mode groups
 };
 
 struct SolverMode {
@@ -80,6 +82,7 @@ const SolverMode* find_solver_mode(const std::string& name);
 
 Solver create_constraint_solver(const SolverInput&);  ///< solve_constraint.cpp
 Solver create_node_solver(const SolverInput&);        ///< solve_node.cpp
+Solver create_groups_solver(const SolverInput&);      ///< solve_node.cpp
 Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp, float
 Solver create_cpu_double_solver(const SolverInput&);  ///< solve_cpu.cpp, double
 Solver create_paper_solver(const SolverInput&);       ///< solve_paper.cpp

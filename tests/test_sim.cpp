@@ -1,6 +1,5 @@
 // The GPU step against the same step in double on the CPU, and the laws it has to keep.
 #include <doctest/doctest.h>
-
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "sim/cpu_pbd.h"
 #include "sim/error.h"
+#include "sim/groups.h"
 #include "sim/metrics.h"
 #include "sim/patches.h"
 #include "sim/reference.h"
@@ -57,6 +57,41 @@ State reference_after(const Sim& sim, int steps, Sweep sweep) {
   return state;
 }
 
+// One step of mode groups in double: CpuPbd's averages over each group (omega 1 and nothing else of a step),
+// of which a vertex with n constraints in the group goes min(n, omega) times; contacts after the last group.
+State step_by_groups(const Sim& sim) {
+  const Settings& s = sim.settings;
+  const auto groups = balanced_groups(sim.system, s.groups);
+  std::vector<ConstraintSystem> parts;
+  for (int g = 0; g < s.groups; ++g) parts.push_back(group_of(sim.system, groups, g));
+  Settings average = s;
+  average.iterations = average.substeps = 1, average.omega = 1, average.gravity = 0, average.ground = false;
+  const double h = s.dt / s.substeps;
+  State state = start_of(sim);
+  auto& x = state.positions;
+  for (int substep = 0; substep < s.substeps; ++substep) {
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      state.velocities[i].y -= h * s.gravity;
+      x[i] += h * state.velocities[i];
+    }
+    const auto predicted = x;
+    for (int iteration = 0; iteration < s.iterations; ++iteration) {
+      for (const ConstraintSystem& part : parts) {
+        State moved{x, std::vector<glm::dvec3>(x.size())};
+        CpuPbd<double>(*sim.model, part).step(moved, average, sim.inverse_masses, Sweep::jacobi);
+        for (std::size_t i = 0; i < x.size(); ++i)
+          x[i] += (moved.positions[i] - x[i]) * std::min(double(part.at_vertex[i]), s.omega);
+      }
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (const double depth = x[i].y - s.ground_height; depth < 0)
+          x[i] += Formulas<double>{}.plane_correction(
+              glm::dvec3(0, 1, 0), depth, h * state.velocities[i] + (x[i] - predicted[i]), s.friction);
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) state.velocities[i] += (x[i] - predicted[i]) / h;
+  }
+  return state;
+}
+
 double distance(const State& a, const State& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.positions.size(); ++i)
@@ -88,6 +123,59 @@ TEST_CASE("one GPU step is the double CPU step, for each constraint kind, mode a
         CHECK(dv < 1e-3);
         if (std::string(kinds) != "none") CHECK(distance(after, before) > 1e-3);
       }
+}
+
+TEST_CASE("one step of mode groups is Gauss-Seidel between groups in double, averaged inside each") {
+  GlTest gl;
+  for (glm::ivec3 cells : {glm::ivec3(1, 1, 1), glm::ivec3(4, 3, 2)})
+    for (int groups : {1, 3, 8, 128})  // the last is a colouring
+      for (int iterations : {1, 3})
+        for (unsigned lanes : {0u, 4u}) {
+          CAPTURE(cells.x);
+          CAPTURE(groups);
+          CAPTURE(iterations);
+          CAPTURE(lanes);
+          Settings settings = quick("groups", iterations, 2);
+          settings.groups = groups;
+          Sim sim = create_sim(block_model(cells, -0.01, 1, "stretch:1.3", glm::dvec3(0, 2, 0)), settings,
+                               {.lanes = lanes});
+          const State expected = step_by_groups(sim), before = read_state(sim);
+          step(sim);
+          const State after = read_state(sim);
+          CHECK(distance(after, expected) < 2e-6 * sim.model->size);
+          CHECK(distance(State{after.velocities, {}}, State{expected.velocities, {}}) < 1e-3);
+          CHECK(distance(after, before) > 1e-3);
+        }
+}
+
+TEST_CASE(
+    "one group is mode node, many groups come closer to Gauss-Seidel, and the setting takes effect at once") {
+  GlTest gl;
+  const auto model = block_model({4, 3, 2}, 0.2, 1, "stretch:1.1");
+  Settings settings = quick("node");
+  settings.gravity = 0, settings.ground = false;
+  Sim node = create_sim(model, settings);
+  settings.mode = "groups", settings.groups = 1;
+  Sim sim = create_sim(model, settings);
+  const State start = read_state(sim);
+  const State exact = rigid_step({*model, sim.system, settings, sim.inverse_masses}, start);
+  step(node), step(sim);
+  CHECK(distance(read_state(sim), read_state(node)) < 1e-7);
+  double previous = 1;
+  for (int groups : {1, 4, 16, 128}) {
+    CAPTURE(groups);
+    settings.groups = groups;
+    apply_settings(sim, settings);
+    write_state(sim, start);
+    step(sim);
+    const double left = error_to(*model, exact, read_state(sim)) / error_to(*model, exact, start);
+    MESSAGE(groups << " groups leave " << left << " of the stretch");
+    CHECK(left < previous);
+    previous = left;
+    Sim fresh = create_sim(model, settings);
+    step(fresh);
+    CHECK(state_hash(fresh) == state_hash(sim));
+  }
 }
 
 TEST_CASE("however kernels are cut into invocations, a step is the double CPU step") {
@@ -197,7 +285,7 @@ TEST_CASE("vertices in another order are the same bodies, and what leaves is in 
 
 TEST_CASE("a body is solved as well 1e4 sizes from the origin as near it") {
   GlTest gl;
-  for (const char* mode : {"node", "constraint"}) {
+  for (const char* mode : {"node", "constraint", "groups"}) {
     CAPTURE(mode);
     const auto model = block_model({4, 3, 2}, 0.3, 1, "stretch:1.2");
     auto far = std::make_shared<Model>(*model);
@@ -315,7 +403,7 @@ TEST_CASE("positions and velocities keep 48 bits on their way to the GPU and bac
 
 TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
   GlTest gl;
-  for (const char* mode : {"node", "constraint", "cpu"})
+  for (const char* mode : {"node", "constraint", "groups", "cpu"})
     for (int substeps : {1, 10, 100, 1000}) {
       CAPTURE(mode);
       CAPTURE(substeps);
@@ -383,10 +471,12 @@ TEST_CASE("friction stops a sliding block and none does not") {
   GlTest gl;
   TetMesh mesh = make_block(glm::dvec3(1.0, 0.5, 0.5), {2, 1, 1});
   for (auto& p : mesh.positions) p.y += 0.25;
-  for (double friction : {0.0, 0.5}) {
+  for (const auto& [mode, friction] :
+       {std::pair("node", 0.0), std::pair("node", 0.5), std::pair("groups", 0.5)}) {
+    CAPTURE(mode);
     auto model = std::make_shared<Model>();
     add_body(*model, "block", mesh, 1000, mesh.positions, glm::dvec3(1, 0, 0), glm::dvec3(0), {});
-    Settings settings = quick("node", 10, 4);
+    Settings settings = quick(mode, 10, 4);
     settings.friction = friction;
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < 100; ++s) step(sim);
@@ -428,7 +518,7 @@ TEST_CASE("fixed and pinned vertices stay, moved ones pull, unpinned ones fall")
 TEST_CASE("settings change while running: mode, kinds and numbers, and the state stays") {
   GlTest gl;
   Sim sim = create_sim(block_model({4, 3, 2}, 0.1), quick("node"));
-  for (const char* mode : {"constraint", "cpu", "node", "cpu", "constraint"})
+  for (const char* mode : {"constraint", "cpu", "node", "groups", "cpu", "constraint"})
     for (const char* kinds : {"stretch", "stretch,bend,volume", "", "volume,stretch"}) {
       for (int s = 0; s < 3; ++s) step(sim);
       const State before = read_state(sim);
@@ -470,6 +560,18 @@ TEST_CASE("only what a scene needs is allocated and dispatched") {
   CHECK(all.dispatches_per_step == 10 * 2);
   settings.mode = "node";
   CHECK(explain(create_sim(model, settings)).dispatches_per_step == 10);
+  settings.constraints = "stretch,bend,volume";
+  const auto streams = [](const Explanation& e) {
+    std::size_t bytes = 0;
+    for (const auto& b : e.buffers)
+      if (b.name.starts_with("stream ") && b.name != "stream table") bytes += b.bytes;
+    return bytes;
+  };
+  const std::size_t node_streams = streams(explain(create_sim(model, settings)));
+  settings.mode = "groups";
+  const Explanation groups = explain(create_sim(model, settings));
+  CHECK(groups.dispatches_per_step == 10 * settings.groups);
+  CHECK(streams(groups) == node_streams);
   settings.mode = "paper";
   settings.constraints = "stretch,bend,volume";
   CHECK(explain(create_sim(model, settings)).dispatches_per_step == 1 + 10 * 4 + 1);

@@ -13,6 +13,7 @@
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl_context.h"
+#include "sim/interrupt.h"
 
 namespace tetpbd {
 
@@ -40,7 +41,7 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
       now.velocities = sim.velocities.id();
       draw(*renderer, now);
     };
-    for (long f = 0; f < options.warm_up; ++f) frame();
+    for (long f = 0; f < options.warm_up && !interrupted(); ++f) frame();
     glFinish();
     sim.timed = true;
     std::vector<double> steps;
@@ -48,6 +49,7 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
     const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
     long frames = 0;
     for (; frames < options.frames && elapsed() < options.most_seconds; ++frames) {
+      if (interrupted()) throw Interrupted();
       frame();
       while (const auto ms = sim.timer.poll()) steps.push_back(*ms);
     }
@@ -66,8 +68,8 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
 std::string csv_line(const BenchRow& r) {
   const bool on_gpu = r.gpu_ms.median > 0;
   return fmt::format(
-      "{},{},{},{},{},{},{},{},{:.6g},{},{:.6g},{},{},{},{}\n", r.scene, r.mode, r.constraints, r.iterations,
-      r.substeps, r.size, r.vertices, r.tets, r.fps.median,
+      "{},{},{},{},{},{},{},{},{:.6g},{},{:.6g},{},{},{},{}\n", csv_field(r.scene), r.mode, r.constraints,
+      r.iterations, r.substeps, r.size, r.vertices, r.tets, r.fps.median,
       on_gpu ? fmt::format("{:.6g}", r.gpu_ms.median) : "", r.wall_ms.median,
       on_gpu ? fmt::format("{:.6g}", 1e3 * r.gpu_ms.median / r.iterations / r.substeps) : "", r.dispatches,
       r.gpu_bytes,
@@ -160,6 +162,7 @@ std::string bench_csv(const std::vector<BenchRow>& rows) {
 }
 
 int run_bench(const BenchOptions& options) {
+  catch_interrupts();
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
   const Capabilities& device = context.capabilities();
@@ -172,7 +175,9 @@ int run_bench(const BenchOptions& options) {
       options.frames, options.warm_up, options.repeats);
   fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", "scene", "mode", "constraints",
              "iter", "sub", "size", "fps", "GPU us", "us/iter", "loss %");
-  const auto rows = bench_rows(options, [](const BenchRow& row) {
+  std::vector<BenchRow> rows;
+  const auto report = [&](const BenchRow& row) {
+    rows.push_back(row);
     const auto gpu = [&](double value) {
       return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
     };
@@ -183,7 +188,13 @@ int run_bench(const BenchOptions& options) {
                std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
                                                           : "-");
     std::fflush(stdout);
-  });
+  };
+  bool whole = true;
+  try {
+    bench_rows(options, report);
+  } catch (const Interrupted&) {
+    whole = false;
+  }
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   const auto triple = [](const Percentiles& p) {
     return nlohmann::ordered_json{{"median", p.median}, {"min", p.p05}, {"max", p.p95}};
@@ -213,8 +224,10 @@ int run_bench(const BenchOptions& options) {
                                            {"warm_up", options.warm_up},
                                            {"repeats", options.repeats},
                                            {"rows", list}};
-  write_file(options.out / "bench.json", document.dump(1) + "\n");
+  write_file(options.out / "bench.json", json_text(document, 1) + "\n");
   fmt::print("\n{}\n", (options.out / "bench.csv").string());
+  if (!whole)
+    throw Error("interrupted", fmt::format("after {} rows", rows.size()), "what was finished is written", 1);
   return 0;
 }
 

@@ -14,6 +14,7 @@
 #include "app/progress.h"
 #include "sim/error.h"
 #include "sim/gl_context.h"
+#include "sim/interrupt.h"
 
 namespace tetpbd {
 
@@ -169,7 +170,7 @@ std::string csv_of(const ordered_json& rows) {
     for (const std::string& column : columns) {
       if (&column != &columns.front()) line += ",";
       const auto& value = row[column];
-      line += value.is_string() ? value.get<std::string>() : value.is_null() ? "" : value.dump();
+      line += value.is_string() ? csv_field(value.get<std::string>()) : value.is_null() ? "" : value.dump();
     }
     csv += line + "\n";
   }
@@ -229,7 +230,11 @@ ordered_json measured(const CompareOptions& options) {
   Progress progress("compare", long(combinations.size()) / options.shards);
   for (std::size_t i = std::size_t(options.shard - 1); i < combinations.size();
        i += std::size_t(options.shards)) {
-    rows.push_back(run_one(scene, model, combinations[i], options.steps));
+    try {
+      rows.push_back(run_one(scene, model, combinations[i], options.steps));
+    } catch (const Interrupted&) {
+      break;  // the finished rows are written; merging says how many there should be
+    }
     progress.update(long(rows.size()));
   }
   return {{"device", device_json(device)},
@@ -272,9 +277,12 @@ void print_choice(const ordered_json& rows, const CompareOptions& options) {
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
+  catch_interrupts();
   make_output_folder(options.out);
   ordered_json document = options.merge.empty() ? measured(options) : merged(options.merge);
   ordered_json& rows = document["rows"];
+  if (rows.empty() && interrupted())
+    throw Error("interrupted", "before the first row", "nothing was written", 1);
   if (rows.empty())
     throw Error("nothing to compare", fmt::format("--shard {}/{}", options.shard, options.shards),
                 "there are fewer combinations than shards");
@@ -296,11 +304,16 @@ int run_compare(const CompareOptions& options) {
   if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return loss(row) == 0; }))
     fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
                document["steps"].get<long>());
-  write_file(options.out / "compare.json", document.dump(1) + "\n");
+  write_file(options.out / "compare.json", json_text(document, 1) + "\n");
   write_file(options.out / "compare.csv", csv_of(rows));
   write_chart(options.out / "compare", to_svg(chart_of(document)));
   print_choice(rows, options);
   fmt::print("{}\n", (options.out / "compare.csv").string());
+  if (interrupted())
+    throw Error(
+        "interrupted",
+        fmt::format("after {} of {} combinations", rows.size(), document["combinations"].get<std::size_t>()),
+        "what was finished is written", 1);
   return 0;
 }
 

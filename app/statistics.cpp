@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "app/files.h"
+
 namespace tetpbd {
 
 using nlohmann::ordered_json;
@@ -120,7 +122,7 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                  {"final_potential", number(last.potential)}};
   j["finite"] = errors.finite;
   j["state_hash"] = fmt::format("{:016x}", hash);
-  return j.dump(2) + "\n";
+  return json_text(j, 2) + "\n";
 }
 
 namespace {

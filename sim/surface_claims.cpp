@@ -63,7 +63,7 @@ void require_words(const std::filesystem::path& file, std::istream& body,
     }
   };
   for (const TextElement& element : elements)
-    for (std::size_t i = 0; i < element.count; ++i) {
+    for (std::size_t i = 0; i < element.count && !element.lists.empty(); ++i) {
       for (const bool list : element.lists) {
         const std::string_view word = next_word();
         if (word.empty()) throw_early_end(file, element.name);
@@ -131,7 +131,7 @@ SurfaceClaims off_claims(const std::filesystem::path& file, std::istream& head, 
     if (digit == std::string::npos) continue;
     std::istringstream words(line.substr(digit));
     double vertices = 0, faces = 0;
-    if (!(words >> vertices >> faces)) return {};
+    if (!(words >> vertices >> faces) || !(vertices >= 0) || !(faces >= 0)) return {};
     const double least = vertices * 6 + faces * 8;  // "0 0 0\n", "3 0 1 2\n"
     if (least > size + 1)
       throw_short(file, fmt::format("{:.0f} vertices, {:.0f} faces", vertices, faces), least, size);

@@ -127,7 +127,8 @@ void Video::finish() {
   if (std::ifstream log(log_); std::getline(log, line) && !line.empty()) why += " (" + line + ")";
   std::error_code ignored;
   fs::remove(log_, ignored);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  // On a full disk ffmpeg 5.1 says so and still ends with 0.
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && line.empty()) return;
   fs::remove(temporary_, ignored);
   throw Error("cannot write the video", file_.string(), why, 1);
 }

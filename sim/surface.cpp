@@ -108,7 +108,7 @@ SurfaceMesh load_surface(const std::filesystem::path& file) {
   require_readable(file);
   const SurfaceClaims claims = read_surface_claims(file);
   // On a loaded machine a megabyte takes 0.1 s; damaged files can keep assimp busy for ever.
-  // assimp keeps about 60 bytes for each byte of an STL or OFF, whose vertices it unrolls.
+  // A stated limit, with room for readers that unroll vertices and for the answer.
   const std::size_t size = std::filesystem::file_size(file);
   const double seconds = 20 + 1e-6 * static_cast<double>(size);
   const std::size_t memory = (std::size_t{512} << 20) + 200 * std::min(size, std::size_t{1} << 34);

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "app/files.h"
@@ -260,8 +261,10 @@ void write_chart(const std::filesystem::path& name, const std::string& svg) {
   if (status == 0) return rename_whole(part, png_file);
   std::error_code ignored;
   std::filesystem::remove(part, ignored);
-  fmt::print(stderr, "tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n",
-             printable(png_file));
+  std::fputs(
+      fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n", printable(png_file))
+          .c_str(),
+      stderr);
 }
 
 }  // namespace tetpbd

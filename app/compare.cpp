@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -204,9 +205,11 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
     throw Error("a shard was given twice", fmt::format("--merge, shards {}", fmt::join(shards, ", ")),
                 "name each folder once");
   if (document["rows"].size() < document["combinations"].get<std::size_t>())
-    fmt::print(stderr, "tetpbd: only {} of {} combinations: shards {} of {}\n", document["rows"].size(),
-               document["combinations"].get<std::size_t>(), fmt::join(shards, ", "),
-               document["shards"].get<int>());
+    std::fputs(fmt::format("tetpbd: only {} of {} combinations: shards {} of {}\n", document["rows"].size(),
+                           document["combinations"].get<std::size_t>(), fmt::join(shards, ", "),
+                           document["shards"].get<int>())
+                   .c_str(),
+               stderr);
   return document;
 }
 

@@ -351,6 +351,13 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   };
 }
 
+// Not fmt::print(), which throws where standard error cannot be written.
+static int fail(const std::string& line, int status) {
+  std::fflush(stdout);
+  std::fputs(("tetpbd: " + printable(line) + "\n").c_str(), stderr);
+  return status;
+}
+
 int main(int argc, char** argv) {
   // A full quota is then an error of write(), which is reported and cleaned up after.
   std::signal(SIGXFSZ, SIG_IGN);
@@ -360,14 +367,11 @@ int main(int argc, char** argv) {
       throw Error("cannot write", "standard output", "is the disk full?", 1);
     return status;
   } catch (const Error& error) {
-    std::fflush(stdout);
-    fmt::print(stderr, "tetpbd: {}\n", error.what());
-    return error.exit_status;
+    return fail(error.what(), error.exit_status);
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "tetpbd: out of memory: {}: use a smaller mesh\n", argc > 1 ? argv[1] : "start");
-    return 1;
+    return fail(fmt::format("out of memory: {}: use a smaller mesh", argc > 1 ? argv[1] : "start"), 1);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "tetpbd: unexpected: {}: please report this\n", printable(error.what()));
-    return 1;
+    if (std::ferror(stdout)) return fail("cannot write: standard output: is the disk full?", 1);
+    return fail(fmt::format("unexpected: {}: please report this", error.what()), 1);
   }
 }

@@ -33,7 +33,8 @@ struct Program {
   pid_t pid;
   Program(
       const Folder& in, std::vector<std::string> words, const std::function<void()>& prepare = [] {})
-      : folder(in), pid(::fork()) {
+      : folder(in), pid((std::fflush(nullptr), ::fork())) {
+    REQUIRE(pid >= 0);
     if (pid != 0) return;
     if (::chdir(folder.path.c_str()) != 0 || !std::freopen("stdout", "w", stdout) ||
         !std::freopen("stderr", "w", stderr))
@@ -79,14 +80,15 @@ void check_failed(Program& program, const std::string& word, int wanted = 1) {
   }
 }
 
-const std::vector<std::string> short_run = {"run", "--scene",    "beam",  "--steps",   "4", "--iterations",
-                                            "1",   "--size",     "64x48", "--samples", "0", "--png-every",
-                                            "2",   "--positions"};
+const std::vector<std::string> plain_run = {"run", "--scene", "beam",  "--steps",   "4", "--iterations",
+                                            "1",   "--size",  "64x48", "--samples", "0", "--positions"};
 
 std::vector<std::string> with(std::vector<std::string> words, const std::vector<std::string>& more) {
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
+
+const std::vector<std::string> short_run = with(plain_run, {"--png-every", "2"});
 
 std::function<void()> files_of_at_most(rlim_t bytes) {
   return [bytes] {
@@ -116,15 +118,14 @@ std::string cube_off() {
 
 TEST_CASE("faults: a full disk") {
   const Folder folder;
-  Program nothing(folder, with(short_run, {"--out", "a"}), files_of_at_most(10));
+  Program nothing(folder, with(short_run, {"--out", "a"}), files_of_at_most(150));
   check_failed(nothing, "cannot be written");
   CHECK(fs::is_empty(folder.path / "a"));
-  Program some(folder, with(short_run, {"--out", "b", "--png-every", "1000"}), files_of_at_most(6000));
+  Program some(folder, with(plain_run, {"--out", "b"}), files_of_at_most(6000));
   check_failed(some, ".npy");  // statistics fit, positions do not
   CHECK(!fs::exists(folder.path / "b/positions.npy"));
   CHECK(nlohmann::json::parse(content(folder.path / "b/stats.json")).contains("timing"));
-  Program video(folder, with(short_run, {"--out", "c", "--video", "c.mp4", "--png-every", "1000"}),
-                files_of_at_most(900));
+  Program video(folder, with(plain_run, {"--out", "c", "--video", "c.mp4"}), files_of_at_most(900));
   check_failed(video, "c.mp4");
   CHECK(!fs::exists(folder.path / "c.mp4"));
   Program compare(folder,
@@ -143,6 +144,15 @@ TEST_CASE("faults: a full disk") {
     if (!std::freopen("/dev/full", "w", stdout)) ::_exit(97);
   });
   check_failed(full, "standard output");
+  Program explain(folder, {"run", "--scene", "beam", "--explain"}, [] {
+    if (!std::freopen("/dev/full", "w", stdout)) ::_exit(97);
+    std::setvbuf(stdout, nullptr, _IONBF, 0);
+  });
+  check_failed(explain, "standard output");
+  Program mute(folder, {"run", "--scene", "none"}, [] {
+    if (!std::freopen("/dev/full", "w", stderr)) ::_exit(97);
+  });
+  CHECK(mute.wait() == 2);
 }
 
 TEST_CASE("faults: folders and files in the way") {
@@ -154,7 +164,7 @@ TEST_CASE("faults: folders and files in the way") {
     check_failed(run, out, 2);
   }
   fs::create_directories(folder.path / "a/stats.json");
-  Program taken(folder, with(short_run, {"--out", "a", "--png-every", "1000"}));
+  Program taken(folder, with(plain_run, {"--out", "a"}));
   check_failed(taken, "stats.json");
   for (const char* scene : {"file", "a", "none.json", "/dev/full", "/dev/zero"}) {
     CAPTURE(scene);
@@ -289,20 +299,20 @@ TEST_CASE("faults: TetGen's child is killed, runs out of memory, or is interrupt
   const Folder folder;
   folder.write("cube.off", cube_off());
   // Ten million tets: minutes.
-  const std::vector<std::string> long_work = {"mesh",     "cube.off", "--tetgen",
-                                              "pYqa1e-7", "--out",    "cube.msh"};
+  const std::vector<std::string> long_work = {"mesh", "cube.off", "--tetgen", "pqa1e-7", "--out", "cube.msh"};
   const auto meddle = [&](const std::function<void(pid_t, pid_t)>& action, const char* word) {
     CAPTURE(word);
     Program program(folder, long_work);
     // The first child reads the file; the one after the report of the surface fills it.
     pid_t child = 0;
-    CHECK(soon([&] {
+    REQUIRE(soon([&] {
       const std::string name = content(fmt::format("/proc/{}/statm", child = child_of(program.pid)));
       std::istringstream words(name);
       long mapped = 0, resident = 0;
       words >> mapped >> resident;
       return child > 0 && resident > 10000;  // pages: 40 MB of tets
     }));
+    REQUIRE(child > 0);
     action(program.pid, child);
     check_failed(program, word, std::string(word) == "interrupted" ? 1 : 2);
     CHECK(!fs::exists(folder.path / "cube.msh"));

@@ -178,12 +178,40 @@ std::string csv_of(const ordered_json& rows) {
   return csv;
 }
 
+// Whatever stands in the file, what follows finds the keys and types it looks for.
+bool is_comparison(const ordered_json& part) {
+  const auto has = [](const ordered_json& object, const char* key, auto type) {
+    return object.is_object() && object.contains(key) && (object.at(key).*type)();
+  };
+  using J = ordered_json;
+  const auto is_row = [&](const ordered_json& row) {
+    for (const std::string& column : columns)
+      if (!row.is_object() || !row.contains(column)) return false;
+    for (const char* key : {"omega", "gpu_ms_per_step", "wall_ms_per_step", "max_volume_loss_percent"})
+      if (!row[key].is_number() && !row[key].is_null()) return false;
+    return has(row, "scene", &J::is_string) && has(row, "mode", &J::is_string) &&
+           has(row, "iterations", &J::is_number_integer) && has(row, "substeps", &J::is_number_integer) &&
+           has(row, "tets", &J::is_number_integer) && has(row, "finite", &J::is_boolean) &&
+           (row["gpu_ms_per_step"].is_number() || row["wall_ms_per_step"].is_number());
+  };
+  if (!has(part, "steps", &J::is_number_integer) || !has(part, "dt", &J::is_number) ||
+      !has(part, "combinations", &J::is_number_unsigned) || !has(part, "shards", &J::is_number_integer) ||
+      !has(part, "shard", &J::is_array) || !has(part, "device", &J::is_object) ||
+      !has(part, "rows", &J::is_array) || !has(part["device"], "gl_renderer", &J::is_string) ||
+      !has(part["device"], "software", &J::is_boolean))
+    return false;
+  return std::all_of(part["shard"].begin(), part["shard"].end(),
+                     [](const J& s) { return s.is_number_integer(); }) &&
+         std::all_of(part["rows"].begin(), part["rows"].end(), is_row);
+}
+
 ordered_json merged(const std::vector<std::filesystem::path>& folders) {
   ordered_json document;
   for (const auto& folder : folders) {
     std::ifstream stream(folder / "compare.json");
-    const ordered_json part = ordered_json::parse(stream, nullptr, false);
-    if (!part.is_object() || !part.contains("rows"))
+    const auto shallow = [](int depth, ordered_json::parse_event_t, ordered_json&) { return depth < 16; };
+    const ordered_json part = ordered_json::parse(stream, shallow, false);
+    if (!is_comparison(part))
       throw Error("not a finished comparison", (folder / "compare.json").string(), "run that shard again");
     if (document.is_null()) {
       document = part;

@@ -63,7 +63,7 @@ void require_words(const std::filesystem::path& file, std::istream& body,
     }
   };
   for (const TextElement& element : elements)
-    for (std::size_t i = 0; i < element.count && !element.lists.empty(); ++i) {
+    for (std::size_t i = 0; i < element.count; ++i) {
       for (const bool list : element.lists) {
         const std::string_view word = next_word();
         if (word.empty()) throw_early_end(file, element.name);
@@ -114,6 +114,10 @@ SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, 
       if (least > body + (binary ? 0 : 1))
         throw_short  // text may lack its last line's end
             (file, claim, least, body);
+      for (const TextElement& e : elements)  // assimp would count to the claim, of nothing
+        if (e.lists.empty() && e.count > 0)
+          throw Error(fmt::format("PLY element '{}' has no properties", e.name), file.string(),
+                      "the file is damaged: fetch or export it again");
       if (!binary) require_words(file, head, elements);
       return claims;
     }

@@ -185,6 +185,39 @@ TEST_CASE("faults: folders and files in the way") {
   CHECK(content(folder.path / "stdout").empty());
 }
 
+TEST_CASE("faults: shards that are damaged are not merged") {
+  const Folder folder;
+  Program whole(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", "1", "--substeps",
+                         "1", "--steps", "2", "--out", "part"});
+  REQUIRE(whole.wait() == 0);
+  const fs::path file = folder.path / "part/compare.json";
+  const nlohmann::json good = nlohmann::json::parse(content(file));
+  const auto refused = [&](const std::string& text) {
+    CAPTURE(text);
+    std::ofstream(file) << text;
+    Program merge(folder, {"compare", "--merge", "part", "--out", "all"});
+    check_failed(merge, "not a finished comparison", 2);
+  };
+  std::vector<nlohmann::json> changed;
+  for (const char* key : {"device", "steps", "shard", "combinations"}) {
+    nlohmann::json without = good, other = good;
+    without.erase(key), other[key] = "x";
+    changed.push_back(without), changed.push_back(other);
+  }
+  for (const char* key : {"mode", "iterations", "wall_ms_per_step", "finite"}) {
+    nlohmann::json without = good, other = good;
+    without["rows"][0].erase(key), other["rows"][0][key] = nlohmann::json::array();
+    changed.push_back(without), changed.push_back(other);
+  }
+  for (const nlohmann::json& document : changed) refused(document.dump());
+  refused(good.dump().substr(0, 200));
+  refused("{\"device\": " + std::string(100000, '['));
+  refused("");
+  std::ofstream(file) << good.dump();
+  Program merge(folder, {"compare", "--merge", "part", "--out", "all"});
+  CHECK(merge.wait() == 0);
+}
+
 TEST_CASE("faults: ffmpeg that is missing, fails at once, or dies on the way") {
   const Folder folder;
   const auto film =

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -113,11 +114,13 @@ TEST_CASE("fuzz: every reader takes its corpus, or refuses it in one line") {
 
 TEST_CASE("fuzz: and mutations of it") {
   const Environment restored;
+  const int factor = std::max(1, std::atoi(Environment::value("FUZZ_FACTOR").c_str()));
   for (const fuzz::Reader& reader : fuzz::readers()) {
     CAPTURE(reader.name);
     const auto corpus = corpus_of(reader);
     Mutator mutator{std::mt19937(20261121)};
-    const int runs = reader.forks ? 30 : std::string_view(reader.name) == "words" ? 100 : 1000;
+    const int few = reader.forks ? 30 : std::string_view(reader.name) == "words" ? 100 : 1000;
+    const int runs = few * factor;
     for (int run = 0; run < runs; ++run) {
       CAPTURE(run);
       reader.read(mutator.mutated(corpus));

@@ -110,7 +110,7 @@ SurfaceMesh load_surface(const std::filesystem::path& file) {
   // On a loaded machine a megabyte takes 0.1 s; damaged files can keep assimp busy for ever.
   // A stated limit, with room for readers that unroll vertices and for the answer.
   const std::size_t size = std::filesystem::file_size(file);
-  const double seconds = 10 + 1e-6 * static_cast<double>(size);
+  const double seconds = 8 + 1e-6 * static_cast<double>(size);
   const std::size_t memory = (std::size_t{512} << 20) + 200 * std::min(size, std::size_t{1} << 34);
   const ContainedResult answer =
       run_contained([&] { return read_with_assimp(file, claims); }, {seconds, memory});

@@ -14,6 +14,7 @@
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl_context.h"
+#include "sim/interrupt.h"
 
 namespace tetpbd {
 
@@ -48,7 +49,7 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
       now.velocities = sim.velocities.id();
       draw(*renderer, now);
     };
-    for (long f = 0; f < options.warm_up; ++f) frame();
+    for (long f = 0; f < options.warm_up && !interrupted(); ++f) frame();
     glFinish();
     sim.timed = true;
     std::vector<double> steps;
@@ -56,6 +57,7 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
     const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
     long frames = 0;
     for (; frames < options.frames && elapsed() < options.most_seconds; ++frames) {
+      if (interrupted()) throw Interrupted();
       frame();
       while (const auto ms = sim.timer.poll()) steps.push_back(*ms);
     }
@@ -77,7 +79,7 @@ std::string csv_line(const BenchRow& r) {
     return known && std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string();
   };
   const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", r.scene, r.mode, r.constraints,
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(r.scene), r.mode, r.constraints,
                      r.iterations, r.substeps, r.size, r.vertices, r.tets, number(r.fps.median),
                      number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
                      number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu), r.dispatches,
@@ -172,6 +174,7 @@ std::string bench_csv(const std::vector<BenchRow>& rows) {
 }
 
 int run_bench(const BenchOptions& options) {
+  catch_interrupts();
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
   const Capabilities& device = context.capabilities();
@@ -184,7 +187,9 @@ int run_bench(const BenchOptions& options) {
       options.frames, options.warm_up, options.repeats);
   fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", "scene", "mode", "constraints",
              "iter", "sub", "size", "fps", "GPU us", "us/iter", "loss %");
-  const auto rows = bench_rows(options, [](const BenchRow& row) {
+  std::vector<BenchRow> rows;
+  const auto report = [&](const BenchRow& row) {
+    rows.push_back(row);
     const auto gpu = [&](double value) {
       return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
     };
@@ -195,7 +200,13 @@ int run_bench(const BenchOptions& options) {
                std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
                                                           : "-");
     std::fflush(stdout);
-  });
+  };
+  bool whole = true;
+  try {
+    bench_rows(options, report);
+  } catch (const Interrupted&) {
+    whole = false;
+  }
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   const auto triple = [](const Percentiles& p) {
     return nlohmann::ordered_json{{"median", p.median}, {"min", p.p05}, {"max", p.p95}};
@@ -227,12 +238,14 @@ int run_bench(const BenchOptions& options) {
                                            {"warm_up", options.warm_up},
                                            {"repeats", options.repeats},
                                            {"rows", list}};
-  write_file(options.out / "bench.json", document.dump(1) + "\n");
+  write_file(options.out / "bench.json", json_text(document, 1) + "\n");
   fmt::print("\n{}\n", (options.out / "bench.csv").string());
   for (const BenchRow& r : rows)
     if (r.non_finite)
       throw error_of(*r.non_finite, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", r.scene,
                                                 r.mode, r.constraints, r.iterations, r.substeps));
+  if (!whole)
+    throw Error("interrupted", fmt::format("after {} rows", rows.size()), "what was finished is written", 1);
   return 0;
 }
 

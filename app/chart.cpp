@@ -7,11 +7,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "app/files.h"
 #include "sim/solver.h"
+#include "sim/text_file.h"
 
 extern char** environ;
 
@@ -243,19 +246,25 @@ std::string to_svg(const BarChart& chart) {
 }
 
 void write_chart(const std::filesystem::path& name, const std::string& svg) {
-  const std::string svg_file = name.string() + ".svg", png_file = name.string() + ".png",
-                    part = name.string() + ".part.png";
+  // Absolute: a folder whose name begins with a dash is no option of rsvg-convert.
+  const std::string whole = std::filesystem::absolute(name).string();
+  const std::string svg_file = whole + ".svg", png_file = whole + ".png",
+                    part = temporary_name(png_file).string();
   write_file(svg_file, svg);
   const char* arguments[] = {"rsvg-convert", "-z", "1.5", "-o", part.c_str(), svg_file.c_str(), nullptr};
   pid_t child = 0;
   int status = -1;
   if (posix_spawnp(&child, "rsvg-convert", nullptr, nullptr, const_cast<char* const*>(arguments), environ) ==
       0)
-    waitpid(child, &status, 0);
-  if (status == 0)
-    std::filesystem::rename(part, png_file);
-  else
-    fmt::print(stderr, "tetpbd: no {}: rsvg-convert did not run: install librsvg2-bin\n", png_file);
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+  if (status == 0) return rename_whole(part, png_file);
+  std::error_code ignored;
+  std::filesystem::remove(part, ignored);
+  std::fputs(
+      fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n", printable(png_file))
+          .c_str(),
+      stderr);
 }
 
 }  // namespace tetpbd

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,7 @@
 #include "app/progress.h"
 #include "sim/error.h"
 #include "sim/gl_context.h"
+#include "sim/interrupt.h"
 
 namespace tetpbd {
 
@@ -177,19 +179,47 @@ std::string csv_of(const ordered_json& rows) {
     for (const std::string& column : columns) {
       if (&column != &columns.front()) line += ",";
       const auto& value = row[column];
-      line += value.is_string() ? value.get<std::string>() : value.is_null() ? "" : value.dump();
+      line += value.is_string() ? csv_field(value.get<std::string>()) : value.is_null() ? "" : value.dump();
     }
     csv += line + "\n";
   }
   return csv;
 }
 
+// Whatever stands in the file, what follows finds the keys and types it looks for.
+bool is_comparison(const ordered_json& part) {
+  const auto has = [](const ordered_json& object, const char* key, auto type) {
+    return object.is_object() && object.contains(key) && (object.at(key).*type)();
+  };
+  using J = ordered_json;
+  const auto is_row = [&](const ordered_json& row) {
+    for (const std::string& column : columns)
+      if (!row.is_object() || !row.contains(column)) return false;
+    for (const char* key : {"omega", "gpu_ms_per_step", "wall_ms_per_step", "max_volume_loss_percent"})
+      if (!row[key].is_number() && !row[key].is_null()) return false;
+    return has(row, "scene", &J::is_string) && has(row, "mode", &J::is_string) &&
+           has(row, "iterations", &J::is_number_integer) && has(row, "substeps", &J::is_number_integer) &&
+           has(row, "tets", &J::is_number_integer) && has(row, "finite", &J::is_boolean) &&
+           (row["gpu_ms_per_step"].is_number() || row["wall_ms_per_step"].is_number());
+  };
+  if (!has(part, "steps", &J::is_number_integer) || !has(part, "dt", &J::is_number) ||
+      !has(part, "combinations", &J::is_number_unsigned) || !has(part, "shards", &J::is_number_integer) ||
+      !has(part, "shard", &J::is_array) || !has(part, "device", &J::is_object) ||
+      !has(part, "rows", &J::is_array) || !has(part["device"], "gl_renderer", &J::is_string) ||
+      !has(part["device"], "software", &J::is_boolean))
+    return false;
+  return std::all_of(part["shard"].begin(), part["shard"].end(),
+                     [](const J& s) { return s.is_number_integer(); }) &&
+         std::all_of(part["rows"].begin(), part["rows"].end(), is_row);
+}
+
 ordered_json merged(const std::vector<std::filesystem::path>& folders) {
   ordered_json document;
   for (const auto& folder : folders) {
     std::ifstream stream(folder / "compare.json");
-    const ordered_json part = ordered_json::parse(stream, nullptr, false);
-    if (!part.is_object() || !part.contains("rows"))
+    const auto shallow = [](int depth, ordered_json::parse_event_t, ordered_json&) { return depth < 16; };
+    const ordered_json part = ordered_json::parse(stream, shallow, false);
+    if (!is_comparison(part))
       throw Error("not a finished comparison", (folder / "compare.json").string(), "run that shard again");
     if (document.is_null()) {
       document = part;
@@ -211,9 +241,11 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
     throw Error("a shard was given twice", fmt::format("--merge, shards {}", fmt::join(shards, ", ")),
                 "name each folder once");
   if (document["rows"].size() < document["combinations"].get<std::size_t>())
-    fmt::print(stderr, "tetpbd: only {} of {} combinations: shards {} of {}\n", document["rows"].size(),
-               document["combinations"].get<std::size_t>(), fmt::join(shards, ", "),
-               document["shards"].get<int>());
+    std::fputs(fmt::format("tetpbd: only {} of {} combinations: shards {} of {}\n", document["rows"].size(),
+                           document["combinations"].get<std::size_t>(), fmt::join(shards, ", "),
+                           document["shards"].get<int>())
+                   .c_str(),
+               stderr);
   return document;
 }
 
@@ -237,7 +269,11 @@ ordered_json measured(const CompareOptions& options) {
   Progress progress("compare", long(combinations.size()) / options.shards);
   for (std::size_t i = std::size_t(options.shard - 1); i < combinations.size();
        i += std::size_t(options.shards)) {
-    rows.push_back(run_one(scene, model, combinations[i], options.steps));
+    try {
+      rows.push_back(run_one(scene, model, combinations[i], options.steps));
+    } catch (const Interrupted&) {
+      break;  // the finished rows are written; merging says how many there should be
+    }
     progress.update(long(rows.size()));
   }
   return {{"device", device_json(device)},
@@ -280,9 +316,12 @@ void print_choice(const ordered_json& rows, const CompareOptions& options) {
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
+  catch_interrupts();
   make_output_folder(options.out);
   ordered_json document = options.merge.empty() ? measured(options) : merged(options.merge);
   ordered_json& rows = document["rows"];
+  if (rows.empty() && interrupted())
+    throw Error("interrupted", "before the first row", "nothing was written", 1);
   if (rows.empty())
     throw Error("nothing to compare", fmt::format("--shard {}/{}", options.shard, options.shards),
                 "there are fewer combinations than shards");
@@ -304,11 +343,16 @@ int run_compare(const CompareOptions& options) {
   if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return loss(row) == 0; }))
     fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
                document["steps"].get<long>());
-  write_file(options.out / "compare.json", document.dump(1) + "\n");
+  write_file(options.out / "compare.json", json_text(document, 1) + "\n");
   write_file(options.out / "compare.csv", csv_of(rows));
   write_chart(options.out / "compare", to_svg(chart_of(document)));
   print_choice(rows, options);
   fmt::print("{}\n", (options.out / "compare.csv").string());
+  if (interrupted())
+    throw Error(
+        "interrupted",
+        fmt::format("after {} of {} combinations", rows.size(), document["combinations"].get<std::size_t>()),
+        "what was finished is written", 1);
   return 0;
 }
 

@@ -13,27 +13,13 @@
 #include <fstream>
 
 #include "sim/error.h"
+#include "sim/text_file.h"
 
 namespace tetpbd {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-fs::path temporary_name(const fs::path& file) {
-  // Keeps the extension: ffmpeg chooses the container by it.
-  return file.parent_path() /
-         fmt::format(".{}.{}.part{}", file.stem().string(), getpid(), file.extension().string());
-}
-
-void finish_file(const fs::path& temporary, const fs::path& file) {
-  std::error_code error;
-  fs::rename(temporary, file, error);
-  if (error) {
-    fs::remove(temporary);
-    throw Error("cannot write", file.string(), error.message(), 1);
-  }
-}
 
 std::string npy(const char* type, std::size_t rows, std::size_t columns, const void* data) {
   std::string header =
@@ -80,7 +66,7 @@ void GrowingFile::add(const std::string& text) {
 void GrowingFile::close() {
   stream_.close();
   check();
-  finish_file(temporary_, file_);
+  rename_whole(temporary_, file_);
 }
 
 void GrowingFile::check() {
@@ -91,10 +77,13 @@ void GrowingFile::check() {
   throw Error("cannot write", file_.string(), why, 1);
 }
 
-void write_file(const fs::path& file, const std::string& content) {
-  GrowingFile growing(file);
-  growing.add(content);
-  growing.close();
+void write_file(const fs::path& file, const std::string& content) { write_files_whole({{file, content}}); }
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string field = "\"";
+  for (const char c : text) field += c == '"' ? "\"\"" : std::string(1, c);
+  return field + "\"";
 }
 
 void write_png(const fs::path& file, const Image& image) {
@@ -127,11 +116,7 @@ void write_npy(const fs::path& file, const std::vector<Tet>& rows) {
 // video
 
 Video::Video(const fs::path& file, int width, int height, int frames_per_second)
-    : file_(file),
-      temporary_(temporary_name(file)),
-      log_(temporary_.string() + ".log"),
-      width_(width),
-      height_(height) {
+    : file_(file), temporary_(temporary_name(file)), log_(temporary_.string() + ".log") {
   if (file.extension() != ".mp4" && file.extension() != ".mkv" && file.extension() != ".webm" &&
       file.extension() != ".gif")
     throw Error("unknown video format", file.string(), "name it .mp4, .mkv, .webm or .gif");
@@ -152,6 +137,7 @@ Video::Video(const fs::path& file, int width, int height, int frames_per_second)
   const std::string log = log_.string();
   child_ = fork();
   if (child_ == 0) {
+    setpgid(0, 0);  // Ctrl-C in a terminal is for us: ffmpeg gets its last frames and ends the file
     dup2(ends[0], 0);
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     if (out >= 0) dup2(out, 1), dup2(out, 2);
@@ -176,7 +162,8 @@ void Video::finish() {
   if (std::ifstream log(log_); std::getline(log, line) && !line.empty()) why += " (" + line + ")";
   std::error_code ignored;
   fs::remove(log_, ignored);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  // On a full disk ffmpeg 5.1 says so and still ends with 0.
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && line.empty()) return;
   fs::remove(temporary_, ignored);
   throw Error("cannot write the video", file_.string(), why, 1);
 }
@@ -198,7 +185,7 @@ void Video::add(const Image& frame) {
 
 void Video::close() {
   finish();
-  finish_file(temporary_, file_);
+  rename_whole(temporary_, file_);
 }
 
 Video::~Video() {

@@ -18,6 +18,13 @@ namespace tetpbd {
 /// Makes the folder and checks that it can be written to.
 void make_output_folder(const std::filesystem::path& folder);
 void write_file(const std::filesystem::path& file, const std::string& content);
+/// A field of a CSV line: quoted where a comma, quote or line break stands in it.
+std::string csv_field(const std::string& text);
+/// JSON text; bytes that are no UTF-8 (file names may hold any) are replaced.
+template <class Json>
+std::string json_text(const Json& document, int indent) {
+  return document.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
 void write_png(const std::filesystem::path& file, const Image& image);
 /// Text that is written as it comes; the file appears under its name when close() has succeeded.
 class GrowingFile {
@@ -51,7 +58,7 @@ class Video {
  private:
   void finish();
   std::filesystem::path file_, temporary_, log_;
-  int width_, height_, pipe_ = -1;
+  int pipe_ = -1;
   pid_t child_ = -1;
 };
 

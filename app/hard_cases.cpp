@@ -207,7 +207,7 @@ int run_hard_cases(const HardCaseOptions& options) {
                value("recovered_at_step"), value("reference_recovered_at_step"), error("final_volume_error_percent"),
                error("inverted_tets"), error("rigid_distance"), row["finite"] == true ? "" : "  NOT FINITE");
   }
-  write_file(options.out / "stability.json", document.dump(1) + "\n");
+  write_file(options.out / "stability.json", json_text(document, 1) + "\n");
   write_file(options.out / "stability.csv", csv_of(rows));
   fmt::print("{}\n", (options.out / "stability.csv").string());
   return finite ? 0 : 1;

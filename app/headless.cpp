@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <optional>
 
 #include "app/files.h"
@@ -14,14 +13,12 @@
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl_context.h"
+#include "sim/interrupt.h"
 #include "sim/metrics.h"
 
 namespace tetpbd {
 
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-void on_interrupt(int) { interrupted = 1; }
 
 /// Draws what a run asked for and writes it as it arrives.
 struct FrameWriter {
@@ -38,6 +35,9 @@ struct FrameWriter {
     bool video;
   };
   std::deque<Use> uses;
+
+  FrameWriter(const RunOptions& run, Camera view, Renderer with, Target to)
+      : options(run), camera(view), renderer(std::move(with)), target(std::move(to)) {}
 
   void draw_frame(const Sim& sim, long png_step, bool to_video) {
     Frame frame;
@@ -84,6 +84,7 @@ std::vector<BodyRange> body_ranges(const Model& model) {
 
 int run_headless(const Scene& scene, const RunOptions& options) {
   using Clock = std::chrono::steady_clock;
+  catch_interrupts();
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
@@ -111,9 +112,6 @@ int run_headless(const Scene& scene, const RunOptions& options) {
     }
   }
 
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  interrupted = 0;
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
   RunErrors errors;
@@ -129,7 +127,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
     measure(metrics, sim);
     if (frames && !check_finite(sim))
       frames->draw_frame(sim, options.png_every > 0 ? 0 : -1, bool(frames->video));
-    for (long s = 1; s <= steps && !interrupted && !check_finite(sim); ++s) {
+    for (long s = 1; s <= steps && !interrupted() && !check_finite(sim); ++s) {
       const auto begin = Clock::now();
       step(sim);
       if (sim.solver.step_on_cpu == nullptr) glFinish();  // wall time of the work itself, not of queueing it
@@ -171,7 +169,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
              sim.steps, context.capabilities().renderer, errors.max_volume_loss_percent,
              percentiles(timing.wall_ms.values).median, (options.out / "stats.json").string());
-  if (interrupted)
+  if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);
   if (errors.non_finite) throw error_of(*errors.non_finite);

@@ -5,13 +5,17 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <functional>
 #include <iostream>
 #include <optional>
+#include <sstream>
 
 #include "app/bench.h"
+#include "app/command_line.h"
 #include "app/compare.h"
 #include "app/hard_cases.h"
 #include "app/headless.h"
@@ -22,6 +26,7 @@
 #include "app/window.h"
 #include "sim/error.h"
 #include "sim/gpu.h"
+#include "sim/interrupt.h"
 
 using namespace tetpbd;
 
@@ -52,6 +57,18 @@ int index_of(const Names& names, const std::string& name, const char* flag) {
 // An unset shell variable must not run another experiment than was meant.
 const CLI::Validator not_empty(
     [](std::string& text) { return text.empty() ? std::string("must not be empty") : std::string(); }, "");
+
+template <class T>
+CLI::Validator in_range(T low, T high) {
+  return CLI::Validator(
+      [=](std::string& text) {
+        T value{};
+        if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+        return fmt::format("must be a {} from {} to {}, not '{}'",
+                           std::is_integral_v<T> ? "whole number" : "number", low, high, text);
+      },
+      fmt::format("[{} .. {}]", low, high));
+}
 
 void add_scene_options(CLI::App& command, SceneArguments& a) {
   command
@@ -87,7 +104,7 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
       ->take_all()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command.add_option("--gpu", a.gpu, "which device of tetpbd info (default: the first GPU)")
-      ->check(CLI::Range(0, 1023));
+      ->check(in_range(0, 1023));
   command.add_option("--size", a.size, "of images and window, WxH")->capture_default_str();
   command.add_option("--samples", a.samples, "of MSAA: 0, 2, 4, 8")
       ->check(CLI::IsMember({0, 2, 4, 8}))
@@ -97,11 +114,9 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
       ->capture_default_str()
       ->group("View");
   command.add_option("--cut", a.view.cut, "tets: show those below this part of the body, 0 .. 1")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(in_range(0.0, 1.0))
       ->group("View");
-  command.add_option("--cut-axis", a.view.cut_axis, "0: x, 1: y, 2: z")
-      ->check(CLI::Range(0, 2))
-      ->group("View");
+  command.add_option("--cut-axis", a.view.cut_axis, "0: x, 1: y, 2: z")->check(in_range(0, 2))->group("View");
   command.add_flag("--flat", a.flat, "flat normals, made in the geometry shader")->group("View");
   command.add_flag("--no-shadow", a.no_shadow, "no shadow")->group("View");
   command.add_flag("--no-grid", a.no_grid, "no lines on the ground")->group("View");
@@ -140,7 +155,9 @@ Scene scene_of(SceneArguments& a) {
   return load_scene(a.scene, a.overrides);
 }
 
-int run_commands(int argc, char** argv) {
+}  // namespace
+
+std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) {
   CLI::App app("tetpbd: Position-Based Dynamics of tetrahedral soft bodies on a GPU");
   app.set_version_flag("--version", TETPBD_VERSION);
   app.name("tetpbd");
@@ -159,21 +176,21 @@ int run_commands(int argc, char** argv) {
   add_scene_options(*run, scene);
   RunOptions options;
   run->add_option("--steps", options.steps, "steps to take (default: the scene's duration)")
-      ->check(CLI::Range(1L, 1000000000L));
+      ->check(in_range(1L, 1000000000L));
   run->add_option("--out", options.out, "folder for stats.json, stats.csv, frames")->capture_default_str();
   run->add_option("--png-every", options.png_every, "write frame_NNNNN.png every K steps")
-      ->check(CLI::Range(1L, 1000000000L));
+      ->check(in_range(1L, 1000000000L));
   run->add_option("--video", options.video,
                   "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
   run->add_option("--video-every", options.video_every,
                   "steps a video frame (default: real time at 30 frames a second)")
-      ->check(CLI::Range(1L, 1000000000L));
+      ->check(in_range(1L, 1000000000L));
   run->add_option("--csv-every", options.csv_every, "a row of stats.csv every K steps, 0: none")
-      ->check(CLI::Range(0L, 1000000000L))
+      ->check(in_range(0L, 1000000000L))
       ->capture_default_str();
   run->add_option("--measure-every", options.measure_every,
                   "measure errors every K steps and at the end; largest values are over the measured steps")
-      ->check(CLI::Range(1L, 1000000000L))
+      ->check(in_range(1L, 1000000000L))
       ->capture_default_str();
   run->add_flag("--positions", options.positions, "write positions.npy and tets.npy");
   run->add_flag("--progress", options.progress, "show progress even if standard error is no terminal");
@@ -183,10 +200,10 @@ int run_commands(int argc, char** argv) {
   add_scene_options(*soak, scene);
   SoakOptions soak_options;
   soak->add_option("--settle", soak_options.settle, "steps before the watch begins")
-      ->check(CLI::Range(0L, 1000000000L))
+      ->check(in_range(0L, 1000000000L))
       ->capture_default_str();
   soak->add_option("--steps", soak_options.steps, "steps watched")
-      ->check(CLI::Range(10L, 1000000000L))
+      ->check(in_range(10L, 1000000000L))
       ->capture_default_str();
   soak->add_option("--out", soak_options.out, "folder for soak.json and soak.csv")->capture_default_str();
   soak->add_flag("--progress", soak_options.progress, "show progress even if standard error is no terminal");
@@ -206,25 +223,25 @@ int run_commands(int argc, char** argv) {
       ->capture_default_str();
   bench->add_option("--iterations", bench_options.iterations, "iterations a substep")
       ->delimiter(',')
-      ->check(CLI::Range(1, 100000))
+      ->check(in_range(1, 100000))
       ->capture_default_str();
   bench->add_option("--substeps", bench_options.substeps, "substeps a step")
       ->delimiter(',')
-      ->check(CLI::Range(1, 100000))
+      ->check(in_range(1, 100000))
       ->capture_default_str();
   bench->add_option("--frames", bench_options.frames, "timed frames")
-      ->check(CLI::Range(1L, 1000000L))
+      ->check(in_range(1L, 1000000L))
       ->capture_default_str();
   bench->add_option("--warm-up", bench_options.warm_up, "frames before them")
-      ->check(CLI::Range(0L, 1000000L))
+      ->check(in_range(0L, 1000000L))
       ->capture_default_str();
   bench->add_option("--repeats", bench_options.repeats, "repetitions; the median counts")
-      ->check(CLI::Range(1, 100))
+      ->check(in_range(1, 100))
       ->capture_default_str();
   bench
       ->add_option("--most-seconds", bench_options.most_seconds,
                    "a repetition ends there with fewer frames; 12 times that bounds the error run")
-      ->check(CLI::Range(0.01, 1e6))
+      ->check(in_range(0.01, 1e6))
       ->capture_default_str();
   bench->add_option("--size", bench_size, "of the rendered frames, WxH")->capture_default_str();
   bench->add_option("--samples", bench_options.samples, "of MSAA: 0, 2, 4, 8")
@@ -233,7 +250,7 @@ int run_commands(int argc, char** argv) {
   bench->add_flag("--no-render", no_render, "simulation alone");
   bench->add_option("--tetgen", bench_options.overrides.tetgen,
                     "TetGen switches, pY for the paper's kind of mesh");
-  bench->add_option("--gpu", bench_options.gpu, "which device")->check(CLI::Range(0, 1023));
+  bench->add_option("--gpu", bench_options.gpu, "which device")->check(in_range(0, 1023));
   bench->add_option("--out", bench_options.out, "folder for bench.csv and bench.json")->capture_default_str();
 
   auto* compare = app.add_subcommand("compare", "speed against error over modes x iterations x substeps");
@@ -251,25 +268,25 @@ int run_commands(int argc, char** argv) {
       ->capture_default_str();
   compare->add_option("--iterations", compare_options.iterations, "iterations a substep")
       ->delimiter(',')
-      ->check(CLI::Range(1, 100000))
+      ->check(in_range(1, 100000))
       ->capture_default_str();
   compare->add_option("--substeps", compare_options.substeps, "substeps a step")
       ->delimiter(',')
-      ->check(CLI::Range(1, 100000))
+      ->check(in_range(1, 100000))
       ->capture_default_str();
   compare->add_option("--omegas", compare_options.omegas, "over-relaxations (default: the scene's)")
       ->delimiter(',')
-      ->check(CLI::Range(0.0, 4.0));
+      ->check(in_range(0.0, 4.0));
   compare->add_option("--steps", compare_options.steps, "steps of each run")
-      ->check(CLI::Range(1L, 1000000000L))
+      ->check(in_range(1L, 1000000000L))
       ->capture_default_str();
   compare
       ->add_option("--budget-ms", compare_options.budget_ms, "print the best setting within that time a step")
-      ->check(CLI::Range(1e-9, 1e9));
+      ->check(in_range(1e-9, 1e9));
   compare
       ->add_option("--error", compare_options.error_percent,
                    "print the cheapest setting that loses at most this volume, %")
-      ->check(CLI::Range(1e-9, 1e9));
+      ->check(in_range(1e-9, 1e9));
   compare
       ->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")
       ->capture_default_str();
@@ -283,7 +300,7 @@ int run_commands(int argc, char** argv) {
       ->capture_default_str()
       ->needs(hard_flag);
   compare->add_option("--merge", compare_options.merge, "folders of finished shards, instead of running");
-  compare->add_option("--gpu", compare_options.gpu, "which device")->check(CLI::Range(0, 1023));
+  compare->add_option("--gpu", compare_options.gpu, "which device")->check(in_range(0, 1023));
   compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")
       ->capture_default_str();
 
@@ -294,7 +311,7 @@ int run_commands(int argc, char** argv) {
       ->capture_default_str();
   reproduce->add_flag("--quick", reproduce_options.quick,
                       "bunny alone, few frames: checks the trends without a GPU");
-  reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(CLI::Range(0, 1023));
+  reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(in_range(0, 1023));
 
   auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
   std::filesystem::path mesh_file, mesh_out;
@@ -309,10 +326,9 @@ int run_commands(int argc, char** argv) {
 
   auto* info = app.add_subcommand("info", "GL version, devices, limits, extensions used, build, licences");
   int info_gpu = -1;
-  info->add_option("--gpu", info_gpu, "which device")->check(CLI::Range(0, 1023));
+  info->add_option("--gpu", info_gpu, "which device")->check(in_range(0, 1023));
 
   // Options without a command belong to the window: tetpbd --scene beam.
-  std::vector<std::string> words(argv + 1, argv + argc);
   if (!words.empty() && words[0].starts_with("--") && words[0] != "--help" && words[0] != "--version" &&
       !words[0].starts_with("--shaders"))
     words.insert(words.begin(), "view");
@@ -320,24 +336,26 @@ int run_commands(int argc, char** argv) {
   try {
     app.parse(words);
   } catch (const CLI::ParseError& problem) {
-    if (problem.get_exit_code() == 0) return app.exit(problem);  // --help, --version
-    std::string what = problem.what();
-    std::replace(what.begin(), what.end(), '\n', ' ');
+    if (problem.get_exit_code() == 0) {  // --help, --version
+      std::ostringstream text;
+      app.exit(problem, text, text);
+      return [text = text.str()] { return std::fputs(text.c_str(), stdout) < 0 ? 1 : 0; };
+    }
+    const std::string what = problem.what();
     const auto parsed = app.get_subcommands();
     const std::string command = parsed.empty() ? "" : " " + parsed[0]->get_name();
-    fmt::print(stderr, "tetpbd: {}: command line: see tetpbd{} --help\n", what, command);
-    return 2;
+    throw Error(what, "command line", fmt::format("see tetpbd{} --help", command));
   }
   if (!shaders.empty()) set_shader_folder(shaders);
 
-  if (*info) return print_info(info_gpu);
-  if (*mesh) return run_mesh_command(mesh_file, mesh_switches, mesh_out, mesh_json);
+  if (*info) return [=] { return print_info(info_gpu); };
+  if (*mesh) return [=] { return run_mesh_command(mesh_file, mesh_switches, mesh_out, mesh_json); };
   if (*bench) {
     parse_size(bench_size, bench_options.width, bench_options.height);
     bench_options.render = !no_render;
-    return run_bench(bench_options);
+    return [=] { return run_bench(bench_options); };
   }
-  if (*reproduce) return run_reproduce(reproduce_options);
+  if (*reproduce) return [=] { return run_reproduce(reproduce_options); };
   if (*compare) {
     parse_shard(shard, compare_options.shard, compare_options.shards);
     if (hard_cases) {
@@ -346,48 +364,54 @@ int run_commands(int argc, char** argv) {
       if (compare->count("--out")) hard.out = compare_options.out;
       hard.gpu = compare_options.gpu, hard.merge = compare_options.merge;
       hard.shard = compare_options.shard, hard.shards = compare_options.shards;
-      return run_hard_cases(hard);
+      return [=] { return run_hard_cases(hard); };
     }
-    return run_compare(compare_options);
+    return [=] { return run_compare(compare_options); };
   }
   if (*run || scene.explain) {
     const Scene opened = scene_of(scene);
-    if (scene.explain) return print_explanation(opened, scene.gpu);
+    if (scene.explain) return [opened, gpu = scene.gpu] { return print_explanation(opened, gpu); };
     options.gpu = scene.gpu;
     options.width = scene.width, options.height = scene.height, options.samples = scene.samples;
     options.view = scene.view;
-    return run_headless(opened, options);
+    return [=] { return run_headless(opened, options); };
   }
   if (*soak) {
     soak_options.gpu = scene.gpu;
-    return run_soak(scene_of(scene), soak_options);
+    return [opened = scene_of(scene), soak_options] { return run_soak(opened, soak_options); };
   }
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
     throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
                 "start it in a desktop session, or use tetpbd run");
   if (!*view) scene.values.resize(parameters().size());
   const Scene opened = scene_of(scene);
-  return run_window(opened,
-                    {scene.scene, scene.overrides, scene.width, scene.height, scene.samples, scene.view});
+  return [=] {
+    return run_window(opened,
+                      {scene.scene, scene.overrides, scene.width, scene.height, scene.samples, scene.view});
+  };
 }
 
-}  // namespace
+// Not fmt::print(), which throws where standard error cannot be written.
+static int fail(const std::string& line, int status) {
+  std::fflush(stdout);
+  std::fputs(("tetpbd: " + printable(line) + "\n").c_str(), stderr);
+  return status;
+}
 
 int main(int argc, char** argv) {
+  // A full quota is then an error of write(), which is reported and cleaned up after.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
-    const int status = run_commands(argc, argv);
+    const int status = parse_command_line({argv + std::min(argc, 1), argv + argc})();
     if (std::fflush(stdout) != 0 || std::ferror(stdout))
       throw Error("cannot write", "standard output", "is the disk full?", 1);
     return status;
   } catch (const Error& error) {
-    std::fflush(stdout);
-    fmt::print(stderr, "tetpbd: {}\n", error.what());
-    return error.exit_status;
+    return fail(error.what(), error.exit_status);
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "tetpbd: out of memory: {}: use a smaller mesh\n", argc > 1 ? argv[1] : "start");
-    return 1;
+    return fail(fmt::format("out of memory: {}: use a smaller mesh", argc > 1 ? argv[1] : "start"), 1);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "tetpbd: unexpected: {}: please report this\n", error.what());
-    return 1;
+    if (std::ferror(stdout)) return fail("cannot write: standard output: is the disk full?", 1);
+    return fail(fmt::format("unexpected: {}: please report this", error.what()), 1);
   }
 }

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <chrono>
 
+#include "sim/error.h"
+#include "sim/interrupt.h"
+
 namespace tetpbd {
 
 MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::function<bool(long)>& go_on) {
@@ -28,6 +31,7 @@ MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::funct
     while (take(collect(metrics))) {
     }
     while (const auto ms = sim.timer.poll()) run.timing.gpu_ms.add(*ms);
+    if (interrupted()) throw Interrupted();
     if (!run.errors.finite || (go_on && !go_on(s))) break;
   }
   while (take(collect(metrics, true))) {

@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "app/files.h"
 #include "sim/error.h"
+#include "sim/interrupt.h"
 #include "sim/tet_mesh.h"
 
 namespace tetpbd {
@@ -89,6 +91,8 @@ nlohmann::ordered_json as_json(const MeshReport& r) {
 
 int run_mesh_command(const std::filesystem::path& file, const std::string& switches,
                      const std::filesystem::path& out, bool json) {
+  catch_interrupts();
+  if (!out.empty()) require_mesh_format(out);
   std::optional<SurfaceReport> surface_report;
   TetMesh mesh;
   if (is_surface_file(file)) {
@@ -104,6 +108,7 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
   }
   const MeshReport r = report(mesh);
   if (!json) print_tets(r);
+  if (interrupted()) throw Error("interrupted", file.string(), "start again; nothing was written", 1);
   if (!out.empty()) {
     write_mesh(out, mesh);
     if (!json) fmt::print("written {}\n", out.string());
@@ -116,7 +121,7 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
     }
     document["mesh"] = as_json(r);
     if (!out.empty()) document["written"] = out.string();
-    fmt::print("{}\n", document.dump(2));
+    fmt::print("{}\n", json_text(document, 2));
   }
   return r.inverted == 0 ? 0 : 1;
 }

@@ -29,8 +29,9 @@ void Progress::update(long done) {
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   const int filled = int(part * 30);
   const std::string bar = std::string(std::size_t(filled), '#') + std::string(std::size_t(30 - filled), '.');
-  fmt::print(stderr, "\r\033[K{} [{}] {}/{}  {:.0f} s left", label_, bar, done, total_,
-             part > 0 ? elapsed * (1 - part) / part : 0.0);
+  const std::string line = fmt::format("\r\033[K{} [{}] {}/{}  {:.0f} s left", label_, bar, done, total_,
+                                       part > 0 ? elapsed * (1 - part) / part : 0.0);
+  std::fputs(line.c_str(), stderr);  // fmt::print() throws where nothing can be written
   std::fflush(stderr);
 }
 

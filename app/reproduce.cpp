@@ -16,6 +16,7 @@
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl_context.h"
+#include "sim/interrupt.h"
 
 namespace tetpbd {
 
@@ -307,6 +308,7 @@ void snapshots(Report& report, const Fall& fall, const Published& paper) {
       std::filesystem::rename(file,
                               report.out / "figures" / fmt::format("snapshot_{}_{:03}.png", paper.name, s));
     }
+    if (interrupted()) throw Interrupted();
     step(sim);
   }
   report.html += "</div>\n";
@@ -357,6 +359,7 @@ void speed(Report& report, const BenchOptions& options, const std::string& title
 }  // namespace
 
 int run_reproduce(const ReproduceOptions& options) {
+  catch_interrupts();
   make_output_folder(options.out);
   make_output_folder(options.out / "figures");
   make_output_folder(options.out / "tables");

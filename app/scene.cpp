@@ -15,6 +15,7 @@
 
 #include "sim/error.h"
 #include "sim/layout.h"
+#include "sim/text_file.h"
 
 namespace tetpbd {
 
@@ -103,6 +104,10 @@ class Keys {
   std::set<std::string> taken_;
 };
 
+// What a scene file may ask for, whoever wrote it.
+constexpr std::size_t most_bytes = 1u << 20, most_boxes = 100, most_tets = 30'000'000;
+constexpr int most_depth = 32;
+
 constexpr double far = 1e6;  // metres; further out even pairs of floats lose a body's shape
 
 void read_settings(Keys& keys, const char* section, Settings& settings) {
@@ -145,7 +150,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   keys.read("deform", body.deform);
   if (const json* block = keys.find("block")) {
     Keys block_keys(*block, keys.path("block"), file);
-    body.block.emplace();
+    body.block = BodyDescription::Block{};
     block_keys.read_vector("size", body.block->size, 1e-6, far);
     block_keys.read_vector("cells", body.block->cells, 1, 2000, true);
     block_keys.finish();
@@ -156,8 +161,9 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   const auto read_boxes = [&](const char* key, auto more) {
     const json* list = keys.find(key);
     if (!list) return;
-    if (!list->is_array())
-      keys.fail(keys.path(key), "must be a list of boxes {\"low\": [x,y,z], \"high\": [x,y,z]}");
+    if (!list->is_array() || list->size() > most_boxes)
+      keys.fail(keys.path(key), fmt::format("must be a list of at most {} boxes {{\"low\": [x,y,z], \"high\": [x,y,z]}}",
+                                            most_boxes));
     for (std::size_t i = 0; i < list->size(); ++i) {
       Keys box_keys((*list)[i], fmt::format("{}.{}", keys.path(key), i), file);
       BodyDescription::Box box;
@@ -193,6 +199,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
     }
   }
   if (body.name.empty()) body.name = body.block ? "block" : body.tet ? "tet" : fs::path(mesh).stem().string();
+  body.name = printable(body.name);
   return body;
 }
 
@@ -201,6 +208,7 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
   Scene scene;
   scene.name = path.stem().string();
   keys.read("name", scene.name);
+  scene.name = printable(scene.name);  // it is printed and stands in tables
   keys.read("description", scene.description);
   keys.read("duration", scene.duration, 1e-6, 1e6);
   const json* bodies = keys.find("bodies");
@@ -245,16 +253,28 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
   return scene;
 }
 
+// Printing and copying JSON is recursive.
+bool too_deep(int depth, json::parse_event_t, json&) {
+  if (depth > most_depth)
+    throw Error("lists or objects are nested too deeply", "scene",
+                fmt::format("no key needs {} levels", most_depth));
+  return true;
+}
+
 // "bodies.0.density=500": the value is JSON, or text where it is none.
 void set_path(json& document, const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw Error("bad assignment", "--set " + assignment, "write PATH=VALUE, as in bodies.0.density=500");
   const std::string text = assignment.substr(equals + 1);
-  json value = json::parse(text, nullptr, false);
+  json value = json::parse(text, too_deep, false);
   if (value.is_discarded()) value = text;
   json* at = &document;
-  for (const std::string& part : split(assignment.substr(0, equals), '.')) {
+  const std::vector<std::string> parts = split(assignment.substr(0, equals), '.');
+  if (parts.size() > most_depth)
+    throw Error("no such place in the scene", "--set " + assignment.substr(0, 40) + "...",
+                fmt::format("no key needs {} levels", most_depth));
+  for (const std::string& part : parts) {
     if (at->is_array()) {
       const bool number = !part.empty() && part.size() < 6 &&
                           std::all_of(part.begin(), part.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -294,12 +314,12 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   if (!fs::is_regular_file(file, error))
     throw Error("no such scene", name_or_file,
                 fmt::format("give a .json file or one of {}", fmt::join(scene_names(), ", ")));
-  if (fs::file_size(file, error) > (16u << 20))
+  if (fs::file_size(file, error) > most_bytes)
     throw Error("scene file is too large", file.string(), "a scene is a few kilobytes of JSON");
   std::ifstream stream(file, std::ios::binary);
   json document;
   try {
-    document = json::parse(stream);
+    document = json::parse(stream, too_deep);
   } catch (const json::exception& problem) {
     std::string text = problem.what();
     text = text.substr(text.find("] ") == std::string::npos ? 0 : text.find("] ") + 2);
@@ -340,6 +360,9 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
       mesh = load_mesh(body.mesh, body.tetgen);
     }
     for (auto& p : mesh.positions) p *= body.scale;
+    if (model->rest.tets.size() + mesh.tets.size() > most_tets)
+      throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
+                  fmt::format("keep to {} tets in all", most_tets));
     glm::dmat4 turn(1);
     for (int axis = 2; axis >= 0; --axis) {
       glm::dvec3 direction(0);

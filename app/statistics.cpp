@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "app/files.h"
+
 namespace tetpbd {
 
 using nlohmann::ordered_json;
@@ -145,7 +147,7 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
   j["finite"] = errors.finite;
   j["non_finite"] = non_finite_json(errors.non_finite);
   j["state_hash"] = hash ? ordered_json(fmt::format("{:016x}", *hash)) : ordered_json(nullptr);
-  return j.dump(2) + "\n";
+  return json_text(j, 2) + "\n";
 }
 
 namespace {

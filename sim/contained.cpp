@@ -18,6 +18,9 @@
 #include <exception>
 #include <thread>
 
+#include "sim/error.h"
+#include "sim/interrupt.h"
+
 namespace tetpbd {
 namespace {
 
@@ -61,7 +64,7 @@ void limit_memory(std::size_t bytes) {
                             const ContainedLimits& limits) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
-  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGINT, SIGTERM})
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGXFSZ, SIGINT, SIGTERM})
     std::signal(number, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
@@ -104,13 +107,13 @@ std::string describe_end(int status) {
 
 int milliseconds_until(Clock::time_point deadline) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
-  return static_cast<int>(std::clamp<long long>(left, 0, 60'000));
+  return static_cast<int>(std::clamp<long long>(left, 0, 100));  // then looks whether it was interrupted
 }
 
 // Reads to the end of the pipe; false when the deadline comes first.
 bool read_until(int fd, Clock::time_point deadline, std::string& bytes) {
   std::string chunk(1 << 20, '\0');
-  while (Clock::now() < deadline) {
+  while (Clock::now() < deadline && !interrupted()) {
     pollfd wanted{fd, POLLIN, 0};
     const int ready = ::poll(&wanted, 1, milliseconds_until(deadline));
     if (ready < 0 && errno != EINTR) return true;
@@ -179,6 +182,8 @@ ContainedResult run_contained(const std::function<std::string()>& work, const Co
   ::close(ends[0]);
   const int status = reap(child, in_time ? deadline : Clock::time_point::min());
 
+  if (!in_time && interrupted())
+    throw Error("interrupted", "while a mesh was read or filled", "start again; nothing was written", 1);
   if (!in_time) {
     result.end = ContainedResult::End::timed_out;
     result.reason = fmt::format("it took longer than {:g} s", limits.seconds);

@@ -6,11 +6,24 @@
 
 namespace tetpbd {
 
+/// For one line on a terminal: control characters, such as those of a file's name or content, become '?'.
+inline std::string printable(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
+  return text;
+}
+
 /// Exit status 2: bad input or usage; 1: it ran and something failed.
 struct Error : std::runtime_error {
   Error(const std::string& what, const std::string& where, const std::string& mend, int status = 2)
-      : std::runtime_error(what + ": " + where + ": " + mend), exit_status(status) {}
+      : std::runtime_error(part(what) + ": " + part(where) + ": " + part(mend)), exit_status(status) {}
   int exit_status;
+
+ private:
+  // What is quoted from a file may be as long as the file.
+  static std::string part(const std::string& text) {
+    return printable(text.size() > 1000 ? text.substr(0, 997) + "..." : text);
+  }
 };
 
 /// The GPU was reset and everything on it is lost: nothing but ending the program is left.

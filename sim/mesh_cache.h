@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "sim/tet_mesh.h"
 
@@ -20,6 +21,9 @@ CacheKey cache_key(const SurfaceMesh& surface, const std::string& switches);
 std::filesystem::path cache_file(const CacheKey& key);
 /// Nothing when it is not there, damaged, or of another key.
 std::optional<TetMesh> read_cache(const CacheKey& key);
+/// The same of a file's bytes.
+std::optional<TetMesh> parse_cache(std::string_view bytes, const CacheKey& key);
+std::string cache_bytes(const CacheKey& key, const TetMesh& mesh);
 void write_cache(const CacheKey& key, const TetMesh& mesh);
 
 }  // namespace tetpbd

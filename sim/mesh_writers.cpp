@@ -104,7 +104,15 @@ std::string ele_text(const TetMesh& mesh) {
 
 }  // namespace
 
+void require_mesh_format(const std::filesystem::path& file) {
+  const std::string extension = lower_extension(file);
+  if (!is_surface_file(file) && extension != ".node" && extension != ".ele" && extension != ".msh")
+    throw Error(fmt::format("unknown mesh format '{}'", extension), file.string(),
+                "use .node, .ele or .msh for tetrahedra, .ply, .obj, .off or .stl for the boundary surface");
+}
+
 void write_mesh(const std::filesystem::path& file, const TetMesh& mesh) {
+  require_mesh_format(file);
   const std::string extension = lower_extension(file);
   if (extension == ".node" || extension == ".ele") {
     std::filesystem::path node = file, ele = file;
@@ -119,11 +127,8 @@ void write_mesh(const std::filesystem::path& file, const TetMesh& mesh) {
     write_files_whole({{file, stl_bytes(boundary_surface(mesh))}});
   } else if (extension == ".obj") {
     write_files_whole({{file, obj_text(boundary_surface(mesh))}});
-  } else if (extension == ".off") {
-    write_files_whole({{file, off_text(boundary_surface(mesh))}});
   } else {
-    throw Error(fmt::format("unknown mesh format '{}'", extension), file.string(),
-                "use .node, .ele or .msh for tetrahedra, .ply, .obj, .off or .stl for the boundary surface");
+    write_files_whole({{file, off_text(boundary_surface(mesh))}});
   }
 }
 

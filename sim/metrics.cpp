@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <ranges>
 
 #include "shaders/metrics/layout.glsl"
 
@@ -16,11 +15,15 @@ constexpr std::size_t ring_size = 16;
 // Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
 Metrics::Range range_of(const ConstraintList& list, std::size_t first_vertex, std::size_t end_vertex) {
   const auto first_at_least = [&](std::size_t vertex) {
-    const auto constraints = std::views::iota(0u, unsigned(list.count()));
-    return unsigned(std::ranges::lower_bound(
-                        constraints, vertex, {},
-                        [&](unsigned c) { return std::size_t(list.vertices[c * std::size_t(list.arity)]); }) -
-                    constraints.begin());
+    std::size_t low = 0, high = list.count();
+    while (low < high) {
+      const std::size_t middle = (low + high) / 2;
+      if (list.vertices[middle * std::size_t(list.arity)] < vertex)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    return unsigned(low);
   };
   return {first_at_least(first_vertex), first_at_least(end_vertex)};
 }

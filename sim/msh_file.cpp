@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
-#include <unordered_map>
 
 #include "sim/error.h"
 #include "sim/text_file.h"
@@ -17,12 +17,19 @@ constexpr std::size_t any = static_cast<std::size_t>(1) << 40;
 struct Reader {
   TextFile text;
   TetMesh mesh;
-  std::unordered_map<long long, std::uint32_t> index_of;  // node tags are any positive numbers
+  // Node tags are any positive numbers. Sorted, not hashed: no choice of tags makes it slow.
+  std::vector<std::pair<long long, std::uint32_t>> index_of;
 
   void add_node(long long tag, const glm::dvec3& position) {
-    if (!index_of.emplace(tag, static_cast<std::uint32_t>(mesh.positions.size())).second)
-      text.fail(fmt::format("node {} appears twice", tag));
+    index_of.emplace_back(tag, static_cast<std::uint32_t>(mesh.positions.size()));
     mesh.positions.push_back(position);
+  }
+
+  void sort_nodes() {
+    std::sort(index_of.begin(), index_of.end());
+    const auto twice = std::adjacent_find(index_of.begin(), index_of.end(),
+                                          [](const auto& a, const auto& b) { return a.first == b.first; });
+    if (twice != index_of.end()) text.fail(fmt::format("node {} appears twice", twice->first));
   }
 
   glm::dvec3 read_position() {
@@ -34,8 +41,9 @@ struct Reader {
     Tet tet;
     for (std::uint32_t& v : tet) {
       const long long tag = text.integer("node of the tet");
-      const auto found = index_of.find(tag);
-      if (found == index_of.end()) text.fail(fmt::format("element names node {}, which is not there", tag));
+      const auto found = std::lower_bound(index_of.begin(), index_of.end(), std::pair(tag, std::uint32_t{0}));
+      if (found == index_of.end() || found->first != tag)
+        text.fail(fmt::format("element names node {}, which is not there", tag));
       v = found->second;
     }
     mesh.tets.push_back(tet);
@@ -133,8 +141,10 @@ TetMesh read_msh(const std::filesystem::path& file) {
     } else if (version == 0) {
       text.fail("file does not begin with $MeshFormat, so it is not Gmsh's .msh");
     } else if (section == "$Nodes") {
+      if (has_nodes) text.fail("file has $Nodes twice");
       has_nodes = true;
       version < 4 ? reader.read_nodes_2() : reader.read_nodes_4();
+      reader.sort_nodes();
     } else if (section == "$Elements") {
       has_elements = true;
       version < 4 ? reader.read_elements_2() : reader.read_elements_4();

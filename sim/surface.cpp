@@ -1,3 +1,4 @@
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
@@ -28,6 +29,16 @@ struct FirstError : Assimp::LogStream {
   }
 };
 
+// An OBJ names material files, which may be any path: only the mesh itself is opened.
+struct OneFile : Assimp::DefaultIOSystem {
+  std::string only;
+  explicit OneFile(std::string file) : only(std::move(file)) {}
+  bool Exists(const char* file) const override { return file == only && DefaultIOSystem::Exists(file); }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    return file == only ? DefaultIOSystem::Open(file, mode) : nullptr;
+  }
+};
+
 std::runtime_error problem(const std::string& text) { return std::runtime_error(text); }
 
 std::string one_line(std::string text) {
@@ -46,6 +57,7 @@ std::string read_with_assimp(const std::filesystem::path& file, const SurfaceCla
   auto* log = new FirstError;  // the logger owns it
   Assimp::DefaultLogger::get()->attachStream(log, Assimp::Logger::Err);
   Assimp::Importer importer;
+  importer.SetIOHandler(new OneFile(file.string()));  // the importer owns it
   const aiScene* scene = importer.ReadFile(file.string(), 0);
   if (!scene) throw problem(one_line(importer.GetErrorString()));
   if (!log->text.empty()) throw problem(one_line(log->text));
@@ -96,9 +108,12 @@ SurfaceMesh load_surface(const std::filesystem::path& file) {
   require_readable(file);
   const SurfaceClaims claims = read_surface_claims(file);
   // On a loaded machine a megabyte takes 0.1 s; damaged files can keep assimp busy for ever.
-  const double seconds = 20 + 1e-6 * static_cast<double>(std::filesystem::file_size(file));
+  // A stated limit, with room for readers that unroll vertices and for the answer.
+  const std::size_t size = std::filesystem::file_size(file);
+  const double seconds = 8 + 1e-6 * static_cast<double>(size);
+  const std::size_t memory = (std::size_t{512} << 20) + 200 * std::min(size, std::size_t{1} << 34);
   const ContainedResult answer =
-      run_contained([&] { return read_with_assimp(file, claims); }, {seconds, std::size_t{8} << 30});
+      run_contained([&] { return read_with_assimp(file, claims); }, {seconds, memory});
   using End = ContainedResult::End;
   if (answer.end == End::refused)
     throw Error(fmt::format("file cannot be read ({})", answer.reason), file.string(),

@@ -40,7 +40,7 @@ glm::dvec3 area_vector(const SurfaceMesh& s, const Triangle& t) {
 
 // False when nothing else can be computed.
 bool check_numbers(const SurfaceMesh& surface, SurfaceCheck& check) {
-  std::size_t first_bad = 0, first_non_finite = 0;
+  std::size_t first_bad = 0, first_non_finite = 0, far = surface.positions.size();
   for (std::size_t t = surface.triangles.size(); t-- > 0;)
     for (const std::uint32_t v : surface.triangles[t])
       if (v >= surface.positions.size()) ++check.bad_indices, first_bad = t;
@@ -48,6 +48,8 @@ bool check_numbers(const SurfaceMesh& surface, SurfaceCheck& check) {
     const glm::dvec3& p = surface.positions[v];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
       ++check.non_finite, first_non_finite = v;
+    else if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > largest_coordinate)
+      far = v;
   }
   if (check.bad_indices > 0)
     note(check, "triangles name vertices that are not there",
@@ -58,6 +60,11 @@ bool check_numbers(const SurfaceMesh& surface, SurfaceCheck& check) {
         check, "positions are not finite numbers",
         fmt::format("{}, first vertex {}", counted(check.non_finite, "vertex", "vertices"), first_non_finite),
         "export the mesh again");
+  if (far < surface.positions.size())
+    note(check, "positions are too far out",
+         fmt::format("vertex {} at {}, the limit is {:g}", far, point(surface.positions[far]),
+                     largest_coordinate),
+         "scale the mesh");
   if (surface.triangles.size() < 4)
     note(check, "too few triangles to enclose a volume",
          counted(surface.triangles.size(), "triangle", "triangles"), "a closed surface has at least 4");

@@ -25,11 +25,14 @@ namespace {
               file.string(), "it is damaged or incomplete: fetch or export it again");
 }
 
+// Bytes of a value; 0 for what is no type.
 double ply_type_size(const std::string& type) {
   if (type == "char" || type == "uchar" || type == "int8" || type == "uint8") return 1;
   if (type == "short" || type == "ushort" || type == "int16" || type == "uint16") return 2;
+  if (type == "int" || type == "uint" || type == "int32" || type == "uint32") return 4;
+  if (type == "float" || type == "float32") return 4;
   if (type == "double" || type == "float64") return 8;
-  return 4;
+  return 0;
 }
 
 [[noreturn]] void throw_early_end(const std::filesystem::path& file, const std::string& element) {
@@ -69,7 +72,8 @@ void require_words(const std::filesystem::path& file, std::istream& body,
         if (word.empty()) throw_early_end(file, element.name);
         std::size_t entries = 0;
         if (list && std::from_chars(word.data(), word.data() + word.size(), entries).ec != std::errc{})
-          return;
+          throw Error(fmt::format("'{}' is not the length of a list", word.substr(0, 40)), file.string(),
+                      "it is damaged: fetch or export it again");
         for (std::size_t k = 0; k < entries; ++k)
           if (next_word().empty()) throw_early_end(file, element.name);
       }
@@ -77,50 +81,67 @@ void require_words(const std::filesystem::path& file, std::istream& body,
     }
 }
 
+// Strict: on lines it does not know, and on counts of nothing, assimp searches or counts for minutes.
 SurfaceClaims ply_claims(const std::filesystem::path& file, std::istream& head, double size) {
   SurfaceClaims claims;
   std::vector<TextElement> elements;
-  std::string line, element, claim;
-  double count = 0, least = 0;
+  std::string line, claim;
+  double least = 0;
   bool binary = false, first = true;
   while (std::getline(head, line)) {
     std::istringstream words(line);
-    std::string word;
+    std::string word, type, counter, entry, number;
     words >> word;
+    const auto refuse = [&] {
+      throw Error(fmt::format("PLY header line '{}' is not understood", line.substr(0, 60)), file.string(),
+                  "it is damaged: fetch or export it again");
+    };
     if (first && word != "ply" && word != "PLY") return {};
-    first = false;
+    if (word == "end_header") break;
     if (word == "format") {
       words >> word;
       binary = word.starts_with("binary");
     } else if (word == "element") {
-      if (!(words >> element >> count) || count < 0) return {};
-      if (element == "vertex") claims.vertices = static_cast<std::size_t>(std::min(count, 1e15));
-      if (element == "face") claims.faces = static_cast<std::size_t>(std::min(count, 1e15));
-      elements.push_back({element, static_cast<std::size_t>(std::min(count, 1e15)), {}});
-      claim += fmt::format("{}{} {:.0f}", claim.empty() ? "" : ", ", element, count);
+      TextElement element{};
+      words >> element.name >> number;
+      const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), element.count);
+      if (number.empty() || error != std::errc{} || end != number.data() + number.size()) refuse();
+      claim += fmt::format("{}{} {}", claim.empty() ? "" : ", ", element.name, element.count);
+      elements.push_back(element);
     } else if (word == "property") {
-      std::string type, counter, entry;
+      if (elements.empty()) refuse();
+      TextElement& element = elements.back();
       words >> type;
-      if (!elements.empty()) elements.back().lists.push_back(type == "list");
-      if (type == "list") {
-        words >> counter >> entry;
-        const double entries = element == "face" ? 3 : 0;  // no face has fewer corners
-        least += count * (binary ? ply_type_size(counter) + entries * ply_type_size(entry) : 2 + 2 * entries);
-      } else {
-        least += count * (binary ? ply_type_size(type) : 2);
-      }
-    } else if (word == "end_header") {
-      const double body = size - static_cast<double>(head.tellg());
-      if (least > body + (binary ? 0 : 1))
-        throw_short  // text may lack its last line's end
-            (file, claim, least, body);
-      if (!binary) require_words(file, head, elements);
-      return claims;
+      element.lists.push_back(type == "list");
+      if (element.lists.back()) words >> counter >> entry;
+      const double value = ply_type_size(element.lists.back() ? entry : type);
+      const double length = element.lists.back() ? ply_type_size(counter) : 0;
+      if (value == 0 || (element.lists.back() && length == 0)) refuse();
+      const double entries = !element.lists.back()    ? 1
+                             : element.name == "face" ? 3
+                                                      : 0;  // no face has fewer corners
+      const double words_each = entries + (element.lists.back() ? 1 : 0);
+      least += static_cast<double>(element.count) * (binary ? length + entries * value : 2 * words_each);
+    } else if (!first && !word.empty() && word != "comment" && word != "obj_info") {
+      refuse();
     }
+    first = false;
   }
-  // assimp would search for the end of the header for minutes.
-  throw Error("PLY header has no end_header", file.string(),
-              "the file is incomplete: fetch or export it again");
+  if (!head)
+    throw Error("PLY header has no end_header", file.string(),
+                "the file is incomplete: fetch or export it again");
+  for (const TextElement& element : elements) {
+    if (element.lists.empty() && element.count > 0)
+      throw Error(fmt::format("PLY element '{}' has no properties", element.name), file.string(),
+                  "it is damaged: fetch or export it again");
+    if (element.name == "vertex") claims.vertices = element.count;
+    if (element.name == "face") claims.faces = element.count;
+  }
+  const double body = size - static_cast<double>(head.tellg());
+  if (least > body + (binary ? 0 : 1))
+    throw_short(file, claim, least, body);  // text may lack its last line's end
+  if (!binary) require_words(file, head, elements);
+  return claims;
 }
 
 SurfaceClaims off_claims(const std::filesystem::path& file, std::istream& head, double size) {
@@ -131,7 +152,7 @@ SurfaceClaims off_claims(const std::filesystem::path& file, std::istream& head, 
     if (digit == std::string::npos) continue;
     std::istringstream words(line.substr(digit));
     double vertices = 0, faces = 0;
-    if (!(words >> vertices >> faces)) return {};
+    if (!(words >> vertices >> faces) || !(vertices >= 0) || !(faces >= 0)) return {};
     const double least = vertices * 6 + faces * 8;  // "0 0 0\n", "3 0 1 2\n"
     if (least > size + 1)
       throw_short(file, fmt::format("{:.0f} vertices, {:.0f} faces", vertices, faces), least, size);

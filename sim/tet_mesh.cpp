@@ -41,9 +41,16 @@ void check_indices(const TetMesh& mesh, const std::string& source) {
     if (t[0] == t[1] || t[1] == t[2] || t[2] == t[3])
       throw Error(fmt::format("tet {} names a vertex twice", i), source, "remove such elements");
   }
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-    if (const auto& p = mesh.positions[v]; !std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const glm::dvec3 size = glm::abs(mesh.positions[v]);
+    const double largest = size.x + size.y + size.z;  // NaN where one of them is
+    if (!std::isfinite(largest))
       throw Error(fmt::format("position of vertex {} is not finite", v), source, "export the mesh again");
+    if (largest > largest_coordinate)
+      throw Error(fmt::format("vertex {} is at {}, further out than {:g}", v, point(mesh.positions[v]),
+                              largest_coordinate),
+                  source, "scale the mesh");
+  }
 }
 
 void orient_tets(TetMesh& mesh, const std::string& source) {

@@ -27,6 +27,9 @@ struct TetMesh {
   std::vector<Triangle> surface;
 };
 
+/// Largest coordinate of a mesh file: volumes (cubes of it) and their products stay far inside a double.
+constexpr double largest_coordinate = 1e30;
+
 /// PLY, OBJ, STL, OFF (through assimp, in a contained child process): vertices welded, polygons triangulated,
 /// vertices without a triangle dropped. Throws Error (status 2) for files that cannot be read or hold no
 /// triangle.
@@ -62,6 +65,8 @@ TetMesh load_tets(const std::filesystem::path& file);
 /// are.
 TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches);
 bool is_surface_file(const std::filesystem::path& file);
+/// Throws Error when write_mesh() does not know the extension.
+void require_mesh_format(const std::filesystem::path& file);
 /// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Whole
 /// or not at all.
 void write_mesh(const std::filesystem::path& file, const TetMesh& mesh);

@@ -10,9 +10,11 @@
 #include "sim/tetgen_switches.h"
 
 #if TETPBD_TETGEN
+#include <sys/resource.h>
 #include <tetgen.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #endif
 
@@ -77,6 +79,9 @@ struct Intersections {
 std::string intersections_in_child(const SurfaceMesh& surface) {
   std::FILE* printed = std::tmpfile();
   if (!printed) throw std::runtime_error("no temporary file");
+  std::signal(SIGXFSZ, SIG_IGN);  // n triangles can have n^2 pairs: what goes beyond is not printed
+  const rlimit most{64u << 20, 64u << 20};
+  ::setrlimit(RLIMIT_FSIZE, &most);
   std::fflush(stdout);
   ::dup2(::fileno(printed), STDOUT_FILENO);
   tetgenio in, out;

@@ -51,8 +51,14 @@ class TextFile {
   std::string_view word(const char* wanted);
 };
 
-/// Writes each file under a temporary name, then renames all. Throws Error and leaves nothing behind when it
-/// cannot.
+/// ".NAME.PID.part.EXTENSION" in the same folder: programs choose formats by the extension, so it stays.
+std::filesystem::path temporary_name(const std::filesystem::path& file);
+
+/// Gives a finished file its name. Throws Error (status 1) and removes it when that fails.
+void rename_whole(const std::filesystem::path& temporary, const std::filesystem::path& file);
+
+/// Writes each file under a temporary name, then renames all. Throws Error (status 1) and leaves nothing
+/// behind when it cannot.
 void write_files_whole(const std::vector<std::pair<std::filesystem::path, std::string>>& files);
 
 }  // namespace tetpbd

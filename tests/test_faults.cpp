@@ -1,434 +1,394 @@
-// What goes wrong on a GPU: states that stop being numbers, and drivers that refuse. Each is provoked and has
-// to be said.
+// Disks that are full, programs that die, signals, folders in the way: one line, a status, whole files,
+// nothing left.
 #include <doctest/doctest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmath>
-#include <filesystem>
+#include <chrono>
 #include <fstream>
-#include <limits>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
 
-#include "app/files.h"
-#include "app/headless.h"
-#include "app/measure_run.h"
-#include "app/session.h"
-#include "app/statistics.h"
-#include "render/target.h"
-#include "sim/sim.h"
-#include "tests/gl_test.h"
-
-using namespace tetpbd;
+#include "tests/mesh_samples.h"
 
 namespace {
 
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using samples::contains;
+using samples::Folder;
+namespace fs = std::filesystem;
 
-std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::dvec3(0),
-                                   double height = 0.2) {
-  TetMesh mesh = make_block(glm::dvec3(size, 0.6 * size, 0.5 * size), {5, 3, 2});
-  for (auto& p : mesh.positions) p.y += (0.3 + height) * size;
-  auto model = std::make_shared<Model>();
-  add_body(*model, "block", mesh, 1000, mesh.positions, velocity, glm::dvec3(0), {});
-  return model;
+std::string content(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-Settings quick(const std::string& mode) {
-  Settings s;
-  s.mode = mode;
-  s.iterations = 3;
-  return s;
-}
-
-bool is_finite(const State& state) {
-  for (const auto* list : {&state.positions, &state.velocities})
-    for (const glm::dvec3& v : *list)
-      if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) return false;
-  return true;
-}
-
-std::string what_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::exception& error) {
-    return error.what();
+/// tetpbd with these words, in the folder. `prepare` runs in the child before it becomes the program.
+struct Program {
+  const Folder& folder;
+  pid_t pid;
+  Program(
+      const Folder& in, std::vector<std::string> words, const std::function<void()>& prepare = [] {})
+      : folder(in), pid((std::fflush(nullptr), ::fork())) {
+    REQUIRE(pid >= 0);
+    if (pid != 0) return;
+    if (::chdir(folder.path.c_str()) != 0 || !std::freopen("stdout", "w", stdout) ||
+        !std::freopen("stderr", "w", stderr))
+      ::_exit(99);
+    for (const int number : {SIGINT, SIGTERM, SIGXFSZ, SIGPIPE}) ::signal(number, SIG_DFL);
+    prepare();
+    words.insert(words.begin(), TEST_PROGRAM);
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    ::execv(TEST_PROGRAM, arguments.data());
+    ::_exit(98);
   }
-  return "";
+  /// Its exit status; 128 + number where a signal ended it.
+  int wait() {
+    int status = 0;
+    while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+    }
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  std::string err() const { return content(folder.path / "stderr"); }
+};
+
+template <class Condition>
+bool soon(const Condition& condition) {
+  for (int i = 0; i < 6000; ++i, std::this_thread::sleep_for(std::chrono::milliseconds(10)))
+    if (condition()) return true;
+  return false;
 }
 
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+/// One line that holds `word`, and no temporary file anywhere.
+void check_failed(Program& program, const std::string& word, int wanted = 1) {
+  const int status = program.wait();
+  const std::string err = program.err();
+  CAPTURE(err);
+  CHECK(status == wanted);
+  CHECK(err.starts_with("tetpbd: "));
+  CHECK(std::count(err.begin(), err.end(), '\n') == 1);
+  CHECK(contains(err, word));
+  for (const auto& entry : fs::recursive_directory_iterator(program.folder.path)) {
+    CAPTURE(entry.path().string());
+    CHECK(!contains(entry.path().filename().string(), ".part"));
+  }
+}
 
-// Writes into what the GPU reads, as a faulty kernel would.
-void spoil(const Sim& sim, std::uint32_t vertex, bool velocity, float value) {
-  const Buffer& buffer = velocity ? sim.velocities : sim.current_positions();
-  buffer.write(vertex * (velocity ? sizeof(Velocity) : sizeof(Position)) + 4, sizeof value, &value);
+const std::vector<std::string> plain_run = {"run", "--scene", "beam",  "--steps",   "4", "--iterations",
+                                            "1",   "--size",  "64x48", "--samples", "0", "--positions"};
+
+std::vector<std::string> with(std::vector<std::string> words, const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+const std::vector<std::string> short_run = with(plain_run, {"--png-every", "2"});
+
+std::function<void()> files_of_at_most(rlim_t bytes) {
+  return [bytes] {
+    const rlimit most{bytes, bytes};
+    ::setrlimit(RLIMIT_FSIZE, &most);
+  };
+}
+
+/// A program `name` that does what the shell script says, first in PATH.
+std::function<void()> instead_of(const Folder& folder, const std::string& name, const std::string& script) {
+  fs::create_directories(folder.path / "bin");
+  const fs::path file = folder.path / "bin" / name;
+  std::ofstream(file) << "#!/bin/sh\n" << script;
+  ::chmod(file.c_str(), 0755);
+  return [path = (folder.path / "bin").string()] {
+    ::setenv("PATH", (path + ":" + std::getenv("PATH")).c_str(), 1);
+  };
+}
+
+std::string cube_off() {
+  return "OFF\n8 12 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n3 0 2 1\n3 1 2 3\n3 4 5 6\n3 "
+         "5 7 6\n"
+         "3 0 1 4\n3 1 5 4\n3 2 6 3\n3 3 6 7\n3 0 4 2\n3 2 4 6\n3 1 3 5\n3 3 7 5\n";
 }
 
 }  // namespace
 
-TEST_CASE("a given state that is not finite is found at once, with its lowest vertex") {
-  GlTest gl;
-  for (const SolverMode& mode : solver_modes())
-    for (const bool velocity : {false, true})
-      for (const double value : {not_a_number, infinity, -infinity, 1e39}) {  // the last is none as a float
-        CAPTURE(mode.name);
-        CAPTURE(velocity);
-        CAPTURE(value);
-        Sim sim = create_sim(block(), quick(mode.name));
-        for (int s = 0; s < 3; ++s) step(sim);
-        const State good = read_state(sim);
-        State state = good;
-        for (std::size_t v : {61, 17, 40}) (velocity ? state.velocities : state.positions)[v].z = value;
-        write_state(sim, state);
-        REQUIRE(check_finite(sim));
-        CHECK(sim.check.found->vertex == 17);
-        CHECK(sim.check.found->step == 3);
-        CHECK(has(error_of(*sim.check.found).what(), "at step 3, vertex 17"));
-        CHECK(has(sim.check.found->cause, "given"));
-        CHECK(!return_to_kept(sim));
-        write_state(sim, good);
-        CHECK(!check_finite(sim, true));
-        step(sim);
-        CHECK(!check_finite(sim, true));
-      }
+TEST_CASE("faults: a full disk") {
+  const Folder folder;
+  Program nothing(folder, with(short_run, {"--out", "a"}), files_of_at_most(150));
+  check_failed(nothing, "cannot be written");
+  CHECK(fs::is_empty(folder.path / "a"));
+  Program some(folder, with(plain_run, {"--out", "b"}), files_of_at_most(6000));
+  check_failed(some, ".npy");  // statistics fit, positions do not
+  CHECK(!fs::exists(folder.path / "b/positions.npy"));
+  CHECK(nlohmann::json::parse(content(folder.path / "b/stats.json")).contains("timing"));
+  Program video(folder, with(plain_run, {"--out", "c", "--video", "c.mp4"}), files_of_at_most(900));
+  check_failed(video, "c.mp4");
+  CHECK(!fs::exists(folder.path / "c.mp4"));
+  Program compare(folder,
+                  {"compare", "--scene", "beam", "--modes", "node", "--iterations", "1", "--substeps", "1",
+                   "--steps", "2", "--out", "d"},
+                  files_of_at_most(600));
+  check_failed(compare, "compare.");
+  CHECK(fs::is_empty(folder.path / "d"));
+  Program bench(folder,
+                {"bench", "--scenes", "beam", "--modes", "cpu", "--iterations", "1", "--frames", "1",
+                 "--warm-up", "0", "--repeats", "1", "--no-render", "--out", "e"},
+                files_of_at_most(200));
+  check_failed(bench, "bench.");
+  CHECK(fs::is_empty(folder.path / "e"));
+  Program full(folder, {"info"}, [] {
+    if (!std::freopen("/dev/full", "w", stdout)) ::_exit(97);
+  });
+  check_failed(full, "standard output");
+  Program explain(folder, {"run", "--scene", "beam", "--explain"}, [] {
+    if (!std::freopen("/dev/full", "w", stdout)) ::_exit(97);
+    std::setvbuf(stdout, nullptr, _IONBF, 0);
+  });
+  check_failed(explain, "standard output");
+  Program mute(folder, {"run", "--scene", "none"}, [] {
+    if (!std::freopen("/dev/full", "w", stderr)) ::_exit(97);
+  });
+  CHECK(mute.wait() == 2);
 }
 
-TEST_CASE(
-    "what stops being a number on the GPU is found in its step, and the step before comes back bit for bit") {
-  GlTest gl;
-  for (const char* mode : {"node", "constraint"})
-    for (const bool velocity : {false, true})
-      for (const int good_steps : {0, 5, 64, 100, 230}) {
-        CAPTURE(mode);
-        CAPTURE(velocity);
-        CAPTURE(good_steps);
-        Settings settings = quick(mode);
-        settings.iterations = 1;
-        Sim sim = create_sim(block(), settings);
-        for (int s = 0; s < good_steps; ++s) step(sim);
-        CHECK(!check_finite(sim, good_steps == 5));
-        const std::uint64_t hash = state_hash(sim);
-        spoil(sim, 33, velocity, std::numeric_limits<float>::quiet_NaN());
-        for (int s = 0; s < 40; ++s) step(sim);  // nobody asks for a while
-        REQUIRE(check_finite(sim, true));
-        CHECK(sim.check.found->step == good_steps + 1);
-        CHECK(sim.check.found->vertex <= 33);
-        REQUIRE(return_to_last_good(sim));
-        CHECK(sim.steps == good_steps);
-        CHECK(state_hash(sim) == hash);
-        CHECK(sim.check.found);  // for whoever reports it
-        reset(sim);
-        CHECK(!check_finite(sim, true));
-      }
-}
-
-TEST_CASE("a fixed vertex that is moved nowhere is found too") {
-  GlTest gl;
-  for (const SolverMode& mode : solver_modes()) {
-    CAPTURE(mode.name);
-    Settings settings = quick(mode.name);
-    settings.constraints = "";
-    Sim sim = create_sim(block(), settings);
-    pin(sim, 7);
-    step(sim);
-    move_pinned(sim, 7, glm::dvec3(0, not_a_number, 0));
-    step(sim);
-    REQUIRE(check_finite(sim, true));
-    CHECK(sim.check.found->step == 2);
-    CHECK(sim.check.found->vertex == 7);
-    CHECK(return_to_kept(sim));
-    CHECK(sim.steps == 0);
-    CHECK(is_pinned(sim, 7));
-    CHECK(is_finite(read_state(sim)));
-    CHECK(!check_finite(sim, true));
-    step(sim);
-    CHECK(!check_finite(sim, true));
+TEST_CASE("faults: folders and files in the way") {
+  const Folder folder;
+  folder.write("file", "x");
+  for (const char* out : {"file", "file/out", "/proc/none", "/dev/full"}) {
+    CAPTURE(out);
+    Program run(folder, with(short_run, {"--out", out}));
+    check_failed(run, out, 2);
   }
-}
-
-TEST_CASE("absurd settings either stay numbers or are found, and the message says which of them it was") {
-  GlTest gl;
-  struct Absurd {
-    const char* name;
-    double size, speed, dt, omega, gravity;
-  };
-  for (const SolverMode& mode : solver_modes())
-    for (const Absurd& a : {Absurd{"fast", 1, 1e5, 1, 1.5, 9.81},
-                            {"heavy", 1, 0, 1, 1.5, 1000},
-                            {"omega", 1, 0, 0.005, 4, 9.81},
-                            {"large", 1e6, 1e5, 1, 4, 1000},
-                            {"huge", 1e11, 0, 0.005, 1.5, 9.81},
-                            {"tiny", 1e-12, 1e5, 1, 4, 1000}}) {
-      CAPTURE(mode.name);
-      CAPTURE(a.name);
-      Settings settings = quick(mode.name);
-      settings.dt = a.dt, settings.omega = a.omega, settings.gravity = a.gravity;
-      Sim sim = create_sim(block(a.size, glm::dvec3(a.speed, -a.speed, 0)), settings);
-      for (int s = 0; s < 150; ++s) step(sim);
-      const auto found = check_finite(sim, true);
-      CHECK(found.has_value() == !is_finite(read_state(sim)));
-      if (!found) continue;
-      MESSAGE(mode.name << " " << a.name << ": " << error_of(*found).what());
-      CHECK(!has(found->cause, "unknown"));
-      REQUIRE(return_to_last_good(sim));
-      CHECK(is_finite(read_state(sim)));
-      CHECK(sim.steps == found->step - 1);
-    }
-}
-
-TEST_CASE("a measured run ends with the numbers of the last good step and never shows others as numbers") {
-  GlTest gl;
-  const auto model = block();
-  for (const char* mode : {"node", "cpu"}) {
-    Sim sim = create_sim(model, quick(mode));
-    Metrics metrics = create_metrics(*model);
-    const MeasuredRun run = measure_run(sim, metrics, 50, [&](long s) {
-      if (s == 6 && std::string(mode) == "cpu") sim.host.velocities[9].x = infinity;
-      if (s == 6) spoil(sim, 9, true, std::numeric_limits<float>::infinity());
-      return true;
-    });
-    REQUIRE(run.errors.non_finite);
-    CHECK(run.errors.non_finite->step == 7);
-    CHECK(!run.errors.finite);
-    REQUIRE(run.errors.last);
-    CHECK(run.errors.last->step == 6);
-    CHECK(run.errors.last->finite());
-    CHECK(std::isfinite(run.errors.max_volume_loss_percent));
-    CHECK(run.timing.wall_ms.count == 6);
-    const auto text = non_finite_json(run.errors.non_finite).dump();
-    CHECK(has(text, "\"step\":7"));
-    CHECK(has(text, "\"cause\":\""));
-    Measurement bad = *run.errors.last;
-    bad.non_finite = 1;
-    bad.kinetic = not_a_number;
-    const std::string row = csv_row(bad, run.errors);
-    CHECK(!has(row, "nan"));
-    CHECK(has(row, ",,,"));
-    CHECK(row.ends_with(",0\n"));
+  fs::create_directories(folder.path / "a/stats.json");
+  Program taken(folder, with(plain_run, {"--out", "a"}));
+  check_failed(taken, "stats.json");
+  for (const char* scene : {"file", "a", "none.json", "/dev/full", "/dev/zero"}) {
+    CAPTURE(scene);
+    Program run(folder, {"run", "--scene", scene});
+    check_failed(run, scene, 2);
   }
-  const auto file = std::filesystem::temp_directory_path() / "tetpbd_nan.npy";
-  CHECK_THROWS_AS(write_npy(file, {glm::vec3(0), glm::vec3(0, float(not_a_number), 0)}), Error);
-  CHECK(!std::filesystem::exists(file));
+  for (const char* mesh : {"none.ply", "a", "/dev/zero", "none.node"}) {
+    CAPTURE(mesh);
+    Program run(folder, {"mesh", mesh});
+    check_failed(run, mesh, 2);
+  }
+  Program line(folder, {"mesh", "two\nlines\x1b[2J.ply"});
+  check_failed(line, "two?lines?[2J.ply", 2);
+  Program range(folder, {"run", "--steps", "0"});
+  check_failed(range, "--steps: must be a whole number from 1 to 1000000000, not '0'", 2);
+  Program format(folder, {"mesh", "none.ply", "--out", "a.vtk"});
+  check_failed(format, "unknown mesh format '.vtk'", 2);
+  CHECK(content(folder.path / "stdout").empty());
 }
 
-TEST_CASE("nothing that is not finite is drawn, in any look or colour, and none of it is picked") {
-  GlTest gl;
-  const auto model = block();
-  Sim sim = create_sim(model, quick("node"));
-  Renderer renderer = make_renderer(model->rest);
-  Picker picker = make_picker(model->rest);
-  const Target target = make_target(96, 64);
-  Frame frame;
-  frame.target = target.framebuffer.id();
-  frame.viewport = {0, 0, target.width, target.height};
-  frame.ground = 0.0f;
-  frame.options.legend = false;
-  frame_box(frame.camera, {-0.6f, 0, -0.6f}, {0.6f, 1, 0.6f}, 1.5f, 1.2f);
-  const std::vector<std::uint32_t> dots{0, 5};
-  frame.pinned = dots;
-  const auto picture = [&] {
-    frame.positions = sim.current_positions().id();
-    frame.velocities = sim.velocities.id();
-    draw(renderer, frame);
-    return read_rgba(target).rgba;
+TEST_CASE("faults: shards that are damaged are not merged") {
+  const Folder folder;
+  Program whole(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", "1", "--substeps",
+                         "1", "--steps", "2", "--out", "part"});
+  REQUIRE(whole.wait() == 0);
+  const fs::path file = folder.path / "part/compare.json";
+  const nlohmann::json good = nlohmann::json::parse(content(file));
+  const auto refused = [&](const std::string& text) {
+    CAPTURE(text);
+    std::ofstream(file) << text;
+    Program merge(folder, {"compare", "--merge", "part", "--out", "all"});
+    check_failed(merge, "not a finished comparison", 2);
   };
-  for (const Look look : {Look::surface, Look::wire, Look::tets})
-    for (const Colour colour : {Colour::plain, Colour::volume, Colour::stretch, Colour::velocity}) {
-      frame.options.look = look, frame.options.colour = colour;
-      CAPTURE(look_names[std::size_t(look)]);
-      CAPTURE(colour_names[std::size_t(colour)]);
-      reset(sim);
-      const auto good = picture();
-      State away = read_state(sim), bad = away;
-      for (auto& p : away.positions) p = glm::dvec3(0, 1e8, 0);  // beyond what is drawn: the empty scene
-      write_state(sim, away);
-      const auto empty = picture();
-      CHECK(good != empty);
-      for (const double value : {not_a_number, infinity, -infinity}) {
-        for (auto& p : bad.positions) p.y = value;
-        write_state(sim, bad);
-        CHECK(picture() == empty);
-        request(picker, sim.current_positions().id(),
-                {eye(frame.camera), glm::normalize(frame.camera.target - eye(frame.camera))});
-        CHECK(!poll(picker, true)->hit);
-      }
-      if (colour != Colour::velocity) continue;
-      frame.pinned = {};
-      State wild = read_state((reset(sim), sim));
-      for (auto& v : wild.velocities) v.x = not_a_number;
-      write_state(sim, wild);
-      CHECK(picture() == empty);
-      frame.pinned = dots;
-    }
+  std::vector<nlohmann::json> changed;
+  for (const char* key : {"device", "steps", "shard", "combinations"}) {
+    nlohmann::json without = good, other = good;
+    without.erase(key), other[key] = "x";
+    changed.push_back(without), changed.push_back(other);
+  }
+  for (const char* key : {"mode", "iterations", "wall_ms_per_step", "finite"}) {
+    nlohmann::json without = good, other = good;
+    without["rows"][0].erase(key), other["rows"][0][key] = nlohmann::json::array();
+    changed.push_back(without), changed.push_back(other);
+  }
+  for (const nlohmann::json& document : changed) refused(document.dump());
+  refused(good.dump().substr(0, 200));
+  refused("{\"device\": " + std::string(100000, '['));
+  refused("");
+  std::ofstream(file) << good.dump();
+  Program merge(folder, {"compare", "--merge", "part", "--out", "all"});
+  CHECK(merge.wait() == 0);
 }
 
-TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode change on the way") {
-  GlTest gl;
-  for (const SolverMode& mode : solver_modes()) {
-    CAPTURE(mode.name);
-    Settings settings = quick(mode.name);
-    settings.ground = false;
-    settings.dt = 0.02;
-    Sim sim = create_sim(block(), settings);
-    pin(sim, 3);
-    const glm::dvec3 held = read_state(sim).positions[3];
-    settings.constraints = "";
-    apply_settings(sim, settings);  // so that the pinned vertex does not hold the others
-    double fallen = 0, speed = 0;
-    const auto fall = [&](int steps) {
-      for (int s = 0; s < steps; ++s) step(sim);
-      const double t = steps * sim.settings.dt, g = sim.settings.gravity;
-      fallen += speed * t + 0.5 * g * t * t;
-      speed += g * t;
+TEST_CASE("faults: ffmpeg that is missing, fails at once, or dies on the way") {
+  const Folder folder;
+  const auto film =
+      with(short_run, {"--out", "a", "--video", "'-q \"$(touch run)\nx.mp4", "--video-every", "1"});
+  Program missing(folder, film, [] { ::setenv("PATH", "/nowhere", 1); });
+  check_failed(missing, "install ffmpeg");
+  Program fails(folder, film, instead_of(folder, "ffmpeg", "echo no such codec >&2; exit 1\n"));
+  check_failed(fails, "no such codec");
+  Program dies(folder, film, instead_of(folder, "ffmpeg", "head -c 20000 >/dev/null; kill -9 $$\n"));
+  check_failed(dies, "ffmpeg ended early");
+  fs::remove_all(folder.path / "bin");
+  Program works(folder, film);  // and a name full of quotes, blanks and line breaks is only a name
+  CHECK(works.wait() == 0);
+  CHECK(works.err() == "");
+  CHECK(content(folder.path / "'-q \"$(touch run)\nx.mp4").substr(4, 4) == "ftyp");
+  CHECK(!fs::exists(folder.path / "run"));
+}
+
+TEST_CASE("faults: interrupted, what was finished is whole") {
+  const Folder folder;
+  // A first signal after the first result is there.
+  const auto interrupt = [&](const std::vector<std::string>& words, int number,
+                             const std::function<bool()>& begun) {
+    CAPTURE(words[0]);
+    Program program(folder, words);
+    CHECK(soon(begun));
+    ::kill(program.pid, number);
+    check_failed(program, "interrupted");
+  };
+  const auto printed = [&](std::size_t lines) {
+    return [&folder, lines] {
+      const std::string out = content(folder.path / "stdout");
+      return std::size_t(std::count(out.begin(), out.end(), '\n')) >= lines;
     };
-    fall(20);
-    settings.dt = 0.001;
-    apply_settings(sim, settings);
-    fall(50);
-    settings.substeps = 7, settings.dt = 0.03;
-    apply_settings(sim, settings);
-    fall(10);
-    settings.gravity = -3;
-    apply_settings(sim, settings);
-    fall(10);
-    settings.mode = std::string(mode.name) == "cpu" ? "node" : "cpu", settings.substeps = 1;
-    apply_settings(sim, settings);
-    fall(10);
-    const State state = read_state(sim);
-    double worst = 0;
-    for (std::size_t i = 0; i < state.positions.size(); ++i)
-      if (i != 3)
-        worst = std::max(
-            worst, glm::length(state.positions[i] - sim.model->positions[i] + glm::dvec3(0, fallen, 0)));
-    CHECK(worst < 1e-5 * fallen);
-    CHECK(glm::length(state.positions[3] - held) < 1e-6);
-    CHECK(glm::length(state.velocities[3]) == 0);
-  }
-}
-
-TEST_CASE("limits of a driver are named with what is needed and what there is") {
-  GlTest gl;
-  const Limits real = gl_limits();
-  CHECK(real.storage_blocks >= STORAGE_BINDINGS);
-  CHECK(real.work_groups >= 65535);
-  const ConstraintSystem system = build_constraints(block()->rest, "stretch,bend,volume");
-  check_limits(system, real);
-  Limits few = real;
-  few.storage_blocks = 9;
-  CHECK(has(what_of([&] { check_limits(system, few); }),
-            "too few shader storage blocks: 10 needed, the driver offers 9"));
-  few = real;
-  few.storage_bytes = 100;
-  CHECK(has(what_of([&] { check_limits(system, few); }), "a storage buffer is too large"));
-  CHECK(has(what_of([&] {
-              check_work_groups("predict", 70000, {8, 0, 65535});
-            }),
-            "too many work-groups: predict needs 70000, the driver allows 65535"));
-  check_work_groups("predict", 65535, {8, 0, 65535});
-  CHECK(has(what_of([&] { make_target(100000, 10); }), "bad image size: 100000x10"));
-}
-
-TEST_CASE("a buffer that does not fit is named with its bytes, and the simulation beside it goes on") {
-  HeadlessContext context;  // no debug context: that one reports the refusal as a GL error
-  Sim sim = create_sim(block(), quick("node"));
-  step(sim);
-  const std::string what = what_of([] { Buffer("adjacency", std::size_t(1) << 46); });
-  CHECK(has(what, "out of GPU memory: buffer 'adjacency' of 70368744177664 bytes: "));
-  step(sim);
-  CHECK(!check_finite(sim, true));
-}
-
-TEST_CASE("a GPU that was reset ends the program, whatever it was doing") {
-  GlTest gl;
-  Sim sim = create_sim(block(), quick("node"));
-  step(sim);
-  check_finite(sim, true);
-  for (const GLenum reason : {GL_GUILTY_CONTEXT_RESET, GL_INNOCENT_CONTEXT_RESET, GL_UNKNOWN_CONTEXT_RESET}) {
-    static GLenum answer;
-    answer = reason;
-    set_reset_status([] { return answer; });
-    CHECK_THROWS_AS(check_finite(sim), ContextLost);
-    CHECK_THROWS_AS(([&] {
-                      for (int s = 0; s < CHECK_STEPS; ++s) step(sim);
-                    }()),
-                    ContextLost);  // nobody asks
-    CHECK(has(what_of([&] { check_context(); }), "the GPU was reset: "));
-    Session session;
-    CHECK_THROWS_AS(attempt(session, [] { check_context(); }),
-                    ContextLost);  // no message: there is no window left
-    set_reset_status(nullptr);
-  }
-  CHECK(!attempt(*std::make_unique<Session>(), [] { throw Error("a", "b", "c"); }));
-  check_context();
-}
-
-TEST_CASE("shader faults name file and line, or the uniform") {
-  GlTest gl;
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::temp_directory_path() / ("tetpbd_shaders_" + std::to_string(getpid()));
-  fs::remove_all(folder);
-  fs::copy(TEST_MODELS "/../shaders", folder, fs::copy_options::recursive);
-  const auto with = [&](const std::string& file, const std::string& from, const std::string& to) {
-    std::ifstream stream(folder / file);
-    std::string text{std::istreambuf_iterator<char>(stream), {}};
-    const std::string before = text;
-    const auto at = text.find(from);
-    REQUIRE(at != std::string::npos);
-    std::ofstream(folder / file) << text.replace(at, from.size(), to);
-    set_shader_folder(folder.string());
-    std::string what = what_of([] {
-      Sim sim = create_sim(block(), quick("constraint"));
-      step(sim);
-      Renderer renderer = make_renderer(sim.model->rest);
-      const Target target = make_target(32, 32);
-      Frame frame;
-      frame.positions = sim.current_positions().id();
-      frame.target = target.framebuffer.id();
-      frame.viewport = {0, 0, 32, 32};
-      draw(renderer, frame);
-    });
-    set_shader_folder("");
-    std::ofstream(folder / file) << before;
-    CHECK(!has(what, "\n"));
-    return what;
   };
-  CHECK(with("average.comp", "void main", "void main") == "");
-  CHECK(has(with("average.comp", "uint i = group", "uint i = nothing + group"), "shaders/average.comp:"));
-  CHECK(has(with("average.comp", "\"pair.glsl\"", "\"pears.glsl\""),
-            "no such shader: " + folder.string() + "/pears.glsl"));
-  CHECK(has(with("solve_constraint.comp", "uniform uint patch_count", "const uint patch_count = 1u"),
-            "no such uniform: 'patch_count' in solve_constraint"));
-  CHECK(has(with("render/surface.geom", "vec3 edge;", "vec2 edge;"), "surface"));
-  CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
-  const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");
-  CAPTURE(unlinked);
-  if (is_software_renderer()) CHECK(has(unlinked, "shader program does not link: surface: "));  // others may link it
-  // A kernel that goes wrong in a certain step: blamed, and the last good state stands.
+  interrupt({"run", "--scene", "beam", "--steps", "100000000", "--out", "run", "--size", "64x48", "--samples",
+             "0", "--png-every", "5", "--video", "run.mp4"},
+            SIGTERM, [&] { return fs::exists(folder.path / "run/frame_00010.png"); });
+  CHECK(nlohmann::json::parse(content(folder.path / "run/stats.json"))["timing"]["steps"].get<long>() >= 10);
+  CHECK(content(folder.path / "run.mp4").substr(4, 4) == "ftyp");
+  fs::remove(folder.path / "stdout");
+  std::string many = "1";
+  for (int i = 0; i < 2000; ++i) many += ",1";
+  interrupt({"bench",
+             "--scenes",
+             "beam",
+             "--modes",
+             "cpu",
+             "--iterations",
+             "1",
+             "--substeps",
+             many,
+             "--frames",
+             "5",
+             "--warm-up",
+             "0",
+             "--repeats",
+             "1",
+             "--no-render",
+             "--out",
+             "bench",
+             "--constraint-sets",
+             "stretch"},
+            SIGINT, printed(6));
+  CHECK(nlohmann::json::parse(content(folder.path / "bench/bench.json"))["rows"].size() >= 2);
   {
-    std::ifstream stream(folder / "vertex.glsl");
-    std::string text{std::istreambuf_iterator<char>(stream), {}};
-    const std::string end = "positions[i] = Position(";
-    REQUIRE(has(text, end));
-    text.insert(text.find(end), "if (i == 12u && x.high.y < 0.45) x.high.x = sqrt(x.high.y - 1.0);\n  ");
-    std::ofstream(folder / "vertex.glsl") << text;
+    Program program(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", many,
+                             "--substeps", "1", "--steps", "5", "--out", "compare"});
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    ::kill(program.pid, SIGINT);
+    check_failed(program, "interrupted");
+    for (const auto& entry : fs::directory_iterator(folder.path / "compare"))
+      if (entry.path().extension() == ".json")
+        CHECK(nlohmann::json::parse(content(entry.path()))["rows"].size() >= 1);
   }
-  set_shader_folder(folder.string());
-  for (const char* mode : {"node", "constraint"}) {
-    Settings settings = quick(mode);
-    settings.constraints = "";
-    Sim sim = create_sim(block(), settings);
-    long steps = 0;
-    while (!check_finite(sim, true) && steps < 200) step(sim), ++steps;
-    REQUIRE(sim.check.found);
-    CHECK(sim.check.found->vertex == 12);
-    CHECK(sim.check.found->step == steps);
-    CHECK(steps > 5);
-    CHECK(has(sim.check.found->cause, "a shader of " + folder.string()));
-    REQUIRE(return_to_last_good(sim));
-    CHECK(sim.steps == steps - 1);
-    CHECK(is_finite(read_state(sim)));
-  }
-  set_shader_folder("");
-  fs::remove_all(folder);
+  // A step of hours: the second signal does not wait for it.
+  Program stubborn(folder, {"run", "--scene", "beam", "--mode", "cpu", "--iterations", "100000", "--substeps",
+                            "100000", "--out", "stubborn"});
+  CHECK(soon([&] { return fs::exists(folder.path / "stubborn"); }));
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  ::kill(stubborn.pid, SIGINT);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ::kill(stubborn.pid, SIGINT);
+  CHECK(stubborn.wait() == 128 + SIGINT);
+  CHECK(fs::is_empty(folder.path / "stubborn"));
 }
+
+#ifdef TETPBD_TETGEN
+TEST_CASE("faults: an interrupted reproduce keeps the tables it has") {
+  const Folder folder;
+  Program program(folder, {"reproduce", "--quick", "--out", "r"});
+  CHECK(soon([&] { return fs::exists(folder.path / "r/tables/table4.csv"); }));
+  ::kill(program.pid, SIGTERM);
+  check_failed(program, "interrupted");
+  CHECK(contains(content(folder.path / "r/tables/table4.csv"), "Bunny,pYq1.85o/140"));
+  CHECK(!fs::exists(folder.path / "r/report.html"));
+}
+
+namespace {
+
+// The child that fills the surface, once it is there.
+pid_t child_of(pid_t parent) {
+  std::istringstream children(content(fmt::format("/proc/{0}/task/{0}/children", parent)));
+  pid_t child = 0;
+  children >> child;
+  return child;
+}
+
+}  // namespace
+
+TEST_CASE("faults: TetGen's child is killed, runs out of memory, or is interrupted") {
+  const Folder folder;
+  folder.write("cube.off", cube_off());
+  // Ten million tets: minutes.
+  const std::vector<std::string> long_work = {"mesh", "cube.off", "--tetgen", "pqa1e-7", "--out", "cube.msh"};
+  const auto meddle = [&](const std::function<void(pid_t, pid_t)>& action, const char* word) {
+    CAPTURE(word);
+    Program program(folder, long_work);
+    // The first child reads the file; the one after the report of the surface fills it.
+    pid_t child = 0;
+    REQUIRE(soon([&] {
+      const std::string name = content(fmt::format("/proc/{}/statm", child = child_of(program.pid)));
+      std::istringstream words(name);
+      long mapped = 0, resident = 0;
+      words >> mapped >> resident;
+      return child > 0 && resident > 10000;  // pages: 40 MB of tets
+    }));
+    REQUIRE(child > 0);
+    action(program.pid, child);
+    check_failed(program, word, std::string(word) == "interrupted" ? 1 : 2);
+    CHECK(!fs::exists(folder.path / "cube.msh"));
+    CHECK(::kill(child, 0) != 0);
+  };
+  meddle([](pid_t, pid_t child) { ::kill(child, SIGKILL); }, "signal 9");
+  meddle(
+      [](pid_t, pid_t child) {
+        const rlimit most{1 << 20, 1 << 20};
+        ::prlimit(child, RLIMIT_AS, &most, nullptr);
+      },
+      "TetGen failed");
+  meddle([](pid_t parent, pid_t) { ::kill(parent, SIGINT); }, "interrupted");
+}
+
+TEST_CASE("faults: cache folders that cannot be used cost time alone") {
+  const Folder folder;
+  folder.write("cube.off", cube_off());
+  const std::vector<std::string> words = {"mesh", "cube.off", "--out", "cube.msh"};
+  Program first(folder, words);
+  CHECK(first.wait() == 0);
+  const std::string made = content(folder.path / "cube.msh");
+  fs::path kept;
+  for (const auto& entry : fs::directory_iterator(folder.cache())) kept = entry.path();
+  const auto again = [&](const std::string& how, const std::function<void()>& damage,
+                         const std::string& cache = "") {
+    CAPTURE(how);
+    damage();
+    fs::remove(folder.path / "cube.msh");
+    Program program(folder, words, [&] {
+      if (!cache.empty()) ::setenv("TETPBD_CACHE", cache.c_str(), 1);
+    });
+    CHECK(program.wait() == 0);
+    CHECK(program.err() == "");
+    CHECK(content(folder.path / "cube.msh") == made);
+  };
+  const auto nothing = [] {};
+  again("a device", nothing, "/dev/full");
+  again("read-only", nothing, "/proc");
+  again("a file", nothing, (folder.path / "cube.off").string());
+  again("garbage", [&] { std::ofstream(kept, std::ios::binary) << std::string(5000, '\x91'); });
+  again("empty", [&] { std::ofstream(kept, std::ios::trunc).close(); });
+  again("a folder", [&] { fs::remove(kept), fs::create_directory(kept); });
+  again("a pipe", [&] { fs::remove(kept), ::mkfifo(kept.c_str(), 0600); });
+}
+#endif

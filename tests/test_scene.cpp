@@ -39,6 +39,26 @@ bool has(const std::string& text, const std::string& word) { return text.find(wo
 
 }  // namespace
 
+TEST_CASE("scenes that ask for too much are refused") {
+  std::string deep = "1";
+  for (int i = 0; i < 40; ++i) deep = "[" + deep + "]";
+  CHECK(has(error_of("{" + block + ", \"duration\": " + deep + "}"), "nested too deeply"));
+  SceneOverrides overrides;
+  overrides.set = {"duration=" + deep};
+  CHECK(has(error_of("{" + block + "}", overrides), "nested too deeply"));
+  std::string path = "a";
+  for (int i = 0; i < 40; ++i) path += ".a";
+  overrides.set = {path + "=1"};
+  CHECK(has(error_of("{" + block + "}", overrides), "no key needs"));
+  CHECK(
+      has(error_of("{" + block + ", \"description\": \"" + std::string(1 << 20, 'x') + "\"}"), "too large"));
+  std::string boxes, bodies;
+  for (int i = 0; i < 101; ++i) boxes += std::string(i ? "," : "") + R"({"low": [0, 0, 0]})";
+  CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [1, 1, 1]}, "fixed": [)" + boxes + "]}]}"),
+            "100 boxes"));
+  CHECK(load_scene(SceneFile("{" + block + R"(, "name": "a\n\u001b[2J"})").path.string()).name == "a??[2J");
+}
+
 TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(error_of("{" + block + "}") == "");
   CHECK(has(error_of("{" + block), "not valid JSON"));

@@ -298,7 +298,8 @@ TEST_CASE("a body is solved as well 1e4 sizes from the origin as near it") {
     for (int s = 0; s < 20; ++s) step(a), step(b);
     State sa = read_state(a);
     for (auto& p : sa.positions) p += away;
-    CHECK(distance(sa, read_state(b)) < 2e-6);
+    // Positions are rounded to places after every group, so more often.
+    CHECK(distance(sa, read_state(b)) < (std::string(mode) == "groups" ? 6e-6 : 2e-6));
     CHECK(distance(sa, State{far->positions, {}}) > 0.01);
   }
 }

@@ -78,7 +78,7 @@ struct ShaderVariant {
       } else {
         text = replaced(text, "gl_GlobalInvocationID.x", "ordered_invocation()");
       }
-      if (order.enlarged > 1) text = replaced(text, "$GROUP", "1024");
+      if (order.enlarged > 1) text = replaced(replaced(replaced(text, "$GROUPED", "@"), "$GROUP", "1024"), "@", "$GROUPED");
       const std::string row = "return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;";
       if (entry.path() == folder / "types.glsl") {
         REQUIRE(text.find(row) != std::string::npos);

@@ -225,9 +225,10 @@ forget; sleep 1.1; cp good.comp shaders/predict.comp; await '^message shaders co
 key s; await '^step 3$'
 
 # A state that is not finite: said, paused, and mended by a reset.
-sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.comp >shaders/predict.comp
-cmp -s good.comp shaders/predict.comp && fail "predict.comp has no gravity to spoil"
-forget; sleep 1.1; touch shaders/predict.comp; await '^message shaders compiled again'
+cp shaders/vertex.glsl good.glsl
+sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.glsl >shaders/vertex.glsl
+cmp -s good.glsl shaders/vertex.glsl && fail "vertex.glsl has no gravity to spoil"
+forget; sleep 1.1; touch shaders/vertex.glsl; await '^message shaders compiled again'
 key m  # also without the plots, where nothing is measured
 key space; await '^error the state is not finite: at step [0-9]+, vertex [0-9]+: likely cause: the shaders of shaders'
 new_events | grep -q '^pause' || fail "it did not pause"
@@ -237,7 +238,7 @@ sleep 4.2  # until older messages are gone and this one stays where it is
 click back; await '^back [0-9]+$'
 differ not_finite.png <(import -window root png:-) 2000 "the body is back"
 key space; await '^error the state is not finite'
-forget; sleep 1.1; cp good.comp shaders/predict.comp; await '^message shaders compiled again'
+forget; sleep 1.1; cp good.glsl shaders/vertex.glsl; await '^message shaders compiled again'
 key r; await '^reset'
 key space; await '^running [1-9]'
 new_events | grep -q '^error' && fail "an error after the reset"

@@ -52,9 +52,13 @@ std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) 
 
 Settings settings_of(const Scene& scene, const std::string& mode) {
   Settings settings = scene.settings;
-  const std::string suffix = "-substeps";
+  const std::string suffix = "-substeps", groups = "groups-";
   settings.mode = mode.ends_with(suffix) ? mode.substr(0, mode.size() - suffix.size()) : mode;
   if (mode.ends_with(suffix)) std::swap(settings.substeps, settings.iterations);
+  if (settings.mode.starts_with(groups)) {
+    set_parameter(settings, *find_parameter("groups"), settings.mode.substr(groups.size()), "--modes " + mode);
+    settings.mode = "groups";
+  }
   check_settings(settings, "--modes " + mode);
   return settings;
 }
@@ -146,7 +150,10 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
   if (document["rows"].size() != document["rows_in_all"].get<std::size_t>())
     throw Error(fmt::format("{} rows of {}", document["rows"].size(), document["rows_in_all"].get<std::size_t>()),
                 "--merge", "name each shard's folder once");
-  auto& rows = document["rows"];
+  return document;
+}
+
+void sort_rows(ordered_json& rows) {
   std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
     const auto key = [](const auto& row) {
       return std::tuple(row["case"].template get<std::string>(), row["mesh"].template get<std::string>(),
@@ -154,7 +161,6 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
     };
     return key(a) < key(b);
   });
-  return document;
 }
 
 // Every row says when the reference recovered in its case.
@@ -190,6 +196,7 @@ int run_hard_cases(const HardCaseOptions& options) {
   if (rows.empty())
     throw Error("no hard case to run", fmt::format("--shard {}/{}", options.shard, options.shards),
                 "choose cases that have the meshes asked for, and no more shards than rows");
+  sort_rows(rows);
   add_reference(rows);
   fmt::print("{:<18}{:<7}{:<15}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}\n", "case", "mesh", "mode", "steps", "recovered",
              "reference", "volume err %", "inverted", "rigid dist");

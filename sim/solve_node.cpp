@@ -19,7 +19,7 @@ namespace {
 // gives the same bits.
 unsigned lanes_for(std::size_t vertices, bool software) {
   if (software) return 1;
-  return vertices <= 15000 ? 16 : vertices <= 60000 ? 8 : 4;
+  return vertices <= 15000 ? 16 : vertices <= 100000 ? 4 : 2;
 }
 
 // What a vertex reads of its constraints of one kind, one after the other (gather.glsl): the other vertices

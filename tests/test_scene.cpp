@@ -193,3 +193,42 @@ TEST_CASE("every shipped scene runs in every mode") {
       CHECK(std::abs(m.volume_error_percent) < 5);
     }
 }
+
+TEST_CASE("every hard case opens, and says what it is") {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(models_folder() / "scenes/hard")) {
+    CAPTURE(entry.path());
+    Scene scene = load_scene("hard/" + entry.path().stem().string());
+    CHECK(scene.name == "hard/" + entry.path().stem().string());
+    CHECK(scene.description.size() > 10);
+    if (!scene.bodies[0].block && !scene.bodies[0].tet) scene.bodies[0].block = {{0.8, 1, 0.6}, {3, 4, 2}};
+    const auto model = build_model(scene);
+    CHECK(model->positions.size() >= 4);
+    ++count;
+  }
+  CHECK(count >= 40);
+}
+
+TEST_CASE("scale, heavy vertices and a single tet") {
+  const auto model = [](const std::string& body) {
+    const auto file = std::filesystem::temp_directory_path() / ("tetpbd_heavy_" + std::to_string(getpid()) + ".json");
+    std::ofstream(file) << "{\"bodies\": [" << body << "]}";
+    const auto result = build_model(load_scene(file.string()));
+    std::filesystem::remove(file);
+    return result;
+  };
+  const auto plain = model(R"({"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}})");
+  const auto heavy = model(
+      R"({"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "heavy": [{"low": [0, 0.6, 0], "high": [1, 1, 1], "ratio": 100}]})");
+  for (std::size_t i = 0; i < plain->masses.size(); ++i) {
+    const double factor = plain->positions[i].y > 0.6 ? 100 : 1;
+    CHECK(heavy->masses[i] == doctest::Approx(factor * plain->masses[i]));
+    CHECK(heavy->inverse_masses[i] == doctest::Approx(1 / heavy->masses[i]));
+  }
+  const auto flat = model(R"({"block": {"size": [1, 1, 1], "cells": [1, 1, 1]}, "scale": [2, 0.5, 1]})");
+  const Bounds box = bounds(flat->positions);
+  CHECK(glm::length(box.high - box.low - glm::dvec3(2, 0.5, 1)) < 1e-12);
+  const auto tet = model(R"({"tet": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]})");
+  CHECK(tet->rest.tets.size() == 1);
+  CHECK(mesh_volume(tet->rest) == doctest::Approx(1.0 / 6));
+}

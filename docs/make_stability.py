@@ -14,7 +14,7 @@ import json, pathlib, sys
 note, folders = sys.argv[1], sys.argv[2:]
 docs = pathlib.Path(__file__).parent
 scenes = docs.parent / "models/scenes/hard"
-modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps", "groups", "groups-substeps", "groups-32"]
+modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps", "groups", "groups-substeps", "groups-32", "groups-64"]
 gpu = modes[2:]
 rows = {}
 for folder in folders:
@@ -62,7 +62,7 @@ Each case is a scene in `models/scenes/hard`, run with all constraints, dt 0.005
 three meshes: the bunny (10.8k tets), a block (2880 tets) and a single tet. A number is the step from which the volume stays within 1 % and
 no tet is inverted **until the end of the run**; "never" gives the final volume error and the inverted tets. `cpu-double` is Gauss–Seidel in
 double precision, what the others are held against. `…-substeps` spends the same work as 25 substeps of one iteration. `groups` is
-Gauss–Seidel between 8 groups, `groups-32` between 32. "–": not run.
+Gauss–Seidel between 8 groups, `groups-32` and `groups-64` between 32 and 64. "–": not run.
 
 Rows: {len(rows)}. Not finite: {sum(not r['finite'] for r in rows.values())}.
 """]

@@ -1,6 +1,6 @@
 // Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): $LANES invocations a vertex gather the corrections of all
-// constraints on it, of every kind present; the first adds them up and moves the vertex. Places are read from one half of their
-// buffer and written to the other. Each constraint is evaluated once by each of its vertices. Mode groups takes the constraints of
+// constraints on it, of every kind present; the first adds them up and moves the vertex. Places are read from one buffer
+// and written to another. Each constraint is evaluated once by each of its vertices. Mode groups takes the constraints of
 // one group, and averages by the number of those on the vertex, without ever exceeding the full correction.
 #include "types.glsl"
 #include "pair.glsl"

@@ -198,7 +198,7 @@ void shift_velocities(Sim& sim, double upwards) {
 }  // namespace
 
 void check_limits(const ConstraintSystem& system, const Limits& limits) {
-  const int needed = STORAGE_BINDINGS;
+  const int needed = BIND_STREAMS + std::max(3, int(kind_words(system).size()));
   if (needed > limits.storage_blocks)
     throw Error("too few shader storage blocks",
                 fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),

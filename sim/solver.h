@@ -43,7 +43,7 @@ struct Solver {
   std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every mode shares
   std::vector<Pass>
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
-  bool double_buffered = false;   ///< an iteration reads one half of the places and writes the other
+  bool double_buffered = false;   ///< an iteration reads one buffer of places and writes the other
   int groups = 1;  ///< the last dispatch runs once for each group of constraints, swapping sides every time
   bool separate = false;          ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;

@@ -79,9 +79,9 @@ std::string csv_line(const BenchRow& r) {
     return known && std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string();
   };
   const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(r.scene), r.mode, r.constraints,
-                     r.iterations, r.substeps, r.size, r.vertices, r.tets, number(r.fps.median),
-                     number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(r.scene), r.mode,
+                     r.constraints, r.iterations, r.substeps, r.size, r.vertices, r.tets,
+                     number(r.fps.median), number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
                      number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu), r.dispatches,
                      r.gpu_bytes, number(r.max_volume_loss_percent));
 }

@@ -56,7 +56,8 @@ Settings settings_of(const Scene& scene, const std::string& mode) {
   settings.mode = mode.ends_with(suffix) ? mode.substr(0, mode.size() - suffix.size()) : mode;
   if (mode.ends_with(suffix)) std::swap(settings.substeps, settings.iterations);
   if (settings.mode.starts_with(groups)) {
-    set_parameter(settings, *find_parameter("groups"), settings.mode.substr(groups.size()), "--modes " + mode);
+    set_parameter(settings, *find_parameter("groups"), settings.mode.substr(groups.size()),
+                  "--modes " + mode);
     settings.mode = "groups";
   }
   check_settings(settings, "--modes " + mode);
@@ -138,7 +139,8 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
     std::ifstream stream(folder / "stability.json");
     const ordered_json part = ordered_json::parse(stream, nullptr, false);
     if (!part.is_object() || !part.contains("rows"))
-      throw Error("not a finished run of hard cases", (folder / "stability.json").string(), "run that shard again");
+      throw Error("not a finished run of hard cases", (folder / "stability.json").string(),
+                  "run that shard again");
     if (document.is_null()) {
       document = part;
     } else {
@@ -148,8 +150,9 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
     }
   }
   if (document["rows"].size() != document["rows_in_all"].get<std::size_t>())
-    throw Error(fmt::format("{} rows of {}", document["rows"].size(), document["rows_in_all"].get<std::size_t>()),
-                "--merge", "name each shard's folder once");
+    throw Error(
+        fmt::format("{} rows of {}", document["rows"].size(), document["rows_in_all"].get<std::size_t>()),
+        "--merge", "name each shard's folder once");
   return document;
 }
 
@@ -198,8 +201,8 @@ int run_hard_cases(const HardCaseOptions& options) {
                 "choose cases that have the meshes asked for, and no more shards than rows");
   sort_rows(rows);
   add_reference(rows);
-  fmt::print("{:<18}{:<7}{:<15}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}\n", "case", "mesh", "mode", "steps", "recovered",
-             "reference", "volume err %", "inverted", "rigid dist");
+  fmt::print("{:<18}{:<7}{:<15}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}\n", "case", "mesh", "mode", "steps",
+             "recovered", "reference", "volume err %", "inverted", "rigid dist");
   bool finite = true;
   for (const auto& row : rows) {
     finite = finite && row["finite"] == true;
@@ -211,8 +214,9 @@ int run_hard_cases(const HardCaseOptions& options) {
     };
     fmt::print("{:<18}{:<7}{:<15}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}{}\n", row["case"].get<std::string>(),
                row["mesh"].get<std::string>(), row["mode"].get<std::string>(), value("steps"),
-               value("recovered_at_step"), value("reference_recovered_at_step"), error("final_volume_error_percent"),
-               error("inverted_tets"), error("rigid_distance"), row["finite"] == true ? "" : "  NOT FINITE");
+               value("recovered_at_step"), value("reference_recovered_at_step"),
+               error("final_volume_error_percent"), error("inverted_tets"), error("rigid_distance"),
+               row["finite"] == true ? "" : "  NOT FINITE");
   }
   write_file(options.out / "stability.json", json_text(document, 1) + "\n");
   write_file(options.out / "stability.csv", csv_of(rows));

@@ -1,4 +1,5 @@
-// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double precision.
+// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double
+// precision.
 #pragma once
 
 #include <filesystem>
@@ -10,8 +11,8 @@ namespace tetpbd {
 struct HardCaseOptions {
   std::vector<std::string> cases;  ///< empty: all of models/scenes/hard
   std::vector<std::string> meshes = {"bunny", "block", "tet"};
-  /// Solver modes; NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the scene has iterations;
-  /// groups-K runs mode groups with K groups instead of the scene's.
+  /// Solver modes; NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the scene
+  /// has iterations; groups-K runs mode groups with K groups instead of the scene's.
   std::vector<std::string> modes = {"node", "constraint", "node-substeps", "groups", "groups-substeps",
                                     "cpu",  "cpu-double"};
   long steps = 0;  ///< 0: the scene's duration

@@ -81,9 +81,9 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
       ->check(not_empty);
   command.add_option("--tetgen", a.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh")
       ->check(not_empty);
-  command.add_option(
-      "--deform", a.overrides.deform,
-      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, twist:DEGREES, invert-one, coincident, fold");
+  command.add_option("--deform", a.overrides.deform,
+                     "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
+                     "twist:DEGREES, invert-one, coincident, fold");
   a.values.resize(parameters().size());
   for (std::size_t i = 0; i < parameters().size(); ++i) {
     const Parameter& row = parameters()[i];
@@ -292,9 +292,12 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
       ->capture_default_str();
   HardCaseOptions hard;
   bool hard_cases = false;
-  auto* hard_flag = compare->add_flag("--hard-cases", hard_cases,
-                                      "instead: which mode recovers from the scenes of models/scenes/hard, and when");
-  compare->add_option("--cases", hard.cases, "hard cases to run (default: all)")->delimiter(',')->needs(hard_flag);
+  auto* hard_flag =
+      compare->add_flag("--hard-cases", hard_cases,
+                        "instead: which mode recovers from the scenes of models/scenes/hard, and when");
+  compare->add_option("--cases", hard.cases, "hard cases to run (default: all)")
+      ->delimiter(',')
+      ->needs(hard_flag);
   compare->add_option("--meshes", hard.meshes, "hard cases: bunny, block, tet")
       ->delimiter(',')
       ->capture_default_str()

@@ -162,8 +162,9 @@ BodyDescription read_body(const json& value, const std::string& where, const std
     const json* list = keys.find(key);
     if (!list) return;
     if (!list->is_array() || list->size() > most_boxes)
-      keys.fail(keys.path(key), fmt::format("must be a list of at most {} boxes {{\"low\": [x,y,z], \"high\": [x,y,z]}}",
-                                            most_boxes));
+      keys.fail(keys.path(key),
+                fmt::format("must be a list of at most {} boxes {{\"low\": [x,y,z], \"high\": [x,y,z]}}",
+                            most_boxes));
     for (std::size_t i = 0; i < list->size(); ++i) {
       Keys box_keys((*list)[i], fmt::format("{}.{}", keys.path(key), i), file);
       BodyDescription::Box box;

@@ -28,8 +28,8 @@ struct BodyDescription {
     double ratio = 1, share = 1;
   };
   std::string name;
-  std::filesystem::path mesh;  ///< a file, or
-  std::optional<Block> block;  ///< a generated block, or
+  std::filesystem::path mesh;                    ///< a file, or
+  std::optional<Block> block;                    ///< a generated block, or
   std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m
   std::string tetgen = "pYq1.85o/140";
   glm::dvec3 scale{1};     ///< along the mesh's own axes, before all else

@@ -195,8 +195,8 @@ Buffer::~Buffer() {
 // Kernels queued before may still read or write the buffer (docs/barriers.md).
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  // Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old bytes, whatever
-  // barriers stand between, unless something flushes (docs/decisions.md).
+  // Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old
+  // bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
   GLuint staging = 0;
   glGenBuffers(1, &staging);
   glBindBuffer(GL_COPY_READ_BUFFER, staging);
@@ -387,8 +387,8 @@ std::string shader_text(const std::string& name, const ShaderWords& words) {
 
 namespace {
 
-// A driver may take a second to compile a kernel, and a comparison makes the same ones for every row: what was linked once
-// in this process comes back as the driver's own binary.
+// A driver may take a second to compile a kernel, and a comparison makes the same ones for every row: what
+// was linked once in this process comes back as the driver's own binary.
 struct Binary {
   GLenum format = 0;
   std::vector<char> bytes;

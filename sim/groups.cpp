@@ -33,8 +33,8 @@ std::vector<std::vector<std::uint8_t>> balanced_groups(const ConstraintSystem& s
   return result;
 }
 
-ConstraintSystem group_of(const ConstraintSystem& system, const std::vector<std::vector<std::uint8_t>>& groups,
-                          int group) {
+ConstraintSystem group_of(const ConstraintSystem& system,
+                          const std::vector<std::vector<std::uint8_t>>& groups, int group) {
   ConstraintSystem part;
   part.at_vertex.assign(system.at_vertex.size(), 0);
   for (std::size_t k = 0; k < system.lists.size(); ++k) {

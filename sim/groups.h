@@ -9,12 +9,13 @@
 
 namespace tetpbd {
 
-/// By kind, which of `groups` each constraint is in: the one that its vertices use least so far, all kinds mixed. With groups
-/// enough (about the largest number of constraints on a vertex) no vertex has two constraints in one: a colouring. Deterministic.
+/// By kind, which of `groups` each constraint is in: the one that its vertices use least so far, all kinds
+/// mixed. With groups enough (about the largest number of constraints on a vertex) no vertex has two
+/// constraints in one: a colouring. Deterministic.
 std::vector<std::vector<std::uint8_t>> balanced_groups(const ConstraintSystem& system, int groups);
 
 /// The constraints of group `group` alone, in their order; at_vertex counts those.
-ConstraintSystem group_of(const ConstraintSystem& system, const std::vector<std::vector<std::uint8_t>>& groups,
-                          int group);
+ConstraintSystem group_of(const ConstraintSystem& system,
+                          const std::vector<std::vector<std::uint8_t>>& groups, int group);
 
 }  // namespace tetpbd

@@ -27,8 +27,8 @@ struct Model {
   std::vector<std::uint32_t> original;
 };
 
-/// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices; `mass_factors`, if not
-/// empty, multiply the masses of its vertices.
+/// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices;
+/// `mass_factors`, if not empty, multiply the masses of its vertices.
 void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
               const std::vector<std::uint32_t>& fixed, const std::vector<double>& mass_factors = {});

@@ -119,7 +119,9 @@ void set_parameter(Settings& settings, const Parameter& row, const std::string& 
     settings.** member = text == "true" || text == "1";
   }
   if (const auto* member = std::get_if<std::string Settings::*>(&row.member)) {
-    if (text.empty()) refuse(row, text, where, std::string_view(row.name) == "constraints" ? "write none for no constraints" : "name one");
+    if (text.empty())
+      refuse(row, text, where,
+             std::string_view(row.name) == "constraints" ? "write none for no constraints" : "name one");
     const std::string value = text == "none" && std::string_view(row.name) == "constraints" ? "" : text;
     check_words(row, value, where);
     settings.** member = value;

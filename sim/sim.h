@@ -23,10 +23,11 @@ struct Sim {
   Buffer positions;   ///< Position
   Buffer velocities;  ///< Velocity
   Buffer predicted;   ///< Velocity (a pair as well), from the first iteration of a substep to the last
-  Buffer places[2];   ///< what neighbours see (places.glsl); a double-buffered solver reads one and writes the other
-  Buffer step_block;  ///< Step
+  Buffer places[2];  ///< what neighbours see (places.glsl); a double-buffered solver reads one and writes the
+                     ///< other
+  Buffer step_block;    ///< Step
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
-  Pass predict;       ///< makes the places of the next step, after a change from outside
+  Pass predict;         ///< makes the places of the next step, after a change from outside
   Solver solver;
   Tuning tuning;
   double unit = 1;                  ///< m, of places
@@ -39,14 +40,15 @@ struct Sim {
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
   GuardCounts guards_read{};  ///< GPU: counted as of the last reading; CPU modes: the count at the start
-  FiniteCheck check;  ///< ask check_finite()
+  FiniteCheck check;          ///< ask check_finite()
 
   const Buffer& current_positions() const { return positions; }
 };
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
-/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count. Waits.
+/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count.
+/// Waits.
 GuardCounts guard_counts(Sim& sim);
 /// Throws Error naming what the driver's limits do not allow.
 void check_limits(const ConstraintSystem& system, const Limits& limits);

@@ -29,9 +29,11 @@ Solver create_constraint_solver(const SolverInput& input) {
     const Patches patches = make_patches(
         input.model, input.system, input.tuning.patch ? input.tuning.patch : patch_for(input.system.count()));
     Pass pass;
-    pass.program = Program::compute(
-        "solve_constraint.comp",
-        {{{"GROUP", std::to_string(group)}, {"KINDS", std::to_string(kinds.size())}, {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}}, kinds});
+    pass.program =
+        Program::compute("solve_constraint.comp", {{{"GROUP", std::to_string(group)},
+                                                    {"KINDS", std::to_string(kinds.size())},
+                                                    {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
+                                                   kinds});
     pass.program.use();
     pass.program.set("patch_count", unsigned(patches.count));
     pass.groups = patches.count;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "sim/constraints.h"
-#include "sim/layout.h"
 #include "sim/gpu.h"
+#include "sim/layout.h"
 #include "sim/model.h"
 #include "sim/settings.h"
 
@@ -30,12 +30,11 @@ struct State {
   std::vector<glm::dvec3> velocities;  ///< m/s
 };
 
-/// How often each guard of layout.glsl triggered, in its order. A projection counts once where each constraint is evaluated once
-/// (constraint and cpu modes), and once a vertex of it in node mode.
+/// How often each guard of layout.glsl triggered, in its order. A projection counts once where each
+/// constraint is evaluated once (constraint and cpu modes), and once a vertex of it in node mode.
 using GuardCounts = std::array<std::uint64_t, GUARDS>;
-inline constexpr std::array<const char*, GUARDS> guard_names = {"direction",    "hinge", "angle",
-                                                               "volume_floor", "collapsed", "limit",
-                                                               "not_finite"};
+inline constexpr std::array<const char*, GUARDS> guard_names = {
+    "direction", "hinge", "angle", "volume_floor", "collapsed", "limit", "not_finite"};
 
 /// Passes or a function, never both.
 struct Solver {
@@ -43,9 +42,9 @@ struct Solver {
   std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every mode shares
   std::vector<Pass>
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
-  bool double_buffered = false;   ///< an iteration reads one buffer of places and writes the other
+  bool double_buffered = false;  ///< an iteration reads one buffer of places and writes the other
   int groups = 1;  ///< the last dispatch runs once for each group of constraints, swapping sides every time
-  bool separate = false;          ///< prediction and velocities in dispatches of their own
+  bool separate = false;  ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
 };
@@ -53,10 +52,10 @@ struct Solver {
 /// How kernels are cut into invocations; 0: by the mesh's size or the driver's limit. For measurements and
 /// tests.
 struct Tuning {
-  unsigned lanes = 0;  ///< invocations a vertex in mode node, a power of two up to `group`
-  unsigned group = 0;  ///< invocations of a work-group of the solving kernel, a power of two up to 1024
-  unsigned patch = 0;  ///< constraints of a patch in mode constraint
-  unsigned row = 0;    ///< most work-groups in a dispatch's first dimension
+  unsigned lanes = 0;       ///< invocations a vertex in mode node, a power of two up to `group`
+  unsigned group = 0;       ///< invocations of a work-group of the solving kernel, a power of two up to 1024
+  unsigned patch = 0;       ///< constraints of a patch in mode constraint
+  unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
   std::size_t storage = 0;  ///< most bytes of a storage buffer
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };

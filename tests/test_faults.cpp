@@ -302,7 +302,8 @@ TEST_CASE("faults: interrupted, what was finished is whole") {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   ::kill(stubborn.pid, SIGINT);
   CHECK(stubborn.wait() == 128 + SIGINT);
-  for (const auto& entry : fs::directory_iterator(folder.path / "stubborn"))  // temporary ones, as the guide says
+  for (const auto& entry :
+       fs::directory_iterator(folder.path / "stubborn"))  // temporary ones, as the guide says
     CHECK(contains(entry.path().filename().string(), ".part"));
 }
 

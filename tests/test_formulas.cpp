@@ -135,7 +135,8 @@ TEST_CASE("guards: what triggers them, and where vertices without a direction go
   CHECK(stretch.gradient[0] == -stretch.gradient[1]);
   // The same pair named the other way round parts the same way; another pair does not.
   CHECK(Stretch::evaluate<double>(edge.data(), 0.5, swapped).gradient[0] == -stretch.gradient[0]);
-  CHECK(glm::length(Stretch::evaluate<double>(edge.data(), 0.5, id + 1).gradient[0] - stretch.gradient[0]) > 0.01);
+  CHECK(glm::length(Stretch::evaluate<double>(edge.data(), 0.5, id + 1).gradient[0] - stretch.gradient[0]) >
+        0.01);
 
   std::array<glm::dvec3, 4> line;
   for (int j = 0; j < 4; ++j) line[std::size_t(j)] = glm::dvec3(j, 0, 0);
@@ -154,7 +155,8 @@ TEST_CASE("guards: what triggers them, and where vertices without a direction go
   CHECK(formulas.guards_of(open, w) == GUARD_FLOOR);
   std::array<glm::dvec3, 4> point{};
   CHECK(Bend::evaluate<double>(point.data(), 0.0, id).guards == GUARD_HINGE);
-  std::array<glm::dvec3, 4> hinge = {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 0), glm::dvec3(0, 0, 1)};
+  std::array<glm::dvec3, 4> hinge = {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 0),
+                                     glm::dvec3(0, 0, 1)};
   const double angle = formulas.hinge_angle(hinge.data());
   CHECK(Bend::evaluate<double>(hinge.data(), angle - 0.9, id).guards == 0);
   CHECK(Bend::evaluate<double>(hinge.data(), angle - 1.1, id).guards == GUARD_ANGLE);

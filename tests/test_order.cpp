@@ -78,14 +78,16 @@ struct ShaderVariant {
       } else {
         text = replaced(text, "gl_GlobalInvocationID.x", "ordered_invocation()");
       }
-      if (order.enlarged > 1) text = replaced(replaced(replaced(text, "$GROUPED", "@"), "$GROUP", "1024"), "@", "$GROUPED");
+      if (order.enlarged > 1)
+        text = replaced(replaced(replaced(text, "$GROUPED", "@"), "$GROUP", "1024"), "@", "$GROUPED");
       const std::string row = "return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;";
       if (entry.path() == folder / "types.glsl") {
         REQUIRE(text.find(row) != std::string::npos);
-        text = replaced(text, row,
-                        "uint g = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, n = gl_NumWorkGroups.x * "
-                        "gl_NumWorkGroups.y; return " +
-                            std::string(order.expression) + ";");
+        text = replaced(
+            text, row,
+            "uint g = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, n = gl_NumWorkGroups.x * "
+            "gl_NumWorkGroups.y; return " +
+                std::string(order.expression) + ";");
       }
       CHECK_MESSAGE(text.find("gl_GlobalInvocationID") == std::string::npos, entry.path());
       std::ofstream(entry.path(), std::ios::binary) << text;

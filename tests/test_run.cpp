@@ -244,7 +244,8 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   const std::string end = "positions[i] = Position(";
   REQUIRE(text.find(end) != std::string::npos);
   // The free end of the beam falls: at a certain speed its numbers end.
-  text.insert(text.find(end), "if ((phase & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
+  text.insert(text.find(end),
+              "if ((phase & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
   std::ofstream(folder.path / "shaders/vertex.glsl") << text;
   const std::string common = "--scene beam --iterations 2 ";
   const Outcome bad = tetpbd("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
@@ -458,13 +459,15 @@ TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contai
 
 TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the reference; shards merge") {
   const Folder folder;
-  const std::string common = "compare --hard-cases --cases coincident,mass-top --meshes tet --modes node,cpu-double --steps 30 ";
+  const std::string common =
+      "compare --hard-cases --cases coincident,mass-top --meshes tet --modes node,cpu-double --steps 30 ";
   const Outcome whole = tetpbd(common + "--out whole", folder);
   CAPTURE(whole.err);
   REQUIRE(whole.status == 0);
   const std::string csv = read(folder.path / "whole/stability.csv");
-  CHECK(csv.starts_with("case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,"
-                        "rigid_distance,reference_recovered_at_step,"));
+  CHECK(csv.starts_with(
+      "case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,"
+      "rigid_distance,reference_recovered_at_step,"));
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 5);
   const json rows = json::parse(read(folder.path / "whole/stability.json"))["rows"];
   for (const auto& row : rows) {
@@ -475,11 +478,15 @@ TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the 
     CHECK(row["reference_recovered_at_step"].get<long>() >= 1);
     CHECK(row["guard_direction"].get<long>() > 0);
   }
-  for (int i : {1, 2}) CHECK(tetpbd(common + "--shard " + std::to_string(i) + "/2 --out s" + std::to_string(i), folder).status == 0);
+  for (int i : {1, 2})
+    CHECK(tetpbd(common + "--shard " + std::to_string(i) + "/2 --out s" + std::to_string(i), folder).status ==
+          0);
   CHECK(tetpbd("compare --hard-cases --merge s1 s2 --out merged", folder).status == 0);
   CHECK(json::parse(read(folder.path / "merged/stability.json"))["rows"] == rows);
-  CHECK(tetpbd("compare --hard-cases --merge s1 --out half", folder).err.find("2 rows of 4") != std::string::npos);
-  CHECK(tetpbd("compare --hard-cases --cases nosuch --out none", folder).err.find("no such scene") != std::string::npos);
-  CHECK(tetpbd("compare --hard-cases --meshes cow --out none", folder).err.find("choose from bunny, block, tet") !=
+  CHECK(tetpbd("compare --hard-cases --merge s1 --out half", folder).err.find("2 rows of 4") !=
         std::string::npos);
+  CHECK(tetpbd("compare --hard-cases --cases nosuch --out none", folder).err.find("no such scene") !=
+        std::string::npos);
+  CHECK(tetpbd("compare --hard-cases --meshes cow --out none", folder)
+            .err.find("choose from bunny, block, tet") != std::string::npos);
 }

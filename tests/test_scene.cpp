@@ -211,7 +211,8 @@ TEST_CASE("every hard case opens, and says what it is") {
 
 TEST_CASE("scale, heavy vertices and a single tet") {
   const auto model = [](const std::string& body) {
-    const auto file = std::filesystem::temp_directory_path() / ("tetpbd_heavy_" + std::to_string(getpid()) + ".json");
+    const auto file =
+        std::filesystem::temp_directory_path() / ("tetpbd_heavy_" + std::to_string(getpid()) + ".json");
     std::ofstream(file) << "{\"bodies\": [" << body << "]}";
     const auto result = build_model(load_scene(file.string()));
     std::filesystem::remove(file);

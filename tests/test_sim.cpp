@@ -638,7 +638,8 @@ TEST_CASE("the float GPU solvers converge to the exact step as the double ones d
 TEST_CASE("a guard that does not trigger changes no bit") {
   GlTest gl;
   // The same kernels with every guard taken out of their text.
-  const auto folder = std::filesystem::temp_directory_path() / ("tetpbd_no_guards_" + std::to_string(getpid()));
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("tetpbd_no_guards_" + std::to_string(getpid()));
   std::filesystem::copy(TEST_MODELS "/../shaders", folder, std::filesystem::copy_options::recursive);
   const auto replace = [&](const char* file, const std::string& from, const std::string& to) {
     std::ifstream in(folder / file);
@@ -665,9 +666,11 @@ TEST_CASE("a guard that does not trigger changes no bit") {
     std::filesystem::copy(TEST_MODELS "/../shaders", folder, std::filesystem::copy_options::recursive);
     replace("constraints/stretch.glsl", "l > real(1e-6) * rest", "true");
     replace("constraints/bend.glsl", "if (!(aa > tiny && bb > tiny)) return c;", "");
-    replace("constraints/bend.glsl", "clamp(resolved(turn, noise), real(-1), real(1))", "resolved(turn, noise)");
+    replace("constraints/bend.glsl", "clamp(resolved(turn, noise), real(-1), real(1))",
+            "resolved(turn, noise)");
     replace("constraints/volume.glsl", "if (sum <= real(1e-10) * c.floor) {", "if (false) {");
-    replace("constraints/types.glsl", "sum = max(sum, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));", "");
+    replace("constraints/types.glsl", "sum = max(sum, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));",
+            "");
     replace("constraints/types.glsl", "vec3 limited(vec3 correction, real limit) {",
             "vec3 limited(vec3 correction, real limit) {\n  return correction;");
     set_shader_folder(folder.string());
@@ -683,8 +686,9 @@ TEST_CASE("guards that trigger are counted, the same in every run") {
   GlTest gl;
   for (const char* mode : {"node", "constraint", "cpu"})
     for (const auto& [deformation, guard] :
-         {std::pair("point", GUARD_DIRECTION), std::pair("point", GUARD_COLLAPSED), std::pair("line", GUARD_COLLAPSED),
-          std::pair("line", GUARD_HINGE), std::pair("mirror", GUARD_ANGLE)}) {
+         {std::pair("point", GUARD_DIRECTION), std::pair("point", GUARD_COLLAPSED),
+          std::pair("line", GUARD_COLLAPSED), std::pair("line", GUARD_HINGE),
+          std::pair("mirror", GUARD_ANGLE)}) {
       CAPTURE(mode);
       CAPTURE(deformation);
       GuardCounts before{};
@@ -695,7 +699,8 @@ TEST_CASE("guards that trigger are counted, the same in every run") {
         step(sim);
         const GuardCounts counts = guard_counts(sim);
         for (std::size_t g = 0; g < GUARDS; ++g)
-          if (guard == 1u << g && (guard != GUARD_COLLAPSED || std::string(mode) != "cpu"))  // there stretch opens tets first
+          if (guard == 1u << g &&
+              (guard != GUARD_COLLAPSED || std::string(mode) != "cpu"))  // there stretch opens tets first
             CHECK(counts[g] > 0);
         if (run == 1) CHECK(counts == before);
         before = counts;

@@ -44,8 +44,6 @@ const std::vector<std::string> columns = {"scene",
                                           "finite",
                                           "pareto"};
 
-ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(); }
-
 /// What a step costs: GPU time, or wall time where the CPU does the work.
 double cost_ms(const ordered_json& row) {
   const auto& gpu = row["gpu_ms_per_step"];
@@ -106,17 +104,17 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   row["tets"] = model->rest.tets.size();
   row["gpu_ms_per_step"] = run.timing.gpu_ms.values.empty()
                                ? ordered_json()
-                               : number(percentiles(run.timing.gpu_ms.values).median);
-  row["wall_ms_per_step"] = number(percentiles(run.timing.wall_ms.values).median);
-  row["max_volume_loss_percent"] = number(run.errors.max_volume_loss_percent);
-  row["tet_volume_rms"] = number(last.tet_volume_rms);
-  row["stretch_rms"] = number(last.stretch_rms);
-  row["bend_rms_rad"] = number(last.bend_rms_rad);
-  row["rigid_distance"] = number(last.rigid_distance);
-  row["reference_distance"] = number(remaining_after_one_step(model, settings));
-  row["linear_drift"] = number(run.errors.linear_drift);
-  row["angular_drift"] = number(run.errors.angular_drift);
-  row["inverted_tets"] = number(last.inverted_tets);
+                               : json_number(percentiles(run.timing.gpu_ms.values).median);
+  row["wall_ms_per_step"] = json_number(percentiles(run.timing.wall_ms.values).median);
+  row["max_volume_loss_percent"] = json_number(run.errors.max_volume_loss_percent);
+  row["tet_volume_rms"] = json_number(last.tet_volume_rms);
+  row["stretch_rms"] = json_number(last.stretch_rms);
+  row["bend_rms_rad"] = json_number(last.bend_rms_rad);
+  row["rigid_distance"] = json_number(last.rigid_distance);
+  row["reference_distance"] = json_number(remaining_after_one_step(model, settings));
+  row["linear_drift"] = json_number(run.errors.linear_drift);
+  row["angular_drift"] = json_number(run.errors.angular_drift);
+  row["inverted_tets"] = json_number(last.inverted_tets);
   row["finite"] = run.errors.finite;
   row["non_finite"] = non_finite_json(run.errors.non_finite);
   row["pareto"] = false;
@@ -168,22 +166,6 @@ Chart chart_of(const ordered_json& document) {
   }
   chart.series.push_back(front);
   return chart;
-}
-
-std::string csv_of(const ordered_json& rows) {
-  std::string csv;
-  for (const std::string& column : columns) csv += (csv.empty() ? "" : ",") + column;
-  csv += "\n";
-  for (const auto& row : rows) {
-    std::string line;
-    for (const std::string& column : columns) {
-      if (&column != &columns.front()) line += ",";
-      const auto& value = row[column];
-      line += value.is_string() ? csv_field(value.get<std::string>()) : value.is_null() ? "" : value.dump();
-    }
-    csv += line + "\n";
-  }
-  return csv;
 }
 
 // Whatever stands in the file, what follows finds the keys and types it looks for.
@@ -344,7 +326,7 @@ int run_compare(const CompareOptions& options) {
     fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
                document["steps"].get<long>());
   write_file(options.out / "compare.json", json_text(document, 1) + "\n");
-  write_file(options.out / "compare.csv", csv_of(rows));
+  write_file(options.out / "compare.csv", csv_text(columns, rows));
   write_chart(options.out / "compare", to_svg(chart_of(document)));
   print_choice(rows, options);
   fmt::print("{}\n", (options.out / "compare.csv").string());

@@ -100,10 +100,6 @@ Watch watch_rest(Sim& sim, Metrics& metrics, const SoakOptions& options) {
   return watch;
 }
 
-ordered_json number(double value) {
-  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
-}
-
 std::string csv_of(const Watch& watch) {
   std::string csv =
       "step,seconds,centre_x,centre_y,centre_z,drift,kinetic_energy,resident_bytes,gl_buffer_bytes\n";
@@ -137,7 +133,7 @@ int run_soak(const Scene& scene, const SoakOptions& options) {
   ordered_json checks = ordered_json::array();
   std::string failed;
   const auto check = [&](const char* name, double value, double limit, bool good) {
-    checks.push_back({{"name", name}, {"value", number(value)}, {"limit", limit}, {"passed", good}});
+    checks.push_back({{"name", name}, {"value", json_number(value)}, {"limit", limit}, {"passed", good}});
     if (!good)
       failed += (failed.empty() ? "" : ", ") + fmt::format("{} {:.3g} (limit {:.3g})", name, value, limit);
   };
@@ -158,20 +154,21 @@ int run_soak(const Scene& scene, const SoakOptions& options) {
   j["settle"] = options.settle;
   j["steps"] = last.step;
   j["size"] = watch.size;
-  j["centre"] = {{"drift", number(drift)}, {"final_drift", number(watch.drift(last))}};
-  j["largest_vertex_shift"] = number(watch.largest_shift / watch.size);
-  j["kinetic_energy"] = {{"start", number(first.measurement.kinetic)},
-                         {"end", number(last.measurement.kinetic)}};
+  j["centre"] = {{"drift", json_number(drift)}, {"final_drift", json_number(watch.drift(last))}};
+  j["largest_vertex_shift"] = json_number(watch.largest_shift / watch.size);
+  j["kinetic_energy"] = {{"start", json_number(first.measurement.kinetic)},
+                         {"end", json_number(last.measurement.kinetic)}};
   j["resident_bytes"] = {{"start", first.resident}, {"tenth", tenth.resident}, {"end", last.resident}};
   j["gl_buffer_bytes"] = {{"start", first.gl.buffer_bytes}, {"end", last.gl.buffer_bytes}};
   j["gl_objects"] = {{"start", first.gl.objects}, {"end", last.gl.objects}};
-  j["steps_per_second"] = {{"first_tenth", number(first_speed)}, {"last_tenth", number(last_speed)}};
+  j["steps_per_second"] = {{"first_tenth", json_number(first_speed)},
+                           {"last_tenth", json_number(last_speed)}};
   j["finite"] = finite;
   j["state_hash"] = fmt::format("{:016x}", state_hash(sim));
   j["checks"] = checks;
   j["passed"] = failed.empty();
   write_file(options.out / "soak.csv", csv_of(watch));
-  write_file(options.out / "soak.json", j.dump(2) + "\n");
+  write_file(options.out / "soak.json", json_text(j, 2) + "\n");
   fmt::print(
       "{}: {} steps at rest on {}: drift {:.2g} of the size, resident {:+.1f} MiB, {:.0f} then {:.0f} steps "
       "a "

@@ -33,16 +33,12 @@ Percentiles percentiles(std::vector<double> values) {
 namespace {
 
 // Nothing non-finite is written as a number.
-ordered_json number(double value) {
-  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
-}
-
-ordered_json vector(const glm::dvec3& v) { return {number(v.x), number(v.y), number(v.z)}; }
+ordered_json vector(const glm::dvec3& v) { return {json_number(v.x), json_number(v.y), json_number(v.z)}; }
 
 ordered_json times(const Samples& ms) {
   if (ms.values.empty()) return nullptr;
   const Percentiles p = percentiles(ms.values);
-  return {{"median", number(p.median)}, {"p05", number(p.p05)}, {"p95", number(p.p95)}};
+  return {{"median", json_number(p.median)}, {"p05", json_number(p.p05)}, {"p95", json_number(p.p95)}};
 }
 
 ordered_json settings_json(const Scene& scene, const Settings& settings) {
@@ -91,6 +87,26 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
 
 }  // namespace
 
+ordered_json json_number(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
+
+std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows) {
+  std::string csv;
+  for (const std::string& column : columns) csv += (csv.empty() ? "" : ",") + column;
+  csv += "\n";
+  for (const auto& row : rows) {
+    std::string line;
+    for (const std::string& column : columns) {
+      if (&column != &columns.front()) line += ",";
+      const auto& value = row[column];
+      line += value.is_string() ? csv_field(value.get<std::string>()) : value.is_null() ? "" : value.dump();
+    }
+    csv += line + "\n";
+  }
+  return csv;
+}
+
 ordered_json device_json(const Capabilities& device) {
   return {{"gl_renderer", device.renderer},
           {"gl_vendor", device.vendor},
@@ -121,28 +137,30 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
       {"steps", sim.steps},
       {"gpu_ms_per_step", times(timing.gpu_ms)},
       {"wall_ms_per_step", times(timing.wall_ms)},
-      {"fps", timing.total_s > 0 ? number(double(sim.steps) / timing.total_s) : ordered_json(nullptr)}};
+      {"fps", timing.total_s > 0 ? json_number(double(sim.steps) / timing.total_s) : ordered_json(nullptr)}};
   const Measurement last = errors.last.value_or(nothing_measured());
-  const auto measured = [&](double value) { return errors.last ? number(value) : ordered_json(nullptr); };
+  const auto measured = [&](double value) {
+    return errors.last ? json_number(value) : ordered_json(nullptr);
+  };
   j["error"] = {{"max_volume_loss_percent", measured(errors.max_volume_loss_percent)},
-                {"final_volume_error_percent", number(last.volume_error_percent)},
-                {"tet_volume_rms", number(last.tet_volume_rms)},
-                {"tet_volume_max", number(last.tet_volume_max)},
+                {"final_volume_error_percent", json_number(last.volume_error_percent)},
+                {"tet_volume_rms", json_number(last.tet_volume_rms)},
+                {"tet_volume_max", json_number(last.tet_volume_max)},
                 {"inverted_tets", std::isfinite(last.inverted_tets) ? ordered_json(long(last.inverted_tets))
                                                                     : ordered_json(nullptr)},
-                {"stretch_rms", number(last.stretch_rms)},
-                {"stretch_max", number(last.stretch_max)},
-                {"bend_rms_rad", number(last.bend_rms_rad)},
-                {"rigid_distance", number(last.rigid_distance)}};
-  j["momentum"] = {{"linear_drift", number(errors.linear_drift)},
-                   {"angular_drift", number(errors.angular_drift)},
+                {"stretch_rms", json_number(last.stretch_rms)},
+                {"stretch_max", json_number(last.stretch_max)},
+                {"bend_rms_rad", json_number(last.bend_rms_rad)},
+                {"rigid_distance", json_number(last.rigid_distance)}};
+  j["momentum"] = {{"linear_drift", json_number(errors.linear_drift)},
+                   {"angular_drift", json_number(errors.angular_drift)},
                    {"linear", vector(last.momentum)},
                    {"angular", vector(last.angular_momentum)}};
   j["energy"] = {{"start", measured(errors.start_energy)},
-                 {"final", number(last.energy())},
+                 {"final", json_number(last.energy())},
                  {"max", measured(errors.max_energy)},
-                 {"final_kinetic", number(last.kinetic)},
-                 {"final_potential", number(last.potential)}};
+                 {"final_kinetic", json_number(last.kinetic)},
+                 {"final_potential", json_number(last.potential)}};
   for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
   j["finite"] = errors.finite;
   j["non_finite"] = non_finite_json(errors.non_finite);

@@ -38,6 +38,10 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                             const GuardCounts& guards, std::optional<std::uint64_t> hash);
 /// {"step", "vertex", "cause"}, or null.
 nlohmann::ordered_json non_finite_json(const std::optional<NonFinite>& found);
+/// null where it is no number.
+nlohmann::ordered_json json_number(double value);
+/// A line of column names, then one a row (objects with those keys); a field is empty where there is null.
+std::string csv_text(const std::vector<std::string>& columns, const nlohmann::ordered_json& rows);
 /// The device as stats.json, bench.json and compare.json name it.
 nlohmann::ordered_json device_json(const Capabilities& device);
 std::string csv_header();

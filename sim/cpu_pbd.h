@@ -102,7 +102,7 @@ class CpuPbd {
       const auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
       const real lambda = k * formulas.multiplier(c, w);
       std::uint32_t triggered = formulas.guards_of(c, w);
-      for (std::size_t j = 0; j < arity; ++j) {
+      for (std::size_t j = 0; lambda != real(0) && j < arity; ++j) {
         const vec full = lambda * w[j] * c.gradient[j];
         triggered |= formulas.guards_of(full, limit);
         const glm::dvec3 correction(formulas.limited(full, limit));

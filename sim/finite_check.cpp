@@ -17,8 +17,6 @@ constexpr long ask_every =
     CHECK_STEPS / 2;  // steps; unasked, an answer is waited for only when it is this old
 constexpr long keep_every = CHECK_STEPS;
 
-bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
-
 // As floats: that is what the GPU and all files get.
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(float(v.x)) && std::isfinite(float(v.y)) && std::isfinite(float(v.z));
@@ -59,12 +57,7 @@ long kept_step(const FiniteCheck& check) {
 
 State read_kept(const Sim& sim) {
   if (on_cpu(sim)) return sim.check.host;
-  State state;
-  for (const Position& p : sim.check.positions.read_all<Position>())
-    state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  for (const Velocity& v : sim.check.velocities.read_all<Velocity>())
-    state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
-  return state;
+  return read_state(sim.check.positions, sim.check.velocities);
 }
 
 struct Cause {

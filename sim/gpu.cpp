@@ -126,10 +126,16 @@ void clear_errors() {
   }
 }
 
+namespace {
+Error out_of_memory(const std::string& what, std::size_t bytes) {
+  return Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
+               "use a smaller mesh, a smaller image or fewer samples", 1);
+}
+}  // namespace
+
 void check_memory(const std::string& what, std::size_t bytes) {
   if (glGetError() != GL_NO_ERROR)  // drivers call an absurd size by other names than GL_OUT_OF_MEMORY
-    throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
-                "use a smaller mesh, a smaller image or fewer samples", 1);
+    throw out_of_memory(what, bytes);
 }
 
 Capabilities load_gl() {
@@ -172,12 +178,11 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
   glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
   try {
-    check_memory(fmt::format("buffer '{}'", label_), bytes);
+    const std::string what = fmt::format("buffer '{}'", label_);
+    check_memory(what, bytes);
     GLint64 made = 0;  // some drivers say nothing
     glGetBufferParameteri64v(GL_COPY_WRITE_BUFFER, GL_BUFFER_SIZE, &made);
-    if (std::size_t(made) < bytes)
-      throw Error("out of GPU memory", fmt::format("buffer '{}' of {} bytes", label_, bytes),
-                  "use a smaller mesh, a smaller image or fewer samples", 1);
+    if (std::size_t(made) < bytes) throw out_of_memory(what, bytes);
   } catch (...) {
     glDeleteBuffers(1, &id_);
     throw;

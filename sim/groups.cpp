@@ -33,21 +33,4 @@ std::vector<std::vector<std::uint8_t>> balanced_groups(const ConstraintSystem& s
   return result;
 }
 
-ConstraintSystem group_of(const ConstraintSystem& system,
-                          const std::vector<std::vector<std::uint8_t>>& groups, int group) {
-  ConstraintSystem part;
-  part.at_vertex.assign(system.at_vertex.size(), 0);
-  for (std::size_t k = 0; k < system.lists.size(); ++k) {
-    const ConstraintList& list = system.lists[k];
-    const std::size_t arity = std::size_t(list.arity);
-    ConstraintList& members = part.lists.emplace_back();
-    members.arity = list.arity;
-    for (std::size_t c = 0; c < list.count(); ++c)
-      if (groups[k][c] == group) members.add({list.vertices.data() + c * arity, arity}, list.rest[c]);
-    for (std::uint32_t v : members.vertices) ++part.at_vertex[v];
-    part.present.push_back(system.present[k]);
-  }
-  return part;
-}
-
 }  // namespace tetpbd

@@ -14,8 +14,4 @@ namespace tetpbd {
 /// constraints in one: a colouring. Deterministic.
 std::vector<std::vector<std::uint8_t>> balanced_groups(const ConstraintSystem& system, int groups);
 
-/// The constraints of group `group` alone, in their order; at_vertex counts those.
-ConstraintSystem group_of(const ConstraintSystem& system,
-                          const std::vector<std::vector<std::uint8_t>>& groups, int group);
-
 }  // namespace tetpbd

@@ -45,8 +45,6 @@ void upload(Sim& sim, const State& state) {
   sim.stale = true;
 }
 
-bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
-
 void write_step_block(Sim& sim) {
   const Settings& s = sim.settings;
   const double h = s.dt / s.substeps;
@@ -347,14 +345,17 @@ GuardCounts guard_counts(Sim& sim) {
   return counts;
 }
 
-State read_state(const Sim& sim) {
-  if (on_cpu(sim)) return sim.host;
-  const auto positions = sim.current_positions().read_all<Position>();
-  const auto velocities = sim.velocities.read_all<Velocity>();
+State read_state(const Buffer& positions, const Buffer& velocities) {
   State state;
-  for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
+  for (const Position& p : positions.read_all<Position>())
+    state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
+  for (const Velocity& v : velocities.read_all<Velocity>())
+    state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
   return state;
+}
+
+State read_state(const Sim& sim) {
+  return on_cpu(sim) ? sim.host : read_state(sim.current_positions(), sim.velocities);
 }
 
 std::uint64_t state_hash(const Sim& sim) {

@@ -64,8 +64,13 @@ void step(Sim& sim);
 /// Back to the model's start.
 void reset(Sim& sim);
 
+/// Whether the mode steps on the CPU: then `host` is the state.
+inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
+
 /// Waits for the GPU.
 State read_state(const Sim& sim);
+/// Of any buffers of Position and Velocity. Waits for the GPU.
+State read_state(const Buffer& positions, const Buffer& velocities);
 /// A state that is not finite is taken, and found by check_finite() at once.
 void write_state(Sim& sim, const State& state);
 /// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.

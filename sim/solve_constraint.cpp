@@ -48,11 +48,7 @@ Solver create_constraint_solver(const SolverInput& input) {
     solver.buffers.push_back(storage_buffer(input.tuning, "patch records", patches.records));
     solver.bindings.push_back({BIND_PATCH_RECORDS, solver.buffers.back().id()});
   }
-  solver.iteration.push_back(average_pass(input, 256, false));
-  Buffer deltas("deltas", input.model.positions.size() * 16);
-  deltas.clear();
-  solver.bindings.push_back({BIND_DELTAS, deltas.id()});
-  solver.buffers.push_back(std::move(deltas));
+  add_average(solver, input, 256, false);
   return solver;
 }
 

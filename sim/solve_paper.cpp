@@ -26,11 +26,7 @@ Solver create_paper_solver(const SolverInput& input) {
     solver.iteration.push_back(std::move(pass));
     ++index;
   }
-  solver.iteration.push_back(average_pass(input, group, true));
-  Buffer deltas("deltas", input.model.positions.size() * 16);
-  deltas.clear();
-  solver.bindings.push_back({BIND_DELTAS, deltas.id()});
-  solver.buffers.push_back(std::move(deltas));
+  add_average(solver, input, group, true);
   return solver;
 }
 

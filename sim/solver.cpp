@@ -103,14 +103,18 @@ void check_storage(const Tuning& tuning, const std::string& label, std::size_t b
                 "use a smaller mesh", 1);
 }
 
-Pass average_pass(const SolverInput& input, unsigned group, bool float_sums) {
+void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {
   const std::size_t vertices = input.model.positions.size();
   Pass pass;
   pass.program = Program::compute(
       "average.comp", {{{"GROUP", std::to_string(group)}, {"FLOAT_SUMS", float_sums ? "1" : "0"}}, {}});
   pass.groups = work_groups(vertices, group);
   pass.bytes = vertices * (2 * sizeof(Position) + 3 * 16);  // itself, its sum there and back, its place
-  return pass;
+  solver.iteration.push_back(std::move(pass));
+  Buffer deltas("deltas", vertices * 16);
+  deltas.clear();
+  solver.bindings.push_back({BIND_DELTAS, deltas.id()});
+  solver.buffers.push_back(std::move(deltas));
 }
 
 }  // namespace tetpbd

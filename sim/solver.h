@@ -100,7 +100,8 @@ Buffer storage_buffer(const Tuning& tuning, const std::string& label, const std:
   return Buffer(label, data);
 }
 
-/// The dispatch that averages sums of corrections and moves the vertices (average.comp).
-Pass average_pass(const SolverInput& input, unsigned group, bool float_sums);
+/// Gives a solver its sums of corrections, at zero, and its last dispatch, which averages them and moves the
+/// vertices (average.comp).
+void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums);
 
 }  // namespace tetpbd

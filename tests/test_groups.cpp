@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "sim/groups.h"
+#include "tests/group_of.h"
 
 using namespace tetpbd;
 

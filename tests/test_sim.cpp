@@ -15,6 +15,7 @@
 #include "sim/reference.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
+#include "tests/group_of.h"
 
 using namespace tetpbd;
 

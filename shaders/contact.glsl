@@ -1,9 +1,9 @@
 #include "collision.glsl"
 float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
 bool touches(Pair x) {
-  for (int k = 0; k < params.plane_count; ++k)
-    if (depth_of(x, params.planes[k]) < 0.0) return true;
-  return false;
+  bool any = false;
+  for (int k = 0; k < params.plane_count; ++k) any = any || depth_of(x, params.planes[k]) < 0.0;
+  return any;
 }
 // Corrects a vertex out of all half spaces; `moved`: its displacement in this substep before the correction.
 Pair resolve_contacts(Pair x, vec3 moved) {

@@ -70,13 +70,12 @@ struct Step {
 #define BIND_PLACES 3         // ivec4: what the neighbours of a vertex see of it (places.glsl)
 #define BIND_PLACES_OUT 4
 #define BIND_CHECK 5          // which vertex is not finite
-#define BIND_TABLE 6          // modes node and groups: where each vertex's entries start
 #define BIND_DELTAS 6         // constraint modes: sums of corrections
-#define BIND_STREAMS 7        // modes node and groups: entries, + index of the constraint kind among those present
-#define BIND_PATCHES 7        // mode constraint
+#define BIND_PARTS 7          // patches (sim/patches.h)
 #define BIND_PATCH_VERTICES 8
 #define BIND_PATCH_RECORDS 9
 #define BIND_RECORDS 7        // mode paper: + index of the constraint kind among those present
+#define STORAGE_BINDINGS 10   // most of any mode
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most

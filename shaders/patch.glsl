@@ -1,24 +1,44 @@
-// Every $GROUP-th constraint of one kind of a patch, from `at` on.
-void solve_$KIND(uint at, uint end) {
-  for (; at < end; at += $GROUPu) {
-    uvec2 record = records[at];
-    uint slot[$ARITY];
-    vec3 x[$ARITY];
-    float w[$ARITY];
-    uint id[$ARITY];
-    for (int j = 0; j < $ARITY; ++j) slot[j] = (record.x >> (8 * j)) & 255u, id[j] = names[slot[j]];
-    for (int j = 0; j < $ARITY; ++j) x[j] = between(here[slot[j]], here[slot[0]]), w[j] = inverse_mass_of(here[slot[j]]);
-    Constraint$ARITY c = $KIND(x, uintBitsToFloat(record.y), id);
-    float lambda = params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w);
-    uint guards = guards_of(c, w);
-    for (int j = 0; j < $ARITY; ++j) {
-      vec3 correction = lambda * w[j] * c.gradient[j];
-      guards |= guards_of(correction, params.limit);
-      correction = limited(correction, params.limit);
-      ivec3 units = ivec3(round(correction * units_per_metre[slot[j]]));
-      for (int a = 0; a < 3; ++a)
-        if (units[a] != 0) atomicAdd(sums[3u * slot[j] + uint(a)], units[a]);
-    }
-    count_guards(guards);
+// What a work-group does with a patch of constraints (sim/patches.h): reads the places of its vertices once, evaluates the constraints, an
+// invocation each, and adds up the corrections of summed vertices in shared memory. Sums are integers, so their order does not
+// matter and the result is the same bits every time, however constraints are cut into patches. A unit is params.delta_unit times the
+// vertex's number of constraints, and no correction exceeds params.limit = 2^30 units over that number: no sum can overflow.
+layout(std430, binding = BIND_PARTS) restrict readonly buffer Parts { uint parts[]; };
+layout(std430, binding = BIND_PATCH_VERTICES) restrict readonly buffer PatchVertices { uvec2 vertices[]; };
+layout(std430, binding = BIND_PATCH_RECORDS) restrict readonly buffer Records { uvec2 records[]; };
+shared ivec4 here[$VERTICES];
+shared uint names[$VERTICES];
+shared float units_per_metre[$SUMMED];
+shared int sums[3 * $SUMMED];
+// Bytes of a record: its vertices' numbers in the patch.
+uint slot_of(uint slots, int j) { return (slots >> (8 * j)) & 255u; }
+#define Ids uint
+uint id_of(Ids slots, int j) { return names[slot_of(slots, j)]; }
+#include "constraints/types.glsl"
+#include "guards.glsl"
+#foreach #include "constraints/$KIND.glsl"
+#foreach #include "project.glsl"
+
+void clear_sums() {
+  for (uint k = gl_LocalInvocationIndex; k < 3u * $SUMMEDu; k += $GROUPu) sums[k] = 0;
+}
+/// `part`: its index in parts[]; `some`: whether there is one. All invocations of a work-group call it; sums are complete when it returns.
+void solve_part(uint part, bool some) {
+  uint me = gl_LocalInvocationIndex, row = $PART_WORDSu * part;
+  uint summed = parts[row + 1u];
+  #foreach uint from_$KIND = parts[row + 4u + 2u * $INDEXu], count_$KIND = some ? parts[row + 5u + 2u * $INDEXu] : 0u;
+  // Every part has room for as many vertices, so that none waits for its words before it looks for them.
+  for (uint k = me; k < $VERTICESu; k += $GROUPu) {
+    uvec2 vertex = vertices[$VERTICESu * part + k];
+    names[k] = vertex.x;
+    here[k] = places[vertex.x];
+    if (k < $SUMMEDu) units_per_metre[k] = 1.0 / (params.delta_unit * uintBitsToFloat(vertex.y));
   }
+  barrier();
+  // Each kind begins with a warp of its own.
+  uint end = 0u;
+  #foreach uint begin_$KIND = end; end = (end + count_$KIND + 31u) & ~31u;
+  for (uint t = me; t < end; t += $GROUPu) {
+    #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records[from_$KIND + (t - begin_$KIND)], summed);
+  }
+  barrier();
 }

@@ -7,7 +7,8 @@
 layout(local_size_x = $GROUP) in;
 layout(std430, binding = BIND_DELTAS) buffer Deltas { uint deltas[]; };
 layout(std430, binding = $BINDING) restrict readonly buffer Records { Record$ARITY records[]; };
-uniform uint count;
+#define Ids uint  // the record
+uint id_of(Ids record, int j) { return records[record].vertices[j]; }
 #include "constraints/types.glsl"
 #include "constraints/$KIND.glsl"
 
@@ -19,7 +20,7 @@ void add(uint at, float value) {
 
 void main() {
   uint index = group_index() * $GROUPu + gl_LocalInvocationIndex;
-  if (index >= count) return;
+  if (index >= $COUNTu) return;
   Record$ARITY record = records[index];
   vec3 x[$ARITY];
   float w[$ARITY];
@@ -29,10 +30,11 @@ void main() {
     x[j] = between(p, first);
     w[j] = inverse_mass_of(p);
   }
-  Constraint$ARITY c = $KIND(x, record.rest, record.vertices);
-  float lambda = params.stiffness[$KIND_ROW][$KIND_COLUMN] * multiplier(c, w);
+  Constraint$ARITY c = $KIND(x, record.rest, index);
+  float lambda = multiplier(c, w, params.stiffness[$KIND_ROW][$KIND_COLUMN], params.limit);
+  if (lambda == 0.0) return;
   for (int j = 0; j < $ARITY; ++j) {
-    vec3 correction = limited(lambda * w[j] * c.gradient[j], params.limit);
+    vec3 correction = lambda * w[j] * c.gradient[j];
     for (int a = 0; a < 3; ++a)
       if (correction[a] != 0.0) add(4u * record.vertices[j] + uint(a), correction[a]);
   }

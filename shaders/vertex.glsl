@@ -20,15 +20,10 @@ ivec4 predicted_place(Position own, Velocity speed) {
   return place_of(x, own.inverse_mass);
 }
 
-// Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phase predicts or finishes.
-void advance(uint i, Position own, Velocity speed, vec3 correction) {
+// Moves vertex i, which is not fixed; returns where its neighbours see it.
+Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   uint phase = turn.x;
   Pair x = Pair(own.high, own.low), v = Pair(speed.high, speed.low), start = x;
-  if (!(own.inverse_mass > 0.0)) {
-    if ((phase & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
-    places_out[i] = place_of(x, own.inverse_mass);
-    return;
-  }
   if ((phase & PHASE_PREDICT) != 0u) {
     v = predict_velocity(v);
     start = x = predict_position(x, v);
@@ -54,5 +49,12 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
   if ((phase & (PHASE_PREDICT | PHASE_FINISH)) != 0u) velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
   // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
   if ((phase & PHASE_FINISH) != 0u) x = predict_position(x, predict_velocity(v));
+  return x;
+}
+// Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phase predicts or finishes.
+void advance(uint i, Position own, Velocity speed, vec3 correction) {
+  Pair x = Pair(own.high, own.low);
+  if (own.inverse_mass > 0.0) x = moved(i, own, speed, correction);
+  else if ((turn.x & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
   places_out[i] = place_of(x, own.inverse_mass);
 }

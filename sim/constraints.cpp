@@ -62,9 +62,7 @@ const std::vector<ConstraintKind>& constraint_kinds() {
   static const std::vector<ConstraintKind> rows = [] {
     std::vector<ConstraintKind> result;
     for_each_kind([&]<class Kind>(Kind, int) {
-      const int* turned = nullptr;
-      if constexpr (requires { Kind::turned; }) turned = &Kind::turned[0][0];
-      result.push_back({Kind::name, Kind::arity, Kind::stiffness, turned});
+      result.push_back({Kind::name, Kind::arity, Kind::stiffness});
     });
     return result;
   }();

@@ -30,14 +30,12 @@ struct ConstraintList {
 inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
 
 // A kind is a formula in shaders/constraints/NAME.glsl, included in sim/formulas.h, and a row here: its name,
-// arity, stiffness, the formula as C++, and how a mesh gives its constraints. `turned[j]`, if given: an order
-// of its vertices that is the same constraint and has the j-th as early as possible (mode node is faster
-// where each can be first). Order is the order of projection in Gauss-Seidel.
+// arity (2 or 4), stiffness, the formula as C++, and how a mesh gives its constraints. Order is the order of
+// projection in Gauss-Seidel.
 struct Stretch {
   static constexpr const char* name = "stretch";
   static constexpr int arity = 2;
   static constexpr double Settings::*stiffness = &Settings::k_stretch;
-  static constexpr int turned[2][2] = {{0, 1}, {1, 0}};
   template <class real>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real>{}.stretch(x, rest, id);
@@ -48,7 +46,6 @@ struct Bend {
   static constexpr const char* name = "bend";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_bend;
-  static constexpr int turned[4][4] = {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}};
   template <class real>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real>{}.bend(x, rest, id);
@@ -60,7 +57,6 @@ struct Volume {
   static constexpr const char* name = "volume";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_volume;
-  static constexpr int turned[4][4] = {{0, 1, 2, 3}, {1, 0, 3, 2}, {2, 0, 1, 3}, {3, 0, 2, 1}};
   template <class real>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real>{}.volume(x, rest, id);
@@ -81,7 +77,6 @@ struct ConstraintKind {
   const char* name;
   int arity;
   double Settings::*stiffness;
-  const int* turned;  ///< arity * arity, or null
 };
 const std::vector<ConstraintKind>& constraint_kinds();
 

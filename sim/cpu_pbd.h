@@ -100,14 +100,10 @@ class CpuPbd {
         w[j] = inverse_masses_[item.vertices[j]];
       }
       const auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
-      const real lambda = k * formulas.multiplier(c, w);
-      std::uint32_t triggered = formulas.guards_of(c, w);
-      for (std::size_t j = 0; lambda != real(0) && j < arity; ++j) {
-        const vec full = lambda * w[j] * c.gradient[j];
-        triggered |= formulas.guards_of(full, limit);
-        const glm::dvec3 correction(formulas.limited(full, limit));
-        (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += correction;
-      }
+      const real lambda = formulas.multiplier(c, w, k, limit);
+      const std::uint32_t triggered = formulas.guards_of(c, w, k, limit);
+      for (std::size_t j = 0; lambda != real(0) && j < arity; ++j)
+        (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += glm::dvec3(lambda * w[j] * c.gradient[j]);
       if (triggered)
         for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
     }

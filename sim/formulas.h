@@ -16,6 +16,8 @@ struct Formulas {
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
   static constexpr real grain = 0;  // positions are kept in full here
+  using Ids = const uint*;
+  static uint id_of(Ids ids, int j) { return ids[j]; }
   // in order of use
   // clang-format off
 #pragma GCC diagnostic push

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <span>
 
 #include "sim/hilbert.h"
 
@@ -36,57 +37,186 @@ std::vector<Item> ordered(const Model& model, const ConstraintSystem& system) {
   return items;
 }
 
+using Record = std::array<std::uint32_t, 2>;
+
+// Consecutive threads take constraints far apart, which seldom meet at a vertex: their additions to its sum
+// would wait for each other.
+void spread(std::vector<Record>& records) {
+  const std::vector<Record> near = std::move(records);
+  records.clear();
+  const std::size_t stride = (near.size() + 31) / 32;
+  for (std::size_t start = 0; start < stride; ++start)
+    for (std::size_t r = start; r < near.size(); r += stride) records.push_back(near[r]);
+}
+
+// One part of a patch after the other, at the end of `patches`.
+class PartWriter {
+ public:
+  PartWriter(const ConstraintSystem& system, Patches& patches)
+      : system_(system),
+        patches_(patches),
+        local_(system.at_vertex.size(), none),
+        records_(system.lists.size()) {
+    patches.part_words = 4 + 2 * std::size_t(std::count(system.present.begin(), system.present.end(), true));
+  }
+  std::size_t vertices() const { return gathered_.size() - first_; }
+  /// The vertex's number in the part, which has it from now on.
+  std::uint32_t vertex(std::uint32_t v) {
+    if (local_[v] == none) {
+      local_[v] = std::uint32_t(vertices());
+      gathered_.push_back({v, std::bit_cast<std::uint32_t>(float(system_.at_vertex[v]))});
+    }
+    return local_[v];
+  }
+  /// False, and nothing done, if it has more vertices than fit.
+  bool add(std::size_t kind, std::uint32_t constraint) {
+    const ConstraintList& list = system_.lists[kind];
+    const std::size_t arity = std::size_t(list.arity);
+    const std::span of(list.vertices.data() + std::size_t(constraint) * arity, arity);
+    const auto added =
+        std::count_if(of.begin(), of.end(), [&](std::uint32_t v) { return local_[v] == none; });
+    if (vertices() + std::size_t(added) > Patches::most_vertices) return false;
+    std::array<std::uint32_t, 2> record = {0, std::bit_cast<std::uint32_t>(float(list.rest[constraint]))};
+    for (std::size_t j = 0; j < arity; ++j) record[0] |= vertex(of[j]) << (8 * j);
+    records_[kind].push_back(record);
+    return true;
+  }
+  /// Writes the part's words; `summed`: how many of its first vertices are.
+  void close(std::size_t part, std::size_t summed) {
+    patches_.parts.resize(std::max(patches_.parts.size(), (part + 1) * patches_.part_words));
+    firsts_.resize(patches_.parts.size() / patches_.part_words);
+    firsts_[part] = first_;
+    std::uint32_t* words = patches_.parts.data() + part * patches_.part_words;
+    words[0] = std::uint32_t(vertices());
+    words[1] = std::uint32_t(summed);
+    words[2] = summed ? gathered_[first_][0] : 0;
+    words[3] = 0;
+    words += 4;
+    for (std::size_t k = 0; k < records_.size(); ++k) {
+      if (!system_.present[k]) continue;
+      *words++ = std::uint32_t(patches_.records.size());
+      *words++ = std::uint32_t(records_[k].size());
+      spread(records_[k]);
+      patches_.records.insert(patches_.records.end(), records_[k].begin(), records_[k].end());
+      records_[k].clear();
+    }
+    patches_.largest = std::max(patches_.largest, vertices());
+    patches_.most_summed = std::max(patches_.most_summed, summed);
+    for (std::size_t v = first_; v < gathered_.size(); ++v) local_[gathered_[v][0]] = none;
+    first_ = gathered_.size();
+  }
+  /// When all parts are closed: gives each the same room for its vertices, the rest of it copies of the
+  /// first.
+  void finish() {
+    patches_.vertices.resize(firsts_.size() * patches_.largest);
+    for (std::size_t part = 0; part < firsts_.size(); ++part) {
+      const std::size_t count = patches_.parts[part * patches_.part_words];
+      for (std::size_t v = 0; v < patches_.largest; ++v)
+        patches_.vertices[part * patches_.largest + v] = gathered_[firsts_[part] + (v < count ? v : 0)];
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t none = ~0u;
+  const ConstraintSystem& system_;
+  Patches& patches_;
+  std::vector<std::uint32_t> local_;                    // of a vertex, its number in the part being written
+  std::vector<std::vector<Record>> records_;            // by kind
+  std::vector<std::array<std::uint32_t, 2>> gathered_;  // vertices of parts, as they were closed
+  std::vector<std::size_t> firsts_;                     // of each part among them
+  std::size_t first_ = 0;                               // of the part being written
+};
+
+// The constraints of one kind on each vertex.
+struct Incidence {
+  std::vector<std::uint32_t> first, constraints;
+  Incidence(const ConstraintList& list, std::size_t vertices)
+      : first(vertices + 1), constraints(list.vertices.size()) {
+    for (std::uint32_t v : list.vertices) ++first[v + 1];
+    for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
+    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+    for (std::size_t at = 0; at < list.vertices.size(); ++at)
+      constraints[next[list.vertices[at]]++] = std::uint32_t(at / std::size_t(list.arity));
+  }
+};
+
 }  // namespace
 
-Patches make_patches(const Model& model, const ConstraintSystem& system, std::size_t most) {
+Patches constraint_patches(const Model& model, const ConstraintSystem& system, std::size_t most) {
   Patches patches;
-  const std::vector<Item> items = ordered(model, system);
-  constexpr std::uint32_t none = ~0u;
-  std::vector<std::uint32_t> slot(model.rest.positions.size(),
-                                  none);  // of a vertex in the patch being filled
-  std::vector<std::vector<std::array<std::uint32_t, 2>>> kinds(system.lists.size());
-  std::size_t first_vertex = 0, filled = 0;
+  PartWriter writer(system, patches);
+  std::size_t filled = 0;
   const auto close = [&] {
-    patches.rows.push_back(std::uint32_t(first_vertex));
-    for (std::size_t k = 0; k < kinds.size(); ++k) {
-      if (!system.present[k]) continue;
-      patches.rows.push_back(std::uint32_t(patches.records.size()));
-      // Consecutive threads take constraints far apart, which seldom meet at a vertex: their additions to its
-      // sum would wait for each other.
-      const std::size_t n = kinds[k].size(), stride = (n + 31) / 32;
-      for (std::size_t start = 0; start < stride; ++start)
-        for (std::size_t r = start; r < n; r += stride) patches.records.push_back(kinds[k][r]);
-      kinds[k].clear();
-    }
-    patches.rows.push_back(std::uint32_t(patches.records.size()));
-    for (std::size_t v = first_vertex; v < patches.vertices.size(); ++v) slot[patches.vertices[v][0]] = none;
-    first_vertex = patches.vertices.size();
+    writer.close(patches.count++, writer.vertices());
     filled = 0;
-    ++patches.count;
   };
-  for (const Item& item : items) {
-    const ConstraintList& list = system.lists[item.kind];
-    const std::size_t arity = std::size_t(list.arity);
-    const std::uint32_t* vertices = list.vertices.data() + std::size_t(item.constraint) * arity;
-    std::size_t added = 0;
-    for (std::size_t j = 0; j < arity; ++j) added += slot[vertices[j]] == none;
-    if (filled == most || patches.vertices.size() - first_vertex + added > Patches::most_vertices) close();
-    std::array<std::uint32_t, 2> record = {0,
-                                           std::bit_cast<std::uint32_t>(float(list.rest[item.constraint]))};
-    for (std::size_t j = 0; j < arity; ++j) {
-      std::uint32_t& place = slot[vertices[j]];
-      if (place == none) {
-        place = std::uint32_t(patches.vertices.size() - first_vertex);
-        patches.vertices.push_back(
-            {vertices[j], std::bit_cast<std::uint32_t>(float(system.at_vertex[vertices[j]]))});
-      }
-      record[0] |= place << (8 * j);
+  for (const Item& item : ordered(model, system)) {
+    if (filled == most || !writer.add(item.kind, item.constraint)) {
+      close();
+      writer.add(item.kind, item.constraint);
     }
-    kinds[item.kind].push_back(record);
     ++filled;
   }
   if (filled > 0) close();
-  patches.rows.push_back(std::uint32_t(patches.vertices.size()));
+  writer.finish();
+  return patches;
+}
+
+Patches vertex_patches(const ConstraintSystem& system, std::size_t own, int groups,
+                       const std::vector<std::vector<std::uint8_t>>& members) {
+  const std::size_t vertices = system.at_vertex.size();
+  Patches patches;
+  PartWriter writer(system, patches);
+  std::vector<Incidence> incidence;
+  for (const ConstraintList& list : system.lists) incidence.emplace_back(list, vertices);
+  patches.count = (vertices + own - 1) / own;
+  patches.parts.resize(patches.count * std::size_t(groups) * patches.part_words);
+  std::vector<std::uint32_t> found;
+  for (std::size_t g = 0; g < std::size_t(groups); ++g)
+    for (std::size_t p = 0; p < patches.count; ++p) {
+      const std::size_t first = p * own, end = std::min(first + own, vertices);
+      std::size_t part = g * patches.count + p;
+      const auto begin_part = [&] {
+        for (std::size_t v = first; v < end; ++v) writer.vertex(std::uint32_t(v));
+      };
+      begin_part();
+      for (std::size_t k = 0; k < system.lists.size(); ++k) {
+        found.assign(incidence[k].constraints.begin() + incidence[k].first[first],
+                     incidence[k].constraints.begin() + incidence[k].first[end]);
+        std::sort(found.begin(), found.end());
+        found.erase(std::unique(found.begin(), found.end()), found.end());
+        for (std::uint32_t c : found) {
+          if (!members.empty() && members[k][c] != g) continue;
+          if (writer.add(k, c)) continue;
+          const std::size_t next = patches.parts.size() / patches.part_words;
+          writer.close(part, end - first);
+          patches.parts[part * patches.part_words + 3] = std::uint32_t(next);
+          patches.parts.resize(patches.parts.size() + patches.part_words);
+          patches.parted = true;
+          part = next;
+          begin_part();
+          writer.add(k, c);
+        }
+      }
+      writer.close(part, end - first);
+    }
+  writer.finish();
+  if (!members.empty()) {  // count those of the group alone
+    std::vector<std::uint32_t> here(vertices * std::size_t(groups));
+    for (std::size_t k = 0; k < system.lists.size(); ++k)
+      for (std::size_t at = 0; at < system.lists[k].vertices.size(); ++at)
+        ++here[members[k][at / std::size_t(system.lists[k].arity)] * vertices + system.lists[k].vertices[at]];
+    for (std::size_t g = 0; g < std::size_t(groups); ++g)
+      for (std::size_t p = 0; p < patches.count; ++p)
+        for (std::size_t part = g * patches.count + p;;) {
+          const std::uint32_t* words = patches.parts.data() + part * patches.part_words;
+          for (std::size_t v = part * patches.largest; v < (part + 1) * patches.largest; ++v)
+            patches.vertices[v][1] =
+                std::bit_cast<std::uint32_t>(float(here[g * vertices + patches.vertices[v][0]]));
+          part = words[3];
+          if (part == 0) break;
+        }
+  }
   return patches;
 }
 

@@ -99,10 +99,9 @@ void build_solver(Sim& sim) {
   const SolverMode* mode = find_solver_mode(sim.settings.mode);
   if (!mode) throw Error("no such mode", sim.settings.mode, "see tetpbd run --help");
   // Made first, then put in place: a shader that does not compile leaves the old solver running.
-  Pass predict;
-  predict.program = Program::compute("predict.comp");
-  predict.groups = work_groups(sim.model->positions.size(), group_size);
-  predict.bytes = sim.model->positions.size() * (sizeof(Position) + sizeof(Velocity) + 16);
+  const std::size_t vertices = sim.model->positions.size();
+  Pass predict{Program::compute("predict.comp"), work_groups(vertices, group_size),
+               vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
   Solver solver =
       mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning, sim.settings.groups});
   Program keep = Program::compute("keep.comp");
@@ -196,7 +195,7 @@ void shift_velocities(Sim& sim, double upwards) {
 }  // namespace
 
 void check_limits(const ConstraintSystem& system, const Limits& limits) {
-  const int needed = BIND_STREAMS + std::max(3, int(kind_words(system).size()));
+  const int needed = std::max(STORAGE_BINDINGS, BIND_RECORDS + int(kind_words(system).size()));
   if (needed > limits.storage_blocks)
     throw Error("too few shader storage blocks",
                 fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),

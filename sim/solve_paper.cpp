@@ -16,14 +16,12 @@ Solver create_paper_solver(const SolverInput& input) {
     const std::size_t count = solver.buffers[index].bytes() / (4 * (arity + 1));
     check_storage(input.tuning, solver.buffers[index].label(), solver.buffers[index].bytes());
     words["GROUP"] = std::to_string(group);
-    Pass pass;
-    pass.program = Program::compute("solve_paper.comp", {words, {}});
-    pass.program.use();
-    pass.program.set("count", unsigned(count));
-    pass.groups = work_groups(count, group);
-    pass.bytes = count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
+    words["COUNT"] = std::to_string(count);
+    const std::size_t bytes =
+        count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
     solver.bindings.push_back({BIND_RECORDS + int(index), solver.buffers[index].id()});
-    solver.iteration.push_back(std::move(pass));
+    solver.iteration.push_back(
+        {Program::compute("solve_paper.comp", {words, {}}), work_groups(count, group), bytes});
     ++index;
   }
   add_average(solver, input, group, true);

@@ -40,27 +40,17 @@ Tuning tuning_from_environment() {
   const char* variable = std::getenv("TETPBD_TUNE");
   for (const std::string& assignment : split(variable ? variable : "", ',')) {
     unsigned* target = nullptr;
-    for (const auto& [name, member] : {std::pair("lanes=", &tuning.lanes), std::pair("group=", &tuning.group),
-                                       std::pair("patch=", &tuning.patch), std::pair("row=", &tuning.row)})
+    for (const auto& [name, member] : {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
+                                       std::pair("row=", &tuning.row)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
     if (!target || std::from_chars(number, end, *target).ptr != end)
       throw Error(fmt::format("'{}' is no tuning", assignment), "TETPBD_TUNE",
-                  "write lanes=N, group=N, patch=N or row=N, separated by commas");
+                  "write group=N, patch=N or row=N, separated by commas");
   }
   return tuning;
 }
-
-namespace {
-
-bool every_vertex_first(const ConstraintKind& kind) {
-  for (int j = 0; j < kind.arity; ++j)
-    if (!kind.turned || kind.turned[j * kind.arity] != j) return false;
-  return true;
-}
-
-}  // namespace
 
 std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   std::vector<Substitutions> rows;
@@ -70,8 +60,7 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
     rows.push_back({{"KIND", constraint_kinds()[k].name},
                     {"ARITY", std::to_string(constraint_kinds()[k].arity)},
                     {"INDEX", std::to_string(index)},
-                    {"BINDING", std::to_string(BIND_STREAMS + index)},
-                    {"FIRST", every_vertex_first(constraint_kinds()[k]) ? "true" : "false"},
+                    {"BINDING", std::to_string(BIND_RECORDS + index)},
                     {"KIND_ROW", std::to_string(k / 4)},
                     {"KIND_COLUMN", std::to_string(k % 4)}});
   }
@@ -103,14 +92,45 @@ void check_storage(const Tuning& tuning, const std::string& label, std::size_t b
                 "use a smaller mesh", 1);
 }
 
+Cut tuned(Cut cut, const Tuning& tuning) {
+  if (tuning.patch) cut.patch = tuning.patch;
+  if (tuning.group) cut.group = tuning.group;
+  if (!std::has_single_bit(cut.group) || cut.group > 1024)
+    throw Error("no such work-group", fmt::format("{} invocations", cut.group), "a power of two up to 1024");
+  return cut;
+}
+
+void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
+                 unsigned group, bool grouped) {
+  std::size_t bytes = 0;
+  const auto add = [&](const char* label, int binding, const auto& data) {
+    solver.buffers.push_back(storage_buffer(input.tuning, label, data));
+    solver.bindings.push_back({binding, solver.buffers.back().id()});
+    bytes += solver.buffers.back().bytes();
+  };
+  add("patches", BIND_PARTS, patches.parts);
+  add("patch vertices", BIND_PATCH_VERTICES, patches.vertices);
+  add("patch records", BIND_PATCH_RECORDS, patches.records);
+  const ShaderWords words = {{{"GROUP", std::to_string(group)},
+                              {"PATCHES", std::to_string(patches.count)},
+                              {"PART_WORDS", std::to_string(patches.part_words)},
+                              {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},
+                              {"SUMMED", std::to_string(std::max<std::size_t>(patches.most_summed, 1))},
+                              {"PARTED", patches.parted ? "1" : "0"},
+                              {"GROUPED", grouped ? "1" : "0"},
+                              {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
+                             kind_words(input.system)};
+  bytes += 16 * patches.vertices.size();  // places
+  solver.iteration.push_back(
+      {Program::compute(shader, words), patches.count, bytes / std::size_t(grouped ? input.groups : 1)});
+}
+
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {
   const std::size_t vertices = input.model.positions.size();
-  Pass pass;
-  pass.program = Program::compute(
-      "average.comp", {{{"GROUP", std::to_string(group)}, {"FLOAT_SUMS", float_sums ? "1" : "0"}}, {}});
-  pass.groups = work_groups(vertices, group);
-  pass.bytes = vertices * (2 * sizeof(Position) + 3 * 16);  // itself, its sum there and back, its place
-  solver.iteration.push_back(std::move(pass));
+  const ShaderWords words = {{{"GROUP", std::to_string(group)}, {"FLOAT_SUMS", float_sums ? "1" : "0"}}, {}};
+  const std::size_t bytes =
+      vertices * (2 * sizeof(Position) + 3 * 16);  // itself, its sum there and back, its place
+  solver.iteration.push_back({Program::compute("average.comp", words), work_groups(vertices, group), bytes});
   Buffer deltas("deltas", vertices * 16);
   deltas.clear();
   solver.bindings.push_back({BIND_DELTAS, deltas.id()});

@@ -12,6 +12,7 @@
 #include "sim/gpu.h"
 #include "sim/layout.h"
 #include "sim/model.h"
+#include "sim/patches.h"
 #include "sim/settings.h"
 
 namespace tetpbd {
@@ -52,14 +53,14 @@ struct Solver {
 /// How kernels are cut into invocations; 0: by the mesh's size or the driver's limit. For measurements and
 /// tests.
 struct Tuning {
-  unsigned lanes = 0;       ///< invocations a vertex in mode node, a power of two up to `group`
-  unsigned group = 0;       ///< invocations of a work-group of the solving kernel, a power of two up to 1024
-  unsigned patch = 0;       ///< constraints of a patch in mode constraint
-  unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
-  std::size_t storage = 0;  ///< most bytes of a storage buffer
+  unsigned group = 0;  ///< invocations of a work-group of the solving kernel, a power of two up to 1024
+  unsigned patch =
+      0;             ///< constraints of a patch in mode constraint, vertices of one in modes node and groups
+  unsigned row = 0;  ///< most work-groups in a dispatch's first dimension
+  std::size_t storage = 0;    ///< most bytes of a storage buffer
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };
-/// From the variable TETPBD_TUNE, as in "lanes=8,group=128"; throws Error for anything else.
+/// From the variable TETPBD_TUNE, as in "patch=8,group=128"; throws Error for anything else.
 Tuning tuning_from_environment();
 
 struct SolverInput {
@@ -87,8 +88,7 @@ Solver create_cpu_double_solver(const SolverInput&);  ///< solve_cpu.cpp, double
 Solver create_paper_solver(const SolverInput&);       ///< solve_paper.cpp
 
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING (of its
-/// stream or records), FIRST (whether each vertex can be its first), KIND_ROW and KIND_COLUMN (of the
-/// stiffness).
+/// records), KIND_ROW and KIND_COLUMN (of the stiffness).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
 /// Record buffers of the kinds present, in the order of kind_words (layout.glsl: Record2, Record4).
 std::vector<Buffer> record_buffers(const ConstraintSystem& system);
@@ -100,6 +100,15 @@ Buffer storage_buffer(const Tuning& tuning, const std::string& label, const std:
   return Buffer(label, data);
 }
 
+/// How constraints are cut: `patch` as in Tuning, invocations of a work-group.
+struct Cut {
+  unsigned patch, group;
+};
+/// With what `tuning` overrides; throws Error if a work-group cannot have that size.
+Cut tuned(Cut cut, const Tuning& tuning);
+/// Gives a solver a dispatch of `shader`, a work-group a patch, and the patches' buffers (patch.glsl).
+void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
+                 unsigned group, bool grouped);
 /// Gives a solver its sums of corrections, at zero, and its last dispatch, which averages them and moves the
 /// vertices (average.comp).
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums);

@@ -386,6 +386,7 @@ TEST_CASE("shader faults name file and line, or the uniform") {
       frame.positions = sim.current_positions().id();
       frame.target = target.framebuffer.id();
       frame.viewport = {0, 0, 32, 32};
+      frame.ground = 0.0f;
       draw(renderer, frame);
     });
     set_shader_folder("");
@@ -397,8 +398,8 @@ TEST_CASE("shader faults name file and line, or the uniform") {
   CHECK(has(with("average.comp", "uint i = group", "uint i = nothing + group"), "shaders/average.comp:"));
   CHECK(has(with("average.comp", "\"pair.glsl\"", "\"pears.glsl\""),
             "no such shader: " + folder.string() + "/pears.glsl"));
-  CHECK(has(with("solve_constraint.comp", "uniform uint patch_count", "const uint patch_count = 1u"),
-            "no such uniform: 'patch_count' in solve_constraint"));
+  CHECK(has(with("render/plane.frag", "uniform float opacity", "const float opacity = 1.0"),
+            "no such uniform: 'opacity' in plane"));
   CHECK(has(with("render/surface.geom", "vec3 edge;", "vec2 edge;"), "surface"));
   CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
   const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");

@@ -104,9 +104,10 @@ TEST_CASE("#include, #foreach and words expand") {
       "solve_node.comp", {{{"KINDS", "2"}},
                           {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
                            {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
-  CHECK(text.find("gather_stretch(i, at_stretch, end_stretch, entry_stretch, self)") != std::string::npos);
-  CHECK(text.find("gather_bend(i, at_bend, end_bend, entry_bend, self)") != std::string::npos);
-  CHECK(text.find("gather_volume") == std::string::npos);
+  CHECK(text.find("project_stretch(records[from_stretch + (t - begin_stretch)], summed)") !=
+        std::string::npos);
+  CHECK(text.find("project_bend(records[from_bend + (t - begin_bend)], summed)") != std::string::npos);
+  CHECK(text.find("project_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);
 }

@@ -11,7 +11,6 @@
 #include "sim/error.h"
 #include "sim/groups.h"
 #include "sim/metrics.h"
-#include "sim/patches.h"
 #include "sim/reference.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
@@ -131,15 +130,15 @@ TEST_CASE("one step of mode groups is Gauss-Seidel between groups in double, ave
   for (glm::ivec3 cells : {glm::ivec3(1, 1, 1), glm::ivec3(4, 3, 2)})
     for (int groups : {1, 3, 8, 128})  // the last is a colouring
       for (int iterations : {1, 3})
-        for (unsigned lanes : {0u, 4u}) {
+        for (unsigned patch : {0u, 5u}) {
           CAPTURE(cells.x);
           CAPTURE(groups);
           CAPTURE(iterations);
-          CAPTURE(lanes);
+          CAPTURE(patch);
           Settings settings = quick("groups", iterations, 2);
           settings.groups = groups;
           Sim sim = create_sim(block_model(cells, -0.01, 1, "stretch:1.3", glm::dvec3(0, 2, 0)), settings,
-                               {.lanes = lanes});
+                               {.patch = patch});
           const State expected = step_by_groups(sim), before = read_state(sim);
           step(sim);
           const State after = read_state(sim);
@@ -184,7 +183,6 @@ TEST_CASE("however kernels are cut into invocations, a step is the double CPU st
   const auto model = block_model({8, 6, 4}, -0.01, 1, "stretch:1.3");
   const auto check = [&](const char* mode, const Tuning& tuning) {
     CAPTURE(mode);
-    CAPTURE(tuning.lanes);
     CAPTURE(tuning.group);
     CAPTURE(tuning.patch);
     CAPTURE(tuning.row);
@@ -194,14 +192,14 @@ TEST_CASE("however kernels are cut into invocations, a step is the double CPU st
     CHECK(distance(read_state(sim), expected) < 2e-6 * model->size);
     return state_hash(sim);
   };
-  for (unsigned lanes : {1, 4, 8, 16}) check("node", {.lanes = lanes});
-  for (unsigned lanes : {2, 32}) check("node", {.lanes = lanes, .group = 32});
-  // Rows of work-groups, the last of them not full.
-  CHECK(check("node", {.lanes = 4, .row = 7}) == check("node", {.lanes = 4}));
-  // Sums of whole numbers: the same bits however constraints are cut into patches.
+  // Sums of whole numbers: the same bits however constraints are cut into patches, in rows of work-groups the
+  // last of which is not full, and in both modes.
   const std::uint64_t bits = check("constraint", {});
   for (unsigned patch : {1, 17, 64, 100000}) CHECK(check("constraint", {.patch = patch}) == bits);
   CHECK(check("constraint", {.group = 32, .patch = 64, .row = 3}) == bits);
+  for (unsigned patch : {0, 1, 7, 64}) CHECK(check("node", {.patch = patch}) == bits);
+  CHECK(check("node", {.group = 256, .patch = 200}) == bits);
+  CHECK(check("node", {.group = 32, .patch = 17, .row = 3}) == bits);
   check("paper", {});
   check("paper", {.row = 1});
 }
@@ -209,8 +207,8 @@ TEST_CASE("however kernels are cut into invocations, a step is the double CPU st
 TEST_CASE("tuning is checked, and so is the size of a storage buffer") {
   GlTest gl;
   const auto model = block_model({4, 3, 2});
-  CHECK_THROWS_AS(create_sim(model, quick("node"), {.lanes = 3}), Error);
-  CHECK_THROWS_AS(create_sim(model, quick("node"), {.lanes = 64, .group = 32}), Error);
+  CHECK_THROWS_AS(create_sim(model, quick("node"), {.group = 96}), Error);
+  CHECK_THROWS_AS(create_sim(model, quick("node"), {.group = 32, .patch = 33}), Error);
   for (const char* mode : {"node", "constraint", "paper"}) {
     CAPTURE(mode);
     std::string message;
@@ -221,37 +219,6 @@ TEST_CASE("tuning is checked, and so is the size of a storage buffer") {
     }
     CHECK(message.find("too large") != std::string::npos);
     CHECK(message.find("3000") != std::string::npos);
-  }
-}
-
-TEST_CASE("patches hold every constraint once, on at most 256 vertices") {
-  const auto model = block_model({8, 6, 4});
-  const ConstraintSystem system = build_constraints(model->rest, "stretch,bend,volume");
-  for (std::size_t most : {1, 50, 5000}) {
-    const Patches patches = make_patches(*model, system, most);
-    std::vector<std::vector<std::uint32_t>> found[3], given[3];
-    for (std::size_t p = 0; p < patches.count; ++p) {
-      const std::uint32_t* row = patches.rows.data() + 5 * p;
-      CHECK(row[5] - row[0] <= Patches::most_vertices);
-      CHECK(row[4] - row[1] <= most);
-      for (std::size_t k = 0; k < 3; ++k)
-        for (std::uint32_t r = row[1 + k]; r < row[2 + k]; ++r) {
-          std::vector<std::uint32_t> vertices;
-          for (int j = 0; j < system.lists[k].arity; ++j)
-            vertices.push_back(patches.vertices[row[0] + ((patches.records[r][0] >> (8 * j)) & 255)][0]);
-          found[k].push_back(vertices);
-        }
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      const ConstraintList& list = system.lists[k];
-      for (std::size_t c = 0; c < list.count(); ++c) {
-        const auto first = list.vertices.begin() + std::ptrdiff_t(c) * list.arity;
-        given[k].emplace_back(first, first + list.arity);
-      }
-      std::sort(found[k].begin(), found[k].end());
-      std::sort(given[k].begin(), given[k].end());
-      CHECK(found[k] == given[k]);
-    }
   }
 }
 
@@ -666,14 +633,16 @@ TEST_CASE("a guard that does not trigger changes no bit") {
     std::filesystem::remove_all(folder);
     std::filesystem::copy(TEST_MODELS "/../shaders", folder, std::filesystem::copy_options::recursive);
     replace("constraints/stretch.glsl", "l > real(1e-6) * rest", "true");
-    replace("constraints/bend.glsl", "if (!(aa > tiny && bb > tiny)) return c;", "");
+    replace("constraints/bend.glsl", "bool sound = aa > tiny && bb > tiny;", "bool sound = true;");
     replace("constraints/bend.glsl", "clamp(resolved(turn, noise), real(-1), real(1))",
             "resolved(turn, noise)");
     replace("constraints/volume.glsl", "if (sum <= real(1e-10) * c.floor) {", "if (false) {");
-    replace("constraints/types.glsl", "sum = max(sum, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));",
-            "");
-    replace("constraints/types.glsl", "vec3 limited(vec3 correction, real limit) {",
-            "vec3 limited(vec3 correction, real limit) {\n  return correction;");
+    replace("constraints/types.glsl",
+            "max(sum, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3])), longest, limit);",
+            "sum, longest, limit);");
+    replace("constraints/types.glsl", "if (squared > limit * limit) lambda *= limit / sqrt(squared);", "");
+    replace("constraints/types.glsl", "return squared * real(0) == real(0) ? lambda : real(0);",
+            "return lambda;");
     set_shader_folder(folder.string());
     const std::uint64_t without = run(false);
     set_shader_folder("");

@@ -10,12 +10,8 @@ real hinge_angle(vec3 x[4]) {
   return atan(dot(cross(n0, n1), e), length(e) * dot(n0, n1));
 }
 
-Constraint4 bend(vec3 x[4], real rest, const uint id[4]) {
+Constraint4 bend(vec3 x[4], real rest, Ids ids) {
   Constraint4 c;
-  c.C = real(0);
-  for (int j = 0; j < 4; ++j) c.gradient[j] = vec3(real(0));
-  c.floor = real(0);
-  c.guards = GUARD_HINGE;
   vec3 e = x[3] - x[2];
   vec3 n0 = cross(x[2] - x[0], x[3] - x[0]);
   vec3 n1 = cross(x[3] - x[1], x[2] - x[1]);
@@ -23,23 +19,24 @@ Constraint4 bend(vec3 x[4], real rest, const uint id[4]) {
   real aa = dot(n0, n0);
   real bb = dot(n1, n1);
   real tiny = real(1e-12) * ee * ee;  // a wing closer to the edge than 1e-6 of its length has no angle
-  if (!(aa > tiny && bb > tiny)) return c;
+  bool sound = aa > tiny && bb > tiny;
   real turn = hinge_angle(x) - rest;
   const real pi = real(3.14159265358979323846);
   if (turn > pi) turn -= real(2) * pi;
   if (turn <= -pi) turn += real(2) * pi;
   real l = sqrt(ee);
-  vec3 a = n0 / aa;
-  vec3 b = n1 / bb;
-  vec3 u = e / l;
+  vec3 a = n0 / (sound ? aa : real(1));
+  vec3 b = n1 / (sound ? bb : real(1));
+  vec3 u = e / (sound ? l : real(1));
   // Sides are differences of positions relative to x0, so each is known to rounding times the hinge's extent; a normal's
   // direction then to that times a side over the normal's length.
   vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b0 = x[1] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
   real a22 = dot(a2, a2), a33 = dot(a3, a3), b22 = dot(b2, b2), b33 = dot(b3, b3);
   real longest = max(max(max(a22, a33), max(b22, b33)), dot(b0, b0));
-  real noise = pi + real(4) * (longest + grain * sqrt(longest)) / sqrt(min(aa, bb));
-  c.C = clamp(resolved(turn, noise), real(-1), real(1));
-  c.guards = abs(turn) > real(1) ? GUARD_ANGLE : 0u;
+  real noise = pi + real(4) * (longest + grain * sqrt(longest)) / (sound ? sqrt(min(aa, bb)) : real(1));
+  c.C = sound ? clamp(resolved(turn, noise), real(-1), real(1)) : real(0);
+  c.guards = !sound ? GUARD_HINGE : abs(turn) > real(1) ? GUARD_ANGLE : 0u;
+  c.floor = real(0);
   c.gradient[0] = -l * a;
   c.gradient[1] = -l * b;
   c.gradient[2] = -a * dot(x[0] - x[3], u) - b * dot(x[1] - x[3], u);

@@ -1,11 +1,11 @@
 // Stretch: C = |x0 - x1| - rest, in metres (paper eqs. 4-5; method.md eq. 6).
 // Coincident vertices have no direction: they part along a pseudo-random one of their own.
-Constraint2 stretch(vec3 x[2], real rest, const uint id[2]) {
+Constraint2 stretch(vec3 x[2], real rest, Ids ids) {
   Constraint2 c;
   vec3 d = x[0] - x[1];
   real l = length(d);
   bool apart = l > real(1e-6) * rest;
-  vec3 n = apart ? d / l : any_direction(id[0], id[1]);
+  vec3 n = apart ? d / l : any_direction(id_of(ids, 0), id_of(ids, 1));
   c.guards = apart ? 0u : GUARD_DIRECTION;
   c.C = resolved(l - rest, rest + grain);
   c.gradient[0] = n;

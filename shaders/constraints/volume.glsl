@@ -2,7 +2,7 @@
 // (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a regular tet's at rest)
 // keeps the correction under about ten times the tet's size there. A tet on a line has no gradient at all: its vertices part in
 // pseudo-random directions.
-Constraint4 volume(vec3 x[4], real rest, const uint id[4]) {
+Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   Constraint4 c;
   vec3 a = x[1] - x[0];
   vec3 b = x[2] - x[0];
@@ -21,14 +21,12 @@ Constraint4 volume(vec3 x[4], real rest, const uint id[4]) {
   real sum = real(0);
   for (int j = 0; j < 4; ++j) sum += dot(c.gradient[j], c.gradient[j]);
   if (sum <= real(1e-10) * c.floor) {
-    // Pairs push each other apart, so momentum stays. Large, so that the step is small, a few hundredths of the tet: it is to
+    // Two pairs push each other apart, so momentum stays. Large, so that the step is small, a few hundredths of the tet: it is to
     // break the symmetry, and the true gradient takes over.
-    for (int j = 0; j < 4; ++j) {
-      vec3 push = vec3(real(0));
-      for (int other = 0; other < 4; ++other)
-        if (other != j) push += any_direction(id[j], id[other]);
-      c.gradient[j] = push * (real(5) * area);
-    }
+    c.gradient[0] = any_direction(id_of(ids, 0), id_of(ids, 1)) * (real(9) * area);
+    c.gradient[1] = -c.gradient[0];
+    c.gradient[2] = any_direction(id_of(ids, 2), id_of(ids, 3)) * (real(9) * area);
+    c.gradient[3] = -c.gradient[2];
     c.guards = GUARD_COLLAPSED;
   }
   return c;

@@ -1,5 +1,7 @@
 // How far edges, hinges and tets of one body are from rest (method.md eqs. 16-19).
 #include "metrics/reduce.glsl"
+#define Ids uint  // no guard asks here
+uint id_of(Ids ids, int j) { return 0u; }
 #include "constraints/types.glsl"
 #include "constraints/bend.glsl"
 layout(std430, binding = BIND_M_STRETCH) readonly buffer Stretch { Record2 edges[]; };

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "app/files.h"
 #include "app/measure_run.h"
@@ -37,20 +38,33 @@ void mark_non_finite(BenchRow& row, const NonFinite& found) {
 /// Frames as fast as they come: a step, and a picture of it if there is a target. One wait, at the end.
 void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer* renderer,
                  const Frame& view) {
-  std::vector<double> fps, gpu, wall;
+  std::vector<double> fps, gpu, wall, still;
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     reset(sim);
     sim.timed = false;
-    const auto frame = [&] {
-      step(sim);
+    const auto picture = [&] {
       if (!renderer) return;
       Frame now = view;
       now.positions = sim.current_positions().id();
       now.velocities = sim.velocities.id();
       draw(*renderer, now);
     };
+    const auto frame = [&] {
+      step(sim);
+      picture();
+    };
+    const auto time_picture = [&] {
+      if (!renderer) return;
+      const auto begin = Clock::now();
+      const long count = std::min(options.frames, 100L);
+      for (long f = 0; f < count; ++f) picture();
+      glFinish();
+      still.push_back(std::chrono::duration<double, std::milli>(Clock::now() - begin).count() /
+                      double(count));
+    };
     for (long f = 0; f < options.warm_up && !interrupted(); ++f) frame();
     glFinish();
+    time_picture();
     sim.timed = true;
     std::vector<double> steps;
     const auto begin = Clock::now();
@@ -68,7 +82,9 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
     fps.push_back(double(frames) / seconds);
     wall.push_back(seconds * 1e3 / double(frames));
     if (!steps.empty()) gpu.push_back(percentiles(steps).median);
+    time_picture();
   }
+  if (!still.empty()) row.draw_ms = std::accumulate(still.begin(), still.end(), 0.0) / double(still.size());
   row.fps = spread(fps);
   row.wall_ms = spread(wall);
   if (!gpu.empty()) row.gpu_ms = spread(gpu);
@@ -79,9 +95,10 @@ std::string csv_line(const BenchRow& r) {
     return known && std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string();
   };
   const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(r.scene), r.mode,
-                     r.constraints, r.iterations, r.substeps, r.size, r.vertices, r.tets,
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(r.scene), r.mode,
+                     r.constraints, r.iterations, r.substeps, r.size, r.picture, r.vertices, r.tets,
                      number(r.fps.median), number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
+                     number(r.draw_ms, r.draw_ms > 0),
                      number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu), r.dispatches,
                      r.gpu_bytes, number(r.max_volume_loss_percent));
 }
@@ -124,16 +141,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
   long done = 0;
   for (const auto& [scene, model] : scenes) {
     std::optional<Renderer> renderer;
-    std::optional<Target> target;
-    Frame view;
-    if (options.render) {
-      renderer = make_renderer(model->rest);
-      target = make_target(options.width, options.height, options.samples);
-      view.camera = scene_camera(scene, *model, float(options.width) / float(options.height));
-      view.viewport = {0, 0, options.width, options.height};
-      view.target = target->framebuffer.id();
-      if (scene.settings.ground) view.ground = float(scene.settings.ground_height);
-    }
+    if (!options.sizes.empty()) renderer = make_renderer(model->rest);
     for (const std::string& set : options.constraint_sets)
       for (const std::string& mode : options.modes)
         for (int iterations : options.iterations)
@@ -152,12 +160,25 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
             row.gpu_bytes = cost.bytes, row.dispatches = cost.dispatches_per_step;
             row.bytes_per_step = cost.bytes_per_step;
             error_run(row, sim, *model, options);
-            for (const bool render : {false, true}) {
-              if (render && !options.render) continue;
-              row.size = render ? fmt::format("{}x{}", options.width, options.height) : "";
-              if (!row.non_finite) time_frames(row, sim, options, render ? &*renderer : nullptr, view);
+            const auto add = [&](Renderer* drawn_by, const Frame& view) {
+              if (!row.non_finite) time_frames(row, sim, options, drawn_by, view);
               rows.push_back(row);
               if (report) report(row);
+            };
+            add(nullptr, {});
+            for (const auto& [width, height] : options.sizes) {
+              const Target target = make_target(width, height, options.samples);
+              Frame view;
+              view.camera = scene_camera(scene, *model, float(width) / float(height));
+              view.viewport = {0, 0, width, height};
+              view.target = target.framebuffer.id();
+              if (settings.ground) view.ground = float(settings.ground_height);
+              for (const std::string& picture : options.pictures) {
+                row.size = fmt::format("{}x{}", width, height);
+                row.picture = picture;
+                view.options = picture == "plain" ? plain_view({}) : ViewOptions{};
+                add(&*renderer, view);
+              }
             }
             progress.update(++done);
           }
@@ -167,7 +188,8 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
 
 std::string bench_csv(const std::vector<BenchRow>& rows) {
   std::string csv =
-      "scene,mode,constraints,iterations,substeps,size,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_step,"
+      "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_"
+      "step,draw_ms,"
       "gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n";
   for (const BenchRow& row : rows) csv += csv_line(row);
   return csv;
@@ -185,8 +207,8 @@ int run_bench(const BenchOptions& options) {
       device.software ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
                       : ", OpenGL " + device.version,
       options.frames, options.warm_up, options.repeats);
-  fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", "scene", "mode", "constraints",
-             "iter", "sub", "size", "fps", "GPU us", "us/iter", "loss %");
+  fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", "scene", "mode",
+             "constraints", "iter", "sub", "picture", "fps", "GPU us", "us/iter", "draw us", "loss %");
   std::vector<BenchRow> rows;
   const auto report = [&](const BenchRow& row) {
     rows.push_back(row);
@@ -194,9 +216,11 @@ int run_bench(const BenchOptions& options) {
       return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
     };
     const std::string fps = row.non_finite ? "-" : fmt::format("{:.1f}", row.fps.median);
-    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>11}{:>11}{:>11}{:>10}{:>11}\n", row.scene, row.mode,
-               row.constraints, row.iterations, row.substeps, row.size.empty() ? "none" : row.size, fps,
-               gpu(1e3 * row.gpu_ms.median), gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
+    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", row.scene, row.mode,
+               row.constraints, row.iterations, row.substeps,
+               row.size.empty() ? "none" : row.size + " " + row.picture, fps, gpu(1e3 * row.gpu_ms.median),
+               gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
+               row.draw_ms > 0 ? fmt::format("{:.1f}", 1e3 * row.draw_ms) : "-",
                std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
                                                           : "-");
     std::fflush(stdout);
@@ -220,11 +244,13 @@ int run_bench(const BenchOptions& options) {
                     {"iterations", r.iterations},
                     {"substeps", r.substeps},
                     {"size", r.size},
+                    {"picture", r.picture},
                     {"vertices", r.vertices},
                     {"tets", r.tets},
                     {"fps", triple(r.fps)},
                     {"gpu_ms_per_step", triple(r.gpu_ms)},
                     {"wall_ms_per_step", triple(r.wall_ms)},
+                    {"draw_ms", r.draw_ms > 0 ? nlohmann::ordered_json(r.draw_ms) : nlohmann::ordered_json()},
                     {"dispatches_per_step", r.dispatches},
                     {"bytes_per_step", r.bytes_per_step},
                     {"gpu_bytes", r.gpu_bytes},

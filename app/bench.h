@@ -2,6 +2,7 @@
 // same setting.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -22,20 +23,22 @@ struct BenchOptions {
   std::vector<int> substeps = {1};
   long frames = 400, warm_up = 50;
   int repeats = 3;
-  double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)
-  bool render = true;       ///< also with rendering
-  int width = 1280, height = 720, samples = 0;
+  double most_seconds = 5;                ///< a repetition stops there, with fewer frames (slow CPU modes)
+  std::vector<std::array<int, 2>> sizes;  ///< of rendered frames, in pixels; none: no rendering
+  std::vector<std::string> pictures = {"plain", "full"};  ///< rendered at each size
+  int samples = 0;
   int gpu = -1;
   std::filesystem::path out = "bench";
   SceneOverrides overrides;  ///< for every scene
 };
 
 struct BenchRow {
-  std::string scene, mode, constraints, size;  ///< size empty: no rendering
+  std::string scene, mode, constraints, size, picture;  ///< the last two empty: no rendering
   int iterations = 1, substeps = 1;
   std::size_t vertices = 0, tets = 0, gpu_bytes = 0;
   Percentiles fps;              ///< over repetitions: median, smallest (p05), largest (p95)
-  Percentiles gpu_ms, wall_ms;  ///< a step
+  Percentiles gpu_ms, wall_ms;  ///< a step; a frame
+  double draw_ms = 0;           ///< a frame whose state stands still: clearing and drawing alone
   long dispatches = 0;
   std::size_t bytes_per_step = 0;       ///< read and written by all dispatches; caches may serve part of it
   double max_volume_loss_percent = 0;   ///< NaN where the error run was cut short

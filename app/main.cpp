@@ -42,7 +42,7 @@ struct SceneArguments {
   int width = 1280, height = 720, samples = 4;
   bool explain = false;
   std::string look = "surface", colour = "plain";
-  bool flat = false, no_shadow = false, no_grid = false, no_legend = false;
+  bool flat = false, no_shadow = false, no_grid = false, no_legend = false, plain = false;
   ViewOptions view;
 };
 
@@ -121,6 +121,7 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
   command.add_flag("--no-shadow", a.no_shadow, "no shadow")->group("View");
   command.add_flag("--no-grid", a.no_grid, "no lines on the ground")->group("View");
   command.add_flag("--no-legend", a.no_legend, "no colour bar")->group("View");
+  command.add_flag("--plain", a.plain, "the cheapest picture: flat faces on one colour")->group("View");
   command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches, and stop");
 }
 
@@ -146,10 +147,11 @@ Scene scene_of(SceneArguments& a) {
   parse_size(a.size, a.width, a.height);
   a.view.look = Look(index_of(look_names, a.look, "--look"));
   a.view.colour = Colour(index_of(colour_names, a.colour, "--colour"));
-  a.view.smooth_normals = !a.flat;
-  a.view.shadow = !a.no_shadow;
-  a.view.grid = !a.no_grid;
-  a.view.legend = !a.no_legend;
+  if (a.plain) a.view = plain_view(a.view);
+  if (a.flat) a.view.smooth_normals = false;
+  if (a.no_shadow) a.view.shadow = false;
+  if (a.no_grid) a.view.grid = false;
+  if (a.no_legend) a.view.legend = false;
   for (std::size_t i = 0; i < parameters().size(); ++i)
     if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
   return load_scene(a.scene, a.overrides);
@@ -210,7 +212,7 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
 
   auto* bench = app.add_subcommand("bench", "fps and ms a step, the paper's protocol and ours");
   BenchOptions bench_options;
-  std::string bench_size = "1280x720";
+  std::vector<std::string> bench_sizes = {"1280x720"};
   bool no_render = false;
   bench->add_option("--scenes,--scene", bench_options.scenes, "scenes, separated by commas")
       ->delimiter(',')
@@ -243,7 +245,15 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
                    "a repetition ends there with fewer frames; 12 times that bounds the error run")
       ->check(in_range(0.01, 1e6))
       ->capture_default_str();
-  bench->add_option("--size", bench_size, "of the rendered frames, WxH")->capture_default_str();
+  bench->add_option("--sizes,--size", bench_sizes, "of the rendered frames, WxH, separated by commas")
+      ->delimiter(',')
+      ->capture_default_str();
+  bench
+      ->add_option("--pictures", bench_options.pictures,
+                   "plain (flat faces on one colour), full (as run draws it), separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"plain", "full"}))
+      ->capture_default_str();
   bench->add_option("--samples", bench_options.samples, "of MSAA: 0, 2, 4, 8")
       ->check(CLI::IsMember({0, 2, 4, 8}))
       ->capture_default_str();
@@ -354,8 +364,11 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   if (*info) return [=] { return print_info(info_gpu); };
   if (*mesh) return [=] { return run_mesh_command(mesh_file, mesh_switches, mesh_out, mesh_json); };
   if (*bench) {
-    parse_size(bench_size, bench_options.width, bench_options.height);
-    bench_options.render = !no_render;
+    for (const std::string& size : bench_sizes) {
+      bench_options.sizes.emplace_back();
+      parse_size(size, bench_options.sizes.back()[0], bench_options.sizes.back()[1]);
+    }
+    if (no_render) bench_options.sizes.clear();
     return [=] { return run_bench(bench_options); };
   }
   if (*reproduce) return [=] { return run_reproduce(reproduce_options); };

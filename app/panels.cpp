@@ -264,6 +264,7 @@ void draw_view(Session& s, Ui& ui) {
   ImGui::Checkbox("shadow", &view.shadow);
   mark(s, ui, "shadow");
   ImGui::Checkbox("grid", &view.grid);
+  ImGui::Checkbox("sky and ground", &view.backdrop);
   mark(s, ui, "grid");
   ImGui::SameLine(column);
   ImGui::Checkbox("legend", &view.legend);

@@ -326,7 +326,8 @@ void speed(Report& report, const BenchOptions& options, const std::string& title
     BarChart chart;
     chart.title = what;
     chart.subtitle =
-        rendered ? fmt::format("with rendering at {}x{}", options.width, options.height) : "simulation alone";
+        rendered ? fmt::format("with rendering at {}x{}", options.sizes.at(0)[0], options.sizes.at(0)[1])
+                 : "simulation alone";
     chart.y_label = "frames a second (log)";
     chart.groups = options.scenes;
     for (const std::string& mode : options.modes) {
@@ -387,7 +388,7 @@ int run_reproduce(const ReproduceOptions& options) {
 
   BenchOptions bench;
   bench.scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
-  bench.width = 640, bench.height = 480;
+  bench.sizes = {{640, 480}}, bench.pictures = {"full"};
   bench.repeats = options.quick ? 1 : 3;
   bench.most_seconds = options.quick ? 0.5 : 2;
   bench.iterations = {1};

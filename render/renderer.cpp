@@ -79,7 +79,7 @@ void prepare(Renderer& renderer, const Frame& frame) {
   if ((options.shadow || (tets && options.explode > 0)) && !renderer.shadow.light)
     make_bounds(renderer.shadow);
   if (options.shadow && !renderer.shadow.depth) make_map(renderer.shadow);
-  need(renderer.background, [] { return screen_program("background"); });
+  if (options.backdrop) need(renderer.background, [] { return screen_program("background"); });
   if (frame.ground || !frame.planes.empty()) need(renderer.plane, [] { return screen_program("plane"); });
   if (!frame.pinned.empty() || !frame.grabbed.empty())
     need(renderer.dot, [] { return screen_program("dots"); });
@@ -293,11 +293,14 @@ void draw(Renderer& renderer, const Frame& frame) {
   glEnable(GL_SCISSOR_TEST);  // so that clearing leaves a neighbouring viewport alone
   glEnable(GL_FRAMEBUFFER_SRGB);
   glDepthMask(GL_TRUE);
-  glClear(GL_DEPTH_BUFFER_BIT);
+  glClearColor(0.7f, 0.73f, 0.76f, 1.0f);
+  glClear(options.backdrop ? GL_DEPTH_BUFFER_BIT : GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
   glDisable(GL_DEPTH_TEST);
   glBindVertexArray(renderer.empty_array.id());
-  renderer.background.use();
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  if (options.backdrop) {
+    renderer.background.use();
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
 
   for (const auto& [unit, sampler] :
        {std::pair{UNIT_SHADOW, &renderer.shadow.compared}, {UNIT_SHADOW_DEPTH, &renderer.shadow.plain}}) {
@@ -310,8 +313,10 @@ void draw(Renderer& renderer, const Frame& frame) {
   glDepthFunc(GL_LESS);
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
-  if (frame.ground) draw_plane(renderer, frame, glm::vec4(0.0f, 1.0f, 0.0f, *frame.ground), false);
-  for (const glm::vec4& plane : frame.planes) draw_plane(renderer, frame, plane, true);
+  if (options.backdrop) {
+    if (frame.ground) draw_plane(renderer, frame, glm::vec4(0.0f, 1.0f, 0.0f, *frame.ground), false);
+    for (const glm::vec4& plane : frame.planes) draw_plane(renderer, frame, plane, true);
+  }
   glDisable(GL_BLEND);
   draw_bodies(renderer, frame, options.look == Look::tets ? renderer.tets_body : renderer.surface);
   glEnable(GL_BLEND);

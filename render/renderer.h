@@ -33,6 +33,7 @@ struct ViewOptions {
   bool smooth_normals = true;
   bool shadow = true;
   bool grid = true;      ///< lines on the ground and on walls
+  bool backdrop = true;  ///< sky, ground and walls; without: one colour
   bool legend = true;    ///< drawn with every colour but plain
   double shrink = 0.15;  ///< tets: each towards its centre, 0..1
   double explode = 0;    ///< tets: away from the bodies' centre, as a part of their distance from it
@@ -44,6 +45,12 @@ struct ViewOptions {
   ColourRange stretch{-0.2, 0.2};              ///< L/L0 - 1
   ColourRange velocity{0, 5};                  ///< m/s
 };
+
+/// The cheapest picture: flat faces on one colour, and nothing else.
+inline ViewOptions plain_view(ViewOptions view) {
+  view.smooth_normals = view.shadow = view.grid = view.legend = view.backdrop = false;
+  return view;
+}
 
 /// Vertices of one of several bodies in one mesh.
 struct BodyRange {

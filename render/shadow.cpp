@@ -10,7 +10,7 @@ namespace tetpbd {
 void make_bounds(Shadow& shadow) {
   shadow.bounds_kernel = Program::compute("render/bounds.comp");
   shadow.fit_kernel = Program::compute("render/shadow_fit.comp");
-  shadow.bounds = Buffer("bounds", 6 * sizeof(std::uint32_t));
+  shadow.bounds = Buffer("bounds", std::vector<std::uint32_t>{~0u, ~0u, ~0u, 0, 0, 0});
   shadow.light = Buffer("light", sizeof(Light));
 }
 
@@ -43,8 +43,6 @@ void make_map(Shadow& shadow) {
 }
 
 void fit(const Shadow& shadow, GLuint positions, std::size_t vertices, const glm::vec4& limit) {
-  const std::array<std::uint32_t, 6> empty{~0u, ~0u, ~0u, 0, 0, 0};
-  shadow.bounds.write(0, sizeof empty, empty.data());
   shadow.bounds_kernel.use();
   shadow.bounds_kernel.set("count", unsigned(vertices));
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);

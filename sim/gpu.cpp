@@ -172,7 +172,7 @@ Capabilities load_gl() {
 // buffers
 
 Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
-    : bytes_(bytes), label_(std::move(label)) {
+    : bytes_(bytes), label_(std::move(label)), whole_at_once_(usage == GL_STREAM_DRAW) {
   clear_errors();
   glGenBuffers(1, &id_);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
@@ -200,6 +200,11 @@ Buffer::~Buffer() {
 // Kernels queued before may still read or write the buffer (docs/barriers.md).
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  if (whole_at_once_ && offset == 0 && bytes == bytes_) {
+    glBindBuffer(GL_COPY_WRITE_BUFFER, id_);
+    glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(bytes), data, GL_STREAM_DRAW);
+    return;
+  }
   // Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old
   // bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
   GLuint staging = 0;

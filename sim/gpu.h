@@ -107,10 +107,13 @@ class Buffer {
  private:
   void swap(Buffer& other) noexcept {
     std::swap(id_, other.id_), std::swap(bytes_, other.bytes_), std::swap(label_, other.label_);
+    std::swap(whole_at_once_, other.whole_at_once_);
   }
   GLuint id_ = 0;
   std::size_t bytes_ = 0;
   std::string label_;
+  bool whole_at_once_ =
+      false;  ///< GL_STREAM_DRAW: a write of all of it gets new memory, which nothing waits for
 };
 
 /// Values of `$NAME` in a shader's text, put in before it is compiled: {"KIND", "stretch"} makes gather_$KIND

@@ -376,13 +376,14 @@ TEST_CASE(
       folder);
   REQUIRE(run.status == 0);
   const json bench = json::parse(read(folder.path / "b/bench.json"));
-  CHECK(bench["rows"].size() == 3 * 2 * 2 * 2);
+  CHECK(bench["rows"].size() == 3 * 2 * 2 * 3);
   if (bench["device"]["software"] == true) CHECK(run.out.find("SOFTWARE") != std::string::npos);
   const std::string csv = read(folder.path / "b/bench.csv");
   CHECK(csv.starts_with(
-      "scene,mode,constraints,iterations,substeps,size,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_step,"
-      "gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n"));
-  CHECK(std::count(csv.begin(), csv.end(), '\n') == 25);
+      "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
+      "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_"
+      "percent\n"));
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == 37);
   for (const json& row : bench["rows"]) {
     const int iterations = row["iterations"], kinds = row["constraints"] == "stretch" ? 1 : 3;
     CHECK(row["fps"]["median"].get<double>() > 0);
@@ -391,6 +392,7 @@ TEST_CASE(
     CHECK(row["dispatches_per_step"] == (row["mode"] == "cpu"    ? 0
                                          : row["mode"] == "node" ? iterations
                                                                  : 2 + iterations * (kinds + 1)));
+    CHECK((row["picture"] == "") == row["draw_ms"].is_null());
     CHECK((row["gpu_ms_per_step"]["median"].get<double>() > 0) == (row["mode"] != "cpu"));
   }
 }

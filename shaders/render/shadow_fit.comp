@@ -2,7 +2,7 @@
 // shadow edges do not crawl while a body moves.
 #include "render/view.glsl"
 layout(local_size_x = 1) in;
-layout(std430, binding = BIND_RENDER_BOUNDS) readonly buffer Bounds { uint bounds[6]; };
+layout(std430, binding = BIND_RENDER_BOUNDS) buffer Bounds { uint bounds[6]; };
 layout(std430, binding = BIND_RENDER_FIT) writeonly buffer Fit { Light fitted; };
 uniform float map_size;  // texels
 uniform vec4 limit;      // centre and radius of what is worth a shadow
@@ -15,6 +15,7 @@ void main() {
     low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w, limit.xyz + limit.w);
     high = clamp(vec3(decoded(bounds[3]), decoded(bounds[4]), decoded(bounds[5])), limit.xyz - limit.w, limit.xyz + limit.w);
   }
+  for (int a = 0; a < 3; ++a) bounds[a] = ~0u, bounds[3 + a] = 0u;  // for the next picture
   vec3 centre = 0.5 * (low + high);
   vec3 half_size = max(0.5 * (high - low) * (1.0 + view.tets.y), vec3(1e-4 * limit.w));
   vec3 z = key_direction;

@@ -13,8 +13,8 @@ void main() {
   uint me = gl_LocalInvocationIndex;
   bool some = group_index() < $PATCHESu;
   uint part = some ? (turn.x >> PHASE_BITS) * $PATCHESu + group_index() : 0u;
-  uint i = $SUMMEDu * group_index() + me;
-  bool mine = me < $SUMMEDu && i < params.vertex_count;
+  uint i = parts[$PART_WORDSu * part + 2u] + me;
+  bool mine = some && me < parts[$PART_WORDSu * part + 1u];
   vec3 correction = vec3(0.0);
   if ((turn.x & PHASE_SOLVE) != 0u) {
     float share = params.omega;

@@ -140,6 +140,41 @@ struct Incidence {
   }
 };
 
+// Where patches of at most `own` consecutive vertices begin, and the end: fewer vertices where these and the
+// ones that share a constraint with them would not fit a part.
+std::vector<std::size_t> starts_of_patches(const ConstraintSystem& system,
+                                           const std::vector<Incidence>& incidence, std::size_t own) {
+  const std::size_t vertices = system.at_vertex.size();
+  std::vector<std::size_t> starts;
+  std::vector<std::uint32_t> last(vertices);  // patch that had the vertex last, from 1 on
+  std::vector<std::uint32_t> added;
+  std::size_t held = 0;
+  const auto add = [&](std::size_t v) {
+    const auto hold = [&](std::size_t u) {
+      if (last[u] != starts.size()) last[u] = std::uint32_t(starts.size()), added.push_back(std::uint32_t(u));
+    };
+    added.clear();
+    hold(v);
+    for (std::size_t k = 0; k < system.lists.size(); ++k) {
+      const ConstraintList& list = system.lists[k];
+      const std::size_t arity = std::size_t(list.arity);
+      for (std::size_t at = incidence[k].first[v]; at < incidence[k].first[v + 1]; ++at)
+        for (std::size_t j = 0; j < arity; ++j) hold(list.vertices[incidence[k].constraints[at] * arity + j]);
+    }
+    held += added.size();
+  };
+  for (std::size_t v = 0; v < vertices; ++v) {
+    if (!starts.empty() && v - starts.back() < own) add(v);
+    if (starts.empty() || v - starts.back() == own || held > Patches::most_vertices) {
+      starts.push_back(v);
+      held = 0;
+      add(v);
+    }
+  }
+  starts.push_back(vertices);
+  return starts;
+}
+
 }  // namespace
 
 Patches constraint_patches(const Model& model, const ConstraintSystem& system, std::size_t most) {
@@ -169,12 +204,13 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own, int grou
   PartWriter writer(system, patches);
   std::vector<Incidence> incidence;
   for (const ConstraintList& list : system.lists) incidence.emplace_back(list, vertices);
-  patches.count = (vertices + own - 1) / own;
+  const std::vector<std::size_t> starts = starts_of_patches(system, incidence, own);
+  patches.count = starts.size() - 1;
   patches.parts.resize(patches.count * std::size_t(groups) * patches.part_words);
   std::vector<std::uint32_t> found;
   for (std::size_t g = 0; g < std::size_t(groups); ++g)
     for (std::size_t p = 0; p < patches.count; ++p) {
-      const std::size_t first = p * own, end = std::min(first + own, vertices);
+      const std::size_t first = starts[p], end = starts[p + 1];
       std::size_t part = g * patches.count + p;
       const auto begin_part = [&] {
         for (std::size_t v = first; v < end; ++v) writer.vertex(std::uint32_t(v));

@@ -100,7 +100,7 @@ TEST_CASE(
   };
   const Case cases[] = {{make_block({1, 0.7, 0.5}, {8, 6, 4}), 1, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 17, false},
-                        {make_block({1, 0.7, 0.5}, {8, 6, 4}), 200, true},
+                        {make_block({1, 0.7, 0.5}, {8, 6, 4}), 200, false},
                         {wheel(300), 16, true}};
   for (const Case& c : cases)
     for (int groups : {1, 5}) {

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "app/files.h"
+#include "app/floors.h"
 #include "app/measure_run.h"
 #include "app/progress.h"
 #include "render/target.h"
@@ -202,11 +203,14 @@ int run_bench(const BenchOptions& options) {
   const Capabilities& device = context.capabilities();
   fmt::print(
       "{}{}\n{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing "
-      "waits between frames\n\n",
+      "waits between frames\n",
       device.renderer,
       device.software ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
                       : ", OpenGL " + device.version,
       options.frames, options.warm_up, options.repeats);
+  const Floors floors = measure_floors(device.software);
+  fmt::print("floors: {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n\n", floors.dispatch_us,
+             floors.copy_gb_s);
   fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", "scene", "mode",
              "constraints", "iter", "sub", "picture", "fps", "GPU us", "us/iter", "draw us", "loss %");
   std::vector<BenchRow> rows;
@@ -259,11 +263,13 @@ int run_bench(const BenchOptions& options) {
                     {"non_finite", non_finite_json(r.non_finite)}});
   }
   write_file(options.out / "bench.csv", bench_csv(rows));
-  const nlohmann::ordered_json document = {{"device", device_json(device)},
-                                           {"frames", options.frames},
-                                           {"warm_up", options.warm_up},
-                                           {"repeats", options.repeats},
-                                           {"rows", list}};
+  const nlohmann::ordered_json document = {
+      {"device", device_json(device)},
+      {"frames", options.frames},
+      {"warm_up", options.warm_up},
+      {"repeats", options.repeats},
+      {"floors", {{"dispatch_us", floors.dispatch_us}, {"copy_gb_s", floors.copy_gb_s}}},
+      {"rows", list}};
   write_file(options.out / "bench.json", json_text(document, 1) + "\n");
   fmt::print("\n{}\n", (options.out / "bench.csv").string());
   for (const BenchRow& r : rows)

@@ -4,17 +4,9 @@
 
 namespace tetpbd {
 
-namespace {
-
-// Constraints of a patch. A small mesh needs patches for every part of the GPU; a large one gains from large
-// patches, whose vertices are read and added to once.
-unsigned patch_for(std::size_t constraints) { return constraints <= 200000 ? 256 : 512; }
-
-}  // namespace
-
 Solver create_constraint_solver(const SolverInput& input) {
   Solver solver;
-  const Cut cut = tuned({patch_for(input.system.count()), 128}, input.tuning);
+  const Cut cut = tuned({256, 128}, input.tuning);
   const Patches patches = constraint_patches(input.model, input.system, cut.patch);
   if (patches.count > 0) {
     add_patches(solver, input, patches, "solve_constraint.comp", cut.group, false);

@@ -377,6 +377,8 @@ TEST_CASE(
   REQUIRE(run.status == 0);
   const json bench = json::parse(read(folder.path / "b/bench.json"));
   CHECK(bench["rows"].size() == 3 * 2 * 2 * 3);
+  CHECK(bench["floors"]["dispatch_us"].get<double>() > 0);
+  CHECK(bench["floors"]["copy_gb_s"].get<double>() > 0);
   if (bench["device"]["software"] == true) CHECK(run.out.find("SOFTWARE") != std::string::npos);
   const std::string csv = read(folder.path / "b/bench.csv");
   CHECK(csv.starts_with(

@@ -1,8 +1,8 @@
 #include "collision.glsl"
 float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
 bool touches(Pair x) {
-  bool any = false;
-  for (int k = 0; k < params.plane_count; ++k) any = any || depth_of(x, params.planes[k]) < 0.0;
+  bool any = params.plane_count > 0 && depth_of(x, params.planes[0]) < 0.0;  // mostly there is one, or none
+  for (int k = 1; k < params.plane_count; ++k) any = any || depth_of(x, params.planes[k]) < 0.0;
   return any;
 }
 // Corrects a vertex out of all half spaces; `moved`: its displacement in this substep before the correction.

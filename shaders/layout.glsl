@@ -40,7 +40,7 @@ struct Step {
   float unit;             // m, one unit of a place: a power of two
   float inverse_unit;     // 1/m
   float position_grain;   // m, the size whose rounding is one unit (constraints/types.glsl)
-  float _0;
+  float mass_splitting;   // 1: neighbours see n_i w_i, not w_i
   vec4 stiffness[2];      // by constraint kind
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
 };

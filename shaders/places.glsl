@@ -1,4 +1,4 @@
-// A place: a position in whole units, modulo 2^32 in each component, with the inverse mass as float bits. Differences of
+// A place: a position in whole units, modulo 2^32 in each component, with the inverse mass (times n_i for mass splitting) as float bits. Differences of
 // places wrap as well, so they are exact wherever the body is, as long as the vertices of a constraint are within 2^31 units
 // of each other (method.md, "What neighbours see").
 // Read from one buffer and written to another (or the same, where nobody reads in the dispatch that writes).
@@ -8,13 +8,13 @@ layout(std430, binding = BIND_PLACES_OUT) restrict writeonly buffer PlacesOut { 
 layout(location = 0) uniform uvec2 turn;
 
 // Halves of 16 bits: a float holds neither 2^32 nor a small negative number plus 2^32.
-ivec4 place_of(Pair x, float inverse_mass) {
+ivec4 place_of(Pair x, float weight) {
   vec3 units = x.high * params.inverse_unit;
   vec3 upper = floor(units / 65536.0);
   vec3 lower = (units - upper * 65536.0) + x.low * params.inverse_unit;
   upper -= floor(upper / 65536.0) * 65536.0;
   uvec3 place = uvec3(upper) * 65536u + uvec3(ivec3(floor(lower + 0.5)));
-  return ivec4(ivec3(place), floatBitsToInt(inverse_mass));
+  return ivec4(ivec3(place), floatBitsToInt(weight));
 }
 float inverse_mass_of(ivec4 place) { return intBitsToFloat(place.w); }
 // a - b in metres.

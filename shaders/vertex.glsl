@@ -14,10 +14,13 @@ Pair predict_position(Pair x, Pair v) {
   precise vec3 move = params.h * v.high;
   return pair_add(pair_add(x, move), params.h * v.low);
 }
+// The inverse mass that constraints see. With mass splitting (Tonge et al. 2012) each of n_i constraints has 1/n_i of the mass: the
+// average over them then keeps momentum (method.md eq. 13m).
+float weight_of(Position own) { return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass; }
 ivec4 predicted_place(Position own, Velocity speed) {
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) x = predict_position(x, predict_velocity(Pair(speed.high, speed.low)));
-  return place_of(x, own.inverse_mass);
+  return place_of(x, weight_of(own));
 }
 
 // Moves vertex i, which is not fixed; returns where its neighbours see it.
@@ -56,5 +59,5 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) x = moved(i, own, speed, correction);
   else if ((turn.x & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
-  places_out[i] = place_of(x, own.inverse_mass);
+  places_out[i] = place_of(x, weight_of(own));
 }

@@ -91,6 +91,7 @@ class CpuPbd {
     constexpr std::size_t arity = std::size_t(Kind::arity);
     using vec = glm::vec<3, real>;
     const real k = real(settings.*Kind::stiffness), limit = real(model_.size);
+    const bool split = settings.mass_splitting && sweep == Sweep::jacobi;
     Formulas<real> formulas;
     for (const auto& item : std::get<Batch<Kind, real>>(batches_).items) {
       vec local[arity];
@@ -98,6 +99,7 @@ class CpuPbd {
       for (std::size_t j = 0; j < arity; ++j) {
         local[j] = vec(x[item.vertices[j]] - x[item.vertices[0]]);
         w[j] = inverse_masses_[item.vertices[j]];
+        if (split) w[j] *= real(at_vertex_[item.vertices[j]]);
       }
       const auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
       const real lambda = formulas.multiplier(c, w, k, limit);

@@ -13,6 +13,7 @@ struct Settings {
   std::string constraints = "stretch,bend,volume";
   double k_stretch = 1, k_bend = 1, k_volume = 1;
   double omega = 1.5;
+  bool mass_splitting = false;
   int groups = 8;
   int iterations = 25;
   int substeps = 1;

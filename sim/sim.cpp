@@ -57,6 +57,7 @@ void write_step_block(Sim& sim) {
   block.keep = float(std::exp(-s.damping * h));
   block.limit = float(sim.model->size);
   block.delta_unit = float(sim.model->size / double(1 << 30));
+  block.mass_splitting = s.mass_splitting && s.mode != "groups";
   block.unit = float(sim.unit);
   block.inverse_unit = float(1 / sim.unit);
   block.position_grain = float(sim.unit / double(std::numeric_limits<float>::epsilon()));

@@ -281,7 +281,7 @@ TEST_CASE("faults: interrupted, what was finished is whole") {
              "bench",
              "--constraint-sets",
              "stretch"},
-            SIGINT, printed(6));
+            SIGINT, printed(7));
   CHECK(nlohmann::json::parse(content(folder.path / "bench/bench.json"))["rows"].size() >= 2);
   {
     Program program(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", many,

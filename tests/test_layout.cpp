@@ -42,8 +42,8 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(Velocity));
 
-  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"},    {"BINDING", "7"},
-                         {"KIND_ROW", "0"},  {"GROUP", "1024"}, {"KIND_COLUMN", "2"}};
+  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"},       {"BINDING", "7"}, {"KIND_ROW", "0"},
+                         {"GROUP", "1024"},  {"KIND_COLUMN", "2"}, {"COUNT", "7"}};
   const Program volume = Program::compute("solve_paper.comp", {words, {}});
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
         offsetof(layout::Record4, rest));

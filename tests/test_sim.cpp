@@ -110,6 +110,7 @@ TEST_CASE("one GPU step is the double CPU step, for each constraint kind, mode a
         CAPTURE(kinds);
         CAPTURE(cells.x);
         Settings settings = quick(mode, 3, 2);
+        settings.mass_splitting = cells.x == 4;
         settings.constraints = std::string(kinds) == "none" ? "" : kinds;
         Sim sim = create_sim(block_model(cells, -0.01, 1, "stretch:1.3"), settings);
         const State expected = reference_after(sim, 1, Sweep::jacobi);
@@ -123,6 +124,35 @@ TEST_CASE("one GPU step is the double CPU step, for each constraint kind, mode a
         CHECK(dv < 1e-3);
         if (std::string(kinds) != "none") CHECK(distance(after, before) > 1e-3);
       }
+}
+
+TEST_CASE("mass splitting keeps the momentum that averaging loses") {
+  GlTest gl;
+  for (const char* mode : {"node", "constraint"}) {
+    CAPTURE(mode);
+    double shift[2];
+    for (const bool split : {false, true}) {
+      Settings settings = quick(mode);
+      settings.gravity = 0;
+      settings.ground = false;
+      settings.mass_splitting = split;
+      Sim sim = create_sim(block_model({8, 6, 4}, 1, 1, "random"), settings);
+      const auto centre = [&] {
+        glm::dvec3 sum(0);
+        double mass = 0;
+        const State state = read_state(sim);
+        for (std::size_t i = 0; i < state.positions.size(); ++i)
+          sum += sim.model->masses[i] * state.positions[i], mass += sim.model->masses[i];
+        return sum / mass;
+      };
+      const glm::dvec3 before = centre();
+      for (int s = 0; s < 400; ++s) step(sim);
+      shift[split] = glm::length(centre() - before) / sim.model->size;
+    }
+    MESSAGE("the centre went " << shift[0] << " of the size, with mass splitting " << shift[1]);
+    CHECK(shift[0] > 1e-3);
+    CHECK(shift[1] < 1e-5);
+  }
 }
 
 TEST_CASE("one step of mode groups is Gauss-Seidel between groups in double, averaged inside each") {

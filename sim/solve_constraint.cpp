@@ -6,7 +6,8 @@ namespace tetpbd {
 
 Solver create_constraint_solver(const SolverInput& input) {
   Solver solver;
-  const Cut cut = tuned({256, 128}, input.tuning);
+  // A small mesh needs patches for every part of the GPU.
+  const Cut cut = tuned({input.system.count() <= 150000 ? 128u : 256u, 128}, input.tuning);
   const Patches patches = constraint_patches(input.model, input.system, cut.patch);
   if (patches.count > 0) {
     add_patches(solver, input, patches, "solve_constraint.comp", cut.group, false);

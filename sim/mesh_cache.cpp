@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "sim/bytes.h"
+#include "sim/parallel.h"
 
 namespace tetpbd {
 namespace {
@@ -18,17 +20,24 @@ constexpr CacheMagic magic{'t', 'e', 't', 'p', 'b', 'd', 'M', '1'};
 
 // Damage passes the checksum only by malice, but a cache folder may be shared: what is taken is a mesh.
 bool is_sound(const TetMesh& mesh) {
-  const auto in_range = [&](const auto& elements) {
-    for (const auto& element : elements)
-      for (const std::uint32_t v : element)
-        if (v >= mesh.positions.size()) return false;
-    return true;
+  std::atomic<bool> sound = !mesh.tets.empty();
+  const auto require = [&sound](std::size_t count, const auto& holds) {
+    parallel_for(count, [&](std::size_t first, std::size_t end) {
+      for (std::size_t i = first; i < end; ++i)
+        if (!holds(i)) sound = false;
+    });
   };
-  const auto has_volume = [&](const Tet& tet) { return tet_volume(mesh, tet) > 0; };  // false for NaN as well
-  return !mesh.tets.empty() && in_range(mesh.tets) && in_range(mesh.surface) &&
-         std::all_of(mesh.tets.begin(), mesh.tets.end(), has_volume) &&
-         std::all_of(mesh.positions.begin(), mesh.positions.end(),
-                     [](const glm::dvec3& p) { return glm::length(p) < largest_coordinate; });
+  const auto in_range = [&](const auto& element) {
+    return std::all_of(element.begin(), element.end(),
+                       [&](std::uint32_t v) { return v < mesh.positions.size(); });
+  };
+  require(mesh.tets.size(), [&](std::size_t i) {
+    return in_range(mesh.tets[i]) && tet_volume(mesh, mesh.tets[i]) > 0;  // false for NaN as well
+  });
+  require(mesh.surface.size(), [&](std::size_t i) { return in_range(mesh.surface[i]); });
+  require(mesh.positions.size(),
+          [&](std::size_t i) { return glm::length(mesh.positions[i]) < largest_coordinate; });
+  return sound;
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "sim/mesh_cache.h"
 
+#include <assimp/version.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 
 #include "sim/bytes.h"
 #include "sim/parallel.h"
+#include "sim/text_file.h"
 
 namespace tetpbd {
 namespace {
@@ -17,6 +19,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view maker = "tetpbd cache 1, TetGen 1.5.0";
 
 constexpr CacheMagic magic{'t', 'e', 't', 'p', 'b', 'd', 'M', '1'};
+constexpr CacheMagic source_magic{'t', 'e', 't', 'p', 'b', 'd', 'S', '1'};
 
 // Damage passes the checksum only by malice, but a cache folder may be shared: what is taken is a mesh.
 bool is_sound(const TetMesh& mesh) {
@@ -76,6 +79,37 @@ std::optional<TetMesh> read_mesh(const CacheKey& key) {
   const std::optional<std::string> bytes = read_cached(mesh_file(key), most);
   if (!bytes) return {};
   return parse_mesh(*bytes, key);
+}
+
+std::optional<CacheKey> source_key(const fs::path& surface, const std::string& switches) {
+  constexpr std::size_t most = std::size_t{1} << 30;  // parsing a larger one takes what hashing saves
+  const std::optional<std::string> content = read_cached(surface, most);
+  if (!content) return {};
+  return cache_key(fmt::format("{}, assimp {}.{}.{}\n{}\n{}\n", maker, aiGetVersionMajor(),
+                               aiGetVersionMinor(), aiGetVersionPatch(), switches, lower_extension(surface)) +
+                   *content);
+}
+
+namespace {
+fs::path source_file(const CacheKey& source) {
+  const fs::path folder = cache_folder();
+  return folder.empty() ? folder : folder / (cache_name(source) + ".source");
+}
+}  // namespace
+
+std::optional<TetMesh> read_mesh_of(const CacheKey& source) {
+  const std::optional<std::string> bytes = read_cached(source_file(source), 1000);
+  const auto content = bytes ? unwrap_cached(*bytes, source_magic, source) : std::nullopt;
+  CacheKey mesh;
+  if (!content || content->size() != sizeof mesh) return {};
+  std::memcpy(mesh.data(), content->data(), sizeof mesh);
+  return read_mesh(mesh);
+}
+
+void keep_source(const CacheKey& source, const CacheKey& mesh) {
+  const std::string_view content(reinterpret_cast<const char*>(mesh.data()), sizeof mesh);
+  if (const fs::path file = source_file(source); !file.empty())
+    write_cached(file, wrap_cached(source_magic, source, content));
 }
 
 void keep_mesh(const CacheKey& key, const TetMesh& mesh) {

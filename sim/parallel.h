@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <exception>
 #include <span>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -33,7 +34,11 @@ void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
   {
     std::vector<std::jthread> threads;
     threads.reserve(parts);
-    for (std::size_t part = 1; part < parts; ++part) threads.emplace_back(run, part);
+    for (std::size_t part = 1; part < parts; ++part) try {
+        threads.emplace_back(run, part);
+      } catch (const std::system_error&) {  // the system gives no more threads
+        run(part);
+      }
     run(0);
   }
   for (const std::exception_ptr& e : failed)

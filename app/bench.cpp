@@ -119,7 +119,7 @@ std::string kinds_of(std::string set) {
 
 // Over the same frames, but NaN where time ran out: an error over part of the run would be another quantity.
 void error_run(BenchRow& row, Sim& sim, const Model& model, const BenchOptions& options) {
-  Metrics metrics = create_metrics(model);
+  Metrics metrics = create_metrics(model, sim.system);
   const auto begin = Clock::now();
   bool whole = true;
   const MeasuredRun run = measure_run(sim, metrics, options.frames, [&](long) {

@@ -76,7 +76,7 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   settings.gravity = 0;
   settings.ground = false;
   Sim sim = create_sim(stretched, settings);
-  Metrics metrics = create_metrics(*stretched);
+  Metrics metrics = create_metrics(*stretched, sim.system);
   const double before = measure_now(metrics, sim).rigid_distance;
   step(sim);
   if (check_finite(sim, true)) return std::nan("");
@@ -86,7 +86,7 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
 ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings,
                      long steps) {
   Sim sim = create_sim(model, settings);
-  Metrics metrics = create_metrics(*model);
+  Metrics metrics = create_metrics(*model, sim.system);
   const MeasuredRun run = measure_run(sim, metrics, steps);
   if (run.errors.non_finite) {
     const std::string where = fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", settings.mode,

@@ -79,7 +79,7 @@ ordered_json run_one(const HardCase& hard, long steps) {
   Tuning tuning;
   tuning.count_guards = true;
   Sim sim = create_sim(model, settings_of(scene, hard.mode), tuning);
-  Metrics metrics = create_metrics(*model);
+  Metrics metrics = create_metrics(*model, sim.system);
   if (steps == 0) steps = std::max(1L, std::lround(scene.duration / scene.settings.dt));
   const MeasuredRun run = measure_run(sim, metrics, steps);
   const Measurement& last = *run.errors.last;

@@ -92,7 +92,7 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
   sim.timed = true;
-  Metrics metrics = create_metrics(*model);
+  Metrics metrics = create_metrics(*model, sim.system);
   const long steps =
       options.steps > 0 ? options.steps : std::max(1L, std::lround(scene.duration / scene.settings.dt));
   const long video_every =

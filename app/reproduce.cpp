@@ -110,7 +110,7 @@ MeasuredRun fall_run(const Scene& scene, const std::shared_ptr<const Model>& mod
   settings.constraints = kinds;
   settings.iterations = iterations;
   Sim sim = create_sim(model, settings);
-  Metrics metrics = create_metrics(*model);
+  Metrics metrics = create_metrics(*model, sim.system);
   MeasuredRun run = measure_run(sim, metrics, steps);
   if (run.errors.non_finite)
     throw error_of(*run.errors.non_finite,

@@ -287,7 +287,7 @@ void measure_frame(Session& s, bool stepped) {
   for (; const auto ms = sim.timer.poll(); ++count) total += *ms;
   if (count && s.measuring) s.step_ms.add(total / count);
   if (!s.measuring) return;
-  if (!s.loaded.metrics) s.loaded.metrics = create_metrics(*sim.model);
+  if (!s.loaded.metrics) s.loaded.metrics = create_metrics(*sim.model, sim.system);
   Metrics& metrics = *s.loaded.metrics;
   while (const auto measurement = collect(metrics)) {
     if (s.stale > 0) {

@@ -119,7 +119,7 @@ int run_soak(const Scene& scene, const SoakOptions& options) {
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
   Sim sim = create_sim(model, scene.settings);
-  Metrics metrics = create_metrics(*model);
+  Metrics metrics = create_metrics(*model, sim.system);
   const Watch watch = watch_rest(sim, metrics, options);
 
   const Sample &first = watch.samples.front(), &last = watch.samples.back(), &tenth = watch.at(0.1);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "sim/parallel.h"
+
 namespace tetpbd {
 
 namespace {
@@ -15,10 +17,23 @@ double measure(const TetMesh& mesh, const std::array<std::uint32_t, std::size_t(
   return Kind::template evaluate<double>(x.data(), 0.0).C;
 }
 
+template <class Kind, class Vertices>
+void measure_all(const TetMesh& mesh, const std::vector<Vertices>& of, ConstraintList& list) {
+  constexpr std::size_t arity = std::size_t(Kind::arity);
+  list.vertices.resize(of.size() * arity);
+  list.rest.resize(of.size());
+  parallel_for(of.size(), [&](std::size_t first, std::size_t end) {
+    for (std::size_t c = first; c < end; ++c) {
+      std::copy_n(of[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
+      list.rest[c] = measure<Kind>(mesh, of[c]);
+    }
+  });
+}
+
 }  // namespace
 
 void Stretch::build(const TetMesh& mesh, ConstraintList& list) {
-  for (const auto& edge : tet_edges(mesh)) list.add(edge, measure<Stretch>(mesh, edge));
+  measure_all<Stretch>(mesh, tet_edges(mesh), list);
 }
 
 void Bend::build(const TetMesh& mesh, ConstraintList& list) {
@@ -54,9 +69,7 @@ void Bend::build(const TetMesh& mesh, ConstraintList& list) {
   }
 }
 
-void Volume::build(const TetMesh& mesh, ConstraintList& list) {
-  for (const Tet& tet : mesh.tets) list.add(tet, measure<Volume>(mesh, tet));
-}
+void Volume::build(const TetMesh& mesh, ConstraintList& list) { measure_all<Volume>(mesh, mesh.tets, list); }
 
 const std::vector<ConstraintKind>& constraint_kinds() {
   static const std::vector<ConstraintKind> rows = [] {

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "sim/error.h"
+#include "sim/program_cache.h"
 
 namespace tetpbd {
 
@@ -373,7 +374,6 @@ GLuint link_program(const std::string& label, const std::vector<GLuint>& shaders
     glDeleteProgram(program);
     throw Error("shader program does not link", label, name_files(log, {}), 1);
   }
-  label_object(GL_PROGRAM, program, label);
   return program;
 }
 
@@ -395,72 +395,32 @@ std::string shader_text(const std::string& name, const ShaderWords& words) {
   return expand(name, words, files);
 }
 
-namespace {
-
-// A driver may take a second to compile a kernel, and a comparison makes the same ones for every row: what
-// was linked once in this process comes back as the driver's own binary.
-struct Binary {
-  GLenum format = 0;
-  std::vector<char> bytes;
-};
-std::map<std::vector<std::string>, Binary>& binaries() {
-  static std::map<std::vector<std::string>, Binary> map;
-  return map;
-}
-
-GLuint linked_before(const std::vector<std::string>& texts) {
-  const auto found = binaries().find(texts);
-  if (found == binaries().end()) return 0;
-  const GLuint program = glCreateProgram();
-  glProgramBinary(program, found->second.format, found->second.bytes.data(),
-                  GLsizei(found->second.bytes.size()));
-  GLint linked = 0;
-  glGetProgramiv(program, GL_LINK_STATUS, &linked);
-  if (linked) return program;
-  glDeleteProgram(program);  // of another context's driver
-  binaries().erase(found);
-  return 0;
-}
-
-void keep_linked(GLuint program, const std::vector<std::string>& texts) {
-  GLint formats = 0, size = 0;
-  glGetIntegerv(GL_NUM_PROGRAM_BINARY_FORMATS, &formats);
-  if (formats == 0) return;
-  glGetProgramiv(program, GL_PROGRAM_BINARY_LENGTH, &size);
-  if (size <= 0) return;
-  Binary binary;
-  binary.bytes.resize(std::size_t(size));
-  glGetProgramBinary(program, size, &size, &binary.format, binary.bytes.data());
-  binary.bytes.resize(std::size_t(size));
-  binaries()[texts] = std::move(binary);
-}
-
-}  // namespace
-
 Program::Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words,
                  const std::vector<std::string>& defines)
     : label_(std::move(label)) {
   std::string head = version_line;
   for (const std::string& define : defines) head += "#define " + define + "\n";
   std::vector<std::vector<std::string>> files(stages.size());
-  std::vector<std::string> texts;
+  std::vector<std::pair<GLenum, std::string>> texts;
   for (std::size_t s = 0; s < stages.size(); ++s) {
-    texts.push_back(head + expand(stages[s].file, words, files[s]));
-    declarations_ += uniform_lines(texts.back());
+    texts.emplace_back(stages[s].type, head + expand(stages[s].file, words, files[s]));
+    declarations_ += uniform_lines(texts.back().second);
   }
-  id_ = linked_before(texts);
+  const CacheKey key = program_key(texts, driver_lines());
+  id_ = kept_program(key);
   if (!id_) {
     std::vector<GLuint> shaders;
     try {
       for (std::size_t s = 0; s < stages.size(); ++s)
-        shaders.push_back(compile_stage(stages[s].type, stages[s].file, texts[s], files[s]));
+        shaders.push_back(compile_stage(stages[s].type, stages[s].file, texts[s].second, files[s]));
     } catch (...) {
       for (GLuint shader : shaders) glDeleteShader(shader);
       throw;
     }
     id_ = link_program(label_, shaders);
-    keep_linked(id_, texts);
+    keep_program(key, id_);
   }
+  label_object(GL_PROGRAM, id_, label_);
   count_gl_objects(1);
 }
 

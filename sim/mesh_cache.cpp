@@ -1,13 +1,13 @@
 #include "sim/mesh_cache.h"
 
+#include <assimp/version.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <fstream>
+#include <atomic>
 
 #include "sim/bytes.h"
-#include "sim/error.h"
+#include "sim/parallel.h"
 #include "sim/text_file.h"
 
 namespace tetpbd {
@@ -18,106 +18,102 @@ namespace fs = std::filesystem;
 // Change it whenever the file's layout, the mesher or what is done with its result changes.
 constexpr std::string_view maker = "tetpbd cache 1, TetGen 1.5.0";
 
-struct CacheHeader {
-  std::array<char, 8> magic{'t', 'e', 't', 'p', 'b', 'd', 'M', '1'};
-  CacheKey key{};
-  std::uint64_t checksum = 0;  // of all that follows
-  std::uint64_t size = 0;
-};
-
-fs::path cache_folder() {
-  const auto variable = [](const char* name) {
-    const char* value = std::getenv(name);
-    return fs::path(value ? value : "");
-  };
-  if (const fs::path own = variable("TETPBD_CACHE"); !own.empty()) return own;
-  if (const fs::path shared = variable("XDG_CACHE_HOME"); shared.is_absolute()) return shared / "tetpbd";
-  if (const fs::path home = variable("HOME"); !home.empty()) return home / ".cache" / "tetpbd";
-  return {};
-}
+constexpr CacheMagic magic{'t', 'e', 't', 'p', 'b', 'd', 'M', '1'};
+constexpr CacheMagic source_magic{'t', 'e', 't', 'p', 'b', 'd', 'S', '1'};
 
 // Damage passes the checksum only by malice, but a cache folder may be shared: what is taken is a mesh.
 bool is_sound(const TetMesh& mesh) {
-  const auto in_range = [&](const auto& elements) {
-    for (const auto& element : elements)
-      for (const std::uint32_t v : element)
-        if (v >= mesh.positions.size()) return false;
-    return true;
+  std::atomic<bool> sound = !mesh.tets.empty();
+  const auto require = [&sound](std::size_t count, const auto& holds) {
+    parallel_for(count, [&](std::size_t first, std::size_t end) {
+      for (std::size_t i = first; i < end; ++i)
+        if (!holds(i)) sound = false;
+    });
   };
-  const auto has_volume = [&](const Tet& tet) { return tet_volume(mesh, tet) > 0; };  // false for NaN as well
-  return !mesh.tets.empty() && in_range(mesh.tets) && in_range(mesh.surface) &&
-         std::all_of(mesh.tets.begin(), mesh.tets.end(), has_volume) &&
-         std::all_of(mesh.positions.begin(), mesh.positions.end(),
-                     [](const glm::dvec3& p) { return glm::length(p) < largest_coordinate; });
+  const auto in_range = [&](const auto& element) {
+    return std::all_of(element.begin(), element.end(),
+                       [&](std::uint32_t v) { return v < mesh.positions.size(); });
+  };
+  require(mesh.tets.size(), [&](std::size_t i) {
+    return in_range(mesh.tets[i]) && tet_volume(mesh, mesh.tets[i]) > 0;  // false for NaN as well
+  });
+  require(mesh.surface.size(), [&](std::size_t i) { return in_range(mesh.surface[i]); });
+  require(mesh.positions.size(),
+          [&](std::size_t i) { return glm::length(mesh.positions[i]) < largest_coordinate; });
+  return sound;
 }
 
 }  // namespace
 
-CacheKey cache_key(const SurfaceMesh& surface, const std::string& switches) {
+CacheKey mesh_key(const SurfaceMesh& surface, const std::string& switches) {
   std::string bytes = fmt::format("{}\n{}\n", maker, switches);
   put_array(bytes, surface.positions);
   put_array(bytes, surface.triangles);
-  return {hash_bytes(bytes, 1), hash_bytes(bytes, 2)};
+  return cache_key(bytes);
 }
 
-fs::path cache_file(const CacheKey& key) {
+fs::path mesh_file(const CacheKey& key) {
   const fs::path folder = cache_folder();
-  return folder.empty() ? folder : folder / fmt::format("{:016x}{:016x}.tets", key[0], key[1]);
+  return folder.empty() ? folder : folder / (cache_name(key) + ".tets");
 }
 
-std::optional<TetMesh> parse_cache(std::string_view bytes, const CacheKey& key) {
-  CacheHeader header;
-  if (bytes.size() < sizeof header) return {};
-  std::memcpy(&header, bytes.data(), sizeof header);
-  bytes.remove_prefix(sizeof header);
-  if (header.magic != CacheHeader{}.magic || header.key != key || header.size != bytes.size() ||
-      hash_bytes(bytes, 3) != header.checksum)
-    return {};
+std::optional<TetMesh> parse_mesh(std::string_view bytes, const CacheKey& key) {
+  std::optional<std::string_view> content = unwrap_cached(bytes, magic, key);
   TetMesh mesh;
-  const bool whole = take_array(bytes, mesh.positions) && take_array(bytes, mesh.tets) &&
-                     take_array(bytes, mesh.surface) && bytes.empty() && is_sound(mesh);
+  const bool whole = content && take_array(*content, mesh.positions) && take_array(*content, mesh.tets) &&
+                     take_array(*content, mesh.surface) && content->empty() && is_sound(mesh);
   if (!whole) return {};
   return mesh;
 }
 
-std::string cache_bytes(const CacheKey& key, const TetMesh& mesh) {
-  std::string bytes(sizeof(CacheHeader), '\0');
-  put_array(bytes, mesh.positions);
-  put_array(bytes, mesh.tets);
-  put_array(bytes, mesh.surface);
-  CacheHeader header;
-  header.key = key;
-  header.size = bytes.size() - sizeof header;
-  header.checksum = hash_bytes(std::string_view(bytes).substr(sizeof header), 3);
-  std::memcpy(bytes.data(), &header, sizeof header);
-  return bytes;
+std::string mesh_bytes(const CacheKey& key, const TetMesh& mesh) {
+  std::string content;
+  put_array(content, mesh.positions);
+  put_array(content, mesh.tets);
+  put_array(content, mesh.surface);
+  return wrap_cached(magic, key, content);
 }
 
-std::optional<TetMesh> read_cache(const CacheKey& key) {
-  const fs::path file = cache_file(key);
-  std::error_code failed;
-  if (!fs::is_regular_file(file, failed)) return {};
-  const std::uintmax_t size = fs::file_size(file, failed);
-  std::ifstream in(file, std::ios::binary);
-  CacheHeader header;  // looked at first: a wrong file is not read whole
-  if (failed || !in.read(reinterpret_cast<char*>(&header), sizeof header) ||
-      header.size != size - sizeof header)
-    return {};
-  std::string bytes(size, '\0');
-  in.seekg(0);
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) return {};
-  return parse_cache(bytes, key);
+std::optional<TetMesh> read_mesh(const CacheKey& key) {
+  constexpr std::size_t most = std::size_t{16} << 30;
+  const std::optional<std::string> bytes = read_cached(mesh_file(key), most);
+  if (!bytes) return {};
+  return parse_mesh(*bytes, key);
 }
 
-void write_cache(const CacheKey& key, const TetMesh& mesh) {
-  const fs::path file = cache_file(key);
-  if (file.empty()) return;
-  std::error_code ignored;
-  fs::create_directories(file.parent_path(), ignored);
-  try {
-    write_files_whole({{file, cache_bytes(key, mesh)}});
-  } catch (const Error&) {  // read-only or full: the next run meshes again
-  }
+std::optional<CacheKey> source_key(const fs::path& surface, const std::string& switches) {
+  constexpr std::size_t most = std::size_t{1} << 30;  // parsing a larger one takes what hashing saves
+  const std::optional<std::string> content = read_cached(surface, most);
+  if (!content) return {};
+  return cache_key(fmt::format("{}, assimp {}.{}.{}\n{}\n{}\n", maker, aiGetVersionMajor(),
+                               aiGetVersionMinor(), aiGetVersionPatch(), switches, lower_extension(surface)) +
+                   *content);
+}
+
+namespace {
+fs::path source_file(const CacheKey& source) {
+  const fs::path folder = cache_folder();
+  return folder.empty() ? folder : folder / (cache_name(source) + ".source");
+}
+}  // namespace
+
+std::optional<TetMesh> read_mesh_of(const CacheKey& source) {
+  const std::optional<std::string> bytes = read_cached(source_file(source), 1000);
+  const auto content = bytes ? unwrap_cached(*bytes, source_magic, source) : std::nullopt;
+  CacheKey mesh;
+  if (!content || content->size() != sizeof mesh) return {};
+  std::memcpy(mesh.data(), content->data(), sizeof mesh);
+  return read_mesh(mesh);
+}
+
+void keep_source(const CacheKey& source, const CacheKey& mesh) {
+  const std::string_view content(reinterpret_cast<const char*>(mesh.data()), sizeof mesh);
+  if (const fs::path file = source_file(source); !file.empty())
+    write_cached(file, wrap_cached(source_magic, source, content));
+}
+
+void keep_mesh(const CacheKey& key, const TetMesh& mesh) {
+  if (const fs::path file = mesh_file(key); !file.empty()) write_cached(file, mesh_bytes(key, mesh));
 }
 
 }  // namespace tetpbd

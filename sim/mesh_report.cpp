@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "sim/parallel.h"
 #include "sim/surface_topology.h"
 #include "sim/tet_mesh.h"
 
@@ -58,17 +59,25 @@ MeshReport report(const TetMesh& mesh) {
 
   r.smallest_tet_volume = mesh.tets.empty() ? 0 : INFINITY;
   r.min_dihedral_deg = 180;
-  for (const Tet& tet : mesh.tets) {
-    const double volume = tet_volume(mesh, tet);
+  struct Shape {
+    double volume, low, high;  // m^3, degrees
+  };
+  std::vector<Shape> shapes(mesh.tets.size());
+  parallel_for(shapes.size(), [&](std::size_t first, std::size_t end) {
+    for (std::size_t i = first; i < end; ++i) {
+      const auto angles = dihedral_angles(mesh, mesh.tets[i]);
+      const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
+      shapes[i] = {tet_volume(mesh, mesh.tets[i]), *low, *high};
+    }
+  });
+  for (const auto& [volume, low, high] : shapes) {
     r.volume += volume;
     r.smallest_tet_volume = std::min(r.smallest_tet_volume, volume);
     r.inverted += volume <= 0;
-    const auto angles = dihedral_angles(mesh, tet);
-    const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
-    r.min_dihedral_deg = std::min(r.min_dihedral_deg, *low);
-    r.max_dihedral_deg = std::max(r.max_dihedral_deg, *high);
-    r.mean_min_dihedral_deg += *low;
-    r.slivers += *low < 5 || *high > 175;
+    r.min_dihedral_deg = std::min(r.min_dihedral_deg, low);
+    r.max_dihedral_deg = std::max(r.max_dihedral_deg, high);
+    r.mean_min_dihedral_deg += low;
+    r.slivers += low < 5 || high > 175;
   }
   if (r.tets > 0) {
     r.mean_tet_volume = r.volume / static_cast<double>(r.tets);

@@ -30,15 +30,20 @@ Metrics::Range range_of(const ConstraintList& list, std::size_t first_vertex, st
 
 }  // namespace
 
-Metrics create_metrics(const Model& model) {
+Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   Metrics m;
-  const ConstraintSystem system = build_constraints(model.rest, "stretch,bend,volume");
+  const auto is_made = [&](std::size_t k) { return k < made.present.size() && made.present[k]; };
+  std::string missing;
+  for (std::size_t k = 0; k < constraint_kinds().size(); ++k)
+    if (!is_made(k)) missing += std::string(missing.empty() ? "" : ",") + constraint_kinds()[k].name;
+  ConstraintSystem rest_of_kinds;
+  if (!missing.empty()) rest_of_kinds = build_constraints(model.rest, missing);
+  std::vector<const ConstraintList*> lists;
   std::vector<Buffer> records;
   // A mesh can lack hinges (no two surface triangles share an edge): keep an empty buffer for them.
-  for (std::size_t k = 0; k < system.lists.size(); ++k) {
-    ConstraintSystem one = system;
-    for (std::size_t other = 0; other < one.present.size(); ++other) one.present[other] = other == k;
-    records.push_back(std::move(record_buffers(one).front()));
+  for (std::size_t k = 0; k < constraint_kinds().size(); ++k) {
+    lists.push_back(is_made(k) ? &made.lists[k] : &rest_of_kinds.lists[k]);
+    records.push_back(record_buffer(*lists[k], constraint_kinds()[k].name));
   }
   static_assert(std::is_same_v<std::tuple_element_t<0, Kinds>, Stretch> &&
                 std::is_same_v<std::tuple_element_t<1, Kinds>, Bend> &&
@@ -46,16 +51,17 @@ Metrics create_metrics(const Model& model) {
   m.stretch = std::move(records[0]);
   m.bend = std::move(records[1]);
   m.volume = std::move(records[2]);
-  m.edge_count = system.lists[0].count();
-  m.hinge_count = system.lists[1].count();
-  m.tet_count = system.lists[2].count();
+  m.edge_count = lists[0]->count();
+  m.hinge_count = lists[1]->count();
+  m.tet_count = lists[2]->count();
   std::vector<glm::vec4> rest(model.rest.positions.size());
+  const std::vector<double> volumes = tet_volumes(model.rest);
   for (const Body& body : model.bodies) {
     Metrics::BodyRanges ranges;
     const std::size_t end = body.first_vertex + body.vertices;
     ranges.vertices = {unsigned(body.first_vertex), unsigned(end)};
-    ranges.edges = range_of(system.lists[0], body.first_vertex, end);
-    ranges.hinges = range_of(system.lists[1], body.first_vertex, end);
+    ranges.edges = range_of(*lists[0], body.first_vertex, end);
+    ranges.hinges = range_of(*lists[1], body.first_vertex, end);
     ranges.tets = {unsigned(body.first_tet), unsigned(body.first_tet + body.tets)};
     glm::dvec3 centre{0};
     std::vector<glm::dvec3> shape;
@@ -67,8 +73,7 @@ Metrics create_metrics(const Model& model) {
     centre /= ranges.mass;
     for (std::size_t i = body.first_vertex; i < end; ++i)
       rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
-    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)
-      ranges.volume += tet_volume(model.rest, model.rest.tets[t]);
+    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t) ranges.volume += volumes[t];
     ranges.size = bounds(shape).size();
     m.bodies.push_back(ranges);
   }

@@ -65,7 +65,8 @@ struct Metrics {
   std::size_t edge_count = 0, hinge_count = 0, tet_count = 0;
 };
 
-Metrics create_metrics(const Model& model);
+/// Constraints of kinds that are present in `made`, of the same model, are not made again.
+Metrics create_metrics(const Model& model, const ConstraintSystem& made = {});
 /// Queues a measurement of the current state. Waits only if the ring of results is full.
 void measure(Metrics& metrics, const Sim& sim);
 /// The oldest measurement that is ready; with `wait`, the oldest there is.

@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <numeric>
 #include <random>
+#include <span>
 
 #include "sim/constraints.h"
 #include "sim/error.h"
 #include "sim/hilbert.h"
+#include "sim/parallel.h"
 
 namespace tetpbd {
 
@@ -25,13 +26,17 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
             mesh.tets.size(),
             model.rest.surface.size(),
             mesh.surface.size()};
-  const auto shifted = [&](auto face) {
-    for (auto& v : face) v += base;
-    return face;
+  const auto append_shifted = [&](auto& to, const auto& from) {
+    const std::size_t start = to.size();
+    to.resize(start + from.size());
+    parallel_for(from.size(), [&](std::size_t first, std::size_t end) {
+      for (std::size_t i = first; i < end; ++i)
+        for (std::size_t j = 0; j < from[i].size(); ++j) to[start + i][j] = from[i][j] + base;
+    });
   };
   model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
-  for (const Tet& t : mesh.tets) model.rest.tets.push_back(shifted(t));
-  for (const Triangle& t : mesh.surface) model.rest.surface.push_back(shifted(t));
+  append_shifted(model.rest.tets, mesh.tets);
+  append_shifted(model.rest.surface, mesh.surface);
   glm::dvec3 centre{0};
   double total = 0;
   auto masses = lumped_masses(mesh, density);
@@ -57,21 +62,23 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
 
 void renumber(Model& model) {
   const std::size_t count = model.rest.positions.size();
-  std::vector<std::uint64_t> keys(count);
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(count);  // along the curve, vertex
   std::vector<std::uint32_t> old(count), now(count);  // vertex i was old[i]; vertex i is now now[i]
-  std::iota(old.begin(), old.end(), 0u);
   for (const Body& body : model.bodies) {
     const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
     const Bounds box = bounds({model.rest.positions.begin() + first, model.rest.positions.begin() + end});
-    for (auto i = std::size_t(first); i < std::size_t(end); ++i)
-      keys[i] = hilbert_key(model.rest.positions[i], box);
-    std::stable_sort(old.begin() + first, old.begin() + end,
-                     [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+    parallel_for(body.vertices, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = body.first_vertex + from; i < body.first_vertex + to; ++i)
+        keys[i] = {hilbert_key(model.rest.positions[i], box), std::uint32_t(i)};
+    });
+    parallel_sort(std::span(keys).subspan(body.first_vertex, body.vertices));
   }
-  for (std::uint32_t i = 0; i < count; ++i) now[old[i]] = i;
+  for (std::uint32_t i = 0; i < count; ++i) old[i] = keys[i].second, now[old[i]] = i;
   const auto reorder = [&](auto& rows) {
-    auto from = rows;
-    for (std::size_t i = 0; i < count; ++i) rows[i] = from[old[i]];
+    const auto from = rows;
+    parallel_for(count, [&](std::size_t first, std::size_t end) {
+      for (std::size_t i = first; i < end; ++i) rows[i] = from[old[i]];
+    });
   };
   reorder(model.rest.positions);
   reorder(model.inverse_masses);
@@ -79,10 +86,14 @@ void renumber(Model& model) {
   reorder(model.positions);
   reorder(model.velocities);
   reorder(model.original);
-  for (Tet& tet : model.rest.tets)
-    for (std::uint32_t& v : tet) v = now[v];
-  for (Triangle& triangle : model.rest.surface)
-    for (std::uint32_t& v : triangle) v = now[v];
+  const auto rename = [&](auto& elements) {
+    parallel_for(elements.size(), [&](std::size_t first, std::size_t end) {
+      for (std::size_t i = first; i < end; ++i)
+        for (std::uint32_t& v : elements[i]) v = now[v];
+    });
+  };
+  rename(model.rest.tets);
+  rename(model.rest.surface);
 }
 
 std::vector<Tet> original_tets(const Model& model) {

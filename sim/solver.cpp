@@ -8,6 +8,7 @@
 
 #include "sim/error.h"
 #include "sim/layout.h"
+#include "sim/parallel.h"
 
 namespace tetpbd {
 
@@ -67,21 +68,22 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   return rows;
 }
 
+Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
+  const std::size_t arity = std::size_t(list.arity), row = arity + 1;
+  std::vector<std::uint32_t> words(list.count() * row);
+  parallel_for(list.count(), [&](std::size_t first, std::size_t end) {
+    for (std::size_t c = first; c < end; ++c) {
+      std::copy_n(list.vertices.data() + c * arity, arity, words.data() + c * row);
+      words[c * row + arity] = std::bit_cast<std::uint32_t>(float(list.rest[c]));
+    }
+  });
+  return Buffer("records " + kind, words);
+}
+
 std::vector<Buffer> record_buffers(const ConstraintSystem& system) {
   std::vector<Buffer> buffers;
-  for (std::size_t k = 0; k < system.lists.size(); ++k) {
-    if (!system.present[k]) continue;
-    const ConstraintList& list = system.lists[k];
-    const std::size_t arity = std::size_t(list.arity);
-    std::vector<std::uint32_t> words;
-    words.reserve(list.count() * (arity + 1));
-    for (std::size_t c = 0; c < list.count(); ++c) {
-      words.insert(words.end(), list.vertices.begin() + std::ptrdiff_t(c * arity),
-                   list.vertices.begin() + std::ptrdiff_t((c + 1) * arity));
-      words.push_back(std::bit_cast<std::uint32_t>(float(list.rest[c])));
-    }
-    buffers.emplace_back(std::string("records ") + constraint_kinds()[k].name, words);
-  }
+  for (std::size_t k = 0; k < system.lists.size(); ++k)
+    if (system.present[k]) buffers.push_back(record_buffer(system.lists[k], constraint_kinds()[k].name));
   return buffers;
 }
 

@@ -90,7 +90,9 @@ Solver create_paper_solver(const SolverInput&);       ///< solve_paper.cpp
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING (of its
 /// records), KIND_ROW and KIND_COLUMN (of the stiffness).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
-/// Record buffers of the kinds present, in the order of kind_words (layout.glsl: Record2, Record4).
+/// The records of one list (layout.glsl: Record2, Record4).
+Buffer record_buffer(const ConstraintList& list, const std::string& kind);
+/// Record buffers of the kinds present, in the order of kind_words.
 std::vector<Buffer> record_buffers(const ConstraintSystem& system);
 /// Throws Error if a buffer is larger than a storage block may be.
 void check_storage(const Tuning& tuning, const std::string& label, std::size_t bytes);

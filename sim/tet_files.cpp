@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include "sim/error.h"
+#include "sim/mesh_cache.h"
 #include "sim/msh_file.h"
 #include "sim/tet_mesh.h"
+#include "sim/tetgen_switches.h"
 #include "sim/text_file.h"
 
 namespace tetpbd {
@@ -77,8 +79,27 @@ TetMesh load_tets(const std::filesystem::path& file) {
   return mesh;
 }
 
+namespace {
+
+TetMesh fill_file(const std::filesystem::path& file, const std::string& switches) {
+#if TETPBD_TETGEN
+  const std::optional<CacheKey> source = source_key(file, switches);
+  if (source)
+    if (std::optional<TetMesh> kept = read_mesh_of(*source)) return std::move(*kept);
+  const SurfaceMesh surface = load_surface(file);
+  TetMesh mesh = tetrahedralise(surface, switches, 600, file.string());
+  if (source && source == source_key(file, switches))  // nobody wrote it in between
+    keep_source(*source, mesh_key(surface, checked_switches(switches)));
+  return mesh;
+#else
+  return tetrahedralise(load_surface(file), switches, 600, file.string());
+#endif
+}
+
+}  // namespace
+
 TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches) {
-  if (is_surface_file(file)) return tetrahedralise(load_surface(file), switches, 600, file.string());
+  if (is_surface_file(file)) return fill_file(file, switches);
   const std::string extension = lower_extension(file);
   if (extension == ".node" || extension == ".ele" || extension == ".msh") return load_tets(file);
   require_readable(file);  // a missing file or a folder is the better news

@@ -79,6 +79,7 @@ void finish_tets(TetMesh& mesh, const std::string& source);
 TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);
 
 double tet_volume(const TetMesh& mesh, const Tet& tet);
+std::vector<double> tet_volumes(const TetMesh& mesh);
 double mesh_volume(const TetMesh& mesh);  ///< m^3, sum of signed tet volumes
 /// kg per vertex: a quarter of each adjacent tet's mass (density in kg/m^3).
 std::vector<double> lumped_masses(const TetMesh& mesh, double density);

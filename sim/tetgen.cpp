@@ -136,8 +136,8 @@ Intersections diagnose(const SurfaceMesh& surface) {
 TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switches, double time_limit,
                        const std::string& source) {
   const std::string switches = checked_switches(wanted_switches);
-  const CacheKey key = cache_key(given, switches);
-  if (std::optional<TetMesh> kept = read_cache(key)) return std::move(*kept);
+  const CacheKey key = mesh_key(given, switches);
+  if (std::optional<TetMesh> kept = read_mesh(key)) return std::move(*kept);
 
   SurfaceMesh surface = given;
   const SurfaceCheck check = check_surface(surface);
@@ -158,7 +158,7 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
                 fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume,
                             mesh_volume(mesh), source),
                 "remove the inner parts: cavities are not supported");
-  write_cache(key, mesh);
+  keep_mesh(key, mesh);
   return mesh;
 }
 

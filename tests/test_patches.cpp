@@ -6,6 +6,7 @@
 
 #include "sim/cpu_pbd.h"
 #include "sim/groups.h"
+#include "sim/parallel.h"
 #include "sim/patches.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
@@ -98,12 +99,13 @@ TEST_CASE(
     std::size_t own;
     bool parted;
   };
+  set_thread_count(4);
   const Case cases[] = {{make_block({1, 0.7, 0.5}, {8, 6, 4}), 1, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 17, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 200, false},
                         {wheel(300), 16, true}};
   for (const Case& c : cases)
-    for (int groups : {1, 5}) {
+    for (int groups : {1, 5, 40}) {
       CAPTURE(c.own);
       CAPTURE(groups);
       const auto model = model_of(c.mesh);
@@ -143,6 +145,7 @@ TEST_CASE(
       std::sort(of_groups.begin(), of_groups.end());
       CHECK(of_groups == given(system));
     }
+  set_thread_count(0);
 }
 
 TEST_CASE("patches: a vertex with too many neighbours for one part is solved as in double") {

@@ -6,6 +6,7 @@
 
 #include "app/mesh_command.h"
 #include "mesh_samples.h"
+#include "sim/mesh_cache.h"
 #include "sim/tetgen_switches.h"
 
 using namespace tetpbd;
@@ -189,6 +190,38 @@ TEST_CASE("cache: a folder that cannot be written is no error") {
   CHECK(mesh_volume(tetrahedralise(cube(), "pY")) == doctest::Approx(1));
   ::setenv("TETPBD_CACHE", "/proc/none/cache", 1);
   CHECK(mesh_volume(tetrahedralise(cube(), "pY")) == doctest::Approx(1));
+}
+
+TEST_CASE("cache: a file that was meshed before is not parsed again") {
+  Folder folder;
+  const fs::path file = folder.path / "bunny.ply";
+  fs::copy_file(fs::path(TEST_MODELS) / "bunny.ply", file);
+  const TetMesh made = load_mesh(file, "pY");
+  fs::path mesh_kept, source;
+  for (const auto& entry : fs::directory_iterator(folder.cache()))
+    (entry.path().extension() == ".source" ? source : mesh_kept) = entry.path();
+  const auto key = source_key(file, "pY");
+  REQUIRE(key);
+  REQUIRE(read_mesh_of(*key));
+  CHECK(read_mesh_of(*key)->tets == made.tets);
+  CHECK(load_mesh(file, "pY").positions == made.positions);
+  CHECK(source_key(file, "pYq") != key);
+  CHECK(!source_key(folder.path, "pY"));
+  // Damage to the note, or to the mesh it names, costs time alone.
+  const std::string note = content(source), mesh = content(mesh_kept);
+  for (const fs::path& damaged : {source, mesh_kept}) {
+    std::string bytes = content(damaged);
+    bytes[bytes.size() - 3] ^= 1;
+    std::ofstream(damaged, std::ios::binary) << bytes;
+    CHECK(!read_mesh_of(*key));
+    CHECK(load_mesh(file, "pY").tets == made.tets);
+    CHECK((content(source) == note && content(mesh_kept) == mesh));
+  }
+  // Other bytes are another file, and a damaged one is refused whatever is kept.
+  std::ofstream(file, std::ios::binary | std::ios::app) << "x";
+  CHECK(source_key(file, "pY") != key);
+  std::ofstream(file, std::ios::binary) << content(fs::path(TEST_MODELS) / "bunny.ply").substr(0, 5000);
+  CHECK(error_of([&] { load_mesh(file, "pY"); }) != "");
 }
 
 TEST_CASE("mesh command: reports, writes, passes errors on") {

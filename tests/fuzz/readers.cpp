@@ -204,15 +204,15 @@ void fill_surface(std::string_view bytes) {
 // As they are, and once more behind a header that fits them.
 void read_cache_file(std::string_view bytes) {
   const CacheKey key{1, 2};
-  if (const auto mesh = parse_cache(bytes, key)) require_sound(*mesh);
-  std::string whole = cache_bytes(key, {});
+  if (const auto mesh = parse_mesh(bytes, key)) require_sound(*mesh);
+  std::string whole = mesh_bytes(key, {});
   const std::size_t header = whole.size() - 24;  // three counts of 0
   whole.resize(header);
   whole += bytes;
   const std::uint64_t checksum = hash_bytes(bytes, 3), size = bytes.size();
   std::memcpy(whole.data() + header - 16, &checksum, 8);
   std::memcpy(whole.data() + header - 8, &size, 8);
-  if (const auto mesh = parse_cache(whole, key)) require_sound(*mesh);
+  if (const auto mesh = parse_mesh(whole, key)) require_sound(*mesh);
 }
 
 // Scenes of blocks are built too, where they are small.

@@ -36,9 +36,9 @@ struct Stretch {
   static constexpr const char* name = "stretch";
   static constexpr int arity = 2;
   static constexpr double Settings::*stiffness = &Settings::k_stretch;
-  template <class real>
+  template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real>{}.stretch(x, rest, id);
+    return Formulas<real, Math>{}.stretch(x, rest, id);
   }
   static void build(const TetMesh& mesh, ConstraintList& list);  ///< every edge of every tet
 };
@@ -46,9 +46,9 @@ struct Bend {
   static constexpr const char* name = "bend";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_bend;
-  template <class real>
+  template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real>{}.bend(x, rest, id);
+    return Formulas<real, Math>{}.bend(x, rest, id);
   }
   static void build(const TetMesh& mesh,
                     ConstraintList& list);  ///< every edge that two surface triangles share
@@ -57,9 +57,9 @@ struct Volume {
   static constexpr const char* name = "volume";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_volume;
-  template <class real>
+  template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real>{}.volume(x, rest, id);
+    return Formulas<real, Math>{}.volume(x, rest, id);
   }
   static void build(const TetMesh& mesh, ConstraintList& list);  ///< every tet
 };

@@ -13,6 +13,24 @@
 
 namespace tetpbd {
 
+/// The half spaces of a step, n.x >= d as (n, d).
+inline std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings) {
+  std::vector<glm::dvec4> planes = model.obstacles;
+  if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
+  return planes;
+}
+
+/// A vertex out of all half spaces (eqs. 11-12); `fall`: what prediction moved it by.
+inline glm::dvec3 out_of(const std::vector<glm::dvec4>& planes, glm::dvec3 x, const glm::dvec3& predicted,
+                         const glm::dvec3& fall, double friction) {
+  for (const glm::dvec4& plane : planes) {
+    const glm::dvec3 n(plane);
+    const double depth = glm::dot(n, x) - plane.w;
+    if (depth < 0) x += Formulas<double>{}.plane_correction(n, depth, fall + (x - predicted), friction);
+  }
+  return x;
+}
+
 /// Constraints of one kind, contiguous, in the order they are projected.
 template <class Kind, class real>
 struct Batch {
@@ -51,8 +69,7 @@ class CpuPbd {
   void step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep) {
     const double h = settings.dt / settings.substeps;
     const glm::dvec3 gravity(0, -settings.gravity, 0);
-    std::vector<glm::dvec4> planes = model_.obstacles;
-    if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
+    const std::vector<glm::dvec4> planes = planes_of(model_, settings);
     const double keep = std::exp(-settings.damping * h);
     auto& x = state.positions;
     auto& v = state.velocities;
@@ -71,13 +88,7 @@ class CpuPbd {
           if (!(inverse_masses[i] > 0)) continue;
           if (sweep == Sweep::jacobi && at_vertex_[i] > 0)
             x[i] += deltas_[i] * (settings.omega / at_vertex_[i]);
-          for (const glm::dvec4& plane : planes) {
-            const glm::dvec3 n(plane);
-            const double depth = glm::dot(n, x[i]) - plane.w;
-            if (depth < 0)
-              x[i] += Formulas<double>{}.plane_correction(n, depth, h * v[i] + (x[i] - predicted_[i]),
-                                                          settings.friction);
-          }
+          x[i] = out_of(planes, x[i], predicted_[i], h * v[i], settings.friction);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)

@@ -1,6 +1,7 @@
 // The constraint formulas of shaders/ as C++: one text for GLSL, float and double.
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 #include <limits>
 
@@ -10,12 +11,26 @@ namespace tetpbd::glsl {
 
 using namespace glm;
 
-template <class Real>
+/// The library functions that formulas call; another such struct can take their place (sim/lane_math.h).
+struct LibraryMath {
+  template <class real>
+  static real atan(real y, real x) {
+    return std::atan2(y, x);
+  }
+  template <class real>
+  static real pow(real x, real y) {
+    return std::pow(x, y);
+  }
+};
+
+template <class Real, class Math = LibraryMath>
 struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
   static constexpr real grain = 0;  // positions are kept in full here
+  static real atan(real y, real x) { return Math::atan(y, x); }
+  static real pow(real x, real y) { return Math::pow(x, y); }
   using Ids = const uint*;
   static uint id_of(Ids ids, int j) { return ids[j]; }
   // in order of use

@@ -21,6 +21,8 @@ const std::vector<SolverMode>& solver_modes() {
       {"cpu", "non-linear Gauss-Seidel on one CPU core, the paper's baseline", create_cpu_solver},
       {"cpu-double", "the same in double precision: what stability is held against",
        create_cpu_double_solver},
+      {"cpu-fast", "Gauss-Seidel by colours on all CPU cores, with vector instructions",
+       create_cpu_fast_solver},
       {"groups", "Gauss-Seidel on the GPU between K groups of constraints, averaged inside each",
        create_groups_solver},
   };
@@ -41,14 +43,15 @@ Tuning tuning_from_environment() {
   const char* variable = std::getenv("TETPBD_TUNE");
   for (const std::string& assignment : split(variable ? variable : "", ',')) {
     unsigned* target = nullptr;
-    for (const auto& [name, member] : {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
-                                       std::pair("row=", &tuning.row)})
+    for (const auto& [name, member] :
+         {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
+          std::pair("row=", &tuning.row), std::pair("threads=", &tuning.threads)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
     if (!target || std::from_chars(number, end, *target).ptr != end)
       throw Error(fmt::format("'{}' is no tuning", assignment), "TETPBD_TUNE",
-                  "write group=N, patch=N or row=N, separated by commas");
+                  "write group=N, patch=N, row=N or threads=N, separated by commas");
   }
   return tuning;
 }

@@ -58,6 +58,7 @@ struct Tuning {
       0;             ///< constraints of a patch in mode constraint, vertices of one in modes node and groups
   unsigned row = 0;  ///< most work-groups in a dispatch's first dimension
   std::size_t storage = 0;    ///< most bytes of a storage buffer
+  unsigned threads = 0;       ///< of mode cpu-fast; 0: as many as the machine has cores and work is for
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };
 /// From the variable TETPBD_TUNE, as in "patch=8,group=128"; throws Error for anything else.
@@ -85,6 +86,7 @@ Solver create_node_solver(const SolverInput&);        ///< solve_node.cpp
 Solver create_groups_solver(const SolverInput&);      ///< solve_node.cpp
 Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp, float
 Solver create_cpu_double_solver(const SolverInput&);  ///< solve_cpu.cpp, double
+Solver create_cpu_fast_solver(const SolverInput&);    ///< solve_cpu_fast.cpp
 Solver create_paper_solver(const SolverInput&);       ///< solve_paper.cpp
 
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING (of its

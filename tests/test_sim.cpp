@@ -402,7 +402,7 @@ TEST_CASE("positions and velocities keep 48 bits on their way to the GPU and bac
 
 TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
   GlTest gl;
-  for (const char* mode : {"node", "constraint", "groups", "cpu"})
+  for (const char* mode : {"node", "constraint", "groups", "cpu", "cpu-fast"})
     for (int substeps : {1, 10, 100, 1000}) {
       CAPTURE(mode);
       CAPTURE(substeps);

@@ -8,7 +8,7 @@
 namespace tetpbd {
 
 Floors measure_floors(bool software) {
-  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, invocations = bytes / 16;
+  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, invocations = bytes / 16 / 8;
   const Buffer from("probe, from", bytes), to("probe, to", bytes);
   from.clear();
   from.bind_storage(0);

@@ -23,6 +23,21 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
+// A rigid handle (sim/handles.h). `squares` and `products` (yz, xz, xy): sums of weight times steps times steps about their mean.
+struct Handle {
+  vec3 node;              // cells of its body's lattice
+  float weight;           // all its vertices', at most 2^22
+  vec3 centre;            // of these, cells
+  float steps_per_metre;  // of arms from the centre, at most 2^14 steps
+  vec3 cell;              // m, sides of a cell
+  uint keeper;            // the patch that writes its pose
+  vec3 steps;             // sum of weight times steps
+  float _2;
+  vec3 squares;
+  float _3;
+  vec3 products;
+  float _4;
+};
 
 #define MAX_PLANES 8
 // Everything of a step that does not change within it (a uniform block, std140).
@@ -41,6 +56,8 @@ struct Step {
   float inverse_unit;     // 1/m
   float position_grain;   // m, the size whose rounding is one unit (constraints/types.glsl)
   float mass_splitting;   // 1: neighbours see n_i w_i, not w_i
+  float handles;          // share of the way that rigid handles pull in an iteration
+  float _6, _7, _8;
   vec4 stiffness[2];      // by constraint kind
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
 };
@@ -61,7 +78,9 @@ struct Step {
 #define PHASE_SOLVE 2u    // corrections
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_CONTACT 8u  // contacts after the corrections: once an iteration
-#define PHASE_BITS 4      // above them: which group of constraints (mode groups)
+#define PHASE_PLACES 16u  // nothing but sums of handles, from places as they are
+#define PHASE_BITS 5      // above them: which group of constraints (mode groups, at most 128)
+#define TURN_BITS 12      // above that: a count of dispatches, where there are handles
 
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0
@@ -74,8 +93,14 @@ struct Step {
 #define BIND_PARTS 7          // patches (sim/patches.h)
 #define BIND_PATCH_VERTICES 8
 #define BIND_PATCH_RECORDS 9
+#define BIND_HANDLES 10       // handles (sim/handles.h)
+#define BIND_HANDLE_LISTS 11
+#define BIND_HANDLE_REST 12
+#define BIND_HANDLE_SUMS 6
 #define BIND_RECORDS 7        // mode paper: + index of the constraint kind among those present
-#define STORAGE_BINDINGS 10   // most of any mode
+#define STORAGE_BINDINGS 10   // most of any mode without handles
+#define STORAGE_BINDINGS_HANDLES 13
+#define HANDLE_ROW 48         // words of a handle in each set of sums (handles.glsl)
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most

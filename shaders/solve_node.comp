@@ -8,14 +8,21 @@
 layout(local_size_x = $GROUP) in;
 #include "vertex.glsl"
 #include "patch.glsl"
+#if $HANDLES
+#include "handles.glsl"
+#endif
 
 void main() {
   uint me = gl_LocalInvocationIndex;
   bool some = group_index() < $PATCHESu;
-  uint part = some ? (turn.x >> PHASE_BITS) * $PATCHESu + group_index() : 0u;
+  uint part = some ? ((turn.x >> PHASE_BITS) & 127u) * $PATCHESu + group_index() : 0u;
   uint i = parts[$PART_WORDSu * part + 2u] + me;
-  bool mine = some && me < parts[$PART_WORDSu * part + 1u];
+  uint count = some ? parts[$PART_WORDSu * part + 1u] : 0u;
+  bool mine = me < count;
   vec3 correction = vec3(0.0);
+#if $HANDLES
+  find_poses(group_index(), i - me, count);
+#endif
   if ((turn.x & PHASE_SOLVE) != 0u) {
     float share = params.omega;
 #if $GROUPED
@@ -27,10 +34,25 @@ void main() {
     for (uint next = parts[$PART_WORDSu * part + 3u]; next != 0u; next = parts[$PART_WORDSu * next + 3u]) solve_part(next, some);
 #endif
     if (mine) correction = vec3(sums[3u * me], sums[3u * me + 1u], sums[3u * me + 2u]) * (params.delta_unit * share);
+#if $HANDLES
+    if (mine) correction += params.handles * handle_pull(group_index(), me, places[i].xyz);
+#endif
   }
   if (mine) {  // read here only: fewer registers while constraints are evaluated
-    Velocity speed;
-    if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
-    advance(i, positions[i], speed, correction);
+    ivec4 place = places[i];
+    if ((turn.x & PHASE_PLACES) != 0u) {
+      places_out[i] = place;
+    } else {
+      Velocity speed;
+      if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+      place = advance(i, positions[i], speed, correction);
+    }
+#if $HANDLES
+    here[me] = place;
+#endif
   }
+#if $HANDLES
+  barrier();
+  add_to_handles(group_index(), count);
+#endif
 }

@@ -54,10 +54,13 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   if ((phase & PHASE_FINISH) != 0u) x = predict_position(x, predict_velocity(v));
   return x;
 }
-// Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phase predicts or finishes.
-void advance(uint i, Position own, Velocity speed, vec3 correction) {
+// Reads and writes vertex i alone; returns its new place. `own`: its position; `speed`: its velocity, read if the phase predicts or
+// finishes.
+ivec4 advance(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) x = moved(i, own, speed, correction);
   else if ((turn.x & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
-  places_out[i] = place_of(x, weight_of(own));
+  ivec4 place = place_of(x, weight_of(own));
+  places_out[i] = place;
+  return place;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sim/constraints.h"
+#include "sim/handles.h"
 #include "sim/model.h"
 #include "sim/settings.h"
 #include "sim/solver.h"
@@ -41,8 +42,8 @@ struct Batch {
   std::vector<Item> items;
 };
 
-/// `jacobi`: all corrections from the same positions, averaged with omega / n_i. `gauss_seidel`: one after
-/// the other.
+/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and rigid handles.
+/// `gauss_seidel`: one after the other.
 enum class Sweep { jacobi, gauss_seidel };
 
 template <class real>
@@ -82,12 +83,17 @@ class CpuPbd {
         }
       predicted_ = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
+        const bool held = sweep == Sweep::jacobi && settings.handles > 0;
+        const double omega = relaxation(settings.omega, held ? settings.handles : 0);
+        if (held && handles_.rest.empty()) handles_ = build_handles(model_);
+        std::vector<glm::dvec3> pulls;
+        if (held) pulls = handle_pulls(handles_, x);
         if (sweep == Sweep::jacobi) deltas_.assign(x.size(), glm::dvec3(0));
         for_each_kind([&](auto kind, int) { project<decltype(kind)>(x, settings, sweep); });
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
-          if (sweep == Sweep::jacobi && at_vertex_[i] > 0)
-            x[i] += deltas_[i] * (settings.omega / at_vertex_[i]);
+          if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (omega / at_vertex_[i]);
+          if (held) x[i] += settings.handles * pulls[i];
           x[i] = out_of(planes, x[i], predicted_[i], h * v[i], settings.friction);
         }
       }
@@ -134,6 +140,7 @@ class CpuPbd {
   typename Batches<Kinds>::type batches_;
   std::vector<glm::dvec3> predicted_, deltas_;
   std::vector<real> inverse_masses_;
+  Handles handles_;  // made when they are first asked for
 };
 
 }  // namespace tetpbd

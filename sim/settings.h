@@ -14,6 +14,7 @@ struct Settings {
   double k_stretch = 1, k_bend = 1, k_volume = 1;
   double omega = 1.5;
   bool mass_splitting = false;
+  double handles = 0;
   int groups = 8;
   int iterations = 25;
   int substeps = 1;

@@ -49,6 +49,28 @@ void upload(Sim& sim, const State& state) {
   sim.stale = true;
 }
 
+bool has_handles(const Sim& sim) { return !sim.solver.handles.handles.empty(); }
+
+// Poses near to the state's, and sums of 0; from there on the GPU keeps them.
+void start_handles(Sim& sim, const State& state) {
+  if (!has_handles(sim)) return;
+  const std::vector<HandlePose> poses = handle_poses(sim.solver.handles, state.positions);
+  std::vector<std::uint32_t> words(3 * HANDLE_ROW * poses.size());
+  for (std::size_t h = 0; h < poses.size(); ++h) {
+    std::uint32_t* row = words.data() + (sim.turn * poses.size() + h) * HANDLE_ROW;
+    std::memcpy(row + 24, &poses[h].R, sizeof poses[h].R);
+    for (int a = 0; a < 3; ++a) {
+      const double units = std::round(poses[h].place[a] / sim.unit);
+      const double rest = std::isfinite(units) ? std::fmod(units, 4294967296.0) : 0;
+      row[42 + a] = std::uint32_t(std::int64_t(rest));
+    }
+  }
+  for (const auto& [binding, id] : sim.solver.bindings)
+    if (binding == BIND_HANDLE_SUMS)
+      for (const Buffer& buffer : sim.solver.buffers)
+        if (buffer.id() == id) buffer.write(0, buffer.bytes(), words.data());
+}
+
 void write_step_block(Sim& sim) {
   const Settings& s = sim.settings;
   const double h = s.dt / s.substeps;
@@ -56,7 +78,8 @@ void write_step_block(Sim& sim) {
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
   block.h = float(h);
   block.inverse_h = float(1 / h);
-  block.omega = float(s.omega);
+  block.handles = float(has_handles(sim) ? s.handles : 0);
+  block.omega = float(relaxation(s.omega, has_handles(sim) ? s.handles : 0));
   block.friction = float(s.friction);
   block.keep = float(std::exp(-s.damping * h));
   block.limit = float(sim.model->size);
@@ -114,8 +137,8 @@ void build_solver(Sim& sim) {
   const std::size_t vertices = sim.model->positions.size();
   Pass predict{Program::compute("predict.comp"), work_groups(vertices, group_size),
                vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
-  Solver solver =
-      mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning, sim.settings.groups});
+  Solver solver = mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning,
+                                sim.settings.groups, sim.settings.handles > 0});
   Program keep = Program::compute("keep.comp");
   sim.predict = std::move(predict);
   sim.check.keep = std::move(keep);
@@ -243,6 +266,7 @@ void write_state(Sim& sim, const State& state) {
   if (on_cpu(sim)) sim.host = state;
   upload(sim, state);
   sim.unit = unit_of(sim, state);
+  start_handles(sim, state);
   write_step_block(sim);
   start_check(sim, state);
 }
@@ -251,7 +275,8 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const bool kinds = settings.constraints != sim.settings.constraints;
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   const bool groups = settings.groups != sim.settings.groups && settings.mode == "groups";
-  if (kinds || groups || settings.mode != sim.settings.mode) {
+  const bool handles = (settings.handles > 0) != (sim.settings.handles > 0) && settings.mode == "node";
+  if (kinds || groups || handles || settings.mode != sim.settings.mode) {
     if (check_finite(sim, true)) return_to_kept(sim);  // a solver made anew has nothing better to start from
     const State state = read_state(sim);
     // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
@@ -271,6 +296,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
 void rebuild_shaders(Sim& sim) {
   sim.shader_version = shader_folder_version();
   build_solver(sim);
+  start_handles(sim, read_state(sim));
   sim.check.reloaded = sim.steps;
 }
 
@@ -300,6 +326,7 @@ void step(Sim& sim) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
   Dispatcher dispatcher{sim.tuning};
   const auto turn = [&](unsigned phase) {
+    if (has_handles(sim)) phase |= sim.turn << TURN_BITS;
     return glm::uvec2(phase, phase & PHASE_FINISH ? check_slot(sim.steps + 1) : 0);
   };
   const auto bind_places = [&] {  // read these, write the others
@@ -312,13 +339,15 @@ void step(Sim& sim) {
     const GLbitfield readers = GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT;
     dispatcher.run(move, turn(phase), last ? readers : 0);
     if (sim.solver.double_buffered) sim.side = 1 - sim.side, bind_places();
+    sim.turn = (sim.turn + 1) % 3;
   };
   if (sim.stale) {
     sim.places[sim.side].bind_storage(BIND_PLACES_OUT);
     dispatcher.run(sim.predict, {0, 0});
   }
-  sim.stale = false;
   bind_places();
+  if (sim.stale && has_handles(sim)) move_vertices(PHASE_PLACES, false);
+  sim.stale = false;
   const bool separate = sim.solver.separate || s.iterations == 0;
   for (int substep = 0; substep < s.substeps; ++substep) {
     const bool end = substep + 1 == s.substeps;

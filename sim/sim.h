@@ -33,6 +33,7 @@ struct Sim {
   double unit = 1;                  ///< m, of places
   bool stale = true;                ///< the places are not those of the next step
   unsigned side = 0;                ///< which of `places` is read next
+  unsigned turn = 0;                ///< which set of handles' sums is (Solver::handles)
   long steps = 0;                   ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 

@@ -40,7 +40,9 @@ Solver create(const SolverInput& input, bool grouped) {
   const Patches patches = grouped ? vertex_patches(input.system, cut.patch, input.groups,
                                                    balanced_groups(input.system, input.groups))
                                   : vertex_patches(input.system, cut.patch);
-  add_patches(solver, input, patches, "solve_node.comp", cut.group, grouped);
+  const bool held = input.handles && !grouped;
+  if (held) solver.handles = build_handles(input.model);
+  add_patches(solver, input, patches, "solve_node.comp", cut.group, grouped, held ? &solver.handles : nullptr);
   solver.iteration.back().bytes += vertices * (2 * sizeof(Position) + 16);
   return solver;
 }

@@ -105,9 +105,48 @@ Cut tuned(Cut cut, const Tuning& tuning) {
   return cut;
 }
 
+namespace {
+
+// The lists of each patch's handles, and the buffers of handles.glsl; returns the length of the longest list.
+std::size_t add_handles(Solver& solver, const SolverInput& input, const Patches& patches, Handles& handles) {
+  for (layout::Handle& handle : handles.handles) handle.keeper = ~0u;
+  std::vector<std::vector<std::uint32_t>> lists(patches.count);
+  std::size_t most = 1;
+  for (std::size_t p = 0; p < patches.count; ++p) {
+    const std::uint32_t* words = patches.parts.data() + p * patches.part_words;
+    for (std::uint32_t h = 0; h < handles.handles.size(); ++h) {
+      const auto held = [&](std::uint32_t v) {
+        return glsl::Rigid{}.handle_weight(handles.rest[v], handles.handles[h].node) > 0;
+      };
+      bool any = false;
+      for (std::uint32_t v = words[2]; v < words[2] + words[1] && !any; ++v) any = held(v);
+      if (!any) continue;
+      lists[p].push_back(h);
+      if (handles.handles[h].keeper == ~0u) handles.handles[h].keeper = std::uint32_t(p);
+    }
+    most = std::max(most, lists[p].size());
+  }
+  std::vector<std::uint32_t> words(patches.count * (most + 1));
+  for (std::size_t p = 0; p < patches.count; ++p) {
+    words[p * (most + 1)] = std::uint32_t(lists[p].size());
+    std::copy(lists[p].begin(), lists[p].end(), words.begin() + std::ptrdiff_t(p * (most + 1) + 1));
+  }
+  const auto add = [&](const char* label, int binding, const auto& data) {
+    solver.buffers.push_back(storage_buffer(input.tuning, label, data));
+    solver.bindings.push_back({binding, solver.buffers.back().id()});
+  };
+  add("handles", BIND_HANDLES, handles.handles);
+  add("handle lists", BIND_HANDLE_LISTS, words);
+  add("handle rest", BIND_HANDLE_REST, handles.rest);
+  add("handle sums", BIND_HANDLE_SUMS, std::vector<std::uint32_t>(3 * HANDLE_ROW * handles.handles.size()));
+  return most;
+}
+
+}  // namespace
+
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
-                 unsigned group, bool grouped) {
-  std::size_t bytes = 0;
+                 unsigned group, bool grouped, Handles* handles) {
+  std::size_t bytes = 0, most_handles = 0;
   const auto add = [&](const char* label, int binding, const auto& data) {
     solver.buffers.push_back(storage_buffer(input.tuning, label, data));
     solver.bindings.push_back({binding, solver.buffers.back().id()});
@@ -116,7 +155,13 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
   add("patches", BIND_PARTS, patches.parts);
   add("patch vertices", BIND_PATCH_VERTICES, patches.vertices);
   add("patch records", BIND_PATCH_RECORDS, patches.records);
+  if (handles) {
+    most_handles = add_handles(solver, input, patches, *handles);
+    bytes += 32 * patches.count * patches.most_summed + 2 * solver.buffers.back().bytes();
+  }
   const ShaderWords words = {{{"GROUP", std::to_string(group)},
+                              {"HANDLES", std::to_string(most_handles)},
+                              {"HANDLE_COUNT", std::to_string(handles ? handles->handles.size() : 0)},
                               {"PATCHES", std::to_string(patches.count)},
                               {"PART_WORDS", std::to_string(patches.part_words)},
                               {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},

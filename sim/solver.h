@@ -10,6 +10,7 @@
 
 #include "sim/constraints.h"
 #include "sim/gpu.h"
+#include "sim/handles.h"
 #include "sim/layout.h"
 #include "sim/model.h"
 #include "sim/patches.h"
@@ -44,7 +45,8 @@ struct Solver {
   std::vector<Pass>
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
   bool double_buffered = false;  ///< an iteration reads one buffer of places and writes the other
-  int groups = 1;  ///< the last dispatch runs once for each group of constraints, swapping sides every time
+  int groups = 1;   ///< the last dispatch runs once for each group of constraints, swapping sides every time
+  Handles handles;  ///< none but where dispatches keep sums for them, in three sets by turns
   bool separate = false;  ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
@@ -70,6 +72,7 @@ struct SolverInput {
   bool software = false;  ///< the "GPU" is a CPU
   Tuning tuning;          ///< `row` and `storage` filled in
   int groups = 1;         ///< of mode groups
+  bool handles = false;   ///< rigid handles are asked for
 };
 
 struct SolverMode {
@@ -110,9 +113,10 @@ struct Cut {
 };
 /// With what `tuning` overrides; throws Error if a work-group cannot have that size.
 Cut tuned(Cut cut, const Tuning& tuning);
-/// Gives a solver a dispatch of `shader`, a work-group a patch, and the patches' buffers (patch.glsl).
+/// Gives a solver a dispatch of `shader`, a work-group a patch, and the patches' buffers (patch.glsl); with
+/// `handles`, theirs (handles.glsl).
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
-                 unsigned group, bool grouped);
+                 unsigned group, bool grouped, Handles* handles = nullptr);
 /// Gives a solver its sums of corrections, at zero, and its last dispatch, which averages them and moves the
 /// vertices (average.comp).
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums);

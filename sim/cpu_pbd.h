@@ -42,6 +42,12 @@ struct Batch {
   std::vector<Item> items;
 };
 
+/// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
+/// finer: their rounding is what moves the centre of a free body then.
+inline double longest_correction(const Model& model, const Settings& settings) {
+  return settings.mass_splitting ? model.size / 64 : model.size;
+}
+
 /// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and rigid handles.
 /// `gauss_seidel`: one after the other.
 enum class Sweep { jacobi, gauss_seidel };
@@ -107,7 +113,8 @@ class CpuPbd {
   void project(std::vector<glm::dvec3>& x, const Settings& settings, Sweep sweep) {
     constexpr std::size_t arity = std::size_t(Kind::arity);
     using vec = glm::vec<3, real>;
-    const real k = real(settings.*Kind::stiffness), limit = real(model_.size);
+    const real k = real(settings.*Kind::stiffness);
+    const real limit = real(sweep == Sweep::jacobi ? longest_correction(model_, settings) : model_.size);
     const bool split = settings.mass_splitting && sweep == Sweep::jacobi;
     Formulas<real> formulas;
     for (const auto& item : std::get<Batch<Kind, real>>(batches_).items) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <mutex>
 
+#include "sim/cpu_pbd.h"
 #include "sim/error.h"
 #include "sim/parallel.h"
 
@@ -82,8 +83,8 @@ void write_step_block(Sim& sim) {
   block.omega = float(relaxation(s.omega, has_handles(sim) ? s.handles : 0));
   block.friction = float(s.friction);
   block.keep = float(std::exp(-s.damping * h));
-  block.limit = float(sim.model->size);
-  block.delta_unit = float(sim.model->size / double(1 << 30));
+  block.limit = float(longest_correction(*sim.model, s));
+  block.delta_unit = float(longest_correction(*sim.model, s) / double(1 << 30));
   block.mass_splitting = s.mass_splitting && s.mode != "groups";
   block.unit = float(sim.unit);
   block.inverse_unit = float(1 / sim.unit);

@@ -43,6 +43,8 @@ struct Step {
   float mass_splitting;   // 1: neighbours see n_i w_i, not w_i
   vec4 stiffness[2];      // by constraint kind
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
+  vec4 softness[2];        // compliance over h^2, by constraint kind
+  vec4 relaxation;         // with compliance, x: constraint damping over h; y: over-relaxation (`omega` is 1 then)
 };
 
 // Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in the order
@@ -61,7 +63,9 @@ struct Step {
 #define PHASE_SOLVE 2u    // corrections
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_CONTACT 8u  // contacts after the corrections: once an iteration
-#define PHASE_BITS 4      // above them: which group of constraints (mode groups)
+#define PHASE_FIRST 16u   // the corrections are the first of their substep (compliance only)
+#define PHASE_LAST 32u    // and the last
+#define PHASE_BITS 6      // above them: which group of constraints (mode groups)
 
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0
@@ -76,6 +80,7 @@ struct Step {
 #define BIND_PATCH_RECORDS 9
 #define BIND_RECORDS 7        // mode paper: + index of the constraint kind among those present
 #define STORAGE_BINDINGS 10   // most of any mode
+#define BIND_MULTIPLIERS 10   // one more with compliance: of each of the patches' records
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most

@@ -32,5 +32,8 @@ void main() {
     Velocity speed;
     if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
     advance(i, positions[i], speed, correction);
+#ifdef DAMPED
+    if ((turn.x & PHASE_FINISH) == 0u) places_out[params.vertex_count + i] = places[params.vertex_count + i];
+#endif
   }
 }

@@ -45,7 +45,8 @@ struct Solver {
       iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
   bool double_buffered = false;  ///< an iteration reads one buffer of places and writes the other
   int groups = 1;  ///< the last dispatch runs once for each group of constraints, swapping sides every time
-  bool separate = false;  ///< prediction and velocities in dispatches of their own
+  bool compliant = false, damped = false;  ///< what it was made for (constraints.h)
+  bool separate = false;                   ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
 };
@@ -67,9 +68,10 @@ Tuning tuning_from_environment();
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
-  bool software = false;  ///< the "GPU" is a CPU
-  Tuning tuning;          ///< `row` and `storage` filled in
-  int groups = 1;         ///< of mode groups
+  bool software = false;                   ///< the "GPU" is a CPU
+  Tuning tuning;                           ///< `row` and `storage` filled in
+  int groups = 1;                          ///< of mode groups
+  bool compliant = false, damped = false;  ///< constraints.h
 };
 
 struct SolverMode {
@@ -110,6 +112,8 @@ struct Cut {
 };
 /// With what `tuning` overrides; throws Error if a work-group cannot have that size.
 Cut tuned(Cut cut, const Tuning& tuning);
+/// Words defined in kernels for compliance and constraint damping; none without.
+std::vector<std::string> compliance_defines(bool compliant, bool damped);
 /// Gives a solver a dispatch of `shader`, a work-group a patch, and the patches' buffers (patch.glsl).
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
                  unsigned group, bool grouped);

@@ -34,7 +34,7 @@ void tooltip(const std::string& text) {
 void begin_row(const char* label) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(label);
-  ImGui::SameLine(ImGui::GetFontSize() * 7.4f);
+  ImGui::SameLine(ImGui::GetFontSize() * 9.4f);  // "compliance stretch" fits
   ImGui::SetNextItemWidth(-1);
 }
 

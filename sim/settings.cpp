@@ -37,7 +37,9 @@ const std::vector<Parameter>& parameters() {
       {"omega", "solver", &S::omega, 0, 4, false, "",
        "over-relaxation of averaged corrections, 1 to 2 recommended (Jacobi modes)", live},
       {"mass_splitting", "solver", &S::mass_splitting, 0, 1, false, "",
-       "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint)", live},
+       "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
+       "with compliance always",
+       live},
       {"groups", "solver", &S::groups, 1, 128, true, "",
        "groups of constraints, solved one after the other (mode groups); many are a colouring", rebuild},
       {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations a substep", live},

@@ -34,7 +34,7 @@ void tooltip(const std::string& text) {
 void begin_row(const char* label) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(label);
-  ImGui::SameLine(ImGui::GetFontSize() * 7.4f);
+  ImGui::SameLine(ImGui::GetFontSize() * 9.4f);  // "compliance stretch" fits
   ImGui::SetNextItemWidth(-1);
 }
 
@@ -49,6 +49,14 @@ bool number_widget(const Parameter& row, T& value, ImGuiDataType type) {
     const float speed = type == ImGuiDataType_Double ? 0.01f * std::max(1.0f, std::abs(float(value))) : 1.0f;
     return ImGui::DragScalar(id.c_str(), type, &value, speed, &low, &high, format.c_str(),
                              ImGuiSliderFlags_AlwaysClamp);
+  }
+  if (row.logarithmic && row.low == 0 && type == ImGuiDataType_Double) {
+    // ImGui takes what its format does not show for 0: all decades down to 1e-12 have to be in it.
+    const std::string all = "%.12g" + (*row.unit ? " " + std::string(row.unit) : "");
+    const bool changed = ImGui::SliderScalar(id.c_str(), type, &value, &low, &high, all.c_str(),
+                                             ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
+    if (changed) value = T(std::stod(fmt::format("{:.3g}", double(value))));
+    return changed;
   }
   const int flags = ImGuiSliderFlags_AlwaysClamp | (row.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   return ImGui::SliderScalar(id.c_str(), type, &value, &low, &high, format.c_str(), flags);
@@ -105,9 +113,13 @@ bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) 
 // A stiffness of a kind that is switched off has no effect.
 bool is_idle(const Settings& settings, const Parameter& row) {
   const std::string_view name = row.name;
-  if (!name.starts_with("k_")) return false;
-  const auto kinds = split(settings.constraints, ',');
-  return std::find(kinds.begin(), kinds.end(), name.substr(2)) == kinds.end();
+  if (name == "mass_splitting") return compliant(settings);  // brings it with it
+  for (const std::string_view of_kind : {"k_", "compliance_"})
+    if (name.starts_with(of_kind)) {
+      const auto kinds = split(settings.constraints, ',');
+      return std::find(kinds.begin(), kinds.end(), name.substr(of_kind.size())) == kinds.end();
+    }
+  return false;
 }
 
 bool parameter_widget(Session& s, Ui& ui, const Parameter& row, Settings& settings) {

@@ -60,6 +60,8 @@ struct Step {
   float _6, _7, _8;
   vec4 stiffness[2];      // by constraint kind
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
+  vec4 softness[2];        // compliance over h^2, by constraint kind
+  vec4 relaxation;         // with compliance, x: constraint damping over h; y: over-relaxation (`omega` is 1 then)
 };
 
 // Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in the order
@@ -78,9 +80,11 @@ struct Step {
 #define PHASE_SOLVE 2u    // corrections
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_CONTACT 8u  // contacts after the corrections: once an iteration
-#define PHASE_PLACES 16u  // nothing but sums of handles, from places as they are
-#define PHASE_BITS 5      // above them: which group of constraints (mode groups, at most 128)
-#define TURN_BITS 12      // above that: a count of dispatches, where there are handles
+#define PHASE_FIRST 16u   // the corrections are the first of their substep (compliance only)
+#define PHASE_LAST 32u    // and the last
+#define PHASE_PLACES 64u  // nothing but sums of handles, from places as they are
+#define PHASE_BITS 7      // above them: which group of constraints (mode groups, at most 128)
+#define TURN_BITS 14      // above that: a count of dispatches, where there are handles
 
 // Storage bindings of the simulation.
 #define BIND_POSITIONS 0
@@ -98,8 +102,9 @@ struct Step {
 #define BIND_HANDLE_REST 12
 #define BIND_HANDLE_SUMS 6
 #define BIND_RECORDS 7        // mode paper: + index of the constraint kind among those present
-#define STORAGE_BINDINGS 10   // most of any mode without handles
-#define STORAGE_BINDINGS_HANDLES 13
+#define STORAGE_BINDINGS 10   // most of any mode
+#define BIND_MULTIPLIERS 10   // one more with compliance: of each of the patches' records
+#define STORAGE_BINDINGS_HANDLES 13  // with handles, which go without compliance
 #define HANDLE_ROW 48         // words of a handle in each set of sums (handles.glsl)
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2

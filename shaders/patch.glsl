@@ -11,9 +11,22 @@ shared float units_per_metre[$SUMMED];
 shared int sums[3 * $SUMMED];
 // Bytes of a record: its vertices' numbers in the patch.
 uint slot_of(uint slots, int j) { return (slots >> (8 * j)) & 255u; }
+#ifdef COMPLIANT
+layout(std430, binding = BIND_MULTIPLIERS) restrict buffer Multipliers { float multipliers[]; };  // of records, in this substep
+uint at_record;  // the index of the one being projected
+#if $GROUPED
+shared float counts[$VERTICES];  // n_i in the group
+#endif
+#ifdef DAMPED
+shared ivec4 starts[$VERTICES];  // places at the substep's start
+#endif
+#endif
 #define Ids uint
 uint id_of(Ids slots, int j) { return names[slot_of(slots, j)]; }
 #include "constraints/types.glsl"
+#ifdef COMPLIANT
+#include "constraints/compliance.glsl"
+#endif
 #include "guards.glsl"
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "project.glsl"
@@ -31,6 +44,15 @@ void solve_part(uint part, bool some) {
     uvec2 vertex = vertices[$VERTICESu * part + k];
     names[k] = vertex.x;
     here[k] = places[vertex.x];
+#ifdef COMPLIANT
+#if $GROUPED
+    counts[k] = uintBitsToFloat(vertex.y);
+    here[k].w = floatBitsToInt(inverse_mass_of(here[k]) * counts[k]);
+#endif
+#ifdef DAMPED
+    starts[k] = places[params.vertex_count + vertex.x];
+#endif
+#endif
     if (k < $SUMMEDu) units_per_metre[k] = 1.0 / (params.delta_unit * uintBitsToFloat(vertex.y));
   }
   barrier();
@@ -38,6 +60,9 @@ void solve_part(uint part, bool some) {
   uint end = 0u;
   #foreach uint begin_$KIND = end; end = (end + count_$KIND + 31u) & ~31u;
   for (uint t = me; t < end; t += $GROUPu) {
+#ifdef COMPLIANT
+    #foreach if (t - begin_$KIND < count_$KIND) at_record = from_$KIND + (t - begin_$KIND);
+#endif
     #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records[from_$KIND + (t - begin_$KIND)], summed);
   }
   barrier();

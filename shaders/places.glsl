@@ -1,6 +1,7 @@
 // A place: a position in whole units, modulo 2^32 in each component, with the inverse mass (times n_i for mass splitting) as float bits. Differences of
 // places wrap as well, so they are exact wherever the body is, as long as the vertices of a constraint are within 2^31 units
 // of each other (method.md, "What neighbours see").
+// With constraint damping (DAMPED) as many follow: where the vertices were at the substep's start.
 // Read from one buffer and written to another (or the same, where nobody reads in the dispatch that writes).
 layout(std430, binding = BIND_PLACES) restrict readonly buffer Places { ivec4 places[]; };
 layout(std430, binding = BIND_PLACES_OUT) restrict writeonly buffer PlacesOut { ivec4 places_out[]; };

@@ -10,4 +10,7 @@ void main() {
   uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
   if (i >= params.vertex_count) return;
   places_out[i] = predicted_place(positions[i], velocities[i]);
+#ifdef DAMPED
+  places_out[params.vertex_count + i] = place_of(Pair(positions[i].high, positions[i].low), 0.0);
+#endif
 }

@@ -47,6 +47,9 @@ void main() {
       if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
       place = advance(i, positions[i], speed, correction);
     }
+#ifdef DAMPED
+    if ((turn.x & PHASE_FINISH) == 0u) places_out[params.vertex_count + i] = places[params.vertex_count + i];
+#endif
 #if $HANDLES
     here[me] = place;
 #endif

@@ -50,6 +50,9 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
   }
   if ((phase & (PHASE_PREDICT | PHASE_FINISH)) != 0u) velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+#ifdef DAMPED
+  if ((phase & PHASE_FINISH) != 0u) places_out[params.vertex_count + i] = place_of(x, 0.0);
+#endif
   // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
   if ((phase & PHASE_FINISH) != 0u) x = predict_position(x, predict_velocity(v));
   return x;
@@ -60,6 +63,9 @@ ivec4 advance(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) x = moved(i, own, speed, correction);
   else if ((turn.x & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
+#ifdef DAMPED
+  if (own.inverse_mass <= 0.0 && (turn.x & PHASE_FINISH) != 0u) places_out[params.vertex_count + i] = place_of(x, 0.0);
+#endif
   ivec4 place = place_of(x, weight_of(own));
   places_out[i] = place;
   return place;

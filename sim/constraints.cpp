@@ -75,12 +75,23 @@ const std::vector<ConstraintKind>& constraint_kinds() {
   static const std::vector<ConstraintKind> rows = [] {
     std::vector<ConstraintKind> result;
     for_each_kind([&]<class Kind>(Kind, int) {
-      result.push_back({Kind::name, Kind::arity, Kind::stiffness});
+      result.push_back({Kind::name, Kind::arity, Kind::stiffness, Kind::compliance});
     });
     return result;
   }();
   return rows;
 }
+
+bool compliant(const Settings& settings) {
+  bool any = damped(settings);
+  const auto wanted = split(settings.constraints, ',');
+  for (const ConstraintKind& kind : constraint_kinds())
+    any = any || (settings.*kind.compliance > 0 &&
+                  std::find(wanted.begin(), wanted.end(), kind.name) != wanted.end());
+  return any;
+}
+
+bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
 
 std::size_t ConstraintSystem::count() const {
   std::size_t sum = 0;

@@ -30,12 +30,13 @@ struct ConstraintList {
 inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
 
 // A kind is a formula in shaders/constraints/NAME.glsl, included in sim/formulas.h, and a row here: its name,
-// arity (2 or 4), stiffness, the formula as C++, and how a mesh gives its constraints. Order is the order of
-// projection in Gauss-Seidel.
+// arity (2 or 4), stiffness and compliance, the formula as C++, and how a mesh gives its constraints. Order
+// is the order of projection in Gauss-Seidel.
 struct Stretch {
   static constexpr const char* name = "stretch";
   static constexpr int arity = 2;
   static constexpr double Settings::*stiffness = &Settings::k_stretch;
+  static constexpr double Settings::*compliance = &Settings::compliance_stretch;
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.stretch(x, rest, id);
@@ -46,6 +47,7 @@ struct Bend {
   static constexpr const char* name = "bend";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_bend;
+  static constexpr double Settings::*compliance = &Settings::compliance_bend;
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.bend(x, rest, id);
@@ -57,6 +59,7 @@ struct Volume {
   static constexpr const char* name = "volume";
   static constexpr int arity = 4;
   static constexpr double Settings::*stiffness = &Settings::k_volume;
+  static constexpr double Settings::*compliance = &Settings::compliance_volume;
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.volume(x, rest, id);
@@ -76,9 +79,14 @@ void for_each_kind(F&& f) {
 struct ConstraintKind {
   const char* name;
   int arity;
-  double Settings::*stiffness;
+  double Settings::*stiffness, Settings::*compliance;
 };
 const std::vector<ConstraintKind>& constraint_kinds();
+
+/// Whether constraints are XPBD's (method.md eq. 25): any kind in use has compliance, or there is damping.
+bool compliant(const Settings& settings);
+/// Whether constraints resist their rate.
+bool damped(const Settings& settings);
 
 /// The constraints of a mesh of the kinds that `names` ("stretch,volume") lists.
 struct ConstraintSystem {

@@ -40,6 +40,7 @@ struct Batch {
     real rest;
   };
   std::vector<Item> items;
+  std::vector<real> multipliers;  // of compliant constraints, in this substep
 };
 
 /// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
@@ -48,8 +49,8 @@ inline double longest_correction(const Model& model, const Settings& settings) {
   return settings.mass_splitting ? model.size / 64 : model.size;
 }
 
-/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and rigid handles.
-/// `gauss_seidel`: one after the other.
+/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and rigid handles; with
+/// compliance masses are split, and there are no handles. `gauss_seidel`: one after the other.
 enum class Sweep { jacobi, gauss_seidel };
 
 template <class real>
@@ -72,7 +73,7 @@ class CpuPbd {
   /// How often each guard triggered so far.
   GuardCounts guards{};
 
-  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15), `settings.substeps` substeps.
+  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26), `settings.substeps` substeps.
   void step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep) {
     const double h = settings.dt / settings.substeps;
     const glm::dvec3 gravity(0, -settings.gravity, 0);
@@ -80,8 +81,15 @@ class CpuPbd {
     const double keep = std::exp(-settings.damping * h);
     auto& x = state.positions;
     auto& v = state.velocities;
+    const bool soft = compliant(settings);
     inverse_masses_.assign(inverse_masses.begin(), inverse_masses.end());
     for (int s = 0; s < settings.substeps; ++s) {
+      if (damped(settings)) start_ = x;
+      if (soft)
+        for_each_kind([&](auto kind, int) {
+          auto& batch = std::get<Batch<decltype(kind), real>>(batches_);
+          batch.multipliers.assign(batch.items.size(), 0);
+        });
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) {
           v[i] = (v[i] + h * gravity) * keep;
@@ -89,16 +97,22 @@ class CpuPbd {
         }
       predicted_ = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-        const bool held = sweep == Sweep::jacobi && settings.handles > 0;
+        const bool held = sweep == Sweep::jacobi && settings.handles > 0 && !soft;
         const double omega = relaxation(settings.omega, held ? settings.handles : 0);
         if (held && handles_.rest.empty()) handles_ = build_handles(model_);
         std::vector<glm::dvec3> pulls;
         if (held) pulls = handle_pulls(handles_, x);
         if (sweep == Sweep::jacobi) deltas_.assign(x.size(), glm::dvec3(0));
-        for_each_kind([&](auto kind, int) { project<decltype(kind)>(x, settings, sweep); });
+        for_each_kind([&](auto kind, int) {
+          if (soft)
+            project<decltype(kind), true>(x, settings, sweep);
+          else
+            project<decltype(kind), false>(x, settings, sweep);
+        });
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
-          if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (omega / at_vertex_[i]);
+          if (sweep == Sweep::jacobi && at_vertex_[i] > 0)
+            x[i] += deltas_[i] * ((soft ? 1 : omega) / at_vertex_[i]);
           if (held) x[i] += settings.handles * pulls[i];
           x[i] = out_of(planes, x[i], predicted_[i], h * v[i], settings.friction);
         }
@@ -109,15 +123,21 @@ class CpuPbd {
   }
 
  private:
-  template <class Kind>
+  template <class Kind, bool soft>
   void project(std::vector<glm::dvec3>& x, const Settings& settings, Sweep sweep) {
     constexpr std::size_t arity = std::size_t(Kind::arity);
     using vec = glm::vec<3, real>;
     const real k = real(settings.*Kind::stiffness);
     const real limit = real(sweep == Sweep::jacobi ? longest_correction(model_, settings) : model_.size);
-    const bool split = settings.mass_splitting && sweep == Sweep::jacobi;
+    const bool split = (soft || settings.mass_splitting) && sweep == Sweep::jacobi;
+    const double h = settings.dt / settings.substeps;
+    [[maybe_unused]] const real a = real(settings.*Kind::compliance / (h * h)),
+                                gamma = real(settings.constraint_damping / h),
+                                share = (1 + gamma) / real(sweep == Sweep::jacobi ? settings.omega : 1);
     Formulas<real> formulas;
-    for (const auto& item : std::get<Batch<Kind, real>>(batches_).items) {
+    auto& batch = std::get<Batch<Kind, real>>(batches_);
+    for (std::size_t number = 0; number < batch.items.size(); ++number) {
+      const auto& item = batch.items[number];
       vec local[arity];
       real w[arity];
       for (std::size_t j = 0; j < arity; ++j) {
@@ -125,9 +145,24 @@ class CpuPbd {
         w[j] = inverse_masses_[item.vertices[j]];
         if (split) w[j] *= real(at_vertex_[item.vertices[j]]);
       }
-      const auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
-      const real lambda = formulas.multiplier(c, w, k, limit);
-      const std::uint32_t triggered = formulas.guards_of(c, w, k, limit);
+      auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
+      real lambda;
+      std::uint32_t triggered;
+      if constexpr (soft) {
+        if (gamma > 0) {
+          vec start[arity];
+          for (std::size_t j = 0; j < arity; ++j)
+            start[j] = vec(start_[item.vertices[j]] - start_[item.vertices[0]]);
+          c.C += gamma * (c.C - Kind::template evaluate<real>(start, item.rest, item.vertices.data()).C);
+        }
+        c.C += a * batch.multipliers[number];
+        lambda = formulas.multiplier(c, w, k, limit, a, share);
+        triggered = formulas.guards_of(c, w, k, limit, a, share);
+        batch.multipliers[number] += lambda;
+      } else {
+        lambda = formulas.multiplier(c, w, k, limit);
+        triggered = formulas.guards_of(c, w, k, limit);
+      }
       for (std::size_t j = 0; lambda != real(0) && j < arity; ++j)
         (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += glm::dvec3(lambda * w[j] * c.gradient[j]);
       if (triggered)
@@ -145,7 +180,7 @@ class CpuPbd {
   const Model& model_;
   std::vector<std::uint32_t> at_vertex_;
   typename Batches<Kinds>::type batches_;
-  std::vector<glm::dvec3> predicted_, deltas_;
+  std::vector<glm::dvec3> start_, predicted_, deltas_;
   std::vector<real> inverse_masses_;
   Handles handles_;  // made when they are first asked for
 };

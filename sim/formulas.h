@@ -41,6 +41,7 @@ struct Formulas {
 #include "shaders/constraints/stretch.glsl"
 #include "shaders/constraints/bend.glsl"
 #include "shaders/constraints/volume.glsl"
+#include "shaders/constraints/compliance.glsl"
 #include "shaders/collision.glsl"
 #pragma GCC diagnostic pop
   // clang-format on

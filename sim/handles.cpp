@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/constraints.h"
 #include "sim/tet_mesh.h"
 
 namespace tetpbd {
@@ -100,6 +101,10 @@ Handles build_handles(const Model& model) {
         }
   }
   return result;
+}
+
+bool wants_handles(const Settings& settings) {
+  return settings.handles > 0 && settings.mode == "node" && !compliant(settings);
 }
 
 std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<glm::dvec3>& positions) {

@@ -10,6 +10,7 @@
 
 #include "sim/layout.h"
 #include "sim/model.h"
+#include "sim/settings.h"
 
 namespace tetpbd {
 
@@ -30,6 +31,9 @@ struct Handles {
 /// A lattice over each body's box, about 0.3 of its diagonal a cell; a handle at each node that has vertices.
 /// Lattices do not touch.
 Handles build_handles(const Model& model);
+
+/// Whether settings ask for handles where they are: in mode node, without compliance.
+bool wants_handles(const Settings& settings);
 
 struct HandlePose {
   glm::dmat3 R{1};

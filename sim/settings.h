@@ -12,6 +12,8 @@ struct Settings {
   std::string mode = "node";
   std::string constraints = "stretch,bend,volume";
   double k_stretch = 1, k_bend = 1, k_volume = 1;
+  double compliance_stretch = 0, compliance_bend = 0, compliance_volume = 0;
+  double constraint_damping = 0;
   double omega = 1.5;
   bool mass_splitting = false;
   double handles = 0;

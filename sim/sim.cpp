@@ -80,12 +80,13 @@ void write_step_block(Sim& sim) {
   block.h = float(h);
   block.inverse_h = float(1 / h);
   block.handles = float(has_handles(sim) ? s.handles : 0);
-  block.omega = float(relaxation(s.omega, has_handles(sim) ? s.handles : 0));
+  block.omega = sim.solver.compliant ? 1.0f : float(relaxation(s.omega, has_handles(sim) ? s.handles : 0));
   block.friction = float(s.friction);
   block.keep = float(std::exp(-s.damping * h));
   block.limit = float(longest_correction(*sim.model, s));
   block.delta_unit = float(longest_correction(*sim.model, s) / double(1 << 30));
-  block.mass_splitting = s.mass_splitting && s.mode != "groups";
+  // With averages, a constraint's multiplier would not be what its vertices were moved by.
+  block.mass_splitting = (s.mass_splitting || sim.solver.compliant) && s.mode != "groups";
   block.unit = float(sim.unit);
   block.inverse_unit = float(1 / sim.unit);
   block.position_grain = float(sim.unit / double(std::numeric_limits<float>::epsilon()));
@@ -94,6 +95,9 @@ void write_step_block(Sim& sim) {
   for (const glm::dvec4& plane : sim.model->obstacles) block.planes[block.plane_count++] = glm::vec4(plane);
   for (std::size_t k = 0; k < constraint_kinds().size(); ++k)
     block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.*constraint_kinds()[k].stiffness);
+  for (std::size_t k = 0; k < constraint_kinds().size(); ++k)
+    block.softness[k / 4][glm::length_t(k % 4)] = float(s.*constraint_kinds()[k].compliance / (h * h));
+  block.relaxation = {s.constraint_damping / h, s.omega, 0, 0};
   sim.step_block.write(0, sizeof block, &block);
   sim.stale = true;  // the places hold a prediction with the old h and gravity
 }
@@ -136,10 +140,12 @@ void build_solver(Sim& sim) {
   if (!mode) throw Error("no such mode", sim.settings.mode, "see tetpbd run --help");
   // Made first, then put in place: a shader that does not compile leaves the old solver running.
   const std::size_t vertices = sim.model->positions.size();
-  Pass predict{Program::compute("predict.comp"), work_groups(vertices, group_size),
-               vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
+  const bool soft = compliant(sim.settings), slow = damped(sim.settings);
+  Pass predict{Program::compute("predict.comp", {}, compliance_defines(soft, slow)),
+               work_groups(vertices, group_size), vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
   Solver solver = mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning,
-                                sim.settings.groups, sim.settings.handles > 0});
+                                sim.settings.groups, soft, slow, wants_handles(sim.settings)});
+  solver.compliant = soft, solver.damped = slow;
   Program keep = Program::compute("keep.comp");
   sim.predict = std::move(predict);
   sim.check.keep = std::move(keep);
@@ -158,9 +164,10 @@ void allocate(Sim& sim) {
   sim.velocities = buffer("velocities", count * sizeof(Velocity));
   sim.predicted = on_cpu(sim) ? Buffer() : buffer("predicted", count * sizeof(Velocity));
   for (int side = 0; side < 2; ++side)
-    sim.places[side] = on_cpu(sim) || (side == 1 && !sim.solver.double_buffered)
-                           ? Buffer()
-                           : buffer(side == 0 ? "places" : "places, other side", count * 16);
+    sim.places[side] =
+        on_cpu(sim) || (side == 1 && !sim.solver.double_buffered)
+            ? Buffer()
+            : buffer(side == 0 ? "places" : "places, other side", count * 16 * (sim.solver.damped ? 2 : 1));
   sim.side = 0;
 }
 
@@ -198,7 +205,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  check_limits(sim.system, gl_limits());
+  check_limits(sim.system, gl_limits(), compliant(settings));
   make_check_words(sim.check);
   if (tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   build_solver(sim);
@@ -230,8 +237,9 @@ void shift_velocities(Sim& sim, double upwards) {
 
 }  // namespace
 
-void check_limits(const ConstraintSystem& system, const Limits& limits) {
-  const int needed = std::max(STORAGE_BINDINGS, BIND_RECORDS + int(kind_words(system).size()));
+void check_limits(const ConstraintSystem& system, const Limits& limits, bool compliant) {
+  const int needed =
+      std::max(STORAGE_BINDINGS + int(compliant), BIND_RECORDS + int(kind_words(system).size()));
   if (needed > limits.storage_blocks)
     throw Error("too few shader storage blocks",
                 fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),
@@ -276,8 +284,10 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const bool kinds = settings.constraints != sim.settings.constraints;
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   const bool groups = settings.groups != sim.settings.groups && settings.mode == "groups";
-  const bool handles = (settings.handles > 0) != (sim.settings.handles > 0) && settings.mode == "node";
-  if (kinds || groups || handles || settings.mode != sim.settings.mode) {
+  const bool softness =
+      !on_cpu(sim) && (compliant(settings) != sim.solver.compliant || damped(settings) != sim.solver.damped);
+  const bool handles = wants_handles(settings) != wants_handles(sim.settings);
+  if (kinds || groups || softness || handles || settings.mode != sim.settings.mode) {
     if (check_finite(sim, true)) return_to_kept(sim);  // a solver made anew has nothing better to start from
     const State state = read_state(sim);
     // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
@@ -354,11 +364,14 @@ void step(Sim& sim) {
     const bool end = substep + 1 == s.substeps;
     if (separate) move_vertices(PHASE_PREDICT, false);
     for (int iteration = 0; iteration < s.iterations; ++iteration) {
+      unsigned solve = PHASE_SOLVE;
+      if (sim.solver.compliant && iteration == 0) solve |= PHASE_FIRST;
+      if (sim.solver.compliant && iteration + 1 == s.iterations) solve |= PHASE_LAST;
       for (std::size_t p = 0; p + 1 < sim.solver.iteration.size(); ++p)
-        dispatcher.run(sim.solver.iteration[p], turn(PHASE_SOLVE));
+        dispatcher.run(sim.solver.iteration[p], turn(solve));
       for (int group = 0; group < sim.solver.groups; ++group) {
         const bool last = group + 1 == sim.solver.groups, finish = last && iteration + 1 == s.iterations;
-        unsigned phase = PHASE_SOLVE | unsigned(group) << PHASE_BITS;
+        unsigned phase = solve | unsigned(group) << PHASE_BITS;
         if (!separate && iteration == 0 && group == 0) phase |= PHASE_PREDICT;
         if (!separate && finish) phase |= PHASE_FINISH;
         if (last) phase |= PHASE_CONTACT;

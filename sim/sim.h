@@ -52,10 +52,10 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
 /// Waits.
 GuardCounts guard_counts(Sim& sim);
 /// Throws Error naming what the driver's limits do not allow.
-void check_limits(const ConstraintSystem& system, const Limits& limits);
+void check_limits(const ConstraintSystem& system, const Limits& limits, bool compliant = false);
 /// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
-/// solver again if the mode or the constraint kinds changed; where that fails, throws and leaves the
-/// simulation as it was.
+/// solver again if the mode, the constraint kinds or whether there is compliance changed; where that fails,
+/// throws and leaves the simulation as it was.
 void apply_settings(Sim& sim, const Settings& settings);
 /// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
 /// not compile.

@@ -39,8 +39,17 @@ struct LaneBatch {
 template <class Kind>
 struct LaneBatches {
   std::vector<LaneBatch<Kind>> batches;
-  std::vector<std::size_t> first;  // of each colour, and the end
+  std::vector<std::size_t> first;                     // of each colour, and the end
+  std::vector<std::array<float, lanes>> multipliers;  // of compliant constraints, in this substep
 };
+
+// What a kind's constraints share.
+struct Rule {
+  float k, a = 0, gamma = 0;  // stiffness, alpha / h^2, tau / h
+  bool first = true;          // iteration of the substep: multipliers begin at 0
+};
+// Rules that are compiled: without compliance, with it, and with constraint damping too.
+enum class Soft { no, yes, damped };
 
 template <class>
 struct AllBatches;
@@ -57,7 +66,8 @@ struct alignas(sizeof(Row)) Vertex {
 struct Work {
   AllBatches<Kinds>::type batches;
   std::vector<Vertex> x;
-  float limit = 0;  // m, longest correction
+  std::vector<Vertex> start;  // of the substep, with constraint damping
+  float limit = 0;            // m, longest correction
 };
 
 template <class Kind>
@@ -83,13 +93,16 @@ LaneBatches<Kind> cut(const ConstraintList& list, std::size_t vertices) {
   return result;
 }
 
-// A batch where a guard triggers: one constraint after the other, as in CpuPbd.
-template <class Kind>
-[[gnu::noinline]] void project_guarded(const LaneBatch<Kind>& batch, Work& work, float k,
-                                       GuardCounts& guards) {
+// A batch where a guard triggers: one constraint after the other, as in CpuPbd. `multipliers`: with
+// compliance.
+template <class Kind, Soft soft>
+[[gnu::noinline]] void project_guarded(const LaneBatch<Kind>& batch, Work& work, const Rule& rule,
+                                       float* multipliers, GuardCounts& guards) {
   constexpr std::size_t arity = std::size_t(Kind::arity);
+  const float k = rule.k;
   for (std::size_t lane = 0; lane < batch.count; ++lane) {
     glm::vec3 local[arity];
+    [[maybe_unused]] glm::vec3 start[arity];
     float w[arity];
     std::uint32_t ids[arity];
     for (std::size_t j = 0; j < arity; ++j) {
@@ -97,10 +110,26 @@ template <class Kind>
       const Row &x = work.x[ids[j]].row, &origin = work.x[ids[0]].row;
       for (int a = 0; a < 3; ++a) local[j][a] = float(x[a] - origin[a]);
       w[j] = float(x[3]);
+      if constexpr (soft == Soft::damped)
+        for (int a = 0; a < 3; ++a)
+          start[j][a] = float(work.start[ids[j]].row[a] - work.start[ids[0]].row[a]);
     }
-    const auto c = Kind::template evaluate<float>(local, batch.rest[lane], ids);
-    const float lambda = Formulas<float>{}.multiplier(c, w, k, work.limit);
-    const std::uint32_t triggered = Formulas<float>{}.guards_of(c, w, k, work.limit);
+    auto c = Kind::template evaluate<float>(local, batch.rest[lane], ids);
+    float lambda;
+    std::uint32_t triggered;
+    Formulas<float> formulas;
+    if constexpr (soft == Soft::no) {
+      lambda = formulas.multiplier(c, w, k, work.limit);
+      triggered = formulas.guards_of(c, w, k, work.limit);
+    } else {
+      if constexpr (soft == Soft::damped)
+        c.C += rule.gamma * (c.C - Kind::template evaluate<float>(start, batch.rest[lane], ids).C);
+      const float before = rule.first ? 0 : multipliers[lane];
+      c.C += rule.a * before;
+      lambda = formulas.multiplier(c, w, k, work.limit, rule.a, 1 + rule.gamma);
+      triggered = formulas.guards_of(c, w, k, work.limit, rule.a, 1 + rule.gamma);
+      multipliers[lane] = before + lambda;
+    }
     for (std::size_t j = 0; lambda != 0 && j < arity; ++j)
       for (int a = 0; a < 3; ++a) work.x[ids[j]].row[a] += double(lambda * w[j] * c.gradient[j][a]);
     for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
@@ -119,13 +148,14 @@ template <class Kind>
 using Rows = float[std::size_t(Kind::arity)][lanes][4];
 
 template <class Kind>
-[[gnu::always_inline]] inline void gather(const LaneBatch<Kind>& batch, const Work& work, Rows<Kind>& rows) {
+[[gnu::always_inline]] inline void gather(const LaneBatch<Kind>& batch, const std::vector<Vertex>& x,
+                                          Rows<Kind>& rows) {
   for (std::size_t lane = 0; lane < lanes; ++lane) {
-    Row origin = work.x[batch.vertices[0][lane]].row;
+    Row origin = x[batch.vertices[0][lane]].row;
     store(rows[0][lane], FloatRow{0, 0, 0, float(origin[3])});
     origin[3] = 0;
     for (std::size_t j = 1; j < std::size_t(Kind::arity); ++j)
-      store(rows[j][lane], __builtin_convertvector(work.x[batch.vertices[j][lane]].row - origin, FloatRow));
+      store(rows[j][lane], __builtin_convertvector(x[batch.vertices[j][lane]].row - origin, FloatRow));
   }
 }
 
@@ -136,16 +166,21 @@ template <class Kind>
       work.x[batch.vertices[j][lane]].row += __builtin_convertvector(load(rows[j][lane]), Row);
 }
 
-// Corrections in place of positions; whether a guard may have triggered.
-template <class Kind>
-[[gnu::always_inline]] inline bool evaluate(const LaneBatch<Kind>& batch, float limit, float k,
-                                            Rows<Kind>& rows) {
+// Corrections in place of positions; whether a guard may have triggered: then multipliers stay as they were.
+template <class Kind, Soft soft>
+[[gnu::always_inline]] inline bool evaluate(const LaneBatch<Kind>& batch, float limit, const Rule& rule,
+                                            Rows<Kind>& rows, [[maybe_unused]] const Rows<Kind>& starts,
+                                            [[maybe_unused]] float* multipliers) {
   constexpr std::size_t arity = std::size_t(Kind::arity);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   // What tells whether a guard may have triggered. Kept by lane and looked at below: in the loop itself, bits
   // of guards keep GCC 12 from vectorising it.
   std::uint32_t guard[lanes];
   float error[lanes], multiplier[lanes], slack[lanes], longest[lanes];
+  [[maybe_unused]] float before[lanes];
+  if constexpr (soft != Soft::no)
+    for (std::size_t lane = 0; lane < lanes; ++lane) before[lane] = rule.first ? 0 : multipliers[lane];
+  const float k = rule.k;
   Formulas<float, LaneMath> formulas;
 #pragma GCC ivdep
   for (std::size_t lane = 0; lane < lanes; ++lane) {
@@ -156,8 +191,22 @@ template <class Kind>
       x[j] = glm::vec3(rows[j][lane][0], rows[j][lane][1], rows[j][lane][2]);
       w[j] = rows[j][lane][3];
     }
-    const auto c = Kind::template evaluate<float, LaneMath>(x, batch.rest[lane], no_ids);
-    const float lambda = formulas.multiplier(c, w, k, limit);
+    auto c = Kind::template evaluate<float, LaneMath>(x, batch.rest[lane], no_ids);
+    float lambda;
+    if constexpr (soft == Soft::no) {
+      lambda = formulas.multiplier(c, w, k, limit);
+    } else {
+      if constexpr (soft == Soft::damped) {
+        glm::vec3 start[arity];
+#pragma GCC unroll 4
+        for (std::size_t j = 0; j < arity; ++j)
+          start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
+        c.C +=
+            rule.gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, batch.rest[lane], no_ids).C);
+      }
+      c.C += rule.a * before[lane];
+      lambda = formulas.multiplier(c, w, k, limit, rule.a, 1 + rule.gamma);
+    }
     float sum = 0, weights = 0, most = 0;
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < arity; ++j) {
@@ -181,30 +230,58 @@ template <class Kind>
     triggered |= guard[lane] | std::uint32_t(!(slack[lane] >= 0)) |
                  std::uint32_t(!(longest[lane] < 0.99f * limit * limit)) |
                  (std::uint32_t(error[lane] != 0) & std::uint32_t(multiplier[lane] == 0));
+  if constexpr (soft != Soft::no)
+    if (!triggered)
+      for (std::size_t lane = 0; lane < lanes; ++lane) multipliers[lane] = before[lane] + multiplier[lane];
   return triggered != 0;
 }
 
-// Batches [begin, end) of a kind, by its number.
-WIDEST void project(Work& work, int kind, std::size_t begin, std::size_t end, float k, GuardCounts& guards) {
+// Batches [begin, end) of a kind.
+template <class Kind, Soft soft>
+[[gnu::always_inline]] inline void project_batches(Work& work, std::size_t begin, std::size_t end,
+                                                   const Rule& rule, GuardCounts& guards) {
   // Some batches together: reading a row's floats as vectors right after storing the row would wait for the
   // stores.
   constexpr std::size_t together = 4;
+  auto& of_kind = std::get<LaneBatches<Kind>>(work.batches);
+  const LaneBatch<Kind>* batches = of_kind.batches.data();
+  const auto multipliers = [&](std::size_t b) -> float* {
+    return soft == Soft::no ? nullptr : of_kind.multipliers[b].data();
+  };
+  for (std::size_t b = begin; b < end; b += together) {
+    const std::size_t count = std::min(together, end - b);
+    Rows<Kind> rows[together];
+    [[maybe_unused]] Rows<Kind> starts[soft == Soft::damped ? together : 1];
+    bool guarded[together];
+    for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.x, rows[i]);
+    if constexpr (soft == Soft::damped)
+      for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.start, starts[i]);
+    for (std::size_t i = 0; i < count; ++i)
+      guarded[i] = evaluate<Kind, soft>(batches[b + i], work.limit, rule, rows[i],
+                                        starts[soft == Soft::damped ? i : 0], multipliers(b + i));
+    for (std::size_t i = 0; i < count; ++i)
+      if (guarded[i])
+        project_guarded<Kind, soft>(batches[b + i], work, rule, multipliers(b + i), guards);
+      else
+        scatter(batches[b + i], work, rows[i]);
+  }
+}
+
+// By the kind's number.
+WIDEST void project(Work& work, int kind, std::size_t begin, std::size_t end, const Rule& rule,
+                    GuardCounts& guards) {
   for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
-    using Kind = decltype(is);
+    if (number == kind) project_batches<decltype(is), Soft::no>(work, begin, end, rule, guards);
+  });
+}
+WIDEST void project_soft(Work& work, int kind, std::size_t begin, std::size_t end, const Rule& rule,
+                         GuardCounts& guards) {
+  for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
     if (number != kind) return;
-    const LaneBatch<Kind>* batches = std::get<LaneBatches<Kind>>(work.batches).batches.data();
-    for (std::size_t b = begin; b < end; b += together) {
-      const std::size_t count = std::min(together, end - b);
-      Rows<Kind> rows[together];
-      bool guarded[together];
-      for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work, rows[i]);
-      for (std::size_t i = 0; i < count; ++i) guarded[i] = evaluate(batches[b + i], work.limit, k, rows[i]);
-      for (std::size_t i = 0; i < count; ++i)
-        if (guarded[i])
-          project_guarded(batches[b + i], work, k, guards);
-        else
-          scatter(batches[b + i], work, rows[i]);
-    }
+    if (rule.gamma > 0)
+      project_batches<decltype(is), Soft::damped>(work, begin, end, rule, guards);
+    else
+      project_batches<decltype(is), Soft::yes>(work, begin, end, rule, guards);
   });
 }
 
@@ -249,6 +326,13 @@ class FastPbd {
     const double keep = std::exp(-settings.damping * h);
     auto& v = state.velocities;
     auto& x = work_.x;
+    const bool soft = compliant(settings), slow = damped(settings);
+    if (soft)
+      for_each_kind([&](auto is, int) {
+        auto& of_kind = std::get<LaneBatches<decltype(is)>>(work_.batches);
+        of_kind.multipliers.resize(of_kind.batches.size());
+      });
+    work_.start.resize(slow ? state.positions.size() : 0);
     x.resize(state.positions.size());
     predicted_.resize(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -266,13 +350,15 @@ class FastPbd {
           if (inverse_masses[i] > 0) act(i);
       };
       for (int s = 0; s < settings.substeps; ++s) {
+        if (slow)
+          std::copy(x.begin() + long(begin), x.begin() + long(end), work_.start.begin() + long(begin));
         for_each_free_vertex([&](std::size_t i) {
           v[i] = (v[i] + h * gravity) * keep;
           move_to(i, place(i) + h * v[i]);
           predicted_[i] = place(i);
         });
         for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-          solve(settings, thread);
+          solve(settings, thread, soft, iteration == 0);
           for_each_free_vertex([&](std::size_t i) {
             move_to(i, out_of(planes, place(i), predicted_[i], h * v[i], settings.friction));
           });
@@ -289,19 +375,23 @@ class FastPbd {
 
   // One iteration's constraints, colour after colour. Small colours are left to the first thread: neighbours
   // among them then need no meeting.
-  void solve(const Settings& settings, unsigned thread) {
+  void solve(const Settings& settings, unsigned thread, bool soft, bool first) {
+    const double h = settings.dt / settings.substeps;
     bool shared_before = true;
     for (const Turn& turn : turns_) {
       const std::size_t count = turn.end - turn.begin;
       const bool shared = count >= batches_worth_a_meeting * team_->size();
       if (shared || shared_before) team_->meet();
       shared_before = shared;
-      const float k = float(settings.*constraint_kinds()[std::size_t(turn.kind)].stiffness);
+      const ConstraintKind& kind = constraint_kinds()[std::size_t(turn.kind)];
+      const Rule rule{float(settings.*kind.stiffness), float(settings.*kind.compliance / (h * h)),
+                      float(settings.constraint_damping / h), first};
+      const auto act = soft ? project_soft : project;
       if (shared)
-        project(work_, turn.kind, turn.begin + team_->share(count, thread),
-                turn.begin + team_->share(count, thread + 1), k, guards_[thread]);
+        act(work_, turn.kind, turn.begin + team_->share(count, thread),
+            turn.begin + team_->share(count, thread + 1), rule, guards_[thread]);
       else if (thread == 0)
-        project(work_, turn.kind, turn.begin, turn.end, k, guards_[thread]);
+        act(work_, turn.kind, turn.begin, turn.end, rule, guards_[thread]);
     }
     team_->meet();
   }

@@ -42,7 +42,8 @@ Solver create(const SolverInput& input, bool grouped) {
                                   : vertex_patches(input.system, cut.patch);
   const bool held = input.handles && !grouped;
   if (held) solver.handles = build_handles(input.model);
-  add_patches(solver, input, patches, "solve_node.comp", cut.group, grouped, held ? &solver.handles : nullptr);
+  add_patches(solver, input, patches, "solve_node.comp", cut.group, grouped,
+              held ? &solver.handles : nullptr);
   solver.iteration.back().bytes += vertices * (2 * sizeof(Position) + 16);
   return solver;
 }

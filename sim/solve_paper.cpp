@@ -1,11 +1,15 @@
 // The paper's GPU pipeline as published, the baseline of `bench`: predict, a dispatch a constraint kind with
 // float atomics made of compare-and-swap, average, update; work-groups of 1024; one thread a vertex.
+#include "sim/error.h"
 #include "sim/layout.h"
 #include "sim/solver.h"
 
 namespace tetpbd {
 
 Solver create_paper_solver(const SolverInput& input) {
+  if (input.compliant)
+    throw Error("mode paper has no compliance", "compliance and constraint_damping above 0",
+                "set them to 0 or use mode constraint");
   constexpr unsigned group = 1024;
   Solver solver;
   solver.separate = true;

@@ -105,6 +105,13 @@ Cut tuned(Cut cut, const Tuning& tuning) {
   return cut;
 }
 
+std::vector<std::string> compliance_defines(bool compliant, bool damped) {
+  std::vector<std::string> defines;
+  if (compliant) defines.push_back("COMPLIANT");
+  if (damped) defines.push_back("DAMPED");
+  return defines;
+}
+
 namespace {
 
 // The lists of each patch's handles, and the buffers of handles.glsl; returns the length of the longest list.
@@ -170,9 +177,14 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
                               {"GROUPED", grouped ? "1" : "0"},
                               {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
                              kind_words(input.system)};
-  bytes += 16 * patches.vertices.size();  // places
-  solver.iteration.push_back(
-      {Program::compute(shader, words), patches.count, bytes / std::size_t(grouped ? input.groups : 1)});
+  bytes += 16 * patches.vertices.size() * (input.damped ? 2 : 1);  // places
+  if (input.compliant) {
+    add("multipliers", BIND_MULTIPLIERS, std::vector<float>(patches.records.size()));
+    bytes += solver.buffers.back().bytes();  // read and written
+  }
+  const auto defines = compliance_defines(input.compliant, input.damped);
+  solver.iteration.push_back({Program::compute(shader, words, defines), patches.count,
+                              bytes / std::size_t(grouped ? input.groups : 1)});
 }
 
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {
@@ -180,7 +192,9 @@ void add_average(Solver& solver, const SolverInput& input, unsigned group, bool 
   const ShaderWords words = {{{"GROUP", std::to_string(group)}, {"FLOAT_SUMS", float_sums ? "1" : "0"}}, {}};
   const std::size_t bytes =
       vertices * (2 * sizeof(Position) + 3 * 16);  // itself, its sum there and back, its place
-  solver.iteration.push_back({Program::compute("average.comp", words), work_groups(vertices, group), bytes});
+  const auto defines = compliance_defines(input.compliant, input.damped);
+  solver.iteration.push_back(
+      {Program::compute("average.comp", words, defines), work_groups(vertices, group), bytes});
   Buffer deltas("deltas", vertices * 16);
   deltas.clear();
   solver.bindings.push_back({BIND_DELTAS, deltas.id()});

@@ -47,7 +47,8 @@ struct Solver {
   bool double_buffered = false;  ///< an iteration reads one buffer of places and writes the other
   int groups = 1;   ///< the last dispatch runs once for each group of constraints, swapping sides every time
   Handles handles;  ///< none but where dispatches keep sums for them, in three sets by turns
-  bool separate = false;  ///< prediction and velocities in dispatches of their own
+  bool compliant = false, damped = false;  ///< what it was made for (constraints.h)
+  bool separate = false;                   ///< prediction and velocities in dispatches of their own
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
   std::function<GuardCounts()> guards_on_cpu;
 };
@@ -69,10 +70,11 @@ Tuning tuning_from_environment();
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
-  bool software = false;  ///< the "GPU" is a CPU
-  Tuning tuning;          ///< `row` and `storage` filled in
-  int groups = 1;         ///< of mode groups
-  bool handles = false;   ///< rigid handles are asked for
+  bool software = false;                   ///< the "GPU" is a CPU
+  Tuning tuning;                           ///< `row` and `storage` filled in
+  int groups = 1;                          ///< of mode groups
+  bool compliant = false, damped = false;  ///< constraints.h
+  bool handles = false;                    ///< rigid handles are asked for
 };
 
 struct SolverMode {
@@ -113,6 +115,8 @@ struct Cut {
 };
 /// With what `tuning` overrides; throws Error if a work-group cannot have that size.
 Cut tuned(Cut cut, const Tuning& tuning);
+/// Words defined in kernels for compliance and constraint damping; none without.
+std::vector<std::string> compliance_defines(bool compliant, bool damped);
 /// Gives a solver a dispatch of `shader`, a work-group a patch, and the patches' buffers (patch.glsl); with
 /// `handles`, theirs (handles.glsl).
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,

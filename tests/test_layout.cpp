@@ -71,6 +71,8 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(nested("plane_count") == offsetof(Step, plane_count));
   CHECK(nested("stiffness[0]") == offsetof(Step, stiffness));
   CHECK(nested("planes[0]") == offsetof(Step, planes));
+  CHECK(nested("softness[0]") == offsetof(Step, softness));
+  CHECK(nested("relaxation") == offsetof(Step, relaxation));
   CHECK(property(predict, GL_UNIFORM_BLOCK, "StepBlock", GL_BUFFER_DATA_SIZE) == sizeof(Step));
 }
 

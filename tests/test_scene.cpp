@@ -174,7 +174,8 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
 
 TEST_CASE("every shipped scene runs in every mode") {
   GlTest gl;
-  CHECK(scene_names() == std::vector<std::string>{"armadillo-drop", "beam", "bunny-drop", "dragon-drop"});
+  CHECK(scene_names() ==
+        std::vector<std::string>{"armadillo-drop", "beam", "bunny-drop", "dragon-drop", "jelly-beam"});
   for (const std::string& name : scene_names())
     for (const SolverMode& mode : solver_modes()) {
       CAPTURE(name);

@@ -21,6 +21,20 @@ uint handle_count(uint which) { return which < $PATCHESu ? lists[which * ($HANDL
 uint handle_of(uint which, uint k) { return lists[which * ($HANDLESu + 1u) + 1u + k]; }
 uint row_of(uint offset, uint handle) { return (((turn.x >> TURN_BITS) + offset) % 3u * $HANDLE_COUNTu + handle) * HANDLE_ROW; }
 double sum_of(uint row, uint k) { return double(int(rows[row + 2u * k + 1u])) * 4294967296.0LF + double(rows[row + 2u * k]); }
+dvec3 sums_of(uint row, uint k) { return dvec3(sum_of(row, k), sum_of(row, k + 1u), sum_of(row, k + 2u)); }
+double double_of(uint at) { return packDouble2x32(uvec2(rows[at], rows[at + 1u])); }
+dvec3 doubles_of(uint at) { return dvec3(double_of(at), double_of(at + 2u), double_of(at + 4u)); }
+void keep_double(uint at, double value) {
+  uvec2 words = unpackDouble2x32(value);
+  rows[at] = words.x;
+  rows[at + 1u] = words.y;
+}
+// No component of a vector of doubles is written by an index that is not constant: a driver cannot link that (docs/decisions.md).
+void keep_doubles(uint at, dvec3 value) {
+  keep_double(at, value.x);
+  keep_double(at + 2u, value.y);
+  keep_double(at + 4u, value.z);
+}
 void add_64(inout uint low, inout int high, int a, int b) {
   int more_high, more_low;
   uint carry;
@@ -42,20 +56,19 @@ void find_poses(uint which, uint first, uint count) {
     uint handle = handle_of(which, k), row = row_of(0u, handle);
     Handle h = handles[handle];
     Pose pose;
-    for (uint q = 0u; q < 3u; ++q)
-      for (uint a = 0u; a < 3u; ++a) pose.R[q][a] = packDouble2x32(uvec2(rows[row + 24u + 2u * (3u * q + a)], rows[row + 25u + 2u * (3u * q + a)]));
+    pose.R = dmat3(doubles_of(row + 24u), doubles_of(row + 30u), doubles_of(row + 36u));
     pose.place = ivec3(rows[row + 42u], rows[row + 43u], rows[row + 44u]);
     pose.turn = dmat3(0.0LF);
     pose.move = dvec3(0.0LF);
     if ((turn.x & PHASE_PLACES) == 0u) {
       double mass = double(h.weight);
-      dvec3 sum = dvec3(sum_of(row, 0u), sum_of(row, 1u), sum_of(row, 2u));
+      dvec3 sum = sums_of(row, 0u);
       double unit_steps = double(params.inverse_unit) / double(h.steps_per_metre);
       dmat3 spread = dmat3(h.squares.x, h.products.z, h.products.y, h.products.z, h.squares.y, h.products.x, h.products.y, h.products.x,
                            h.squares.z);
       dmat3 A = pose.R * spread * unit_steps;
-      for (uint q = 0u; q < 3u; ++q)
-        A[q] += dvec3(sum_of(row, 3u + 3u * q), sum_of(row, 4u + 3u * q), sum_of(row, 5u + 3u * q)) - sum * (double(h.steps[q]) / mass);
+      dvec3 mean = sum / mass;
+      A += dmat3(sums_of(row, 3u) - mean * double(h.steps.x), sums_of(row, 6u) - mean * double(h.steps.y), sums_of(row, 9u) - mean * double(h.steps.z));
       pose.turn = (rotation_of(A) - pose.R) * unit_steps;
       pose.move = (sum - pose.turn * dvec3(h.steps)) / mass;
     }
@@ -87,13 +100,12 @@ void add_to_handles(uint which, uint count) {
     pose.place = ivec3(uvec3(pose.place) + uvec3(ivec3(floor(pose.move + 0.5LF))));
     poses[k] = pose;
     if (h.keeper == which) {
-      for (uint q = 0u; q < 3u; ++q)
-        for (uint a = 0u; a < 3u; ++a) {
-          uvec2 words = unpackDouble2x32(pose.R[q][a]);
-          rows[row + 24u + 2u * (3u * q + a)] = words.x;
-          rows[row + 25u + 2u * (3u * q + a)] = words.y;
-        }
-      for (uint a = 0u; a < 3u; ++a) rows[row + 42u + a] = uint(pose.place[a]);
+      keep_doubles(row + 24u, pose.R[0]);
+      keep_doubles(row + 30u, pose.R[1]);
+      keep_doubles(row + 36u, pose.R[2]);
+      rows[row + 42u] = uint(pose.place.x);
+      rows[row + 43u] = uint(pose.place.y);
+      rows[row + 44u] = uint(pose.place.z);
       for (uint word = 0u; word < 24u; ++word) rows[row_of(2u, handle) + word] = 0u;
     }
   }

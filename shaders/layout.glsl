@@ -105,7 +105,7 @@ struct Step {
 #define STORAGE_BINDINGS 10   // most of any mode
 #define BIND_MULTIPLIERS 10   // one more with compliance: of each of the patches' records
 #define STORAGE_BINDINGS_HANDLES 13  // with handles, which go without compliance
-#define HANDLE_ROW 48         // words of a handle in each set of sums (handles.glsl)
+#define HANDLE_ROW 36         // words of a handle in each set of sums (handles.glsl)
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most

@@ -59,11 +59,12 @@ void start_handles(Sim& sim, const State& state) {
   std::vector<std::uint32_t> words(3 * HANDLE_ROW * poses.size());
   for (std::size_t h = 0; h < poses.size(); ++h) {
     std::uint32_t* row = words.data() + (sim.turn * poses.size() + h) * HANDLE_ROW;
-    std::memcpy(row + 24, &poses[h].R, sizeof poses[h].R);
+    const glm::mat3 R(poses[h].R);
+    std::memcpy(row + 24, &R, sizeof R);
     for (int a = 0; a < 3; ++a) {
       const double units = std::round(poses[h].place[a] / sim.unit);
       const double rest = std::isfinite(units) ? std::fmod(units, 4294967296.0) : 0;
-      row[42 + a] = std::uint32_t(std::int64_t(rest));
+      row[33 + a] = std::uint32_t(std::int64_t(rest));
     }
   }
   for (const auto& [binding, id] : sim.solver.bindings)

@@ -8,23 +8,38 @@ layout(std430, binding = BIND_HANDLE_LISTS) restrict readonly buffer HandleLists
 layout(std430, binding = BIND_HANDLE_REST) restrict readonly buffer HandleRest { vec4 rest[]; };     // of a vertex: in cells; mass
 layout(std430, binding = BIND_HANDLE_SUMS) buffer HandleSums { uint rows[]; };  // three sets: read, added to, cleared, by turns
 shared vec4 home[$SUMMED];
-// Of each handle of the patch: the pose its sums are from, the next one, the change between both as units a step, and of the place in
-// whole units and the rest.
-shared mat3 poses[$HANDLES], next_poses[$HANDLES], turns[$HANDLES];
-shared ivec3 centres[$HANDLES], moves[$HANDLES];
-shared vec3 move_rests[$HANDLES];
-shared uint low_sums[12 * $HANDLES], high_sums[12 * $HANDLES];
+// Of each handle of the patch.
+struct Held {
+  vec3 node, centre, cell;
+  float steps_per_metre;
+  mat3 R;         // pose of the sums, and where it has the centre
+  ivec3 place;
+  mat3 turn;      // how R has to change, units a step
+  ivec3 move;     // and the place, whole units and the rest
+  vec3 move_rest;
+};
+shared Held held[$HANDLES];
 
 uint handle_count(uint which) { return which < $PATCHESu ? lists[which * ($HANDLESu + 1u)] : 0u; }
 uint handle_of(uint which, uint k) { return lists[which * ($HANDLESu + 1u) + 1u + k]; }
 uint row_of(uint offset, uint handle) { return (((turn.x >> TURN_BITS) + offset) % 3u * $HANDLE_COUNTu + handle) * HANDLE_ROW; }
-double sum_of(uint row, uint k) { return double(int(rows[row + 2u * k + 1u])) * 4294967296.0LF + double(rows[row + 2u * k]); }
-dvec3 sums_of(uint row, uint k) { return dvec3(sum_of(row, k), sum_of(row, k + 1u), sum_of(row, k + 2u)); }
 vec3 floats_of(uint at) { return uintBitsToFloat(uvec3(rows[at], rows[at + 1u], rows[at + 2u])); }
+double exact_sum_of(uint row, uint k) { return double(int(rows[row + 2u * k + 1u])) * 4294967296.0LF + double(rows[row + 2u * k]); }
+float sum_of(uint row, uint k) {  // by its size: the low word of a small negative number is large
+  uint low = rows[row + 2u * k], high = rows[row + 2u * k + 1u];
+  bool negative = int(high) < 0;
+  if (negative) low = ~low + 1u, high = ~high + (low == 0u ? 1u : 0u);
+  float size = float(high) * 4294967296.0 + float(low);
+  return negative ? -size : size;
+}
+vec3 sums_of(uint row, uint k) { return vec3(sum_of(row, k), sum_of(row, k + 1u), sum_of(row, k + 2u)); }
 void keep_words(uint at, uvec3 words) {
   rows[at] = words.x;
   rows[at + 1u] = words.y;
   rows[at + 2u] = words.z;
+}
+mat3 symmetric(vec3 squares, vec3 products) {
+  return mat3(squares.x, products.z, products.y, products.z, squares.y, products.x, products.y, products.x, squares.z);
 }
 // How far a vertex is from where its handle's pose has it, units. Float rounds where the pose has it, to 1e-7 of the arm, always alike.
 ivec3 deviation(mat3 R, ivec3 centre, vec3 arm, ivec3 place) {
@@ -39,95 +54,96 @@ void find_poses(uint which, uint first, uint count) {
   for (uint k = $GROUPu - 1u - gl_LocalInvocationIndex; k < handle_count(which); k += $GROUPu) {
     uint handle = handle_of(which, k), row = row_of(0u, handle);
     Handle h = handles[handle];
-    mat3 R = mat3(floats_of(row + 24u), floats_of(row + 27u), floats_of(row + 30u)), next = R;
-    dmat3 change = dmat3(0.0LF);
-    dvec3 move = dvec3(0.0LF);
+    float unit_steps = params.inverse_unit / h.steps_per_metre;
+    mat3 R = mat3(floats_of(row + 24u), floats_of(row + 27u), floats_of(row + 30u)), change = mat3(0.0);
+    ivec3 move = ivec3(0);
+    vec3 move_rest = vec3(0.0);
     if ((turn.x & PHASE_PLACES) == 0u) {
-      dvec3 sum = sums_of(row, 0u), mean = sum / double(h.weight);
-      double unit_steps = double(params.inverse_unit) / double(h.steps_per_metre);
-      dmat3 spread = dmat3(dvec3(h.squares.x, h.products.z, h.products.y), dvec3(h.products.z, h.squares.y, h.products.x),
-                           dvec3(h.products.y, h.products.x, h.squares.z));
-      dmat3 A = (dmat3(R) * spread) * unit_steps;
-      A += dmat3(sums_of(row, 3u) - mean * double(h.steps.x), sums_of(row, 6u) - mean * double(h.steps.y), sums_of(row, 9u) - mean * double(h.steps.z));
-      dmat3 turned = rotation_of(A);
-      change = (turned - dmat3(R)) * unit_steps;
-      move = mean - change * (dvec3(h.steps) / double(h.weight));
-      next = mat3(turned);
+      dvec3 mean = dvec3(exact_sum_of(row, 0u), exact_sum_of(row, 1u), exact_sum_of(row, 2u)) / double(h.weight);
+      move = ivec3(mean);
+      vec3 sum = vec3(mean);
+      mat3 B = transpose(R) * mat3(sums_of(row, 3u) - sum * h.steps.x, sums_of(row, 6u) - sum * h.steps.y, sums_of(row, 9u) - sum * h.steps.z);
+      mat3 Q = small_rotation(symmetric(h.squares, h.products) * unit_steps, B, symmetric(h.inverse_squares, h.inverse_products) / unit_steps);
+      mat3 turned = R * Q;
+      turned = turned * (mat3(1.5) - 0.5 * (transpose(turned) * turned));  // what rounding does to it stays small
+      change = (turned - R) * unit_steps;
+      move_rest = vec3(mean - dvec3(move)) - change * (h.steps / h.weight);
     }
-    poses[k] = R;
-    next_poses[k] = next;
-    turns[k] = mat3(change);
-    centres[k] = ivec3(rows[row + 33u], rows[row + 34u], rows[row + 35u]);
-    moves[k] = ivec3(move);
-    move_rests[k] = vec3(move - dvec3(ivec3(move)));
+    held[k] = Held(h.node, h.centre, h.cell, h.steps_per_metre, R, ivec3(rows[row + 33u], rows[row + 34u], rows[row + 35u]), change, move, move_rest);
   }
 }
 /// How far its handles pull the patch's vertex v, m.
 vec3 handle_pull(uint which, uint v, ivec3 place) {
+  vec4 own = home[v];
   vec3 pull = vec3(0.0);
-  for (uint k = 0u; k < handle_count(which); ++k) {
-    Handle h = handles[handle_of(which, k)];
-    int weight = handle_weight(home[v], h.node);
+  uint many = handle_count(which);
+  for (uint k = 0u; k < many; ++k) {
+    int weight = handle_weight(own, held[k].node);
     if (weight != 0) {
-      vec3 arm = handle_arm(home[v], h.centre, h.cell);
-      vec3 steps = vec3(handle_steps(arm, h.steps_per_metre));
-      ivec3 whole = moves[k] - deviation(poses[k], centres[k], arm, place);
-      pull += float(weight) * (vec3(whole) + (move_rests[k] + turns[k] * steps));
+      vec3 arm = handle_arm(own, held[k].centre, held[k].cell);
+      ivec3 whole = held[k].move - deviation(held[k].R, held[k].place, arm, place);
+      pull += float(weight) * (vec3(whole) + (held[k].move_rest + held[k].turn * vec3(handle_steps(arm, held[k].steps_per_metre))));
     }
   }
-  return pull / home[v].w * params.unit;
+  return pull / own.w * params.unit;
 }
-/// Changes the poses, and adds what the new places, in here[], deviate from them to the sums. Has barriers.
+/// Changes the poses, and adds what the new places, in here[], deviate from them to the sums. Has barriers. Uses here[] behind the
+/// patch's own vertices for the patch's sums: four pairs of low and high words a handle.
 void add_to_handles(uint which, uint count) {
   uint many = handle_count(which), me = gl_LocalInvocationIndex;
   for (uint k = me; k < many; k += $GROUPu) {
+    precise mat3 R = held[k].R + held[k].turn * (held[k].steps_per_metre * params.unit);
+    ivec3 place = ivec3(uvec3(held[k].place) + uvec3(held[k].move));
+    held[k].R = R;
+    held[k].place = place;
     uint handle = handle_of(which, k), row = row_of(1u, handle);
-    ivec3 centre = ivec3(uvec3(centres[k]) + uvec3(moves[k]));
-    centres[k] = centre;
     if (handles[handle].keeper == which) {
-      keep_words(row + 24u, floatBitsToUint(next_poses[k][0]));
-      keep_words(row + 27u, floatBitsToUint(next_poses[k][1]));
-      keep_words(row + 30u, floatBitsToUint(next_poses[k][2]));
-      keep_words(row + 33u, uvec3(centre));
+      keep_words(row + 24u, floatBitsToUint(R[0]));
+      keep_words(row + 27u, floatBitsToUint(R[1]));
+      keep_words(row + 30u, floatBitsToUint(R[2]));
+      keep_words(row + 33u, uvec3(place));
       for (uint word = 0u; word < 24u; ++word) rows[row_of(2u, handle) + word] = 0u;
     }
   }
-  for (uint k = me; k < 12u * many; k += $GROUPu) low_sums[k] = high_sums[k] = 0u;
+  for (uint k = me; k < 8u * many; k += $GROUPu) here[$SUMMEDu + k] = ivec4(0);
   barrier();
-  // An invocation a handle, one of {1, steps}, and a strip of the vertices: as many as there are invocations for.
-  uint strips = max($GROUPu / max(4u * many, 1u), 1u);
-  for (uint k = me; k < 4u * many * strips; k += $GROUPu) {
-    uint slot = k / (4u * strips), q = k / strips % 4u;
-    Handle h = handles[handle_of(which, slot)];
-    uvec3 low = uvec3(0u);
-    ivec3 high = ivec3(0);
+  // An invocation a handle and a strip of the vertices: as many strips as there are invocations for.
+  uint strips = max($GROUPu / max(many, 1u), 1u);
+  for (uint k = me; k < many * strips; k += $GROUPu) {
+    uint slot = k / strips;
+    uvec3 low[4];
+    ivec3 high[4];
+    for (int q = 0; q < 4; ++q) low[q] = uvec3(0u), high[q] = ivec3(0);
     bool any = false;
     for (uint v = k % strips; v < count; v += strips) {
-      int weight = handle_weight(home[v], h.node);
+      int weight = handle_weight(home[v], held[slot].node);
       if (weight != 0) {
         any = true;
-        vec3 arm = handle_arm(home[v], h.centre, h.cell);
-        ivec3 steps = handle_steps(arm, h.steps_per_metre), more_high, more_low;
-        uvec3 carry;
-        weight *= q == 0u ? 1 : q == 1u ? steps.x : q == 2u ? steps.y : steps.z;
-        imulExtended(ivec3(weight), deviation(next_poses[slot], centres[slot], arm, here[v].xyz), more_high, more_low);
-        low = uaddCarry(low, uvec3(more_low), carry);
-        high += more_high + ivec3(carry);
+        vec3 arm = handle_arm(home[v], held[slot].centre, held[slot].cell);
+        ivec4 factors = ivec4(1, handle_steps(arm, held[slot].steps_per_metre)) * weight;
+        ivec3 away = deviation(held[slot].R, held[slot].place, arm, here[v].xyz);
+        for (int q = 0; q < 4; ++q) {
+          ivec3 more_high, more_low;
+          uvec3 carry;
+          imulExtended(ivec3(factors[q]), away, more_high, more_low);
+          low[q] = uaddCarry(low[q], uvec3(more_low), carry);
+          high[q] += more_high + ivec3(carry);
+        }
       }
     }
-    if (any) {
-      uint at = 12u * slot + 3u * q;
-      uvec3 before = uvec3(atomicAdd(low_sums[at], low.x), atomicAdd(low_sums[at + 1u], low.y), atomicAdd(low_sums[at + 2u], low.z));
-      high += ivec3(lessThan(before + low, before));
-      atomicAdd(high_sums[at], uint(high.x));
-      atomicAdd(high_sums[at + 1u], uint(high.y));
-      atomicAdd(high_sums[at + 2u], uint(high.z));
+    for (int q = 0; q < 4 && any; ++q) {
+      uint at = $SUMMEDu + 8u * slot + 2u * uint(q);
+      uvec3 before = uvec3(atomicAdd(here[at].x, int(low[q].x)), atomicAdd(here[at].y, int(low[q].y)), atomicAdd(here[at].z, int(low[q].z)));
+      high[q] += ivec3(lessThan(before + low[q], before));
+      atomicAdd(here[at + 1u].x, high[q].x);
+      atomicAdd(here[at + 1u].y, high[q].y);
+      atomicAdd(here[at + 1u].z, high[q].z);
     }
   }
   barrier();
   for (uint k = me; k < 12u * many; k += $GROUPu) {
-    uint at = row_of(1u, handle_of(which, k / 12u)) + 2u * (k % 12u);
-    uint before = atomicAdd(rows[at], low_sums[k]);
-    atomicAdd(rows[at + 1u], high_sums[k] + (before + low_sums[k] < before ? 1u : 0u));
+    uint s = k % 12u, at = row_of(1u, handle_of(which, k / 12u)) + 2u * s, from = $SUMMEDu + 8u * (k / 12u) + 2u * (s / 3u);
+    uint low = uint(here[from][s % 3u]), before = atomicAdd(rows[at], low);
+    atomicAdd(rows[at + 1u], uint(here[from + 1u][s % 3u]) + (before + low < before ? 1u : 0u));
   }
 }

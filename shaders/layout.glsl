@@ -23,7 +23,7 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
-// A rigid handle (sim/handles.h). `squares` and `products` (yz, xz, xy): sums of weight times steps times steps about their mean.
+// A rigid handle (sim/handles.h). S: sum of weight times steps times steps about their mean; matrices as diagonal and (yz, xz, xy).
 struct Handle {
   vec3 node;              // cells of its body's lattice
   float weight;           // all its vertices', at most 2^22
@@ -33,10 +33,14 @@ struct Handle {
   uint keeper;            // the patch that writes its pose
   vec3 steps;             // sum of weight times steps
   float _2;
-  vec3 squares;
+  vec3 squares;           // S
   float _3;
   vec3 products;
   float _4;
+  vec3 inverse_squares;   // (tr S - S)^-1
+  float _5;
+  vec3 inverse_products;
+  float _6;
 };
 
 #define MAX_PLANES 8
@@ -57,7 +61,7 @@ struct Step {
   float position_grain;   // m, the size whose rounding is one unit (constraints/types.glsl)
   float mass_splitting;   // 1: neighbours see n_i w_i, not w_i
   float handles;          // share of the way that rigid handles pull in an iteration
-  float _6, _7, _8;
+  float _7, _8, _9;
   vec4 stiffness[2];      // by constraint kind
   vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 softness[2];        // compliance over h^2, by constraint kind

@@ -5,7 +5,7 @@
 layout(std430, binding = BIND_PARTS) restrict readonly buffer Parts { uint parts[]; };
 layout(std430, binding = BIND_PATCH_VERTICES) restrict readonly buffer PatchVertices { uvec2 vertices[]; };
 layout(std430, binding = BIND_PATCH_RECORDS) restrict readonly buffer Records { uvec2 records[]; };
-shared ivec4 here[$VERTICES];
+shared ivec4 here[$HERE];
 shared uint names[$VERTICES];
 shared float units_per_metre[$SUMMED];
 shared int sums[3 * $SUMMED];

@@ -18,26 +18,21 @@ ivec3 handle_steps(vec3 arm, float steps_per_metre) {
   return ivec3(floor(steps));
 }
 
-// The rotation R with the largest trace(R^T A), for A = sum w x X^T: the one that turns the X nearest to the x (Horn 1987). The sum
-// of A's singular values, the smallest one with the sign of det A, is the largest root of a quartic, found from above by Newton's
-// method as in Theobald (2005); R follows from it without eigenvectors. The identity where A says nothing: points on a line.
-dmat3 rotation_of(dmat3 A) {
-  double size = sqrt(dot(A[0], A[0]) + dot(A[1], A[1]) + dot(A[2], A[2]));
-  bool some = size > 0.0;
-  A /= some ? size : 1.0;
-  dmat3 cofactors = dmat3(cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1]));
-  double det = dot(A[0], cofactors[0]);
-  dmat3 B = transpose(A) * A;
-  double constant = 2.0 * (dot(B[0], B[0]) + dot(B[1], B[1]) + dot(B[2], B[2])) - 1.0;
-  double root = sqrt(double(3.0));
-  for (int k = 0; k < 24; ++k) {
-    double slope = 4.0 * root * (root * root - 1.0) - 8.0 * det;
-    double down = (root * root * (root * root - 2.0) - 8.0 * det * root + constant) / (slope > 1e-12 ? slope : 1.0);
-    root -= slope > 1e-12 ? down : 0.0;
-    if (abs(down) < 1e-15) break;
+// What turns S + B nearest to symmetric, for S symmetric with `inverse` = (tr S - S)^-1 and B small against it: three steps of Newton's
+// method with S's matrix in place of the true one, scaled to the true trace; no step exceeds half a radian, whatever comes in.
+mat3 small_rotation(mat3 S, mat3 B, mat3 inverse_) {
+  mat3 Q = mat3(1.0f);
+  float trace = S[0].x + S[1].y + S[2].z;
+  for (int k = 0; k < 3; ++k) {
+    // Q^T (S + B), and where S alone would be symmetric its rounding is left out.
+    mat3 C = k == 0 ? B : transpose(Q) * (S + B);
+    float scale = trace / max(abs(C[0].x + C[1].y + C[2].z + (k == 0 ? trace : 0.0f)), 0.1f * trace + 1e-30f);
+    vec3 turn = inverse_ * vec3(C[1].z - C[2].y, C[2].x - C[0].z, C[0].y - C[1].x) * scale;
+    turn *= 0.5f / max(1.0f, 2.0f * length(turn));
+    // Cayley: (1 + [t])^2 / (1 + t^2), exactly a rotation.
+    float square = dot(turn, turn);
+    mat3 cross_ = mat3(vec3(0.0f, turn.z, -turn.y), vec3(-turn.z, 0.0f, turn.x), vec3(turn.y, -turn.x, 0.0f));
+    Q = Q * (mat3(1.0f) + (cross_ + cross_ * cross_) * (2.0f / (1.0f + square)));
   }
-  double divisor = root * (root * root - 1.0) - 2.0 * det;
-  bool sound = some && divisor > 1e-6;
-  dmat3 R = ((root * root + 1.0) * A + 2.0 * root * cofactors - 2.0 * A * B) / (sound ? divisor : 1.0);
-  return sound ? R : dmat3(1.0);
+  return Q;
 }

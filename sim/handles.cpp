@@ -1,5 +1,6 @@
 #include "sim/handles.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -97,6 +98,12 @@ Handles build_handles(const Model& model) {
           handle.steps = glm::vec3(sum);
           handle.squares = glm::vec3(squares[0][0], squares[1][1], squares[2][2]);
           handle.products = glm::vec3(squares[1][2], squares[0][2], squares[0][1]);
+          const double trace = squares[0][0] + squares[1][1] + squares[2][2];
+          // Points on a line have no inverse: then a small one, and about the line nothing turns.
+          const glm::dmat3 inverse =
+              trace > 0 ? glm::inverse(glm::dmat3(trace * (1 + 1e-6)) - squares) : glm::dmat3(0);
+          handle.inverse_squares = glm::vec3(inverse[0][0], inverse[1][1], inverse[2][2]);
+          handle.inverse_products = glm::vec3(inverse[1][2], inverse[0][2], inverse[0][1]);
           result.handles.push_back(handle);
         }
   }
@@ -105,6 +112,20 @@ Handles build_handles(const Model& model) {
 
 bool wants_handles(const Settings& settings) {
   return settings.handles > 0 && settings.mode == "node" && !compliant(settings);
+}
+
+// The rotation R with the largest trace(R^T A), for A = sum w x X^T (Horn 1987): the one that turns the X nearest to the x.
+glm::dmat3 rotation_of(const glm::dmat3& A) {
+  Eigen::Matrix3d a;
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 3; ++row) a(row, column) = A[column][row];
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
+  const Eigen::Matrix3d r = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  glm::dmat3 R;
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 3; ++row) R[column][row] = r(row, column);
+  return R;
 }
 
 std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<glm::dvec3>& positions) {
@@ -122,7 +143,7 @@ std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<g
       A += double(weight) * glm::outerProduct(positions[v] - x, arm - arms);
     });
     HandlePose pose;
-    pose.R = glsl::Rigid{}.rotation_of(A);
+    pose.R = rotation_of(A);
     pose.place = x - pose.R * arms;
     poses.push_back(pose);
   }

@@ -35,6 +35,9 @@ Handles build_handles(const Model& model);
 /// Whether settings ask for handles where they are: in mode node, without compliance.
 bool wants_handles(const Settings& settings);
 
+/// The rotation nearest to A = sum w x X^T, in trace(R^T A); a rotation whatever A is.
+glm::dmat3 rotation_of(const glm::dmat3& A);
+
 struct HandlePose {
   glm::dmat3 R{1};
   glm::dvec3 place{0};  ///< m, of the handle's centre

@@ -171,6 +171,8 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
                               {"HANDLE_COUNT", std::to_string(handles ? handles->handles.size() : 0)},
                               {"PATCHES", std::to_string(patches.count)},
                               {"PART_WORDS", std::to_string(patches.part_words)},
+                              {"HERE", std::to_string(std::max({patches.largest, std::size_t(1),
+                                                               handles ? patches.most_summed + 8 * most_handles : 0}))},
                               {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},
                               {"SUMMED", std::to_string(std::max<std::size_t>(patches.most_summed, 1))},
                               {"PARTED", patches.parted ? "1" : "0"},

@@ -3,8 +3,8 @@
 // to change. All sums are exact, and a pull uses the same integers, so momentum stays to rounding of the pulls themselves.
 #include "rigid.glsl"
 // HANDLE_ROW words of a handle: 12 sums W {1, steps} x deviation, low and high words; the pose they are from, as R and the centre's place.
-layout(std430, binding = BIND_HANDLES) restrict readonly buffer Handles { Handle handles[]; };
-layout(std430, binding = BIND_HANDLE_LISTS) restrict readonly buffer HandleLists { uint lists[]; };  // of a patch: how many, which
+layout(std430, binding = BIND_HANDLES) restrict readonly buffer Handles { Handle handles[]; };          // of each patch, $HANDLES places
+layout(std430, binding = BIND_HANDLE_LISTS) restrict readonly buffer HandleLists { uint lists[]; };  // which these are; ~0: none
 layout(std430, binding = BIND_HANDLE_REST) restrict readonly buffer HandleRest { vec4 rest[]; };     // of a vertex: in cells; mass
 layout(std430, binding = BIND_HANDLE_SUMS) buffer HandleSums { uint rows[]; };  // three sets: read, added to, cleared, by turns
 shared vec4 home[$SUMMED];
@@ -19,9 +19,9 @@ struct Held {
   vec3 move_rest;
 };
 shared Held held[$HANDLES];
+shared uint handle_numbers[$HANDLES];
+shared uint held_count;
 
-uint handle_count(uint which) { return which < $PATCHESu ? lists[which * ($HANDLESu + 1u)] : 0u; }
-uint handle_of(uint which, uint k) { return lists[which * ($HANDLESu + 1u) + 1u + k]; }
 uint row_of(uint offset, uint handle) { return (((turn.x >> TURN_BITS) + offset) % 3u * $HANDLE_COUNTu + handle) * HANDLE_ROW; }
 vec3 floats_of(uint at) { return uintBitsToFloat(uvec3(rows[at], rows[at + 1u], rows[at + 2u])); }
 double exact_sum_of(uint row, uint k) { return double(int(rows[row + 2u * k + 1u])) * 4294967296.0LF + double(rows[row + 2u * k]); }
@@ -51,9 +51,14 @@ ivec3 deviation(mat3 R, ivec3 centre, vec3 arm, ivec3 place) {
 /// constraints. Needs a barrier behind it.
 void find_poses(uint which, uint first, uint count) {
   for (uint v = gl_LocalInvocationIndex; v < count; v += $GROUPu) home[v] = rest[first + v];
-  for (uint k = $GROUPu - 1u - gl_LocalInvocationIndex; k < handle_count(which); k += $GROUPu) {
-    uint handle = handle_of(which, k), row = row_of(0u, handle);
-    Handle h = handles[handle];
+  if (gl_LocalInvocationIndex == $GROUPu - 1u && (which >= $PATCHESu || lists[which * $HANDLESu] == ~0u)) held_count = 0u;
+  for (uint k = $GROUPu - 1u - gl_LocalInvocationIndex; which < $PATCHESu && k < $HANDLESu; k += $GROUPu) {
+    uint place = which * $HANDLESu + k, handle = lists[place];
+    Handle h = handles[place];
+    if (handle == ~0u) break;
+    if (k + 1u == $HANDLESu || lists[place + 1u] == ~0u) held_count = k + 1u;
+    handle_numbers[k] = handle;
+    uint row = row_of(0u, handle);
     float unit_steps = params.inverse_unit / h.steps_per_metre;
     mat3 R = mat3(floats_of(row + 24u), floats_of(row + 27u), floats_of(row + 30u)), change = mat3(0.0);
     ivec3 move = ivec3(0);
@@ -73,10 +78,10 @@ void find_poses(uint which, uint first, uint count) {
   }
 }
 /// How far its handles pull the patch's vertex v, m.
-vec3 handle_pull(uint which, uint v, ivec3 place) {
+vec3 handle_pull(uint v, ivec3 place) {
   vec4 own = home[v];
   vec3 pull = vec3(0.0);
-  uint many = handle_count(which);
+  uint many = held_count;
   for (uint k = 0u; k < many; ++k) {
     int weight = handle_weight(own, held[k].node);
     if (weight != 0) {
@@ -90,14 +95,14 @@ vec3 handle_pull(uint which, uint v, ivec3 place) {
 /// Changes the poses, and adds what the new places, in here[], deviate from them to the sums. Has barriers. Uses here[] behind the
 /// patch's own vertices for the patch's sums: four pairs of low and high words a handle.
 void add_to_handles(uint which, uint count) {
-  uint many = handle_count(which), me = gl_LocalInvocationIndex;
+  uint many = held_count, me = gl_LocalInvocationIndex;
   for (uint k = me; k < many; k += $GROUPu) {
     precise mat3 R = held[k].R + held[k].turn * (held[k].steps_per_metre * params.unit);
     ivec3 place = ivec3(uvec3(held[k].place) + uvec3(held[k].move));
     held[k].R = R;
     held[k].place = place;
-    uint handle = handle_of(which, k), row = row_of(1u, handle);
-    if (handles[handle].keeper == which) {
+    uint handle = handle_numbers[k], row = row_of(1u, handle);
+    if (handles[which * $HANDLESu + k].keeper == which) {
       keep_words(row + 24u, floatBitsToUint(R[0]));
       keep_words(row + 27u, floatBitsToUint(R[1]));
       keep_words(row + 30u, floatBitsToUint(R[2]));
@@ -142,7 +147,7 @@ void add_to_handles(uint which, uint count) {
   }
   barrier();
   for (uint k = me; k < 12u * many; k += $GROUPu) {
-    uint s = k % 12u, at = row_of(1u, handle_of(which, k / 12u)) + 2u * s, from = $SUMMEDu + 8u * (k / 12u) + 2u * (s / 3u);
+    uint s = k % 12u, at = row_of(1u, handle_numbers[k / 12u]) + 2u * s, from = $SUMMEDu + 8u * (k / 12u) + 2u * (s / 3u);
     uint low = uint(here[from][s % 3u]), before = atomicAdd(rows[at], low);
     atomicAdd(rows[at + 1u], uint(here[from + 1u][s % 3u]) + (before + low < before ? 1u : 0u));
   }

@@ -18,12 +18,12 @@ ivec3 handle_steps(vec3 arm, float steps_per_metre) {
   return ivec3(floor(steps));
 }
 
-// What turns S + B nearest to symmetric, for S symmetric with `inverse` = (tr S - S)^-1 and B small against it: three steps of Newton's
+// What turns S + B nearest to symmetric, for S symmetric with `inverse` = (tr S - S)^-1 and B small against it: two steps of Newton's
 // method with S's matrix in place of the true one, scaled to the true trace; no step exceeds half a radian, whatever comes in.
 mat3 small_rotation(mat3 S, mat3 B, mat3 inverse_) {
   mat3 Q = mat3(1.0f);
   float trace = S[0].x + S[1].y + S[2].z;
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 2; ++k) {
     // Q^T (S + B), and where S alone would be symmetric its rounding is left out.
     mat3 C = k == 0 ? B : transpose(Q) * (S + B);
     float scale = trace / max(abs(C[0].x + C[1].y + C[2].z + (k == 0 ? trace : 0.0f)), 0.1f * trace + 1e-30f);

@@ -35,7 +35,7 @@ void main() {
 #endif
     if (mine) correction = vec3(sums[3u * me], sums[3u * me + 1u], sums[3u * me + 2u]) * (params.delta_unit * share);
 #if $HANDLES
-    if (mine) correction += params.handles * handle_pull(group_index(), me, places[i].xyz);
+    if (mine) correction += params.handles * handle_pull(me, places[i].xyz);
 #endif
   }
   if (mine) {  // read here only: fewer registers while constraints are evaluated

@@ -114,7 +114,8 @@ bool wants_handles(const Settings& settings) {
   return settings.handles > 0 && settings.mode == "node" && !compliant(settings);
 }
 
-// The rotation R with the largest trace(R^T A), for A = sum w x X^T (Horn 1987): the one that turns the X nearest to the x.
+// The rotation R with the largest trace(R^T A), for A = sum w x X^T (Horn 1987): the one that turns the X
+// nearest to the x.
 glm::dmat3 rotation_of(const glm::dmat3& A) {
   Eigen::Matrix3d a;
   for (int column = 0; column < 3; ++column)

@@ -133,17 +133,19 @@ std::size_t add_handles(Solver& solver, const SolverInput& input, const Patches&
     }
     most = std::max(most, lists[p].size());
   }
-  std::vector<std::uint32_t> words(patches.count * (most + 1));
-  for (std::size_t p = 0; p < patches.count; ++p) {
-    words[p * (most + 1)] = std::uint32_t(lists[p].size());
-    std::copy(lists[p].begin(), lists[p].end(), words.begin() + std::ptrdiff_t(p * (most + 1) + 1));
-  }
+  std::vector<std::uint32_t> numbers(patches.count * most, ~0u);
+  std::vector<layout::Handle> copies(patches.count * most);  // beside each other: no number to wait for
+  for (std::size_t p = 0; p < patches.count; ++p)
+    for (std::size_t k = 0; k < lists[p].size(); ++k) {
+      numbers[p * most + k] = lists[p][k];
+      copies[p * most + k] = handles.handles[lists[p][k]];
+    }
   const auto add = [&](const char* label, int binding, const auto& data) {
     solver.buffers.push_back(storage_buffer(input.tuning, label, data));
     solver.bindings.push_back({binding, solver.buffers.back().id()});
   };
-  add("handles", BIND_HANDLES, handles.handles);
-  add("handle lists", BIND_HANDLE_LISTS, words);
+  add("handles", BIND_HANDLES, copies);
+  add("handle numbers", BIND_HANDLE_LISTS, numbers);
   add("handle rest", BIND_HANDLE_REST, handles.rest);
   add("handle sums", BIND_HANDLE_SUMS, std::vector<std::uint32_t>(3 * HANDLE_ROW * handles.handles.size()));
   return most;
@@ -166,19 +168,20 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
     most_handles = add_handles(solver, input, patches, *handles);
     bytes += 32 * patches.count * patches.most_summed + 2 * solver.buffers.back().bytes();
   }
-  const ShaderWords words = {{{"GROUP", std::to_string(group)},
-                              {"HANDLES", std::to_string(most_handles)},
-                              {"HANDLE_COUNT", std::to_string(handles ? handles->handles.size() : 0)},
-                              {"PATCHES", std::to_string(patches.count)},
-                              {"PART_WORDS", std::to_string(patches.part_words)},
-                              {"HERE", std::to_string(std::max({patches.largest, std::size_t(1),
-                                                               handles ? patches.most_summed + 8 * most_handles : 0}))},
-                              {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},
-                              {"SUMMED", std::to_string(std::max<std::size_t>(patches.most_summed, 1))},
-                              {"PARTED", patches.parted ? "1" : "0"},
-                              {"GROUPED", grouped ? "1" : "0"},
-                              {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
-                             kind_words(input.system)};
+  const ShaderWords words = {
+      {{"GROUP", std::to_string(group)},
+       {"HANDLES", std::to_string(most_handles)},
+       {"HANDLE_COUNT", std::to_string(handles ? handles->handles.size() : 0)},
+       {"PATCHES", std::to_string(patches.count)},
+       {"PART_WORDS", std::to_string(patches.part_words)},
+       {"HERE", std::to_string(std::max({patches.largest, std::size_t(1),
+                                         handles ? patches.most_summed + 8 * most_handles : 0}))},
+       {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},
+       {"SUMMED", std::to_string(std::max<std::size_t>(patches.most_summed, 1))},
+       {"PARTED", patches.parted ? "1" : "0"},
+       {"GROUPED", grouped ? "1" : "0"},
+       {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
+      kind_words(input.system)};
   bytes += 16 * patches.vertices.size() * (input.damped ? 2 : 1);  // places
   if (input.compliant) {
     add("multipliers", BIND_MULTIPLIERS, std::vector<float>(patches.records.size()));

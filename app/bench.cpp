@@ -136,9 +136,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
   std::vector<std::pair<Scene, std::shared_ptr<const Model>>> scenes;
   for (const std::string& name : options.scenes) {
     Scene scene = load_scene(name, options.overrides);
-    for (const std::string& mode : options.modes)
-      if (!find_solver_mode(mode))  // "paper" is the bench's own
-        set_parameter(scene.settings, *find_parameter("mode"), mode, "--modes");
+    for (const std::string& mode : options.modes) check_mode(mode, "--modes");
     for (const std::string& set : options.constraint_sets)
       set_parameter(scene.settings, *find_parameter("constraints"), kinds_of(set), "--constraint-sets");
     auto model = build_model(scene);
@@ -157,7 +155,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
           for (int substeps : options.substeps) {
             Settings settings = scene.settings;
             settings.constraints = kinds_of(set);
-            settings.mode = mode;
+            set_mode(settings, mode);
             settings.iterations = iterations;
             settings.substeps = substeps;
             Sim sim = create_sim(model, settings);
@@ -219,7 +217,7 @@ int run_bench(const BenchOptions& options) {
   const Floors floors = measure_floors(device.software);
   fmt::print("floors: {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n\n", floors.dispatch_us,
              floors.copy_gb_s);
-  fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", "scene", "mode",
+  fmt::print("{:<16}{:<14}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", "scene", "mode",
              "constraints", "iter", "sub", "picture", "fps", "GPU us", "us/iter", "draw us", "loss %");
   std::vector<BenchRow> rows;
   const auto report = [&](const BenchRow& row) {
@@ -228,7 +226,7 @@ int run_bench(const BenchOptions& options) {
       return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
     };
     const std::string fps = row.non_finite ? "-" : fmt::format("{:.1f}", row.fps.median);
-    fmt::print("{:<16}{:<12}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", row.scene, row.mode,
+    fmt::print("{:<16}{:<14}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", row.scene, row.mode,
                row.constraints, row.iterations, row.substeps,
                row.size.empty() ? "none" : row.size + " " + row.picture, fps, gpu(1e3 * row.gpu_ms.median),
                gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),

@@ -89,14 +89,15 @@ ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& mod
   Metrics metrics = create_metrics(*model, sim.system);
   const MeasuredRun run = measure_run(sim, metrics, steps);
   if (run.errors.non_finite) {
-    const std::string where = fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", settings.mode,
-                                          settings.omega, settings.iterations, settings.substeps);
+    const std::string where =
+        fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", mode_word(settings), settings.omega,
+                    settings.iterations, settings.substeps);
     fmt::print(stderr, "tetpbd: {}\n", error_of(*run.errors.non_finite, where).what());
   }
   const Measurement last = run.errors.last.value_or(nothing_measured());  // of the last good step
   ordered_json row;
   row["scene"] = scene.name;
-  row["mode"] = settings.mode;
+  row["mode"] = mode_word(settings);
   row["omega"] = settings.omega;
   row["iterations"] = settings.iterations;
   row["substeps"] = settings.substeps;
@@ -157,12 +158,14 @@ Chart chart_of(const ordered_json& document) {
     front.x.push_back(cost_ms(*row)), front.y.push_back(loss(*row));
     chart.notes.push_back({cost_ms(*row), loss(*row), setting_name(*row)});
   }
-  for (const SolverMode& mode : solver_modes()) {
-    Series series{mode.name, mode_colour(mode.name), {}, {}, false, true, false};
-    for (const auto& row : rows)
-      if (row["mode"] == mode.name && std::isfinite(loss(row)))
-        series.x.push_back(cost_ms(row)), series.y.push_back(loss(row));
-    if (!series.x.empty()) chart.series.push_back(series);
+  for (const auto& row : rows) {
+    if (!std::isfinite(loss(row))) continue;
+    const std::string mode = row["mode"];
+    auto series = std::find_if(chart.series.begin(), chart.series.end(),
+                               [&](const Series& other) { return other.name == mode; });
+    if (series == chart.series.end())
+      series = chart.series.insert(series, {mode, mode_colour(mode), {}, {}, false, true, false});
+    series->x.push_back(cost_ms(row)), series->y.push_back(loss(row));
   }
   chart.series.push_back(front);
   return chart;
@@ -239,9 +242,9 @@ ordered_json measured(const CompareOptions& options) {
       for (int iterations : options.iterations)
         for (int substeps : options.substeps) {
           Settings settings = scene.settings;
-          settings.mode = mode, settings.omega = omega, settings.iterations = iterations,
-          settings.substeps = substeps;
-          check_settings(settings, "compare");
+          check_mode(mode, "--modes");
+          set_mode(settings, mode), settings.omega = omega, settings.iterations = iterations,
+                                    settings.substeps = substeps;
           combinations.push_back(settings);
         }
   const auto model = build_model(scene);
@@ -311,13 +314,13 @@ int run_compare(const CompareOptions& options) {
   if (document["device"]["software"] == true)
     fmt::print("{}: a SOFTWARE renderer on the CPU. These are not a GPU's numbers.\n",
                document["device"]["gl_renderer"].get<std::string>());
-  fmt::print("{:<12}{:>7}{:>6}{:>6}{:>12}{:>10}{:>12}{:>12}{:>12}\n", "mode", "omega", "iter", "sub",
+  fmt::print("{:<14}{:>7}{:>6}{:>6}{:>12}{:>10}{:>12}{:>12}{:>12}\n", "mode", "omega", "iter", "sub",
              "ms a step", "loss %", "rigid dist", "one step", "front");
   for (const auto& row : rows) {
     const auto value = [&](const char* key) {
       return row[key].is_number() ? fmt::format("{:.4g}", row[key].get<double>()) : std::string("-");
     };
-    fmt::print("{:<12}{:>7}{:>6}{:>6}{:>12.4g}{:>10}{:>12}{:>12}{:>12}\n", row["mode"].get<std::string>(),
+    fmt::print("{:<14}{:>7}{:>6}{:>6}{:>12.4g}{:>10}{:>12}{:>12}{:>12}\n", row["mode"].get<std::string>(),
                value("omega"), value("iterations"), value("substeps"), cost_ms(row),
                std::isfinite(loss(row)) ? fmt::format("{:.3g}", loss(row)) : "-", value("rigid_distance"),
                value("reference_distance"), row["pareto"] == true ? "*" : "");

@@ -52,7 +52,7 @@ std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) 
 Settings settings_of(const Scene& scene, const std::string& mode) {
   Settings settings = scene.settings;
   const std::string suffix = "-substeps", groups = "groups-";
-  settings.mode = mode.ends_with(suffix) ? mode.substr(0, mode.size() - suffix.size()) : mode;
+  set_mode(settings, mode.ends_with(suffix) ? mode.substr(0, mode.size() - suffix.size()) : mode);
   if (mode.ends_with(suffix)) std::swap(settings.substeps, settings.iterations);
   if (settings.mode.starts_with(groups)) {
     set_parameter(settings, *find_parameter("groups"), settings.mode.substr(groups.size()),

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "app/auto_solver.h"
 #include "app/files.h"
 #include "app/progress.h"
 #include "app/statistics.h"
@@ -82,12 +83,14 @@ std::vector<BodyRange> body_ranges(const Model& model) {
 
 }  // namespace
 
-int run_headless(const Scene& scene, const RunOptions& options) {
+int run_headless(Scene scene, const RunOptions& options) {
   using Clock = std::chrono::steady_clock;
   catch_interrupts();
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
+  const auto choice = choose_for(scene, model);
+  if (choice) fmt::print("solver: {}\n", describe(*choice));
   Tuning tuning = tuning_from_environment();
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
@@ -155,9 +158,10 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   errors.non_finite = check_finite(sim, true);
   errors.finite = errors.finite && !errors.non_finite;
   const bool good = !errors.non_finite || return_to_last_good(sim);
-  write_file(options.out / "stats.json",
-             statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
-                             guard_counts(sim), good ? std::optional(state_hash(sim)) : std::nullopt));
+  write_file(
+      options.out / "stats.json",
+      statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
+                      guard_counts(sim), good ? std::optional(state_hash(sim)) : std::nullopt, choice));
   if (csv) csv->close();
   if (options.positions && good) {
     std::vector<glm::vec3> positions;
@@ -180,13 +184,14 @@ int run_headless(const Scene& scene, const RunOptions& options) {
   return 0;
 }
 
-int print_explanation(const Scene& scene, int gpu) {
+int print_explanation(Scene scene, int gpu) {
   const auto model = build_model(scene);
   HeadlessContext context(gpu);
+  if (const auto choice = choose_for(scene, model)) fmt::print("solver: {}\n", describe(*choice));
   const Sim sim = create_sim(model, scene.settings);
   const Explanation e = explain(sim);
-  fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),
-             model->rest.tets.size());
+  fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, mode_word(sim.settings),
+             model->positions.size(), model->rest.tets.size());
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
     if (sim.system.present[k]) fmt::print(", {} {}", sim.system.lists[k].count(), constraint_kinds()[k].name);
   fmt::print("\n\n{:<52}{:>14}\n", "buffer", "bytes");

@@ -25,9 +25,9 @@ struct RunOptions {
 };
 
 /// Exit status: 0, or 1 if the state became non-finite.
-int run_headless(const Scene& scene, const RunOptions& options);
+int run_headless(Scene scene, const RunOptions& options);
 /// Prints buffers, bytes, kernels and dispatches a step.
-int print_explanation(const Scene& scene, int gpu);
+int print_explanation(Scene scene, int gpu);
 int print_info(int gpu);
 
 }  // namespace tetpbd

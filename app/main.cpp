@@ -97,6 +97,19 @@ void add_scene_options(CLI::App& command, SceneArguments& a) {
       help += fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit);
     command.add_option(flag_name(row), a.values[i], help)->group("Settings")->type_name("VALUE");
   }
+  std::string solvers;
+  for (const SolverPreset& preset : solver_presets())
+    solvers += fmt::format("{} ({}), ", preset.name, preset.help);
+  command
+      .add_option("--solver", a.overrides.solver,
+                  "how to solve, by name; other settings go on top: " + solvers +
+                      "auto (tries, and takes what loses least volume within --budget-ms)")
+      ->check(not_empty)
+      ->type_name("NAME");
+  command
+      .add_option("--budget-ms", a.overrides.budget_ms,
+                  "GPU time a step, for --solver auto (default: a tenth of dt)")
+      ->check(in_range(1e-6, 1e6));
   command
       .add_option("--set", a.overrides.set,
                   "PATH=VALUE for anything else in the scene, as in bodies.0.density=500")

@@ -148,6 +148,50 @@ void draw_parameters(Session& s, Ui& ui, std::string_view section) {
   if (changed) change_settings(s, wanted);
 }
 
+const SolverPreset* preset_of(const Settings& settings) {
+  for (const SolverPreset& preset : solver_presets()) {
+    Settings same = settings;
+    apply_preset(same, preset);
+    if (same == settings) return &preset;
+  }
+  return nullptr;
+}
+
+// The whole way to solve by one word, and what auto picked.
+void draw_solver(Session& s, Ui& ui) {
+  const Settings& now = s.loaded.sim.settings;
+  const SolverPreset* preset = preset_of(now);
+  const auto& choice = s.loaded.choice;
+  const bool chosen = choice && choice->settings() == now;
+  begin_row("solver");
+  if (ImGui::BeginCombo("##solver", chosen ? "auto" : preset ? preset->name : "as set below")) {
+    for (const SolverPreset& row : solver_presets()) {
+      if (ImGui::Selectable(row.name, !chosen && preset == &row)) {
+        Settings wanted = now;
+        apply_preset(wanted, row);
+        change_settings(s, wanted);
+      }
+      tooltip(row.help);
+      mark(s, ui, fmt::format("solver={}", row.name));
+    }
+    if (ImGui::Selectable("auto", chosen)) s.choosing = true;
+    tooltip("tries ways to solve this scene and takes what loses least volume within the budget");
+    mark(s, ui, "solver=auto");
+    ImGui::EndCombo();
+  }
+  tooltip("a way to solve, by name\n--solver");
+  mark(s, ui, "solver");
+  if (!chosen) return;
+  begin_row("budget");
+  const double low = 0.01, high = 100;
+  ImGui::SliderScalar("##budget", ImGuiDataType_Double, &s.budget_ms, &low, &high, "%.3g ms a step",
+                      ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
+  if (ImGui::IsItemDeactivatedAfterEdit()) s.choosing = true;
+  tooltip("GPU time that a step may take; choosing again takes a second or so\n--budget-ms");
+  mark(s, ui, "budget");
+  ImGui::TextWrapped("%s", describe(*choice).c_str());
+}
+
 void draw_run(Session& s, Ui& ui) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const ImVec2 size((ImGui::GetContentRegionAvail().x - 2 * gap) / 3, ImGui::GetFrameHeight() * 1.25f);
@@ -319,7 +363,7 @@ void draw_panel(Session& s, Ui& ui, const Rect& place) {
   draw_edge(place, place.x, place.y + place.height);
   draw_run(s, ui);
   if (section(s, ui, "Scene", true)) draw_scene(s, ui);
-  if (section(s, ui, "Solver", true)) draw_parameters(s, ui, "solver");
+  if (section(s, ui, "Solver", true)) draw_solver(s, ui), draw_parameters(s, ui, "solver");
   if (section(s, ui, "View", true)) draw_view(s, ui);
   if (section(s, ui, "World", true)) draw_parameters(s, ui, "world");
   ImGui::End();

@@ -101,6 +101,7 @@ Scene fall_scene(const char* name, const Fall& fall) {
   overrides.tetgen = fall.tetgen;
   overrides.set = {fmt::format("bodies.0.position=[0,{},0]", fall.height)};
   overrides.parameters = {{"mode", "constraint"}};
+  overrides.solver = "paper";
   return load_scene(name, overrides);
 }
 
@@ -281,8 +282,7 @@ void snapshots(Report& report, const Fall& fall, const Published& paper) {
   report.text("All constraints, 25 iterations.");
   const Scene scene = fall_scene(paper.scene, fall);
   const auto model = build_model(scene);
-  Settings settings = scene.settings;
-  settings.iterations = 25;
+  const Settings& settings = scene.settings;
   Sim sim = create_sim(model, settings);
   Renderer renderer = make_renderer(model->rest);
   const Target target = make_target(360, 300, 4);

@@ -50,15 +50,18 @@ struct Scene {
   std::vector<glm::dvec4> obstacles;  ///< half spaces n.x >= d as (n, d), n of unit length
   Settings settings;
   std::optional<Camera> camera;
-  double duration = 2;  ///< s
+  double duration = 2;              ///< s
+  std::optional<double> budget_ms;  ///< --solver auto: settings are yet to be chosen (auto_solver.h)
 };
 
 /// What the command line puts in place of a scene's own.
 struct SceneOverrides {
-  std::filesystem::path mesh;
-  std::string tetgen, deform;
-  std::vector<std::pair<std::string, std::string>> parameters;  ///< name, text
-  std::vector<std::string> set;                                 ///< PATH=VALUE
+  std::filesystem::path mesh{};
+  std::string tetgen{}, deform{};
+  std::string solver{};                                           ///< one of solver_presets(), or auto
+  std::optional<double> budget_ms{};                              ///< for auto
+  std::vector<std::pair<std::string, std::string>> parameters{};  ///< name, text
+  std::vector<std::string> set{};                                 ///< PATH=VALUE
 };
 
 /// A name in models/scenes, or a file. Throws Error naming file, key and allowed range.

@@ -42,9 +42,10 @@ void one_step(Session& s) {
 
 }  // namespace
 
-Loaded load(const std::string& name, const SceneOverrides& overrides, const Scene& scene) {
+Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene) {
   const auto model = build_model(scene);
-  Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, {}, {}, {}};
+  auto choice = choose_for(scene, model);
+  Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, {}, {}, {}, choice};
   std::vector<BodyRange> ranges;
   for (const Body& body : model->bodies)
     ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
@@ -176,6 +177,25 @@ void change_settings(Session& s, const Settings& asked) {
   });
 }
 
+namespace {
+void say_choice(Session& s) {
+  s.budget_ms = s.loaded.choice->budget_ms;
+  say(s, "solver: " + describe(*s.loaded.choice));
+}
+}  // namespace
+
+void finish_choosing(Session& s) {
+  s.choosing = false;
+  attempt(s, [&] {
+    Scene scene = s.loaded.scene;
+    scene.settings = s.loaded.sim.settings;
+    scene.budget_ms = s.budget_ms;
+    s.loaded.choice = choose_for(scene, s.loaded.sim.model);
+    change_settings(s, scene.settings);
+    say_choice(s);
+  });
+}
+
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset();
   s.loaded = std::move(loaded);
@@ -185,6 +205,7 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
   forget_measurements(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim.model->positions.size());
+  if (s.loaded.choice) say_choice(s);
 }
 
 void finish_loading(Session& s) {
@@ -192,7 +213,7 @@ void finish_loading(Session& s) {
   s.loading.reset();
   attempt(s, [&] {
     Scene scene = load_scene(request.name, request.overrides);
-    if (request.keep_settings) scene.settings = s.loaded.sim.settings;
+    if (request.keep_settings) scene.settings = s.loaded.sim.settings, scene.budget_ms.reset();
     take_over(s, load(request.name, request.overrides, scene), request.keep_camera);
     s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);  // what was there before is gone
   });

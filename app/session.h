@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "app/auto_solver.h"
 #include "app/grab.h"
 #include "app/scene.h"
 #include "app/window.h"
@@ -32,10 +33,11 @@ struct Loaded {
   Picker picker;
   std::optional<Metrics> metrics;  ///< made when first shown
   std::vector<glm::vec4> planes;
-  std::vector<std::uint32_t> fixed;  ///< by the scene
-  std::vector<std::uint32_t> pins;   ///< by the user
+  std::vector<std::uint32_t> fixed;    ///< by the scene
+  std::vector<std::uint32_t> pins;     ///< by the user
+  std::optional<SolverChoice> choice;  ///< made last, by --solver auto or in the window
 };
-Loaded load(const std::string& name, const SceneOverrides& overrides, const Scene& scene);
+Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene);
 
 struct Message {
   std::string text;
@@ -92,7 +94,9 @@ struct Session {
   std::optional<Grab> grab;
   std::vector<Message> messages;
   std::optional<LoadRequest> loading;
-  bool measuring = true;  ///< somebody looks at the measurements
+  double budget_ms = 0.5;  ///< for the solver auto
+  bool choosing = false;   ///< that is asked for
+  bool measuring = true;   ///< somebody looks at the measurements
   std::optional<Measurement> measured;
   bool told_non_finite = false;
   std::size_t stale = 0;  ///< measurements under way that belong to before a reset
@@ -112,6 +116,8 @@ void restart(Session& session);
 void change_settings(Session& session, const Settings& asked);
 /// Loads what was asked for, in place of what there is if it succeeds.
 void finish_loading(Session& session);
+/// Chooses a solver within the budget and takes its settings; the bodies stay where they are.
+void finish_choosing(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
 void toggle_pin(Session& session, std::uint32_t vertex);

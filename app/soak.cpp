@@ -9,6 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "app/auto_solver.h"
 #include "app/files.h"
 #include "app/progress.h"
 #include "app/statistics.h"
@@ -114,10 +115,11 @@ std::string csv_of(const Watch& watch) {
 
 }  // namespace
 
-int run_soak(const Scene& scene, const SoakOptions& options) {
+int run_soak(Scene scene, const SoakOptions& options) {
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
+  if (const auto choice = choose_for(scene, model)) fmt::print("solver: {}\n", describe(*choice));
   Sim sim = create_sim(model, scene.settings);
   Metrics metrics = create_metrics(*model, sim.system);
   const Watch watch = watch_rest(sim, metrics, options);

@@ -16,6 +16,6 @@ struct SoakOptions {
 };
 
 /// Writes soak.json and soak.csv. Exit status: 0, or 1 if a check failed.
-int run_soak(const Scene& scene, const SoakOptions& options);
+int run_soak(Scene scene, const SoakOptions& options);
 
 }  // namespace tetpbd

@@ -121,10 +121,12 @@ ordered_json non_finite_json(const std::optional<NonFinite>& found) {
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
-                            const GuardCounts& guards, std::optional<std::uint64_t> hash) {
+                            const GuardCounts& guards, std::optional<std::uint64_t> hash,
+                            const std::optional<SolverChoice>& choice) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
+  if (choice) j["solver_choice"] = solver_choice_json(*choice);
   j["mesh"] = {{"vertices", mesh.vertices},
                {"surface_triangles", mesh.surface_triangles},
                {"edges", mesh.edges},

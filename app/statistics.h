@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "app/auto_solver.h"
 #include "app/scene.h"
 #include "sim/metrics.h"
 
@@ -35,7 +36,8 @@ Percentiles percentiles(std::vector<double> values);
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
-                            const GuardCounts& guards, std::optional<std::uint64_t> hash);
+                            const GuardCounts& guards, std::optional<std::uint64_t> hash,
+                            const std::optional<SolverChoice>& choice);
 /// {"step", "vertex", "cause"}, or null.
 nlohmann::ordered_json non_finite_json(const std::optional<NonFinite>& found);
 /// null where it is no number.

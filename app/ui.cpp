@@ -326,12 +326,12 @@ void draw_ui(Session& s, Ui& ui, const Layout& layout) {
   if (ui.help) draw_help(ui, layout);
 }
 
-void draw_loading(const Layout& layout, const std::string& what) {
+void draw_busy(const Layout& layout, const std::string& what) {
   const Rect& view = layout.view;
   ImGui::SetNextWindowPos(ImVec2(view.x + view.width / 2, view.y + view.height / 2), ImGuiCond_Always,
                           ImVec2(0.5f, 0.5f));
-  ImGui::Begin("loading", nullptr, fixed_window | ImGuiWindowFlags_AlwaysAutoResize);
-  ImGui::Text("loading %s ...", what.c_str());
+  ImGui::Begin("busy", nullptr, fixed_window | ImGuiWindowFlags_AlwaysAutoResize);
+  ImGui::Text("%s ...", what.c_str());
   ImGui::End();
 }
 

@@ -46,8 +46,8 @@ const std::vector<Shortcut>& shortcuts();
 Layout make_layout(const Ui& ui, float width, float height);
 /// All panels of a frame, between ImGui::NewFrame() and ImGui::Render().
 void draw_ui(Session& session, Ui& ui, const Layout& layout);
-/// Over the view while a scene loads.
-void draw_loading(const Layout& layout, const std::string& what);
+/// Over the view while the window stands still: "loading bunny-drop".
+void draw_busy(const Layout& layout, const std::string& what);
 
 /// Colours, sizes and font for a display of this scale (ui_style.cpp). `density`: framebuffer pixels a window
 /// coordinate.

@@ -220,7 +220,7 @@ void show_start(Desktop& desktop, Ui& ui, const std::string& what) {
     if (!extent.visible) return;
     follow_scale(desktop, ui, extent);
     begin_imgui_frame();
-    draw_loading(make_layout(ui, float(extent.width), float(extent.height)), what);
+    draw_busy(make_layout(ui, float(extent.width), float(extent.height)), what);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.93f, 0.935f, 0.94f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
@@ -239,11 +239,13 @@ void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, GLFWwindow* window
   fit_target(s, view, width, height);
   draw_view(s, view);
   take_screenshots(s, view);
-  const std::optional<LoadRequest> before = s.loading;
+  const bool load_now = s.loading.has_value(), choose_now = s.choosing;
   draw_ui(s, ui, layout);
   if (s.loading)
-    draw_loading(layout,
-                 s.loading->overrides.mesh.empty() ? s.loading->name : s.loading->overrides.mesh.string());
+    draw_busy(layout, "loading " + (s.loading->overrides.mesh.empty() ? s.loading->name
+                                                                      : s.loading->overrides.mesh.string()));
+  else if (s.choosing)
+    draw_busy(layout, "trying ways to solve");
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glDisable(GL_SCISSOR_TEST);
   glClearColor(0.93f, 0.935f, 0.94f, 1);
@@ -251,7 +253,11 @@ void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, GLFWwindow* window
   if (view.target.framebuffer)
     present(view.target, 0, 0, pixels(float(extent.height)) - height, width, height);
   end_imgui_frame(window, extent);
-  if (before) finish_loading(s);  // its message has been on the screen for a frame
+  // Their messages have been on the screen for a frame.
+  if (load_now)
+    finish_loading(s);
+  else if (choose_now)
+    finish_choosing(s);
 }
 
 }  // namespace
@@ -284,8 +290,8 @@ int run_window(const Scene& scene, const WindowOptions& options) {
   s.log("ready");
   while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !is_busy(mouse) && !s.loading && view.read_back.pending() == 0 &&
-                      glfwGetTime() - last_event > 0.5;
+    const bool idle = !s.playing && !is_busy(mouse) && !s.loading && !s.choosing &&
+                      view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
     const Extent extent = extent_of(desktop.window);
     if (!extent.visible || idle)
       glfwWaitEventsTimeout(0.1);

@@ -68,10 +68,7 @@ void find_poses(uint which, uint first, uint count) {
       move = ivec3(mean);
       vec3 sum = vec3(mean);
       mat3 B = transpose(R) * mat3(sums_of(row, 3u) - sum * h.steps.x, sums_of(row, 6u) - sum * h.steps.y, sums_of(row, 9u) - sum * h.steps.z);
-      mat3 Q = small_rotation(symmetric(h.squares, h.products) * unit_steps, B, symmetric(h.inverse_squares, h.inverse_products) / unit_steps);
-      mat3 turned = R * Q;
-      turned = turned * (mat3(1.5) - 0.5 * (transpose(turned) * turned));  // what rounding does to it stays small
-      change = (turned - R) * unit_steps;
+      change = R * small_rotation(symmetric(h.squares, h.products) * unit_steps, B, symmetric(h.inverse_squares, h.inverse_products) / unit_steps) * unit_steps;
       move_rest = vec3(mean - dvec3(move)) - change * (h.steps / h.weight);
     }
     held[k] = Held(h.node, h.centre, h.cell, h.steps_per_metre, R, ivec3(rows[row + 33u], rows[row + 34u], rows[row + 35u]), change, move, move_rest);
@@ -98,6 +95,7 @@ void add_to_handles(uint which, uint count) {
   uint many = held_count, me = gl_LocalInvocationIndex;
   for (uint k = me; k < many; k += $GROUPu) {
     precise mat3 R = held[k].R + held[k].turn * (held[k].steps_per_metre * params.unit);
+    R = R * (mat3(1.5) - 0.5 * (transpose(R) * R));  // what rounding does to it stays small
     ivec3 place = ivec3(uvec3(held[k].place) + uvec3(held[k].move));
     held[k].R = R;
     held[k].place = place;

@@ -1,4 +1,4 @@
-// Rigid handles (method.md eqs. 17-20), as GLSL and as C++. `precise`: both round alike, so that their integers are the same.
+// Rigid handles (method.md eqs. 28-31), as GLSL and as C++. `precise`: both round alike, so that their integers are the same.
 
 // A vertex's weight: mass times a trilinear share, so that the shares of a vertex's eight handles make 1. `vertex`: in cells of the
 // handles' lattice, and its mass in units of a weight.
@@ -18,21 +18,22 @@ ivec3 handle_steps(vec3 arm, float steps_per_metre) {
   return ivec3(floor(steps));
 }
 
-// What turns S + B nearest to symmetric, for S symmetric with `inverse` = (tr S - S)^-1 and B small against it: two steps of Newton's
-// method with S's matrix in place of the true one, scaled to the true trace; no step exceeds half a radian, whatever comes in.
+// E, for the rotation 1 + E that turns S + B nearest to symmetric; S is symmetric, `inverse` = (tr S - S)^-1, and B is small against it.
+// Two steps of Newton's method with S's matrix in place of the true one, scaled to the true trace; no step exceeds half a radian,
+// whatever comes in. Without the 1, which would round what is added to it.
 mat3 small_rotation(mat3 S, mat3 B, mat3 inverse_) {
-  mat3 Q = mat3(1.0f);
+  mat3 E = mat3(0.0f);
   float trace = S[0].x + S[1].y + S[2].z;
   for (int k = 0; k < 2; ++k) {
-    // Q^T (S + B), and where S alone would be symmetric its rounding is left out.
-    mat3 C = k == 0 ? B : transpose(Q) * (S + B);
-    float scale = trace / max(abs(C[0].x + C[1].y + C[2].z + (k == 0 ? trace : 0.0f)), 0.1f * trace + 1e-30f);
+    mat3 C = B + transpose(E) * (S + B);  // and S, which is symmetric and would only round it
+    float scale = trace / max(abs(C[0].x + C[1].y + C[2].z + trace), 0.1f * trace + 1e-30f);
     vec3 turn = inverse_ * vec3(C[1].z - C[2].y, C[2].x - C[0].z, C[0].y - C[1].x) * scale;
     turn *= 0.5f / max(1.0f, 2.0f * length(turn));
     // Cayley: (1 + [t])^2 / (1 + t^2), exactly a rotation.
     float square = dot(turn, turn);
     mat3 cross_ = mat3(vec3(0.0f, turn.z, -turn.y), vec3(-turn.z, 0.0f, turn.x), vec3(turn.y, -turn.x, 0.0f));
-    Q = Q * (mat3(1.0f) + (cross_ + cross_ * cross_) * (2.0f / (1.0f + square)));
+    mat3 more = (cross_ + cross_ * cross_) * (2.0f / (1.0f + square));
+    E = E + more + E * more;
   }
-  return Q;
+  return E;
 }

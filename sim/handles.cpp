@@ -11,7 +11,7 @@ namespace tetpbd {
 
 namespace {
 
-constexpr double spacing = 0.3;  // of a body's diagonal
+constexpr double spacing = 0.6;  // of a body's diagonal: eight handles for a compact body
 
 glm::dvec3 cell_of(const glm::dvec3& size) {
   const double diagonal = glm::length(size);

@@ -28,7 +28,7 @@ struct Handles {
   std::vector<glm::vec4>
       rest;  ///< by vertex: where in its body's lattice, in cells; mass, in units of a weight
 };
-/// A lattice over each body's box, about 0.3 of its diagonal a cell; a handle at each node that has vertices.
+/// A lattice over each body's box, about 0.6 of its diagonal a cell; a handle at each node that has vertices.
 /// Lattices do not touch.
 Handles build_handles(const Model& model);
 
@@ -42,12 +42,12 @@ struct HandlePose {
   glm::dmat3 R{1};
   glm::dvec3 place{0};  ///< m, of the handle's centre
 };
-/// The rigid poses nearest to the vertices (method.md eqs. 17-18).
+/// The rigid poses nearest to the vertices (method.md eqs. 28-29).
 std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<glm::dvec3>& positions);
-/// What handles pull each vertex by at full strength, m (method.md eq. 19).
+/// What handles pull each vertex by at full strength, m (method.md eq. 30).
 std::vector<glm::dvec3> handle_pulls(const Handles& handles, const std::vector<glm::dvec3>& positions);
 /// The over-relaxation that goes with handles of this strength: both together must not go beyond the answer
-/// by a third (method.md eq. 20).
+/// by a third (method.md eq. 31).
 double relaxation(double omega, double handles);
 
 }  // namespace tetpbd

@@ -10,6 +10,7 @@
 
 #include "sim/constraints.h"
 #include "sim/error.h"
+#include "sim/handles.h"
 #include "sim/solver.h"
 
 namespace tetpbd {
@@ -158,6 +159,51 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
           return fmt::format("{}", settings.*member);
       },
       row.member);
+}
+
+void set_mode(Settings& settings, const std::string& word) {
+  const bool held = word == "node+handles";
+  settings.mode = held ? "node" : word;
+  settings.handles = held ? 0.8 : 0;
+}
+
+void check_mode(const std::string& word, const std::string& where) {
+  Settings settings;
+  set_mode(settings, word);
+  if (find_solver_mode(settings.mode)) return;
+  std::vector<std::string> words = choices(*find_parameter("mode"));
+  words.push_back("node+handles");
+  throw Error(fmt::format("'mode' cannot be '{}'", word), where,
+              fmt::format("choose from {}", fmt::join(words, ", ")));
+}
+
+std::string mode_word(const Settings& settings) {
+  return settings.mode + (wants_handles(settings) ? "+handles" : "");
+}
+
+const std::vector<SolverPreset>& solver_presets() {
+  static const std::vector<SolverPreset> rows = {
+      {"paper",
+       "25 iterations a step, averaged",
+       {{"mode", "node"},
+        {"iterations", "25"},
+        {"substeps", "1"},
+        {"omega", "1.5"},
+        {"handles", "0"},
+        {"mass_splitting", "false"}}},
+      {"substeps",
+       "20 substeps of 1 iteration",
+       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "20"}, {"omega", "1.5"}, {"handles", "0"}}},
+      {"hard",
+       "10 substeps of 1 iteration with rigid handles: the least error for hard bodies",
+       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "10"}, {"omega", "1.5"}, {"handles", "0.8"}}},
+  };
+  return rows;
+}
+
+void apply_preset(Settings& settings, const SolverPreset& preset) {
+  for (const auto& [name, text] : preset.values)
+    set_parameter(settings, *find_parameter(name), text, preset.name);
 }
 
 void check_settings(const Settings& settings, const std::string& where) {

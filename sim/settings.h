@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -18,8 +19,8 @@ struct Settings {
   bool mass_splitting = false;
   double handles = 0;
   int groups = 8;
-  int iterations = 25;
-  int substeps = 1;
+  int iterations = 1;
+  int substeps = 20;
   double dt = 0.005;
   double damping = 0;
   double gravity = 9.81;
@@ -27,6 +28,7 @@ struct Settings {
   double ground_height = 0;
   double friction = 0.5;
   int seed = 1;
+  bool operator==(const Settings&) const = default;
 };
 
 /// Live: takes effect at the next step. Rebuild: the solver is made again, the state stays. Restart: the
@@ -56,6 +58,22 @@ std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
 /// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of
 /// them.
 std::vector<std::string> choices(const Parameter& parameter);
+/// A mode as sweeps name it: "node+handles" is mode node with handles of strength 0.8. Also the modes that
+/// are not offered elsewhere.
+void set_mode(Settings& settings, const std::string& word);
+std::string mode_word(const Settings& settings);
+/// Throws Error naming `where` if there is no such mode.
+void check_mode(const std::string& word, const std::string& where);
+
+/// A way to solve, by name: what --solver puts in place of the scene's settings.
+struct SolverPreset {
+  const char* name;
+  const char* help;
+  std::vector<std::pair<std::string, std::string>> values;  ///< parameter, text
+};
+const std::vector<SolverPreset>& solver_presets();
+void apply_preset(Settings& settings, const SolverPreset& preset);
+
 /// Throws Error for values out of range; `where` names the file or flag.
 void check_settings(const Settings& settings, const std::string& where);
 std::vector<std::string> split(const std::string& text, char separator);

@@ -18,8 +18,13 @@ namespace {
 // small mesh needs a patch for every part of the GPU, and an invocation for each of its constraints; a large
 // one gains from large patches, in which fewer constraints belong to two, and from small work-groups, of
 // which a part of the GPU runs many.
-Cut cut_for(std::size_t vertices, bool software) {
+// With handles a kernel holds more, and no more work-groups than a GPU runs at once should wait for their
+// poses.
+Cut cut_for(std::size_t vertices, bool software, bool handles) {
   if (software) return {64, 64};
+  if (handles && vertices <= 4000) return {32, 512};
+  if (handles && vertices <= 8000) return {56, 512};
+  if (handles && vertices <= 14000) return {64, 256};
   if (vertices <= 4000) return {16, 512};
   if (vertices <= 8000) return {16, 256};
   if (vertices <= 14000) return {24, 256};
@@ -29,7 +34,8 @@ Cut cut_for(std::size_t vertices, bool software) {
 
 Solver create(const SolverInput& input, bool grouped) {
   const std::size_t vertices = input.model.positions.size();
-  const Cut cut = tuned(cut_for(vertices, input.software), input.tuning);
+  const bool held = input.handles && !grouped;
+  const Cut cut = tuned(cut_for(vertices, input.software, held), input.tuning);
   if (cut.patch > std::min<std::size_t>(cut.group, Patches::most_vertices - 4))
     throw Error("a patch does not fit a work-group",
                 fmt::format("{} vertices, work-groups of {}", cut.patch, cut.group),
@@ -40,7 +46,6 @@ Solver create(const SolverInput& input, bool grouped) {
   const Patches patches = grouped ? vertex_patches(input.system, cut.patch, input.groups,
                                                    balanced_groups(input.system, input.groups))
                                   : vertex_patches(input.system, cut.patch);
-  const bool held = input.handles && !grouped;
   if (held) solver.handles = build_handles(input.model);
   add_patches(solver, input, patches, "solve_node.comp", cut.group, grouped,
               held ? &solver.handles : nullptr);

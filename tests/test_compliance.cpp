@@ -22,7 +22,7 @@ constexpr double pi = 3.14159265358979323846;
 struct Spring {
   Model model;
   ConstraintSystem system;
-  Settings settings;
+  Settings settings{.iterations = 25, .substeps = 1};
   State state;
   explicit Spring(double mass) {
     model.rest.positions = model.positions = {glm::dvec3(0), glm::dvec3(1, 0, 0)};
@@ -64,7 +64,7 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, double height, const 
 }
 
 Settings soft(const std::string& mode, int iterations, int substeps, double tau = 0) {
-  Settings s;
+  Settings s{.iterations = 25, .substeps = 1};
   s.mode = mode, s.iterations = iterations, s.substeps = substeps;
   s.compliance_stretch = 1e-6, s.compliance_bend = 1e-4, s.compliance_volume = 1e-10;
   s.constraint_damping = tau;
@@ -87,7 +87,7 @@ State jacobi_after(const Sim& sim) {
 struct Beam {
   Model model;
   ConstraintSystem system;
-  Settings settings;
+  Settings settings{.iterations = 25, .substeps = 1};
   std::vector<glm::dvec3> equilibrium;
   double sag = 0;
   Beam() {

@@ -35,7 +35,7 @@ std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::d
 }
 
 Settings quick(const std::string& mode) {
-  Settings s;
+  Settings s{.iterations = 25, .substeps = 1};
   s.mode = mode;
   s.iterations = 3;
   return s;

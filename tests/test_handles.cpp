@@ -38,7 +38,7 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, const std::string& de
 }
 
 Settings held(double handles, int iterations = 1, int substeps = 1) {
-  Settings s;
+  Settings s{.iterations = 25, .substeps = 1};
   s.mode = "node";
   s.handles = handles;
   s.iterations = iterations;

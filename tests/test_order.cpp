@@ -121,7 +121,7 @@ std::shared_ptr<const Model> falling(glm::ivec3 cells, int bodies = 1) {
 }
 
 Settings settings_of(const std::string& mode) {
-  Settings settings;
+  Settings settings{.iterations = 25, .substeps = 1};
   settings.mode = mode;
   settings.iterations = 4;
   settings.substeps = 2;

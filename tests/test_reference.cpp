@@ -27,7 +27,7 @@ glm::dvec3 noise(double amplitude) {
 struct Scene {
   Model model;
   ConstraintSystem system;
-  Settings settings;
+  Settings settings{.iterations = 25, .substeps = 1};
   ReferenceInput input() const { return {model, system, settings, model.inverse_masses}; }
   State start() const { return {model.positions, model.velocities}; }
 };

@@ -247,7 +247,7 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   text.insert(text.find(end),
               "if ((phase & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
   std::ofstream(folder.path / "shaders/vertex.glsl") << text;
-  const std::string common = "--scene beam --iterations 2 ";
+  const std::string common = "--scene beam --iterations 2 --substeps 1 ";
   const Outcome bad = tetpbd("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
   CAPTURE(bad.err);
   CHECK(bad.status == 1);

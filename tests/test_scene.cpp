@@ -107,14 +107,14 @@ TEST_CASE("the command line overrides, and its errors name the flag") {
   for (const auto& p : model->positions) CHECK(p.y == doctest::Approx(1.5));
   CHECK(mesh_volume(model->rest) == doctest::Approx(1));
 
-  CHECK(has(error_of(scene, {{}, "", "", {{"omega", "x"}}, {}}), "--omega"));
-  CHECK(has(error_of(scene, {{}, "", "", {{"dt", "nan"}}, {}}), "--dt"));
-  CHECK(has(error_of(scene, {{}, "", "", {{"iterations", "1e3"}}, {}}), "--iterations"));
-  CHECK(has(error_of(scene, {{}, "", "", {}, {"nonsense"}}), "PATH=VALUE"));
-  CHECK(has(error_of(scene, {{}, "", "", {}, {"bodies.7.density=1"}}), "bodies.7"));
-  CHECK(has(error_of(scene, {{}, "", "", {}, {"bodies.0.density=-1"}}), "density"));
-  CHECK(has(error_of(scene, {{}, "", "melt", {}, {}}), "--deform melt"));
-  CHECK(has(error_of(scene, {{}, "", "stretch:0", {}, {}}), "factor"));
+  CHECK(has(error_of(scene, {.parameters = {{"omega", "x"}}}), "--omega"));
+  CHECK(has(error_of(scene, {.parameters = {{"dt", "nan"}}}), "--dt"));
+  CHECK(has(error_of(scene, {.parameters = {{"iterations", "1e3"}}}), "--iterations"));
+  CHECK(has(error_of(scene, {.set = {"nonsense"}}), "PATH=VALUE"));
+  CHECK(has(error_of(scene, {.set = {"bodies.7.density=1"}}), "bodies.7"));
+  CHECK(has(error_of(scene, {.set = {"bodies.0.density=-1"}}), "density"));
+  CHECK(has(error_of(scene, {.deform = "melt"}), "--deform melt"));
+  CHECK(has(error_of(scene, {.deform = "stretch:0"}), "factor"));
   CHECK_THROWS_AS(load_scene("no-such-scene"), Error);
 }
 
@@ -183,7 +183,7 @@ TEST_CASE("every shipped scene runs in every mode") {
 #ifndef TETPBD_TETGEN
       if (name != "beam") continue;  // the others start from surfaces
 #endif
-      const Scene scene = load_scene(name, {{}, "", "", {{"mode", mode.name}, {"iterations", "2"}}, {}});
+      const Scene scene = load_scene(name, {.parameters = {{"mode", mode.name}, {"iterations", "2"}}});
       const auto model = build_model(scene);
       Sim sim = create_sim(model, scene.settings);
       for (int s = 0; s < 4; ++s) step(sim);

@@ -41,7 +41,7 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, double he
 }
 
 Settings quick(const std::string& mode, int iterations = 10, int substeps = 1) {
-  Settings s;
+  Settings s{.iterations = 25, .substeps = 1};
   s.mode = mode;
   s.iterations = iterations;
   s.substeps = substeps;

@@ -1,0 +1,151 @@
+#include "app/auto_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "app/measure_run.h"
+#include "app/scene.h"
+#include "sim/error.h"
+#include "sim/gl_context.h"
+#include "sim/interrupt.h"
+
+namespace tetpbd {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double most_seconds = 3;  // of a trial: a slow machine compares fewer steps
+constexpr int most_substeps = 1000;
+
+// On the front wherever it was measured (docs/results.md): one iteration a substep, never several.
+std::vector<Settings> candidates(const Settings& settings) {
+  Settings base = settings;
+  set_mode(base, "node");
+  base.iterations = 1;
+  if (compliant(settings)) return {base};  // neither over-relaxation nor handles apply
+  std::vector<Settings> all;
+  for (double omega : {1.5, 2.5}) {
+    base.omega = omega;
+    all.push_back(base);
+  }
+  bool hard = true;
+  for (const ConstraintKind& kind : constraint_kinds()) hard = hard && settings.*kind.stiffness == 1;
+  if (hard) {
+    base.omega = 1.5;
+    set_mode(base, "node+handles");
+    all.push_back(base);
+  }
+  return all;
+}
+
+// The median of steps taken one after the other, after what a GPU needs to raise its clock.
+double step_ms(Sim& sim, double spin_seconds, double seconds) {
+  const auto begin = Clock::now();
+  const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  sim.timed = false;
+  do {
+    step(sim);
+    glFinish();
+  } while (elapsed() < spin_seconds && !interrupted());
+  sim.timed = true;
+  std::vector<double> times;
+  const double end = elapsed() + seconds;
+  do {
+    step(sim);
+    while (const auto ms = sim.timer.poll()) times.push_back(*ms);
+  } while (elapsed() < end && !interrupted());
+  while (const auto ms = sim.timer.poll(true)) times.push_back(*ms);
+  if (interrupted()) throw Interrupted();
+  return percentiles(times).median;
+}
+
+double loss_until(const MeasuredRun& run, long steps) {
+  double loss = 0;
+  for (const Measurement& m : run.measurements)
+    if (m.step <= steps) loss = std::max(loss, m.finite() ? -m.volume_error_percent : std::nan(""));
+  return loss;
+}
+
+}  // namespace
+
+double default_budget_ms(const Settings& settings) { return 1e3 * settings.dt / 10; }
+
+SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
+                           double budget_ms, long steps) {
+  SolverChoice choice;
+  choice.budget_ms = budget_ms;
+  choice.steps = steps;
+  const bool software = is_software_renderer();
+  std::vector<MeasuredRun> runs;
+  for (const Settings& candidate : candidates(settings)) {
+    SolverTrial trial{candidate, 0, 0};
+    trial.settings.substeps = 1;
+    Sim sim = create_sim(model, trial.settings);
+    // Twice: from one substep's time to how many fit, and from what so many took.
+    for (int round = 0; round < 2; ++round) {
+      const double ms = step_ms(sim, software || round || !runs.empty() ? 0 : 0.3, software ? 0 : 0.03);
+      trial.settings.substeps =
+          int(std::clamp(std::floor(trial.settings.substeps * budget_ms / ms), 1.0, double(most_substeps)));
+      apply_settings(sim, trial.settings);
+    }
+    reset(sim);
+    Metrics metrics = create_metrics(*model, sim.system);
+    const auto begin = Clock::now();
+    runs.push_back(measure_run(sim, metrics, choice.steps, [&](long) {
+      return std::chrono::duration<double>(Clock::now() - begin).count() < most_seconds;
+    }));
+    const MeasuredRun& run = runs.back();
+    if (run.errors.finite && !run.measurements.empty())
+      choice.steps = std::min(choice.steps, run.measurements.back().step);
+    if (!run.timing.gpu_ms.values.empty()) trial.ms = percentiles(run.timing.gpu_ms.values).median;
+    choice.trials.push_back(trial);
+  }
+  const auto badness = [](const SolverTrial& trial) {
+    return std::isnan(trial.loss_percent) ? std::numeric_limits<double>::infinity() : trial.loss_percent;
+  };
+  for (std::size_t t = 0; t < runs.size(); ++t) {
+    SolverTrial& trial = choice.trials[t];
+    trial.loss_percent = runs[t].errors.finite ? loss_until(runs[t], choice.steps) : std::nan("");
+    // Losses that agree to a hundredth are the same: then the plainer one.
+    if (badness(trial) < 0.99 * badness(choice.trials[choice.best])) choice.best = t;
+  }
+  return choice;
+}
+
+std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model) {
+  if (!scene.budget_ms) return std::nullopt;
+  const long steps = std::clamp(std::lround(scene.duration / scene.settings.dt), 1L, 400L);
+  SolverChoice choice = choose_solver(model, scene.settings, *scene.budget_ms, steps);
+  scene.settings = choice.settings();
+  scene.budget_ms.reset();
+  return choice;
+}
+
+std::string describe(const SolverChoice& choice) {
+  const SolverTrial& best = choice.trials[choice.best];
+  const Settings& s = best.settings;
+  return fmt::format(
+      "{}, {} substep{}, omega {:g}: {:.3g} ms of {:.3g} ms a step, loss {:.3g} % over {} steps",
+      mode_word(s), s.substeps, s.substeps == 1 ? "" : "s", s.omega, best.ms, choice.budget_ms,
+      best.loss_percent, choice.steps);
+}
+
+nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {
+  nlohmann::ordered_json trials = nlohmann::ordered_json::array();
+  for (const SolverTrial& trial : choice.trials)
+    trials.push_back({{"mode", mode_word(trial.settings)},
+                      {"omega", trial.settings.omega},
+                      {"iterations", trial.settings.iterations},
+                      {"substeps", trial.settings.substeps},
+                      {"gpu_ms_per_step", json_number(trial.ms)},
+                      {"max_volume_loss_percent", json_number(trial.loss_percent)}});
+  return {
+      {"budget_ms", choice.budget_ms}, {"steps", choice.steps}, {"chosen", choice.best}, {"trials", trials}};
+}
+
+}  // namespace tetpbd

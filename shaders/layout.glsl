@@ -32,7 +32,7 @@ struct Handle {
   vec3 cell;              // m, sides of a cell
   uint keeper;            // the patch that writes its pose
   vec3 steps;             // sum of weight times steps
-  float _2;
+  uint number;            // of the handle; ~0: none
   vec3 squares;           // S
   float _3;
   vec3 products;
@@ -102,14 +102,13 @@ struct Step {
 #define BIND_PATCH_VERTICES 8
 #define BIND_PATCH_RECORDS 9
 #define BIND_HANDLES 10       // handles (sim/handles.h)
-#define BIND_HANDLE_LISTS 11
-#define BIND_HANDLE_REST 12
+#define BIND_HANDLE_REST 11
 #define BIND_HANDLE_SUMS 6
 #define BIND_RECORDS 7        // mode paper: + index of the constraint kind among those present
 #define STORAGE_BINDINGS 10   // most of any mode
 #define BIND_MULTIPLIERS 10   // one more with compliance: of each of the patches' records
-#define STORAGE_BINDINGS_HANDLES 13  // with handles, which go without compliance
-#define HANDLE_ROW 36         // words of a handle in each set of sums (handles.glsl)
+#define STORAGE_BINDINGS_HANDLES 12  // with handles, which go without compliance
+#define HANDLE_ROW 48         // words of a handle in each set of sums (handles.glsl)
 #define BIND_KEEP_FROM 0      // keep.comp
 #define BIND_KEEP_TO 2
 #define CHECK_STEPS 64        // steps whose checks are under way at most

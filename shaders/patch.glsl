@@ -34,13 +34,10 @@ uint id_of(Ids slots, int j) { return names[slot_of(slots, j)]; }
 void clear_sums() {
   for (uint k = gl_LocalInvocationIndex; k < 3u * $SUMMEDu; k += $GROUPu) sums[k] = 0;
 }
-/// `part`: its index in parts[]; `some`: whether there is one. All invocations of a work-group call it; sums are complete when it returns.
-void solve_part(uint part, bool some) {
-  uint me = gl_LocalInvocationIndex, row = $PART_WORDSu * part;
-  uint summed = parts[row + 1u];
-  #foreach uint from_$KIND = parts[row + 4u + 2u * $INDEXu], count_$KIND = some ? parts[row + 5u + 2u * $INDEXu] : 0u;
+/// The places of a part's vertices; `part`: its index in parts[]. Needs a barrier behind it.
+void load_part(uint part) {
   // Every part has room for as many vertices, so that none waits for its words before it looks for them.
-  for (uint k = me; k < $VERTICESu; k += $GROUPu) {
+  for (uint k = gl_LocalInvocationIndex; k < $VERTICESu; k += $GROUPu) {
     uvec2 vertex = vertices[$VERTICESu * part + k];
     names[k] = vertex.x;
     here[k] = places[vertex.x];
@@ -55,7 +52,12 @@ void solve_part(uint part, bool some) {
 #endif
     if (k < $SUMMEDu) units_per_metre[k] = 1.0 / (params.delta_unit * uintBitsToFloat(vertex.y));
   }
-  barrier();
+}
+/// Adds the corrections of a part that is loaded; `some`: whether there is one. Needs a barrier behind it.
+void project_part(uint part, bool some) {
+  uint me = gl_LocalInvocationIndex, row = $PART_WORDSu * part;
+  uint summed = parts[row + 1u];
+  #foreach uint from_$KIND = parts[row + 4u + 2u * $INDEXu], count_$KIND = some ? parts[row + 5u + 2u * $INDEXu] : 0u;
   // Each kind begins with a warp of its own.
   uint end = 0u;
   #foreach uint begin_$KIND = end; end = (end + count_$KIND + 31u) & ~31u;
@@ -65,5 +67,11 @@ void solve_part(uint part, bool some) {
 #endif
     #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records[from_$KIND + (t - begin_$KIND)], summed);
   }
+}
+/// All invocations of a work-group call it; sums are complete when it returns.
+void solve_part(uint part, bool some) {
+  load_part(part);
+  barrier();
+  project_part(part, some);
   barrier();
 }

@@ -20,22 +20,32 @@ void main() {
   uint count = some ? parts[$PART_WORDSu * part + 1u] : 0u;
   bool mine = me < count;
   vec3 correction = vec3(0.0);
+  bool solves = (turn.x & PHASE_SOLVE) != 0u;
 #if $HANDLES
-  find_poses(group_index(), i - me, count);
+  load_handles(group_index(), i - me, count);
 #endif
-  if ((turn.x & PHASE_SOLVE) != 0u) {
+  if (solves) {
+    clear_sums();
+    load_part(part);
+  }
+  barrier();
+#if $HANDLES
+  find_poses();  // while others evaluate constraints
+  if (!solves) barrier();
+#endif
+  if (solves) {
     float share = params.omega;
 #if $GROUPED
     share = min(share, uintBitsToFloat(vertices[$VERTICESu * part + (mine ? me : 0u)].y));
 #endif
-    clear_sums();
-    solve_part(part, some);
+    project_part(part, some);
+    barrier();
 #if $PARTED
     for (uint next = parts[$PART_WORDSu * part + 3u]; next != 0u; next = parts[$PART_WORDSu * next + 3u]) solve_part(next, some);
 #endif
     if (mine) correction = vec3(sums[3u * me], sums[3u * me + 1u], sums[3u * me + 2u]) * (params.delta_unit * share);
 #if $HANDLES
-    if (mine) correction += params.handles * handle_pull(me, places[i].xyz);
+    correction += params.handles * handle_pull(i - me, count);
 #endif
   }
   if (mine) {  // read here only: fewer registers while constraints are evaluated
@@ -55,7 +65,6 @@ void main() {
 #endif
   }
 #if $HANDLES
-  barrier();
   add_to_handles(group_index(), count);
 #endif
 }

@@ -60,11 +60,11 @@ void start_handles(Sim& sim, const State& state) {
   for (std::size_t h = 0; h < poses.size(); ++h) {
     std::uint32_t* row = words.data() + (sim.turn * poses.size() + h) * HANDLE_ROW;
     const glm::mat3 R(poses[h].R);
-    std::memcpy(row + 24, &R, sizeof R);
+    std::memcpy(row + 36, &R, sizeof R);
     for (int a = 0; a < 3; ++a) {
       const double units = std::round(poses[h].place[a] / sim.unit);
       const double rest = std::isfinite(units) ? std::fmod(units, 4294967296.0) : 0;
-      row[33 + a] = std::uint32_t(std::int64_t(rest));
+      row[45 + a] = std::uint32_t(std::int64_t(rest));
     }
   }
   for (const auto& [binding, id] : sim.solver.bindings)
@@ -142,6 +142,7 @@ void build_solver(Sim& sim) {
   // Made first, then put in place: a shader that does not compile leaves the old solver running.
   const std::size_t vertices = sim.model->positions.size();
   const bool soft = compliant(sim.settings), slow = damped(sim.settings);
+  check_limits(sim.system, gl_limits(), soft, wants_handles(sim.settings));
   Pass predict{Program::compute("predict.comp", {}, compliance_defines(soft, slow)),
                work_groups(vertices, group_size), vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
   Solver solver = mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning,
@@ -206,7 +207,6 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  check_limits(sim.system, gl_limits(), compliant(settings));
   make_check_words(sim.check);
   if (tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   build_solver(sim);
@@ -238,9 +238,9 @@ void shift_velocities(Sim& sim, double upwards) {
 
 }  // namespace
 
-void check_limits(const ConstraintSystem& system, const Limits& limits, bool compliant) {
-  const int needed =
-      std::max(STORAGE_BINDINGS + int(compliant), BIND_RECORDS + int(kind_words(system).size()));
+void check_limits(const ConstraintSystem& system, const Limits& limits, bool compliant, bool handles) {
+  const int needed = std::max(handles ? STORAGE_BINDINGS_HANDLES : STORAGE_BINDINGS + int(compliant),
+                              BIND_RECORDS + int(kind_words(system).size()));
   if (needed > limits.storage_blocks)
     throw Error("too few shader storage blocks",
                 fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),

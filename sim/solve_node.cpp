@@ -24,7 +24,8 @@ Cut cut_for(std::size_t vertices, bool software, bool handles) {
   if (software) return {64, 64};
   if (handles && vertices <= 4000) return {32, 512};
   if (handles && vertices <= 8000) return {56, 512};
-  if (handles && vertices <= 14000) return {64, 256};
+  if (handles && vertices <= 14000) return {48, 256};
+  if (handles) return {64, 256};
   if (vertices <= 4000) return {16, 512};
   if (vertices <= 8000) return {16, 256};
   if (vertices <= 14000) return {24, 256};

@@ -114,8 +114,13 @@ std::vector<std::string> compliance_defines(bool compliant, bool damped) {
 
 namespace {
 
+constexpr std::size_t few_handles = 8;  // up to here each patch has all, in their order
+
 // The lists of each patch's handles, and the buffers of handles.glsl; returns the length of the longest list.
 std::size_t add_handles(Solver& solver, const SolverInput& input, const Patches& patches, Handles& handles) {
+  if (patches.count > 65536)  // as many numbers of 16 bits fit 32
+    throw Error("the body is too large for handles", fmt::format("{} patches", patches.count),
+                "set handles to 0, or take a mesh of at most 20 million tets");
   for (layout::Handle& handle : handles.handles) handle.keeper = ~0u;
   std::vector<std::vector<std::uint32_t>> lists(patches.count);
   std::size_t most = 1;
@@ -125,7 +130,7 @@ std::size_t add_handles(Solver& solver, const SolverInput& input, const Patches&
       const auto held = [&](std::uint32_t v) {
         return glsl::Rigid{}.handle_weight(handles.rest[v], handles.handles[h].node) > 0;
       };
-      bool any = false;
+      bool any = handles.handles.size() <= few_handles;
       for (std::uint32_t v = words[2]; v < words[2] + words[1] && !any; ++v) any = held(v);
       if (!any) continue;
       lists[p].push_back(h);
@@ -133,19 +138,19 @@ std::size_t add_handles(Solver& solver, const SolverInput& input, const Patches&
     }
     most = std::max(most, lists[p].size());
   }
-  std::vector<std::uint32_t> numbers(patches.count * most, ~0u);
-  std::vector<layout::Handle> copies(patches.count * most);  // beside each other: no number to wait for
+  layout::Handle none{};
+  none.number = ~0u;
+  std::vector<layout::Handle> copies(patches.count * most, none);  // beside each other, for each patch
   for (std::size_t p = 0; p < patches.count; ++p)
     for (std::size_t k = 0; k < lists[p].size(); ++k) {
-      numbers[p * most + k] = lists[p][k];
-      copies[p * most + k] = handles.handles[lists[p][k]];
+      layout::Handle& copy = copies[p * most + k] = handles.handles[lists[p][k]];
+      copy.number = lists[p][k];
     }
   const auto add = [&](const char* label, int binding, const auto& data) {
     solver.buffers.push_back(storage_buffer(input.tuning, label, data));
     solver.bindings.push_back({binding, solver.buffers.back().id()});
   };
   add("handles", BIND_HANDLES, copies);
-  add("handle numbers", BIND_HANDLE_LISTS, numbers);
   add("handle rest", BIND_HANDLE_REST, handles.rest);
   add("handle sums", BIND_HANDLE_SUMS, std::vector<std::uint32_t>(3 * HANDLE_ROW * handles.handles.size()));
   return most;
@@ -168,16 +173,21 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
     most_handles = add_handles(solver, input, patches, *handles);
     bytes += 32 * patches.count * patches.most_summed + 2 * solver.buffers.back().bytes();
   }
+  const std::size_t summed = std::max<std::size_t>(patches.most_summed, 1);
+  const std::size_t chunk =
+      std::clamp<std::size_t>(group / summed, 1, std::clamp<std::size_t>(most_handles, 1, 8));
   const ShaderWords words = {
       {{"GROUP", std::to_string(group)},
        {"HANDLES", std::to_string(most_handles)},
+       {"ALL_HANDLES", handles && handles->handles.size() <= few_handles ? "1" : "0"},
        {"HANDLE_COUNT", std::to_string(handles ? handles->handles.size() : 0)},
        {"PATCHES", std::to_string(patches.count)},
        {"PART_WORDS", std::to_string(patches.part_words)},
-       {"HERE", std::to_string(std::max({patches.largest, std::size_t(1),
-                                         handles ? patches.most_summed + 8 * most_handles : 0}))},
+       {"CHUNK", std::to_string(chunk)},
+       {"HERE",
+        std::to_string(std::max({patches.largest, std::size_t(1), handles ? (1 + chunk) * summed : 0}))},
        {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},
-       {"SUMMED", std::to_string(std::max<std::size_t>(patches.most_summed, 1))},
+       {"SUMMED", std::to_string(summed)},
        {"PARTED", patches.parted ? "1" : "0"},
        {"GROUPED", grouped ? "1" : "0"},
        {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},

@@ -135,8 +135,10 @@ void mark_front(ordered_json& rows) {
 }
 
 std::string setting_name(const ordered_json& row) {
-  return fmt::format("{} {} it x {} sub", row["mode"].get<std::string>(), row["iterations"].get<int>(),
-                     row["substeps"].get<int>());
+  const std::string omega =
+      row["omega"] == Settings{}.omega ? "" : fmt::format(", omega {}", row["omega"].dump());
+  return fmt::format("{} {} it x {} sub{}", row["mode"].get<std::string>(), row["iterations"].get<int>(),
+                     row["substeps"].get<int>(), omega);
 }
 
 Chart chart_of(const ordered_json& document) {
@@ -210,15 +212,30 @@ ordered_json merged(const std::vector<std::filesystem::path>& folders) {
       document = part;
       continue;
     }
+    // Shards of one command, or whole comparisons: other modes and other numbers of substeps.
+    const bool whole = part["shards"] == 1 && document["shards"] == 1;
     for (const char* key : {"steps", "dt", "combinations", "shards"})
-      if (part[key] != document[key])
+      if (part[key] != document[key] && !(whole && key == std::string_view("combinations")))
         throw Error("these shards differ", fmt::format("'{}' in {}", key, folder.string()),
                     "merge runs of one command");
     if (part["device"] != document["device"])
       throw Error("these shards ran on different devices", folder.string(),
                   "times can only be compared on one kind of GPU");
+    for (const auto& row : part["rows"]) {
+      for (const auto& other : document["rows"]) {
+        if (row["scene"] != other["scene"])
+          throw Error("these are of different scenes", folder.string(), "merge comparisons of one scene");
+        if (setting_name(row) == setting_name(other))
+          throw Error("a setting is in two of these",
+                      fmt::format("{}: {}", folder.string(), setting_name(row)), "name each folder once");
+      }
+    }
     for (const auto& row : part["rows"]) document["rows"].push_back(row);
-    for (const auto& shard : part["shard"]) document["shard"].push_back(shard);
+    if (whole)
+      document["combinations"] =
+          document["combinations"].get<std::size_t>() + part["combinations"].get<std::size_t>();
+    else
+      for (const auto& shard : part["shard"]) document["shard"].push_back(shard);
   }
   auto shards = document["shard"].get<std::vector<int>>();
   std::sort(shards.begin(), shards.end());

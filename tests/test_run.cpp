@@ -440,6 +440,21 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
             .starts_with("scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step"));
   CHECK(tetpbd("compare --shard 4/3", folder).status == 2);
   CHECK(tetpbd("compare --merge nowhere --out x", folder).status == 2);
+  CHECK(tetpbd("compare --merge part1 part1 --out x", folder).status == 2);
+  // Whole comparisons of the same scene go together as well; node+handles and the paper's pipeline are modes
+  // here.
+  REQUIRE(
+      tetpbd(
+          "compare --scene beam --modes node+handles,paper --iterations 1 --substeps 2 --steps 12 --out more",
+          folder)
+          .status == 0);
+  REQUIRE(tetpbd("compare --merge whole more --out both", folder).status == 0);
+  const json both = json::parse(read(folder.path / "both/compare.json"));
+  CHECK(both["rows"].size() == 10);
+  CHECK(both["combinations"] == 10);
+  CHECK(both["rows"][8]["mode"] == "node+handles");
+  CHECK(tetpbd("compare --merge whole whole --out x", folder).err.find("two of these") != std::string::npos);
+  CHECK(tetpbd("compare --modes node+handle --out x", folder).err.find("node+handles") != std::string::npos);
 }
 
 #ifdef TETPBD_TETGEN

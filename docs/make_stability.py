@@ -14,7 +14,7 @@ import json, pathlib, sys
 note, folders = sys.argv[1], sys.argv[2:]
 docs = pathlib.Path(__file__).parent
 scenes = docs.parent / "models/scenes/hard"
-modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps", "groups", "groups-substeps", "groups-32", "groups-64"]
+modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps", "node+handles-substeps", "groups", "groups-substeps", "groups-32", "groups-64"]
 gpu = modes[2:]
 rows = {}
 for folder in folders:

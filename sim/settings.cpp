@@ -42,7 +42,8 @@ const std::vector<Parameter>& parameters() {
        "with compliance always",
        live},
       {"handles", "solver", &S::handles, 0, 1, false, "",
-       "how far rigid handles pull towards the rest shape in an iteration: for hard bodies, 0.8 (mode node, "
+       "how far rigid handles pull towards the rest shape in an iteration: for hard bodies, 0.4 to 0.8 (mode "
+       "node, "
        "without compliance)",
        live},
       {"groups", "solver", &S::groups, 1, 128, true, "",
@@ -161,10 +162,24 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
       row.member);
 }
 
+constexpr double usual_handles = 0.4;
+
 void set_mode(Settings& settings, const std::string& word) {
-  const bool held = word == "node+handles";
-  settings.mode = held ? "node" : word;
-  settings.handles = held ? 0.8 : 0;
+  const std::string suffix = "+handles";
+  const std::size_t at = word.find(suffix);
+  settings.mode = word.substr(0, at);
+  settings.handles = 0;
+  if (at == std::string::npos) return;
+  settings.handles = usual_handles;
+  const std::string strength = word.substr(at + suffix.size());
+  bool good = settings.mode == "node";
+  if (!strength.empty()) {
+    const char* end = strength.data() + strength.size();
+    const auto [stop, error] = std::from_chars(strength.data() + 1, end, settings.handles);
+    good = good && strength[0] == '-' && error == std::errc() && stop == end && settings.handles > 0 &&
+           settings.handles <= 1;
+  }
+  if (!good) settings.mode = word;  // which there is not
 }
 
 void check_mode(const std::string& word, const std::string& where) {
@@ -178,7 +193,9 @@ void check_mode(const std::string& word, const std::string& where) {
 }
 
 std::string mode_word(const Settings& settings) {
-  return settings.mode + (wants_handles(settings) ? "+handles" : "");
+  if (!wants_handles(settings)) return settings.mode;
+  return settings.mode + "+handles" +
+         (settings.handles == usual_handles ? "" : fmt::format("-{:g}", settings.handles));
 }
 
 const std::vector<SolverPreset>& solver_presets() {
@@ -196,7 +213,7 @@ const std::vector<SolverPreset>& solver_presets() {
        {{"mode", "node"}, {"iterations", "1"}, {"substeps", "20"}, {"omega", "1.5"}, {"handles", "0"}}},
       {"hard",
        "10 substeps of 1 iteration with rigid handles: the least error for hard bodies",
-       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "10"}, {"omega", "1.5"}, {"handles", "0.8"}}},
+       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "10"}, {"omega", "1.5"}, {"handles", "0.4"}}},
   };
   return rows;
 }

@@ -58,8 +58,8 @@ std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
 /// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of
 /// them.
 std::vector<std::string> choices(const Parameter& parameter);
-/// A mode as sweeps name it: "node+handles" is mode node with handles of strength 0.8. Also the modes that
-/// are not offered elsewhere.
+/// A mode as sweeps name it: "node+handles" is mode node with handles of strength 0.4, "node+handles-0.8" of
+/// another. Also the modes that are not offered elsewhere.
 void set_mode(Settings& settings, const std::string& word);
 std::string mode_word(const Settings& settings);
 /// Throws Error naming `where` if there is no such mode.

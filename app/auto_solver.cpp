@@ -33,8 +33,11 @@ std::vector<Settings> candidates(const Settings& settings) {
     base.omega = omega;
     all.push_back(base);
   }
+  const auto used = split(settings.constraints, ',');
   bool hard = true;
-  for (const ConstraintKind& kind : constraint_kinds()) hard = hard && settings.*kind.stiffness == 1;
+  for (const ConstraintKind& kind : constraint_kinds())
+    if (std::find(used.begin(), used.end(), kind.name) != used.end())
+      hard = hard && settings.*kind.stiffness == 1;
   if (hard) {
     base.omega = 1.5;
     set_mode(base, "node+handles");
@@ -67,7 +70,7 @@ double step_ms(Sim& sim, double spin_seconds, double seconds) {
 double loss_until(const MeasuredRun& run, long steps) {
   double loss = 0;
   for (const Measurement& m : run.measurements)
-    if (m.step <= steps) loss = std::max(loss, m.finite() ? -m.volume_error_percent : std::nan(""));
+    if (m.step <= steps && m.finite()) loss = std::max(loss, -m.volume_error_percent);
   return loss;
 }
 

@@ -265,8 +265,8 @@ ordered_json measured(const CompareOptions& options) {
         for (int substeps : options.substeps) {
           Settings settings = scene.settings;
           check_mode(mode, "--modes");
-          set_mode(settings, mode), settings.omega = omega, settings.iterations = iterations,
-                                    settings.substeps = substeps;
+          set_mode(settings, mode);
+          settings.omega = omega, settings.iterations = iterations, settings.substeps = substeps;
           combinations.push_back(settings);
         }
   const auto model = build_model(scene);

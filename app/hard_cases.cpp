@@ -184,7 +184,7 @@ int run_hard_cases(const HardCaseOptions& options) {
                 "choose cases that have the meshes asked for, and no more shards than rows");
   sort_rows(rows);
   add_reference(rows);
-  fmt::print("{:<18}{:<7}{:<15}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}\n", "case", "mesh", "mode", "steps",
+  fmt::print("{:<18}{:<7}{:<23}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}\n", "case", "mesh", "mode", "steps",
              "recovered", "reference", "volume err %", "inverted", "rigid dist");
   bool finite = true;
   for (const auto& row : rows) {
@@ -195,7 +195,7 @@ int run_hard_cases(const HardCaseOptions& options) {
     const auto error = [&](const char* key) {
       return row[key].is_number() ? fmt::format("{:.3g}", row[key].get<double>()) : std::string("-");
     };
-    fmt::print("{:<18}{:<7}{:<15}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}{}\n", row["case"].get<std::string>(),
+    fmt::print("{:<18}{:<7}{:<23}{:>7}{:>11}{:>11}{:>13}{:>10}{:>12}{}\n", row["case"].get<std::string>(),
                row["mesh"].get<std::string>(), row["mode"].get<std::string>(), value("steps"),
                value("recovered_at_step"), value("reference_recovered_at_step"),
                error("final_volume_error_percent"), error("inverted_tets"), error("rigid_distance"),

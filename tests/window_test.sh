@@ -72,7 +72,7 @@ click() {
 }
 choose() {  # a combo's entry
   click "$1"
-  await "^at $1=$2 "
+  await "^at $1="  # its first entry always moves
   sleep 0.7  # a list opens in one place and is moved to another in its next frame
   click "$1=$2"
 }

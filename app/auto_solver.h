@@ -22,6 +22,7 @@ struct SolverChoice {
   long steps = 0;  ///< of each trial
   std::vector<SolverTrial> trials;
   std::size_t best = 0;
+  bool lost_nothing = false;  ///< none of them in so few steps: chosen by what is best elsewhere
   const Settings& settings() const { return trials[best].settings; }
 };
 

@@ -70,5 +70,9 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
   // No budget is too small for one substep, and a hundred times the budget holds more.
   CHECK(choose_solver(model, scene.settings, 1e-6, 2).settings().substeps == 1);
-  CHECK(choose_solver(model, scene.settings, 100, 2).settings().substeps > 4);
+  const SolverChoice early = choose_solver(model, scene.settings, 100, 2);
+  CHECK(early.settings().substeps > 4);
+  CHECK(early.lost_nothing);  // it has not hit the ground: what is best elsewhere
+  CHECK(early.settings().handles > 0);
+  CHECK(describe(early).find("none lost volume in 2 steps") != std::string::npos);
 }

@@ -230,7 +230,9 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   bench->add_option("--scenes,--scene", bench_options.scenes, "scenes, separated by commas")
       ->delimiter(',')
       ->capture_default_str();
-  bench->add_option("--modes,--mode", bench_options.modes, "solver modes")
+  bench
+      ->add_option("--modes,--mode", bench_options.modes,
+                   "solver modes, node+handles, paper (the pipeline as published)")
       ->delimiter(',')
       ->capture_default_str();
   bench->add_option("--constraint-sets", bench_options.constraint_sets, "sets of kinds joined by +")
@@ -286,7 +288,9 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   compare->add_option("--set", compare_options.overrides.set, "PATH=VALUE for anything else in the scene")
       ->expected(1)
       ->take_all();
-  compare->add_option("--modes", compare_options.modes, "solver modes")
+  compare
+      ->add_option("--modes", compare_options.modes,
+                   "solver modes, node+handles, paper (the pipeline as published)")
       ->delimiter(',')
       ->capture_default_str();
   compare->add_option("--iterations", compare_options.iterations, "iterations a substep")

@@ -50,7 +50,7 @@ largest volume loss over the same {steps} steps, which hold the fall and the fir
 [performance.md](performance.md).
 
 `node+handles` is mode `node` with `handles` 0.4, `node+handles-0.8` with 0.8 ([what handles are](method.md#rigid-handles-setting-handles)); `paper` is the pipeline as the paper
-describes it. All rows are of one run, but those of `node+handles`, which were measured an hour later on another machine of that kind. The exact answer of these bodies is a rigid one, which is what handles pull to.
+describes it. All rows are of one run, but those of `node+handles`, which were measured in a second run on a machine of that kind. The exact answer of these bodies is a rigid one, which is what handles pull to.
 
 ## Speed against error
 """]

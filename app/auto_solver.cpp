@@ -26,7 +26,7 @@ constexpr int most_substeps = 1000;
 // On the front wherever it was measured (docs/results.md): one iteration a substep, never several.
 std::vector<Settings> candidates(const Settings& settings) {
   Settings base = settings;
-  set_mode(base, "node");
+  set_mode(base, "node", "auto");
   base.iterations = 1;
   if (compliant(settings)) return {base};  // neither over-relaxation nor handles apply
   std::vector<Settings> all;
@@ -41,28 +41,22 @@ std::vector<Settings> candidates(const Settings& settings) {
       hard = hard && settings.*kind.stiffness == 1;
   if (hard) {
     base.omega = 1.5;
-    set_mode(base, "node+handles");
+    set_mode(base, "node+handles", "auto");
     all.push_back(base);
   }
   return all;
 }
 
-// The median of steps taken one after the other, after what a GPU needs to raise its clock.
-double step_ms(Sim& sim, double spin_seconds, double seconds) {
+// The median of steps taken one after the other for so long, one at least.
+double step_ms(Sim& sim, double seconds) {
   const auto begin = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  sim.timed = false;
-  do {
-    step(sim);
-    glFinish();
-  } while (elapsed() < spin_seconds && !interrupted());
   sim.timed = true;
   std::vector<double> times;
-  const double end = elapsed() + seconds;
   do {
     step(sim);
     while (const auto ms = sim.timer.poll()) times.push_back(*ms);
-  } while (elapsed() < end && !interrupted());
+  } while (elapsed() < seconds && !interrupted());
   while (const auto ms = sim.timer.poll(true)) times.push_back(*ms);
   if (interrupted()) throw Interrupted();
   return percentiles(times).median;
@@ -84,15 +78,16 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   SolverChoice choice;
   choice.budget_ms = budget_ms;
   choice.steps = steps;
-  const bool software = is_software_renderer();
   std::vector<MeasuredRun> runs;
   for (const Settings& candidate : candidates(settings)) {
     SolverTrial trial{candidate, 0, 0};
     trial.settings.substeps = 1;
     Sim sim = create_sim(model, trial.settings);
+    if (runs.empty()) warm_up(sim);
+    step(sim);  // the first of a new solver is not like the others
     // Twice: from one substep's time to how many fit, and from what so many took.
     for (int round = 0; round < 2; ++round) {
-      const double ms = step_ms(sim, software || round || !runs.empty() ? 0 : 0.3, software ? 0 : 0.03);
+      const double ms = step_ms(sim, is_software_renderer() ? 0 : 0.03);
       trial.settings.substeps =
           int(std::clamp(std::floor(trial.settings.substeps * budget_ms / ms), 1.0, double(most_substeps)));
       apply_settings(sim, trial.settings);

@@ -40,14 +40,7 @@ void mark_non_finite(BenchRow& row, const NonFinite& found) {
 void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer* renderer,
                  const Frame& view) {
   std::vector<double> fps, gpu, wall, still;
-  // A GPU that has rested while the CPU prepared the scene runs at a low clock for its first few hundred
-  // milliseconds.
-  const auto begin_spin = Clock::now();
-  while (!is_software_renderer() && std::chrono::duration<double>(Clock::now() - begin_spin).count() < 0.3 &&
-         !interrupted()) {
-    step(sim);
-    glFinish();
-  }
+  warm_up(sim);
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     reset(sim);
     sim.timed = false;
@@ -136,7 +129,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
   std::vector<std::pair<Scene, std::shared_ptr<const Model>>> scenes;
   for (const std::string& name : options.scenes) {
     Scene scene = load_scene(name, options.overrides);
-    for (const std::string& mode : options.modes) check_mode(mode, "--modes");
+    for (const std::string& mode : options.modes) set_mode(scene.settings, mode, "--modes");
     for (const std::string& set : options.constraint_sets)
       set_parameter(scene.settings, *find_parameter("constraints"), kinds_of(set), "--constraint-sets");
     auto model = build_model(scene);
@@ -155,7 +148,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
           for (int substeps : options.substeps) {
             Settings settings = scene.settings;
             settings.constraints = kinds_of(set);
-            set_mode(settings, mode);
+            set_mode(settings, mode, "--modes");
             settings.iterations = iterations;
             settings.substeps = substeps;
             Sim sim = create_sim(model, settings);

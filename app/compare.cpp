@@ -264,8 +264,7 @@ ordered_json measured(const CompareOptions& options) {
       for (int iterations : options.iterations)
         for (int substeps : options.substeps) {
           Settings settings = scene.settings;
-          check_mode(mode, "--modes");
-          set_mode(settings, mode);
+          set_mode(settings, mode, "--modes");
           settings.omega = omega, settings.iterations = iterations, settings.substeps = substeps;
           combinations.push_back(settings);
         }

@@ -52,14 +52,18 @@ std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) 
 Settings settings_of(const Scene& scene, const std::string& mode) {
   Settings settings = scene.settings;
   const std::string suffix = "-substeps", groups = "groups-";
-  set_mode(settings, mode.ends_with(suffix) ? mode.substr(0, mode.size() - suffix.size()) : mode);
-  if (mode.ends_with(suffix)) std::swap(settings.substeps, settings.iterations);
-  if (settings.mode.starts_with(groups)) {
-    set_parameter(settings, *find_parameter("groups"), settings.mode.substr(groups.size()),
-                  "--modes " + mode);
-    settings.mode = "groups";
+  const std::string where = "--modes " + mode;
+  std::string word = mode;
+  if (word.ends_with(suffix)) {
+    word.resize(word.size() - suffix.size());
+    std::swap(settings.substeps, settings.iterations);
   }
-  check_settings(settings, "--modes " + mode);
+  if (word.starts_with(groups)) {
+    set_parameter(settings, *find_parameter("groups"), word.substr(groups.size()), where);
+    word = "groups";
+  }
+  set_mode(settings, word, where);
+  check_settings(settings, where);
   return settings;
 }
 

@@ -4,9 +4,20 @@
 #include <chrono>
 
 #include "sim/error.h"
+#include "sim/gl_context.h"
 #include "sim/interrupt.h"
 
 namespace tetpbd {
+
+void warm_up(Sim& sim) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  while (!is_software_renderer() && std::chrono::duration<double>(Clock::now() - begin).count() < 0.3 &&
+         !interrupted()) {
+    step(sim);
+    glFinish();
+  }
+}
 
 MeasuredRun measure_run(Sim& sim, Metrics& metrics, long steps, const std::function<bool(long)>& go_on) {
   using Clock = std::chrono::steady_clock;

@@ -294,25 +294,25 @@ void set_path(json& document, const std::string& assignment) {
   *at = std::move(value);
 }
 
-void apply_solver(Scene& scene, const SceneOverrides& overrides) {
+// Puts a named solver's settings in place; whether it is auto, which chooses them later.
+bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   const std::string name = overrides.solver.empty() && overrides.budget_ms ? "auto" : overrides.solver;
   if (name == "auto") {
-    scene.budget_ms = overrides.budget_ms.value_or(0);
     for (const auto& [parameter, text] : overrides.parameters)
       for (const char* chosen : {"mode", "iterations", "substeps", "omega", "handles"})
         if (parameter == chosen)
           throw Error(fmt::format("--solver auto chooses {} itself", chosen),
                       flag_name(*find_parameter(parameter)), "leave out one of the two");
-    return;
+    return true;
   }
   if (overrides.budget_ms)
     throw Error("a budget is for --solver auto", fmt::format("--solver {} --budget-ms", name),
                 "leave out one of the two");
-  if (name.empty()) return;
+  if (name.empty()) return false;
   std::vector<std::string> names{"auto"};
   for (const SolverPreset& preset : solver_presets()) {
     names.emplace_back(preset.name);
-    if (name == preset.name) return apply_preset(scene.settings, preset);
+    if (name == preset.name) return apply_preset(settings, preset), false;
   }
   throw Error("no such solver", "--solver " + name, fmt::format("choose from {}", fmt::join(names, ", ")));
 }
@@ -354,12 +354,12 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   std::string shown = file.string();
   if (!overrides.set.empty()) shown += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));
   Scene scene = read_scene(document, shown, file);
-  apply_solver(scene, overrides);
+  const bool by_trying = apply_solver(scene.settings, overrides);
   for (const auto& [name, text] : overrides.parameters) {
     const Parameter& row = *find_parameter(name);
     set_parameter(scene.settings, row, text, flag_name(row));
   }
-  if (scene.budget_ms && !overrides.budget_ms) scene.budget_ms = default_budget_ms(scene.settings);
+  if (by_trying) scene.budget_ms = overrides.budget_ms.value_or(default_budget_ms(scene.settings));
   if (!overrides.mesh.empty()) {
     scene.bodies[0].mesh = overrides.mesh;
     scene.bodies[0].block.reset();

@@ -82,6 +82,9 @@ class CpuPbd {
     auto& x = state.positions;
     auto& v = state.velocities;
     const bool soft = compliant(settings);
+    const bool held = sweep == Sweep::jacobi && settings.handles > 0 && !soft;
+    const double omega = soft ? 1 : relaxation(settings.omega, held ? settings.handles : 0);
+    if (held && handles_.rest.empty()) handles_ = build_handles(model_);
     inverse_masses_.assign(inverse_masses.begin(), inverse_masses.end());
     for (int s = 0; s < settings.substeps; ++s) {
       if (damped(settings)) start_ = x;
@@ -97,9 +100,6 @@ class CpuPbd {
         }
       predicted_ = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-        const bool held = sweep == Sweep::jacobi && settings.handles > 0 && !soft;
-        const double omega = relaxation(settings.omega, held ? settings.handles : 0);
-        if (held && handles_.rest.empty()) handles_ = build_handles(model_);
         std::vector<glm::dvec3> pulls;
         if (held) pulls = handle_pulls(handles_, x);
         if (sweep == Sweep::jacobi) deltas_.assign(x.size(), glm::dvec3(0));
@@ -111,8 +111,7 @@ class CpuPbd {
         });
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
-          if (sweep == Sweep::jacobi && at_vertex_[i] > 0)
-            x[i] += deltas_[i] * ((soft ? 1 : omega) / at_vertex_[i]);
+          if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (omega / at_vertex_[i]);
           if (held) x[i] += settings.handles * pulls[i];
           x[i] = out_of(planes, x[i], predicted_[i], h * v[i], settings.friction);
         }

@@ -42,9 +42,8 @@ const std::vector<Parameter>& parameters() {
        "with compliance always",
        live},
       {"handles", "solver", &S::handles, 0, 1, false, "",
-       "how far rigid handles pull towards the rest shape in an iteration: for hard bodies, 0.4 to 0.8 (mode "
-       "node, "
-       "without compliance)",
+       "how far rigid handles pull towards the rest shape in an iteration: for hard bodies, 0.4 to 0.8 "
+       "(mode node, without compliance)",
        live},
       {"groups", "solver", &S::groups, 1, 128, true, "",
        "groups of constraints, solved one after the other (mode groups); many are a colouring", rebuild},
@@ -164,30 +163,26 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
 
 constexpr double usual_handles = 0.4;
 
-void set_mode(Settings& settings, const std::string& word) {
-  const std::string suffix = "+handles";
-  const std::size_t at = word.find(suffix);
-  settings.mode = word.substr(0, at);
-  settings.handles = 0;
-  if (at == std::string::npos) return;
-  settings.handles = usual_handles;
-  const std::string strength = word.substr(at + suffix.size());
-  bool good = settings.mode == "node";
-  if (!strength.empty()) {
-    const char* end = strength.data() + strength.size();
-    const auto [stop, error] = std::from_chars(strength.data() + 1, end, settings.handles);
-    good = good && strength[0] == '-' && error == std::errc() && stop == end && settings.handles > 0 &&
-           settings.handles <= 1;
+void set_mode(Settings& settings, const std::string& word, const std::string& where) {
+  const std::string with = "node+handles";
+  bool known = true;
+  if (!word.starts_with(with)) {
+    settings.mode = word;
+    settings.handles = 0;
+    known = find_solver_mode(word);
+  } else {
+    settings.mode = "node";
+    settings.handles = usual_handles;
+    if (word != with) {
+      const char *begin = word.data() + with.size(), *end = word.data() + word.size();
+      const auto [stop, error] = std::from_chars(begin + 1, end, settings.handles);
+      known = *begin == '-' && error == std::errc() && stop == end && settings.handles > 0 &&
+              settings.handles <= 1;
+    }
   }
-  if (!good) settings.mode = word;  // which there is not
-}
-
-void check_mode(const std::string& word, const std::string& where) {
-  Settings settings;
-  set_mode(settings, word);
-  if (find_solver_mode(settings.mode)) return;
+  if (known) return;
   std::vector<std::string> words = choices(*find_parameter("mode"));
-  words.push_back("node+handles");
+  words.push_back(with);
   throw Error(fmt::format("'mode' cannot be '{}'", word), where,
               fmt::format("choose from {}", fmt::join(words, ", ")));
 }
@@ -213,7 +208,11 @@ const std::vector<SolverPreset>& solver_presets() {
        {{"mode", "node"}, {"iterations", "1"}, {"substeps", "20"}, {"omega", "1.5"}, {"handles", "0"}}},
       {"hard",
        "10 substeps of 1 iteration with rigid handles: the least error for hard bodies",
-       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "10"}, {"omega", "1.5"}, {"handles", "0.4"}}},
+       {{"mode", "node"},
+        {"iterations", "1"},
+        {"substeps", "10"},
+        {"omega", "1.5"},
+        {"handles", fmt::format("{}", usual_handles)}}},
   };
   return rows;
 }

@@ -59,11 +59,9 @@ std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
 /// them.
 std::vector<std::string> choices(const Parameter& parameter);
 /// A mode as sweeps name it: "node+handles" is mode node with handles of strength 0.4, "node+handles-0.8" of
-/// another. Also the modes that are not offered elsewhere.
-void set_mode(Settings& settings, const std::string& word);
+/// another. Also the modes that are not offered elsewhere. Throws Error naming `where` if there is none.
+void set_mode(Settings& settings, const std::string& word, const std::string& where);
 std::string mode_word(const Settings& settings);
-/// Throws Error naming `where` if there is no such mode.
-void check_mode(const std::string& word, const std::string& where);
 
 /// A way to solve, by name: what --solver puts in place of the scene's settings.
 struct SolverPreset {

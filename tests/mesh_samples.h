@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -53,6 +54,19 @@ std::string error_of(const Action& action) {
 
 inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+/// An irregular block about (0, 0, 0), moved: corrections differ from vertex to vertex.
+inline tetpbd::TetMesh irregular_block(glm::ivec3 cells, const glm::dvec3& moved) {
+  tetpbd::TetMesh mesh = tetpbd::make_block(glm::dvec3(1.0, 0.7, 0.5), cells);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    auto& p = mesh.positions[i];
+    p +=
+        0.02 * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+    p += moved + glm::dvec3(0.15 * p.y * p.y, 0, 0);
+  }
+  tetpbd::finish_tets(mesh, "block");
+  return mesh;
 }
 
 inline tetpbd::SurfaceMesh tetrahedron(const glm::dvec3& at = glm::dvec3(0)) {

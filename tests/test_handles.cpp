@@ -5,11 +5,13 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
+#include "app/measure_run.h"
 #include "sim/cpu_pbd.h"
 #include "sim/handles.h"
 #include "sim/metrics.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
+#include "tests/mesh_samples.h"
 
 using namespace tetpbd;
 
@@ -20,15 +22,7 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, const std::string& de
                                          glm::dvec3 spin = glm::dvec3(0), int bodies = 1, double height = 0) {
   auto model = std::make_shared<Model>();
   for (int b = 0; b < bodies; ++b) {
-    TetMesh mesh = make_block(glm::dvec3(1.0, 0.7, 0.5), cells);
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      auto& p = mesh.positions[i];
-      p += 0.02 *
-           glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
-      p.x += 0.15 * p.y * p.y;
-      p.y += 0.36 + b + height;
-    }
-    finish_tets(mesh, "block");
+    const TetMesh mesh = samples::irregular_block(cells, glm::dvec3(0, 0.36 + b + height, 0));
     auto start = mesh.positions;
     deform(start, mesh, deformation, 1);
     add_body(*model, "block", mesh, 1000, start, glm::dvec3(0), spin, {});
@@ -38,7 +32,7 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, const std::string& de
 }
 
 Settings held(double handles, int iterations = 1, int substeps = 1) {
-  Settings s{.iterations = 25, .substeps = 1};
+  Settings s;
   s.mode = "node";
   s.handles = handles;
   s.iterations = iterations;
@@ -223,11 +217,7 @@ TEST_CASE("handles lose less volume in a fall than iterations of the same number
   const auto loss = [&](double handles) {
     Sim sim = create_sim(model, held(handles, 1, 8));
     Metrics metrics = create_metrics(*model);
-    RunErrors errors;
-    for (int s = 0; s < 120; ++s) {
-      step(sim);
-      add_measurement(errors, measure_now(metrics, sim), sim);
-    }
+    const RunErrors errors = measure_run(sim, metrics, 120).errors;
     CHECK(errors.finite);
     return errors.max_volume_loss_percent;
   };

@@ -18,6 +18,7 @@
 #include "sim/metrics.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
+#include "tests/mesh_samples.h"
 
 using namespace tetpbd;
 namespace fs = std::filesystem;
@@ -105,14 +106,7 @@ struct ShaderVariant {
 std::shared_ptr<const Model> falling(glm::ivec3 cells, int bodies = 1) {
   auto model = std::make_shared<Model>();
   for (int b = 0; b < bodies; ++b) {
-    TetMesh mesh = make_block(glm::dvec3(1.0, 0.7, 0.5), cells);
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      auto& p = mesh.positions[i];
-      p += 0.02 *
-           glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
-      p += glm::dvec3(0.15 * p.y * p.y + 2 * b, 0.385, 0);
-    }
-    finish_tets(mesh, "block");
+    const TetMesh mesh = samples::irregular_block(cells, glm::dvec3(2 * b, 0.385, 0));
     auto start = mesh.positions;
     deform(start, mesh, "stretch:1.1", 1);
     add_body(*model, "block", mesh, 1000, start, glm::dvec3(0.3, 0, 0.1), glm::dvec3(0), {});

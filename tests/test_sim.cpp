@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "app/measure_run.h"
 #include "sim/cpu_pbd.h"
 #include "sim/error.h"
 #include "sim/groups.h"
@@ -584,11 +585,7 @@ TEST_CASE("iterations and the volume constraint lower the volume lost in a fall"
     settings.constraints = kinds;
     Sim sim = create_sim(model, settings);
     Metrics metrics = create_metrics(*model);
-    RunErrors errors;
-    for (int s = 0; s < 120; ++s) {
-      step(sim);
-      add_measurement(errors, measure_now(metrics, sim), sim);
-    }
+    const RunErrors errors = measure_run(sim, metrics, 120).errors;
     CHECK(errors.finite);
     return errors.max_volume_loss_percent;
   };

@@ -11,8 +11,8 @@
 #include "app/measure_run.h"
 #include "app/scene.h"
 #include "sim/error.h"
-#include "sim/gl_context.h"
-#include "sim/handles.h"
+#include "sim/gl/context.h"
+#include "sim/solvers/handles.h"
 #include "sim/interrupt.h"
 
 namespace tetpbd {

@@ -15,7 +15,7 @@
 #include "app/progress.h"
 #include "render/target.h"
 #include "sim/error.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "sim/interrupt.h"
 
 namespace tetpbd {

@@ -13,8 +13,8 @@
 #include <limits>
 
 #include "app/files.h"
-#include "sim/solver.h"
-#include "sim/text_file.h"
+#include "sim/solvers/solver.h"
+#include "sim/mesh/text_file.h"
 
 extern char** environ;
 

@@ -14,7 +14,7 @@
 #include "app/measure_run.h"
 #include "app/progress.h"
 #include "sim/error.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "sim/interrupt.h"
 
 namespace tetpbd {

@@ -13,7 +13,7 @@
 #include <fstream>
 
 #include "sim/error.h"
-#include "sim/text_file.h"
+#include "sim/mesh/text_file.h"
 
 namespace tetpbd {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "render/target.h"
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

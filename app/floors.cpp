@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "sim/gpu.h"
+#include "sim/gl/gpu.h"
 
 namespace tetpbd {
 

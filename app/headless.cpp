@@ -13,7 +13,7 @@
 #include "app/statistics.h"
 #include "render/target.h"
 #include "sim/error.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "sim/interrupt.h"
 #include "sim/metrics.h"
 

@@ -25,7 +25,7 @@
 #include "app/soak.h"
 #include "app/window.h"
 #include "sim/error.h"
-#include "sim/gpu.h"
+#include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
 
 using namespace tetpbd;

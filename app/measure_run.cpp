@@ -4,7 +4,7 @@
 #include <chrono>
 
 #include "sim/error.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "sim/interrupt.h"
 
 namespace tetpbd {

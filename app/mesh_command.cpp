@@ -9,7 +9,7 @@
 #include "app/files.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 namespace {

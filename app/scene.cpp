@@ -16,7 +16,7 @@
 #include "app/auto_solver.h"
 #include "sim/error.h"
 #include "sim/layout.h"
-#include "sim/text_file.h"
+#include "sim/mesh/text_file.h"
 
 namespace tetpbd {
 

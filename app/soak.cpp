@@ -14,7 +14,7 @@
 #include "app/progress.h"
 #include "app/statistics.h"
 #include "sim/error.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "sim/metrics.h"
 
 namespace tetpbd {

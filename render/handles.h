@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "sim/gpu.h"
+#include "sim/gl/gpu.h"
 
 namespace tetpbd {
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "render/camera.h"
-#include "sim/gpu.h"
-#include "sim/tet_mesh.h"
+#include "sim/gl/gpu.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

@@ -14,7 +14,7 @@
 #include "render/legend.h"
 #include "render/shadow.h"
 #include "render/vertex_data.h"
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

@@ -5,8 +5,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "sim/gpu.h"
-#include "sim/tet_mesh.h"
+#include "sim/gl/gpu.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

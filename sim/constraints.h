@@ -9,7 +9,7 @@
 
 #include "sim/formulas.h"
 #include "sim/settings.h"
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "sim/error.h"
-#include "sim/gpu.h"
-#include "sim/solver.h"
+#include "sim/gl/gpu.h"
+#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 

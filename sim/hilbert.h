@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 

@@ -10,8 +10,8 @@
 
 #include "sim/constraints.h"
 #include "sim/error.h"
-#include "sim/handles.h"
-#include "sim/solver.h"
+#include "sim/solvers/handles.h"
+#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <mutex>
 
-#include "sim/cpu_pbd.h"
+#include "sim/solvers/cpu_pbd.h"
 #include "sim/error.h"
 #include "sim/parallel.h"
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "sim/finite_check.h"
-#include "sim/gpu.h"
+#include "sim/gl/gpu.h"
 #include "sim/layout.h"
 #include "sim/model.h"
-#include "sim/solver.h"
+#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 

@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 
 struct GlTest {
   tetpbd::HeadlessContext context{-1, true};

@@ -1,7 +1,7 @@
 // One group of constraints by itself, as the tests of mode groups look at it.
 #pragma once
 
-#include "sim/groups.h"
+#include "sim/solvers/groups.h"
 
 /// The constraints of group `group` alone, in their order; at_vertex counts those.
 inline tetpbd::ConstraintSystem group_of(const tetpbd::ConstraintSystem& system,

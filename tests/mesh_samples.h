@@ -11,7 +11,7 @@
 #include <string>
 
 #include "sim/error.h"
-#include "sim/tet_mesh.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace samples {
 

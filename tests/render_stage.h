@@ -8,7 +8,7 @@
 
 #include "render/renderer.h"
 #include "render/target.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "sim/layout.h"
 
 namespace tetpbd {

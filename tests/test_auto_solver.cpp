@@ -5,7 +5,7 @@
 
 #include "app/auto_solver.h"
 #include "app/scene.h"
-#include "sim/gl_context.h"
+#include "sim/gl/context.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;

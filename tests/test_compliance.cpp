@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/colours.h"
-#include "sim/cpu_pbd.h"
+#include "sim/solvers/colours.h"
+#include "sim/solvers/cpu_pbd.h"
 #include "sim/error.h"
-#include "sim/reference.h"
+#include "sim/reference/reference.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/colours.h"
-#include "sim/cpu_pbd.h"
-#include "sim/lane_math.h"
+#include "sim/solvers/colours.h"
+#include "sim/solvers/cpu_pbd.h"
+#include "sim/solvers/lane_math.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "sim/groups.h"
+#include "sim/solvers/groups.h"
 #include "tests/group_of.h"
 
 using namespace tetpbd;

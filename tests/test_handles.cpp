@@ -6,8 +6,8 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "app/measure_run.h"
-#include "sim/cpu_pbd.h"
-#include "sim/handles.h"
+#include "sim/solvers/cpu_pbd.h"
+#include "sim/solvers/handles.h"
 #include "sim/metrics.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"

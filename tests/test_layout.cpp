@@ -9,7 +9,7 @@
 
 #include "sim/error.h"
 #include "sim/layout.h"
-#include "sim/solver.h"
+#include "sim/solvers/solver.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;

@@ -6,7 +6,7 @@
 
 #include "sim/hilbert.h"
 #include "sim/parallel.h"
-#include "sim/patches.h"
+#include "sim/solvers/patches.h"
 
 using namespace tetpbd;
 

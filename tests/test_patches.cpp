@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/cpu_pbd.h"
-#include "sim/groups.h"
+#include "sim/solvers/cpu_pbd.h"
+#include "sim/solvers/groups.h"
 #include "sim/parallel.h"
-#include "sim/patches.h"
+#include "sim/solvers/patches.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <chrono>
 
-#include "sim/gpu.h"
+#include "sim/gl/gpu.h"
 #include "sim/layout.h"
-#include "sim/program_cache.h"
+#include "sim/gl/program_cache.h"
 #include "tests/gl_test.h"
 #include "tests/mesh_samples.h"
 

@@ -5,9 +5,9 @@
 #include <limits>
 #include <random>
 
-#include "sim/cpu_pbd.h"
+#include "sim/solvers/cpu_pbd.h"
 #include "sim/error.h"
-#include "sim/reference.h"
+#include "sim/reference/reference.h"
 
 using namespace tetpbd;
 

@@ -8,11 +8,11 @@
 #include <fstream>
 
 #include "app/measure_run.h"
-#include "sim/cpu_pbd.h"
+#include "sim/solvers/cpu_pbd.h"
 #include "sim/error.h"
-#include "sim/groups.h"
+#include "sim/solvers/groups.h"
 #include "sim/metrics.h"
-#include "sim/reference.h"
+#include "sim/reference/reference.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 #include "tests/group_of.h"

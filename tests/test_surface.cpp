@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "mesh_samples.h"
-#include "sim/contained.h"
-#include "sim/weld.h"
+#include "sim/mesh/contained.h"
+#include "sim/mesh/weld.h"
 
 using namespace tetpbd;
 using namespace samples;

@@ -6,8 +6,8 @@
 
 #include "app/mesh_command.h"
 #include "mesh_samples.h"
-#include "sim/mesh_cache.h"
-#include "sim/tetgen_switches.h"
+#include "sim/mesh/mesh_cache.h"
+#include "sim/mesh/tetgen_switches.h"
 
 using namespace tetpbd;
 using namespace samples;

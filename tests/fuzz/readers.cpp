@@ -12,13 +12,13 @@
 
 #include "app/command_line.h"
 #include "app/scene.h"
-#include "sim/bytes.h"
+#include "sim/mesh/bytes.h"
 #include "sim/error.h"
-#include "sim/mesh_cache.h"
-#include "sim/surface_claims.h"
-#include "sim/tet_mesh.h"
-#include "sim/tetgen_switches.h"
-#include "sim/weld.h"
+#include "sim/mesh/mesh_cache.h"
+#include "sim/mesh/surface_claims.h"
+#include "sim/mesh/tet_mesh.h"
+#include "sim/mesh/tetgen_switches.h"
+#include "sim/mesh/weld.h"
 
 namespace fuzz {
 namespace {

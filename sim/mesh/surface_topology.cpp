@@ -1,0 +1,51 @@
+#include "sim/mesh/surface_topology.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace tetpbd {
+
+SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  SurfaceTopology topology;
+  auto& uses = topology.uses;
+  uses.reserve(triangles.size() * 3);
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = triangles[t][k], b = triangles[t][(k + 1) % 3];
+      uses.push_back({std::min(a, b), std::max(a, b), t, k, a < b});
+    }
+  std::sort(uses.begin(), uses.end(), [](const EdgeUse& a, const EdgeUse& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  for (std::uint32_t i = 0; i < uses.size(); ++i)
+    if (i == 0 || uses[i].low != uses[i - 1].low || uses[i].high != uses[i - 1].high)
+      topology.edges.push_back(i);
+  topology.edges.push_back(static_cast<std::uint32_t>(uses.size()));
+
+  DisjointSets patches(triangles.size()), corners(triangles.size() * 3);
+  const auto corner = [&](const EdgeUse& use, std::uint32_t vertex) {
+    const bool first = triangles[use.triangle][use.side] == vertex;
+    return use.triangle * 3 + (first ? use.side : (use.side + 1) % 3);
+  };
+  for (std::size_t e = 0; e < topology.edge_count(); ++e) {
+    if (topology.uses_of(e) != 2) continue;
+    const EdgeUse &a = uses[topology.edges[e]], &b = uses[topology.edges[e] + 1];
+    patches.join(a.triangle, b.triangle);
+    corners.join(corner(a, a.low), corner(b, a.low));
+    corners.join(corner(a, a.high), corner(b, a.high));
+  }
+  topology.patch.resize(triangles.size());
+  std::vector<std::uint32_t> number(triangles.size(), ~0u);
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    std::uint32_t& n = number[patches.root(t)];
+    if (n == ~0u) n = static_cast<std::uint32_t>(topology.patches++);
+    topology.patch[t] = n;
+  }
+  topology.fans.assign(vertex_count, 0);
+  for (std::uint32_t c = 0; c < triangles.size() * 3; ++c)
+    if (corners.root(c) == c) ++topology.fans[triangles[c / 3][c % 3]];
+  for (const std::uint32_t fans : topology.fans) topology.vertices += fans > 0;
+  return topology;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,168 @@
+#include "sim/mesh/text_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+
+namespace tetpbd {
+namespace fs = std::filesystem;
+
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+void require_readable(const fs::path& file) {
+  std::error_code failed;
+  const fs::file_status status = fs::status(file, failed);
+  if (!fs::exists(status)) throw Error("no such file", file.string(), "check the path");
+  if (fs::is_directory(status)) throw Error("is a folder, not a mesh", file.string(), "name a file in it");
+  if (!fs::is_regular_file(status)) throw Error("is not a plain file", file.string(), "name a mesh file");
+  if (!std::ifstream(file)) throw Error("cannot be read", file.string(), "check its permissions");
+  if (fs::file_size(file, failed) == 0 || failed)
+    throw Error("file is empty", file.string(), "fetch or export it again");
+}
+
+TextFile::TextFile(const fs::path& file, char comment) : file_(file), comment_(comment) {
+  require_readable(file);
+  std::ifstream in(file, std::ios::binary);
+  text_.resize(static_cast<std::size_t>(fs::file_size(file)));
+  in.read(text_.data(), static_cast<std::streamsize>(text_.size()));
+  if (!in) throw Error("cannot be read to its end", file.string(), "check the disk");
+}
+
+bool TextFile::next_line() {
+  while (at_ < text_.size()) {
+    const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+    line_ = std::string_view(text_).substr(at_, end - at_);
+    at_ = end + 1;
+    ++line_number_;
+    if (comment_ != '\0') line_ = line_.substr(0, line_.find(comment_));
+    const std::size_t first = line_.find_first_not_of(" \t\r,");
+    if (first == std::string_view::npos) continue;
+    line_ = line_.substr(first, line_.find_last_not_of(" \t\r,") - first + 1);
+    rest_ = line_;
+    return true;
+  }
+  line_ = rest_ = {};
+  return false;
+}
+
+void TextFile::require_line(const char* wanted) {
+  if (!next_line()) fail(fmt::format("file ends before {}", wanted));
+}
+
+std::string_view TextFile::word(const char* wanted) {
+  const std::size_t first = rest_.find_first_not_of(" \t\r,");
+  if (first == std::string_view::npos) fail(fmt::format("line has no {}", wanted));
+  rest_.remove_prefix(first);
+  const std::string_view found = rest_.substr(0, rest_.find_first_of(" \t\r,"));
+  rest_.remove_prefix(found.size());
+  return found;
+}
+
+double TextFile::number(const char* wanted) {
+  const std::string_view found = word(wanted);
+  const char* first = found.data() + (found.front() == '+' ? 1 : 0);
+  double value = 0;
+  const auto [end, code] = std::from_chars(first, found.data() + found.size(), value);
+  if (code != std::errc{} || end != found.data() + found.size())
+    fail(fmt::format("'{}' is not a number ({})", found.substr(0, 40), wanted));
+  return value;
+}
+
+long long TextFile::integer(const char* wanted) {
+  const std::string_view found = word(wanted);
+  long long value = 0;
+  const auto [end, code] = std::from_chars(found.data(), found.data() + found.size(), value);
+  if (code != std::errc{} || end != found.data() + found.size())
+    fail(fmt::format("'{}' is not a whole number ({})", found.substr(0, 40), wanted));
+  return value;
+}
+
+std::size_t TextFile::count(const char* wanted, std::size_t most) {
+  const long long value = integer(wanted);
+  if (value < 0 || static_cast<unsigned long long>(value) > most)
+    fail(fmt::format("{} is {}, outside 0 .. {}", wanted, value, most));
+  return static_cast<std::size_t>(value);
+}
+
+std::size_t TextFile::count_fitting(const char* wanted, std::size_t bytes_each) {
+  const long long value = integer(wanted);
+  if (value < 0) fail(fmt::format("{} is {}", wanted, value));
+  if (static_cast<unsigned long long>(value) > text_.size() / bytes_each + 1)
+    fail(fmt::format("{} is {}, more than {} bytes can hold", wanted, value, text_.size()));
+  return static_cast<std::size_t>(value);
+}
+
+void TextFile::fail(const std::string& what) const {
+  throw Error(what, fmt::format("{} line {}", file_.string(), line_number_),
+              "mend the file or export it again");
+}
+
+namespace {
+
+// Why not; empty when it is written. A link left under the temporary name is not followed: the name is freed
+// first, then made.
+std::string write_new(const fs::path& file, const std::string& content) {
+  ::unlink(file.c_str());
+  const int target = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (target < 0) return std::strerror(errno);
+  std::string why;
+  for (std::size_t done = 0; done < content.size() && why.empty();) {
+    const ssize_t n = ::write(target, content.data() + done, content.size() - done);
+    if (n > 0)
+      done += static_cast<std::size_t>(n);
+    else if (errno != EINTR)
+      why = std::strerror(errno);
+  }
+  if (::close(target) != 0 && why.empty()) why = std::strerror(errno);
+  return why;
+}
+
+}  // namespace
+
+fs::path temporary_name(const fs::path& file) {
+  return file.parent_path() /
+         fmt::format(".{}.{}.part{}", file.stem().string(), ::getpid(), file.extension().string());
+}
+
+void rename_whole(const fs::path& temporary, const fs::path& file) {
+  std::error_code failed, ignored;
+  fs::rename(temporary, file, failed);
+  if (!failed) return;
+  fs::remove(temporary, ignored);
+  throw Error("cannot be written", file.string(), failed.message(), 1);
+}
+
+void write_files_whole(const std::vector<std::pair<fs::path, std::string>>& files) {
+  const auto remove_from = [&](std::size_t first) {
+    std::error_code ignored;
+    for (std::size_t i = first; i < files.size(); ++i) fs::remove(temporary_name(files[i].first), ignored);
+  };
+  for (const auto& [file, content] : files) {
+    std::error_code ignored;
+    std::string why = write_new(temporary_name(file), content);
+    if (why.empty() && fs::is_directory(file, ignored)) why = "a folder has that name";
+    if (why.empty()) continue;
+    remove_from(0);
+    throw Error("cannot be written", file.string(), why, 1);
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) try {
+      rename_whole(temporary_name(files[i].first), files[i].first);
+    } catch (const Error&) {
+      remove_from(i);
+      throw;
+    }
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,254 @@
+#include "sim/reference/objective.h"
+
+#include <Eigen/Dense>
+#include <Eigen/Sparse>
+#include <cmath>
+#include <limits>
+
+namespace tetpbd {
+
+namespace {
+
+using Points = std::vector<glm::dvec3>;
+
+Eigen::Vector3d eigen(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+// C, without the clamp to +-1 that bend.glsl has, and its gradient. C = f(x) - rest, so a clamped one is
+// found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long gets
+// the same C as before.
+template <class Kind, class Positions>
+auto unclamped(Positions& x, double rest) {
+  auto c = Kind::template evaluate<double>(x.data(), rest);
+  const double unit = c.C;
+  if (unit == 1 || unit == -1) {
+    double further = unit;
+    for (int turns = 1; turns <= 3 && further == unit; ++turns) {
+      further = Kind::template evaluate<double>(x.data(), rest + turns * unit).C;
+      c.C = turns * unit + further;
+    }
+  }
+  return c;
+}
+
+// Calls visit(Kind{}, vertex indices, positions relative to the first, rest, alpha) for every constraint with
+// an energy.
+template <class F>
+void for_each_constraint(const Objective& o, const Points& positions, F&& visit) {
+  for_each_kind([&](auto kind, int k) {
+    constexpr std::size_t arity = std::size_t(decltype(kind)::arity);
+    const double alpha = o.compliances[std::size_t(k)];
+    if (std::isinf(alpha)) return;
+    const ConstraintList& list = o.system.lists[std::size_t(k)];
+    std::array<glm::dvec3, arity> x;
+    for (std::size_t c = 0; c < list.count(); ++c) {
+      const std::uint32_t* vertices = list.vertices.data() + c * arity;
+      for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
+      visit(kind, vertices, x, list.rest[c], alpha);
+    }
+  });
+}
+
+// E, and the sum of its terms' magnitudes: rounding is relative to that.
+struct Energy {
+  double value = 0, magnitude = 0;
+};
+
+Energy evaluate_energy(const Objective& o, const Points& positions) {
+  Energy e;
+  const auto add = [&](double term) { e.value += term, e.magnitude += std::abs(term); };
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const glm::dvec3 moved = positions[i] - o.predicted[i];
+    add(0.5 * o.masses[i] * o.inertia * glm::dot(moved, moved));
+    add(-o.masses[i] * glm::dot(o.gravity, moved));
+  }
+  for_each_constraint(o, positions, [&](auto kind, const std::uint32_t*, auto& x, double rest, double alpha) {
+    const double C = unclamped<decltype(kind)>(x, rest).C;
+    add(C * C / (2 * alpha));
+  });
+  return e;
+}
+
+}  // namespace
+
+double energy(const Objective& objective, const Points& positions) {
+  return evaluate_energy(objective, positions).value;
+}
+
+Points gradient(const Objective& o, const Points& positions) {
+  Points g(positions.size());
+  for (std::size_t i = 0; i < g.size(); ++i)
+    g[i] = o.masses[i] * (o.inertia * (positions[i] - o.predicted[i]) - o.gravity);
+  for_each_constraint(o, positions, [&](auto kind, const auto* vertices, auto& x, double rest, double alpha) {
+    const auto c = unclamped<decltype(kind)>(x, rest);
+    for (std::size_t j = 0; j < x.size(); ++j) g[vertices[j]] += c.C / alpha * c.gradient[j];
+  });
+  return g;
+}
+
+// -------------------------------------------------------------------------------------------------------------
+// Newton
+
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double>;
+using Factor = Eigen::SimplicialLDLT<Sparse>;
+
+// Of C^2 / (2 alpha): (grad C grad C^T + C Hess C) / alpha. Hess C by central differences of the gradient
+// over 1e-5 of the smallest side: truncation and rounding are both near 1e-10 relative, and Newton converges
+// with far worse.
+template <class Kind, std::size_t arity>
+auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double alpha, bool project) {
+  constexpr int n = 3 * int(arity);
+  Eigen::Matrix<double, n, n> hessian;
+  const auto flat = [](const auto& c) {
+    Eigen::Matrix<double, n, 1> result;
+    for (std::size_t j = 0; j < arity; ++j) result.template segment<3>(3 * int(j)) = eigen(c.gradient[j]);
+    return result;
+  };
+  const auto here = unclamped<Kind>(x, rest);
+  const auto g = flat(here);
+  double side = std::numeric_limits<double>::max();
+  for (std::size_t i = 0; i < arity; ++i)
+    for (std::size_t j = 0; j < i; ++j) side = std::min(side, glm::length(x[i] - x[j]));
+  const double step = 1e-5 * side;
+  hessian.setZero();
+  if (here.C != 0 && step > 0)
+    for (int column = 0; column < n; ++column) {
+      double& coordinate = x[std::size_t(column / 3)][column % 3];
+      const double start = coordinate;
+      coordinate = start + step;
+      const double high = coordinate;
+      hessian.col(column) = flat(Kind::template evaluate<double>(x.data(), rest));
+      coordinate = start - step;
+      hessian.col(column) -= flat(Kind::template evaluate<double>(x.data(), rest));
+      hessian.col(column) *= here.C / (high - coordinate);
+      coordinate = start;
+    }
+  hessian = ((0.5 * (hessian + hessian.transpose()) + g * g.transpose()) / alpha).eval();
+  if (project) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>> modes(hessian);
+    hessian = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).asDiagonal() *
+              modes.eigenvectors().transpose();
+  }
+  return hessian;
+}
+
+// Lower triangle over the free vertices; `place` gives a vertex its row / 3, or -1. The pattern is the same
+// at all positions.
+Sparse assemble(const Objective& o, const Points& positions, const std::vector<int>& place, int rows,
+                bool project) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    for (int a = 0; a < 3 && place[i] >= 0; ++a)
+      entries.emplace_back(3 * place[i] + a, 3 * place[i] + a, o.masses[i] * o.inertia);
+  for_each_constraint(o, positions, [&](auto kind, const auto* vertices, auto& x, double rest, double alpha) {
+    const auto local = constraint_hessian<decltype(kind)>(x, rest, alpha, project);
+    for (int r = 0; r < int(local.rows()); ++r)
+      for (int c = 0; c < int(local.cols()); ++c) {
+        const int row = place[vertices[r / 3]], column = place[vertices[c / 3]];
+        if (row < 0 || column < 0 || 3 * row + r % 3 < 3 * column + c % 3) continue;
+        entries.emplace_back(3 * row + r % 3, 3 * column + c % 3, local(r, c));
+      }
+  });
+  Sparse hessian(rows, rows);
+  hessian.setFromTriplets(entries.begin(), entries.end());
+  return hessian;
+}
+
+// A pivot below 1e-14 of its diagonal entry is rounding.
+bool positive_definite(Factor& factor, const Sparse& hessian) {
+  factor.factorize(hessian);
+  if (factor.info() != Eigen::Success) return false;
+  const Eigen::VectorXd pivots = factor.vectorD(),
+                        diagonal = factor.permutationP() * Eigen::VectorXd(hessian.diagonal());
+  return (pivots.array() > 1e-14 * diagonal.array()).all();
+}
+
+// Factors the Hessian, or the nearest thing to it that is positive definite: with projected constraint
+// Hessians, and if that is singular still, with a growing multiple of the mass matrix. `exact`: it was the
+// Hessian itself.
+bool factorise(Factor& factor, const Objective& o, const Points& positions, const std::vector<int>& place,
+               const Eigen::VectorXd& masses, bool& exact) {
+  const int rows = int(masses.size());
+  Sparse hessian = assemble(o, positions, place, rows, false);
+  if (factor.cols() != rows) factor.analyzePattern(hessian);
+  exact = positive_definite(factor, hessian);
+  if (exact) return true;
+  hessian = assemble(o, positions, place, rows, true);
+  if (positive_definite(factor, hessian)) return true;
+  double shift = 1e-8 * Eigen::VectorXd(hessian.diagonal()).sum() / masses.sum();
+  for (int attempt = 0; attempt < 10; ++attempt, shift *= 100) {
+    Sparse shifted = hessian;
+    shifted.diagonal() += shift * masses;
+    if (positive_definite(factor, shifted)) return true;
+  }
+  return false;
+}
+
+constexpr int newton_limit =
+    1000;  // stiff bodies that turn far take hundreds of short steps, all others under 30
+
+Minimum newton(const Objective& o, Points start) {
+  Minimum result;
+  Points& x = result.positions = std::move(start);
+  std::vector<int> place(x.size(), -1);
+  int count = 0;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (o.masses[i] > 0)
+      place[i] = count++;
+    else
+      x[i] = o.predicted[i];
+  result.converged = count == 0, result.residual = count == 0 ? 0 : result.residual;
+  Eigen::VectorXd masses(3 * count), slope(3 * count);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (place[i] >= 0) masses.segment<3>(3 * place[i]).setConstant(o.masses[i]);
+  Factor factor;
+  while (!result.converged) {
+    const Points g = gradient(o, x);
+    for (std::size_t i = 0; i < x.size(); ++i)
+      if (place[i] >= 0) slope.segment<3>(3 * place[i]) = eigen(g[i]);
+    bool exact = false;
+    if (!factorise(factor, o, x, place, masses, exact))
+      return result.reason = "the Hessian has no factors", result;
+    const Eigen::VectorXd step = factor.solve(-slope);
+    const double descent = slope.dot(step);  // < 0
+    result.residual = std::sqrt(-descent / o.unit);
+    result.converged = exact && result.residual <= minimum_tolerance;
+    // The step at hand is taken even so: it squares what is left.
+    if (!exact && result.residual <= 1e-4 * minimum_tolerance)
+      return result.reason = "not a stable, isolated minimum", result;
+    if (result.iterations == newton_limit) return result.reason = "too many Newton steps", result;
+    // Armijo; the last steps lower E by less than its rounding, which is allowed for.
+    const Energy before = evaluate_energy(o, x);
+    const double rounding = 1e-14 * before.magnitude;
+    Points trial = x;
+    double t = 1;
+    for (int halvings = 0;; ++halvings, t *= 0.5) {
+      if (halvings == 60) return result.reason = "no step lowers the energy", result;
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (place[i] >= 0) {
+          const Eigen::Vector3d d = t * step.segment<3>(3 * place[i]);
+          trial[i] = x[i] + glm::dvec3(d(0), d(1), d(2));
+        }
+      if (evaluate_energy(o, trial).value <= before.value + 1e-4 * t * descent + rounding) break;
+    }
+    x = std::move(trial);
+    ++result.iterations;
+  }
+  return result;
+}
+
+}  // namespace
+
+// Around the first vertex: far from the origin, positions have no digits left for small strains.
+Minimum minimise(const Objective& objective, Points start) {
+  Objective o = objective;
+  const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
+  for (Points* list : {&o.predicted, &start})
+    for (glm::dvec3& p : *list) p -= origin;
+  Minimum result = newton(o, std::move(start));
+  for (glm::dvec3& p : result.positions) p += origin;
+  return result;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,232 @@
+#include "sim/reference/reference.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+namespace {
+
+using Points = std::vector<glm::dvec3>;
+
+void check_sizes(const ReferenceInput& input, const Points& positions) {
+  const std::size_t count = input.model.rest.positions.size();
+  if (positions.size() != count || input.inverse_masses.size() != count ||
+      input.system.at_vertex.size() != count)
+    throw Error("state and model differ", fmt::format("{} positions, {} vertices", positions.size(), count),
+                "step the state of this model");
+}
+
+void refuse_contact(const ReferenceInput& input, const Points& positions) {
+  std::vector<glm::dvec4> planes = input.model.obstacles;
+  if (input.settings.ground) planes.emplace_back(0, 1, 0, input.settings.ground_height);
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    for (const glm::dvec4& plane : planes)
+      if (input.inverse_masses[i] > 0 && glm::dot(glm::dvec3(plane), positions[i]) < plane.w)
+        throw Error("the reference knows no contact", fmt::format("vertex {} is inside an obstacle", i),
+                    "compare before the first contact, or without the ground", 1);
+}
+
+// v += h g, damped, y = x + h v: the same first part of a substep as CpuPbd and predict.comp.
+void predict(const ReferenceInput& input, State& state, double h) {
+  const double keep = std::exp(-input.settings.damping * h);
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    if (input.inverse_masses[i] > 0) {
+      state.velocities[i] = (state.velocities[i] + h * glm::dvec3(0, -input.settings.gravity, 0)) * keep;
+      state.positions[i] += h * state.velocities[i];
+    }
+}
+
+// `state` as predicted; it moves on to `positions`.
+void finish(State& state, const Points& positions, double h) {
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    state.velocities[i] += (positions[i] - state.positions[i]) / h;
+  state.positions = positions;
+}
+
+Eigen::Vector3d eigen(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+// The rest shape of one body put where it is nearest to `to`, by mass.
+void align(const ReferenceInput& input, const Body& body, const Points& to, Points& placed) {
+  const Points& rest = input.model.rest.positions;
+  const std::size_t first = body.first_vertex, end = first + body.vertices;
+  double mass = 0;
+  glm::dvec3 centre(0), rest_centre(0);
+  for (std::size_t i = first; i < end; ++i) {
+    const double m = 1 / input.inverse_masses[i];
+    mass += m, centre += m * to[i], rest_centre += m * rest[i];
+  }
+  centre /= mass, rest_centre /= mass;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t i = first; i < end; ++i)
+    covariance += eigen(to[i] - centre) * eigen(rest[i] - rest_centre).transpose() / input.inverse_masses[i];
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  // A rotation that turns about the axes of the two smallest values costs their (signed) sum: 0 leaves it
+  // undecided.
+  const Eigen::Vector3d values = svd.singularValues();
+  if (!(values(1) + sign * values(2) > 1e-12 * values(0)))
+    throw Error("no best rotation",
+                "predicted positions of " + body.name + " are on a line, a point or mirrored",
+                "start nearer to the rest shape", 1);
+  const Eigen::Matrix3d rotation =
+      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  for (std::size_t i = first; i < end; ++i) {
+    const Eigen::Vector3d turned = rotation * eigen(rest[i] - rest_centre);
+    placed[i] = centre + glm::dvec3(turned(0), turned(1), turned(2));
+  }
+}
+
+}  // namespace
+
+State rigid_step(const ReferenceInput& input, State state) {
+  check_sizes(input, state.positions);
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    if (!(input.inverse_masses[i] > 0))
+      throw Error("the rigid step needs free bodies", fmt::format("vertex {} is fixed", i), "unpin it");
+  const double h = input.settings.dt / input.settings.substeps;
+  for (int s = 0; s < input.settings.substeps; ++s) {
+    predict(input, state, h);
+    refuse_contact(input, state.positions);
+    Points placed = state.positions;
+    for (const Body& body : input.model.bodies) align(input, body, state.positions, placed);
+    refuse_contact(input, placed);
+    finish(state, placed, h);
+  }
+  return state;
+}
+
+namespace {
+
+void check_compliances(const Compliances& compliances) {
+  for (std::size_t k = 0; k < compliances.size(); ++k)
+    if (!(compliances[k] > 0))
+      throw Error("compliance must be above 0",
+                  fmt::format("{} of {}", compliances[k], constraint_kinds()[k].name),
+                  "rigid_step is the limit of 0, infinity leaves a kind out");
+}
+
+Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
+  check_compliances(compliances);
+  Objective o{input.system, compliances, {}, {}, 0, glm::dvec3(0), 1};
+  for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);
+  return o;
+}
+
+double total_mass(const Objective& o) {
+  double sum = 0;
+  for (double m : o.masses) sum += m;
+  return sum;
+}
+
+Error no_convergence(const Minimum& result, const char* mend) {
+  return {"the reference did not converge",
+          fmt::format("{} after {}, residual {:.1e}", result.reason, result.iterations, result.residual),
+          mend, 1};
+}
+
+}  // namespace
+
+Objective step_objective(const ReferenceInput& input, const State& state, const Compliances& compliances,
+                         double h) {
+  Objective o = objective_of(input, compliances);
+  State predicted = state;
+  predict(input, predicted, h);
+  o.predicted = std::move(predicted.positions);
+  o.inertia = 1 / (h * h);
+  o.unit = total_mass(o) * o.inertia * input.model.size * input.model.size;
+  return o;
+}
+
+Objective static_objective(const ReferenceInput& input, const Points& positions,
+                           const Compliances& compliances) {
+  Objective o = objective_of(input, compliances);
+  o.predicted = positions;
+  o.gravity.y = -input.settings.gravity;
+  o.unit = total_mass(o) * input.settings.gravity * input.model.size;
+  return o;
+}
+
+ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, const Compliances& compliances,
+                                  const Points* guess) {
+  check_sizes(input, state.positions);
+  if (guess != nullptr) check_sizes(input, *guess);
+  const double h = input.settings.dt / input.settings.substeps;
+  ReferenceStep step;
+  for (int s = 0; s < input.settings.substeps; ++s) {
+    const Objective objective = step_objective(input, state, compliances, h);
+    predict(input, state, h);
+    refuse_contact(input, state.positions);
+    Minimum result = minimise(objective, guess != nullptr && s == 0 ? *guess : state.positions);
+    if (!result.converged) throw no_convergence(result, "use a smaller step or a larger compliance");
+    refuse_contact(input, result.positions);
+    for (std::size_t i = 0; i < state.positions.size(); ++i)
+      if (!(input.inverse_masses[i] > 0)) result.positions[i] = state.positions[i];  // not even by rounding
+    finish(state, result.positions, h);
+    step.iterations += result.iterations;
+    step.residual = std::max(step.residual, result.residual);
+  }
+  step.state = std::move(state);
+  return step;
+}
+
+ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions,
+                                 const Compliances& compliances) {
+  check_sizes(input, positions);
+  const bool held =
+      std::any_of(input.inverse_masses.begin(), input.inverse_masses.end(), [](double w) { return w == 0; });
+  if (!held || !(input.settings.gravity > 0))
+    throw Error("nothing hangs", held ? "gravity is 0" : "no vertex is fixed",
+                "fix vertices and set gravity");
+  const Objective full = static_objective(input, positions, compliances);
+  for (int loads = 1;; loads *= 2) {
+    Minimum result;
+    result.positions = positions;
+    int iterations = 0;
+    for (int load = 1; load <= loads; ++load) {
+      Objective part = full;
+      part.gravity *= double(load) / loads;
+      result = minimise(part, std::move(result.positions));
+      iterations += result.iterations;
+      if (!result.converged) break;
+    }
+    if (result.converged) {
+      refuse_contact(input, result.positions);
+      for (std::size_t i = 0; i < positions.size(); ++i)
+        if (input.inverse_masses[i] == 0) result.positions[i] = positions[i];
+      return {{std::move(result.positions), Points(positions.size(), glm::dvec3(0))},
+              iterations,
+              result.residual};
+    }
+    if (loads == 64) throw no_convergence(result, "hold more vertices, or start nearer to equilibrium");
+  }
+}
+
+double error_to(const Model& model, const State& reference, const State& state) {
+  const std::size_t count = model.masses.size();
+  if (reference.positions.size() != count || state.positions.size() != count)
+    throw Error("states of different models",
+                fmt::format("{} and {} vertices", reference.positions.size(), state.positions.size()),
+                fmt::format("compare states of {} vertices", count));
+  // The size metrics.cpp takes for rigid_distance: the mean of the bodies' by mass.
+  double mass = 0, size = 0, squares = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 apart = state.positions[i] - reference.positions[i];
+    mass += model.masses[i];
+    squares += model.masses[i] * glm::dot(apart, apart);
+  }
+  for (const Body& body : model.bodies) {
+    const auto first = model.rest.positions.begin() + std::ptrdiff_t(body.first_vertex);
+    double body_mass = 0;
+    for (std::size_t i = 0; i < body.vertices; ++i) body_mass += model.masses[body.first_vertex + i];
+    size += body_mass / mass * bounds(Points(first, first + std::ptrdiff_t(body.vertices))).size();
+  }
+  return std::sqrt(squares / mass) / size;
+}
+
+}  // namespace tetpbd

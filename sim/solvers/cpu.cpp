@@ -1,0 +1,28 @@
+// Non-linear Gauss-Seidel on one CPU core (method.md eq. 15), with contiguous constraints and everything
+// inlined: in float the paper's baseline, in double what stability is held against.
+#include <memory>
+
+#include "sim/solvers/cpu_pbd.h"
+
+namespace tetpbd {
+
+namespace {
+
+template <class real>
+Solver create(const SolverInput& input) {
+  Solver solver;
+  const auto pbd = std::make_shared<CpuPbd<real>>(input.model, input.system);
+  solver.step_on_cpu = [pbd](State& state, const Settings& settings,
+                             const std::vector<double>& inverse_masses) {
+    pbd->step(state, settings, inverse_masses, Sweep::gauss_seidel);
+  };
+  solver.guards_on_cpu = [pbd] { return pbd->guards; };
+  return solver;
+}
+
+}  // namespace
+
+Solver create_cpu_solver(const SolverInput& input) { return create<float>(input); }
+Solver create_cpu_double_solver(const SolverInput& input) { return create<double>(input); }
+
+}  // namespace tetpbd

@@ -1,0 +1,170 @@
+#include "sim/solvers/handles.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "sim/constraints.h"
+#include "sim/mesh/tet_mesh.h"
+
+namespace tetpbd {
+
+namespace {
+
+constexpr double spacing = 0.6;  // of a body's diagonal: eight handles for a compact body
+
+glm::dvec3 cell_of(const glm::dvec3& size) {
+  const double diagonal = glm::length(size);
+  glm::dvec3 cell;
+  for (int a = 0; a < 3; ++a) {
+    const double cells = std::max(1.0, std::round(size[a] / (spacing * diagonal)));
+    cell[a] = size[a] > 0 ? size[a] / cells : std::max(diagonal, 1e-30);
+  }
+  return cell;
+}
+
+// Calls visit(vertex, weight, arm in m) for every vertex of a handle.
+template <class F>
+void for_each_vertex(const Handles& handles, const layout::Handle& handle, const Body& body, F&& visit) {
+  glsl::Rigid rigid;
+  for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
+    if (const int weight = rigid.handle_weight(handles.rest[v], handle.node))
+      visit(v, weight, rigid.handle_arm(handles.rest[v], handle.centre, handle.cell));
+}
+// Of all bodies: those of others have no weight.
+template <class F>
+void for_each_vertex(const Handles& handles, const layout::Handle& handle, F&& visit) {
+  Body all;
+  all.vertices = handles.rest.size();
+  for_each_vertex(handles, handle, all, visit);
+}
+
+}  // namespace
+
+Handles build_handles(const Model& model) {
+  glsl::Rigid rigid;
+  Handles result;
+  result.rest.resize(model.rest.positions.size());
+  for (std::size_t b = 0; b < model.bodies.size(); ++b) {
+    const Body& body = model.bodies[b];
+    if (body.vertices == 0) continue;
+    const auto from = model.rest.positions.begin() + std::ptrdiff_t(body.first_vertex);
+    const Bounds box = bounds({from, from + std::ptrdiff_t(body.vertices)});
+    const glm::dvec3 cell = cell_of(box.high - box.low);
+    const glm::ivec3 nodes = glm::ivec3(glm::round((box.high - box.low) / cell)) + 1;
+    // 64 bodies in a row lie apart, more than meet in a patch.
+    const glm::vec3 origin(float(8 * (b % 64)), 0, 0);
+    double heaviest = 0;
+    std::vector<double> masses(std::size_t(nodes.x * nodes.y * nodes.z));
+    for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) {
+      const glm::dvec3 at = (model.rest.positions[v] - box.low) / cell;
+      result.rest[v] = glm::vec4(origin + glm::vec3(at), 0);
+      heaviest = std::max(heaviest, model.masses[v]);
+      const glm::ivec3 low = glm::clamp(glm::ivec3(at), glm::ivec3(0), nodes - 2);
+      for (int corner = 0; corner < 8; ++corner) {
+        const glm::ivec3 node = low + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
+        const glm::dvec3 share = glm::max(1.0 - glm::abs(at - glm::dvec3(node)), 0.0);
+        masses[std::size_t((node.z * nodes.y + node.y) * nodes.x + node.x)] +=
+            share.x * share.y * share.z * model.masses[v];
+      }
+    }
+    // Weight times steps times deviation fit 64 bits (handles.glsl), the first two 31.
+    const double unit = std::min(std::exp2(16.0) / heaviest,
+                                 0.99 * std::exp2(22.0) / *std::max_element(masses.begin(), masses.end()));
+    for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
+      result.rest[v].w = float(model.masses[v] * unit);
+    for (int k = 0; k < nodes.z; ++k)
+      for (int j = 0; j < nodes.y; ++j)
+        for (int i = 0; i < nodes.x; ++i) {
+          layout::Handle handle{};
+          handle.node = origin + glm::vec3(i, j, k);
+          handle.cell = glm::vec3(cell);
+          handle.steps_per_metre = float(16320 / (2 * glm::length(cell)));  // no arm is longer than two cells
+          double weight = 0;
+          glm::dvec3 centre(0);
+          for_each_vertex(result, handle, body, [&](std::size_t v, int w, const glm::vec3&) {
+            weight += w, centre += double(w) * glm::dvec3(result.rest[v]);
+          });
+          if (weight == 0) continue;
+          handle.weight = float(weight);
+          handle.centre = glm::vec3(centre / weight);
+          glm::dvec3 sum(0);
+          glm::dmat3 squares(0);
+          for_each_vertex(result, handle, body, [&](std::size_t, int w, const glm::vec3& arm) {
+            const glm::dvec3 steps(rigid.handle_steps(arm, handle.steps_per_metre));
+            sum += double(w) * steps, squares += double(w) * glm::outerProduct(steps, steps);
+          });
+          squares -= glm::outerProduct(sum, sum) / weight;
+          handle.steps = glm::vec3(sum);
+          handle.squares = glm::vec3(squares[0][0], squares[1][1], squares[2][2]);
+          handle.products = glm::vec3(squares[1][2], squares[0][2], squares[0][1]);
+          const double trace = squares[0][0] + squares[1][1] + squares[2][2];
+          // Points on a line have no inverse: then a small one, and about the line nothing turns.
+          const glm::dmat3 inverse =
+              trace > 0 ? glm::inverse(glm::dmat3(trace * (1 + 1e-6)) - squares) : glm::dmat3(0);
+          handle.inverse_squares = glm::vec3(inverse[0][0], inverse[1][1], inverse[2][2]);
+          handle.inverse_products = glm::vec3(inverse[1][2], inverse[0][2], inverse[0][1]);
+          result.handles.push_back(handle);
+        }
+  }
+  return result;
+}
+
+bool wants_handles(const Settings& settings) {
+  return settings.handles > 0 && settings.mode == "node" && !compliant(settings);
+}
+
+// The rotation R with the largest trace(R^T A), for A = sum w x X^T (Horn 1987): the one that turns the X
+// nearest to the x.
+glm::dmat3 rotation_of(const glm::dmat3& A) {
+  Eigen::Matrix3d a;
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 3; ++row) a(row, column) = A[column][row];
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
+  const Eigen::Matrix3d r = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  glm::dmat3 R;
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 3; ++row) R[column][row] = r(row, column);
+  return R;
+}
+
+std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<glm::dvec3>& positions) {
+  std::vector<HandlePose> poses;
+  for (const layout::Handle& handle : handles.handles) {
+    glm::dvec3 x(0), arms(0);
+    for_each_vertex(handles, handle, [&](std::size_t v, int weight, const glm::vec3& arm_m) {
+      const glm::dvec3 arm(arm_m);
+      x += double(weight) * positions[v], arms += double(weight) * arm;
+    });
+    x /= double(handle.weight), arms /= double(handle.weight);
+    glm::dmat3 A(0);
+    for_each_vertex(handles, handle, [&](std::size_t v, int weight, const glm::vec3& arm_m) {
+      const glm::dvec3 arm(arm_m);
+      A += double(weight) * glm::outerProduct(positions[v] - x, arm - arms);
+    });
+    HandlePose pose;
+    pose.R = rotation_of(A);
+    pose.place = x - pose.R * arms;
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<glm::dvec3> handle_pulls(const Handles& handles, const std::vector<glm::dvec3>& positions) {
+  std::vector<glm::dvec3> pulls(positions.size());
+  const std::vector<HandlePose> poses = handle_poses(handles, positions);
+  for (std::size_t h = 0; h < poses.size(); ++h)
+    for_each_vertex(handles, handles.handles[h], [&](std::size_t v, int weight, const glm::vec3& arm_m) {
+      const glm::dvec3 arm(arm_m);
+      pulls[v] +=
+          double(weight) / double(handles.rest[v].w) * (poses[h].place + poses[h].R * arm - positions[v]);
+    });
+  return pulls;
+}
+
+double relaxation(double omega, double handles) {
+  return handles > 0 ? std::min(omega, 3 * (1.2 - handles)) : omega;
+}
+
+}  // namespace tetpbd

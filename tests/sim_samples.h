@@ -1,0 +1,53 @@
+// A block that tests step, and the same step in double.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "sim/sim.h"
+#include "sim/solvers/cpu_pbd.h"
+
+namespace samples {
+
+using namespace tetpbd;
+
+// Irregular and asymmetric; 5*4*3 = 60 or 9*7*5 = 315 vertices, no multiple of any work-group.
+inline std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, double height = 0.2,
+                                                double scale = 1, const std::string& deformation = "none",
+                                                glm::dvec3 spin = glm::dvec3(0)) {
+  TetMesh mesh = make_block(glm::dvec3(1.0, 0.7, 0.5) * scale, cells);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    auto& p = mesh.positions[i];
+    p += 0.02 * scale *
+         glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+    p.y += (0.35 + 0.02 + height) * scale;
+    p.x += 0.15 * p.y * p.y / scale;
+  }
+  finish_tets(mesh, "block");
+  auto model = std::make_shared<Model>();
+  auto start = mesh.positions;
+  deform(start, mesh, deformation, 1);
+  add_body(*model, "block", mesh, 1000, start, glm::dvec3(0), spin, {});
+  return model;
+}
+
+inline Settings quick(const std::string& mode, int iterations = 10, int substeps = 1) {
+  return {.mode = mode, .iterations = iterations, .substeps = substeps};
+}
+
+inline State reference_after(const Sim& sim, int steps, Sweep sweep) {
+  CpuPbd<double> pbd(*sim.model, sim.system);
+  State state = read_state(sim);
+  for (int s = 0; s < steps; ++s) pbd.step(state, sim.settings, sim.inverse_masses, sweep);
+  return state;
+}
+
+inline double distance(const State& a, const State& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.positions.size(); ++i)
+    largest = std::max(largest, glm::length(a.positions[i] - b.positions[i]));
+  return largest;
+}
+
+}  // namespace samples

@@ -14,7 +14,8 @@
 
 #include "app/files.h"
 #include "sim/solvers/solver.h"
-#include "sim/mesh/text_file.h"
+#include "sim/error.h"
+#include "sim/files.h"
 
 extern char** environ;
 

@@ -13,7 +13,7 @@
 #include <fstream>
 
 #include "sim/error.h"
-#include "sim/mesh/text_file.h"
+#include "sim/files.h"
 
 namespace tetpbd {
 
@@ -77,7 +77,7 @@ void GrowingFile::check() {
   throw Error("cannot write", file_.string(), why, 1);
 }
 
-void write_file(const fs::path& file, const std::string& content) { write_files_whole({{file, content}}); }
+void write_file(const fs::path& file, const std::string& content) { write_whole(file, content); }
 
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;

@@ -9,9 +9,9 @@
 #include <cstdlib>
 #include <vector>
 
-#include "sim/mesh/bytes.h"
 #include "sim/error.h"
-#include "sim/mesh/text_file.h"
+#include "sim/files.h"
+#include "sim/mesh/bytes.h"
 
 namespace tetpbd {
 
@@ -86,7 +86,7 @@ bool write_cached(const fs::path& file, std::string bytes) {
   std::error_code ignored;
   fs::create_directories(file.parent_path(), ignored);
   try {
-    write_files_whole({{file, std::move(bytes)}});
+    write_whole(file, bytes);
   } catch (const Error&) {  // read-only or full
     return false;
   }

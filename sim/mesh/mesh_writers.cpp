@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "sim/error.h"
+#include "sim/files.h"
 #include "sim/mesh/msh_file.h"
 #include "sim/mesh/tet_mesh.h"
 #include "sim/mesh/text_file.h"
@@ -118,17 +119,17 @@ void write_mesh(const std::filesystem::path& file, const TetMesh& mesh) {
     std::filesystem::path node = file, ele = file;
     node.replace_extension(".node");
     ele.replace_extension(".ele");
-    write_files_whole({{node, node_text(mesh)}, {ele, ele_text(mesh)}});
+    write_whole({{node, node_text(mesh)}, {ele, ele_text(mesh)}});
   } else if (extension == ".msh") {
-    write_files_whole({{file, msh_text(mesh)}});
+    write_whole(file, msh_text(mesh));
   } else if (extension == ".ply") {
-    write_files_whole({{file, ply_bytes(boundary_surface(mesh))}});
+    write_whole(file, ply_bytes(boundary_surface(mesh)));
   } else if (extension == ".stl") {
-    write_files_whole({{file, stl_bytes(boundary_surface(mesh))}});
+    write_whole(file, stl_bytes(boundary_surface(mesh)));
   } else if (extension == ".obj") {
-    write_files_whole({{file, obj_text(boundary_surface(mesh))}});
+    write_whole(file, obj_text(boundary_surface(mesh)));
   } else {
-    write_files_whole({{file, off_text(boundary_surface(mesh))}});
+    write_whole(file, off_text(boundary_surface(mesh)));
   }
 }
 

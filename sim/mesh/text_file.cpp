@@ -1,14 +1,10 @@
 #include "sim/mesh/text_file.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
 #include <fstream>
 
 namespace tetpbd {
@@ -107,62 +103,6 @@ std::size_t TextFile::count_fitting(const char* wanted, std::size_t bytes_each) 
 void TextFile::fail(const std::string& what) const {
   throw Error(what, fmt::format("{} line {}", file_.string(), line_number_),
               "mend the file or export it again");
-}
-
-namespace {
-
-// Why not; empty when it is written. A link left under the temporary name is not followed: the name is freed
-// first, then made.
-std::string write_new(const fs::path& file, const std::string& content) {
-  ::unlink(file.c_str());
-  const int target = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (target < 0) return std::strerror(errno);
-  std::string why;
-  for (std::size_t done = 0; done < content.size() && why.empty();) {
-    const ssize_t n = ::write(target, content.data() + done, content.size() - done);
-    if (n > 0)
-      done += static_cast<std::size_t>(n);
-    else if (errno != EINTR)
-      why = std::strerror(errno);
-  }
-  if (::close(target) != 0 && why.empty()) why = std::strerror(errno);
-  return why;
-}
-
-}  // namespace
-
-fs::path temporary_name(const fs::path& file) {
-  return file.parent_path() /
-         fmt::format(".{}.{}.part{}", file.stem().string(), ::getpid(), file.extension().string());
-}
-
-void rename_whole(const fs::path& temporary, const fs::path& file) {
-  std::error_code failed, ignored;
-  fs::rename(temporary, file, failed);
-  if (!failed) return;
-  fs::remove(temporary, ignored);
-  throw Error("cannot be written", file.string(), failed.message(), 1);
-}
-
-void write_files_whole(const std::vector<std::pair<fs::path, std::string>>& files) {
-  const auto remove_from = [&](std::size_t first) {
-    std::error_code ignored;
-    for (std::size_t i = first; i < files.size(); ++i) fs::remove(temporary_name(files[i].first), ignored);
-  };
-  for (const auto& [file, content] : files) {
-    std::error_code ignored;
-    std::string why = write_new(temporary_name(file), content);
-    if (why.empty() && fs::is_directory(file, ignored)) why = "a folder has that name";
-    if (why.empty()) continue;
-    remove_from(0);
-    throw Error("cannot be written", file.string(), why, 1);
-  }
-  for (std::size_t i = 0; i < files.size(); ++i) try {
-      rename_whole(temporary_name(files[i].first), files[i].first);
-    } catch (const Error&) {
-      remove_from(i);
-      throw;
-    }
 }
 
 }  // namespace tetpbd

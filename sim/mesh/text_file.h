@@ -1,12 +1,10 @@
-// Text files line by line with line numbers for errors, and files that appear whole or not at all.
+// Text files line by line, with line numbers for errors.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "sim/error.h"
 
@@ -50,15 +48,5 @@ class TextFile {
 
   std::string_view word(const char* wanted);
 };
-
-/// ".NAME.PID.part.EXTENSION" in the same folder: programs choose formats by the extension, so it stays.
-std::filesystem::path temporary_name(const std::filesystem::path& file);
-
-/// Gives a finished file its name. Throws Error (status 1) and removes it when that fails.
-void rename_whole(const std::filesystem::path& temporary, const std::filesystem::path& file);
-
-/// Writes each file under a temporary name, then renames all. Throws Error (status 1) and leaves nothing
-/// behind when it cannot.
-void write_files_whole(const std::vector<std::pair<std::filesystem::path, std::string>>& files);
 
 }  // namespace tetpbd

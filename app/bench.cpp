@@ -45,11 +45,7 @@ void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer*
     reset(sim);
     sim.timed = false;
     const auto picture = [&] {
-      if (!renderer) return;
-      Frame now = view;
-      now.positions = sim.current_positions().id();
-      now.velocities = sim.velocities.id();
-      draw(*renderer, now);
+      if (renderer) draw(*renderer, view);
     };
     const auto frame = [&] {
       step(sim);
@@ -168,16 +164,12 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
             add(nullptr, {});
             for (const auto& [width, height] : options.sizes) {
               const Target target = make_target(width, height, options.samples);
-              Frame view;
-              view.camera = scene_camera(scene, *model, float(width) / float(height));
-              view.viewport = {0, 0, width, height};
-              view.target = target.framebuffer.id();
-              if (settings.ground) view.ground = float(settings.ground_height);
+              const Camera camera = scene_camera(scene, *model, float(width) / float(height));
               for (const std::string& picture : options.pictures) {
                 row.size = fmt::format("{}x{}", width, height);
                 row.picture = picture;
-                view.options = picture == "plain" ? plain_view({}) : ViewOptions{};
-                add(&*renderer, view);
+                const ViewOptions look = picture == "plain" ? plain_view({}) : ViewOptions{};
+                add(&*renderer, frame_of(sim, camera, look, target));
               }
             }
             progress.update(++done);

@@ -103,7 +103,7 @@ Grab begin_grab(Sim& sim, const Pick& pick) {
 }
 
 void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
-         std::span<const glm::vec4> planes) {
+         std::span<const glm::dvec4> planes) {
   if (const auto now = poll(grab.watch)) {
     if (!grab.placed) {
       grab.start = grab.position = now->front();
@@ -121,9 +121,9 @@ void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
   if (towards > 1e-3)
     grab.target = origin + along * (glm::dot(grab.hit - origin, forward) / towards) + grab.offset;
   // A pinned vertex has infinite mass and no contact, so it is kept out of the ground and walls here.
-  for (const glm::vec4& plane : planes) {
-    const glm::dvec3 normal{glm::vec3(plane)};
-    grab.target += normal * std::max(0.0, double(plane.w) - glm::dot(normal, grab.target));
+  for (const glm::dvec4& plane : planes) {
+    const glm::dvec3 normal(plane);
+    grab.target += normal * std::max(0.0, plane.w - glm::dot(normal, grab.target));
   }
 }
 

@@ -46,7 +46,7 @@ struct Grab {
 Grab begin_grab(Sim& sim, const Pick& pick);
 /// Takes in what has been read back, and aims at the point under the cursor at the depth of the hit.
 void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
-         std::span<const glm::vec4> planes);
+         std::span<const glm::dvec4> planes);
 /// Before each step: leads the vertex on.
 void lead(Grab& grab, Sim& sim);
 /// Lets go: the vertex is free again unless it had been pinned.

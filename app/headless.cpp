@@ -27,8 +27,6 @@ struct FrameWriter {
   Camera camera;
   Renderer renderer;
   Target target;
-  std::vector<glm::vec4> planes;
-  std::vector<std::uint32_t> pinned;
   std::optional<Video> video;
   ReadBack read_back;
   struct Use {
@@ -41,17 +39,7 @@ struct FrameWriter {
       : options(run), camera(view), renderer(std::move(with)), target(std::move(to)) {}
 
   void draw_frame(const Sim& sim, long png_step, bool to_video) {
-    Frame frame;
-    frame.positions = sim.current_positions().id();
-    frame.velocities = sim.velocities.id();
-    frame.camera = camera;
-    frame.viewport = {0, 0, target.width, target.height};
-    frame.options = options.view;
-    if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
-    frame.planes = planes;
-    frame.pinned = pinned;
-    frame.target = target.framebuffer.id();
-    draw(renderer, frame);
+    draw(renderer, frame_of(sim, camera, options.view, target));
     read_back.push(target);
     uses.push_back({png_step, to_video});
     while (uses.size() > 2) write_one(true);
@@ -73,13 +61,6 @@ struct FrameWriter {
     if (video) video->close();
   }
 };
-
-std::vector<BodyRange> body_ranges(const Model& model) {
-  std::vector<BodyRange> ranges;
-  for (const Body& body : model.bodies)
-    ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
-  return ranges;
-}
 
 }  // namespace
 
@@ -104,11 +85,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   std::optional<FrameWriter> frames;
   if (options.png_every > 0 || !options.video.empty()) {
     frames.emplace(options, scene_camera(scene, *model, float(options.width) / float(options.height)),
-                   make_renderer(model->rest, body_ranges(*model)),
-                   make_target(options.width, options.height, options.samples));
-    for (const glm::dvec4& plane : model->obstacles) frames->planes.emplace_back(plane);
-    for (std::uint32_t v = 0; v < model->inverse_masses.size(); ++v)
-      if (!(model->inverse_masses[v] > 0)) frames->pinned.push_back(v);
+                   make_renderer(*model), make_target(options.width, options.height, options.samples));
     if (!options.video.empty()) {
       const int rate = std::clamp(int(std::lround(1 / (double(video_every) * scene.settings.dt))), 1, 120);
       frames->video.emplace(options.video, options.width, options.height, rate);

@@ -107,9 +107,8 @@ void handle_input(Session& s, Ui& ui, Mouse& mouse, const Rect& view) {
   if (mouse.drag == Mouse::Drag::grab && !s.grab)
     mouse.drag = Mouse::Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
-  std::vector<glm::vec4> planes = s.loaded.planes;
-  if (s.loaded.sim.settings.ground)
-    planes.emplace_back(0.0f, 1.0f, 0.0f, float(s.loaded.sim.settings.ground_height));
+  std::vector<glm::dvec4> planes = s.loaded.sim.model->obstacles;
+  if (s.loaded.sim.settings.ground) planes.emplace_back(0.0, 1.0, 0.0, s.loaded.sim.settings.ground_height);
   aim(*s.grab, s.loaded.sim, s.camera, ray_at(s, view, mouse.x, mouse.y), planes);
 }
 

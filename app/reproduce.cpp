@@ -286,19 +286,15 @@ void snapshots(Report& report, const Fall& fall, const Published& paper) {
   Sim sim = create_sim(model, settings);
   Renderer renderer = make_renderer(model->rest);
   const Target target = make_target(360, 300, 4);
-  Frame frame;
-  frame.camera.azimuth = bunny ? -35.0f : 25.0f;
-  frame_box(frame.camera, {-0.6f, 0, -0.6f}, {0.6f, float(1 + fall.height), 0.6f}, 1.2f, 1.0f);
-  frame.viewport = {0, 0, target.width, target.height};
-  frame.target = target.framebuffer.id();
-  frame.ground = 0.0f;
+  Camera camera;
+  camera.azimuth = bunny ? -35.0f : 25.0f;
+  frame_box(camera, {-0.6f, 0, -0.6f}, {0.6f, float(1 + fall.height), 0.6f}, 1.2f, 1.0f);
+  Frame frame = frame_of(sim, camera, {}, target);
   const std::filesystem::path file = report.out / "figures" / "snapshot.png";
   report.html += "<div class=\"row\">";
   for (int s = 0; s <= 150; ++s) {
     if (s % 25 == 0) {
       if (check_finite(sim, true)) throw error_of(*sim.check.found, scene.name);
-      frame.positions = sim.current_positions().id();
-      frame.velocities = sim.velocities.id();
       frame.caption = fmt::format("t = {:.3f} s", s * settings.dt);
       draw(renderer, frame);
       write_png(file, read_rgba(target));

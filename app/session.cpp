@@ -45,15 +45,9 @@ void one_step(Session& s) {
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene) {
   const auto model = build_model(scene);
   auto choice = choose_for(scene, model);
-  Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, {}, {}, {}, choice};
-  std::vector<BodyRange> ranges;
-  for (const Body& body : model->bodies)
-    ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
-  loaded.renderer = make_renderer(model->rest, ranges);
+  Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, choice};
+  loaded.renderer = make_renderer(*model);
   loaded.picker = make_picker(model->rest);
-  for (const glm::dvec4& plane : model->obstacles) loaded.planes.emplace_back(plane);
-  for (std::uint32_t v = 0; v < model->inverse_masses.size(); ++v)
-    if (!(model->inverse_masses[v] > 0)) loaded.fixed.push_back(v);
   return loaded;
 }
 
@@ -112,7 +106,6 @@ void restart(Session& s) {
     return;
   }
   attempt(s, [&] { reset(s.loaded.sim); });
-  s.loaded.pins.clear();
   s.clock.owed = 0;
   std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
   forget_measurements(s);
@@ -234,7 +227,7 @@ void frame_body(Session& s) {
 
 namespace {
 bool is_fixed(const Session& s, std::uint32_t vertex) {
-  return std::binary_search(s.loaded.fixed.begin(), s.loaded.fixed.end(), vertex);
+  return !(s.loaded.sim.model->inverse_masses[vertex] > 0);
 }
 }  // namespace
 
@@ -243,12 +236,11 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
     say(s, fmt::format("vertex {} is fixed by the scene", vertex));
     return;
   }
-  if (std::erase(s.loaded.pins, vertex)) {
+  if (is_pinned(s.loaded.sim, vertex)) {
     unpin(s.loaded.sim, vertex);
     s.log("unpin {}", vertex);
   } else {
     pin(s.loaded.sim, vertex);
-    s.loaded.pins.push_back(vertex);
     s.log("pin {}", vertex);
   }
 }

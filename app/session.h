@@ -32,9 +32,6 @@ struct Loaded {
   Renderer renderer;
   Picker picker;
   std::optional<Metrics> metrics;  ///< made when first shown
-  std::vector<glm::vec4> planes;
-  std::vector<std::uint32_t> fixed;    ///< by the scene
-  std::vector<std::uint32_t> pins;     ///< by the user
   std::optional<SolverChoice> choice;  ///< made last, by --solver auto or in the window
 };
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene);

@@ -156,20 +156,8 @@ void fit_target(Session& s, View& view, int width, int height) {
 
 void draw_view(Session& s, View& view) {
   if (!view.target.framebuffer) return;
-  Frame frame;
-  frame.positions = s.loaded.sim.current_positions().id();
-  frame.velocities = s.loaded.sim.velocities.id();
-  frame.camera = s.camera;
-  frame.viewport = {0, 0, view.target.width, view.target.height};
-  frame.options = s.view;
-  if (s.loaded.sim.settings.ground) frame.ground = float(s.loaded.sim.settings.ground_height);
-  frame.planes = s.loaded.planes;
-  std::vector<std::uint32_t> pinned = s.loaded.fixed, grabbed;
-  pinned.insert(pinned.end(), s.loaded.pins.begin(), s.loaded.pins.end());
-  if (s.grab) grabbed.push_back(s.grab->vertex);
-  frame.pinned = pinned;
-  frame.grabbed = grabbed;
-  frame.target = view.target.framebuffer.id();
+  Frame frame = frame_of(s.loaded.sim, s.camera, s.view, view.target);
+  if (s.grab) frame.grabbed.push_back(s.grab->vertex);
   if (attempt(s, [&] { draw(s.loaded.renderer, frame); })) {
     view.drawn = s.view;
   } else {

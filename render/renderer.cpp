@@ -208,8 +208,9 @@ void draw_plane(const Renderer& renderer, const Frame& frame, const glm::vec4& p
 void draw_dots(Renderer& renderer, const Frame& frame) {
   const std::size_t count = frame.pinned.size() + frame.grabbed.size(), bytes = count * sizeof(std::uint32_t);
   if (renderer.dots.bytes() < bytes) renderer.dots = Buffer("dot indices", bytes, nullptr, GL_STREAM_DRAW);
-  renderer.dots.write(0, frame.pinned.size_bytes(), frame.pinned.data());
-  renderer.dots.write(frame.pinned.size_bytes(), frame.grabbed.size_bytes(), frame.grabbed.data());
+  std::vector<std::uint32_t> dots = frame.grabbed;  // first, so that it covers its own pin
+  dots.insert(dots.end(), frame.pinned.begin(), frame.pinned.end());
+  renderer.dots.write(0, bytes, dots.data());
   glBindVertexArray(renderer.vertex_array.id());
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.dots.id());
   glEnable(GL_PROGRAM_POINT_SIZE);
@@ -221,8 +222,9 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
     renderer.dot.set("size", size * scale);
     glDrawElements(GL_POINTS, GLsizei(n), GL_UNSIGNED_INT, reinterpret_cast<const void*>(offset));
   };
-  batch(frame.pinned.size(), 0, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
-  batch(frame.grabbed.size(), frame.pinned.size_bytes(), glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);
+  const std::size_t grabbed = frame.grabbed.size();
+  batch(grabbed, 0, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);
+  batch(frame.pinned.size(), grabbed * sizeof(std::uint32_t), glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_PROGRAM_POINT_SIZE);
 }
 
@@ -267,6 +269,13 @@ Renderer make_renderer(TetMesh mesh, std::vector<BodyRange> bodies) {
   glBindVertexArray(0);
   renderer.view = Buffer("view", sizeof(View), nullptr, GL_STREAM_DRAW);
   return renderer;
+}
+
+Renderer make_renderer(const Model& model) {
+  std::vector<BodyRange> bodies;
+  for (const Body& body : model.bodies)
+    bodies.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
+  return make_renderer(model.rest, std::move(bodies));
 }
 
 void draw(Renderer& renderer, const Frame& frame) {

@@ -12,8 +12,8 @@
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
-#include "sim/solvers/handles.h"
 #include "sim/interrupt.h"
+#include "sim/solvers/handles.h"
 
 namespace tetpbd {
 
@@ -34,12 +34,19 @@ std::vector<Settings> candidates(const Settings& settings) {
     base.omega = omega;
     all.push_back(base);
   }
+  if (!base.mass_splitting) {
+    all.push_back(base);
+    all.back().mass_splitting = true;
+  }
+  // Handles pull to the rest shape: right only where that is what the constraints ask for.
   const auto used = split(settings.constraints, ',');
-  bool hard = true;
+  const auto is_used = [&](const char* kind) {
+    return std::find(used.begin(), used.end(), kind) != used.end();
+  };
+  bool keeps_shape = is_used("stretch");
   for (const ConstraintKind& kind : constraint_kinds())
-    if (std::find(used.begin(), used.end(), kind.name) != used.end())
-      hard = hard && settings.*kind.stiffness == 1;
-  if (hard) {
+    keeps_shape = keeps_shape && (!is_used(kind.name) || settings.*kind.stiffness == 1);
+  if (keeps_shape) {
     base.omega = 1.5;
     set_mode(base, "node+handles", "auto");
     all.push_back(base);
@@ -136,15 +143,17 @@ std::string describe(const SolverChoice& choice) {
   const std::string loss = choice.lost_nothing
                                ? fmt::format("none lost volume in {} steps", choice.steps)
                                : fmt::format("loss {:.3g} % over {} steps", best.loss_percent, choice.steps);
-  return fmt::format("{}, {} substep{}, omega {:g}: {:.3g} ms of {:.3g} ms a step, {}", mode_word(s),
-                     s.substeps, s.substeps == 1 ? "" : "s", s.omega, best.ms, choice.budget_ms, loss);
+  return fmt::format("{}, {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {}", mode_word(s),
+                     s.substeps, s.substeps == 1 ? "" : "s", effective_omega(s),
+                     s.mass_splitting ? ", masses split" : "", best.ms, choice.budget_ms, loss);
 }
 
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {
   nlohmann::ordered_json trials = nlohmann::ordered_json::array();
   for (const SolverTrial& trial : choice.trials)
     trials.push_back({{"mode", mode_word(trial.settings)},
-                      {"omega", trial.settings.omega},
+                      {"omega", effective_omega(trial.settings)},
+                      {"mass_splitting", trial.settings.mass_splitting},
                       {"iterations", trial.settings.iterations},
                       {"substeps", trial.settings.substeps},
                       {"gpu_ms_per_step", json_number(trial.ms)},

@@ -30,8 +30,9 @@ struct Scene;
 
 /// The budget without --budget-ms: a tenth of the time that a step simulates.
 double default_budget_ms(const Settings& settings);
-/// Tries mode node, one iteration a substep: averaged with two over-relaxations and, for hard bodies, with
-/// rigid handles. Everything else stays as in `settings`. Takes a second or so on a GPU; needs a GL context.
+/// Tries mode node, one iteration a substep: averaged with two over-relaxations, with masses split and, where
+/// all constraints are hard and edges are among them, with rigid handles. Everything else stays as in
+/// `settings`. Takes a second or so on a GPU; needs a GL context.
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
                            double budget_ms, long steps);
 /// For a scene that asks for it: over its first 400 steps at most. The scene then has the settings chosen.

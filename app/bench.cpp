@@ -152,6 +152,7 @@ std::vector<BenchRow> bench_rows(const BenchOptions& options,
             BenchRow row;
             row.scene = scene.name, row.mode = mode, row.constraints = set;
             row.iterations = iterations, row.substeps = substeps;
+            row.omega = effective_omega(settings);
             row.vertices = model->positions.size(), row.tets = model->rest.tets.size();
             row.gpu_bytes = cost.bytes, row.dispatches = cost.dispatches_per_step;
             row.bytes_per_step = cost.bytes_per_step;
@@ -235,6 +236,7 @@ int run_bench(const BenchOptions& options) {
     if (std::isfinite(r.max_volume_loss_percent)) loss = r.max_volume_loss_percent;
     list.push_back({{"scene", r.scene},
                     {"mode", r.mode},
+                    {"omega", r.omega},
                     {"constraints", r.constraints},
                     {"iterations", r.iterations},
                     {"substeps", r.substeps},

@@ -35,6 +35,7 @@ struct BenchOptions {
 struct BenchRow {
   std::string scene, mode, constraints, size, picture;  ///< the last two empty: no rendering
   int iterations = 1, substeps = 1;
+  double omega = 1;  ///< that acts
   std::size_t vertices = 0, tets = 0, gpu_bytes = 0;
   Percentiles fps;              ///< over repetitions: median, smallest (p05), largest (p95)
   Percentiles gpu_ms, wall_ms;  ///< a step; a frame

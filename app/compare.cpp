@@ -266,7 +266,9 @@ ordered_json measured(const CompareOptions& options) {
           Settings settings = scene.settings;
           set_mode(settings, mode, "--modes");
           settings.omega = omega, settings.iterations = iterations, settings.substeps = substeps;
-          combinations.push_back(settings);
+          settings.omega = effective_omega(settings);
+          if (std::find(combinations.begin(), combinations.end(), settings) == combinations.end())
+            combinations.push_back(settings);  // two omegas beyond what handles allow are one
         }
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);

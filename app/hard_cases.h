@@ -3,8 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "sim/metrics.h"
 
 namespace tetpbd {
 
@@ -23,6 +26,9 @@ struct HardCaseOptions {
   std::vector<std::filesystem::path> merge;
 };
 
+/// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
+/// 5 % of the run's `steps` at least: what is good for less long may be passing through.
+std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);
 /// Writes stability.csv and stability.json; prints a table. Exit status 1 if any state became non-finite.
 int run_hard_cases(const HardCaseOptions& options);
 

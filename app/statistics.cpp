@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/files.h"
+#include "sim/solvers/handles.h"
 
 namespace tetpbd {
 
@@ -87,6 +88,10 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
 
 }  // namespace
 
+double effective_omega(const Settings& settings) {
+  return relaxation(settings.omega, wants_handles(settings) ? settings.handles : 0);
+}
+
 ordered_json json_number(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
 }
@@ -127,6 +132,7 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
   if (choice) j["solver_choice"] = solver_choice_json(*choice);
+  j["solver"] = {{"omega", effective_omega(sim.settings)}};
   j["mesh"] = {{"vertices", mesh.vertices},
                {"surface_triangles", mesh.surface_triangles},
                {"edges", mesh.edges},

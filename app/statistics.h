@@ -38,6 +38,8 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                             const MeshReport& mesh, const Timing& timing, const RunErrors& errors,
                             const GuardCounts& guards, std::optional<std::uint64_t> hash,
                             const std::optional<SolverChoice>& choice);
+/// The over-relaxation that acts: rigid handles bound it.
+double effective_omega(const Settings& settings);
 /// {"step", "vertex", "cause"}, or null.
 nlohmann::ordered_json non_finite_json(const std::optional<NonFinite>& found);
 /// null where it is no number.

@@ -51,8 +51,9 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   REQUIRE(choice);
   CHECK_FALSE(scene.budget_ms);
   CHECK(scene.settings == choice->settings());
-  CHECK(choice->trials.size() == 3);  // averaged, with more over-relaxation, with handles
-  CHECK(choice->trials[2].settings.handles > 0);
+  CHECK(choice->trials.size() == 4);  // averaged, with more over-relaxation, with masses split, with handles
+  CHECK(choice->trials[2].settings.mass_splitting);
+  CHECK(choice->trials[3].settings.handles > 0);
   for (const SolverTrial& trial : choice->trials) {
     CHECK(trial.settings.iterations == 1);
     CHECK(trial.settings.substeps >= 1);
@@ -60,12 +61,17 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
     CHECK(0.99 * choice->trials[choice->best].loss_percent <= trial.loss_percent);
   }
   CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
-  CHECK(solver_choice_json(*choice)["trials"].size() == 3);
+  CHECK(solver_choice_json(*choice)["trials"].size() == 4);
 
   // What handles or over-relaxation would change is not tried with them.
   Settings soft = scene.settings;
   soft.k_stretch = 0.5;
-  CHECK(choose_solver(model, soft, 1, 3).trials.size() == 2);
+  CHECK(choose_solver(model, soft, 1, 3).trials.size() == 3);
+  Settings liquid = scene.settings;  // keeps its volume and no shape: handles would freeze it
+  liquid.handles = 0;
+  liquid.constraints = "volume";
+  for (const SolverTrial& trial : choose_solver(model, liquid, 1, 3).trials)
+    CHECK(trial.settings.handles == 0);
   soft.compliance_volume = 1e-6;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
   // No budget is too small for one substep, and a hundred times the budget holds more.

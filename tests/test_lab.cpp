@@ -1,0 +1,239 @@
+// The commands that measure: bench, compare, hard cases, reproduce, soak.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "app/hard_cases.h"
+#include "tests/run_program.h"
+
+using nlohmann::json;
+using namespace tetpbd;
+using run_program::Folder, run_program::Outcome, run_program::read, run_program::program;
+namespace fs = std::filesystem;
+
+TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does not pass") {
+  const Folder folder;
+  std::ofstream(folder.path / "rest.json")
+      << R"({"name": "rest", "bodies": [{"name": "block", "block": {"size": [1, 0.5, 0.5], "cells": [4, 2, 2]},
+             "position": [0, 0.02, 0]}], "solver": {"iterations": 10}})";
+  for (const char* mode : {"node", "constraint"}) {
+    CAPTURE(mode);
+    program("soak --scene rest.json --settle 600 --steps 400 --out s --mode " + std::string(mode), folder);
+    const json soak = json::parse(read(folder.path / "s/soak.json"));
+    CHECK(soak["steps"] == 400);
+    CHECK(soak["finite"] == true);
+    CHECK(soak["gl_buffer_bytes"]["start"].get<long>() > 10000);
+    int seen = 0;
+    for (const json& check : soak["checks"]) {
+      const std::string name = check["name"];
+      CAPTURE(name);
+      CAPTURE(check["value"].dump());
+      if (name == "speed_ratio") continue;  // of this machine, with whatever else runs on it
+      CHECK(check["passed"] == true);
+      ++seen;
+    }
+    CHECK(seen == 4);
+    const std::string csv = read(folder.path / "s/soak.csv");
+    CHECK(std::count(csv.begin(), csv.end(), '\n') == 402);
+  }
+  const Outcome falling = program("soak --scene rest.json --settle 0 --steps 100 --out f", folder);
+  CHECK(falling.status == 1);
+  CHECK(falling.err.find("drift") != std::string::npos);
+  CHECK(json::parse(read(folder.path / "f/soak.json"))["passed"] == false);
+}
+
+TEST_CASE(
+    "bench writes a row a setting, with and without rendering, and calls a software renderer by its name") {
+  const Folder folder;
+  const Outcome run = program(
+      "bench --scenes beam --modes cpu,node,paper --constraint-sets stretch,stretch+bend+volume --iterations "
+      "1,2 "
+      "--frames 5 "
+      "--warm-up 1 --repeats 1 --size 64x48 --out b",
+      folder);
+  REQUIRE(run.status == 0);
+  const json bench = json::parse(read(folder.path / "b/bench.json"));
+  CHECK(bench["rows"].size() == 3 * 2 * 2 * 3);
+  CHECK(bench["floors"]["dispatch_us"].get<double>() > 0);
+  CHECK(bench["floors"]["copy_gb_s"].get<double>() > 0);
+  if (bench["device"]["software"] == true) CHECK(run.out.find("SOFTWARE") != std::string::npos);
+  const std::string csv = read(folder.path / "b/bench.csv");
+  CHECK(csv.starts_with(
+      "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
+      "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_"
+      "percent\n"));
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == 37);
+  for (const json& row : bench["rows"]) {
+    const int iterations = row["iterations"], kinds = row["constraints"] == "stretch" ? 1 : 3;
+    CHECK(row["fps"]["median"].get<double>() > 0);
+    CHECK(row["max_volume_loss_percent"].is_number());
+    CHECK((row["bytes_per_step"].get<long>() > 0) == (row["mode"] != "cpu"));
+    CHECK(row["dispatches_per_step"] == (row["mode"] == "cpu"    ? 0
+                                         : row["mode"] == "node" ? iterations
+                                                                 : 2 + iterations * (kinds + 1)));
+    CHECK((row["picture"] == "") == row["draw_ms"].is_null());
+    CHECK((row["gpu_ms_per_step"]["median"].get<double>() > 0) == (row["mode"] != "cpu"));
+  }
+}
+
+TEST_CASE("compare finds the front, and shards merge to the same rows") {
+  const Folder folder;
+  const std::string command =
+      "compare --scene beam --modes node,cpu --iterations 1,4 --substeps 1,2 --steps 12 ";
+  const Outcome whole = program(command + "--out whole --budget-ms 1e9 --error 1000", folder);
+  REQUIRE(whole.status == 0);
+  CHECK(whole.out.find("best within") != std::string::npos);
+  CHECK(whole.out.find("cheapest with") != std::string::npos);
+  for (const char* shard : {"1/3", "2/3", "3/3"})
+    REQUIRE(program(command + "--out part" + shard[0] + " --shard " + shard, folder).status == 0);
+  REQUIRE(program("compare --merge part1 part2 part3 --out merged", folder).status == 0);
+  const json a = json::parse(read(folder.path / "whole/compare.json")),
+             b = json::parse(read(folder.path / "merged/compare.json"));
+  CHECK(a["rows"].size() == 8);
+  CHECK(b["rows"].size() == 8);
+  int on_front = 0;
+  for (const json& row : a["rows"]) {
+    on_front += row["pareto"] == true;
+    int twins = 0;
+    for (const json& other : b["rows"])
+      twins += row["mode"] == other["mode"] && row["iterations"] == other["iterations"] &&
+               row["substeps"] == other["substeps"] &&
+               row["max_volume_loss_percent"] == other["max_volume_loss_percent"] &&
+               row["rigid_distance"] == other["rigid_distance"];
+    CHECK(twins == 1);
+    // Nothing on the front is beaten in both time and error.
+    const auto cost = [](const json& r) {
+      return (r["gpu_ms_per_step"].is_number() ? r["gpu_ms_per_step"] : r["wall_ms_per_step"]).get<double>();
+    };
+    for (const json& other : a["rows"])
+      if (row["pareto"] == true)
+        CHECK(
+            !(cost(other) < cost(row) && other["max_volume_loss_percent"] < row["max_volume_loss_percent"]));
+  }
+  CHECK(on_front >= 1);
+  CHECK(read(folder.path / "whole/compare.svg").starts_with("<svg"));
+  CHECK(read(folder.path / "whole/compare.png").substr(1, 3) == "PNG");
+  CHECK(read(folder.path / "whole/compare.csv")
+            .starts_with("scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step"));
+  CHECK(program("compare --shard 4/3", folder).status == 2);
+  CHECK(program("compare --merge nowhere --out x", folder).status == 2);
+  CHECK(program("compare --merge part1 part1 --out x", folder).status == 2);
+  // Whole comparisons of the same scene go together as well; node+handles and the paper's pipeline are modes
+  // here.
+  REQUIRE(
+      program(
+          "compare --scene beam --modes node+handles,paper --iterations 1 --substeps 2 --steps 12 --out more",
+          folder)
+          .status == 0);
+  REQUIRE(program("compare --merge whole more --out both", folder).status == 0);
+  const json both = json::parse(read(folder.path / "both/compare.json"));
+  CHECK(both["rows"].size() == 10);
+  CHECK(both["combinations"] == 10);
+  CHECK(both["rows"][8]["mode"] == "node+handles");
+  CHECK(program("compare --merge whole whole --out x", folder).err.find("two of these") != std::string::npos);
+  CHECK(program("compare --modes node+handle --out x", folder).err.find("node+handles") != std::string::npos);
+}
+
+#ifdef TETPBD_TETGEN
+TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contained report") {
+  const Folder folder;
+  const Outcome run = program("reproduce --quick --out r", folder);
+  CHECK(run.err == "");
+  REQUIRE(run.status == 0);
+  const std::string html = read(folder.path / "r/report.html");
+  for (const char* part : {"Table 4", "Figure 6", "Figure 7", "Figure 8", "Figure 9", "Figure 12",
+                           "data:image/png;base64,iVBOR", "<svg", "drop height"})
+    CHECK(html.find(part) != std::string::npos);
+  CHECK(html.find("src=\"http") == std::string::npos);
+  for (const char* file : {"tables/table4.csv", "tables/volume_error_bunny.csv",
+                           "figures/volume_error_bunny_all.svg", "figures/fps_all_alone.svg"})
+    CHECK(fs::exists(folder.path / "r" / file));
+  CHECK(read(folder.path / "r/tables/table4.csv").find("31800,10582,42072,15419,36690,31709") ==
+        std::string::npos);  // quick: bunny alone
+}
+#endif
+
+TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the reference; shards merge") {
+  const Folder folder;
+  const std::string common =
+      "compare --hard-cases --cases coincident,mass-top --meshes tet --modes node,cpu-double --steps 30 ";
+  const Outcome whole = program(common + "--out whole", folder);
+  CAPTURE(whole.err);
+  REQUIRE(whole.status == 0);
+  const std::string csv = read(folder.path / "whole/stability.csv");
+  CHECK(csv.starts_with(
+      "case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,"
+      "rigid_distance,reference_recovered_at_step,"));
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == 5);
+  const json rows = json::parse(read(folder.path / "whole/stability.json"))["rows"];
+  for (const auto& row : rows) {
+    CHECK(row["finite"] == true);
+    CHECK(row["steps"] == 30);
+    if (row["case"] != "coincident") continue;
+    CHECK(row["recovered_at_step"].get<long>() >= 1);  // it starts with a flat tet
+    CHECK(row["reference_recovered_at_step"].get<long>() >= 1);
+    CHECK(row["guard_direction"].get<long>() > 0);
+  }
+  for (int i : {1, 2})
+    CHECK(
+        program(common + "--shard " + std::to_string(i) + "/2 --out s" + std::to_string(i), folder).status ==
+        0);
+  CHECK(program("compare --hard-cases --merge s1 s2 --out merged", folder).status == 0);
+  CHECK(json::parse(read(folder.path / "merged/stability.json"))["rows"] == rows);
+  CHECK(program("compare --hard-cases --merge s1 --out half", folder).err.find("2 rows of 4") !=
+        std::string::npos);
+  CHECK(program("compare --hard-cases --cases nosuch --out none", folder).err.find("no such scene") !=
+        std::string::npos);
+  CHECK(program("compare --hard-cases --meshes cow --out none", folder)
+            .err.find("choose from bunny, block, tet") != std::string::npos);
+}
+
+TEST_CASE("compare: with handles, rows name the over-relaxation that acts, and each once") {
+  const Folder folder;
+  REQUIRE(
+      program("compare --scene beam --modes node+handles-0.8,node --omegas 1,1.5,2 --iterations 1 --steps 2 "
+              "--out c",
+              folder)
+          .status == 0);
+  std::vector<double> handles, plain;
+  const json compared = json::parse(read(folder.path / "c/compare.json"));
+  for (const json& row : compared["rows"])
+    (row["mode"] == "node" ? plain : handles).push_back(row["omega"]);
+  CHECK(plain == std::vector<double>{1, 1.5, 2});
+  REQUIRE(handles.size() == 2);
+  CHECK(handles[0] == 1);
+  CHECK(handles[1] == doctest::Approx(1.2));  // of 1.5 and of 2
+  REQUIRE(
+      program(
+          "bench --scenes beam --modes node+handles-0.8 --constraint-sets stretch --iterations 1 --frames "
+          "1 --warm-up 0 --repeats 1 --no-render --out b",
+          folder)
+          .status == 0);
+  CHECK(json::parse(read(folder.path / "b/bench.json"))["rows"][0]["omega"] == doctest::Approx(1.2));
+  REQUIRE(program("run --scene beam --handles 0.8 --omega 2 --steps 1 --out r", folder).status == 0);
+  const json stats = json::parse(read(folder.path / "r/stats.json"));
+  CHECK(stats["settings"]["omega"] == 2);
+  CHECK(stats["solver"]["omega"] == doctest::Approx(1.2));
+}
+
+TEST_CASE("hard cases: recovered is what stays good for the last 5 % of the steps") {
+  const auto series = [](int bad) {  // 100 steps, of which so many at the start have an inverted tet
+    std::vector<Measurement> measurements(101);
+    for (int s = 0; s <= 100; ++s) measurements[s].step = s, measurements[s].inverted_tets = s < bad;
+    return measurements;
+  };
+  CHECK(recovered_at(series(0), 100) == 0);
+  CHECK(recovered_at(series(95), 100) == 95);
+  CHECK_FALSE(recovered_at(series(96), 100));
+  CHECK_FALSE(recovered_at(series(100), 100));
+  CHECK_FALSE(recovered_at(series(101), 100));
+}
+
+TEST_CASE("hard cases: where no constraint acts there is nothing to recover by") {
+  const Folder folder;
+  const Outcome run = program(
+      "compare --hard-cases --cases stiffness-0 --meshes tet --modes node+handles --steps 2 --out h", folder);
+  CHECK(run.status == 2);
+  CHECK(run.err.find("no hard case to run") != std::string::npos);
+}

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "sim/error.h"
+#include "sim/rotation.h"
 
 namespace tetpbd {
 
@@ -49,8 +49,6 @@ void finish(State& state, const Points& positions, double h) {
   state.positions = positions;
 }
 
-Eigen::Vector3d eigen(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
-
 // The rest shape of one body put where it is nearest to `to`, by mass.
 void align(const ReferenceInput& input, const Body& body, const Points& to, Points& placed) {
   const Points& rest = input.model.rest.positions;
@@ -62,24 +60,15 @@ void align(const ReferenceInput& input, const Body& body, const Points& to, Poin
     mass += m, centre += m * to[i], rest_centre += m * rest[i];
   }
   centre /= mass, rest_centre /= mass;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  glm::dmat3 covariance(0);
   for (std::size_t i = first; i < end; ++i)
-    covariance += eigen(to[i] - centre) * eigen(rest[i] - rest_centre).transpose() / input.inverse_masses[i];
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  // A rotation that turns about the axes of the two smallest values costs their (signed) sum: 0 leaves it
-  // undecided.
-  const Eigen::Vector3d values = svd.singularValues();
-  if (!(values(1) + sign * values(2) > 1e-12 * values(0)))
+    covariance += glm::outerProduct(to[i] - centre, rest[i] - rest_centre) / input.inverse_masses[i];
+  const BestRotation best = best_rotation(covariance);
+  if (!best.unique)
     throw Error("no best rotation",
                 "predicted positions of " + body.name + " are on a line, a point or mirrored",
                 "start nearer to the rest shape", 1);
-  const Eigen::Matrix3d rotation =
-      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
-  for (std::size_t i = first; i < end; ++i) {
-    const Eigen::Vector3d turned = rotation * eigen(rest[i] - rest_centre);
-    placed[i] = centre + glm::dvec3(turned(0), turned(1), turned(2));
-  }
+  for (std::size_t i = first; i < end; ++i) placed[i] = centre + best.R * (rest[i] - rest_centre);
 }
 
 }  // namespace

@@ -1,0 +1,20 @@
+#include "sim/rotation.h"
+
+#include <Eigen/Dense>
+
+namespace tetpbd {
+
+BestRotation best_rotation(const glm::dmat3& A) {
+  const Eigen::Map<const Eigen::Matrix3d> a(&A[0].x);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  BestRotation best;
+  Eigen::Map<Eigen::Matrix3d>(&best.R[0].x) =
+      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  // A turn about the axes of the two smallest values costs their (signed) sum: 0 leaves it undecided.
+  const Eigen::Vector3d values = svd.singularValues();
+  best.unique = values(1) + sign * values(2) > 1e-12 * values(0);
+  return best;
+}
+
+}  // namespace tetpbd

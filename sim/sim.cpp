@@ -142,7 +142,7 @@ void build_solver(Sim& sim) {
   // Made first, then put in place: a shader that does not compile leaves the old solver running.
   const std::size_t vertices = sim.model->positions.size();
   const bool soft = compliant(sim.settings), slow = damped(sim.settings);
-  check_limits(sim.system, gl_limits(), soft, wants_handles(sim.settings));
+  check_limits(sim.system, capabilities(), soft, wants_handles(sim.settings));
   Pass predict{Program::compute("predict.comp", {}, compliance_defines(soft, slow)),
                work_groups(vertices, group_size), vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
   Solver solver = mode->create({*sim.model, sim.system, is_software_renderer(), sim.tuning,
@@ -238,7 +238,7 @@ void shift_velocities(Sim& sim, double upwards) {
 
 }  // namespace
 
-void check_limits(const ConstraintSystem& system, const Limits& limits, bool compliant, bool handles) {
+void check_limits(const ConstraintSystem& system, const Capabilities& limits, bool compliant, bool handles) {
   const int needed = std::max(handles ? STORAGE_BINDINGS_HANDLES : STORAGE_BINDINGS + int(compliant),
                               BIND_RECORDS + int(kind_words(system).size()));
   if (needed > limits.storage_blocks)

@@ -52,7 +52,7 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
 /// Waits.
 GuardCounts guard_counts(Sim& sim);
 /// Throws Error naming what the driver's limits do not allow.
-void check_limits(const ConstraintSystem& system, const Limits& limits, bool compliant = false,
+void check_limits(const ConstraintSystem& system, const Capabilities& limits, bool compliant = false,
                   bool handles = false);
 /// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
 /// solver again if the mode, the constraint kinds or whether there is compliance changed; where that fails,

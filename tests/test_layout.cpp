@@ -102,10 +102,13 @@ TEST_CASE("a shader that does not compile names its file and line") {
 }
 
 TEST_CASE("#include, #foreach and words expand") {
-  const std::string text = shader_text(
-      "solve_node.comp", {{{"KINDS", "2"}},
-                          {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
-                           {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}});
+  std::vector<std::string> files;
+  const std::string text =
+      shader_text("solve_node.comp",
+                  {{{"KINDS", "2"}},
+                   {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
+                    {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}},
+                  files);
   CHECK(text.find("project_stretch(records[from_stretch + (t - begin_stretch)], summed)") !=
         std::string::npos);
   CHECK(text.find("project_bend(records[from_bend + (t - begin_bend)], summed)") != std::string::npos);

@@ -1,13 +1,122 @@
 #include "sim/gl/context.h"
 
+#include <GL/glew.h>
 #define EGL_NO_X11
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <fmt/format.h>
 
+#include <atomic>
+#include <cstdio>
+
 #include "sim/error.h"
 
 namespace tetpbd {
+
+namespace {
+
+std::atomic<int> error_count = 0;
+GLenum (*given_reset_status)() = nullptr;
+
+void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text,
+                           const void*) {
+  // What the shader compiler finds is thrown as an Error with file and line.
+  if (type != GL_DEBUG_TYPE_ERROR || source == GL_DEBUG_SOURCE_SHADER_COMPILER) return;
+  ++error_count;
+  std::fprintf(stderr, "GL error: %s\n", text);
+}
+
+std::string gl_string(GLenum name) {
+  const auto* text = reinterpret_cast<const char*>(glGetString(name));
+  return text ? text : "";
+}
+
+int gl_integer(GLenum name) {
+  GLint value = 0;
+  glGetIntegerv(name, &value);
+  return value;
+}
+
+}  // namespace
+
+bool is_software_renderer() {
+  const std::string renderer = gl_string(GL_RENDERER);
+  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR"})
+    if (renderer.find(name) != std::string::npos) return true;
+  return false;
+}
+
+Capabilities capabilities() {
+  Capabilities caps;
+  caps.vendor = gl_string(GL_VENDOR);
+  caps.renderer = gl_string(GL_RENDERER);
+  caps.version = gl_string(GL_VERSION);
+  caps.shading_language = gl_string(GL_SHADING_LANGUAGE_VERSION);
+  caps.storage_blocks = gl_integer(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS);
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &caps.storage_bytes);
+  GLint groups = 0;
+  glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
+  caps.work_groups = unsigned(groups);
+  caps.work_group_invocations = gl_integer(GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS);
+  caps.shared_bytes = gl_integer(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE);
+  caps.samples = gl_integer(GL_MAX_SAMPLES);
+  caps.software = is_software_renderer();
+  caps.debug = gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT;
+  caps.reset_status = GLEW_KHR_robustness || GLEW_VERSION_4_5 || GLEW_ARB_robustness;
+  return caps;
+}
+
+Capabilities load_gl() {
+  glewExperimental = GL_TRUE;
+  // GLEW built for GLX answers GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.
+  const GLenum result = glewInit();
+  if (result != GLEW_OK && result != GLEW_ERROR_NO_GLX_DISPLAY)
+    throw Error("OpenGL functions did not load", reinterpret_cast<const char*>(glewGetErrorString(result)),
+                "check the OpenGL driver", 1);
+  if (gl_integer(GL_MAJOR_VERSION) * 10 + gl_integer(GL_MINOR_VERSION) < 43)
+    throw Error("OpenGL 4.3 is needed", "the driver offers " + gl_string(GL_VERSION),
+                "use a newer driver or another GPU (tetpbd info lists them)", 1);
+  const Capabilities caps = capabilities();
+  if (caps.debug) {
+    glEnable(GL_DEBUG_OUTPUT);
+    glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+    glDebugMessageCallback(on_message, nullptr);
+  }
+  return caps;
+}
+
+int gl_error_count() { return error_count; }
+
+void check_work_groups(const std::string& kernel, std::size_t groups, unsigned allowed) {
+  if (groups > allowed)
+    throw Error("too many work-groups",
+                fmt::format("{} needs {}, the driver allows {}", kernel, groups, allowed),
+                "use a smaller mesh or another GPU (tetpbd info lists them)", 1);
+}
+
+void set_reset_status(GLenum (*answer)()) { given_reset_status = answer; }
+
+void check_context() {
+  GLenum status = GL_NO_ERROR;
+  if (given_reset_status)
+    status = given_reset_status();
+  else if (GLEW_KHR_robustness || GLEW_VERSION_4_5)
+    status = glGetGraphicsResetStatus();
+  else if (GLEW_ARB_robustness)
+    status = glGetGraphicsResetStatusARB();
+  if (status == GL_NO_ERROR) return;
+  const char* whose = status == GL_GUILTY_CONTEXT_RESET ? "by what this program did (a step too long for it?)"
+                      : status == GL_INNOCENT_CONTEXT_RESET ? "by another program"
+                                                            : "for an unknown reason";
+  throw ContextLost(
+      "the GPU was reset", whose,
+      "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look "
+      "into the system's log",
+      1);
+}
+
+// -----------------------------------------------------------------------------------------------------------
+// EGL
 
 namespace {
 
@@ -20,72 +129,64 @@ std::vector<EGLDeviceEXT> query_devices() {
   return devices;
 }
 
-const char* device_extensions(EGLDeviceEXT device) {
+std::string device_string(EGLDeviceEXT device, EGLint name) {
   const auto query =
       reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
-  const char* text = query ? query(device, EGL_EXTENSIONS) : nullptr;
+  const char* text = query ? query(device, name) : nullptr;
   return text ? text : "";
 }
 
-std::string device_name(EGLDeviceEXT device) {
-  const std::string extensions = device_extensions(device);
-  if (extensions.find("NV_device_cuda") != std::string::npos) return "NVIDIA GPU";
-  if (extensions.find("MESA_device_software") != std::string::npos) return "software renderer (Mesa)";
-  const auto query =
-      reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
-  const char* file = query ? query(device, EGL_DRM_DEVICE_FILE_EXT) : nullptr;
-  return file ? fmt::format("GPU {}", file) : "GPU";
+bool is_software(EGLDeviceEXT device) {
+  return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
 }
 
-EGLDisplay platform_display(EGLenum platform, void* native) {
-  const auto get =
-      reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
-  if (!get) return EGL_NO_DISPLAY;
-  return get(platform, native, nullptr);
+std::vector<EGLDisplay> displays_of(const std::vector<EGLDeviceEXT>& devices, int device) {
+  const auto of = [](EGLDeviceEXT one) {
+    return eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr);
+  };
+  if (device >= 0) return {of(devices[std::size_t(device)])};
+  std::vector<EGLDisplay> displays;
+  for (EGLDeviceEXT one : devices)
+    if (!is_software(one)) displays.push_back(of(one));
+  displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
+  for (EGLDeviceEXT one : devices) displays.push_back(of(one));
+  return displays;
 }
 
-/// `version`: major and minor; 0: whatever the driver makes. With `reset`, the driver tells of a GPU that was
-/// reset (and of nothing else: bounds checks in shaders would cost time).
-EGLContext make_context(EGLDisplay display, bool debug, int version = 43, bool reset = true) {
+/// Current, or none. `version`: major and minor; 0: whatever the driver makes. With `reset`, the driver tells
+/// of a GPU that was reset (and of nothing else: bounds checks in shaders would cost time).
+EGLContext make_context(EGLDisplay display, bool debug, int version, bool reset = true) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
-  const EGLint config_attributes[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
-  EGLConfig config = nullptr;
-  EGLint count = 0;
-  if (!eglChooseConfig(display, config_attributes, &config, 1, &count) || count == 0) config = nullptr;
-  if (version == 0) return eglCreateContext(display, config, EGL_NO_CONTEXT, nullptr);
-  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,       version / 10,
-                                    EGL_CONTEXT_MINOR_VERSION,       version % 10,
-                                    EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                    EGL_CONTEXT_OPENGL_DEBUG,        debug ? EGL_TRUE : EGL_FALSE};
+  std::vector<EGLint> attributes = {EGL_CONTEXT_OPENGL_DEBUG, debug ? EGL_TRUE : EGL_FALSE};
+  if (version > 0)
+    attributes.insert(attributes.end(),
+                      {EGL_CONTEXT_MAJOR_VERSION, version / 10, EGL_CONTEXT_MINOR_VERSION, version % 10,
+                       EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT});
   if (reset)
     attributes.insert(attributes.end(),
                       {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
   attributes.push_back(EGL_NONE);
-  const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
-  return context == EGL_NO_CONTEXT && reset ? make_context(display, debug, version, false) : context;
-}
-
-/// Of the first display that makes any context.
-std::string offered_version(const std::vector<EGLDisplay>& displays) {
-  for (EGLDisplay display : displays) {
-    const EGLContext context = make_context(display, false, 0);
-    if (context == EGL_NO_CONTEXT) continue;
-    std::string text;
-    if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
-      if (const GLubyte* version = glGetString(GL_VERSION)) text = reinterpret_cast<const char*>(version);
-    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-    eglDestroyContext(display, context);
-    if (!text.empty()) return text;
-  }
-  return {};
+  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes.data());
+  if (context == EGL_NO_CONTEXT && reset) return make_context(display, debug, version, false);
+  if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
+    return context;
+  eglDestroyContext(display, context);
+  return EGL_NO_CONTEXT;
 }
 
 }  // namespace
 
 std::vector<std::string> list_devices() {
   std::vector<std::string> names;
-  for (EGLDeviceEXT device : query_devices()) names.push_back(device_name(device));
+  for (EGLDeviceEXT device : query_devices()) {
+    const std::string file = device_string(device, EGL_DRM_DEVICE_FILE_EXT);
+    const bool nvidia = device_string(device, EGL_EXTENSIONS).find("NV_device_cuda") != std::string::npos;
+    names.push_back(nvidia                ? "NVIDIA GPU"
+                    : is_software(device) ? "software renderer (Mesa)"
+                    : file.empty()        ? "GPU"
+                                          : "GPU " + file);
+  }
   return names;
 }
 
@@ -94,43 +195,24 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
   if (device >= int(devices.size()))
     throw Error("no such GPU", fmt::format("--gpu {}", device),
                 fmt::format("this machine has {}: see tetpbd info", devices.size()));
-  std::vector<EGLDisplay> displays;
-  if (device >= 0) {
-    displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, devices[std::size_t(device)]));
-  } else {
-    for (EGLDeviceEXT candidate : devices)  // hardware first: a software device names itself
-      if (std::string(device_extensions(candidate)).find("MESA_device_software") == std::string::npos)
-        displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
-    displays.push_back(platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY));
-    for (EGLDeviceEXT candidate : devices)
-      displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, candidate));
-  }
-  for (EGLDisplay display : displays) {
-    const EGLContext context = make_context(display, debug);
-    if (context == EGL_NO_CONTEXT) continue;
-    if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
-      eglDestroyContext(display, context);
-      continue;
+  for (const int version : {43, 0})  // another one so that load_gl() can say which
+    for (EGLDisplay display : displays_of(devices, device)) {
+      context_ = make_context(display, debug, version);
+      if (context_ == EGL_NO_CONTEXT) continue;
+      display_ = display;
+      capabilities_ = load_gl();
+      return;
     }
-    display_ = display;
-    context_ = context;
-    capabilities_ = load_gl();
-    return;
-  }
   const std::string which = device >= 0 ? fmt::format("--gpu {}", device) : "EGL, any device";
-  if (const std::string version = offered_version(displays); !version.empty())
-    throw Error("OpenGL 4.3 is needed", fmt::format("{}: the driver offers {}", which, version),
-                "use a newer driver or another GPU (tetpbd info lists them)", 1);
   throw Error("no OpenGL 4.3 context", devices.empty() ? "EGL finds no device and no driver" : which,
               "install a driver, or libegl-mesa0 and libgl1-mesa-dri for software rendering", 1);
 }
 
+// The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that driver.
 HeadlessContext::~HeadlessContext() {
   if (!context_) return;
   eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   eglDestroyContext(display_, context_);
-  // The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that
-  // driver.
 }
 
 }  // namespace tetpbd

@@ -1,0 +1,135 @@
+#include "sim/gl/program.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <regex>
+#include <sstream>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+namespace {
+
+void delete_shader(GLuint id) { glDeleteShader(id); }
+using Shader = Owned<GLuint, delete_shader>;
+
+// A compiler's log on one line, #line's numbers as file names.
+std::string name_files(const std::string& log, const std::vector<std::string>& files) {
+  std::istringstream lines(log);
+  std::string line, result;
+  // "0:12(3): error" (Mesa) and "2(17) : error" (NVIDIA)
+  static const std::regex position(R"(^(\d+)[:(](\d+)[^:]*:?\s*(.*)$)");
+  while (std::getline(lines, line) && result.size() <= 600) {
+    std::smatch match;
+    if (std::regex_match(line, match, position) && std::stoul(match[1]) < files.size())
+      line = fmt::format("shaders/{}:{}: {}", files[std::stoul(match[1])], match[2].str(), match[3].str());
+    if (!line.empty()) result += (result.empty() ? "" : "; ") + line;
+  }
+  return result;
+}
+
+// What the compiler or linker has against it.
+std::optional<std::string> fault(GLuint id, GLenum status) {
+  const bool linked = status == GL_LINK_STATUS;
+  GLint ok = 0;
+  (linked ? glGetProgramiv : glGetShaderiv)(id, status, &ok);
+  if (ok) return std::nullopt;
+  std::string log(8192, '\0');
+  GLsizei length = 0;
+  (linked ? glGetProgramInfoLog : glGetShaderInfoLog)(id, GLsizei(log.size()), &length, log.data());
+  return log.substr(0, std::size_t(length));
+}
+
+Shader compile(const Program::Stage& stage, const std::string& text, const std::vector<std::string>& files) {
+  Shader shader(glCreateShader(stage.type));
+  const char* pointer = text.c_str();
+  glShaderSource(shader.name(), 1, &pointer, nullptr);
+  glCompileShader(shader.name());
+  if (const auto log = fault(shader.name(), GL_COMPILE_STATUS))
+    throw Error("shader does not compile", stage.file, name_files(*log, files), 1);
+  return shader;
+}
+
+// Programs as the driver's binaries, by their texts: a comparison makes the same kernels for every row, and
+// NVIDIA's driver takes 0.3 s for them.
+struct Binary {
+  GLenum format = 0;
+  std::vector<char> bytes;
+};
+std::map<std::string, Binary>& linked_before() {
+  static std::map<std::string, Binary> binaries;
+  return binaries;
+}
+
+bool load_linked_before(GLuint program, const std::string& texts) {
+  const Binary& binary = linked_before()[texts];
+  if (binary.bytes.empty()) return false;
+  glProgramBinary(program, binary.format, binary.bytes.data(), GLsizei(binary.bytes.size()));
+  return !fault(program, GL_LINK_STATUS);  // refused in another kind of context
+}
+
+void keep_linked(GLuint program, const std::string& texts) {
+  GLint size = 0;  // stays 0 where the driver gives no binaries
+  glGetProgramiv(program, GL_PROGRAM_BINARY_LENGTH, &size);
+  Binary& binary = linked_before()[texts];
+  binary.bytes.resize(std::size_t(size));
+  if (size > 0) glGetProgramBinary(program, size, nullptr, &binary.format, binary.bytes.data());
+}
+
+}  // namespace
+
+Program::Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words,
+                 const std::vector<std::string>& defines)
+    : label_(std::move(label)) {
+  std::string head = "#version 430 core\n";
+  for (const std::string& define : defines) head += "#define " + define + "\n";
+  std::vector<std::vector<std::string>> files(stages.size());
+  std::vector<std::string> texts;
+  std::string all;
+  for (std::size_t s = 0; s < stages.size(); ++s) {
+    texts.push_back(head + shader_text(stages[s].file, words, files[s]));
+    all += fmt::format("{}\n{}", stages[s].type, texts[s]);
+  }
+  // Where `set` looks for names: a uniform that nothing uses has no location and yet is no mistake.
+  std::istringstream lines(all);
+  for (std::string line; std::getline(lines, line);)
+    if (line.find("uniform ") != std::string::npos) declarations_ += line + "\n";
+
+  object_ = Owned<GLuint, delete_program>(glCreateProgram());
+  if (!load_linked_before(id(), all)) {
+    std::vector<Shader> shaders;
+    for (std::size_t s = 0; s < stages.size(); ++s) {
+      shaders.push_back(compile(stages[s], texts[s], files[s]));
+      glAttachShader(id(), shaders[s].name());
+    }
+    glLinkProgram(id());
+    for (const Shader& shader : shaders) glDetachShader(id(), shader.name());
+    if (const auto log = fault(id(), GL_LINK_STATUS))
+      throw Error("shader program does not link", label_, name_files(*log, {}), 1);
+    keep_linked(id(), all);
+  }
+  label_object(GL_PROGRAM, id(), label_);
+}
+
+Program Program::compute(const std::string& file, const ShaderWords& words,
+                         const std::vector<std::string>& defines) {
+  std::string label = file.substr(0, file.rfind('.'));
+  if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
+  for (const Substitutions& item : words.each)
+    if (const auto kind = item.find("KIND"); kind != item.end()) label += " " + kind->second;
+  return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
+}
+
+GLint Program::location(const char* name) const {
+  if (const auto found = locations_.find(std::string_view(name)); found != locations_.end())
+    return found->second;
+  const GLint location = glGetUniformLocation(id(), name);
+  if (location < 0 && !std::regex_search(declarations_, std::regex(fmt::format("\\b{}\\b", name))))
+    throw Error("no such uniform", fmt::format("'{}' in {}", name, label_),
+                shader_folder().empty() ? "declare it in the shader" : "declare it in " + shader_folder(), 1);
+  return locations_.emplace(name, location).first->second;
+}
+
+}  // namespace tetpbd

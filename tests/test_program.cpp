@@ -1,0 +1,62 @@
+// Programs made again of the same texts are the driver's binaries of before, and work.
+#include <algorithm>
+
+#include "sim/gl/gpu.h"
+#include "sim/layout.h"
+#include "tests/gl_test.h"
+
+using namespace tetpbd;
+
+namespace {
+
+// What the kernel leaves of 1, 2, 3.
+std::vector<unsigned> run_keep(const Program& program) {
+  const std::vector<unsigned> numbers = {1, 2, 3};
+  const Buffer from("from", numbers), to("to", 12), check("check", std::vector<unsigned>{0xffffffffu});
+  from.bind_storage(BIND_KEEP_FROM), to.bind_storage(BIND_KEEP_TO), check.bind_storage(BIND_CHECK);
+  program.use();
+  program.set("count", 3u);
+  glDispatchCompute(1, 1, 1);
+  return to.read_all<unsigned>();
+}
+
+const std::vector<unsigned> copied = {1, 2, 3};
+
+}  // namespace
+
+TEST_CASE("a program made again of the same texts works, also in another context and with other defines") {
+  for (int context = 0; context < 2; ++context) {
+    GlTest gl;
+    for (int time = 0; time < 2; ++time) {
+      CHECK(run_keep(Program::compute("keep.comp")) == copied);
+      CHECK(run_keep(Program::compute("keep.comp", {}, {"OTHER 1"})) == copied);
+    }
+  }
+  const HeadlessContext no_debug;  // another kind of context: the driver may refuse what it gave
+  CHECK(run_keep(Program::compute("keep.comp")) == copied);
+}
+
+TEST_CASE("a program keeps its own uniforms, whatever one of the same texts is given") {
+  GlTest gl;
+  const Program one = Program::compute("keep.comp"), other = Program::compute("keep.comp");
+  other.use();
+  other.set("count", 1u);
+  CHECK(run_keep(one) == copied);
+  CHECK(one.id() != other.id());
+}
+
+TEST_CASE("GL objects are counted while they live") {
+  GlTest gl;
+  const GlLive before = gl_live();
+  {
+    Buffer moved("a", 400), buffer = std::move(moved);
+    Program program = Program::compute("keep.comp");
+    const Fence fence = Fence::here();
+    buffer = Buffer("b", 1000);
+    CHECK(buffer.bytes() == 1000);
+    CHECK(gl_live().objects == before.objects + 3);
+    CHECK(gl_live().buffer_bytes == before.buffer_bytes + 1000);
+  }
+  CHECK(gl_live().objects == before.objects);
+  CHECK(gl_live().buffer_bytes == before.buffer_bytes);
+}

@@ -15,8 +15,8 @@ namespace {
 constexpr unsigned counts[] = {1, 2, 3, 8};
 
 struct Threads {
-  explicit Threads(unsigned count) { set_thread_count(count); }
-  ~Threads() { set_thread_count(0); }
+  explicit Threads(unsigned count) { omp_set_num_threads(int(count)); }
+  ~Threads() { omp_set_num_threads(omp_get_num_procs()); }
 };
 
 // Enough tets for several threads in each loop; stretched unevenly, so that no two rest values are alike.
@@ -76,7 +76,7 @@ TEST_CASE("parallel: sorting and grouping do not depend on threads") {
 }
 
 TEST_CASE("parallel: models, constraints, patches and reports have the same bits for any number of threads") {
-  set_thread_count(1);
+  omp_set_num_threads(1);
   const Model model = block_model();
   const ConstraintSystem system = build_constraints(model.rest, "stretch,bend,volume");
   const Patches by_vertex = vertex_patches(system, 64), crowded = vertex_patches(system, 250),

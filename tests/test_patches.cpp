@@ -99,7 +99,7 @@ TEST_CASE(
     std::size_t own;
     bool parted;
   };
-  set_thread_count(4);
+  omp_set_num_threads(4);
   const Case cases[] = {{make_block({1, 0.7, 0.5}, {8, 6, 4}), 1, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 17, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 200, false},
@@ -145,7 +145,7 @@ TEST_CASE(
       std::sort(of_groups.begin(), of_groups.end());
       CHECK(of_groups == given(system));
     }
-  set_thread_count(0);
+  omp_set_num_threads(omp_get_num_procs());
 }
 
 TEST_CASE("patches: a vertex with too many neighbours for one part is solved as in double") {

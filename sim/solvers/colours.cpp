@@ -1,7 +1,6 @@
 #include "sim/solvers/colours.h"
 
 #include <algorithm>
-#include <bit>
 #include <numeric>
 
 namespace tetpbd {
@@ -11,34 +10,26 @@ Coloured coloured(const ConstraintList& list, std::size_t vertices) {
   const auto ends = [&](std::size_t c) { return std::span(list.vertices).subspan(c * arity, arity); };
   std::vector<std::size_t> order(list.count());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::ranges::min(ends(a)) < std::ranges::min(ends(b));
-  });
-  std::vector<std::vector<std::uint64_t>> taken(vertices);  // colours at a vertex, as bits
-  std::vector<std::vector<std::size_t>> members;            // by colour
+  std::ranges::stable_sort(order, {}, [&](std::size_t c) { return std::ranges::min(ends(c)); });
+  struct Colour {
+    std::vector<bool> has;  // by vertex
+    std::vector<std::size_t> members;
+  };
+  std::vector<Colour> colours;
   for (const std::size_t c : order) {
-    std::size_t word = 0;
-    std::uint64_t bits = 0;
-    for (;; ++word) {
-      bits = 0;
-      for (const std::uint32_t v : ends(c))
-        if (word < taken[v].size()) bits |= taken[v][word];
-      if (~bits) break;
-    }
-    const int bit = std::countr_one(bits);
-    for (const std::uint32_t v : ends(c)) {
-      if (taken[v].size() <= word) taken[v].resize(word + 1);
-      taken[v][word] |= std::uint64_t(1) << bit;
-    }
-    const std::size_t colour = 64 * word + std::size_t(bit);
-    if (members.size() <= colour) members.resize(colour + 1);
-    members[colour].push_back(c);
+    const auto is_free = [&](const Colour& colour) {
+      return std::ranges::none_of(ends(c), [&](std::uint32_t v) { return colour.has[v]; });
+    };
+    auto colour = std::ranges::find_if(colours, is_free);
+    if (colour == colours.end()) colour = colours.insert(colour, {std::vector<bool>(vertices), {}});
+    for (const std::uint32_t v : ends(c)) colour->has[v] = true;
+    colour->members.push_back(c);
   }
   Coloured result;
   result.list.arity = list.arity;
-  for (const auto& of_colour : members) {
+  for (const Colour& colour : colours) {
     result.first.push_back(result.list.count());
-    for (const std::size_t c : of_colour) result.list.add(ends(c), list.rest[c]);
+    for (const std::size_t c : colour.members) result.list.add(ends(c), list.rest[c]);
   }
   result.first.push_back(result.list.count());
   return result;

@@ -1,16 +1,16 @@
 // Coloured Gauss-Seidel on all CPU cores (method.md, mode cpu-fast): batches of constraints of
 // one colour are evaluated in the lanes of vector instructions, and batches of a colour are shared out among
 // threads. Who solves a batch changes nothing in it, so results do not depend on the number of threads.
+#include <omp.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <memory>
-#include <thread>
 
 #include "sim/solvers/colours.h"
 #include "sim/solvers/cpu_pbd.h"
 #include "sim/solvers/lane_math.h"
-#include "sim/solvers/team.h"
 
 // The widest vector instructions that the machine has, chosen when the program starts. Other compilers and
 // processors get what the build is for.
@@ -45,11 +45,9 @@ struct LaneBatches {
 
 // What a kind's constraints share.
 struct Rule {
-  float k, a = 0, gamma = 0;  // stiffness, alpha / h^2, tau / h
-  bool first = true;          // iteration of the substep: multipliers begin at 0
+  float k, a, gamma;  // stiffness, alpha / h^2, tau / h
+  bool soft, first;   // compliant; iteration of the substep: multipliers begin at 0
 };
-// Rules that are compiled: without compliance, with it, and with constraint damping too.
-enum class Soft { no, yes, damped };
 
 template <class>
 struct AllBatches;
@@ -95,11 +93,12 @@ LaneBatches<Kind> cut(const ConstraintList& list, std::size_t vertices) {
 
 // A batch where a guard triggers: one constraint after the other, as in CpuPbd. `multipliers`: with
 // compliance.
-template <class Kind, Soft soft>
+template <class Kind, bool damped>
 [[gnu::noinline]] void project_guarded(const LaneBatch<Kind>& batch, Work& work, const Rule& rule,
                                        float* multipliers, GuardCounts& guards) {
   constexpr std::size_t arity = std::size_t(Kind::arity);
-  const float k = rule.k;
+  const float share = 1 + rule.gamma;
+  Formulas<float> formulas;
   for (std::size_t lane = 0; lane < batch.count; ++lane) {
     glm::vec3 local[arity];
     [[maybe_unused]] glm::vec3 start[arity];
@@ -110,26 +109,18 @@ template <class Kind, Soft soft>
       const Row &x = work.x[ids[j]].row, &origin = work.x[ids[0]].row;
       for (int a = 0; a < 3; ++a) local[j][a] = float(x[a] - origin[a]);
       w[j] = float(x[3]);
-      if constexpr (soft == Soft::damped)
+      if constexpr (damped)
         for (int a = 0; a < 3; ++a)
           start[j][a] = float(work.start[ids[j]].row[a] - work.start[ids[0]].row[a]);
     }
     auto c = Kind::template evaluate<float>(local, batch.rest[lane], ids);
-    float lambda;
-    std::uint32_t triggered;
-    Formulas<float> formulas;
-    if constexpr (soft == Soft::no) {
-      lambda = formulas.multiplier(c, w, k, work.limit);
-      triggered = formulas.guards_of(c, w, k, work.limit);
-    } else {
-      if constexpr (soft == Soft::damped)
-        c.C += rule.gamma * (c.C - Kind::template evaluate<float>(start, batch.rest[lane], ids).C);
-      const float before = rule.first ? 0 : multipliers[lane];
-      c.C += rule.a * before;
-      lambda = formulas.multiplier(c, w, k, work.limit, rule.a, 1 + rule.gamma);
-      triggered = formulas.guards_of(c, w, k, work.limit, rule.a, 1 + rule.gamma);
-      multipliers[lane] = before + lambda;
-    }
+    if constexpr (damped)
+      c.C += rule.gamma * (c.C - Kind::template evaluate<float>(start, batch.rest[lane], ids).C);
+    const float before = rule.first ? 0 : multipliers[lane];
+    c.C += rule.a * before;
+    const float lambda = formulas.multiplier(c, w, rule.k, work.limit, rule.a, share);
+    const std::uint32_t triggered = formulas.guards_of(c, w, rule.k, work.limit, rule.a, share);
+    if (rule.soft) multipliers[lane] = before + lambda;
     for (std::size_t j = 0; lambda != 0 && j < arity; ++j)
       for (int a = 0; a < 3; ++a) work.x[ids[j]].row[a] += double(lambda * w[j] * c.gradient[j][a]);
     for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
@@ -167,20 +158,19 @@ template <class Kind>
 }
 
 // Corrections in place of positions; whether a guard may have triggered: then multipliers stay as they were.
-template <class Kind, Soft soft>
+// Without compliance a and gamma are 0, which changes no bit.
+template <class Kind, bool damped>
 [[gnu::always_inline]] inline bool evaluate(const LaneBatch<Kind>& batch, float limit, const Rule& rule,
                                             Rows<Kind>& rows, [[maybe_unused]] const Rows<Kind>& starts,
-                                            [[maybe_unused]] float* multipliers) {
+                                            float* multipliers) {
   constexpr std::size_t arity = std::size_t(Kind::arity);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   // What tells whether a guard may have triggered. Kept by lane and looked at below: in the loop itself, bits
   // of guards keep GCC 12 from vectorising it.
   std::uint32_t guard[lanes];
-  float error[lanes], multiplier[lanes], slack[lanes], longest[lanes];
-  [[maybe_unused]] float before[lanes];
-  if constexpr (soft != Soft::no)
-    for (std::size_t lane = 0; lane < lanes; ++lane) before[lane] = rule.first ? 0 : multipliers[lane];
-  const float k = rule.k;
+  float error[lanes], multiplier[lanes], slack[lanes], longest[lanes], before[lanes];
+  for (std::size_t lane = 0; lane < lanes; ++lane) before[lane] = rule.first ? 0 : multipliers[lane];
+  const float k = rule.k, a = rule.a, gamma = rule.gamma;
   Formulas<float, LaneMath> formulas;
 #pragma GCC ivdep
   for (std::size_t lane = 0; lane < lanes; ++lane) {
@@ -192,21 +182,15 @@ template <class Kind, Soft soft>
       w[j] = rows[j][lane][3];
     }
     auto c = Kind::template evaluate<float, LaneMath>(x, batch.rest[lane], no_ids);
-    float lambda;
-    if constexpr (soft == Soft::no) {
-      lambda = formulas.multiplier(c, w, k, limit);
-    } else {
-      if constexpr (soft == Soft::damped) {
-        glm::vec3 start[arity];
+    if constexpr (damped) {
+      glm::vec3 start[arity];
 #pragma GCC unroll 4
-        for (std::size_t j = 0; j < arity; ++j)
-          start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
-        c.C +=
-            rule.gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, batch.rest[lane], no_ids).C);
-      }
-      c.C += rule.a * before[lane];
-      lambda = formulas.multiplier(c, w, k, limit, rule.a, 1 + rule.gamma);
+      for (std::size_t j = 0; j < arity; ++j)
+        start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
+      c.C += gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, batch.rest[lane], no_ids).C);
     }
+    c.C += a * before[lane];
+    const float lambda = formulas.multiplier(c, w, k, limit, a, 1 + gamma);
     float sum = 0, weights = 0, most = 0;
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < arity; ++j) {
@@ -230,14 +214,13 @@ template <class Kind, Soft soft>
     triggered |= guard[lane] | std::uint32_t(!(slack[lane] >= 0)) |
                  std::uint32_t(!(longest[lane] < 0.99f * limit * limit)) |
                  (std::uint32_t(error[lane] != 0) & std::uint32_t(multiplier[lane] == 0));
-  if constexpr (soft != Soft::no)
-    if (!triggered)
-      for (std::size_t lane = 0; lane < lanes; ++lane) multipliers[lane] = before[lane] + multiplier[lane];
+  if (rule.soft && !triggered)
+    for (std::size_t lane = 0; lane < lanes; ++lane) multipliers[lane] = before[lane] + multiplier[lane];
   return triggered != 0;
 }
 
 // Batches [begin, end) of a kind.
-template <class Kind, Soft soft>
+template <class Kind, bool damped>
 [[gnu::always_inline]] inline void project_batches(Work& work, std::size_t begin, std::size_t end,
                                                    const Rule& rule, GuardCounts& guards) {
   // Some batches together: reading a row's floats as vectors right after storing the row would wait for the
@@ -245,23 +228,21 @@ template <class Kind, Soft soft>
   constexpr std::size_t together = 4;
   auto& of_kind = std::get<LaneBatches<Kind>>(work.batches);
   const LaneBatch<Kind>* batches = of_kind.batches.data();
-  const auto multipliers = [&](std::size_t b) -> float* {
-    return soft == Soft::no ? nullptr : of_kind.multipliers[b].data();
-  };
+  const auto multipliers = [&](std::size_t b) { return of_kind.multipliers[rule.soft ? b : 0].data(); };
   for (std::size_t b = begin; b < end; b += together) {
     const std::size_t count = std::min(together, end - b);
     Rows<Kind> rows[together];
-    [[maybe_unused]] Rows<Kind> starts[soft == Soft::damped ? together : 1];
+    [[maybe_unused]] Rows<Kind> starts[damped ? together : 1];
     bool guarded[together];
     for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.x, rows[i]);
-    if constexpr (soft == Soft::damped)
+    if constexpr (damped)
       for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.start, starts[i]);
     for (std::size_t i = 0; i < count; ++i)
-      guarded[i] = evaluate<Kind, soft>(batches[b + i], work.limit, rule, rows[i],
-                                        starts[soft == Soft::damped ? i : 0], multipliers(b + i));
+      guarded[i] = evaluate<Kind, damped>(batches[b + i], work.limit, rule, rows[i], starts[damped ? i : 0],
+                                          multipliers(b + i));
     for (std::size_t i = 0; i < count; ++i)
       if (guarded[i])
-        project_guarded<Kind, soft>(batches[b + i], work, rule, multipliers(b + i), guards);
+        project_guarded<Kind, damped>(batches[b + i], work, rule, multipliers(b + i), guards);
       else
         scatter(batches[b + i], work, rows[i]);
   }
@@ -271,17 +252,11 @@ template <class Kind, Soft soft>
 WIDEST void project(Work& work, int kind, std::size_t begin, std::size_t end, const Rule& rule,
                     GuardCounts& guards) {
   for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
-    if (number == kind) project_batches<decltype(is), Soft::no>(work, begin, end, rule, guards);
-  });
-}
-WIDEST void project_soft(Work& work, int kind, std::size_t begin, std::size_t end, const Rule& rule,
-                         GuardCounts& guards) {
-  for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
     if (number != kind) return;
     if (rule.gamma > 0)
-      project_batches<decltype(is), Soft::damped>(work, begin, end, rule, guards);
+      project_batches<decltype(is), true>(work, begin, end, rule, guards);
     else
-      project_batches<decltype(is), Soft::yes>(work, begin, end, rule, guards);
+      project_batches<decltype(is), false>(work, begin, end, rule, guards);
   });
 }
 
@@ -305,10 +280,8 @@ class FastPbd {
     work_.limit = float(input.model.size);
     const std::size_t useful =
         batches / (batches_of_a_useful_thread * std::max<std::size_t>(turns_.size(), 1));
-    const std::size_t cores = std::max(std::thread::hardware_concurrency(), 1u);
-    const std::size_t threads = std::clamp<std::size_t>(useful, 1, cores);
-    team_ = std::make_unique<Team>(input.tuning.threads ? input.tuning.threads : unsigned(threads));
-    guards_.resize(team_->size());
+    const std::size_t cores = std::size_t(std::max(omp_get_num_procs(), 1));
+    guards_.resize(input.tuning.threads ? input.tuning.threads : std::clamp<std::size_t>(useful, 1, cores));
   }
 
   GuardCounts guards() const {
@@ -327,11 +300,10 @@ class FastPbd {
     auto& v = state.velocities;
     auto& x = work_.x;
     const bool soft = compliant(settings), slow = damped(settings);
-    if (soft)
-      for_each_kind([&](auto is, int) {
-        auto& of_kind = std::get<LaneBatches<decltype(is)>>(work_.batches);
-        of_kind.multipliers.resize(of_kind.batches.size());
-      });
+    for_each_kind([&](auto is, int) {
+      auto& of_kind = std::get<LaneBatches<decltype(is)>>(work_.batches);
+      of_kind.multipliers.resize(soft ? of_kind.batches.size() : 1);
+    });
     work_.start.resize(slow ? state.positions.size() : 0);
     x.resize(state.positions.size());
     predicted_.resize(x.size());
@@ -343,64 +315,65 @@ class FastPbd {
     const auto move_to = [&](std::size_t i, const glm::dvec3& p) {
       x[i].row = Row{p.x, p.y, p.z, inverse_masses[i]};
     };
-    team_->run([&](unsigned thread) {
-      const std::size_t begin = team_->share(x.size(), thread), end = team_->share(x.size(), thread + 1);
-      const auto for_each_free_vertex = [&](auto&& act) {
-        for (std::size_t i = begin; i < end; ++i)
-          if (inverse_masses[i] > 0) act(i);
-      };
-      for (int s = 0; s < settings.substeps; ++s) {
-        if (slow)
-          std::copy(x.begin() + long(begin), x.begin() + long(end), work_.start.begin() + long(begin));
-        for_each_free_vertex([&](std::size_t i) {
-          v[i] = (v[i] + h * gravity) * keep;
-          move_to(i, place(i) + h * v[i]);
-          predicted_[i] = place(i);
-        });
-        for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-          solve(settings, thread, soft, iteration == 0);
-          for_each_free_vertex([&](std::size_t i) {
-            move_to(i, out_of(planes, place(i), predicted_[i], h * v[i], settings.friction));
-          });
-        }
-        for_each_free_vertex([&](std::size_t i) { v[i] += (place(i) - predicted_[i]) / h; });
+// A static schedule gives a thread the same vertices each time; what others need waits for a barrier in
+// solve().
+#pragma omp parallel num_threads(int(guards_.size()))
+    for (int s = 0; s < settings.substeps; ++s) {
+#pragma omp for schedule(static) nowait
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        if (slow) work_.start[i] = x[i];
+        if (!(inverse_masses[i] > 0)) continue;
+        v[i] = (v[i] + h * gravity) * keep;
+        move_to(i, place(i) + h * v[i]);
+        predicted_[i] = place(i);
       }
-    });
+      for (int iteration = 0; iteration < settings.iterations; ++iteration) {
+        solve(settings, soft, iteration == 0);
+#pragma omp for schedule(static) nowait
+        for (std::size_t i = 0; i < x.size(); ++i)
+          if (inverse_masses[i] > 0)
+            move_to(i, out_of(planes, place(i), predicted_[i], h * v[i], settings.friction));
+      }
+#pragma omp for schedule(static) nowait
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (inverse_masses[i] > 0) v[i] += (place(i) - predicted_[i]) / h;
+    }
     for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = place(i);
   }
 
  private:
-  // A colour's batches take about 0.2 us each, a meeting of threads one to several.
-  static constexpr std::size_t batches_of_a_useful_thread = 16, batches_worth_a_meeting = 4;
+  // A colour's batches take about 0.2 us each, a barrier one to several.
+  static constexpr std::size_t batches_of_a_useful_thread = 16, batches_worth_a_barrier = 4;
 
   // One iteration's constraints, colour after colour. Small colours are left to the first thread: neighbours
-  // among them then need no meeting.
-  void solve(const Settings& settings, unsigned thread, bool soft, bool first) {
+  // among them then need no barrier.
+  void solve(const Settings& settings, bool soft, bool first) {
     const double h = settings.dt / settings.substeps;
+    const std::size_t thread = std::size_t(omp_get_thread_num());
+    const std::size_t threads = std::size_t(omp_get_num_threads());
     bool shared_before = true;
     for (const Turn& turn : turns_) {
       const std::size_t count = turn.end - turn.begin;
-      const bool shared = count >= batches_worth_a_meeting * team_->size();
-      if (shared || shared_before) team_->meet();
+      const bool shared = count >= batches_worth_a_barrier * threads;
+      if (shared || shared_before) {
+#pragma omp barrier
+      }
       shared_before = shared;
+      if (!shared && thread > 0) continue;
+      const std::size_t begin = shared ? count * thread / threads : 0;
+      const std::size_t end = shared ? count * (thread + 1) / threads : count;
       const ConstraintKind& kind = constraint_kinds()[std::size_t(turn.kind)];
       const Rule rule{float(settings.*kind.stiffness), float(settings.*kind.compliance / (h * h)),
-                      float(settings.constraint_damping / h), first};
-      const auto act = soft ? project_soft : project;
-      if (shared)
-        act(work_, turn.kind, turn.begin + team_->share(count, thread),
-            turn.begin + team_->share(count, thread + 1), rule, guards_[thread]);
-      else if (thread == 0)
-        act(work_, turn.kind, turn.begin, turn.end, rule, guards_[thread]);
+                      float(settings.constraint_damping / h), soft, first || !soft};
+      project(work_, turn.kind, turn.begin + begin, turn.begin + end, rule, guards_[thread]);
     }
-    team_->meet();
+#pragma omp barrier
   }
 
   const Model& model_;
   Work work_;
   std::vector<Turn> turns_;
   std::vector<glm::dvec3> predicted_;
-  std::unique_ptr<Team> team_;
   std::vector<GuardCounts> guards_;  // by thread
 };
 

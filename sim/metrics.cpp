@@ -1,8 +1,10 @@
 #include "sim/metrics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <ranges>
 
 #include "shaders/metrics/layout.glsl"
 
@@ -13,68 +15,53 @@ namespace {
 constexpr std::size_t ring_size = 16;
 
 // Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
-Metrics::Range range_of(const ConstraintList& list, std::size_t first_vertex, std::size_t end_vertex) {
-  const auto first_at_least = [&](std::size_t vertex) {
-    std::size_t low = 0, high = list.count();
-    while (low < high) {
-      const std::size_t middle = (low + high) / 2;
-      if (list.vertices[middle * std::size_t(list.arity)] < vertex)
-        low = middle + 1;
-      else
-        high = middle;
-    }
-    return unsigned(low);
-  };
-  return {first_at_least(first_vertex), first_at_least(end_vertex)};
+glm::uvec2 range_of(const ConstraintList& list, glm::uvec2 vertices) {
+  const auto numbers = std::views::iota(0u, unsigned(list.count()));
+  const auto first_vertex = [&](unsigned c) { return list.vertices[c * std::size_t(list.arity)]; };
+  return {std::ranges::lower_bound(numbers, vertices.x, {}, first_vertex) - numbers.begin(),
+          std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
 }
 
 }  // namespace
 
 Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
+  static_assert(std::is_same_v<Kinds, std::tuple<Stretch, Bend, Volume>>);  // as the bindings
   Metrics m;
-  const auto is_made = [&](std::size_t k) { return k < made.present.size() && made.present[k]; };
   std::string missing;
-  for (std::size_t k = 0; k < constraint_kinds().size(); ++k)
-    if (!is_made(k)) missing += std::string(missing.empty() ? "" : ",") + constraint_kinds()[k].name;
-  ConstraintSystem rest_of_kinds;
-  if (!missing.empty()) rest_of_kinds = build_constraints(model.rest, missing);
+  const auto is_made = [&](int k) {
+    return std::size_t(k) < made.present.size() && made.present[std::size_t(k)];
+  };
+  for_each_kind([&](auto kind, int k) {
+    if (!is_made(k)) missing += std::string(kind.name) + ",";
+  });
+  ConstraintSystem others;
+  if (!missing.empty()) others = build_constraints(model.rest, missing.substr(0, missing.size() - 1));
   std::vector<const ConstraintList*> lists;
-  std::vector<Buffer> records;
-  // A mesh can lack hinges (no two surface triangles share an edge): keep an empty buffer for them.
-  for (std::size_t k = 0; k < constraint_kinds().size(); ++k) {
-    lists.push_back(is_made(k) ? &made.lists[k] : &rest_of_kinds.lists[k]);
-    records.push_back(record_buffer(*lists[k], constraint_kinds()[k].name));
-  }
-  static_assert(std::is_same_v<std::tuple_element_t<0, Kinds>, Stretch> &&
-                std::is_same_v<std::tuple_element_t<1, Kinds>, Bend> &&
-                std::is_same_v<std::tuple_element_t<2, Kinds>, Volume>);
-  m.stretch = std::move(records[0]);
-  m.bend = std::move(records[1]);
-  m.volume = std::move(records[2]);
-  m.edge_count = lists[0]->count();
-  m.hinge_count = lists[1]->count();
-  m.tet_count = lists[2]->count();
+  for_each_kind([&](auto kind, int k) {
+    lists.push_back(&(is_made(k) ? made : others).lists[std::size_t(k)]);
+    // A mesh can lack hinges (no two surface triangles share an edge): an empty buffer then.
+    m.records.push_back(record_buffer(*lists.back(), kind.name));
+  });
   std::vector<glm::vec4> rest(model.rest.positions.size());
   const std::vector<double> volumes = tet_volumes(model.rest);
   for (const Body& body : model.bodies) {
     Metrics::BodyRanges ranges;
-    const std::size_t end = body.first_vertex + body.vertices;
-    ranges.vertices = {unsigned(body.first_vertex), unsigned(end)};
-    ranges.edges = range_of(*lists[0], body.first_vertex, end);
-    ranges.hinges = range_of(*lists[1], body.first_vertex, end);
-    ranges.tets = {unsigned(body.first_tet), unsigned(body.first_tet + body.tets)};
+    const std::size_t first = body.first_vertex, end = first + body.vertices;
+    ranges.vertices = {first, end};
+    ranges.edges = range_of(*lists[0], ranges.vertices);
+    ranges.hinges = range_of(*lists[1], ranges.vertices);
+    ranges.tets = {body.first_tet, body.first_tet + body.tets};
     glm::dvec3 centre{0};
-    std::vector<glm::dvec3> shape;
-    for (std::size_t i = body.first_vertex; i < end; ++i) {
+    for (std::size_t i = first; i < end; ++i) {
       ranges.mass += model.masses[i];
       centre += model.masses[i] * model.rest.positions[i];
-      shape.push_back(model.rest.positions[i]);
     }
     centre /= ranges.mass;
-    for (std::size_t i = body.first_vertex; i < end; ++i)
+    for (std::size_t i = first; i < end; ++i)
       rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
-    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t) ranges.volume += volumes[t];
-    ranges.size = bounds(shape).size();
+    for (std::size_t t = ranges.tets.x; t < ranges.tets.y; ++t) ranges.volume += volumes[t];
+    const auto shape = model.rest.positions.begin();
+    ranges.size = bounds({shape + std::ptrdiff_t(first), shape + std::ptrdiff_t(end)}).size();
     m.bodies.push_back(ranges);
   }
   m.rest = Buffer("metrics rest", rest);
@@ -82,35 +69,28 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   for (std::size_t slot = 0; slot < ring_size; ++slot)
     m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
                         GL_STREAM_READ);
-  m.constraints = Program::compute("metrics/constraints.comp");
-  m.vertices = Program::compute("metrics/vertices.comp");
-  m.centre = Program::compute("metrics/centre.comp");
-  m.rigid = Program::compute("metrics/rigid.comp");
-  m.close = Program::compute("metrics/close.comp");
+  for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
+    m.kernels.push_back(Program::compute(fmt::format("metrics/{}.comp", name)));
   return m;
 }
 
 namespace {
 
-void dispatch(const Program& program, unsigned groups) {
-  program.use();
-  glDispatchCompute(groups, 1, 1);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-}
-
 Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
   std::vector<float> floats(m.bodies.size() * M_STRIDE);
   m.rows[pending.slot].read(0, floats.size() * sizeof(float), floats.data());
-  Measurement result;
-  result.step = pending.step;
-  result.time = pending.time;
+  Measurement result = pending.known;
   double rest_volume = 0, mass = 0, tet_squares = 0, stretch_squares = 0, bend_squares = 0, rigid = 0,
          size = 0;
+  std::size_t tets = 0, edges = 0, hinges = 0;
   const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
     const float* row = floats.data() + b * M_STRIDE;
     const auto vector = [&](int at) { return glm::dvec3(row[at], row[at + 1], row[at + 2]); };
+    tets += body.tets.y - body.tets.x;
+    edges += body.edges.y - body.edges.x;
+    hinges += body.hinges.y - body.hinges.x;
     rest_volume += body.volume;
     mass += body.mass;
     result.volume += body.volume + double(row[M_VOLUME_CHANGE]);
@@ -136,9 +116,9 @@ Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
   };
   result.centre /= mass;
   result.volume_error_percent = 100 * (result.volume - rest_volume) / rest_volume;
-  result.tet_volume_rms = rms(tet_squares, m.tet_count);
-  result.stretch_rms = rms(stretch_squares, m.edge_count);
-  result.bend_rms_rad = rms(bend_squares, m.hinge_count);
+  result.tet_volume_rms = rms(tet_squares, tets);
+  result.stretch_rms = rms(stretch_squares, edges);
+  result.bend_rms_rad = rms(bend_squares, hinges);
   result.rigid_distance = std::sqrt(rigid / mass) / (size / mass);
   return result;
 }
@@ -161,47 +141,33 @@ void measure(Metrics& m, const Sim& sim) {
   sim.current_positions().bind_storage(BIND_M_POSITIONS);
   sim.velocities.bind_storage(BIND_M_VELOCITIES);
   m.rest.bind_storage(BIND_M_REST);
-  m.stretch.bind_storage(BIND_M_STRETCH);
-  m.bend.bind_storage(BIND_M_BEND);
-  m.volume.bind_storage(BIND_M_VOLUME);
+  for (std::size_t k = 0; k < m.records.size(); ++k) m.records[k].bind_storage(BIND_M_STRETCH + int(k));
   m.partials.bind_storage(BIND_M_PARTIALS);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(),
                       GLintptr(b * M_STRIDE * sizeof(float)), M_STRIDE * sizeof(float));
-    // About four tets an invocation before there are more groups.
-    const unsigned groups = unsigned(std::min<std::size_t>(
-        METRICS_GROUPS, work_groups(body.tets.end - body.tets.first, 4 * METRICS_SIZE)));
-    for (const Program* program : {&m.constraints, &m.vertices, &m.rigid, &m.centre, &m.close}) {
-      program->use();
-      program->set("groups", groups);
+    // About four tets per invocation before there are more groups.
+    const unsigned groups = unsigned(
+        std::min<std::size_t>(METRICS_GROUPS, work_groups(body.tets.y - body.tets.x, 4 * METRICS_SIZE)));
+    for (const Program& kernel : m.kernels) {
+      kernel.use();
+      kernel.set("groups", groups);
+      kernel.set("vertex_range", body.vertices);
+      kernel.set("edge_range", body.edges), kernel.set("hinge_range", body.hinges);
+      kernel.set("tet_range", body.tets);
+      kernel.set("mass", float(body.mass));
+      kernel.set("touching", float(1e-5 * body.size));
+      const bool one_group =
+          &kernel == &m.kernels[2] || &kernel == &m.kernels[4];  // these add the groups' sums
+      glDispatchCompute(one_group ? 1 : groups, 1, 1);
+      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
-    for (const Program* program : {&m.vertices, &m.rigid, &m.centre}) {
-      program->use();
-      program->set("first_vertex", body.vertices.first);
-    }
-    for (const Program* program : {&m.vertices, &m.rigid}) {
-      program->use();
-      program->set("end_vertex", body.vertices.end);
-    }
-    for (const Program* program : {&m.rigid, &m.centre}) {
-      program->use();
-      program->set("mass", float(body.mass));
-    }
-    m.constraints.use();
-    m.constraints.set("first_edge", body.edges.first), m.constraints.set("end_edge", body.edges.end);
-    m.constraints.set("first_hinge", body.hinges.first), m.constraints.set("end_hinge", body.hinges.end);
-    m.constraints.set("first_tet", body.tets.first), m.constraints.set("end_tet", body.tets.end);
-    dispatch(m.constraints, groups);
-    m.vertices.use();
-    m.vertices.set("touching", float(1e-5 * body.size));
-    dispatch(m.vertices, groups);
-    dispatch(m.centre, 1);
-    dispatch(m.rigid, groups);
-    dispatch(m.close, 1);
   }
-  m.pending.push_back({Fence::here(), slot, sim.steps, double(sim.steps) * sim.settings.dt,
-                       sim.settings.ground ? sim.settings.ground_height : 0.0, sim.settings.gravity});
+  Measurement known;
+  known.step = sim.steps, known.time = double(sim.steps) * sim.settings.dt;
+  m.pending.push_back({Fence::here(), slot, known, sim.settings.ground ? sim.settings.ground_height : 0.0,
+                       sim.settings.gravity});
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {

@@ -38,31 +38,26 @@ struct Measurement {
 };
 
 struct Metrics {
-  struct Range {
-    unsigned first = 0, end = 0;
-  };
+  /// Where a body's part of each list is: first and end.
   struct BodyRanges {
-    Range vertices, edges, hinges, tets;
+    glm::uvec2 vertices, edges, hinges, tets;
     double mass = 0, volume = 0, size = 0;
-    glm::dvec3 first_position{0};
   };
   struct Pending {
     Fence fence;
     std::size_t slot;
-    long step;
-    double time;
-    double ground;
-    double gravity;
+    Measurement known;  ///< step and time
+    double ground, gravity;
   };
 
   std::vector<BodyRanges> bodies;
-  Buffer stretch, bend, volume, rest, partials;
-  Program constraints, vertices, centre, rigid, close;
-  std::vector<Buffer> rows;  ///< a ring: a row a body in each
+  std::vector<Buffer> records;  ///< by kind
+  Buffer rest, partials;
+  std::vector<Program> kernels;  ///< in order of dispatch
+  std::vector<Buffer> rows;      ///< a ring: a row per body in each
   std::deque<Pending> pending;
   std::deque<Measurement> ready;  ///< read because the ring was full
   std::size_t next = 0;
-  std::size_t edge_count = 0, hinge_count = 0, tet_count = 0;
 };
 
 /// Constraints of kinds that are present in `made`, of the same model, are not made again.
@@ -80,16 +75,13 @@ Measurement nothing_measured();
 /// What a run amounts to, from its measurements in order.
 struct RunErrors {
   double max_volume_loss_percent = 0;  ///< the paper's: largest 100 (V0 - V) / V0
-  /// NaN while there was nothing to measure: fixed vertices, damping, contact from the start.
-  double linear_drift =
-      std::numeric_limits<double>::quiet_NaN();  ///< largest |P - (P0 + M g t)| / sum m|v|, while no vertex
-                                                 ///< was fixed or touched anything
-  double angular_drift =
-      std::numeric_limits<double>::quiet_NaN();  ///< largest |L - L0| / |L0| (of a body that hardly spins: /
-                                                 ///< (size * sum m|v|)), likewise
-  double start_energy = 0, max_energy = 0;       ///< J
-  bool free = true;                              ///< so far no contact and no fixed vertex
-  std::optional<Measurement> first, last;        ///< of states that were finite
+  /// Largest |P - (P0 + M g t)| / sum m|v| and |L - L0| / |L0| (of a body that hardly spins: / (size * sum
+  /// m|v|)). NaN while there was nothing to measure: fixed vertices, damping, contact from the start.
+  double linear_drift = std::numeric_limits<double>::quiet_NaN();
+  double angular_drift = std::numeric_limits<double>::quiet_NaN();
+  double start_energy = 0, max_energy = 0;  ///< J
+  bool free = true;                         ///< so far no contact and no fixed vertex
+  std::optional<Measurement> first, last;   ///< of states that were finite
   bool finite = true;
   std::optional<NonFinite> non_finite;  ///< what check_finite() found, if the caller asked it
 };

@@ -1,8 +1,6 @@
 // One work-group: adds the partial sums into the row, then finds the centre of mass and the rotation that brings the rest
 // shape nearest (Horn 1987; method.md eq. 21: the largest eigenvector of a symmetric 4x4 matrix, here by cyclic Jacobi rotations).
 #include "metrics/reduce.glsl"
-uniform float mass;
-uniform uint first_vertex;
 
 void main() {
   int me = int(gl_LocalInvocationIndex);
@@ -38,7 +36,7 @@ void main() {
   for (int k = 1; k < 4; ++k)
     if (n[k][k] > n[best][best]) best = k;
   vec4 rotation = normalize(vectors[best]);
-  vec3 origin = positions[first_vertex].high + positions[first_vertex].low;
+  vec3 origin = positions[vertex_range.x].high + positions[vertex_range.x].low;
   for (int a = 0; a < 3; ++a) row[M_CENTRE + a] = centre[a], row[M_ORIGIN + a] = origin[a];
   for (int a = 0; a < 4; ++a) row[M_ROTATION + a] = rotation[a];
 }

@@ -7,13 +7,12 @@ uint id_of(Ids ids, int j) { return 0u; }
 layout(std430, binding = BIND_M_STRETCH) readonly buffer Stretch { Record2 edges[]; };
 layout(std430, binding = BIND_M_BEND) readonly buffer Bend { Record4 hinges[]; };
 layout(std430, binding = BIND_M_VOLUME) readonly buffer Volume { Record4 tets[]; };
-uniform uint first_edge, end_edge, first_hinge, end_hinge, first_tet, end_tet;
 
 void main() {
   uint start = gl_GlobalInvocationID.x;
   uint stride = groups * METRICS_SIZE;
   float squares = 0.0, largest = 0.0;
-  for (uint i = first_edge + start; i < end_edge; i += stride) {
+  for (uint i = edge_range.x + start; i < edge_range.y; i += stride) {
     Record2 r = edges[i];
     float strain = length(relative(positions[r.vertices[1]], positions[r.vertices[0]])) / r.rest - 1.0;
     squares += strain * strain;
@@ -23,7 +22,7 @@ void main() {
   store_partial(M_STRETCH_MAX, largest, true);
 
   squares = 0.0;
-  for (uint i = first_hinge + start; i < end_hinge; i += stride) {
+  for (uint i = hinge_range.x + start; i < hinge_range.y; i += stride) {
     Record4 r = hinges[i];
     vec3 x[4];
     for (int j = 0; j < 4; ++j) x[j] = relative(positions[r.vertices[j]], positions[r.vertices[0]]);
@@ -37,7 +36,7 @@ void main() {
 
   float change = 0.0, inverted = 0.0;
   squares = 0.0, largest = 0.0;
-  for (uint i = first_tet + start; i < end_tet; i += stride) {
+  for (uint i = tet_range.x + start; i < tet_range.y; i += stride) {
     Record4 r = tets[i];
     Position p = positions[r.vertices[0]];
     vec3 a = relative(positions[r.vertices[1]], p);

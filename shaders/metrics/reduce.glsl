@@ -5,7 +5,10 @@ layout(local_size_x = METRICS_SIZE) in;
 layout(std430, binding = BIND_M_POSITIONS) readonly buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_M_PARTIALS) buffer Partials { float partials[]; };  // [quantity][group]
 layout(std430, binding = BIND_M_ROW) buffer Row { float row[]; };
-uniform uint groups;  // of the kernels that write partials
+uniform uint groups;                // of the kernels that write partials
+uniform uvec2 vertex_range, edge_range, hinge_range, tet_range;  // of the body: first and end
+uniform float mass;      // kg, of the body
+uniform float touching;  // m, how near to a half space counts as contact
 shared float scratch[METRICS_SIZE];
 
 // A tree over the work-group; the result is in scratch[0] for every invocation until the next call.

@@ -2,8 +2,6 @@
 #include "metrics/reduce.glsl"
 layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
 layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
-uniform uint first_vertex, end_vertex;
-uniform float mass;
 
 void main() {
   vec3 centre = vec3(row[M_CENTRE], row[M_CENTRE + 1], row[M_CENTRE + 2]);
@@ -12,10 +10,10 @@ void main() {
   vec3 q = vec3(row[M_ROTATION + 1], row[M_ROTATION + 2], row[M_ROTATION + 3]);
   float squares = 0.0;
   vec3 angular = vec3(0.0);
-  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += groups * METRICS_SIZE) {
+  for (uint i = vertex_range.x + gl_GlobalInvocationID.x; i < vertex_range.y; i += groups * METRICS_SIZE) {
     vec4 at_rest = rest[i];
     vec3 X = at_rest.xyz;
-    vec3 r = relative(positions[i], positions[first_vertex]) - centre;
+    vec3 r = relative(positions[i], positions[vertex_range.x]) - centre;
     vec3 u = velocities[i].high + velocities[i].low - drift;
     vec3 apart = r - (X + 2.0 * cross(q, cross(q, X) + w * X));
     squares += at_rest.w * dot(apart, apart);

@@ -1,21 +1,20 @@
 // Moments of one body: mass, momentum, energy, and the covariance that gives its best-fitting rotation.
 #include "metrics/reduce.glsl"
+#include "finite.glsl"
 layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
 layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
-uniform uint first_vertex, end_vertex;
-uniform float touching;  // m, how near to a half space counts as contact
 
 void main() {
   vec3 moment = vec3(0.0), momentum = vec3(0.0);
   mat3 covariance = mat3(0.0);
   float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, non_finite = 0.0;
-  for (uint i = first_vertex + gl_GlobalInvocationID.x; i < end_vertex; i += groups * METRICS_SIZE) {
+  for (uint i = vertex_range.x + gl_GlobalInvocationID.x; i < vertex_range.y; i += groups * METRICS_SIZE) {
     Position p = positions[i];
-    vec3 x = relative(p, positions[first_vertex]);
+    vec3 x = relative(p, positions[vertex_range.x]);
     vec3 v = velocities[i].high + velocities[i].low;
     vec4 at_rest = rest[i];
     float m = at_rest.w;
-    if (any(isnan(p.high)) || any(isinf(p.high)) || any(isnan(v)) || any(isinf(v))) non_finite += 1.0;
+    if (!is_finite(p.high) || !is_finite(v)) non_finite += 1.0;
     moment += m * x;
     momentum += m * v;
     speed += m * length(v);

@@ -1,14 +1,14 @@
 // Constraints and vertices cut into patches.
 #include <doctest/doctest.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "sim/sim.h"
 #include "sim/solvers/cpu_pbd.h"
 #include "sim/solvers/groups.h"
-#include "sim/parallel.h"
 #include "sim/solvers/patches.h"
-#include "sim/sim.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;

@@ -11,8 +11,6 @@ namespace {
 
 using Points = std::vector<glm::dvec3>;
 
-Eigen::Vector3d eigen(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
-
 // C, without the clamp to +-1 that bend.glsl has, and its gradient. C = f(x) - rest, so a clamped one is
 // found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long gets
 // the same C as before.
@@ -100,11 +98,8 @@ template <class Kind, std::size_t arity>
 auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double alpha, bool project) {
   constexpr int n = 3 * int(arity);
   Eigen::Matrix<double, n, n> hessian;
-  const auto flat = [](const auto& c) {
-    Eigen::Matrix<double, n, 1> result;
-    for (std::size_t j = 0; j < arity; ++j) result.template segment<3>(3 * int(j)) = eigen(c.gradient[j]);
-    return result;
-  };
+  using Vector = Eigen::Matrix<double, n, 1>;
+  const auto flat = [](const auto& c) { return Vector(Eigen::Map<const Vector>(&c.gradient[0].x)); };
   const auto here = unclamped<Kind>(x, rest);
   const auto g = flat(here);
   double side = std::numeric_limits<double>::max();
@@ -133,23 +128,25 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double al
   return hessian;
 }
 
-// Lower triangle over the free vertices; `place` gives a vertex its row / 3, or -1. The pattern is the same
-// at all positions.
-Sparse assemble(const Objective& o, const Points& positions, const std::vector<int>& place, int rows,
-                bool project) {
+// Lower triangle. A fixed vertex has rows of its own, which are the identity's. The pattern is the same at
+// all positions.
+Sparse assemble(const Objective& o, const Points& positions, bool project) {
   std::vector<Eigen::Triplet<double>> entries;
-  for (std::size_t i = 0; i < positions.size(); ++i)
-    for (int a = 0; a < 3 && place[i] >= 0; ++a)
-      entries.emplace_back(3 * place[i] + a, 3 * place[i] + a, o.masses[i] * o.inertia);
+  for (int row = 0; row < 3 * int(positions.size()); ++row) {
+    const double mass = o.masses[std::size_t(row / 3)];
+    entries.emplace_back(row, row, mass > 0 ? mass * o.inertia : 1.0);
+  }
   for_each_constraint(o, positions, [&](auto kind, const auto* vertices, auto& x, double rest, double alpha) {
     const auto local = constraint_hessian<decltype(kind)>(x, rest, alpha, project);
     for (int r = 0; r < int(local.rows()); ++r)
       for (int c = 0; c < int(local.cols()); ++c) {
-        const int row = place[vertices[r / 3]], column = place[vertices[c / 3]];
-        if (row < 0 || column < 0 || 3 * row + r % 3 < 3 * column + c % 3) continue;
-        entries.emplace_back(3 * row + r % 3, 3 * column + c % 3, local(r, c));
+        const std::uint32_t to = vertices[r / 3], from = vertices[c / 3];
+        const int row = 3 * int(to) + r % 3, column = 3 * int(from) + c % 3;
+        if (row >= column && o.masses[to] > 0 && o.masses[from] > 0)
+          entries.emplace_back(row, column, local(r, c));
       }
   });
+  const int rows = 3 * int(positions.size());
   Sparse hessian(rows, rows);
   hessian.setFromTriplets(entries.begin(), entries.end());
   return hessian;
@@ -167,51 +164,41 @@ bool positive_definite(Factor& factor, const Sparse& hessian) {
 // Factors the Hessian, or the nearest thing to it that is positive definite: with projected constraint
 // Hessians, and if that is singular still, with a growing multiple of the mass matrix. `exact`: it was the
 // Hessian itself.
-bool factorise(Factor& factor, const Objective& o, const Points& positions, const std::vector<int>& place,
-               const Eigen::VectorXd& masses, bool& exact) {
-  const int rows = int(masses.size());
-  Sparse hessian = assemble(o, positions, place, rows, false);
-  if (factor.cols() != rows) factor.analyzePattern(hessian);
+bool factorise(Factor& factor, const Objective& o, const Points& positions, bool& exact) {
+  Sparse hessian = assemble(o, positions, false);
+  if (factor.cols() == 0) factor.analyzePattern(hessian);
   exact = positive_definite(factor, hessian);
   if (exact) return true;
-  hessian = assemble(o, positions, place, rows, true);
-  if (positive_definite(factor, hessian)) return true;
+  hessian = assemble(o, positions, true);
+  Eigen::VectorXd masses(hessian.rows());
+  for (Eigen::Index row = 0; row < masses.size(); ++row) masses(row) = o.masses[std::size_t(row / 3)];
   double shift = 1e-8 * Eigen::VectorXd(hessian.diagonal()).sum() / masses.sum();
-  for (int attempt = 0; attempt < 10; ++attempt, shift *= 100) {
-    Sparse shifted = hessian;
-    shifted.diagonal() += shift * masses;
-    if (positive_definite(factor, shifted)) return true;
+  for (int attempt = 0; attempt <= 10; ++attempt, shift *= 100) {
+    if (positive_definite(factor, hessian)) return true;
+    hessian.diagonal() += shift * masses;
   }
   return false;
 }
 
-constexpr int newton_limit =
-    1000;  // stiff bodies that turn far take hundreds of short steps, all others under 30
+// Stiff bodies that turn far take hundreds of short steps, all others under 30.
+constexpr int newton_limit = 1000;
+
+Eigen::Map<Eigen::VectorXd> flat(Points& points) { return {&points[0].x, 3 * Eigen::Index(points.size())}; }
 
 Minimum newton(const Objective& o, Points start) {
   Minimum result;
   Points& x = result.positions = std::move(start);
-  std::vector<int> place(x.size(), -1);
-  int count = 0;
   for (std::size_t i = 0; i < x.size(); ++i)
-    if (o.masses[i] > 0)
-      place[i] = count++;
-    else
-      x[i] = o.predicted[i];
-  result.converged = count == 0, result.residual = count == 0 ? 0 : result.residual;
-  Eigen::VectorXd masses(3 * count), slope(3 * count);
-  for (std::size_t i = 0; i < x.size(); ++i)
-    if (place[i] >= 0) masses.segment<3>(3 * place[i]).setConstant(o.masses[i]);
+    if (!(o.masses[i] > 0)) x[i] = o.predicted[i];
   Factor factor;
   while (!result.converged) {
-    const Points g = gradient(o, x);
+    Points g = gradient(o, x);
     for (std::size_t i = 0; i < x.size(); ++i)
-      if (place[i] >= 0) slope.segment<3>(3 * place[i]) = eigen(g[i]);
+      if (!(o.masses[i] > 0)) g[i] = glm::dvec3(0);
     bool exact = false;
-    if (!factorise(factor, o, x, place, masses, exact))
-      return result.reason = "the Hessian has no factors", result;
-    const Eigen::VectorXd step = factor.solve(-slope);
-    const double descent = slope.dot(step);  // < 0
+    if (!factorise(factor, o, x, exact)) return result.reason = "the Hessian has no factors", result;
+    const Eigen::VectorXd step = factor.solve(-flat(g));
+    const double descent = flat(g).dot(step);  // < 0
     result.residual = std::sqrt(-descent / o.unit);
     result.converged = exact && result.residual <= minimum_tolerance;
     // The step at hand is taken even so: it squares what is left.
@@ -225,11 +212,7 @@ Minimum newton(const Objective& o, Points start) {
     double t = 1;
     for (int halvings = 0;; ++halvings, t *= 0.5) {
       if (halvings == 60) return result.reason = "no step lowers the energy", result;
-      for (std::size_t i = 0; i < x.size(); ++i)
-        if (place[i] >= 0) {
-          const Eigen::Vector3d d = t * step.segment<3>(3 * place[i]);
-          trial[i] = x[i] + glm::dvec3(d(0), d(1), d(2));
-        }
+      flat(trial) = flat(x) + t * step;
       if (evaluate_energy(o, trial).value <= before.value + 1e-4 * t * descent + rounding) break;
     }
     x = std::move(trial);

@@ -1,5 +1,5 @@
 // The elastic energy of constraints with compliance, in double, and its minimiser by Newton: what a step of
-// implicit Euler or a body at rest amounts to (sim/reference.h).
+// implicit Euler or a body at rest amounts to (reference.h).
 #pragma once
 
 #include <array>

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim/error.h"
 #include "sim/rotation.h"
@@ -92,31 +93,23 @@ State rigid_step(const ReferenceInput& input, State state) {
 
 namespace {
 
-void check_compliances(const Compliances& compliances) {
+Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
   for (std::size_t k = 0; k < compliances.size(); ++k)
     if (!(compliances[k] > 0))
       throw Error("compliance must be above 0",
                   fmt::format("{} of {}", compliances[k], constraint_kinds()[k].name),
                   "rigid_step is the limit of 0, infinity leaves a kind out");
-}
-
-Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
-  check_compliances(compliances);
   Objective o{input.system, compliances, {}, {}, 0, glm::dvec3(0), 1};
   for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);
   return o;
 }
 
-double total_mass(const Objective& o) {
-  double sum = 0;
-  for (double m : o.masses) sum += m;
-  return sum;
-}
+double total_mass(const Objective& o) { return std::accumulate(o.masses.begin(), o.masses.end(), 0.0); }
 
-Error no_convergence(const Minimum& result, const char* mend) {
+Error no_convergence(const Minimum& result, const char* hint) {
   return {"the reference did not converge",
           fmt::format("{} after {}, residual {:.1e}", result.reason, result.iterations, result.residual),
-          mend, 1};
+          hint, 1};
 }
 
 }  // namespace

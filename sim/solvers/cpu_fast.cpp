@@ -49,12 +49,9 @@ struct Rule {
   bool soft, first;   // compliant; iteration of the substep: multipliers begin at 0
 };
 
-template <class>
-struct AllBatches;
-template <class... Kind>
-struct AllBatches<std::tuple<Kind...>> {
-  using type = std::tuple<LaneBatches<Kind>...>;
-};
+using AllBatches = decltype([]<class... Kind>(std::tuple<Kind...>) {
+  return std::tuple<LaneBatches<Kind>...>();
+}(Kinds()));
 
 // As an element of std::vector a bare Row would have the alignment of a double (GCC 12).
 struct alignas(sizeof(Row)) Vertex {
@@ -62,7 +59,7 @@ struct alignas(sizeof(Row)) Vertex {
 };
 
 struct Work {
-  AllBatches<Kinds>::type batches;
+  AllBatches batches;
   std::vector<Vertex> x;
   std::vector<Vertex> start;  // of the substep, with constraint damping
   float limit = 0;            // m, longest correction

@@ -52,32 +52,6 @@ Shader compile(const Program::Stage& stage, const std::string& text, const std::
   return shader;
 }
 
-// Programs as the driver's binaries, by their texts: a comparison makes the same kernels for every row, and
-// NVIDIA's driver takes 0.3 s for them.
-struct Binary {
-  GLenum format = 0;
-  std::vector<char> bytes;
-};
-std::map<std::string, Binary>& linked_before() {
-  static std::map<std::string, Binary> binaries;
-  return binaries;
-}
-
-bool load_linked_before(GLuint program, const std::string& texts) {
-  const Binary& binary = linked_before()[texts];
-  if (binary.bytes.empty()) return false;
-  glProgramBinary(program, binary.format, binary.bytes.data(), GLsizei(binary.bytes.size()));
-  return !fault(program, GL_LINK_STATUS);  // refused in another kind of context
-}
-
-void keep_linked(GLuint program, const std::string& texts) {
-  GLint size = 0;  // stays 0 where the driver gives no binaries
-  glGetProgramiv(program, GL_PROGRAM_BINARY_LENGTH, &size);
-  Binary& binary = linked_before()[texts];
-  binary.bytes.resize(std::size_t(size));
-  if (size > 0) glGetProgramBinary(program, size, nullptr, &binary.format, binary.bytes.data());
-}
-
 }  // namespace
 
 Program::Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words,
@@ -85,31 +59,22 @@ Program::Program(std::string label, const std::vector<Stage>& stages, const Shad
     : label_(std::move(label)) {
   std::string head = "#version 430 core\n";
   for (const std::string& define : defines) head += "#define " + define + "\n";
-  std::vector<std::vector<std::string>> files(stages.size());
-  std::vector<std::string> texts;
-  std::string all;
-  for (std::size_t s = 0; s < stages.size(); ++s) {
-    texts.push_back(head + shader_text(stages[s].file, words, files[s]));
-    all += fmt::format("{}\n{}", stages[s].type, texts[s]);
-  }
-  // Where `set` looks for names: a uniform that nothing uses has no location and yet is no mistake.
-  std::istringstream lines(all);
-  for (std::string line; std::getline(lines, line);)
-    if (line.find("uniform ") != std::string::npos) declarations_ += line + "\n";
-
+  std::vector<Shader> shaders;
   object_ = Owned<GLuint, delete_program>(glCreateProgram());
-  if (!load_linked_before(id(), all)) {
-    std::vector<Shader> shaders;
-    for (std::size_t s = 0; s < stages.size(); ++s) {
-      shaders.push_back(compile(stages[s], texts[s], files[s]));
-      glAttachShader(id(), shaders[s].name());
-    }
-    glLinkProgram(id());
-    for (const Shader& shader : shaders) glDetachShader(id(), shader.name());
-    if (const auto log = fault(id(), GL_LINK_STATUS))
-      throw Error("shader program does not link", label_, name_files(*log, {}), 1);
-    keep_linked(id(), all);
+  for (const Stage& stage : stages) {
+    std::vector<std::string> files;
+    const std::string text = head + shader_text(stage.file, words, files);
+    // Where `set` looks for names: a uniform that nothing uses has no location and yet is no mistake.
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);)
+      if (line.find("uniform ") != std::string::npos) declarations_ += line + "\n";
+    shaders.push_back(compile(stage, text, files));
+    glAttachShader(id(), shaders.back().name());
   }
+  glLinkProgram(id());
+  for (const Shader& shader : shaders) glDetachShader(id(), shader.name());
+  if (const auto log = fault(id(), GL_LINK_STATUS))
+    throw Error("shader program does not link", label_, name_files(*log, {}), 1);
   label_object(GL_PROGRAM, id(), label_);
 }
 

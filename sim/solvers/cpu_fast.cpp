@@ -43,6 +43,8 @@ struct LaneBatches {
   std::vector<std::array<float, lanes>> multipliers;  // of compliant constraints, in this substep
 };
 
+// Rules that are compiled: without compliance, with it, and with constraint damping too.
+enum class Soft { no, yes, damped };
 // What a kind's constraints share.
 struct Rule {
   float k, a, gamma;  // stiffness, alpha / h^2, tau / h
@@ -155,18 +157,19 @@ template <class Kind>
 }
 
 // Corrections in place of positions; whether a guard may have triggered: then multipliers stay as they were.
-// Without compliance a and gamma are 0, which changes no bit.
-template <class Kind, bool damped>
+template <class Kind, Soft soft>
 [[gnu::always_inline]] inline bool evaluate(const LaneBatch<Kind>& batch, float limit, const Rule& rule,
                                             Rows<Kind>& rows, [[maybe_unused]] const Rows<Kind>& starts,
-                                            float* multipliers) {
+                                            [[maybe_unused]] float* multipliers) {
   constexpr std::size_t arity = std::size_t(Kind::arity);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   // What tells whether a guard may have triggered. Kept by lane and looked at below: in the loop itself, bits
   // of guards keep GCC 12 from vectorising it.
   std::uint32_t guard[lanes];
-  float error[lanes], multiplier[lanes], slack[lanes], longest[lanes], before[lanes];
-  for (std::size_t lane = 0; lane < lanes; ++lane) before[lane] = rule.first ? 0 : multipliers[lane];
+  float error[lanes], multiplier[lanes], slack[lanes], longest[lanes];
+  [[maybe_unused]] float before[lanes];
+  if constexpr (soft != Soft::no)
+    for (std::size_t lane = 0; lane < lanes; ++lane) before[lane] = rule.first ? 0 : multipliers[lane];
   const float k = rule.k, a = rule.a, gamma = rule.gamma;
   Formulas<float, LaneMath> formulas;
 #pragma GCC ivdep
@@ -179,15 +182,20 @@ template <class Kind, bool damped>
       w[j] = rows[j][lane][3];
     }
     auto c = Kind::template evaluate<float, LaneMath>(x, batch.rest[lane], no_ids);
-    if constexpr (damped) {
+    if constexpr (soft == Soft::damped) {
       glm::vec3 start[arity];
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
         start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
       c.C += gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, batch.rest[lane], no_ids).C);
     }
-    c.C += a * before[lane];
-    const float lambda = formulas.multiplier(c, w, k, limit, a, 1 + gamma);
+    float lambda;
+    if constexpr (soft == Soft::no) {
+      lambda = formulas.multiplier(c, w, k, limit);
+    } else {
+      c.C += a * before[lane];
+      lambda = formulas.multiplier(c, w, k, limit, a, 1 + gamma);
+    }
     float sum = 0, weights = 0, most = 0;
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < arity; ++j) {
@@ -211,15 +219,17 @@ template <class Kind, bool damped>
     triggered |= guard[lane] | std::uint32_t(!(slack[lane] >= 0)) |
                  std::uint32_t(!(longest[lane] < 0.99f * limit * limit)) |
                  (std::uint32_t(error[lane] != 0) & std::uint32_t(multiplier[lane] == 0));
-  if (rule.soft && !triggered)
-    for (std::size_t lane = 0; lane < lanes; ++lane) multipliers[lane] = before[lane] + multiplier[lane];
+  if constexpr (soft != Soft::no)
+    if (!triggered)
+      for (std::size_t lane = 0; lane < lanes; ++lane) multipliers[lane] = before[lane] + multiplier[lane];
   return triggered != 0;
 }
 
 // Batches [begin, end) of a kind.
-template <class Kind, bool damped>
+template <class Kind, Soft soft>
 [[gnu::always_inline]] inline void project_batches(Work& work, std::size_t begin, std::size_t end,
                                                    const Rule& rule, GuardCounts& guards) {
+  constexpr bool damped = soft == Soft::damped;
   // Some batches together: reading a row's floats as vectors right after storing the row would wait for the
   // stores.
   constexpr std::size_t together = 4;
@@ -235,8 +245,8 @@ template <class Kind, bool damped>
     if constexpr (damped)
       for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.start, starts[i]);
     for (std::size_t i = 0; i < count; ++i)
-      guarded[i] = evaluate<Kind, damped>(batches[b + i], work.limit, rule, rows[i], starts[damped ? i : 0],
-                                          multipliers(b + i));
+      guarded[i] = evaluate<Kind, soft>(batches[b + i], work.limit, rule, rows[i], starts[damped ? i : 0],
+                                        multipliers(b + i));
     for (std::size_t i = 0; i < count; ++i)
       if (guarded[i])
         project_guarded<Kind, damped>(batches[b + i], work, rule, multipliers(b + i), guards);
@@ -250,10 +260,12 @@ WIDEST void project(Work& work, int kind, std::size_t begin, std::size_t end, co
                     GuardCounts& guards) {
   for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
     if (number != kind) return;
-    if (rule.gamma > 0)
-      project_batches<decltype(is), true>(work, begin, end, rule, guards);
+    if (!rule.soft)
+      project_batches<decltype(is), Soft::no>(work, begin, end, rule, guards);
+    else if (rule.gamma > 0)
+      project_batches<decltype(is), Soft::damped>(work, begin, end, rule, guards);
     else
-      project_batches<decltype(is), false>(work, begin, end, rule, guards);
+      project_batches<decltype(is), Soft::yes>(work, begin, end, rule, guards);
   });
 }
 

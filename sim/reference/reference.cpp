@@ -35,10 +35,11 @@ void refuse_contact(const ReferenceInput& input, const Points& positions) {
 
 // v += h g, damped, y = x + h v: the same first part of a substep as CpuPbd and predict.comp.
 void predict(const ReferenceInput& input, State& state, double h) {
-  const double keep = std::exp(-input.settings.damping * h);
+  const double velocity_scale = std::exp(-input.settings.damping * h);
   for (std::size_t i = 0; i < state.positions.size(); ++i)
     if (input.inverse_masses[i] > 0) {
-      state.velocities[i] = (state.velocities[i] + h * glm::dvec3(0, -input.settings.gravity, 0)) * keep;
+      state.velocities[i] =
+          (state.velocities[i] + h * glm::dvec3(0, -input.settings.gravity, 0)) * velocity_scale;
       state.positions[i] += h * state.velocities[i];
     }
 }

@@ -156,7 +156,8 @@ template <class Kind>
       work.x[batch.vertices[j][lane]].row += __builtin_convertvector(load(rows[j][lane]), Row);
 }
 
-// Corrections in place of positions; whether a guard may have triggered: then multipliers stay as they were.
+// Corrections in place of positions; whether a guard may have triggered: then multipliers stay as they
+// were.
 template <class Kind, Soft soft>
 [[gnu::always_inline]] inline bool evaluate(const LaneBatch<Kind>& batch, float limit, const Rule& rule,
                                             Rows<Kind>& rows, [[maybe_unused]] const Rows<Kind>& starts,
@@ -305,7 +306,7 @@ class FastPbd {
     const double h = settings.dt / settings.substeps;
     const glm::dvec3 gravity(0, -settings.gravity, 0);
     const std::vector<glm::dvec4> planes = planes_of(model_, settings);
-    const double keep = std::exp(-settings.damping * h);
+    const double velocity_scale = std::exp(-settings.damping * h);
     auto& v = state.velocities;
     auto& x = work_.x;
     const bool soft = compliant(settings), slow = damped(settings);
@@ -320,7 +321,7 @@ class FastPbd {
       const glm::dvec3& p = state.positions[i];
       x[i].row = Row{p.x, p.y, p.z, inverse_masses[i]};
     }
-    const auto place = [&](std::size_t i) { return glm::dvec3(x[i].row[0], x[i].row[1], x[i].row[2]); };
+    const auto position = [&](std::size_t i) { return glm::dvec3(x[i].row[0], x[i].row[1], x[i].row[2]); };
     const auto move_to = [&](std::size_t i, const glm::dvec3& p) {
       x[i].row = Row{p.x, p.y, p.z, inverse_masses[i]};
     };
@@ -334,23 +335,23 @@ class FastPbd {
         if (slow)
           std::copy(x.begin() + long(begin), x.begin() + long(end), work_.start.begin() + long(begin));
         for_each_free_vertex([&](std::size_t i) {
-          v[i] = (v[i] + h * gravity) * keep;
-          move_to(i, place(i) + h * v[i]);
-          predicted_[i] = place(i);
+          v[i] = (v[i] + h * gravity) * velocity_scale;
+          move_to(i, position(i) + h * v[i]);
+          predicted_[i] = position(i);
         });
         for (int iteration = 0; iteration < settings.iterations; ++iteration) {
           solve(settings, thread, threads, soft, iteration == 0);
           for_each_free_vertex([&](std::size_t i) {
-            move_to(i, out_of(planes, place(i), predicted_[i], h * v[i], settings.friction));
+            move_to(i, out_of(planes, position(i), predicted_[i], h * v[i], settings.friction));
           });
         }
-        for_each_free_vertex([&](std::size_t i) { v[i] += (place(i) - predicted_[i]) / h; });
+        for_each_free_vertex([&](std::size_t i) { v[i] += (position(i) - predicted_[i]) / h; });
       }
     };
 // Loops inside the region itself would be 4 % slower on one thread.
 #pragma omp parallel num_threads(int(guards_.size()))
     substeps(std::size_t(omp_get_thread_num()), std::size_t(omp_get_num_threads()));
-    for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = place(i);
+    for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = position(i);
   }
 
  private:

@@ -1,16 +1,15 @@
 #include "app/files.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <png.h>
-#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstring>
-#include <fstream>
+#include <utility>
 
 #include "sim/error.h"
 #include "sim/files.h"
@@ -21,18 +20,22 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string npy(const char* type, std::size_t rows, std::size_t columns, const void* data) {
+void write_npy(const fs::path& file, const char* type, std::size_t rows, std::size_t columns,
+               const void* data) {
   std::string header =
       fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", type, rows, columns);
   header.resize((10 + header.size() + 1 + 63) / 64 * 64 - 10 - 1, ' ');
   header += '\n';
-  std::string text = "\x93NUMPY\x01";
-  text += '\0';
-  text += char(header.size() & 255);
-  text += char(header.size() >> 8);
-  text += header;
-  text.append(static_cast<const char*>(data), rows * columns * 4);
-  return text;
+  const std::string length{char(header.size() & 255), char(header.size() >> 8)};
+  const std::string content(static_cast<const char*>(data), rows * columns * 4);
+  write_whole(file, std::string("\x93NUMPY\x01\0", 8) + length + header + content);
+}
+
+// One word of a shell's command line.
+std::string quoted(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
 }
 
 }  // namespace
@@ -49,32 +52,22 @@ void make_output_folder(const fs::path& folder) {
 
 GrowingFile::GrowingFile(const fs::path& file)
     : file_(file), temporary_(temporary_name(file)), stream_(temporary_, std::ios::binary) {
-  check();
+  add("");
 }
 
 GrowingFile::~GrowingFile() {
-  if (!stream_.is_open()) return;
   std::error_code ignored;
-  fs::remove(temporary_, ignored);
+  fs::remove(temporary_, ignored);  // nothing is there after close()
 }
 
 void GrowingFile::add(const std::string& text) {
-  stream_ << text;
-  check();
+  if (!(stream_ << text)) throw Error("cannot be written", file_.string(), std::strerror(errno), 1);
 }
 
 void GrowingFile::close() {
   stream_.close();
-  check();
+  add("");
   rename_whole(temporary_, file_);
-}
-
-void GrowingFile::check() {
-  if (stream_) return;
-  const std::string why = std::strerror(errno);
-  std::error_code ignored;
-  fs::remove(temporary_, ignored);
-  throw Error("cannot write", file_.string(), why, 1);
 }
 
 void write_file(const fs::path& file, const std::string& content) { write_whole(file, content); }
@@ -93,12 +86,10 @@ void write_png(const fs::path& file, const Image& image) {
   png.height = png_uint_32(image.height);
   png.format = PNG_FORMAT_RGBA;
   png.flags = PNG_IMAGE_FLAG_FAST;
-  png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(png);
-  std::string content(bytes, '\0');
-  if (!png_image_write_to_memory(&png, content.data(), &bytes, 0, image.rgba.data(), 0, nullptr))
-    throw Error("cannot encode a PNG", file.string(), png.message, 1);
-  content.resize(bytes);
-  write_file(file, content);
+  const fs::path temporary = temporary_name(file);
+  if (!png_image_write_to_file(&png, temporary.c_str(), 0, image.rgba.data(), 0, nullptr))
+    throw Error("cannot be written", file.string(), png.message, 1);
+  rename_whole(temporary, file);
 }
 
 void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
@@ -106,97 +97,51 @@ void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
     if (!std::isfinite(rows[i].x) || !std::isfinite(rows[i].y) || !std::isfinite(rows[i].z))
       throw Error("positions are not finite", fmt::format("{}, vertex {}", file.string(), i),
                   "nothing is written", 1);
-  write_file(file, npy("<f4", rows.size(), 3, rows.data()));
+  write_npy(file, "<f4", rows.size(), 3, rows.data());
 }
 void write_npy(const fs::path& file, const std::vector<Tet>& rows) {
-  write_file(file, npy("<u4", rows.size(), 4, rows.data()));
+  write_npy(file, "<u4", rows.size(), 4, rows.data());
 }
-
-// ------------------------------------------------------------------------------------------------------------
-// video
 
 Video::Video(const fs::path& file, int width, int height, int frames_per_second)
     : file_(file), temporary_(temporary_name(file)), log_(temporary_.string() + ".log") {
-  if (file.extension() != ".mp4" && file.extension() != ".mkv" && file.extension() != ".webm" &&
-      file.extension() != ".gif")
+  const std::string extension = file.extension().string();
+  if (extension != ".mp4" && extension != ".mkv" && extension != ".webm" && extension != ".gif")
     throw Error("unknown video format", file.string(), "name it .mp4, .mkv, .webm or .gif");
   if (width % 2 || height % 2)
     throw Error("video needs an even size", fmt::format("{}x{}", width, height), "change --size");
-  signal(SIGPIPE, SIG_IGN);  // a dead ffmpeg is an error of write(), not of ours
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw Error("cannot start ffmpeg", file.string(), std::strerror(errno), 1);
-  // Arguments are passed as they are: no shell sees the file name.
-  const std::string size = fmt::format("{}x{}", width, height), rate = std::to_string(frames_per_second);
-  const std::string target = "file:" + temporary_.string();
-  std::vector<const char*> arguments = {"ffmpeg",   "-y",         "-loglevel", "error", "-f",
-                                        "rawvideo", "-pix_fmt",   "rgba",      "-s",    size.c_str(),
-                                        "-r",       rate.c_str(), "-i",        "-"};
-  if (file.extension() != ".gif") arguments.insert(arguments.end(), {"-pix_fmt", "yuv420p"});
-  if (file.extension() == ".mp4") arguments.insert(arguments.end(), {"-movflags", "+faststart"});
-  arguments.insert(arguments.end(), {target.c_str(), nullptr});
-  const std::string log = log_.string();
-  child_ = fork();
-  if (child_ == 0) {
-    setpgid(0, 0);  // Ctrl-C in a terminal is for us: ffmpeg gets its last frames and ends the file
-    dup2(ends[0], 0);
-    const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    if (out >= 0) dup2(out, 1), dup2(out, 2);
-    execvp("ffmpeg", const_cast<char* const*>(arguments.data()));
-    _exit(127);
-  }
-  ::close(ends[0]);
-  pipe_ = ends[1];
-  if (child_ < 0) throw Error("cannot start ffmpeg", file.string(), std::strerror(errno), 1);
-}
-
-// Waits for ffmpeg; its exit status, and what it said if it failed.
-void Video::finish() {
-  if (pipe_ >= 0) ::close(pipe_), pipe_ = -1;
-  int status = 0;
-  while (waitpid(child_, &status, 0) < 0 && errno == EINTR) {
-  }
-  child_ = -1;
-  const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
-  std::string why = missing ? "install ffmpeg" : "ffmpeg ended early";
-  std::string line;
-  if (std::ifstream log(log_); std::getline(log, line) && !line.empty()) why += " (" + line + ")";
-  std::error_code ignored;
-  fs::remove(log_, ignored);
-  // On a full disk ffmpeg 5.1 says so and still ends with 0.
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && line.empty()) return;
-  fs::remove(temporary_, ignored);
-  throw Error("cannot write the video", file_.string(), why, 1);
+  std::signal(SIGPIPE, SIG_IGN);  // a dead ffmpeg is an error of writing, not of ours
+  // A session of its own: Ctrl-C in a terminal is for us, ffmpeg gets its last frames and ends the file.
+  const std::string command = fmt::format(
+      "exec setsid ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgba -s {}x{} -r {} -i - {} {} {} >{} 2>&1",
+      width, height, frames_per_second, extension == ".gif" ? "" : "-pix_fmt yuv420p",
+      extension == ".mp4" ? "-movflags +faststart" : "", quoted("file:" + temporary_.string()),
+      quoted(log_.string()));
+  pipe_ = ::popen(command.c_str(), "we");
+  if (!pipe_) throw Error("cannot start ffmpeg", file.string(), std::strerror(errno), 1);
 }
 
 void Video::add(const Image& frame) {
-  const auto* data = frame.rgba.data();
-  std::size_t left = frame.rgba.size();
-  while (left > 0) {
-    const ssize_t sent = write(pipe_, data, left);
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) {
-      finish();  // throws what ffmpeg said
-      throw Error("cannot write the video", file_.string(), "ffmpeg stopped reading", 1);
-    }
-    data += sent;
-    left -= std::size_t(sent);
-  }
+  if (std::fwrite(frame.rgba.data(), 1, frame.rgba.size(), pipe_) < frame.rgba.size()) close();  // says why
 }
 
 void Video::close() {
-  finish();
-  rename_whole(temporary_, file_);
+  const bool sent = std::fflush(pipe_) == 0 && !std::ferror(pipe_);
+  const int status = ::pclose(std::exchange(pipe_, nullptr));
+  std::string said;
+  std::getline(std::ifstream(log_), said);
+  // On a full disk ffmpeg 5.1 says so and still ends with 0.
+  if (sent && status == 0 && said.empty()) return rename_whole(temporary_, file_);
+  const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
+  throw Error("cannot write the video", file_.string(),
+              missing ? "install ffmpeg" : "ffmpeg ended early" + (said.empty() ? "" : " (" + said + ")"), 1);
 }
 
 Video::~Video() {
-  if (pipe_ >= 0) ::close(pipe_);
-  if (child_ > 0) {
-    kill(child_, SIGTERM);
-    waitpid(child_, nullptr, 0);
-    std::error_code ignored;
-    fs::remove(log_, ignored);
-    fs::remove(temporary_, ignored);
-  }
+  if (pipe_) ::pclose(pipe_);
+  std::error_code ignored;
+  fs::remove(log_, ignored);
+  fs::remove(temporary_, ignored);
 }
 
 }  // namespace tetpbd

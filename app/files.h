@@ -1,9 +1,7 @@
 // Files that are whole or not there: written under a temporary name, then renamed.
 #pragma once
 
-#include <sys/types.h>
-
-#include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <glm/glm.hpp>
@@ -37,7 +35,6 @@ class GrowingFile {
   void close();
 
  private:
-  void check();
   std::filesystem::path file_, temporary_;
   std::ofstream stream_;
 };
@@ -56,10 +53,8 @@ class Video {
   void close();
 
  private:
-  void finish();
   std::filesystem::path file_, temporary_, log_;
-  int pipe_ = -1;
-  pid_t child_ = -1;
+  std::FILE* pipe_ = nullptr;
 };
 
 }  // namespace tetpbd

@@ -1,18 +1,17 @@
-// The command line: what it says becomes a scene, settings and options for one of the commands.
+// The command line: each command is a row of `commands`, with its options and what it starts.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <exception>
 #include <functional>
-#include <iostream>
 #include <optional>
 #include <sstream>
+#include <tuple>
 
 #include "app/bench.h"
 #include "app/command_line.h"
@@ -26,33 +25,56 @@
 #include "app/window.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
-#include "sim/interrupt.h"
 
 using namespace tetpbd;
 
 namespace {
 
-/// Options that mean the same in every command that opens a scene.
-struct SceneArguments {
+using Task = std::function<int()>;
+constexpr long most_steps = 1000000000;
+
+/// "1280x720", "2/8": two whole numbers in a range.
+template <char between, int low, int high>
+struct Pair {
+  int first = low, second = low;
+  Pair() = default;
+  Pair(int a, int b) : first(a), second(b) {}  // or CLI11 would make one of a single number
+  friend std::ostream& operator<<(std::ostream& out, const Pair& pair) {
+    return out << pair.first << between << pair.second;
+  }
+  friend std::istream& operator>>(std::istream& in, Pair& pair) {
+    char found = 0;
+    in >> pair.first >> found >> pair.second;
+    if (found != between || std::min(pair.first, pair.second) < low ||
+        std::max(pair.first, pair.second) > high)
+      in.setstate(std::ios::failbit);
+    return in;
+  }
+};
+using Size = Pair<'x', 16, 16384>;
+
+/// What words can set, with its defaults.
+struct Arguments {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  std::vector<std::optional<std::string>> values;  ///< text by row of parameters()
-  int gpu = -1;
-  std::string size = "1280x720";
-  int width = 1280, height = 720, samples = 4;
-  bool explain = false;
-  std::string look = "surface", colour = "plain";
-  bool flat = false, no_shadow = false, no_grid = false, no_legend = false, plain = false;
-  ViewOptions view;
+  std::vector<std::optional<std::string>> values{parameters().size()};  ///< text by row of parameters()
+  bool explain = false, no_render = false;
+  std::vector<Size> sizes{{1280, 720}};
+  Pair<'/', 1, 99999> shard{1, 1};
+  RunOptions run;  ///< its device and picture are those of every command that opens a scene
+  SoakOptions soak;
+  BenchOptions bench;
+  CompareOptions compare;
+  HardCaseOptions hard;
+  bool hard_cases = false;
+  ReproduceOptions reproduce;
+  std::filesystem::path mesh_file, mesh_out;
+  std::string switches = "pYq1.85o/140";
+  bool json = false;
 };
 
-template <class Names>
-int index_of(const Names& names, const std::string& name, const char* flag) {
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (name == names[i]) return int(i);
-  throw Error("unknown value", fmt::format("{} {}", flag, name),
-              fmt::format("choose from {}", fmt::join(names, ", ")));
-}
+// ------------------------------------------------------------------------------------------------------------
+// kinds of options
 
 // An unset shell variable must not run another experiment than was meant.
 const CLI::Validator not_empty(
@@ -70,295 +92,295 @@ CLI::Validator in_range(T low, T high) {
       fmt::format("[{} .. {}]", low, high));
 }
 
-void add_scene_options(CLI::App& command, SceneArguments& a) {
-  command
-      .add_option("--scene", a.scene,
-                  fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")))
+/// One of these words; as a transform() its number takes its place, which is an enum's value.
+template <class Words>
+CLI::Validator one_of(const Words& words) {
+  const std::string all = fmt::format("{}", fmt::join(words, ", "));
+  return CLI::Validator(
+      [=](std::string& text) {
+        const auto found = std::find(words.begin(), words.end(), text);
+        if (found == words.end()) return fmt::format("must be one of {}, not '{}'", all, text);
+        text = std::to_string(found - words.begin());
+        return std::string();
+      },
+      "");
+}
+
+/// Text, a path, or a list separated by commas.
+template <class T>
+CLI::Option* add(CLI::App& command, const char* flag, T& target, const std::string& help) {
+  CLI::Option* option = command.add_option(flag, target, help)->check(not_empty);
+  if constexpr (!std::is_constructible_v<std::filesystem::path, T>) option->delimiter(',');
+  return target.empty() ? option : option->capture_default_str();
+}
+
+/// A number in a range, or a list of them. A default outside the range is not shown: the help says what it
+/// is.
+template <class T, class N>
+void add(CLI::App& command, const char* flag, T& target, N low, N high, const std::string& help) {
+  CLI::Option* option = command.add_option(flag, target, help)->check(in_range(low, high));
+  bool shown = false;
+  if constexpr (std::is_same_v<T, N>) shown = target >= low && target <= high;
+  if constexpr (std::is_same_v<T, std::vector<N>>) option->delimiter(','), shown = !target.empty();
+  if (shown) option->capture_default_str();
+}
+
+void add_gpu(CLI::App& command, int& gpu) {
+  add(command, "--gpu", gpu, 0, 1023, "which device of tetpbd info (default: the first GPU)");
+}
+
+void add_progress(CLI::App& command, bool& progress) {
+  command.add_flag("--progress", progress, "show progress even if standard error is no terminal");
+}
+
+void add_samples(CLI::App& command, int& samples) {
+  command.add_option("--samples", samples, "of MSAA: 0, 2, 4, 8")
+      ->check(one_of(std::array{"0", "2", "4", "8"}))
       ->capture_default_str();
-  command
-      .add_option("--mesh", a.overrides.mesh,
-                  "mesh in place of the scene's first body (.ply .obj .stl .off .node .ele .msh)")
-      ->check(not_empty);
-  command.add_option("--tetgen", a.overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh")
-      ->check(not_empty);
+}
+
+void add_tetgen(CLI::App& command, std::string& switches) {
+  add(command, "--tetgen", switches, "TetGen switches, pY for the paper's kind of mesh");
+}
+
+void add_overrides(CLI::App& command, SceneOverrides& overrides) {
+  add(command, "--mesh", overrides.mesh, "mesh in place of the scene's first body");
+  add_tetgen(command, overrides.tetgen);
+  command.add_option("--set", overrides.set, "PATH=VALUE for anything else, as in bodies.0.density=500")
+      ->expected(1)
+      ->take_all();
+}
+
+/// Lists of modes, iterations and substeps, every combination of which is run.
+template <class Options>
+void add_sweep(CLI::App& command, Options& options) {
+  add(command, "--modes,--mode", options.modes, "solver modes; node+handles; paper: as published");
+  add(command, "--iterations", options.iterations, 1, 100000, "iterations a substep");
+  add(command, "--substeps", options.substeps, 1, 100000, "substeps a step");
+}
+
+// ------------------------------------------------------------------------------------------------------------
+// commands
+
+// Options that mean the same in every command that opens a scene.
+void add_scene(CLI::App& command, Arguments& a) {
+  add(command, "--scene", a.scene, fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")));
+  add_overrides(command, a.overrides);
   command.add_option("--deform", a.overrides.deform,
                      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
                      "twist:DEGREES, invert-one, coincident, fold");
-  a.values.resize(parameters().size());
   for (std::size_t i = 0; i < parameters().size(); ++i) {
     const Parameter& row = parameters()[i];
-    const auto allowed = choices(row);
-    std::string help = row.help;
-    if (!allowed.empty())
-      help += fmt::format(": {}", fmt::join(allowed, ", "));
-    else if (std::holds_alternative<bool Settings::*>(row.member))
-      help += ": true, false";
-    else
-      help += fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit);
-    command.add_option(flag_name(row), a.values[i], help)->group("Settings")->type_name("VALUE");
+    const auto words = std::holds_alternative<bool Settings::*>(row.member)
+                           ? std::vector<std::string>{"true", "false"}
+                           : choices(row);
+    const std::string allowed =
+        words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
+                      : fmt::format(": {}", fmt::join(words, ", "));
+    command.add_option(flag_name(row), a.values[i], row.help + allowed)
+        ->group("Settings")
+        ->type_name("VALUE");
   }
   std::string solvers;
   for (const SolverPreset& preset : solver_presets())
     solvers += fmt::format("{} ({}), ", preset.name, preset.help);
-  command
-      .add_option("--solver", a.overrides.solver,
-                  "how to solve, by name; other settings go on top: " + solvers +
-                      "auto (tries, and takes what loses least volume within --budget-ms)")
-      ->check(not_empty)
+  add(command, "--solver", a.overrides.solver,
+      "how to solve, by name; other settings go on top: " + solvers +
+          "auto (tries, and takes what loses least volume within --budget-ms)")
       ->type_name("NAME");
-  command
-      .add_option("--budget-ms", a.overrides.budget_ms,
-                  "GPU time a step, for --solver auto (default: a tenth of dt)")
-      ->check(in_range(1e-6, 1e6));
-  command
-      .add_option("--set", a.overrides.set,
-                  "PATH=VALUE for anything else in the scene, as in bodies.0.density=500")
-      ->expected(1)
-      ->take_all()
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command.add_option("--gpu", a.gpu, "which device of tetpbd info (default: the first GPU)")
-      ->check(in_range(0, 1023));
-  command.add_option("--size", a.size, "of images and window, WxH")->capture_default_str();
-  command.add_option("--samples", a.samples, "of MSAA: 0, 2, 4, 8")
-      ->check(CLI::IsMember({0, 2, 4, 8}))
-      ->capture_default_str();
-  command.add_option("--look", a.look, "surface, wire, tets")->capture_default_str()->group("View");
-  command.add_option("--colour", a.colour, "plain, volume, stretch, velocity")
-      ->capture_default_str()
-      ->group("View");
-  command.add_option("--cut", a.view.cut, "tets: show those below this part of the body, 0 .. 1")
-      ->check(in_range(0.0, 1.0))
-      ->group("View");
-  command.add_option("--cut-axis", a.view.cut_axis, "0: x, 1: y, 2: z")->check(in_range(0, 2))->group("View");
-  command.add_flag("--flat", a.flat, "flat normals, made in the geometry shader")->group("View");
-  command.add_flag("--no-shadow", a.no_shadow, "no shadow")->group("View");
-  command.add_flag("--no-grid", a.no_grid, "no lines on the ground")->group("View");
-  command.add_flag("--no-legend", a.no_legend, "no colour bar")->group("View");
-  command.add_flag("--plain", a.plain, "the cheapest picture: flat faces on one colour")->group("View");
+  add(command, "--budget-ms", a.overrides.budget_ms, 1e-6, 1e6,
+      "GPU ms per step, for --solver auto (default: a tenth of dt)");
+  add_gpu(command, a.run.gpu);
   command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches, and stop");
+  add(command, "--size", a.sizes, "of images and window, WxH from 16x16 to 16384x16384")->expected(1);
+  add_samples(command, a.run.samples);
+  CLI::App& view = *command.add_option_group("View");
+  ViewOptions& look = a.run.view;
+  view.add_option("--look", look.look, "surface, wire, tets")->transform(one_of(look_names));
+  view.add_option("--colour", look.colour, "plain, volume, stretch, velocity")
+      ->transform(one_of(colour_names));
+  add(view, "--cut", look.cut, 0.0, 1.0, "tets: show those below this part of the body");
+  add(view, "--cut-axis", look.cut_axis, 0, 2, "0: x, 1: y, 2: z");
+  for (const auto& [flag, member, help] : {std::tuple("--flat", &ViewOptions::smooth_normals, "flat normals"),
+                                           {"--no-shadow", &ViewOptions::shadow, "no shadow"},
+                                           {"--no-grid", &ViewOptions::grid, "no lines on the ground"},
+                                           {"--no-legend", &ViewOptions::legend, "no colour bar"}})
+    view.add_flag_callback(
+        flag, [&look, off = member] { look.*off = false; }, help);
+  view.add_flag_callback(
+      "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
 }
 
-void parse_size(const std::string& size, int& width, int& height) {
-  const std::size_t cross = size.find('x');
-  const auto whole = [](const std::string& text, int& target) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), target);
-    return error == std::errc() && end == text.data() + text.size() && target >= 16 && target <= 16384;
-  };
-  if (cross == std::string::npos || !whole(size.substr(0, cross), width) ||
-      !whole(size.substr(cross + 1), height))
-    throw Error("bad size", "--size " + size, "write WIDTHxHEIGHT, each from 16 to 16384, as in 1280x720");
-}
-
-void parse_shard(const std::string& text, int& shard, int& shards) {
-  int end = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &end) != 2 || end != int(text.size()) ||
-      shard < 1 || shards < shard)
-    throw Error("bad shard", "--shard " + text, "write i/n with i from 1 to n, as in 2/8");
-}
-
-Scene scene_of(SceneArguments& a) {
-  parse_size(a.size, a.width, a.height);
-  a.view.look = Look(index_of(look_names, a.look, "--look"));
-  a.view.colour = Colour(index_of(colour_names, a.colour, "--colour"));
-  if (a.plain) a.view = plain_view(a.view);
-  if (a.flat) a.view.smooth_normals = false;
-  if (a.no_shadow) a.view.shadow = false;
-  if (a.no_grid) a.view.grid = false;
-  if (a.no_legend) a.view.legend = false;
-  for (std::size_t i = 0; i < parameters().size(); ++i)
+Scene open_scene(Arguments& a) {
+  a.run.width = a.sizes[0].first, a.run.height = a.sizes[0].second;
+  a.soak.gpu = a.run.gpu;
+  for (std::size_t i = 0; i < a.values.size(); ++i)
     if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
   return load_scene(a.scene, a.overrides);
 }
 
+void add_run(CLI::App& command, Arguments& a) {
+  add_scene(command, a);
+  RunOptions& run = a.run;
+  add(command, "--steps", run.steps, 1L, most_steps, "steps to take (default: the scene's duration)");
+  add(command, "--out", run.out, "folder for stats.json, stats.csv, frames");
+  add(command, "--png-every", run.png_every, 1L, most_steps, "write frame_NNNNN.png every K steps");
+  add(command, "--video", run.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
+  add(command, "--video-every", run.video_every, 1L, most_steps,
+      "steps per video frame (default: those of 1/30 s)");
+  add(command, "--csv-every", run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
+  add(command, "--measure-every", run.measure_every, 1L, most_steps,
+      "measure errors every K steps and at the end");
+  command.add_flag("--positions", run.positions, "write positions.npy and tets.npy");
+  add_progress(command, run.progress);
+}
+
+void add_soak(CLI::App& command, Arguments& a) {
+  add_scene(command, a);
+  add(command, "--settle", a.soak.settle, 0L, most_steps, "steps before the watch begins");
+  add(command, "--steps", a.soak.steps, 10L, most_steps, "steps watched");
+  add(command, "--out", a.soak.out, "folder for soak.json and soak.csv");
+  add_progress(command, a.soak.progress);
+}
+
+void add_bench(CLI::App& command, Arguments& a) {
+  BenchOptions& bench = a.bench;
+  add(command, "--scenes,--scene", bench.scenes, "scenes, separated by commas");
+  add_sweep(command, bench);
+  add(command, "--constraint-sets", bench.constraint_sets, "sets of kinds joined by +");
+  add(command, "--frames", bench.frames, 1L, 1000000L, "timed frames");
+  add(command, "--warm-up", bench.warm_up, 0L, 1000000L, "frames before them");
+  add(command, "--repeats", bench.repeats, 1, 100, "repetitions; the median counts");
+  add(command, "--most-seconds", bench.most_seconds, 0.01, 1e6,
+      "a repetition ends there with fewer frames; 12 times that bounds the error run");
+  add(command, "--sizes,--size", a.sizes, "of the rendered frames, WxH, separated by commas");
+  add(command, "--pictures", bench.pictures, "plain (flat faces on one colour), full (as run draws it)")
+      ->check(one_of(std::array{"plain", "full"}));
+  add_samples(command, bench.samples);
+  command.add_flag("--no-render", a.no_render, "simulation alone");
+  add_tetgen(command, bench.overrides.tetgen);
+  add_gpu(command, bench.gpu);
+  add(command, "--out", bench.out, "folder for bench.csv and bench.json");
+}
+
+void add_compare(CLI::App& command, Arguments& a) {
+  CompareOptions& compare = a.compare;
+  // Options are taken in the order of these lines, so what follows stands above the defaults of hard cases.
+  auto* hard = command.add_flag_callback(
+      "--hard-cases",
+      [&] {
+        a.hard_cases = true;
+        compare.modes = a.hard.modes, compare.steps = a.hard.steps, compare.out = a.hard.out;
+      },
+      "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
+      "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 % and no tet "
+      "inverted; scenes in which no constraint acts are left out");
+  add(command, "--scene", compare.scene, "a scene");
+  add_overrides(command, compare.overrides);
+  add_sweep(command, compare);
+  add(command, "--omegas", compare.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
+  add(command, "--steps", compare.steps, 1L, most_steps, "steps of each run");
+  add(command, "--budget-ms", compare.budget_ms, 1e-9, 1e9,
+      "print the best setting within so many ms per step");
+  add(command, "--error", compare.error_percent, 1e-9, 1e9,
+      "print the cheapest setting that loses at most this volume, %");
+  command.add_option("--shard", a.shard,
+                     "i/n: only every n-th combination, from the i-th; merge them afterwards");
+  add(command, "--cases", a.hard.cases, "hard cases to run (default: all)")->needs(hard);
+  add(command, "--meshes", a.hard.meshes, "hard cases: bunny, block, tet")->needs(hard);
+  command.add_option("--merge", compare.merge, "folders of finished shards, instead of running");
+  add_gpu(command, compare.gpu);
+  add(command, "--out", compare.out, "folder for compare.csv, .json, .svg, .png");
+}
+
+void add_reproduce(CLI::App& command, Arguments& a) {
+  add(command, "--out", a.reproduce.out, "folder for report.html, figures, tables");
+  command.add_flag("--quick", a.reproduce.quick, "bunny alone, few frames: checks the trends without a GPU");
+  add_gpu(command, a.reproduce.gpu);
+}
+
+void add_mesh(CLI::App& command, Arguments& a) {
+  add(command, "file", a.mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")
+      ->required();
+  add_tetgen(command, a.switches);
+  add(command, "--out", a.mesh_out,
+      "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  command.add_flag("--json", a.json, "print the report as JSON");
+}
+
+Task start_view(Arguments& a) {
+  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
+    throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
+                "start it in a desktop session, or use tetpbd run");
+  return [scene = open_scene(a), a, r = a.run] {
+    return run_window(scene, {a.scene, a.overrides, r.width, r.height, r.samples, r.view});
+  };
+}
+
+template <auto options, auto run>
+Task start_scene(Arguments& a) {
+  return [scene = open_scene(a), chosen = a.*options] { return run(scene, chosen); };
+}
+
+template <auto options, auto run>
+Task start(Arguments& a) {
+  return [chosen = a.*options] { return run(chosen); };
+}
+
+Task start_bench(Arguments& a) {
+  if (a.no_render) a.sizes.clear();
+  for (const Size& size : a.sizes) a.bench.sizes.push_back({size.first, size.second});
+  return start<&Arguments::bench, run_bench>(a);
+}
+
+Task start_compare(Arguments& a) {
+  const auto [i, n] = a.shard;
+  if (i > n) throw Error("bad share", fmt::format("--shard {}/{}", i, n), "count i from 1 to n, as in 2/8");
+  a.compare.shard = i, a.compare.shards = n;
+  if (!a.hard_cases) return start<&Arguments::compare, run_compare>(a);
+  const CompareOptions& c = a.compare;
+  a.hard = {a.hard.cases, a.hard.meshes, c.modes, c.steps, c.gpu, c.out, c.shard, c.shards, c.merge};
+  return start<&Arguments::hard, run_hard_cases>(a);
+}
+
+struct Command {
+  const char *name, *help;
+  void (*add)(CLI::App&, Arguments&);  ///< its options
+  Task (*start)(Arguments&);           ///< what they ask for
+};
+
+const Command commands[] = {
+    {"view", "a window (the default where there is a display)", add_scene, start_view},
+    {"run", "headless: steps a scene, writes frames, video, statistics", add_run,
+     start_scene<&Arguments::run, run_headless>},
+    {"soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down", add_soak,
+     start_scene<&Arguments::soak, run_soak>},
+    {"bench", "fps and ms per step, the paper's protocol and ours", add_bench, start_bench},
+    {"compare", "speed against error over modes x iterations x substeps", add_compare, start_compare},
+    {"reproduce", "the paper's table and figures, measured here, with plots and one report", add_reproduce,
+     start<&Arguments::reproduce, run_reproduce>},
+    {"mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", add_mesh,
+     [](Arguments& a) -> Task {
+       return [a] { return run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json); };
+     }},
+    {"info", "GL version, devices, limits, extensions used, build, licences",
+     [](CLI::App& command, Arguments& a) { add_gpu(command, a.run.gpu); },
+     [](Arguments& a) -> Task { return [gpu = a.run.gpu] { return print_info(gpu); }; }},
+};
+
 }  // namespace
 
 std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) {
-  CLI::App app("tetpbd: Position-Based Dynamics of tetrahedral soft bodies on a GPU");
+  CLI::App app("tetpbd: Position-Based Dynamics of tetrahedral soft bodies on a GPU", "tetpbd");
   app.set_version_flag("--version", TETPBD_VERSION);
-  app.name("tetpbd");
   app.require_subcommand(0, 1);
   app.fallthrough();
   std::string shaders;
   app.add_option(
       "--shaders", shaders,
       "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
-
-  SceneArguments scene;
-  auto* view = app.add_subcommand("view", "a window (the default where there is a display)");
-  add_scene_options(*view, scene);
-
-  auto* run = app.add_subcommand("run", "headless: steps a scene, writes frames, video, statistics");
-  add_scene_options(*run, scene);
-  RunOptions options;
-  run->add_option("--steps", options.steps, "steps to take (default: the scene's duration)")
-      ->check(in_range(1L, 1000000000L));
-  run->add_option("--out", options.out, "folder for stats.json, stats.csv, frames")->capture_default_str();
-  run->add_option("--png-every", options.png_every, "write frame_NNNNN.png every K steps")
-      ->check(in_range(1L, 1000000000L));
-  run->add_option("--video", options.video,
-                  "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
-  run->add_option("--video-every", options.video_every,
-                  "steps a video frame (default: real time at 30 frames a second)")
-      ->check(in_range(1L, 1000000000L));
-  run->add_option("--csv-every", options.csv_every, "a row of stats.csv every K steps, 0: none")
-      ->check(in_range(0L, 1000000000L))
-      ->capture_default_str();
-  run->add_option("--measure-every", options.measure_every,
-                  "measure errors every K steps and at the end; largest values are over the measured steps")
-      ->check(in_range(1L, 1000000000L))
-      ->capture_default_str();
-  run->add_flag("--positions", options.positions, "write positions.npy and tets.npy");
-  run->add_flag("--progress", options.progress, "show progress even if standard error is no terminal");
-
-  auto* soak = app.add_subcommand(
-      "soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down");
-  add_scene_options(*soak, scene);
-  SoakOptions soak_options;
-  soak->add_option("--settle", soak_options.settle, "steps before the watch begins")
-      ->check(in_range(0L, 1000000000L))
-      ->capture_default_str();
-  soak->add_option("--steps", soak_options.steps, "steps watched")
-      ->check(in_range(10L, 1000000000L))
-      ->capture_default_str();
-  soak->add_option("--out", soak_options.out, "folder for soak.json and soak.csv")->capture_default_str();
-  soak->add_flag("--progress", soak_options.progress, "show progress even if standard error is no terminal");
-
-  auto* bench = app.add_subcommand("bench", "fps and ms a step, the paper's protocol and ours");
-  BenchOptions bench_options;
-  std::vector<std::string> bench_sizes = {"1280x720"};
-  bool no_render = false;
-  bench->add_option("--scenes,--scene", bench_options.scenes, "scenes, separated by commas")
-      ->delimiter(',')
-      ->capture_default_str();
-  bench
-      ->add_option("--modes,--mode", bench_options.modes,
-                   "solver modes, node+handles, paper (the pipeline as published)")
-      ->delimiter(',')
-      ->capture_default_str();
-  bench->add_option("--constraint-sets", bench_options.constraint_sets, "sets of kinds joined by +")
-      ->delimiter(',')
-      ->capture_default_str();
-  bench->add_option("--iterations", bench_options.iterations, "iterations a substep")
-      ->delimiter(',')
-      ->check(in_range(1, 100000))
-      ->capture_default_str();
-  bench->add_option("--substeps", bench_options.substeps, "substeps a step")
-      ->delimiter(',')
-      ->check(in_range(1, 100000))
-      ->capture_default_str();
-  bench->add_option("--frames", bench_options.frames, "timed frames")
-      ->check(in_range(1L, 1000000L))
-      ->capture_default_str();
-  bench->add_option("--warm-up", bench_options.warm_up, "frames before them")
-      ->check(in_range(0L, 1000000L))
-      ->capture_default_str();
-  bench->add_option("--repeats", bench_options.repeats, "repetitions; the median counts")
-      ->check(in_range(1, 100))
-      ->capture_default_str();
-  bench
-      ->add_option("--most-seconds", bench_options.most_seconds,
-                   "a repetition ends there with fewer frames; 12 times that bounds the error run")
-      ->check(in_range(0.01, 1e6))
-      ->capture_default_str();
-  bench->add_option("--sizes,--size", bench_sizes, "of the rendered frames, WxH, separated by commas")
-      ->delimiter(',')
-      ->capture_default_str();
-  bench
-      ->add_option("--pictures", bench_options.pictures,
-                   "plain (flat faces on one colour), full (as run draws it), separated by commas")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"plain", "full"}))
-      ->capture_default_str();
-  bench->add_option("--samples", bench_options.samples, "of MSAA: 0, 2, 4, 8")
-      ->check(CLI::IsMember({0, 2, 4, 8}))
-      ->capture_default_str();
-  bench->add_flag("--no-render", no_render, "simulation alone");
-  bench->add_option("--tetgen", bench_options.overrides.tetgen,
-                    "TetGen switches, pY for the paper's kind of mesh");
-  bench->add_option("--gpu", bench_options.gpu, "which device")->check(in_range(0, 1023));
-  bench->add_option("--out", bench_options.out, "folder for bench.csv and bench.json")->capture_default_str();
-
-  auto* compare = app.add_subcommand("compare", "speed against error over modes x iterations x substeps");
-  CompareOptions compare_options;
-  std::string shard = "1/1";
-  compare->add_option("--scene", compare_options.scene, "a scene")->capture_default_str();
-  compare->add_option("--mesh", compare_options.overrides.mesh, "mesh in place of the scene's first body");
-  compare->add_option("--tetgen", compare_options.overrides.tetgen,
-                      "TetGen switches, pY for the paper's kind of mesh");
-  compare->add_option("--set", compare_options.overrides.set, "PATH=VALUE for anything else in the scene")
-      ->expected(1)
-      ->take_all();
-  compare
-      ->add_option("--modes", compare_options.modes,
-                   "solver modes, node+handles, paper (the pipeline as published)")
-      ->delimiter(',')
-      ->capture_default_str();
-  compare->add_option("--iterations", compare_options.iterations, "iterations a substep")
-      ->delimiter(',')
-      ->check(in_range(1, 100000))
-      ->capture_default_str();
-  compare->add_option("--substeps", compare_options.substeps, "substeps a step")
-      ->delimiter(',')
-      ->check(in_range(1, 100000))
-      ->capture_default_str();
-  compare->add_option("--omegas", compare_options.omegas, "over-relaxations (default: the scene's)")
-      ->delimiter(',')
-      ->check(in_range(0.0, 4.0));
-  compare->add_option("--steps", compare_options.steps, "steps of each run")
-      ->check(in_range(1L, 1000000000L))
-      ->capture_default_str();
-  compare
-      ->add_option("--budget-ms", compare_options.budget_ms, "print the best setting within that time a step")
-      ->check(in_range(1e-9, 1e9));
-  compare
-      ->add_option("--error", compare_options.error_percent,
-                   "print the cheapest setting that loses at most this volume, %")
-      ->check(in_range(1e-9, 1e9));
-  compare
-      ->add_option("--shard", shard, "i/n: only every n-th combination, from the i-th; merge them afterwards")
-      ->capture_default_str();
-  HardCaseOptions hard;
-  bool hard_cases = false;
-  auto* hard_flag =
-      compare->add_flag("--hard-cases", hard_cases,
-                        "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
-                        "recovered_at_step on, for the last 5 % of the steps at least, the volume is within "
-                        "1 % and no tet inverted; scenes in which no constraint acts are left out");
-  compare->add_option("--cases", hard.cases, "hard cases to run (default: all)")
-      ->delimiter(',')
-      ->needs(hard_flag);
-  compare->add_option("--meshes", hard.meshes, "hard cases: bunny, block, tet")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->needs(hard_flag);
-  compare->add_option("--merge", compare_options.merge, "folders of finished shards, instead of running");
-  compare->add_option("--gpu", compare_options.gpu, "which device")->check(in_range(0, 1023));
-  compare->add_option("--out", compare_options.out, "folder for compare.csv, .json, .svg, .png")
-      ->capture_default_str();
-
-  auto* reproduce = app.add_subcommand(
-      "reproduce", "the paper's table and figures, measured here, with plots and one report");
-  ReproduceOptions reproduce_options;
-  reproduce->add_option("--out", reproduce_options.out, "folder for report.html, figures, tables")
-      ->capture_default_str();
-  reproduce->add_flag("--quick", reproduce_options.quick,
-                      "bunny alone, few frames: checks the trends without a GPU");
-  reproduce->add_option("--gpu", reproduce_options.gpu, "which device")->check(in_range(0, 1023));
-
-  auto* mesh = app.add_subcommand("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it");
-  std::filesystem::path mesh_file, mesh_out;
-  std::string mesh_switches = "pYq1.85o/140";
-  bool mesh_json = false;
-  mesh->add_option("file", mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")
-      ->required();
-  mesh->add_option("--tetgen", mesh_switches, "TetGen switches")->capture_default_str();
-  mesh->add_option("--out", mesh_out,
-                   "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
-  mesh->add_flag("--json", mesh_json, "print the report as JSON");
-
-  auto* info = app.add_subcommand("info", "GL version, devices, limits, extensions used, build, licences");
-  int info_gpu = -1;
-  info->add_option("--gpu", info_gpu, "which device")->check(in_range(0, 1023));
+  Arguments arguments;
+  for (const Command& row : commands) row.add(*app.add_subcommand(row.name, row.help), arguments);
 
   // Options without a command belong to the window: tetpbd --scene beam.
   if (!words.empty() && words[0].starts_with("--") && words[0] != "--help" && words[0] != "--version" &&
@@ -373,57 +395,17 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
       app.exit(problem, text, text);
       return [text = text.str()] { return std::fputs(text.c_str(), stdout) < 0 ? 1 : 0; };
     }
-    const std::string what = problem.what();
     const auto parsed = app.get_subcommands();
-    const std::string command = parsed.empty() ? "" : " " + parsed[0]->get_name();
-    throw Error(what, "command line", fmt::format("see tetpbd{} --help", command));
+    throw Error(problem.what(), "command line",
+                fmt::format("see tetpbd {}--help", parsed.empty() ? "" : parsed[0]->get_name() + " "));
   }
   if (!shaders.empty()) set_shader_folder(shaders);
-
-  if (*info) return [=] { return print_info(info_gpu); };
-  if (*mesh) return [=] { return run_mesh_command(mesh_file, mesh_switches, mesh_out, mesh_json); };
-  if (*bench) {
-    for (const std::string& size : bench_sizes) {
-      bench_options.sizes.emplace_back();
-      parse_size(size, bench_options.sizes.back()[0], bench_options.sizes.back()[1]);
-    }
-    if (no_render) bench_options.sizes.clear();
-    return [=] { return run_bench(bench_options); };
-  }
-  if (*reproduce) return [=] { return run_reproduce(reproduce_options); };
-  if (*compare) {
-    parse_shard(shard, compare_options.shard, compare_options.shards);
-    if (hard_cases) {
-      if (compare->count("--modes")) hard.modes = compare_options.modes;
-      if (compare->count("--steps")) hard.steps = compare_options.steps;
-      if (compare->count("--out")) hard.out = compare_options.out;
-      hard.gpu = compare_options.gpu, hard.merge = compare_options.merge;
-      hard.shard = compare_options.shard, hard.shards = compare_options.shards;
-      return [=] { return run_hard_cases(hard); };
-    }
-    return [=] { return run_compare(compare_options); };
-  }
-  if (*run || scene.explain) {
-    const Scene opened = scene_of(scene);
-    if (scene.explain) return [opened, gpu = scene.gpu] { return print_explanation(opened, gpu); };
-    options.gpu = scene.gpu;
-    options.width = scene.width, options.height = scene.height, options.samples = scene.samples;
-    options.view = scene.view;
-    return [=] { return run_headless(opened, options); };
-  }
-  if (*soak) {
-    soak_options.gpu = scene.gpu;
-    return [opened = scene_of(scene), soak_options] { return run_soak(opened, soak_options); };
-  }
-  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
-    throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
-                "start it in a desktop session, or use tetpbd run");
-  if (!*view) scene.values.resize(parameters().size());
-  const Scene opened = scene_of(scene);
-  return [=] {
-    return run_window(opened,
-                      {scene.scene, scene.overrides, scene.width, scene.height, scene.samples, scene.view});
-  };
+  if (arguments.explain)
+    return [scene = open_scene(arguments), gpu = arguments.run.gpu] { return print_explanation(scene, gpu); };
+  const Command* chosen = &commands[0];
+  for (const Command& row : commands)
+    if (app.got_subcommand(row.name)) chosen = &row;
+  return chosen->start(arguments);
 }
 
 // Not fmt::print(), which throws where standard error cannot be written.

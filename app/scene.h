@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,12 +20,9 @@ struct BodyDescription {
     glm::dvec3 size{1};  ///< m
     glm::ivec3 cells{1};
   };
+  /// Vertices in a box; heavy ones, a pseudo-random `share`, have `ratio` times the mass of the material.
   struct Box {
     glm::dvec3 low{0}, high{1};  ///< fractions of the body's bounding box
-  };
-  /// Vertices in a box of which some, a pseudo-random `share`, have `ratio` times the mass of the material.
-  struct Heavy {
-    Box box;
     double ratio = 1, share = 1;
   };
   std::string name;
@@ -40,7 +38,7 @@ struct BodyDescription {
   glm::dvec3 velocity{0};  ///< m/s
   glm::dvec3 spin{0};      ///< rad/s about the centre of mass
   std::vector<Box> fixed;  ///< vertices in any of these boxes are fixed
-  std::vector<Heavy> heavy;
+  std::vector<Box> heavy;
   std::string deform = "none";
 };
 
@@ -68,6 +66,8 @@ struct SceneOverrides {
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides = {});
 std::vector<std::string> scene_names();
 
+/// As a scene file says it.
+nlohmann::json body_json(const BodyDescription& body);
 /// Meshes loaded and tetrahedralised, placed, deformed.
 std::shared_ptr<const Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.

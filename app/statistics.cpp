@@ -46,37 +46,7 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
   ordered_json result;
   for (const Parameter& row : parameters())
     std::visit([&](auto member) { result[row.name] = settings.*member; }, row.member);
-  ordered_json bodies = ordered_json::array();
-  for (const BodyDescription& body : scene.bodies) {
-    ordered_json item = {{"name", body.name}};
-    if (body.block)
-      item["block"] = {{"size", vector(body.block->size)},
-                       {"cells", {body.block->cells.x, body.block->cells.y, body.block->cells.z}}};
-    else if (body.tet)
-      for (const glm::dvec3& point : *body.tet) item["tet"].push_back(vector(point));
-    else
-      item["mesh"] = body.mesh.string(), item["tetgen"] = body.tetgen;
-    if (body.scale != glm::dvec3(1)) item["scale"] = vector(body.scale);
-    if (body.height > 0) item["height"] = body.height;
-    item["position"] = vector(body.position);
-    item["rotation"] = vector(body.rotation);
-    item["density"] = body.density;
-    item["velocity"] = vector(body.velocity);
-    item["spin"] = vector(body.spin);
-    item["deform"] = body.deform;
-    if (!body.fixed.empty()) {
-      item["fixed"] = ordered_json::array();
-      for (const auto& box : body.fixed)
-        item["fixed"].push_back({{"low", vector(box.low)}, {"high", vector(box.high)}});
-    }
-    for (const auto& heavy : body.heavy)
-      item["heavy"].push_back({{"low", vector(heavy.box.low)},
-                               {"high", vector(heavy.box.high)},
-                               {"ratio", heavy.ratio},
-                               {"share", heavy.share}});
-    bodies.push_back(item);
-  }
-  result["bodies"] = bodies;
+  for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
   result["obstacles"] = ordered_json::array();
   for (const glm::dvec4& plane : scene.obstacles) {
     const glm::dvec3 normal(plane);

@@ -1,4 +1,4 @@
-// Scenes: JSON with strict checking (docs/scenes.md), and how a scene becomes a model.
+// Scenes: JSON with strict checking (docs/guide.md), and how a scene becomes a model.
 #pragma once
 
 #include <array>

@@ -37,84 +37,58 @@ glm::dvec3 mean_of_neighbours(const std::vector<glm::dvec3>& positions) {
   return positions.size() > 1 ? sum / double(positions.size() - 1) : positions[0];
 }
 
-}  // namespace
-
-Watch& Watch::operator=(Watch&& other) noexcept {
-  vertices = std::move(other.vertices);
-  copy = std::move(other.copy);
-  std::swap(fence, other.fence);
-  return *this;
-}
-
-Watch::~Watch() {
-  if (fence) glDeleteSync(fence);
-}
-
-Watch make_watch(std::vector<std::uint32_t> vertices) {
-  Watch watch;
-  watch.copy = Buffer("watched positions", vertices.size() * sizeof(Position), nullptr, GL_STREAM_READ);
-  watch.vertices = std::move(vertices);
-  return watch;
-}
-
-void request(Watch& watch, const Sim& sim) {
-  if (watch.fence) return;
+// Starts a copy unless one is under way.
+void request(Grab& grab, const Sim& sim) {
+  if (grab.copied.sync()) return;
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   glBindBuffer(GL_COPY_READ_BUFFER, sim.current_positions().id());
-  glBindBuffer(GL_COPY_WRITE_BUFFER, watch.copy.id());
-  for (std::size_t i = 0; i < watch.vertices.size(); ++i)
+  glBindBuffer(GL_COPY_WRITE_BUFFER, grab.copy.id());
+  for (std::size_t i = 0; i < grab.watched.size(); ++i)
     glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER,
-                        GLintptr(watch.vertices[i] * sizeof(Position)), GLintptr(i * sizeof(Position)),
+                        GLintptr(grab.watched[i] * sizeof(Position)), GLintptr(i * sizeof(Position)),
                         sizeof(Position));
-  watch.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  grab.copied = Fence::here();
   glFlush();
 }
 
-std::optional<std::vector<glm::dvec3>> poll(Watch& watch) {
-  if (!watch.fence) return std::nullopt;
-  const GLenum state = glClientWaitSync(watch.fence, 0, 0);
-  if (state != GL_ALREADY_SIGNALED && state != GL_CONDITION_SATISFIED) return std::nullopt;
-  glDeleteSync(watch.fence);
-  watch.fence = nullptr;
-  std::vector<glm::dvec3> positions;
-  for (const Position& p : watch.copy.read_all<Position>())
-    positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  return positions;
-}
+}  // namespace
 
 Grab begin_grab(Sim& sim, const Pick& pick) {
   Grab grab;
   grab.vertex = pick.vertex;
   grab.was_pinned = is_pinned(sim, pick.vertex);
   grab.hit = glm::dvec3(pick.ray.origin) + double(pick.distance) * glm::dvec3(pick.ray.direction);
-  grab.watch = make_watch(with_neighbours(sim.model->rest, pick.vertex));
+  grab.watched = with_neighbours(sim.model->rest, pick.vertex);
+  grab.copy = Buffer("watched positions", grab.watched.size() * sizeof(Position), nullptr, GL_STREAM_READ);
   const auto& rest = sim.model->rest.positions;
   std::vector<glm::dvec3> around;
   double length = 0;
-  for (const std::uint32_t v : grab.watch.vertices) {
+  for (const std::uint32_t v : grab.watched) {
     around.push_back(rest[v]);
     length += glm::length(rest[v] - rest[pick.vertex]);
   }
   if (around.size() > 1) grab.edge = length / double(around.size() - 1);
   grab.resting = glm::length(rest[pick.vertex] - mean_of_neighbours(around));
   pin(sim, pick.vertex);
-  request(grab.watch, sim);  // after pinning: from here on the vertex is where the copy says
+  request(grab, sim);  // after pinning: from here on the vertex is where the copy says
   return grab;
 }
 
 void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
          std::span<const glm::dvec4> planes) {
-  if (const auto now = poll(grab.watch)) {
+  if (const auto copy = take<Position>(grab.copied, grab.copy, "reading a vertex")) {
+    std::vector<glm::dvec3> now;
+    for (const Position& p : *copy) now.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
     if (!grab.placed) {
-      grab.start = grab.position = now->front();
+      grab.start = grab.position = now.front();
       grab.offset = grab.start - grab.hit;
       grab.placed = true;
     }
-    grab.neighbours = mean_of_neighbours(*now);
-    const double apart = glm::length(now->front() - grab.neighbours), limit = edges_at_most * grab.edge;
+    grab.neighbours = mean_of_neighbours(now);
+    const double apart = glm::length(now.front() - grab.neighbours), limit = edges_at_most * grab.edge;
     grab.pace = std::clamp((limit - apart) / std::max(limit - grab.resting, 0.1 * limit), -1.0, 1.0);
   }
-  request(grab.watch, sim);
+  request(grab, sim);
   const glm::dvec3 forward(glm::normalize(camera.target - eye(camera))), origin(cursor.origin),
       along(cursor.direction);
   const double towards = glm::dot(along, forward);

@@ -11,22 +11,6 @@
 
 namespace tetpbd {
 
-/// Current positions of a few vertices, copied on the GPU and read once the copy has arrived.
-struct Watch {
-  Watch() = default;
-  Watch(Watch&& other) noexcept { *this = std::move(other); }
-  Watch& operator=(Watch&& other) noexcept;
-  ~Watch();
-  std::vector<std::uint32_t> vertices;
-  Buffer copy;
-  GLsync fence = nullptr;
-};
-Watch make_watch(std::vector<std::uint32_t> vertices);
-/// Starts a copy unless one is under way.
-void request(Watch& watch, const Sim& sim);
-/// The positions, once, when they have arrived; waits for nothing.
-std::optional<std::vector<glm::dvec3>> poll(Watch& watch);
-
 struct Grab {
   std::uint32_t vertex = 0;
   bool was_pinned = false;           ///< by the user: it stays so when let go
@@ -39,7 +23,9 @@ struct Grab {
   double resting = 0;                ///< m, distance of the vertex from the mean of its neighbours, at rest
   double pace = 1;                   ///< part of the full speed that the body can follow now, -1..1
   glm::dvec3 neighbours{0};          ///< m, their mean a frame or so ago
-  Watch watch;                       ///< the vertex, then its neighbours
+  std::vector<std::uint32_t> watched;  ///< the vertex, then its neighbours
+  Buffer copy;                         ///< of their positions, on its way back
+  Fence copied;
 };
 
 /// Pins the vertex that was picked.

@@ -54,7 +54,10 @@ void move(Session& s, Mouse& mouse, const Event& event, const Rect& view) {
   mouse.x = event.x, mouse.y = event.y;
   constexpr float degrees = 0.35f;  // a window coordinate: a turn of the wrist is half a turn of the view
   if (mouse.drag == Mouse::Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees);
-  if (mouse.drag == Mouse::Drag::pan) pan(s.camera, dx, dy, int(view.height));
+  if (mouse.drag != Mouse::Drag::pan) return;
+  const glm::vec3 before = s.camera.target;
+  pan(s.camera, dx, dy, int(view.height));
+  s.beside += s.camera.target - before;
 }
 
 void wheel(Session& s, const Mouse& mouse, const Event& event, const Rect& view) {

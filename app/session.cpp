@@ -1,6 +1,7 @@
 #include "app/session.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <new>
 
@@ -18,17 +19,17 @@ double seconds_since(Steady::time_point begin) {
 
 // Measurements under way belong to what was before.
 void forget_measurements(Session& s) {
-  s.measured.reset();
-  s.stale = s.loaded.metrics ? s.loaded.metrics->pending.size() : 0;
+  while (s.loaded.metrics && collect(*s.loaded.metrics, true)) {
+  }
   s.volume_error.values.clear();
 }
 
-bool needs_new_bodies(const Session& s) {
-  for (const Parameter& row : parameters())
-    if (row.effect == Effect::restart &&
-        parameter_text(s.loaded.scene.settings, row) != parameter_text(s.loaded.sim.settings, row))
-      return true;
-  return false;
+void forget_non_finite(Session& s) {
+  std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+}
+
+bool differs(const Settings& a, const Settings& b, const Parameter& row) {
+  return std::visit([&](auto member) { return a.*member != b.*member; }, row.member);
 }
 
 void one_step(Session& s) {
@@ -38,6 +39,34 @@ void one_step(Session& s) {
   step(sim);
   if (sim.solver.step_on_cpu && s.measuring) s.step_ms.add(seconds_since(begin) * 1e3);
   s.clock.simulated += sim.settings.dt;
+}
+
+// What a run without a window of as many steps must give, too. Waits for the GPU, so only where somebody
+// reads it.
+void log_state(Session& s) {
+  if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
+}
+
+// Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a step
+// takes minutes. A scene or the command line can.
+void bound_passes(Session& s, Settings& wanted, const Settings& old) {
+  constexpr int most = 10000;
+  if (wanted.iterations <= old.iterations && wanted.substeps <= old.substeps) return;
+  if (long(wanted.iterations) * wanted.substeps <= most) return;
+  int& grown = wanted.iterations > old.iterations ? wanted.iterations : wanted.substeps;
+  grown = std::max(1, most / (wanted.iterations > old.iterations ? wanted.substeps : wanted.iterations));
+  say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
+}
+
+void say_choice(Session& s) {
+  s.budget_ms = s.loaded.choice->budget_ms;
+  say(s, "solver: " + describe(*s.loaded.choice));
+}
+
+bool is_fixed(Session& s, std::uint32_t vertex) {
+  if (s.loaded.sim.model->inverse_masses[vertex] > 0) return false;
+  say(s, fmt::format("vertex {} is fixed by the scene", vertex));
+  return true;
 }
 
 }  // namespace
@@ -73,14 +102,6 @@ bool attempt(Session& s, const std::function<void()>& action) {
   return false;
 }
 
-namespace {
-// What a run without a window of as many steps must give, too. Waits for the GPU, so only where somebody
-// reads it.
-void log_state(Session& s) {
-  if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
-}
-}  // namespace
-
 void play(Session& s, bool playing) {
   if (s.playing == playing) return;
   s.playing = playing;
@@ -101,13 +122,16 @@ void single_step(Session& s) {
 
 void restart(Session& s) {
   let_go(s);
-  if (needs_new_bodies(s)) {
+  const auto made_with_another = [&](const Parameter& row) {
+    return row.effect == Effect::restart && differs(s.loaded.scene.settings, s.loaded.sim.settings, row);
+  };
+  if (std::any_of(parameters().begin(), parameters().end(), made_with_another)) {
     s.loading = LoadRequest{s.loaded.name, s.loaded.overrides, true, true};
     return;
   }
   attempt(s, [&] { reset(s.loaded.sim); });
   s.clock.owed = 0;
-  std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+  forget_non_finite(s);
   forget_measurements(s);
   s.log("reset");
 }
@@ -118,7 +142,7 @@ void go_back(Session& s) {
     if (!check_finite(s.loaded.sim, true)) return;
     if (!return_to_kept(s.loaded.sim)) return say(s, "no good state is kept: reset (R)");
     s.clock.owed = 0;
-    std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+    forget_non_finite(s);
     forget_measurements(s);
     s.log("back {}", s.loaded.sim.steps);
   });
@@ -128,7 +152,7 @@ void watch_state(Session& s) {
   const auto& found = check_finite(s.loaded.sim);
   if (!found && s.told_non_finite) {  // mended by a reset, another scene or a new solver
     s.told_non_finite = false;
-    std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+    forget_non_finite(s);
   }
   if (!found || (s.told_non_finite && !s.playing)) return;
   s.told_non_finite = true;
@@ -137,45 +161,21 @@ void watch_state(Session& s) {
   say(s, error_of(*found).what(), true, true);
 }
 
-namespace {
-// Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a step
-// takes minutes. A scene or the command line can.
-void bound_passes(Session& s, Settings& wanted, const Settings& old) {
-  constexpr long most = 10000;
-  if (long(wanted.iterations) * wanted.substeps <= std::max(most, long(old.iterations) * old.substeps))
-    return;
-  if (wanted.iterations != old.iterations)
-    wanted.iterations = int(std::max(1L, most / wanted.substeps));
-  else
-    wanted.substeps = int(std::max(1L, most / wanted.iterations));
-  say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
-}
-}  // namespace
-
 void change_settings(Session& s, const Settings& asked) {
   const Settings old = s.loaded.sim.settings;
   Settings wanted = asked;
   bound_passes(s, wanted, old);
   attempt(s, [&] {
-    check_settings(wanted, "window");
     apply_settings(s.loaded.sim, wanted);
     for (const Parameter& row : parameters()) {
-      const std::string text = parameter_text(wanted, row);
-      if (text == parameter_text(old, row)) continue;
-      s.log("set {} {}", row.name, text);
+      if (!differs(wanted, old, row)) continue;
+      s.log("set {} {}", row.name, parameter_text(wanted, row));
       if (row.effect == Effect::restart)
         say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
       if (row.effect == Effect::rebuild) s.step_ms.values.clear();
     }
   });
 }
-
-namespace {
-void say_choice(Session& s) {
-  s.budget_ms = s.loaded.choice->budget_ms;
-  say(s, "solver: " + describe(*s.loaded.choice));
-}
-}  // namespace
 
 void finish_choosing(Session& s) {
   s.choosing = false;
@@ -192,10 +192,14 @@ void finish_choosing(Session& s) {
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset();
   s.loaded = std::move(loaded);
-  if (!keep_camera) s.camera = scene_camera(s.loaded.scene, *s.loaded.sim.model, s.aspect);
+  if (!keep_camera) {
+    s.camera = scene_camera(s.loaded.scene, *s.loaded.sim.model, s.aspect);
+    s.beside = glm::vec3(0);
+  }
+  s.centre.reset();
   s.clock.owed = 0;
   s.step_ms.values.clear();
-  std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+  forget_non_finite(s);
   forget_measurements(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim.model->positions.size());
   if (s.loaded.choice) say_choice(s);
@@ -214,28 +218,26 @@ void finish_loading(Session& s) {
 
 // Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
 void frame_body(Session& s) {
-  glm::vec3 low{1e30f}, high{-1e30f};
-  for (const glm::dvec3& p : read_state(s.loaded.sim).positions) {
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
-    low = glm::min(low, glm::vec3(p));
-    high = glm::max(high, glm::vec3(p));
-  }
-  if (low.x > high.x) return;
-  frame_box(s.camera, low, high, s.aspect, 1.35f);
+  const Bounds box = bounds(read_state(s.loaded.sim).positions);
+  frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
+  s.beside = glm::vec3(0);
   s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
 }
 
-namespace {
-bool is_fixed(const Session& s, std::uint32_t vertex) {
-  return !(s.loaded.sim.model->inverse_masses[vertex] > 0);
+bool follow_bodies(Session& s, double elapsed) {
+  if (!s.view.follow) return false;
+  attempt(s, [&] {
+    if (const auto now = poll_centre(s.loaded.renderer)) s.centre = now;
+  });
+  // While the mouse pulls a vertex it aims by the camera, which therefore keeps still.
+  if (!s.centre || s.grab) return false;
+  const glm::vec3 goal = *s.centre + s.beside;
+  follow(s.camera, goal, float(elapsed));
+  return glm::distance(s.camera.target, goal) > 1e-3f * s.camera.distance;
 }
-}  // namespace
 
 void toggle_pin(Session& s, std::uint32_t vertex) {
-  if (is_fixed(s, vertex)) {
-    say(s, fmt::format("vertex {} is fixed by the scene", vertex));
-    return;
-  }
+  if (is_fixed(s, vertex)) return;
   if (is_pinned(s.loaded.sim, vertex)) {
     unpin(s.loaded.sim, vertex);
     s.log("unpin {}", vertex);
@@ -246,10 +248,7 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
 }
 
 void catch_vertex(Session& s, const Pick& pick) {
-  if (is_fixed(s, pick.vertex)) {
-    say(s, fmt::format("vertex {} is fixed by the scene", pick.vertex));
-    return;
-  }
+  if (is_fixed(s, pick.vertex)) return;
   s.grab = begin_grab(s.loaded.sim, pick);
   s.log("grab {}", pick.vertex);
 }
@@ -302,14 +301,8 @@ void measure_frame(Session& s, bool stepped) {
   if (!s.measuring) return;
   if (!s.loaded.metrics) s.loaded.metrics = create_metrics(*sim.model, sim.system);
   Metrics& metrics = *s.loaded.metrics;
-  while (const auto measurement = collect(metrics)) {
-    if (s.stale > 0) {
-      --s.stale;
-      continue;
-    }
-    s.measured = *measurement;
+  while (const auto measurement = collect(metrics))
     s.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
-  }
   // Half the ring of results: with more under way, asking again would wait for the oldest.
   if (stepped && metrics.pending.size() < 8) measure(metrics, sim);
 }

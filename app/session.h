@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <fstream>
 #include <functional>
 #include <optional>
@@ -31,7 +30,7 @@ struct Loaded {
   Sim sim;
   Renderer renderer;
   Picker picker;
-  std::optional<Metrics> metrics;  ///< made when first shown
+  std::optional<Metrics> metrics;      ///< made when first shown
   std::optional<SolverChoice> choice;  ///< made last, by --solver auto or in the window
 };
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene);
@@ -42,8 +41,7 @@ struct Message {
   double since = 0;                         ///< s
 };
 
-/// A line for each event, in the file that TETPBD_WINDOW_LOG names (docs/window.md), for tests and
-/// demonstrations.
+/// A line for each event, in the file that TETPBD_WINDOW_LOG names, for tests and demonstrations.
 struct EventLog {
   std::ofstream file;
   template <class... T>
@@ -94,9 +92,9 @@ struct Session {
   double budget_ms = 0.5;  ///< for the solver auto
   bool choosing = false;   ///< that is asked for
   bool measuring = true;   ///< somebody looks at the measurements
-  std::optional<Measurement> measured;
   bool told_non_finite = false;
-  std::size_t stale = 0;  ///< measurements under way that belong to before a reset
+  std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago
+  glm::vec3 beside{0};              ///< from there to what a following camera looks at, by moving the view
   History frames_per_second, step_ms, volume_error;
   double now = 0;  ///< s since the start
 };
@@ -117,6 +115,8 @@ void finish_loading(Session& session);
 void finish_choosing(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
+/// Leads the camera after the bodies; whether it is still on its way.
+bool follow_bodies(Session& session, double elapsed);
 void toggle_pin(Session& session, std::uint32_t vertex);
 void catch_vertex(Session& session, const Pick& pick);
 void let_go(Session& session);

@@ -6,143 +6,74 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/legend.h"
+
 namespace tetpbd {
 
 namespace {
-
-constexpr ImGuiWindowFlags fixed_window =
-    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing;
 
 void set_look(Session& s, Look look) {
   s.view.look = look;
   s.log("look {}", look_names[std::size_t(look)]);
 }
 
-void begin_fixed(const char* name, const Rect& place) {
+void flip(Session& s, const char* name, bool& value) { s.log("{} {}", name, value = !value); }
+
+constexpr ImGuiWindowFlags plain_window =
+    ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
+
+// A part of the window's layout.
+void begin_part(const char* name, const Rect& place) {
   ImGui::SetNextWindowPos(ImVec2(place.x, place.y));
   ImGui::SetNextWindowSize(ImVec2(place.width, place.height));
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
-  ImGui::Begin(name, nullptr, fixed_window);
-  draw_edge(place, place.x + place.width, place.y);
+  ImGui::Begin(name, nullptr, plain_window | ImGuiWindowFlags_NoBringToFrontOnFocus);
 }
 
-void end_fixed() {
-  ImGui::End();
-  ImGui::PopStyleVar();
-}
-
-// 1, 2 or 5 times a power of ten, not below the value.
-float rounded_up(float value) {
-  const float power = std::pow(10.0f, std::floor(std::log10(std::max(value, 1e-6f))));
-  for (const float step : {1.0f, 2.0f, 5.0f})
-    if (value <= step * power) return step * power;
-  return 10 * power;
-}
-
-struct Range {
-  float low = 0, high = 1;
-};
-
-Range range_of(const History& history, bool is_signed) {
-  float low = 0, high = 0;
-  for (const float v : history.values) low = std::min(low, v), high = std::max(high, v);
-  if (!is_signed) return {0, rounded_up(std::max(high * 1.05f, 1e-3f))};
-  const float most = rounded_up(std::max({-low, high, 0.1f}));
-  return {low < 0 ? -most : 0, high > 0 ? most : 0};
-}
-
-void draw_plot(const char* title, const char* unit, const History& history, bool is_signed, float width) {
+void draw_plot(const char* title, const char* unit, const History& history, float x, float width) {
+  const auto& values = history.values;
+  ImGui::SetCursorPos(ImVec2(x, ImGui::GetStyle().WindowPadding.y));
   ImGui::BeginGroup();
-  ImGui::TextDisabled("%s", title);
-  const float current = history.values.empty() ? 0.0f : history.values.back();
-  const std::string value = history.values.empty() ? std::string()
-                            : is_signed            ? fmt::format("{:+.3f} {}", current, unit)
-                                                   : fmt::format("{:.3g} {}", current, unit);
-  ImGui::SameLine(width - ImGui::CalcTextSize(value.c_str()).x);
-  ImGui::TextUnformatted(value.c_str());
-  const Range range = range_of(history, is_signed);
-  ImGui::PlotLines(fmt::format("##{}", title).c_str(), history.values.data(), int(history.values.size()), 0,
-                   nullptr, range.low, range.high, ImVec2(width, ImGui::GetContentRegionAvail().y));
-  // The scale, in the plot's own corners.
-  ImDrawList* draw = ImGui::GetWindowDrawList();
-  const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
-  const ImU32 grey = ImGui::GetColorU32(ImGuiCol_TextDisabled, 0.85f);
-  const float size = ImGui::GetFontSize() * 0.8f, pad = ImGui::GetStyle().FramePadding.x * 0.6f;
-  draw->AddText(nullptr, size, ImVec2(low.x + pad, low.y + 1), grey, fmt::format("{:g}", range.high).c_str());
-  draw->AddText(nullptr, size, ImVec2(low.x + pad, high.y - size - 1), grey,
-                fmt::format("{:g}", range.low).c_str());
+  ImGui::Text("%s  %.3g %s", title, values.empty() ? 0.0 : double(values.back()), unit);
+  // From 0 on, so that a plot does not magnify what hardly changes.
+  float least = 0, most = 1e-3f;
+  for (const float v : values) least = std::min(least, v), most = std::max(most, v);
+  ImGui::PlotLines(fmt::format("##{}", title).c_str(), values.data(), int(values.size()), 0,
+                   fmt::format("{:.3g} .. {:.3g}", least, most).c_str(), least, most,
+                   ImVec2(width, ImGui::GetContentRegionAvail().y));
   ImGui::EndGroup();
 }
 
 void draw_plots(const Session& s, const Rect& place) {
-  begin_fixed("plots", place);
-  const float gap = 2 * ImGui::GetStyle().ItemSpacing.x;
-  const float width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
-  const bool cpu = bool(s.loaded.sim.solver.step_on_cpu);
-  const ImVec2 start = ImGui::GetCursorPos();
-  draw_plot("frames a second", "fps", s.frames_per_second, false, width);
-  ImGui::SetCursorPos(ImVec2(start.x + width + gap, start.y));
-  draw_plot(cpu ? "CPU time a step" : "GPU time a step", "ms", s.step_ms, false, width);
-  ImGui::SetCursorPos(ImVec2(start.x + 2 * (width + gap), start.y));
-  draw_plot("volume error", "%", s.volume_error, true, width);
-  end_fixed();
+  begin_part("plots", place);
+  const float pad = ImGui::GetStyle().WindowPadding.x, width = (place.width - 4 * pad) / 3;
+  draw_plot("frames per second", "fps", s.frames_per_second, pad, width);
+  draw_plot(s.loaded.sim.solver.step_on_cpu ? "CPU time per step" : "GPU time per step", "ms", s.step_ms,
+            2 * pad + width, width);
+  draw_plot("volume error", "%", s.volume_error, 3 * pad + 2 * width, width);
+  ImGui::End();
 }
 
-std::string short_renderer(const std::string& renderer) {
-  const std::size_t end = renderer.find_first_of("(/");
-  std::string name = renderer.substr(0, end);
-  while (!name.empty() && name.back() == ' ') name.pop_back();
-  return name;
-}
-
-std::string counted(std::size_t count, const char* what) {
-  return count < 10000 ? fmt::format("{} {}", count, what)
-                       : fmt::format("{:.1f}k {}", double(count) / 1000, what);
-}
-
+// What is cut off first in a narrow window stands last.
 void draw_status(const Session& s, const Rect& place) {
   const Sim& sim = s.loaded.sim;
   std::size_t constraints = 0;
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
     if (sim.system.present[k]) constraints += sim.system.lists[k].count();
+  begin_part("status", place);
   const bool slow = s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95;
-  // From the first to be left out where the window is narrow (0 is never).
-  struct Part {
-    int rank;
-    std::string text;
-  };
-  std::vector<Part> parts{
-      {2, short_renderer(s.gl.renderer)},
-      {0, "mode " + sim.settings.mode},
-      {3, counted(sim.model->positions.size(), "vertices")},
-      {1, counted(sim.model->rest.tets.size(), "tets")},
-      {4, counted(constraints, "constraints")},
-      {0, fmt::format("step {}", sim.steps)},
-      {0, fmt::format("{:.3f} s", double(sim.steps) * sim.settings.dt)},
-      {0, !s.playing ? std::string("paused") : fmt::format("{:.2g}x real time", s.clock.factor)}};
-  begin_fixed("status", place);
-  const char* separator = "  \xC2\xB7  ";
-  const auto width = [&] {
-    float sum = 0;
-    for (const Part& part : parts) sum += ImGui::CalcTextSize((part.text + separator).c_str()).x;
-    return sum;
-  };
-  for (int rank = 4; rank > 0 && width() > ImGui::GetContentRegionAvail().x; --rank)
-    std::erase_if(parts, [&](const Part& part) { return part.rank == rank; });
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (i) {
-      ImGui::SameLine(0, 0);
-      ImGui::TextDisabled("%s", separator);
-      ImGui::SameLine(0, 0);
-    }
-    const bool last = i + 1 == parts.size();
-    if (last && slow)
-      ImGui::TextColored(ImVec4(0.72f, 0.33f, 0.05f, 1), "%s", parts[i].text.c_str());
-    else
-      ImGui::TextUnformatted(parts[i].text.c_str());
-  }
-  end_fixed();
+  const std::string speed = s.playing ? fmt::format("{:.2g}x real time", s.clock.factor) : "paused";
+  ImGui::TextColored(slow ? ImVec4(0.72f, 0.33f, 0.05f, 1) : ImGui::GetStyleColorVec4(ImGuiCol_Text), "%s",
+                     speed.c_str());
+  ImGui::SameLine();
+  const char* dot = "\xC2\xB7";
+  const std::string rest = fmt::format(
+      "{0}  step {1}  {0}  {2:.3f} s  {0}  mode {3}  {0}  {4} tets  {0}  {5} vertices  {0}  {6} constraints  "
+      "{0}  {7}",
+      dot, sim.steps, double(sim.steps) * sim.settings.dt, sim.settings.mode, sim.model->rest.tets.size(),
+      sim.model->positions.size(), constraints, s.gl.renderer);
+  ImGui::TextUnformatted(rest.c_str());
+  ImGui::End();
 }
 
 void draw_messages(Session& s, Ui& ui, const Rect& view) {
@@ -151,99 +82,77 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
   const float margin = 14 * ui.scale, width = std::min(view.width - 2 * margin, 560 * ui.scale);
   float top = view.y + margin;
   std::string dismissed;
-  for (std::size_t i = 0; i < s.messages.size(); ++i) {
-    const Message message = s.messages[i];
+  const auto messages = s.messages;  // buttons change them
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    const Message& message = messages[i];
     ImGui::SetNextWindowPos(ImVec2(view.x + margin, top));
     ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(width, view.height));
-    ImGui::PushStyleColor(ImGuiCol_WindowBg,
-                          message.error ? ImVec4(0.995f, 0.925f, 0.905f, 0.97f) : ImVec4(1, 1, 1, 0.93f));
-    ImGui::PushStyleColor(ImGuiCol_Border,
-                          message.error ? ImVec4(0.80f, 0.36f, 0.26f, 0.8f) : ImVec4(0.80f, 0.82f, 0.84f, 1));
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
+    ImGui::PushStyleColor(ImGuiCol_Text, message.error ? ImVec4(0.65f, 0.1f, 0.05f, 1)
+                                                       : ImGui::GetStyleColorVec4(ImGuiCol_Text));
     // By place, not by text: Dear ImGui keeps every window it has ever been told of.
     ImGui::Begin(fmt::format("message {}", i).c_str(), nullptr,
-                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                     ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing);
+                 plain_window | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::PushTextWrapPos(width - ImGui::GetStyle().WindowPadding.x);
+    ImGui::TextUnformatted(message.text.c_str());
+    ImGui::PopTextWrapPos();
+    ImGui::PopStyleColor();
     if (message.error) {
-      ImGui::PushTextWrapPos(width - ImGui::GetStyle().WindowPadding.x);
-      ImGui::TextUnformatted(message.text.c_str());
-      ImGui::PopTextWrapPos();
       if (ImGui::SmallButton("Dismiss")) dismissed = message.text;
       mark(s, ui, "dismiss");
-      if (message.offer_reset) {
-        ImGui::SameLine();
-        if (ImGui::SmallButton("Reset")) restart(s);
-        mark(s, ui, "reset after error");
-        ImGui::SameLine();
-        if (ImGui::SmallButton("Back to the last good state")) go_back(s);
-        mark(s, ui, "back");
-      }
-    } else {
-      ImGui::TextUnformatted(message.text.c_str());
+    }
+    if (message.offer_reset) {
+      ImGui::SameLine();
+      if (ImGui::SmallButton("Reset")) restart(s);
+      mark(s, ui, "reset after error");
+      ImGui::SameLine();
+      if (ImGui::SmallButton("Back to the last good state")) go_back(s);
+      mark(s, ui, "back");
     }
     top += ImGui::GetWindowHeight() + 6 * ui.scale;
     ImGui::End();
-    ImGui::PopStyleVar();
-    ImGui::PopStyleColor(2);
   }
-  if (!dismissed.empty()) {
-    std::erase_if(s.messages, [&](const Message& m) { return m.text == dismissed; });
-    s.log("dismissed");
-  }
+  if (dismissed.empty()) return;
+  std::erase_if(s.messages, [&](const Message& m) { return m.text == dismissed; });
+  s.log("dismissed");
 }
 
-using HelpRows = std::vector<std::pair<const char*, const char*>>;
-
-void help_rows(const char* title, const HelpRows& rows) {
-  float column = 0;
-  for (const auto& row : rows) column = std::max(column, ImGui::CalcTextSize(row.first).x);
+void help_rows(const char* title, const std::vector<std::pair<const char*, const char*>>& rows) {
+  ImGui::TableNextColumn();
   ImGui::TextDisabled("%s", title);
-  for (const auto& [keys, help] : rows) {
-    ImGui::TextColored(ImVec4(0.18f, 0.42f, 0.60f, 1), "%s", keys);
-    ImGui::SameLine(column + 2 * ImGui::GetStyle().ItemSpacing.x);
-    ImGui::TextUnformatted(help);
-  }
+  for (const auto& [keys, help] : rows) ImGui::BulletText("%s: %s", keys, help);
 }
 
-void draw_help(Ui& ui, const Layout& layout) {
-  const float width = layout.view.width + (ui.panels ? layout.panel.width : 0),
-              height = layout.status.y + layout.status.height;
-  ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(24 * ui.scale, 20 * ui.scale));
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 10 * ui.scale);
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
-  ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.99f, 0.99f, 0.995f, 1));
+void draw_help(const Ui& ui) {
+  const ImVec2 whole = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos(ImVec2(whole.x / 2, whole.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
+  ImGui::SetNextWindowSize(ImVec2(std::min(760 * ui.scale, whole.x), 0));
   ImGui::SetNextWindowFocus();
-  ImGui::Begin("help", nullptr,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_AlwaysAutoResize);
-  HelpRows rows;
-  for (const Shortcut& shortcut : shortcuts()) rows.emplace_back(shortcut.shown, shortcut.help);
-  ImGui::BeginGroup();
-  help_rows("Keys", rows);
-  ImGui::EndGroup();
-  ImGui::SameLine(0, 36 * ui.scale);
-  ImGui::BeginGroup();
-  help_rows("Mouse", {{"Left drag", "pull the body, or turn the view beside it"},
-                      {"Right drag", "turn the view"},
-                      {"Middle drag", "move the view (or Shift + drag)"},
-                      {"Wheel", "closer, farther"},
-                      {"Double click", "pin a vertex, or free it (or Ctrl + click)"}});
-  ImGui::Dummy(ImVec2(0, 10 * ui.scale));
-  help_rows("Sliders", {{"Ctrl + click", "type a value"}, {"Hover", "what it means"}});
-  ImGui::EndGroup();
+  ImGui::Begin("help", nullptr, plain_window);
+  std::vector<std::pair<const char*, const char*>> keys;
+  for (const Shortcut& shortcut : shortcuts()) keys.emplace_back(shortcut.shown, shortcut.help);
+  if (ImGui::BeginTable("help", 2)) {
+    help_rows("Keys", keys);
+    help_rows("Mouse", {{"Left drag", "pull the body, or turn the view beside it"},
+                        {"Right drag", "turn the view"},
+                        {"Middle drag", "move the view (or Shift + drag)"},
+                        {"Wheel", "closer, farther"},
+                        {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
+                        {"Ctrl + click on a slider", "type a value"},
+                        {"Hover", "what a setting means"}});
+    ImGui::EndTable();
+  }
   ImGui::End();
-  ImGui::PopStyleColor();
-  ImGui::PopStyleVar(3);
 }
 
 }  // namespace
 
-void draw_edge(const Rect& place, float to_x, float to_y) {
-  ImDrawList* draw = ImGui::GetWindowDrawList();
-  draw->PushClipRectFullScreen();
-  draw->AddLine(ImVec2(place.x, place.y), ImVec2(to_x, to_y), ImGui::GetColorU32(ImGuiCol_Border));
-  draw->PopClipRect();
+void set_style(float scale, float density) {
+  ImGuiStyle& style = ImGui::GetStyle() = ImGuiStyle();
+  ImGui::StyleColorsLight(&style);
+  style.FrameRounding = style.GrabRounding = 3;
+  style.ScaleAllSizes(scale);
+  set_font(*ImGui::GetIO().Fonts, std::floor(14.0f * scale * density));
+  ImGui::GetIO().FontGlobalScale = 1.0f / density;
 }
 
 const std::vector<Shortcut>& shortcuts() {
@@ -262,36 +171,22 @@ const std::vector<Shortcut>& shortcuts() {
          s.log("colour {}", colour_names[std::size_t(s.view.colour)]);
        }},
       {GLFW_KEY_N, 0, 0, "N", "smooth or flat normals",
-       [](Session& s, Ui&) {
-         s.view.smooth_normals = !s.view.smooth_normals;
-         s.log("normals {}", s.view.smooth_normals ? "smooth" : "flat");
-       }},
-      {GLFW_KEY_G, 0, 0, "G", "grid",
-       [](Session& s, Ui&) {
-         s.view.grid = !s.view.grid;
-         s.log("grid {}", s.view.grid);
-       }},
-      {GLFW_KEY_M, 0, 0, "M", "plots", [](Session&, Ui& ui) { ui.plots = !ui.plots; }},
-      {GLFW_KEY_TAB, 0, 0, "Tab", "panels",
-       [](Session& s, Ui& ui) {
-         ui.panels = !ui.panels;
-         s.log("panels {}", ui.panels);
-       }},
+       [](Session& s, Ui&) { flip(s, "normals", s.view.smooth_normals); }},
+      {GLFW_KEY_G, 0, 0, "G", "grid", [](Session& s, Ui&) { flip(s, "grid", s.view.grid); }},
+      {GLFW_KEY_L, 0, 0, "L", "follow the bodies", [](Session& s, Ui&) { flip(s, "follow", s.view.follow); }},
+      {GLFW_KEY_M, 0, 0, "M", "plots", [](Session& s, Ui& ui) { flip(s, "plots", ui.plots); }},
+      {GLFW_KEY_TAB, 0, 0, "Tab", "panels", [](Session& s, Ui& ui) { flip(s, "panels", ui.panels); }},
       {GLFW_KEY_P, 0, 0, "P", "screenshot without panels", [](Session& s, Ui&) { s.take_screenshot = true; }},
       {GLFW_KEY_H, GLFW_KEY_F1, 0, "H, F1", "this help",
-       [](Session& s, Ui& ui) {
-         ui.help = !ui.help;
-         s.log("help {}", ui.help);
-       }},
+       [](Session& s, Ui& ui) { flip(s, "help", ui.help); }},
       {GLFW_KEY_ESCAPE, 0, 0, "Esc", "close help, messages; let go",
        [](Session& s, Ui& ui) {
          if (ui.help)
-           s.log("help false");
+           flip(s, "help", ui.help);
          else if (s.grab)
            let_go(s);
          else
            s.messages.clear();
-         ui.help = false;
        }},
       {GLFW_KEY_Q, 0, GLFW_MOD_CONTROL, "Ctrl + Q", "quit", [](Session& s, Ui&) { s.quit = true; }},
   };
@@ -300,7 +195,7 @@ const std::vector<Shortcut>& shortcuts() {
 
 Layout make_layout(const Ui& ui, float width, float height) {
   Layout layout;
-  const float status = std::round(28 * ui.scale);
+  const float status = std::round(32 * ui.scale);
   const float panel = ui.panels ? std::min(std::round(320 * ui.scale), width * 0.6f) : 0;
   const float plots = ui.panels && ui.plots && height > 360 * ui.scale ? std::round(104 * ui.scale) : 0;
   const float bottom = ui.panels ? std::max(height - status, 1.0f) : height;
@@ -314,23 +209,21 @@ Layout make_layout(const Ui& ui, float width, float height) {
 void draw_ui(Session& s, Ui& ui, const Layout& layout) {
   mark(s, ui, "view", layout.view);
   if (ui.panels) {
-    draw_panel(s, ui, layout.panel);
+    begin_part("panel", layout.panel);
+    draw_panel(s, ui);
+    ImGui::End();
     if (layout.plots.height > 0) draw_plots(s, layout.plots);
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(14 * ui.scale, 5 * ui.scale));
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.925f, 0.932f, 0.940f, 1));
     draw_status(s, layout.status);
-    ImGui::PopStyleColor();
-    ImGui::PopStyleVar();
   }
   draw_messages(s, ui, layout.view);
-  if (ui.help) draw_help(ui, layout);
+  if (ui.help) draw_help(ui);
 }
 
 void draw_busy(const Layout& layout, const std::string& what) {
   const Rect& view = layout.view;
   ImGui::SetNextWindowPos(ImVec2(view.x + view.width / 2, view.y + view.height / 2), ImGuiCond_Always,
                           ImVec2(0.5f, 0.5f));
-  ImGui::Begin("busy", nullptr, fixed_window | ImGuiWindowFlags_AlwaysAutoResize);
+  ImGui::Begin("busy", nullptr, plain_window | ImGuiWindowFlags_AlwaysAutoResize);
   ImGui::Text("%s ...", what.c_str());
   ImGui::End();
 }

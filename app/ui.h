@@ -49,14 +49,13 @@ void draw_ui(Session& session, Ui& ui, const Layout& layout);
 /// Over the view while the window stands still: "loading bunny-drop".
 void draw_busy(const Layout& layout, const std::string& what);
 
-/// Colours, sizes and font for a display of this scale (ui_style.cpp). `density`: framebuffer pixels a window
-/// coordinate.
+/// Sizes and font for a display of this scale. `density`: framebuffer pixels a window coordinate.
 void set_style(float scale, float density);
 
-// Parts of draw_ui
-void draw_panel(Session& session, Ui& ui, const Rect& place);
-/// A hair line from the place's upper left corner, between it and its neighbour.
-void draw_edge(const Rect& place, float to_x, float to_y);
+/// The panel at the right (panels.cpp), and the part of its width that a widget's label takes.
+void draw_panel(Session& session, Ui& ui);
+float label_width();
+std::string label_of(const char* parameter);
 /// Notes where the last widget is, so that a test can find it: "at NAME x y width height".
 void mark(Session& session, Ui& ui, const std::string& name);
 void mark(Session& session, Ui& ui, const std::string& name, const Rect& place);

@@ -36,9 +36,12 @@ std::string last_glfw_error() {
 /// GLFW, a window with a GL 4.3 core context, and Dear ImGui in it.
 struct Desktop {
   GLFWwindow* window = nullptr;
-  float scale = 0, density = 0;  ///< what the style was made for
+  int width = 0, height = 0;  ///< of this frame, in window coordinates
+  float density = 1;          ///< framebuffer pixels a window coordinate: more on some dense displays
+  bool visible = false;       ///< not minimised
+  float style_scale = 0, style_density = 0;  ///< what the style was made for
 
-  Desktop(int width, int height, const std::string& title) {
+  Desktop(int wanted_width, int wanted_height, const std::string& title) {
     if (!glfwInit())
       throw Error("no display", last_glfw_error(), "start it in a desktop session, or use tetpbd run");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
@@ -49,7 +52,7 @@ struct Desktop {
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
     const char* debug = variable("TETPBD_GL_DEBUG");
     glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, debug && std::string(debug) != "0");
-    window = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+    window = glfwCreateWindow(wanted_width, wanted_height, title.c_str(), nullptr, nullptr);
     if (!window) {
       const std::string reason = last_glfw_error();
       glfwTerminate();
@@ -64,7 +67,7 @@ struct Desktop {
       ImGui_ImplGlfw_Shutdown();
       ImGui::DestroyContext();
     }
-    if (window) glfwDestroyWindow(window);
+    glfwDestroyWindow(window);
     glfwTerminate();
   }
   Desktop(const Desktop&) = delete;
@@ -73,7 +76,8 @@ struct Desktop {
 
 Mouse& mouse_of(GLFWwindow* window) { return *static_cast<Mouse*>(glfwGetWindowUserPointer(window)); }
 
-// Installed before Dear ImGui's, which call them and then do their own.
+// Installed before Dear ImGui's, which call them and then do their own. A queue of our own, since Dear ImGui
+// forgets what came and went within a frame, and frames of a software renderer are long.
 void listen(GLFWwindow* window, Mouse& mouse) {
   glfwSetWindowUserPointer(window, &mouse);
   glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
@@ -105,34 +109,21 @@ void start_imgui(GLFWwindow* window) {
   ImGui_ImplOpenGL3_Init("#version 430 core");
 }
 
-/// Sizes of this frame. Framebuffer pixels and window coordinates differ on some dense displays.
-struct Extent {
-  int width = 0, height = 0;  ///< window coordinates
-  float density = 1;          ///< pixels a window coordinate
-  bool visible = false;
-};
-
-Extent extent_of(GLFWwindow* window) {
-  Extent extent;
+// Sizes of this frame, and a style for them: another monitor can have another scale.
+void measure_window(Desktop& d, Ui& ui) {
   int pixels_x = 0, pixels_y = 0;
-  glfwGetWindowSize(window, &extent.width, &extent.height);
-  glfwGetFramebufferSize(window, &pixels_x, &pixels_y);
-  extent.visible = pixels_x > 0 && pixels_y > 0 && extent.width > 0 && extent.height > 0 &&
-                   !glfwGetWindowAttrib(window, GLFW_ICONIFIED);
-  if (extent.visible) extent.density = float(pixels_x) / float(extent.width);
-  return extent;
-}
-
-// Another monitor can have another scale.
-void follow_scale(Desktop& desktop, Ui& ui, const Extent& extent) {
-  float content = 1, vertical = 1;
-  glfwGetWindowContentScale(desktop.window, &content, &vertical);
-  const float scale = std::clamp(content / extent.density, 0.5f, 4.0f);
-  if (scale == desktop.scale && extent.density == desktop.density) return;
-  desktop.scale = scale;
-  desktop.density = extent.density;
-  ui.scale = scale;
-  set_style(scale, extent.density);
+  glfwGetWindowSize(d.window, &d.width, &d.height);
+  glfwGetFramebufferSize(d.window, &pixels_x, &pixels_y);
+  d.visible = pixels_x > 0 && pixels_y > 0 && d.width > 0 && d.height > 0 &&
+              !glfwGetWindowAttrib(d.window, GLFW_ICONIFIED);
+  if (!d.visible) return;
+  d.density = float(pixels_x) / float(d.width);
+  float content = 1;
+  glfwGetWindowContentScale(d.window, &content, nullptr);
+  ui.scale = std::clamp(content / d.density, 0.5f, 4.0f);
+  if (ui.scale == d.style_scale && d.density == d.style_density) return;
+  d.style_scale = ui.scale, d.style_density = d.density;
+  set_style(ui.scale, d.density);
   ImGui_ImplOpenGL3_DestroyFontsTexture();
   ImGui_ImplOpenGL3_CreateFontsTexture();
 }
@@ -145,16 +136,14 @@ struct View {
   ReadBack read_back;
 };
 
-void fit_target(Session& s, View& view, int width, int height) {
-  if (view.target.width == width && view.target.height == height && view.asked_samples == s.samples) return;
-  view.asked_samples = s.samples;
-  attempt(s, [&] {
-    view.target = {};  // first, so that a large window does not need both at once
-    view.target = make_target(width, height, s.samples);
-  });
-}
-
-void draw_view(Session& s, View& view) {
+void draw_view(Session& s, View& view, int width, int height) {
+  if (view.target.width != width || view.target.height != height || view.asked_samples != s.samples) {
+    view.asked_samples = s.samples;
+    attempt(s, [&] {
+      view.target = {};  // first, so that a large window does not need both at once
+      view.target = make_target(width, height, s.samples);
+    });
+  }
   if (!view.target.framebuffer) return;
   Frame frame = frame_of(s.loaded.sim, s.camera, s.view, view.target);
   if (s.grab) frame.grabbed.push_back(s.grab->vertex);
@@ -192,55 +181,50 @@ void begin_imgui_frame() {
   ImGui::NewFrame();
 }
 
-void end_imgui_frame(GLFWwindow* window, const Extent& extent) {
+// Shows the view's image, if there is one, and the panels.
+void end_imgui_frame(const Desktop& d, const Target& target) {
   ImGui::Render();
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
-  glViewport(0, 0, int(float(extent.width) * extent.density), int(float(extent.height) * extent.density));
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-  glfwSwapBuffers(window);
-}
-
-// The first scene loads before there is anything to show, so this says what is going on.
-void show_start(Desktop& desktop, Ui& ui, const std::string& what) {
-  for (int frame = 0; frame < 2; ++frame) {  // the first has no size for what it places
-    glfwPollEvents();
-    const Extent extent = extent_of(desktop.window);
-    if (!extent.visible) return;
-    follow_scale(desktop, ui, extent);
-    begin_imgui_frame();
-    draw_busy(make_layout(ui, float(extent.width), float(extent.height)), what);
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    glClearColor(0.93f, 0.935f, 0.94f, 1);
-    glClear(GL_COLOR_BUFFER_BIT);
-    end_imgui_frame(desktop.window, extent);
-  }
-}
-
-void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, GLFWwindow* window, const Extent& extent) {
-  begin_imgui_frame();
-  Layout layout = make_layout(ui, float(extent.width), float(extent.height));
-  handle_input(s, ui, mouse, layout.view);
-  layout = make_layout(ui, float(extent.width), float(extent.height));  // a key can hide the panels
-  const auto pixels = [&](float length) { return int(std::lround(length * extent.density)); };
-  const int width = std::max(pixels(layout.view.width), 1), height = std::max(pixels(layout.view.height), 1);
-  s.aspect = float(width) / float(height);
-  fit_target(s, view, width, height);
-  draw_view(s, view);
-  take_screenshots(s, view);
-  const bool load_now = s.loading.has_value(), choose_now = s.choosing;
-  draw_ui(s, ui, layout);
-  if (s.loading)
-    draw_busy(layout, "loading " + (s.loading->overrides.mesh.empty() ? s.loading->name
-                                                                      : s.loading->overrides.mesh.string()));
-  else if (s.choosing)
-    draw_busy(layout, "trying ways to solve");
+  const int width = int(float(d.width) * d.density), height = int(float(d.height) * d.density);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glDisable(GL_SCISSOR_TEST);
   glClearColor(0.93f, 0.935f, 0.94f, 1);
   glClear(GL_COLOR_BUFFER_BIT);
-  if (view.target.framebuffer)
-    present(view.target, 0, 0, pixels(float(extent.height)) - height, width, height);
-  end_imgui_frame(window, extent);
+  if (target.framebuffer) present(target, 0, 0, height - target.height);
+  glViewport(0, 0, width, height);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(d.window);
+}
+
+// The first scene loads before there is anything to show, so this says what is going on.
+void show_start(Desktop& d, Ui& ui, const std::string& what) {
+  for (int frame = 0; frame < 2; ++frame) {  // the first has no size for what it places
+    glfwPollEvents();
+    measure_window(d, ui);
+    if (!d.visible) return;
+    begin_imgui_frame();
+    draw_busy(make_layout(ui, float(d.width), float(d.height)), what);
+    end_imgui_frame(d, {});
+  }
+}
+
+void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, const Desktop& d) {
+  begin_imgui_frame();
+  handle_input(s, ui, mouse, make_layout(ui, float(d.width), float(d.height)).view);
+  const Layout layout = make_layout(ui, float(d.width), float(d.height));  // a key can hide the panels
+  const auto pixels = [&](float length) { return std::max(int(std::lround(length * d.density)), 1); };
+  const int width = pixels(layout.view.width), height = pixels(layout.view.height);
+  s.aspect = float(width) / float(height);
+  draw_view(s, view, width, height);
+  take_screenshots(s, view);
+  const bool load_now = s.loading.has_value(), choose_now = s.choosing;
+  draw_ui(s, ui, layout);
+  if (s.loading) {
+    const std::string mesh = s.loading->overrides.mesh.string();
+    draw_busy(layout, "loading " + (mesh.empty() ? s.loading->name : mesh));
+  } else if (s.choosing) {
+    draw_busy(layout, "trying ways to solve");
+  }
+  end_imgui_frame(d, view.target);
   // Their messages have been on the screen for a frame.
   if (load_now)
     finish_loading(s);
@@ -259,47 +243,45 @@ int run_window(const Scene& scene, const WindowOptions& options) {
   if (const char* file = variable("TETPBD_WINDOW_LOG")) s.log.file.open(file);
   s.samples = options.samples;
   s.view = options.view;
+  s.view.follow = true;
   Ui ui;
   ui.mesh = options.overrides.mesh.string();
   start_imgui(desktop.window);
   show_start(desktop, ui, scene.name);
-  const Extent first = extent_of(desktop.window);
-  const Layout layout = make_layout(ui, float(std::max(first.width, 1)), float(std::max(first.height, 1)));
-  s.aspect = layout.view.width / layout.view.height;
+  const Rect first =
+      make_layout(ui, float(std::max(desktop.width, 1)), float(std::max(desktop.height, 1))).view;
+  s.aspect = first.width / first.height;
   take_over(s, load(options.scene_name, options.overrides, scene), false);
 
   View view;
   view.drawn = s.view;
-  bool vsync = !s.vsync;
+  bool vsync = !s.vsync, moving = false;  // moving: the camera
   std::string title;
-  Extent last;
+  int last_width = 0, last_height = 0;
   long frames = 0;
   double before = glfwGetTime(), last_check = before, last_event = before;
   s.log("ready");
   while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !is_busy(mouse) && !s.loading && !s.choosing &&
+    const bool idle = !s.playing && !moving && !is_busy(mouse) && !s.loading && !s.choosing &&
                       view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
-    const Extent extent = extent_of(desktop.window);
-    if (!extent.visible || idle)
+    if (!desktop.visible || idle)
       glfwWaitEventsTimeout(0.1);
     else
       glfwPollEvents();
+    measure_window(desktop, ui);
     s.now = glfwGetTime();
     if (!mouse.events.empty()) last_event = s.now;
     const double elapsed = s.now - before;
     before = s.now;
-    if (!extent.visible) continue;
+    if (!desktop.visible) continue;
     if (!idle && ++frames > 2)
       s.frames_per_second.add(1 / std::max(elapsed, 1e-6));  // the first compile shaders
-    if (extent.width != last.width || extent.height != last.height) {
-      s.log("size {} {}", extent.width, extent.height);
-      last = extent;
-    }
+    if (desktop.width != last_width || desktop.height != last_height)
+      s.log("size {} {}", last_width = desktop.width, last_height = desktop.height);
     if (s.loaded.scene.name != title)
       glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
     if (s.vsync != vsync) glfwSwapInterval((vsync = s.vsync) ? 1 : 0);
-    follow_scale(desktop, ui, extent);
     s.measuring = ui.panels && ui.plots;
     const long steps = s.loaded.sim.steps;
     if (!attempt(s, [&] {
@@ -308,11 +290,12 @@ int run_window(const Scene& scene, const WindowOptions& options) {
           measure_frame(s, s.loaded.sim.steps != steps);
         }))
       ui.plots = false, play(s, false);  // said once, not every frame
+    moving = follow_bodies(s, elapsed);
     if (s.now - last_check > 0.5) {
       last_check = s.now;
       follow_shaders(s);
     }
-    draw_frame(s, ui, view, mouse, desktop.window, extent);
+    draw_frame(s, ui, view, mouse, desktop);
   }
   s.log("closed");
   return 0;

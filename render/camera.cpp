@@ -35,6 +35,10 @@ void zoom(Camera& camera, float factor) {
   camera.distance = std::clamp(camera.distance * factor, 1e-3f, 1e5f);
 }
 
+void follow(Camera& camera, const glm::vec3& goal, float seconds) {
+  camera.target += (goal - camera.target) * (1.0f - std::exp(-seconds / 0.3f));
+}
+
 void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect, float margin) {
   camera.target = 0.5f * (low + high);
   const glm::mat3 rotation(view_matrix(camera));

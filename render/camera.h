@@ -23,6 +23,8 @@ void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees);
 void pan(Camera& camera, float dx, float dy, int viewport_height);
 /// Multiplies the distance; less than 1 comes closer.
 void zoom(Camera& camera, float factor);
+/// Moves the target towards `goal`, two thirds of the way in 0.3 s, in steps of any length.
+void follow(Camera& camera, const glm::vec3& goal, float seconds);
 /// Looks at the middle of a box and goes back until all of it is in view, with `margin` around it (1: none).
 void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect,
                float margin = 1.15f);

@@ -33,6 +33,7 @@ struct ViewOptions {
   bool grid = true;      ///< lines on the ground and on walls
   bool backdrop = true;  ///< sky, ground and walls; without: one colour
   bool legend = true;    ///< drawn with every colour but plain
+  bool follow = false;   ///< the camera goes where the bodies go: poll_centre() says where they are
   double shrink = 0.15;  ///< tets: each towards its centre, 0..1
   double explode = 0;    ///< tets: away from the bodies' centre, as a part of their distance from it
   double cut =

@@ -1,143 +1,132 @@
 #include "render/legend.h"
 
+#include <backends/imgui_impl_opengl3.h>
 #include <fmt/format.h>
 #include <imgui.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
-#include "render/layout.h"
+extern "C" const unsigned char _binary_font_ttf_start[], _binary_font_ttf_end[];
 
 namespace tetpbd {
 
 namespace {
 
-enum Kind { glyph = 0, plain = 1, bar = 2, panel = 3 };
+namespace colour_maps {
+using glm::clamp, glm::mix, glm::vec3, std::abs, std::cos, std::sin;
+#include "shaders/render/colour.glsl"
+}  // namespace colour_maps
 
-using Corners = std::vector<Legend::Corner>;
-const glm::vec4 ink{0.030f, 0.034f, 0.040f, 1.0f};
+constexpr ImU32 ink = IM_COL32(48, 51, 56, 255), paper = IM_COL32(249, 249, 249, 184);
 
-void add_rectangle(Corners& corners, glm::vec2 low, glm::vec2 high, glm::vec2 uv_low, glm::vec2 uv_high,
-                   Kind kind, const glm::vec4& colour) {
-  const auto corner = [&](bool x, bool y) {
-    return Legend::Corner{{x ? high.x : low.x, y ? high.y : low.y},
-                          {x ? uv_high.x : uv_low.x, y ? uv_high.y : uv_low.y, float(kind)},
-                          colour};
+// Makes a context the current one for a while.
+struct Current {
+  ImGuiContext* before = ImGui::GetCurrentContext();
+  explicit Current(ImGuiContext* context) { ImGui::SetCurrentContext(context); }
+  ~Current() { ImGui::SetCurrentContext(before); }
+};
+
+ImU32 scale_colour(const ViewOptions& options, float value, const ColourRange& range) {
+  const glm::vec3 c =
+      colour_maps::scale_colour(int(options.colour), value, float(range.low), float(range.high));
+  const auto code = [](float linear) {
+    return linear <= 0.0031308f ? linear * 12.92f : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
   };
-  for (auto [x, y] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}})
-    corners.push_back(corner(x, y));
+  return ImGui::ColorConvertFloat4ToU32({code(c.x), code(c.y), code(c.z), 1});
 }
 
-float text_width(const Legend& legend, const std::string& text, float scale) {
-  float width = 0;
-  for (char c : text)
-    if (c >= 32 && c < 127) width += legend.font[std::size_t(c - 32)].advance * scale;
-  return width;
-}
-
-void add_text(Corners& corners, const Legend& legend, glm::vec2 at, const std::string& text, float scale,
-              const glm::vec4& colour) {
-  at = glm::round(at);  // the font is a bitmap: between pixels it blurs
-  for (char c : text) {
-    if (c < 32 || c >= 127) continue;
-    const Legend::Glyph& g = legend.font[std::size_t(c - 32)];
-    add_rectangle(corners, at + g.low * scale, at + g.high * scale, g.uv_low, g.uv_high, glyph, colour);
-    at.x += g.advance * scale;
+void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, float height, float line) {
+  const bool speed = options.colour == Colour::velocity;
+  const char* title = speed ? "Speed" : options.colour == Colour::volume ? "Volume error" : "Edge strain";
+  const char* unit = speed ? "m/s" : "% of rest";
+  const ColourRange range = colour_range(options);
+  const int ticks = 5;
+  const float pad = 0.75f * line, bar_width = line,
+              bar_height = std::round(std::min(14.5f * line, 0.42f * height));
+  const auto value = [&](float part) { return range.low + (range.high - range.low) * double(part); };
+  const auto label = [&](int tick) {
+    const double shown = value(float(tick) / (ticks - 1)) * (speed ? 1 : 100);
+    if (std::abs(shown) < 1e-9) return std::string("0");
+    return speed ? fmt::format("{:.3g}", shown) : fmt::format("{:+.3g}", shown);
+  };
+  float width = std::max(ImGui::CalcTextSize(title).x, ImGui::CalcTextSize(unit).x);
+  for (int i = 0; i < ticks; ++i)
+    width = std::max(width, bar_width + pad + ImGui::CalcTextSize(label(i).c_str()).x);
+  const ImVec2 low(std::round(corner.x - width - 2 * pad),
+                   std::round(corner.y - bar_height - 2.25f * line - 2.5f * pad));
+  draw.AddRectFilled(low, corner, paper, 0.6f * line);
+  draw.AddText(ImVec2(low.x + pad, low.y + pad), ink, title);
+  draw.AddText(ImVec2(low.x + pad, low.y + pad + line), ink, unit);
+  const ImVec2 bar(std::round(low.x + pad), std::round(corner.y - 1.25f * pad - bar_height));
+  for (float y = 0; y < bar_height; ++y)
+    draw.AddRectFilled(ImVec2(bar.x, bar.y + y), ImVec2(bar.x + bar_width, bar.y + y + 1),
+                       scale_colour(options, float(value(1 - y / (bar_height - 1))), range));
+  for (int i = 0; i < ticks; ++i) {
+    const ImVec2 tick(bar.x + bar_width,
+                      std::round(bar.y + (bar_height - 1) * (1 - float(i) / float(ticks - 1))));
+    draw.AddRectFilled(tick, ImVec2(tick.x + 0.3f * line, tick.y + 1), ink);
+    draw.AddText(ImVec2(tick.x + pad, std::round(tick.y - line / 2)), ink, label(i).c_str());
   }
 }
 
 }  // namespace
 
-Legend make_legend() {
-  Legend legend;
-  legend.program = Program(
-      "legend", {{GL_VERTEX_SHADER, "render/legend.vert"}, {GL_FRAGMENT_SHADER, "render/legend.frag"}});
-  ImFontAtlas atlas;
-  const ImFont* font = atlas.AddFontDefault();
-  unsigned char* pixels = nullptr;
-  int width = 0, height = 0;
-  atlas.GetTexDataAsAlpha8(&pixels, &width, &height);
-  legend.glyphs = Texture::make("glyphs");
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, width, height, 0, GL_RED, GL_UNSIGNED_BYTE, pixels);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  for (GLenum name : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
-    glTexParameteri(GL_TEXTURE_2D, name, GL_NEAREST);
-  legend.line_height = font->FontSize;
-  for (int c = 32; c < 127; ++c) {
-    const ImFontGlyph* g = font->FindGlyph(ImWchar(c));
-    legend.font.push_back({{g->X0, g->Y0}, {g->X1, g->Y1}, {g->U0, g->V0}, {g->U1, g->V1}, g->AdvanceX});
+ColourRange colour_range(const ViewOptions& options) {
+  if (options.colour == Colour::stretch) return options.stretch;
+  if (options.colour == Colour::velocity) return options.velocity;
+  return options.volume;
+}
+
+void set_font(ImFontAtlas& atlas, float size) {
+  atlas.Clear();
+  ImFontConfig config;
+  config.FontDataOwnedByAtlas = false;
+  // The atlas reads it only, but takes no const.
+  atlas.AddFontFromMemoryTTF(const_cast<unsigned char*>(_binary_font_ttf_start),
+                             int(_binary_font_ttf_end - _binary_font_ttf_start), size, &config);
+}
+
+void Legend::Close::operator()(ImGuiContext* context) const {
+  {
+    const Current current(context);
+    ImGui_ImplOpenGL3_Shutdown();
   }
-  legend.corners_of = VertexArray::make("legend");
+  ImGui::DestroyContext(context);
+}
+
+Legend make_legend() {
+  const Current current(ImGui::GetCurrentContext());
+  Legend legend;
+  legend.context.reset(ImGui::CreateContext());
+  ImGui::SetCurrentContext(legend.context.get());
+  ImGui::GetIO().IniFilename = nullptr;
+  ImGui_ImplOpenGL3_Init("#version 430 core");
   return legend;
 }
 
-void draw_legend(Legend& legend, int width, int height, const LegendText* scale, const std::string& caption) {
-  const float zoom = float(std::max(1, int(std::lround(double(height) / 900.0))));
-  const float line = legend.line_height * zoom, pad = 10 * zoom, margin = 18 * zoom;
-  Corners corners;
-  glm::vec4 box{0.0f};
-  if (scale) {
-    const int ticks = 5;
-    std::vector<std::string> labels;
-    float label_width = 0;
-    for (int i = 0; i < ticks; ++i) {
-      double value = scale->low + (scale->high - scale->low) * i / (ticks - 1);
-      if (std::abs(value) < 1e-9 * (scale->high - scale->low)) value = 0;
-      labels.push_back(scale->is_signed && value != 0 ? fmt::format("{:+.3g}", value)
-                                                      : fmt::format("{:.3g}", value));
-      label_width = std::max(label_width, text_width(legend, labels.back(), zoom));
-    }
-    const std::string heading = scale->title, unit = scale->unit;
-    const float bar_width = 14 * zoom,
-                bar_height = std::round(std::min(190.0f * zoom, 0.42f * float(height)));
-    const float inner = std::max({text_width(legend, heading, zoom), text_width(legend, unit, zoom),
-                                  bar_width + 10 * zoom + label_width});
-    const glm::vec2 size{inner + 2 * pad, bar_height + 2 * line + 3 * pad};
-    const glm::vec2 low{float(width) - margin - size.x, float(height) - margin - size.y}, high = low + size;
-    box = glm::vec4((low + high) * 0.5f, size * 0.5f);
-    add_rectangle(corners, low, high, glm::vec2(0.0f), glm::vec2(0.0f), panel, {0.95f, 0.95f, 0.95f, 0.72f});
-    add_text(corners, legend, low + glm::vec2(pad), heading, zoom, ink);
-    add_text(corners, legend, low + glm::vec2(pad, pad + line), unit, zoom,
-             glm::vec4(0.13f, 0.14f, 0.15f, 1.0f));
-    const glm::vec2 top = glm::round(low + glm::vec2(pad, 2 * pad + 2 * line - line * 0.25f));
-    add_rectangle(corners, top, top + glm::vec2(bar_width, bar_height), {0.0f, 1.0f}, {0.0f, 0.0f}, bar,
-                  glm::vec4(1.0f));
-    for (int i = 0; i < ticks; ++i) {
-      const float y =
-          std::round(top.y + bar_height * (1.0f - float(i) / float(ticks - 1)) - (i == 0 ? zoom : 0));
-      const glm::vec2 tick{top.x + bar_width, y};
-      add_rectangle(corners, tick, tick + glm::vec2(4 * zoom, zoom), glm::vec2(0.0f), glm::vec2(0.0f), plain,
-                    ink);
-      add_text(corners, legend, {tick.x + 10 * zoom, y - line * 0.5f + zoom}, labels[std::size_t(i)], zoom,
-               ink);
-    }
+void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options,
+                 const std::string& caption) {
+  const Current current(legend.context.get());
+  ImGuiIO& io = ImGui::GetIO();
+  const float line = std::round(13.0f * std::max(1.0f, float(viewport.height) / 720.0f)),
+              margin = 1.4f * line;
+  if (line != legend.font_size) {
+    set_font(*io.Fonts, legend.font_size = line);
+    ImGui_ImplOpenGL3_DestroyFontsTexture();
+    ImGui_ImplOpenGL3_CreateFontsTexture();
   }
-  add_text(corners, legend, glm::vec2(margin), caption, zoom, ink);
-  if (corners.empty()) return;
-
-  const std::size_t bytes = corners.size() * sizeof(Legend::Corner);
-  glBindVertexArray(legend.corners_of.id());
-  if (legend.corners.bytes() < bytes) {
-    legend.corners = Buffer("legend corners", 2 * bytes, nullptr, GL_STREAM_DRAW);
-    glBindBuffer(GL_ARRAY_BUFFER, legend.corners.id());
-    const auto attribute = [](GLuint index, GLint count, std::size_t offset) {
-      glEnableVertexAttribArray(index);
-      glVertexAttribPointer(index, count, GL_FLOAT, GL_FALSE, sizeof(Legend::Corner),
-                            reinterpret_cast<const void*>(offset));
-    };
-    attribute(0, 2, offsetof(Legend::Corner, position));
-    attribute(1, 3, offsetof(Legend::Corner, coordinates));
-    attribute(2, 4, offsetof(Legend::Corner, colour));
-  }
-  legend.corners.write(0, bytes, corners.data());
-  legend.program.use();
-  legend.program.set("panel", box);
-  glActiveTexture(GL_TEXTURE0 + UNIT_GLYPHS);
-  glBindTexture(GL_TEXTURE_2D, legend.glyphs.id());
-  glActiveTexture(GL_TEXTURE0);
-  glDrawArrays(GL_TRIANGLES, 0, GLsizei(corners.size()));
+  // Dear ImGui draws to a viewport at the framebuffer's lower left, from the top.
+  const ImVec2 low(float(viewport.x), 0), high(low.x + float(viewport.width), float(viewport.height));
+  io.DisplaySize = ImVec2(high.x, high.y + float(viewport.y));
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui::NewFrame();
+  ImDrawList& draw = *ImGui::GetBackgroundDrawList();
+  if (has_scale(options))
+    draw_scale(draw, options, ImVec2(high.x - margin, high.y - margin), float(viewport.height), line);
+  draw.AddText(ImVec2(low.x + std::round(margin), std::round(margin)), ink, caption.c_str());
+  ImGui::Render();
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
 }
 
 }  // namespace tetpbd

@@ -1,41 +1,36 @@
-// Text and the colour scale over an image, in the window and headless alike.
+// Text and the colour scale over an image, in the window and headless alike, drawn by Dear ImGui.
 #pragma once
 
+#include <memory>
 #include <string>
-#include <vector>
 
-#include "render/handles.h"
+#include "render/frame.h"
+
+struct ImFontAtlas;
+struct ImGuiContext;
 
 namespace tetpbd {
 
-/// What the scale says; `low` and `high` in `unit`.
-struct LegendText {
-  std::string title, unit;
-  double low = 0, high = 1;
-  bool is_signed = false;  ///< ticks carry a plus sign
-};
+/// DejaVu Sans, which travels inside the program, in place of what fonts there are; `size` in pixels.
+void set_font(ImFontAtlas& atlas, float size);
 
+/// A context of Dear ImGui beside the window's. Contexts are current for the whole program: one thread draws.
 struct Legend {
-  struct Corner {
-    glm::vec2 position;
-    glm::vec3 coordinates;
-    glm::vec4 colour;
+  struct Close {
+    void operator()(ImGuiContext* context) const;
   };
-  struct Glyph {
-    glm::vec2 low, high, uv_low, uv_high;
-    float advance;
-  };
-  Program program;
-  Texture glyphs;
-  VertexArray corners_of;
-  Buffer corners;
-  std::vector<Glyph> font;  ///< characters 32..126 at their native size
-  float line_height = 13;
+  std::unique_ptr<ImGuiContext, Close> context;
+  float font_size = 0;
 };
-
-/// Dear ImGui's built-in font (ProggyClean), without any ImGui context.
 Legend make_legend();
-/// The scale at the lower right, if any, and a caption at the upper left; uses the bound view block.
-void draw_legend(Legend& legend, int width, int height, const LegendText* scale, const std::string& caption);
+/// A colour scale at the lower right where the options ask for one, a caption at the upper left.
+void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options,
+                 const std::string& caption);
+
+/// The range that the options' colour shows.
+ColourRange colour_range(const ViewOptions& options);
+inline bool has_scale(const ViewOptions& options) {
+  return options.legend && options.colour != Colour::plain;
+}
 
 }  // namespace tetpbd

@@ -12,20 +12,6 @@ namespace {
 constexpr std::uint32_t none = 0xffffffffu;
 }
 
-Picker& Picker::operator=(Picker&& other) noexcept {
-  kernel = std::move(other.kernel);
-  triangles = std::move(other.triangles);
-  result = std::move(other.result);
-  count = other.count;
-  ray = other.ray;
-  std::swap(fence, other.fence);
-  return *this;
-}
-
-Picker::~Picker() {
-  if (fence) glDeleteSync(fence);
-}
-
 Picker make_picker(const TetMesh& mesh) {
   Picker picker;
   picker.kernel = Program::compute("render/pick.comp");
@@ -37,7 +23,6 @@ Picker make_picker(const TetMesh& mesh) {
 }
 
 void request(Picker& picker, GLuint positions, const Ray& ray) {
-  if (picker.fence) glDeleteSync(picker.fence);
   picker.ray = ray;
   const std::array<std::uint32_t, 3> start{none, none, none};
   picker.result.write(0, sizeof start, start.data());
@@ -54,24 +39,20 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
     glDispatchCompute(stage < 2 ? unsigned(work_groups(picker.count, 128)) : 1, 1, 1);
   }
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  picker.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  picker.answered = Fence::here();
   glFlush();
 }
 
 std::optional<Pick> poll(Picker& picker, bool wait) {
-  if (!picker.fence) return std::nullopt;
-  if (!reached(picker.fence, wait, "picking")) return std::nullopt;
-  glDeleteSync(picker.fence);
-  picker.fence = nullptr;
-  std::array<std::uint32_t, 3> result;
-  picker.result.read(0, sizeof result, result.data());
+  const auto answer = take<std::uint32_t>(picker.answered, picker.result, "picking", wait);
+  if (!answer) return std::nullopt;
   Pick pick;
   pick.ray = picker.ray;
-  pick.hit = result[1] != none;
+  pick.hit = (*answer)[1] != none;
   if (!pick.hit) return pick;
-  pick.distance = std::bit_cast<float>(result[0]);
-  pick.triangle = result[1];
-  pick.vertex = result[2];
+  pick.distance = std::bit_cast<float>((*answer)[0]);
+  pick.triangle = (*answer)[1];
+  pick.vertex = (*answer)[2];
   return pick;
 }
 

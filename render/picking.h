@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "render/camera.h"
-#include "sim/gl/gpu.h"
+#include "render/gl_objects.h"
 #include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
@@ -21,15 +21,11 @@ struct Pick {
 
 /// One question at a time: a new one replaces one that has not been answered.
 struct Picker {
-  Picker() = default;
-  Picker(Picker&& other) noexcept { *this = std::move(other); }
-  Picker& operator=(Picker&& other) noexcept;
-  ~Picker();
   Program kernel;
   Buffer triangles, result;
   std::size_t count = 0;
   Ray ray;
-  GLsync fence = nullptr;
+  Fence answered;
 };
 
 Picker make_picker(const TetMesh& mesh);

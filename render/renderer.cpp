@@ -12,24 +12,51 @@ namespace tetpbd {
 
 namespace {
 
-using Stages = std::vector<Program::Stage>;
+struct Recipe {
+  std::vector<Program::Stage> stages;
+  std::vector<std::string> defines;
+};
 
-Stages body_stages(const char* geometry, bool shadow) {
-  return {{GL_VERTEX_SHADER, "render/body.vert"},
-          {GL_GEOMETRY_SHADER, geometry},
-          {GL_FRAGMENT_SHADER, shadow ? "render/depth.frag" : "render/body.frag"}};
+const Recipe& recipe(const std::string& name) {
+  const auto body = [](const char* geometry, const char* fragment, std::vector<std::string> defines) {
+    return Recipe{{{GL_VERTEX_SHADER, "render/body.vert"},
+                   {GL_GEOMETRY_SHADER, geometry},
+                   {GL_FRAGMENT_SHADER, fragment}},
+                  std::move(defines)};
+  };
+  const auto screen = [](const std::string& file) {
+    return Recipe{{{GL_VERTEX_SHADER, file + ".vert"}, {GL_FRAGMENT_SHADER, file + ".frag"}}, {}};
+  };
+  const auto compute = [](const char* file, std::vector<std::string> defines) {
+    return Recipe{{{GL_COMPUTE_SHADER, file}}, std::move(defines)};
+  };
+  static const std::map<std::string, Recipe> recipes = {
+      {"surface", body("render/surface.geom", "render/body.frag", {})},
+      {"surface shadow", body("render/surface.geom", "render/depth.frag", {"SHADOW"})},
+      {"tets", body("render/tets.geom", "render/body.frag", {})},
+      {"tets shadow", body("render/tets.geom", "render/depth.frag", {"SHADOW"})},
+      {"background", screen("render/background")},
+      {"plane", screen("render/plane")},
+      {"dots", screen("render/dots")},
+      {"normals", compute("render/gather.comp", {"NORMAL"})},
+      {"volume errors", compute("render/gather.comp", {"VOLUME"})},
+      {"stretch errors", compute("render/gather.comp", {})},
+      {"shadow fit", compute("render/shadow_fit.comp", {})}};
+  return recipes.at(name);
 }
 
-Program body_program(bool tets, bool shadow) {
-  return Program(std::string(tets ? "tets" : "surface") + (shadow ? " shadow" : ""),
-                 body_stages(tets ? "render/tets.geom" : "render/surface.geom", shadow), {},
-                 shadow ? std::vector<std::string>{"SHADOW"} : std::vector<std::string>{});
+Program compile(const std::string& name) {
+  return Program(name, recipe(name).stages, {}, recipe(name).defines);
 }
 
-Program screen_program(const std::string& name) {
-  return Program(name, {{GL_VERTEX_SHADER, "render/" + name + ".vert"},
-                        {GL_FRAGMENT_SHADER, "render/" + name + ".frag"}});
+const Program& use(Renderer& renderer, const std::string& name) {
+  if (!renderer.programs.count(name)) renderer.programs[name] = compile(name);
+  const Program& program = renderer.programs.at(name);
+  program.use();
+  return program;
 }
+
+std::string body_program(const Frame& frame) { return frame.options.look == Look::tets ? "tets" : "surface"; }
 
 const VertexGather* gathered_values(const Renderer& renderer, const ViewOptions& options) {
   if (options.look == Look::tets) return nullptr;  // its geometry shader has the whole tetrahedron
@@ -54,39 +81,6 @@ Buffer rest_buffer(const Renderer& renderer) {
   return Buffer("render rest", rest);
 }
 
-// Makes what this frame needs and does not have yet.
-void prepare(Renderer& renderer, const Frame& frame) {
-  const ViewOptions& options = frame.options;
-  const bool tets = options.look == Look::tets;
-  const auto need = [](auto& thing, auto make) {
-    if (!thing) thing = make();
-  };
-  if (wants_rest(renderer, options)) need(renderer.rest, [&] { return rest_buffer(renderer); });
-  if (tets) {
-    need(renderer.tets, [&] { return Buffer("tet indices", renderer.mesh.tets); });
-    need(renderer.tets_body, [] { return body_program(true, false); });
-    if (options.shadow) need(renderer.tets_shadow, [] { return body_program(true, true); });
-  } else {
-    need(renderer.triangles, [&] { return Buffer("surface indices", renderer.mesh.surface); });
-    need(renderer.surface, [] { return body_program(false, false); });
-    if (options.shadow) need(renderer.surface_shadow, [] { return body_program(false, true); });
-    if (options.smooth_normals) need(renderer.normals, [&] { return make_normals(renderer.mesh); });
-    if (options.colour == Colour::volume)
-      need(renderer.volume_errors, [&] { return make_volume_errors(renderer.mesh); });
-    if (options.colour == Colour::stretch)
-      need(renderer.stretch_errors, [&] { return make_stretch_errors(renderer.mesh); });
-  }
-  if ((options.shadow || (tets && options.explode > 0)) && !renderer.shadow.light)
-    make_bounds(renderer.shadow);
-  if (options.shadow && !renderer.shadow.depth) make_map(renderer.shadow);
-  if (options.backdrop) need(renderer.background, [] { return screen_program("background"); });
-  if (frame.ground || !frame.planes.empty()) need(renderer.plane, [] { return screen_program("plane"); });
-  if (!frame.pinned.empty() || !frame.grabbed.empty())
-    need(renderer.dot, [] { return screen_program("dots"); });
-  if ((options.legend && options.colour != Colour::plain) || !frame.caption.empty())
-    need(renderer.legend, make_legend);
-}
-
 float linear(float srgb) {
   return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f);
 }
@@ -100,12 +94,6 @@ glm::vec3 turned(const glm::vec3& colour, float degrees) {
   return glm::clamp(result, glm::vec3(0.02f), glm::vec3(1.0f));
 }
 
-ColourRange colour_range(const ViewOptions& options) {
-  if (options.colour == Colour::stretch) return options.stretch;
-  if (options.colour == Colour::velocity) return options.velocity;
-  return options.volume;
-}
-
 View view_block(const Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   const Viewport& viewport = frame.viewport;
@@ -115,7 +103,6 @@ View view_block(const Renderer& renderer, const Frame& frame) {
       projection_matrix(frame.camera, float(viewport.width) / float(std::max(viewport.height, 1))) * seen;
   view.eye = glm::vec4(eye(frame.camera), options.smooth_normals && options.look != Look::tets ? 1.0f : 0.0f);
   view.right = glm::vec4(seen[0][0], seen[1][0], seen[2][0], options.shadow ? 1.0f : 0.0f);
-  view.pixels = glm::vec4(float(viewport.width), float(viewport.height), 1.0f, 0.0f);
   const ColourRange range = colour_range(options);
   view.colour = glm::vec4(float(options.colour), float(range.low), float(range.high),
                           options.look == Look::wire ? 0.85f : 0.0f);
@@ -158,19 +145,22 @@ void bind_attributes(const Renderer& renderer, const Frame& frame) {
   attribute(ATTRIBUTE_REST, wants_rest(renderer, options) ? renderer.rest.id() : 0, 4, sizeof(glm::vec4), 0);
 }
 
-void draw_bodies(const Renderer& renderer, const Frame& frame, const Program& program) {
-  program.use();
+void draw_bodies(Renderer& renderer, const Frame& frame, const std::string& program) {
+  use(renderer, program);
   glBindVertexArray(renderer.vertex_array.id());
   if (frame.options.look == Look::tets) {
+    if (!renderer.tets) renderer.tets = Buffer("tet indices", renderer.mesh.tets);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.tets.id());
     glDrawElements(GL_LINES_ADJACENCY, GLsizei(renderer.mesh.tets.size() * 4), GL_UNSIGNED_INT, nullptr);
   } else {
+    if (!renderer.triangles) renderer.triangles = Buffer("surface indices", renderer.mesh.surface);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.triangles.id());
     glDrawElements(GL_TRIANGLES, GLsizei(renderer.mesh.surface.size() * 3), GL_UNSIGNED_INT, nullptr);
   }
 }
 
-void draw_shadow_map(const Renderer& renderer, const Frame& frame) {
+void draw_shadow_map(Renderer& renderer, const Frame& frame) {
+  if (!renderer.shadow.depth) make_map(renderer.shadow);
   glBindFramebuffer(GL_FRAMEBUFFER, renderer.shadow.framebuffer.id());
   glViewport(0, 0, Shadow::size, Shadow::size);
   glDisable(GL_SCISSOR_TEST);
@@ -180,21 +170,19 @@ void draw_shadow_map(const Renderer& renderer, const Frame& frame) {
   glDepthFunc(GL_LESS);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
-  draw_bodies(renderer, frame,
-              frame.options.look == Look::tets ? renderer.tets_shadow : renderer.surface_shadow);
+  draw_bodies(renderer, frame, body_program(frame) + " shadow");
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-void draw_plane(const Renderer& renderer, const Frame& frame, const glm::vec4& plane, bool wall) {
+void draw_plane(Renderer& renderer, const Frame& frame, const glm::vec4& plane, bool wall) {
   const bool behind = glm::dot(glm::vec3(plane), eye(frame.camera)) < plane.w;
   const float rest_size = glm::length(renderer.rest_high - renderer.rest_low);
-  renderer.plane.use();
-  renderer.plane.set("plane", plane);
-  renderer.plane.set("centre", frame.camera.target);
-  renderer.plane.set("extent",
-                     wall ? 2.0f * rest_size : std::max(5.0f * frame.camera.distance, 4.0f * rest_size));
-  renderer.plane.set("opacity", (wall ? 0.45f : 1.0f) * (behind ? 0.2f : 1.0f));
-  renderer.plane.set("grid", frame.options.grid ? 1.0f : 0.0f);
+  const Program& program = use(renderer, "plane");
+  program.set("plane", plane);
+  program.set("centre", frame.camera.target);
+  program.set("extent", wall ? 2.0f * rest_size : std::max(5.0f * frame.camera.distance, 4.0f * rest_size));
+  program.set("opacity", (wall ? 0.45f : 1.0f) * (behind ? 0.2f : 1.0f));
+  program.set("grid", frame.options.grid ? 1.0f : 0.0f);
   // What lies on the plane, or penetrates it a little, shall be neither flickering nor hidden from behind.
   glDepthMask(behind || wall ? GL_FALSE : GL_TRUE);
   glEnable(GL_POLYGON_OFFSET_FILL);
@@ -214,12 +202,12 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   glBindVertexArray(renderer.vertex_array.id());
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.dots.id());
   glEnable(GL_PROGRAM_POINT_SIZE);
-  renderer.dot.use();
+  const Program& program = use(renderer, "dots");
   const float scale = std::max(1.0f, float(frame.viewport.height) / 720.0f);
   const auto batch = [&](std::size_t n, std::size_t offset, const glm::vec3& colour, float size) {
     if (!n) return;
-    renderer.dot.set("colour", colour);
-    renderer.dot.set("size", size * scale);
+    program.set("colour", colour);
+    program.set("size", size * scale);
     glDrawElements(GL_POINTS, GLsizei(n), GL_UNSIGNED_INT, reinterpret_cast<const void*>(offset));
   };
   const std::size_t grabbed = frame.grabbed.size();
@@ -228,40 +216,46 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   glDisable(GL_PROGRAM_POINT_SIZE);
 }
 
-LegendText legend_text(const ViewOptions& options) {
-  const ColourRange range = colour_range(options);
-  if (options.colour == Colour::velocity) return {"Speed", "m/s", range.low, range.high, false};
-  return {options.colour == Colour::volume ? "Volume error" : "Edge strain", "% of rest", range.low * 100,
-          range.high * 100, true};
-}
-
 // All values of this frame that come from kernels.
 void compute(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
+  if (wants_rest(renderer, options) && !renderer.rest) renderer.rest = rest_buffer(renderer);
+  const auto gather = [&](VertexGather& values, auto make, const char* program) {
+    if (!values) values = make(renderer.mesh);
+    update(values, use(renderer, program), frame.positions, renderer.rest);
+  };
   if (options.look != Look::tets) {
-    if (options.smooth_normals && renderer.normals) update(renderer.normals, frame.positions, renderer.rest);
-    if (options.colour == Colour::volume && renderer.volume_errors)
-      update(renderer.volume_errors, frame.positions, renderer.rest);
-    if (options.colour == Colour::stretch && renderer.stretch_errors)
-      update(renderer.stretch_errors, frame.positions, renderer.rest);
+    if (options.smooth_normals) gather(renderer.normals, make_normals, "normals");
+    if (options.colour == Colour::volume) gather(renderer.volume_errors, make_volume_errors, "volume errors");
+    if (options.colour == Colour::stretch)
+      gather(renderer.stretch_errors, make_stretch_errors, "stretch errors");
   }
-  if (options.shadow || (options.look == Look::tets && options.explode > 0)) {
-    const float radius =
-        std::max(4.0f * frame.camera.distance, 4.0f * glm::length(renderer.rest_high - renderer.rest_low));
-    fit(renderer.shadow, frame.positions, renderer.mesh.positions.size(),
-        glm::vec4(frame.camera.target, radius));
-  }
+  if (!options.shadow && !options.follow && !(options.look == Look::tets && options.explode > 0)) return;
+  const float radius =
+      std::max(4.0f * frame.camera.distance, 4.0f * glm::length(renderer.rest_high - renderer.rest_low));
+  fit(renderer.shadow, use(renderer, "shadow fit"), frame.positions, renderer.mesh.positions.size(),
+      glm::vec4(frame.camera.target, radius));
+  if (options.follow) request_centre(renderer.shadow);
 }
+
+// However drawing ends, by a shader that does not compile, too.
+struct Afterwards {
+  ~Afterwards() {
+    for (GLenum what :
+         {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL})
+      glDisable(what);
+    for (int unit : {UNIT_SHADOW, UNIT_SHADOW_DEPTH}) glBindSampler(GLuint(unit), 0);
+    glBindVertexArray(0);
+    glUseProgram(0);
+  }
+};
 
 }  // namespace
 
 Renderer make_renderer(TetMesh mesh, std::vector<BodyRange> bodies) {
   Renderer renderer;
-  if (!mesh.positions.empty()) renderer.rest_low = renderer.rest_high = glm::vec3(mesh.positions[0]);
-  for (const glm::dvec3& p : mesh.positions) {
-    renderer.rest_low = glm::min(renderer.rest_low, glm::vec3(p));
-    renderer.rest_high = glm::max(renderer.rest_high, glm::vec3(p));
-  }
+  const Bounds rest = bounds(mesh.positions);
+  renderer.rest_low = glm::vec3(rest.low), renderer.rest_high = glm::vec3(rest.high);
   renderer.mesh = std::move(mesh);
   renderer.bodies = std::move(bodies);
   renderer.vertex_array = VertexArray::make("bodies");
@@ -280,7 +274,7 @@ Renderer make_renderer(const Model& model) {
 
 void draw(Renderer& renderer, const Frame& frame) {
   if (frame.viewport.width < 1 || frame.viewport.height < 1) return;  // a minimised window
-  prepare(renderer, frame);
+  const Afterwards afterwards;
   const ViewOptions& options = frame.options;
   const View view = view_block(renderer, frame);
   renderer.view.write(0, sizeof view, &view);
@@ -307,7 +301,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   glDisable(GL_DEPTH_TEST);
   glBindVertexArray(renderer.empty_array.id());
   if (options.backdrop) {
-    renderer.background.use();
+    use(renderer, "background");
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
 
@@ -327,43 +321,26 @@ void draw(Renderer& renderer, const Frame& frame) {
     for (const glm::vec4& plane : frame.planes) draw_plane(renderer, frame, plane, true);
   }
   glDisable(GL_BLEND);
-  draw_bodies(renderer, frame, options.look == Look::tets ? renderer.tets_body : renderer.surface);
+  draw_bodies(renderer, frame, body_program(frame));
   glEnable(GL_BLEND);
   if (!frame.pinned.empty() || !frame.grabbed.empty()) draw_dots(renderer, frame);
-  glDisable(GL_DEPTH_TEST);
-  const bool scale = options.legend && options.colour != Colour::plain;
-  if (scale || !frame.caption.empty()) {
-    const LegendText text = legend_text(options);
-    draw_legend(*renderer.legend, viewport.width, viewport.height, scale ? &text : nullptr, frame.caption);
-  }
-  glDisable(GL_BLEND);
+  if (!has_scale(options) && frame.caption.empty()) return;
   glDisable(GL_FRAMEBUFFER_SRGB);
-  glDisable(GL_SCISSOR_TEST);
-  for (int unit : {UNIT_SHADOW, UNIT_SHADOW_DEPTH}) glBindSampler(GLuint(unit), 0);
-  glBindVertexArray(0);
-  glUseProgram(0);
+  if (!renderer.legend) renderer.legend = make_legend();
+  draw_legend(*renderer.legend, viewport, options, frame.caption);
+}
+
+std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait) {
+  Shadow& shadow = renderer.shadow;
+  const auto centre =
+      take<glm::vec4>(shadow.centre_copied, shadow.centre, "reading the bodies' middle", wait);
+  return centre ? std::optional(glm::vec3(centre->front())) : std::nullopt;
 }
 
 void reload_shaders(Renderer& renderer) {
-  std::vector<std::pair<Program*, Program>> fresh;
-  const auto again = [&](Program& program, auto make) {
-    if (program) fresh.emplace_back(&program, make());
-  };
-  again(renderer.surface, [] { return body_program(false, false); });
-  again(renderer.surface_shadow, [] { return body_program(false, true); });
-  again(renderer.tets_body, [] { return body_program(true, false); });
-  again(renderer.tets_shadow, [] { return body_program(true, true); });
-  again(renderer.background, [] { return screen_program("background"); });
-  again(renderer.plane, [] { return screen_program("plane"); });
-  again(renderer.dot, [] { return screen_program("dots"); });
-  again(renderer.normals.kernel, [] { return Program::compute("render/normals.comp"); });
-  again(renderer.volume_errors.kernel,
-        [] { return Program::compute("render/vertex_error.comp", {}, {"VOLUME"}); });
-  again(renderer.stretch_errors.kernel, [] { return Program::compute("render/vertex_error.comp"); });
-  again(renderer.shadow.bounds_kernel, [] { return Program::compute("render/bounds.comp"); });
-  again(renderer.shadow.fit_kernel, [] { return Program::compute("render/shadow_fit.comp"); });
-  if (renderer.legend) again(renderer.legend->program, [] { return screen_program("legend"); });
-  for (auto& [program, compiled] : fresh) *program = std::move(compiled);
+  std::map<std::string, Program> fresh;
+  for (const auto& [name, program] : renderer.programs) fresh[name] = compile(name);
+  renderer.programs = std::move(fresh);
 }
 
 }  // namespace tetpbd

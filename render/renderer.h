@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "render/frame.h"
@@ -25,6 +27,7 @@ struct Renderer {
   TetMesh mesh;
   std::vector<BodyRange> bodies;
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
+  std::map<std::string, Program> programs;
   VertexArray vertex_array, empty_array;
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
@@ -33,7 +36,6 @@ struct Renderer {
   VertexGather normals, volume_errors, stretch_errors;
   Shadow shadow;
   std::optional<Legend> legend;
-  Program surface, surface_shadow, tets_body, tets_shadow, background, plane, dot;
 };
 
 Renderer make_renderer(TetMesh mesh, std::vector<BodyRange> bodies = {});
@@ -41,6 +43,9 @@ Renderer make_renderer(const Model& model);
 /// Leaves framebuffer, viewport and scissor at the frame's, depth test, blending and sRGB encoding off.
 /// Storage bindings change.
 void draw(Renderer& renderer, const Frame& frame);
+/// Where the middle of the bodies' bounds was in a frame drawn with ViewOptions::follow, once, a frame or
+/// more later (with `wait`: now).
+std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
 /// Compiles what is in use again, after shaders changed. Throws Error and keeps the old ones if one does not
 /// compile.
 void reload_shaders(Renderer& renderer);

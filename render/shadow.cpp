@@ -1,18 +1,12 @@
 #include "render/shadow.h"
 
 #include <array>
+#include <cstddef>
 #include <utility>
 
 #include "render/layout.h"
 
 namespace tetpbd {
-
-void make_bounds(Shadow& shadow) {
-  shadow.bounds_kernel = Program::compute("render/bounds.comp");
-  shadow.fit_kernel = Program::compute("render/shadow_fit.comp");
-  shadow.bounds = Buffer("bounds", std::vector<std::uint32_t>{~0u, ~0u, ~0u, 0, 0, 0});
-  shadow.light = Buffer("light", sizeof(Light));
-}
 
 void make_map(Shadow& shadow) {
   Texture depth = Texture::make("shadow depth");
@@ -29,34 +23,48 @@ void make_map(Shadow& shadow) {
   const std::array<float, 4> lit{1.0f, 1.0f, 1.0f, 1.0f};
   shadow.compared = Sampler::make("shadow compared");
   shadow.plain = Sampler::make("shadow plain");
-  for (GLuint sampler : {shadow.compared.id(), shadow.plain.id()}) {
-    glSamplerParameteri(sampler, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
-    glSamplerParameteri(sampler, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+  for (const auto& [sampler, filter] :
+       {std::pair{shadow.compared.id(), GL_LINEAR}, {shadow.plain.id(), GL_NEAREST}}) {
+    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+      glSamplerParameteri(sampler, wrap, GL_CLAMP_TO_BORDER);
+    for (GLenum size : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+      glSamplerParameteri(sampler, size, filter);
     glSamplerParameterfv(sampler, GL_TEXTURE_BORDER_COLOR, lit.data());
   }
-  glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
   glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-  glSamplerParameteri(shadow.plain.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glSamplerParameteri(shadow.plain.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 }
 
-void fit(const Shadow& shadow, GLuint positions, std::size_t vertices, const glm::vec4& limit) {
-  shadow.bounds_kernel.use();
-  shadow.bounds_kernel.set("count", unsigned(vertices));
+void fit(Shadow& shadow, const Program& kernel, GLuint positions, std::size_t vertices,
+         const glm::vec4& limit) {
+  if (!shadow.light) {
+    shadow.bounds = Buffer("bounds", std::vector<std::uint32_t>{~0u, ~0u, ~0u, 0, 0, 0});
+    shadow.light = Buffer("light", sizeof(Light));
+    shadow.centre = Buffer("centre", sizeof(glm::vec4), nullptr, GL_STREAM_READ);
+  }
+  kernel.set("count", unsigned(vertices));
+  kernel.set("map_size", float(Shadow::size));
+  kernel.set("limit", limit);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
   shadow.bounds.bind_storage(BIND_RENDER_BOUNDS);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
-  glDispatchCompute(unsigned(work_groups(vertices, 128)), 1, 1);
-
-  shadow.fit_kernel.use();
-  shadow.fit_kernel.set("map_size", float(Shadow::size));
-  shadow.fit_kernel.set("limit", limit);
   shadow.light.bind_storage(BIND_RENDER_FIT);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-  glDispatchCompute(1, 1, 1);
+  for (int stage = 0; stage < 2; ++stage) {
+    kernel.set("stage", stage);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the bounds
+    glDispatchCompute(stage == 0 ? unsigned(work_groups(vertices, 128)) : 1, 1, 1);
+  }
   glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+}
+
+void request_centre(Shadow& shadow) {
+  if (shadow.centre_copied.sync()) return;
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glBindBuffer(GL_COPY_READ_BUFFER, shadow.light.id());
+  glBindBuffer(GL_COPY_WRITE_BUFFER, shadow.centre.id());
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, offsetof(Light, centre), 0,
+                      sizeof(glm::vec4));
+  shadow.centre_copied = Fence::here();
+  glFlush();
 }
 
 }  // namespace tetpbd

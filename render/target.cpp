@@ -88,33 +88,21 @@ Image read_rgba(const Target& target) {
   return flipped(target.width, target.height, rows.data());
 }
 
-void present(const Target& target, GLuint framebuffer, int x, int y, int width, int height) {
+void present(const Target& target, GLuint framebuffer, int x, int y) {
   const GLuint source = resolve(target);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, source);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
   glDisable(GL_SCISSOR_TEST);
-  const bool same = width == target.width && height == target.height;
-  glBlitFramebuffer(0, 0, target.width, target.height, x, y, x + width, y + height, GL_COLOR_BUFFER_BIT,
-                    same ? GL_NEAREST : GL_LINEAR);
+  glBlitFramebuffer(0, 0, target.width, target.height, x, y, x + target.width, y + target.height,
+                    GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-}
-
-ReadBack::~ReadBack() {
-  for (const Slot& slot : pending_) glDeleteSync(slot.fence);
 }
 
 void ReadBack::push(const Target& target) {
   const std::size_t bytes = std::size_t(target.width) * std::size_t(target.height) * 4;
   Slot slot;
-  const auto fits =
-      std::find_if(free_.begin(), free_.end(), [&](const Slot& s) { return s.pixels.bytes() == bytes; });
-  if (fits != free_.end()) {
-    slot = std::move(*fits);
-    free_.erase(fits);
-  } else {
-    free_.clear();  // of another size
-    slot.pixels = Buffer("frame read-back", bytes, nullptr, GL_STREAM_READ);
-  }
+  if (!free_.empty()) slot = std::move(free_.back()), free_.pop_back();
+  if (slot.pixels.bytes() != bytes) slot.pixels = Buffer("frame read-back", bytes, nullptr, GL_STREAM_READ);
   slot.width = target.width;
   slot.height = target.height;
   glBindFramebuffer(GL_READ_FRAMEBUFFER, resolve(target));
@@ -122,7 +110,7 @@ void ReadBack::push(const Target& target) {
   glBindBuffer(GL_PIXEL_PACK_BUFFER, slot.pixels.id());
   glReadPixels(0, 0, target.width, target.height, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-  slot.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  slot.fence = Fence::here();
   glFlush();  // else the fence may never be reached while nobody waits
   pending_.push_back(std::move(slot));
 }
@@ -130,16 +118,8 @@ void ReadBack::push(const Target& target) {
 std::optional<Image> ReadBack::poll(bool wait) {
   if (pending_.empty()) return std::nullopt;
   Slot& slot = pending_.front();
-  if (!reached(slot.fence, wait, "reading a frame back")) return std::nullopt;
-  glBindBuffer(GL_PIXEL_PACK_BUFFER, slot.pixels.id());
-  const void* rows =
-      glMapBufferRange(GL_PIXEL_PACK_BUFFER, 0, GLsizeiptr(slot.pixels.bytes()), GL_MAP_READ_BIT);
-  if (!rows) throw Error("out of memory", "reading a frame back", "use a smaller image", 1);
-  Image image = flipped(slot.width, slot.height, static_cast<const std::uint8_t*>(rows));
-  glUnmapBuffer(GL_PIXEL_PACK_BUFFER);
-  glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-  glDeleteSync(slot.fence);
-  slot.fence = nullptr;
+  if (!reached(slot.fence.sync(), wait, "reading a frame back")) return std::nullopt;
+  const Image image = flipped(slot.width, slot.height, slot.pixels.read_all<std::uint8_t>().data());
   free_.push_back(std::move(slot));
   pending_.pop_front();
   return image;

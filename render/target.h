@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "render/handles.h"
+#include "render/gl_objects.h"
 
 namespace tetpbd {
 
@@ -29,20 +29,13 @@ Target make_target(int width, int height, int samples = 0);
 GLuint resolve(const Target& target);
 /// Waits for the GPU.
 Image read_rgba(const Target& target);
-/// Copies the image to another framebuffer (0: the window) as it is. The window needs no sRGB format for
-/// this.
-void present(const Target& target, GLuint framebuffer, int x, int y, int width, int height);
+/// Copies the image to a corner of another framebuffer (0: the window) as it is. The window needs no sRGB
+/// format for this.
+void present(const Target& target, GLuint framebuffer, int x, int y);
 
 /// Frames on their way to the CPU, in order. None of it waits until asked to.
 class ReadBack {
  public:
-  ReadBack() = default;
-  ReadBack(ReadBack&&) noexcept = default;
-  ReadBack& operator=(ReadBack&& other) noexcept {
-    std::swap(free_, other.free_), std::swap(pending_, other.pending_);
-    return *this;
-  }
-  ~ReadBack();
   /// Starts copying the image. A caller that never polls gets a buffer more for each frame: poll(true) from a
   /// few frames on.
   void push(const Target& target);
@@ -54,7 +47,7 @@ class ReadBack {
   struct Slot {
     Buffer pixels;
     int width = 0, height = 0;
-    GLsync fence = nullptr;
+    Fence fence;
   };
   std::vector<Slot> free_;
   std::deque<Slot> pending_;

@@ -46,6 +46,16 @@ TEST_CASE("camera: pixels, rays and framing agree") {
   CHECK(camera.elevation == 89.0f);
 }
 
+TEST_CASE("camera: it follows as far in many short steps as in one long one") {
+  Camera few, many;
+  const glm::vec3 goal{3, -1, 2};
+  follow(few, goal, 0.4f);
+  for (int i = 0; i < 40; ++i) follow(many, goal, 0.01f);
+  CHECK(glm::distance(few.target, many.target) < 1e-4f);
+  CHECK(glm::distance(few.target, goal) < 0.3f * glm::length(goal));
+  CHECK(glm::distance(few.target, goal) > 0.2f * glm::length(goal));
+}
+
 TEST_CASE("picking: the first triangle along a ray and its nearest corner") {
   Stage stage;
   Picker picker = make_picker(stage.mesh);

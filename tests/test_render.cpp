@@ -355,8 +355,25 @@ TEST_CASE("render: frames come back without waiting, in order, the same") {
   CHECK_FALSE(frames.poll());
   // The window's way: as it is, with nothing converted.
   const Target copy = make_target(width, height);
-  present(stage.target, copy.framebuffer.id(), 0, 0, width, height);
+  present(stage.target, copy.framebuffer.id(), 0, 0);
   CHECK(read_rgba(copy).rgba == expected.back().rgba);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: the middle of the bodies comes back once it is known, with and without a shadow") {
+  Stage stage;
+  stage.image();
+  CHECK_FALSE(poll_centre(stage.renderer, true));  // nobody asked
+  stage.frame.options.follow = true;
+  for (const bool shadow : {false, true}) {
+    stage.frame.options.shadow = shadow;
+    stage.move(0.5, {1, 2, -3});
+    stage.image();
+    const auto centre = poll_centre(stage.renderer, true);
+    REQUIRE(centre);
+    CHECK(glm::distance(*centre, glm::vec3(1, 2, -3)) < 1e-5f);
+    CHECK_FALSE(poll_centre(stage.renderer, true));
+  }
   CHECK(gl_error_count() == 0);
 }
 
@@ -372,7 +389,7 @@ TEST_CASE("render: block layouts are what the shaders see") {
     glGetProgramResourceiv(program.id(), GL_UNIFORM_BLOCK, index, 1, &property, 1, nullptr, &bytes);
     return std::size_t(bytes);
   };
-  CHECK(block_bytes(stage.renderer.surface, "ViewBlock") == sizeof(View));
-  CHECK(block_bytes(stage.renderer.surface, "LightBlock") == sizeof(Light));
+  CHECK(block_bytes(stage.renderer.programs.at("surface"), "ViewBlock") == sizeof(View));
+  CHECK(block_bytes(stage.renderer.programs.at("surface"), "LightBlock") == sizeof(Light));
   CHECK(gl_error_count() == 0);
 }

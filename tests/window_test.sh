@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Drives the real window under Xvfb with real clicks, drags and keys. What it did is read from the event log that
-# TETPBD_WINDOW_LOG names (docs/window.md); "at NAME x y width height" lines there say where widgets are.
+# TETPBD_WINDOW_LOG names; "at NAME x y width height" lines there say where widgets are.
 # Usage: window_test.sh PROGRAM SHADERS FOLDER
 set -uo pipefail
 if [[ ${1:-} != --inside ]]; then
@@ -111,7 +111,7 @@ key Right; await '^step 2$'
 click step; await '^step 3$'
 click reset; await '^reset'
 key s; await '^step 1$'
-click play; await '^play'; await '^running [1-9]'
+click play; await '^play'; await '^running ([4-9]|[1-9][0-9])'
 key space; await '^pause'
 
 # ---------------------------------------------------------------------------------- the same bits as without a window
@@ -149,10 +149,18 @@ shot panels.png
 # ---------------------------------------------------------------------------------------------------------------- view
 for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
 for colour in volume stretch velocity plain; do key c; await "^colour $colour"; done
-key n; await '^normals flat'
-key n; await '^normals smooth'
+key n; await '^normals false'
+key n; await '^normals true'
 key g; await '^grid false'
 key g; await '^grid true'
+key l; await '^follow false'
+key l; await '^follow true'
+click "section Solver" 0.1; sleep 0.5  # out of the way
+click grid 0.1; await '^grid false'
+click grid 0.1; await '^grid true'
+click "sky and ground" 0.1; await '^sky and ground false'
+click "sky and ground" 0.1; await '^sky and ground true'
+click "section Solver" 0.1; sleep 0.5
 key h; await '^help true'; sleep 1; shot help.png
 differ panels.png help.png 20000 "the help overlay"
 key Escape; await '^help false'; pause_for_frame

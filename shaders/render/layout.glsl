@@ -3,8 +3,7 @@
 // own buffers before it dispatches.
 #define BIND_RENDER_POSITIONS 0
 #define BIND_RENDER_REST 1
-#define BIND_RENDER_VERTICES 2  // which vertices a gather is for: those of the surface
-#define BIND_RENDER_OFFSETS 3   // where a vertex's items begin; one more at the end
+#define BIND_RENDER_OFFSETS 3  // where a vertex's items begin; one more at the end
 #define BIND_RENDER_ITEMS 4
 #define BIND_RENDER_VALUES 5
 #define BIND_RENDER_BOUNDS 6
@@ -17,7 +16,6 @@
 // Texture units.
 #define UNIT_SHADOW 0        // compared by the sampler
 #define UNIT_SHADOW_DEPTH 1  // the same texture as plain depth
-#define UNIT_GLYPHS 2
 // Vertex attributes.
 #define ATTRIBUTE_HIGH 0
 #define ATTRIBUTE_LOW 1
@@ -37,7 +35,6 @@ struct View {
   mat4 camera;                  // world to clip space
   vec4 eye;                     // w: 1 with smooth normals, 0 with flat ones
   vec4 right;                   // of the camera, for the light beside it; w: 1 with shadows
-  vec4 pixels;                  // viewport width and height; z: size of a pixel's text; w: unused
   vec4 colour;                  // COLOUR_..., low and high end of the range; w: edge opacity of the wire view
   vec4 tets;                    // shrink 0..1, explode >= 0, cut 0..1, axis of the cut 0..2
   vec4 rest_low;                // bounds of the rest shape

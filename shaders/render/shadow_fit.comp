@@ -1,15 +1,48 @@
-// The shadow map's projection around the bodies' bounds. Its size goes in steps and its centre by whole texels, so that
-// shadow edges do not crawl while a body moves.
+// The shadow map's projection around the bodies' bounds. Stage 0: least and greatest x, y, z of all finite positions, as
+// integers of the same order, since minimum and maximum of integers are atomic and do not depend on the order of
+// threads. Stage 1, one thread: the projection. Its size goes in steps and its centre by whole texels, so that shadow
+// edges do not crawl while a body moves.
+#include "layout.glsl"
 #include "render/view.glsl"
-layout(local_size_x = 1) in;
+layout(local_size_x = 128) in;
+layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_RENDER_BOUNDS) buffer Bounds { uint bounds[6]; };
 layout(std430, binding = BIND_RENDER_FIT) writeonly buffer Fit { Light fitted; };
+uniform uint count;
+uniform int stage;
 uniform float map_size;  // texels
 uniform vec4 limit;      // centre and radius of what is worth a shadow
 
+shared uint low_bits[3], high_bits[3];
+
+uint ordered(float x) {
+  uint bits = floatBitsToUint(x);
+  return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
+}
 float decoded(uint bits) { return uintBitsToFloat((bits & 0x80000000u) != 0u ? bits & 0x7fffffffu : ~bits); }
 
-void main() {
+void find_bounds(uint i, uint lane) {
+  if (lane < 3u) {
+    low_bits[lane] = 0xffffffffu;
+    high_bits[lane] = 0u;
+  }
+  barrier();
+  if (i < count) {
+    vec3 p = positions[i].high;
+    if (finite(p))
+      for (int axis = 0; axis < 3; ++axis) {
+        atomicMin(low_bits[axis], ordered(p[axis]));
+        atomicMax(high_bits[axis], ordered(p[axis]));
+      }
+  }
+  barrier();
+  if (lane < 3u) {
+    atomicMin(bounds[lane], low_bits[lane]);
+    atomicMax(bounds[3u + lane], high_bits[lane]);
+  }
+}
+
+void fit_light() {
   vec3 low = limit.xyz, high = limit.xyz;
   if (bounds[0] <= bounds[3]) {
     low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w, limit.xyz + limit.w);
@@ -32,4 +65,9 @@ void main() {
   fitted.matrix = transpose(mat4(row0, row1, row2, vec4(0.0, 0.0, 0.0, 1.0)));
   fitted.centre = vec4(centre, texel);
   fitted.extent = vec4(2.0 * depth, across, 0.0, 0.0);
+}
+
+void main() {
+  if (stage == 0) find_bounds(gl_GlobalInvocationID.x, gl_LocalInvocationIndex);
+  else if (gl_GlobalInvocationID.x == 0u) fit_light();
 }

@@ -1,23 +1,8 @@
 // A tetrahedron as four faces, shrunk towards its centre, or nothing when it is cut away or not finite. The cut is by
 // the rest shape, so that a moving tetrahedron does not flicker through it.
-#include "render/view.glsl"
 layout(lines_adjacency) in;
 layout(triangle_strip, max_vertices = 12) out;
-
-in Corner {
-  vec3 position;
-  vec3 normal;
-  float value;
-  vec4 rest;
-} corner[];
-
-out Point {
-  vec3 position;
-  vec3 normal;
-  vec3 edge;
-  float value;
-  flat vec3 albedo;
-} point;
+#include "render/faces.glsl"
 
 float volume(vec3 a, vec3 b, vec3 c, vec3 d) { return dot(cross(b - a, c - a), d - a) / 6.0; }
 
@@ -59,20 +44,7 @@ void main() {
   for (int f = 0; f < 4; ++f) {
     vec3 area = cross(p[faces[f].y] - p[faces[f].x], p[faces[f].z] - p[faces[f].x]);
     vec3 normal = area / max(length(area), 1e-30);
-    for (int i = 0; i < 3; ++i) {
-      vec3 position = p[faces[f][i]];
-#ifdef SHADOW
-      gl_Position = light.matrix * vec4(position, 1.0);
-#else
-      gl_Position = view.camera * vec4(position, 1.0);
-      point.position = position;
-      point.normal = normal;
-      point.edge = vec3(float(i == 0), float(i == 1), float(i == 2));
-      point.value = value;
-      point.albedo = albedo;
-#endif
-      EmitVertex();
-    }
+    for (int i = 0; i < 3; ++i) emit(i, p[faces[f][i]], normal, value, albedo);
     EndPrimitive();
   }
 }

@@ -1,9 +1,11 @@
-// Move-only GL names that have no size of their own: vertex arrays, textures, renderbuffers, framebuffers,
-// samplers.
+// Move-only GL names that have no size of their own (vertex arrays, textures, renderbuffers, framebuffers,
+// samplers), and how values that the GPU wrote come back without waiting.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "sim/gl/gpu.h"
 
@@ -14,12 +16,12 @@ enum class Named { vertex_array, texture, renderbuffer, framebuffer, sampler };
 /// Made by `make`, which leaves the object bound (a name is an object only once it was bound, and only then
 /// has a label).
 template <Named kind>
-class Handle {
+class GlObject {
  public:
-  Handle() = default;
-  static Handle make(const std::string& label) {
-    Handle handle;
-    GLuint& id = handle.id_;
+  GlObject() = default;
+  static GlObject make(const std::string& label) {
+    GlObject object;
+    GLuint& id = object.id_;
     GLenum space = GL_TEXTURE;
     if constexpr (kind == Named::vertex_array)
       glGenVertexArrays(1, &id), glBindVertexArray(id), space = GL_VERTEX_ARRAY;
@@ -32,14 +34,14 @@ class Handle {
       glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0), space = GL_SAMPLER;
     glObjectLabel(space, id, GLsizei(label.size()), label.data());
     count_gl_objects(1);
-    return handle;
+    return object;
   }
-  Handle(Handle&& other) noexcept { std::swap(id_, other.id_); }
-  Handle& operator=(Handle&& other) noexcept {
+  GlObject(GlObject&& other) noexcept { std::swap(id_, other.id_); }
+  GlObject& operator=(GlObject&& other) noexcept {
     std::swap(id_, other.id_);
     return *this;
   }
-  ~Handle() {
+  ~GlObject() {
     if (!id_) return;
     count_gl_objects(-1);
     if constexpr (kind == Named::vertex_array) glDeleteVertexArrays(1, &id_);
@@ -55,10 +57,19 @@ class Handle {
   GLuint id_ = 0;
 };
 
-using VertexArray = Handle<Named::vertex_array>;
-using Texture = Handle<Named::texture>;
-using Renderbuffer = Handle<Named::renderbuffer>;
-using Framebuffer = Handle<Named::framebuffer>;
-using Sampler = Handle<Named::sampler>;
+using VertexArray = GlObject<Named::vertex_array>;
+using Texture = GlObject<Named::texture>;
+using Renderbuffer = GlObject<Named::renderbuffer>;
+using Framebuffer = GlObject<Named::framebuffer>;
+using Sampler = GlObject<Named::sampler>;
+
+/// What a buffer held when the GPU came to `fence`, once: nothing before that (with `wait`, after waiting for
+/// it) or without a fence. `what` is for the error.
+template <class T>
+std::optional<std::vector<T>> take(Fence& fence, const Buffer& buffer, const char* what, bool wait = false) {
+  if (!fence.sync() || !reached(fence.sync(), wait, what)) return std::nullopt;
+  fence = Fence();
+  return buffer.read_all<T>();
+}
 
 }  // namespace tetpbd

@@ -58,13 +58,6 @@ const Program& use(Renderer& renderer, const std::string& name) {
 
 std::string body_program(const Frame& frame) { return frame.options.look == Look::tets ? "tets" : "surface"; }
 
-const VertexGather* gathered_values(const Renderer& renderer, const ViewOptions& options) {
-  if (options.look == Look::tets) return nullptr;  // its geometry shader has the whole tetrahedron
-  if (options.colour == Colour::volume) return &renderer.volume_errors;
-  if (options.colour == Colour::stretch) return &renderer.stretch_errors;
-  return nullptr;
-}
-
 bool wants_rest(const Renderer& renderer, const ViewOptions& options) {
   const bool error = options.colour == Colour::volume || options.colour == Colour::stretch;
   return error || options.look == Look::tets || renderer.bodies.size() > 1;
@@ -119,8 +112,16 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   return view;
 }
 
-// The vertex attributes of this frame, or the constants that stand for them.
-void bind_attributes(const Renderer& renderer, const Frame& frame) {
+// Values of vertices from their kernel, in a buffer of which this is the name.
+GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values,
+                VertexGather (*make)(const TetMesh&), const char* program) {
+  if (!values) values = make(renderer.mesh);
+  update(values, use(renderer, program), frame.positions, renderer.rest);
+  return values.values.id();
+}
+
+// The vertex attributes of this frame, computed where they have to be, or the constants that stand for them.
+void bind_attributes(Renderer& renderer, const Frame& frame) {
   const auto attribute = [](GLuint index, GLuint buffer, GLint count, std::size_t stride,
                             std::size_t offset) {
     if (!buffer) {
@@ -134,15 +135,27 @@ void bind_attributes(const Renderer& renderer, const Frame& frame) {
                           reinterpret_cast<const void*>(offset));
   };
   const ViewOptions& options = frame.options;
-  const bool smooth = options.smooth_normals && options.look != Look::tets;
-  const VertexGather* values = gathered_values(renderer, options);
+  GLuint normal = 0, value = 0, rest = 0;
+  if (wants_rest(renderer, options)) {
+    if (!renderer.rest) renderer.rest = rest_buffer(renderer);
+    rest = renderer.rest.id();
+  }
+  if (options.look != Look::tets) {  // the geometry shader of these has the whole tetrahedron
+    if (options.smooth_normals) normal = gathered(renderer, frame, renderer.normals, make_normals, "normals");
+    if (options.colour == Colour::volume)
+      value = gathered(renderer, frame, renderer.volume_errors, make_volume_errors, "volume errors");
+    if (options.colour == Colour::stretch)
+      value = gathered(renderer, frame, renderer.stretch_errors, make_stretch_errors, "stretch errors");
+  }
+  glBindVertexArray(renderer.vertex_array.id());
   attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
   attribute(ATTRIBUTE_LOW, frame.positions, 3, sizeof(Position), offsetof(Position, low));
-  attribute(ATTRIBUTE_NORMAL, smooth ? renderer.normals.values.id() : 0, 3, sizeof(glm::vec4), 0);
-  attribute(ATTRIBUTE_VALUE, values ? values->values.id() : 0, 1, sizeof(float), 0);
+  attribute(ATTRIBUTE_NORMAL, normal, 3, sizeof(glm::vec4), 0);
+  attribute(ATTRIBUTE_VALUE, value, 1, sizeof(float), 0);
   attribute(ATTRIBUTE_VELOCITY, options.colour == Colour::velocity ? frame.velocities : 0, 3,
             sizeof(Velocity), offsetof(Velocity, high));
-  attribute(ATTRIBUTE_REST, wants_rest(renderer, options) ? renderer.rest.id() : 0, 4, sizeof(glm::vec4), 0);
+  attribute(ATTRIBUTE_REST, rest, 4, sizeof(glm::vec4), 0);
+  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);  // the step's and the kernels'
 }
 
 void draw_bodies(Renderer& renderer, const Frame& frame, const std::string& program) {
@@ -216,20 +229,9 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   glDisable(GL_PROGRAM_POINT_SIZE);
 }
 
-// All values of this frame that come from kernels.
-void compute(Renderer& renderer, const Frame& frame) {
+// The light, as far as something of this frame needs it.
+void fit_light(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
-  if (wants_rest(renderer, options) && !renderer.rest) renderer.rest = rest_buffer(renderer);
-  const auto gather = [&](VertexGather& values, auto make, const char* program) {
-    if (!values) values = make(renderer.mesh);
-    update(values, use(renderer, program), frame.positions, renderer.rest);
-  };
-  if (options.look != Look::tets) {
-    if (options.smooth_normals) gather(renderer.normals, make_normals, "normals");
-    if (options.colour == Colour::volume) gather(renderer.volume_errors, make_volume_errors, "volume errors");
-    if (options.colour == Colour::stretch)
-      gather(renderer.stretch_errors, make_stretch_errors, "stretch errors");
-  }
   if (!options.shadow && !options.follow && !(options.look == Look::tets && options.explode > 0)) return;
   const float radius =
       std::max(4.0f * frame.camera.distance, 4.0f * glm::length(renderer.rest_high - renderer.rest_low));
@@ -281,12 +283,10 @@ void draw(Renderer& renderer, const Frame& frame) {
   renderer.view.bind_uniform(BIND_RENDER_VIEW);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
-  compute(renderer, frame);
+  fit_light(renderer, frame);
   // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
   (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
-  glBindVertexArray(renderer.vertex_array.id());
   bind_attributes(renderer, frame);
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);  // the step's positions and velocities
   if (options.shadow) draw_shadow_map(renderer, frame);
 
   const Viewport& viewport = frame.viewport;

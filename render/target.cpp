@@ -81,11 +81,9 @@ GLuint resolve(const Target& target) {
 }
 
 Image read_rgba(const Target& target) {
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, resolve(target));
-  glPixelStorei(GL_PACK_ALIGNMENT, 4);
-  std::vector<std::uint8_t> rows(std::size_t(target.width) * std::size_t(target.height) * 4);
-  glReadPixels(0, 0, target.width, target.height, GL_RGBA, GL_UNSIGNED_BYTE, rows.data());
-  return flipped(target.width, target.height, rows.data());
+  ReadBack once;
+  once.push(target);
+  return *once.poll(true);
 }
 
 void present(const Target& target, GLuint framebuffer, int x, int y) {

@@ -65,7 +65,6 @@ void update(const VertexGather& gather, const Program& kernel, GLuint positions,
   gather.values.bind_storage(BIND_RENDER_VALUES);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
 }
 
 }  // namespace tetpbd

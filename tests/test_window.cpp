@@ -12,10 +12,10 @@ TEST_CASE("window: every setting's label fits its column, whatever fonts the mac
   ImGui::CreateContext();
   for (const float scale : {1.0f, 1.5f, 2.0f}) {
     set_style(scale, 1);
-    CHECK(ImGui::GetIO().Fonts->Fonts[0]->FontSize == doctest::Approx(14 * scale));
     unsigned char* pixels = nullptr;
     int width = 0, height = 0;
     ImGui::GetIO().Fonts->GetTexDataAsAlpha8(&pixels, &width, &height);
+    CHECK(ImGui::GetIO().Fonts->Fonts[0]->FontSize == doctest::Approx(14 * scale));
     ImGui::GetIO().DisplaySize = {100, 100};
     ImGui::NewFrame();
     for (const Parameter& row : parameters()) {

@@ -27,6 +27,7 @@ struct FrameWriter {
   Camera camera;
   Renderer renderer;
   Target target;
+  long drawn = 0;  ///< step of the last frame
   std::optional<Video> video;
   ReadBack read_back;
   struct Use {
@@ -40,6 +41,9 @@ struct FrameWriter {
 
   void draw_frame(const Sim& sim, long png_step, bool to_video) {
     draw(renderer, frame_of(sim, camera, options.view, target));
+    if (const auto centre = poll_centre(renderer, true))  // for the next frame
+      follow(camera, *centre, float(double(sim.steps - drawn) * sim.settings.dt));
+    drawn = sim.steps;
     read_back.push(target);
     uses.push_back({png_step, to_video});
     while (uses.size() > 2) write_one(true);

@@ -207,6 +207,7 @@ void add_scene(CLI::App& command, Arguments& a) {
                                            {"--no-legend", &ViewOptions::legend, "no colour bar"}})
     view.add_flag_callback(
         flag, [&look, off = member] { look.*off = false; }, help);
+  view.add_flag("--follow", look.follow, "the camera goes where the bodies go (the window: from the start)");
   view.add_flag_callback(
       "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
 }

@@ -72,11 +72,4 @@ Ray pixel_ray(const Camera& camera, float x, float y, int width, int height) {
   return {eye(camera), glm::normalize(glm::transpose(glm::mat3(view_matrix(camera))) * seen)};
 }
 
-glm::vec3 project(const Camera& camera, const glm::vec3& point, int width, int height) {
-  const glm::vec4 clip =
-      projection_matrix(camera, float(width) / float(height)) * view_matrix(camera) * glm::vec4(point, 1.0f);
-  return {(clip.x / clip.w * 0.5f + 0.5f) * float(width), (0.5f - clip.y / clip.w * 0.5f) * float(height),
-          clip.z / clip.w};
-}
-
 }  // namespace tetpbd

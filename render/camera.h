@@ -34,7 +34,5 @@ glm::mat4 view_matrix(const Camera& camera);
 glm::mat4 projection_matrix(const Camera& camera, float aspect);
 /// Through a point of the viewport in pixels from its top left (the middle of the first pixel is 0.5, 0.5).
 Ray pixel_ray(const Camera& camera, float x, float y, int width, int height);
-/// Where a point appears, in the same pixels; z: depth -1..1, outside that range not in view.
-glm::vec3 project(const Camera& camera, const glm::vec3& point, int width, int height);
 
 }  // namespace tetpbd

@@ -65,12 +65,11 @@ bool wants_rest(const Renderer& renderer, const ViewOptions& options) {
 
 Buffer rest_buffer(const Renderer& renderer) {
   std::vector<glm::vec4> rest;
-  rest.reserve(renderer.mesh.positions.size());
-  for (const glm::dvec3& p : renderer.mesh.positions) rest.emplace_back(glm::vec3(p), 0.0f);
-  for (std::size_t body = 0; body < renderer.bodies.size(); ++body)
-    for (std::size_t v = renderer.bodies[body].first, end = v + renderer.bodies[body].count;
-         v < end && v < rest.size(); ++v)
-      rest[v].w = float(body);
+  std::size_t next = 1;  // body
+  for (const glm::dvec3& p : renderer.mesh.positions) {
+    while (next < renderer.bodies.size() && rest.size() >= renderer.bodies[next]) ++next;
+    rest.emplace_back(glm::vec3(p), float(next - 1));
+  }
   return Buffer("render rest", rest);
 }
 
@@ -254,7 +253,7 @@ struct Afterwards {
 
 }  // namespace
 
-Renderer make_renderer(TetMesh mesh, std::vector<BodyRange> bodies) {
+Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies) {
   Renderer renderer;
   const Bounds rest = bounds(mesh.positions);
   renderer.rest_low = glm::vec3(rest.low), renderer.rest_high = glm::vec3(rest.high);
@@ -268,9 +267,8 @@ Renderer make_renderer(TetMesh mesh, std::vector<BodyRange> bodies) {
 }
 
 Renderer make_renderer(const Model& model) {
-  std::vector<BodyRange> bodies;
-  for (const Body& body : model.bodies)
-    bodies.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.vertices)});
+  std::vector<std::size_t> bodies;
+  for (const Body& body : model.bodies) bodies.push_back(body.first_vertex);
   return make_renderer(model.rest, std::move(bodies));
 }
 

@@ -17,15 +17,10 @@
 
 namespace tetpbd {
 
-/// Vertices of one of several bodies in one mesh.
-struct BodyRange {
-  std::uint32_t first = 0, count = 0;
-};
-
 /// Only what was once asked for exists: buffers, programs, the shadow map.
 struct Renderer {
   TetMesh mesh;
-  std::vector<BodyRange> bodies;
+  std::vector<std::size_t> bodies;  ///< the first vertex of each
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
   std::map<std::string, Program> programs;
   VertexArray vertex_array, empty_array;
@@ -38,7 +33,7 @@ struct Renderer {
   std::optional<Legend> legend;
 };
 
-Renderer make_renderer(TetMesh mesh, std::vector<BodyRange> bodies = {});
+Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies = {});
 Renderer make_renderer(const Model& model);
 /// Leaves framebuffer, viewport and scissor at the frame's, depth test, blending and sRGB encoding off.
 /// Storage bindings change.

@@ -15,6 +15,14 @@ namespace tetpbd {
 
 inline constexpr int width = 240, height = 180;
 
+// Where a point appears, in pixels from the top left; z: depth -1..1, outside that range not in view.
+inline glm::vec3 project(const Camera& camera, const glm::vec3& point, int width, int height) {
+  const glm::vec4 clip =
+      projection_matrix(camera, float(width) / float(height)) * view_matrix(camera) * glm::vec4(point, 1.0f);
+  return {(clip.x / clip.w * 0.5f + 0.5f) * float(width), (0.5f - clip.y / clip.w * 0.5f) * float(height),
+          clip.z / clip.w};
+}
+
 // A block of cells, each cut into the six tets around its diagonal, and its boundary.
 inline TetMesh cut_block(const glm::dvec3& size, int n, const glm::dvec3& centre = glm::dvec3(0.0)) {
   TetMesh mesh;

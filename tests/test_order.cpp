@@ -195,9 +195,7 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
                                                      double(pick->vertex), double(pick->distance)});
     }
     CHECK(hits > 0);
-    Renderer renderer = make_renderer(model->rest, {{0, std::uint32_t(model->bodies[1].first_vertex)},
-                                                    {std::uint32_t(model->bodies[1].first_vertex),
-                                                     std::uint32_t(model->bodies[1].vertices)}});
+    Renderer renderer = make_renderer(*model);
     const Target target = make_target(160, 120, 0);
     for (const Colour colour : {Colour::plain, Colour::volume, Colour::stretch}) {
       Frame frame;
@@ -262,7 +260,7 @@ TEST_CASE("other work on the GPU at the same time changes no bit") {
     const HeadlessContext context;
     const auto busy = falling({9, 8, 7}, 2);
     Sim sim = create_sim(busy, settings_of("constraint"));
-    Renderer renderer = make_renderer(busy->rest, {});
+    Renderer renderer = make_renderer(*busy);
     const Target target = make_target(320, 240, 0);
     while (!stop) {
       for (int s = 0; s < 3; ++s) step(sim), ++steps;

@@ -258,7 +258,7 @@ TEST_CASE("render: several bodies have hues of their own, marked vertices dots")
   for (Tet tet : other.tets)
     two.tets.push_back({tet[0] + first, tet[1] + first, tet[2] + first, tet[3] + first});
   Stage stage(two);
-  stage.renderer = make_renderer(two, {{0, first}, {first, first}});
+  stage.renderer = make_renderer(two, {0, first});
   stage.frame.camera.azimuth = 0;
   const Image image = stage.image();
   const glm::vec3 left = pixel(image, project(stage.frame.camera, {-0.5f, 0, 0.3f}, width, height));

@@ -13,7 +13,7 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/solvers/handles.h"
+#include "sim/solvers/clusters.h"
 
 namespace tetpbd {
 
@@ -39,13 +39,9 @@ std::vector<Settings> candidates(const Settings& settings) {
     all.back().mass_splitting = true;
   }
   // Handles pull to the rest shape: right only where that is what the constraints ask for.
-  const auto used = split(settings.constraints, ',');
-  const auto is_used = [&](const char* kind) {
-    return std::find(used.begin(), used.end(), kind) != used.end();
-  };
-  bool keeps_shape = is_used("stretch");
-  for (const ConstraintKind& kind : constraint_kinds())
-    keeps_shape = keeps_shape && (!is_used(kind.name) || settings.*kind.stiffness == 1);
+  bool keeps_shape = uses(settings, Stretch::row);
+  for (std::size_t k = 0; k < kind_count; ++k)
+    keeps_shape = keeps_shape && (!uses(settings, constraint_kinds[k]) || settings.stiffness[k] == 1);
   if (keeps_shape) {
     base.omega = 1.5;
     set_mode(base, "node+handles", "auto");
@@ -124,7 +120,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   // for it. Handles, which come last, were best wherever something was.
   choice.lost_nothing =
       std::all_of(choice.trials.begin(), choice.trials.end(), [&](auto& t) { return badness(t) < 0.01; });
-  if (choice.lost_nothing && wants_handles(choice.trials.back().settings)) choice.best = runs.size() - 1;
+  if (choice.lost_nothing && choice.trials.back().settings.handles > 0) choice.best = runs.size() - 1;
   return choice;
 }
 

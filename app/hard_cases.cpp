@@ -50,24 +50,20 @@ std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) 
 }
 
 bool is_constrained(const Settings& settings) {
-  const auto used = split(settings.constraints, ',');
-  return std::any_of(constraint_kinds().begin(), constraint_kinds().end(), [&](const ConstraintKind& kind) {
-    return settings.*kind.stiffness > 0 && std::find(used.begin(), used.end(), kind.name) != used.end();
-  });
+  bool any = false;
+  for (std::size_t k = 0; k < kind_count; ++k)
+    any = any || (settings.stiffness[k] > 0 && uses(settings, constraint_kinds[k]));
+  return any;
 }
 
 Settings settings_of(const Scene& scene, const std::string& mode) {
   Settings settings = scene.settings;
-  const std::string suffix = "-substeps", groups = "groups-";
+  const std::string suffix = "-substeps";
   const std::string where = "--modes " + mode;
   std::string word = mode;
   if (word.ends_with(suffix)) {
     word.resize(word.size() - suffix.size());
     std::swap(settings.substeps, settings.iterations);
-  }
-  if (word.starts_with(groups)) {
-    set_parameter(settings, *find_parameter("groups"), word.substr(groups.size()), where);
-    word = "groups";
   }
   set_mode(settings, word, where);
   check_settings(settings, where);

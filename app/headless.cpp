@@ -138,7 +138,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   if (frames) frames->finish();
   errors.non_finite = check_finite(sim, true);
   errors.finite = errors.finite && !errors.non_finite;
-  const bool good = !errors.non_finite || return_to_last_good(sim);
+  const bool good = !errors.non_finite || restore_checkpoint(sim);
   write_file(
       options.out / "stats.json",
       statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
@@ -174,14 +174,14 @@ int print_explanation(Scene scene, int gpu) {
   fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, mode_word(sim.settings),
              model->positions.size(), model->rest.tets.size());
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
-    if (sim.system.present[k]) fmt::print(", {} {}", sim.system.lists[k].count(), constraint_kinds()[k].name);
+    if (sim.system.present[k]) fmt::print(", {} {}", sim.system.lists[k].count(), constraint_kinds[k].name);
   fmt::print("\n\n{:<52}{:>14}\n", "buffer", "bytes");
   for (const auto& buffer : e.buffers) fmt::print("{:<52}{:>14}\n", buffer.name, buffer.bytes);
   fmt::print("{:<52}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
              double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
   fmt::print("{:<52}{:>14}{:>14}{:>16}\n", "kernel", "work-groups", "a step", "bytes a step");
   for (const auto& dispatch : e.dispatches)
-    fmt::print("{:<52}{:>14}{:>14}{:>16}\n", dispatch.name, dispatch.groups, dispatch.per_step,
+    fmt::print("{:<52}{:>14}{:>14}{:>16}\n", dispatch.name, dispatch.work_groups, dispatch.per_step,
                dispatch.bytes * std::size_t(dispatch.per_step));
   fmt::print("{:<52}{:>14}{:>14}{:>16}\n", "all", "", e.dispatches_per_step, e.bytes_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);

@@ -153,12 +153,12 @@ bool parameter_widget(Session& s, Ui& ui, const Parameter& row, Settings& settin
   ImGui::BeginDisabled(is_idle(settings, row));
   const std::string id = begin_row(label_of(row.name));
   bool changed = false;
-  if (const auto* member = std::get_if<double Settings::*>(&row.member))
-    changed = number_widget(row, id, settings.**member);
-  else if (const auto* whole = std::get_if<int Settings::*>(&row.member))
-    changed = number_widget(row, id, settings.**whole);
-  else if (const auto* flag = std::get_if<bool Settings::*>(&row.member))
-    changed = ImGui::Checkbox(id.c_str(), &(settings.**flag));
+  with_value(settings, row, [&]<class T>(T& value) {
+    if constexpr (std::is_same_v<T, bool>)
+      changed = ImGui::Checkbox(id.c_str(), &value);
+    else if constexpr (!std::is_same_v<T, std::string>)
+      changed = number_widget(row, id, value);
+  });
   describe_item(s, ui, row.name, help_text(row));
   ImGui::EndDisabled();
   return changed;

@@ -140,7 +140,7 @@ void go_back(Session& s) {
   let_go(s);
   attempt(s, [&] {
     if (!check_finite(s.loaded.sim, true)) return;
-    if (!return_to_kept(s.loaded.sim)) return say(s, "no good state is kept: reset (R)");
+    if (!restore_checkpoint(s.loaded.sim)) return say(s, "no good state is kept: reset (R)");
     s.clock.owed = 0;
     forget_non_finite(s);
     forget_measurements(s);

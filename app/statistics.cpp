@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/files.h"
-#include "sim/solvers/handles.h"
+#include "sim/solvers/clusters.h"
 
 namespace tetpbd {
 
@@ -45,7 +45,7 @@ ordered_json times(const Samples& ms) {
 ordered_json settings_json(const Scene& scene, const Settings& settings) {
   ordered_json result;
   for (const Parameter& row : parameters())
-    std::visit([&](auto member) { result[row.name] = settings.*member; }, row.member);
+    with_value(settings, row, [&](const auto& value) { result[row.name] = value; });
   for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
   result["obstacles"] = ordered_json::array();
   for (const glm::dvec4& plane : scene.obstacles) {
@@ -59,7 +59,7 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
 }  // namespace
 
 double effective_omega(const Settings& settings) {
-  return relaxation(settings.omega, wants_handles(settings) ? settings.handles : 0);
+  return relaxation(settings.omega, settings.handles);
 }
 
 ordered_json json_number(double value) {
@@ -91,7 +91,7 @@ ordered_json device_json(const Capabilities& device) {
 
 ordered_json non_finite_json(const std::optional<NonFinite>& found) {
   if (!found) return nullptr;
-  return {{"step", found->step}, {"vertex", found->vertex}, {"cause", found->cause}};
+  return {{"step", found->step}, {"vertex", found->vertex}};
 }
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,

@@ -40,7 +40,7 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
                             const std::optional<SolverChoice>& choice);
 /// The over-relaxation that acts: rigid handles bound it.
 double effective_omega(const Settings& settings);
-/// {"step", "vertex", "cause"}, or null.
+/// {"step", "vertex"}, or null.
 nlohmann::ordered_json non_finite_json(const std::optional<NonFinite>& found);
 /// null where it is no number.
 nlohmann::ordered_json json_number(double value);

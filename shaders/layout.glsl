@@ -23,16 +23,16 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
-// A rigid handle (sim/handles.h). S: sum of weight times steps times steps about their mean; matrices as diagonal and (yz, xz, xy).
-struct Handle {
+// A shape-matching cluster (sim/solvers/clusters.h). S: sum of weight times steps times steps about their mean; matrices as diagonal and (yz, xz, xy).
+struct Cluster {
   vec3 node;              // cells of its body's lattice
   float weight;           // all its vertices', at most 2^22
   vec3 centre;            // of these, cells
   float steps_per_metre;  // of arms from the centre, at most 2^14 steps
   vec3 cell;              // m, sides of a cell
-  uint keeper;            // the patch that writes its pose
+  uint owner;             // the patch that writes its pose
   vec3 steps;             // sum of weight times steps
-  uint number;            // of the handle; ~0: none
+  uint number;            // of the cluster; ~0: none
   vec3 squares;           // S
   float _3;
   vec3 products;
@@ -46,26 +46,27 @@ struct Handle {
 #define MAX_PLANES 8
 // Everything of a step that does not change within it (a uniform block, std140).
 struct Step {
-  vec3 gravity;           // m/s^2
-  float h;                // s, one substep
-  float inverse_h;        // 1/s
-  float omega;            // over-relaxation of averaged corrections
+  vec3 gravity;             // m/s^2
+  float h;                  // s, one substep
+  float inverse_h;          // 1/s
+  float omega;              // over-relaxation of averaged corrections
   float friction;
-  float keep;             // velocity kept by damping over a substep, exp(-damping * h)
-  float limit;            // m, largest single correction
-  float delta_unit;       // m, one unit of a fixed-point sum
+  float velocity_scale;     // left by damping over a substep, exp(-damping * h)
+  float max_correction;     // m, largest single correction
+  float correction_quantum; // m, of fixed-point sums
   uint vertex_count;
   int plane_count;
-  float unit;             // m, one unit of a place: a power of two
-  float inverse_unit;     // 1/m
-  float position_grain;   // m, the size whose rounding is one unit (constraints/types.glsl)
-  float mass_splitting;   // 1: neighbours see n_i w_i, not w_i
-  float handles;          // share of the way that rigid handles pull in an iteration
-  float _7, _8, _9;
-  vec4 stiffness[2];      // by constraint kind
-  vec4 planes[MAX_PLANES]; // half spaces n.x >= d as (n, d); the ground is the first if there is one
-  vec4 softness[2];        // compliance over h^2, by constraint kind
-  vec4 relaxation;         // with compliance, x: constraint damping over h; y: over-relaxation (`omega` is 1 then)
+  float quantum;            // m, of quantized positions: a power of two
+  float inverse_quantum;    // 1/m
+  float quantized_size;     // m, the size whose rounding is one quantum (constraints/types.glsl)
+  float mass_splitting;     // 1: neighbours see n_i w_i, not w_i
+  float cluster_strength;   // share of the way that clusters pull in an iteration
+  float damping;            // of constraints over h, gamma (with compliance)
+  float soft_omega;         // over-relaxation with compliance (`omega` is 1 then)
+  float _0;
+  vec4 stiffness[2];        // by constraint kind
+  vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
+  vec4 compliance[2];       // over h^2, by constraint kind
 };
 
 // Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in the order
@@ -79,39 +80,29 @@ struct Step {
 #define GUARD_NOT_FINITE 64u  // a correction was not a number: dropped
 #define GUARDS 7
 
-// What a dispatch that moves vertices does with them beside the corrections (vertex.glsl); bits.
-#define PHASE_PREDICT 1u  // before: v += h g, p = x + h v
-#define PHASE_SOLVE 2u    // corrections
+// What a dispatch does (a dispatch parameter); bits.
+#define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v
+#define PHASE_SOLVE 2u    // corrections, then contacts
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
-#define PHASE_CONTACT 8u  // contacts after the corrections: once an iteration
-#define PHASE_FIRST 16u   // the corrections are the first of their substep (compliance only)
-#define PHASE_LAST 32u    // and the last
-#define PHASE_PLACES 64u  // nothing but sums of handles, from places as they are
-#define PHASE_BITS 7      // above them: which group of constraints (mode groups, at most 128)
-#define TURN_BITS 14      // above that: a count of dispatches, where there are handles
+#define PHASE_SUMS 8u     // nothing but the clusters' sums, of positions as they are
 
-// Storage bindings of the simulation.
+// Storage bindings of the simulation; a kernel has 8 at most, but for those with clusters.
 #define BIND_POSITIONS 0
 #define BIND_VELOCITIES 1
 #define BIND_PREDICTED 2
-#define BIND_PLACES 3         // ivec4: what the neighbours of a vertex see of it (places.glsl)
-#define BIND_PLACES_OUT 4
-#define BIND_CHECK 5          // which vertex is not finite
-#define BIND_DELTAS 6         // constraint modes: sums of corrections
-#define BIND_PARTS 7          // patches (sim/patches.h)
-#define BIND_PATCH_VERTICES 8
-#define BIND_PATCH_RECORDS 9
-#define BIND_HANDLES 10       // handles (sim/handles.h)
-#define BIND_HANDLE_REST 11
-#define BIND_HANDLE_SUMS 6
-#define BIND_RECORDS 7        // mode paper: + index of the constraint kind among those present
-#define STORAGE_BINDINGS 10   // most of any mode
-#define BIND_MULTIPLIERS 10   // one more with compliance: of each of the patches' records
-#define STORAGE_BINDINGS_HANDLES 12  // with handles, which go without compliance
-#define HANDLE_ROW 48         // words of a handle in each set of sums (handles.glsl)
-#define BIND_KEEP_FROM 0      // keep.comp
-#define BIND_KEEP_TO 2
-#define CHECK_STEPS 64        // steps whose checks are under way at most
+#define BIND_QUANTIZED 3      // what the neighbours of a vertex see of it (quantized.glsl)
+#define BIND_QUANTIZED_OUT 4
+#define BIND_CHECK 5          // the first state that is not finite
+#define BIND_PATCHES 6        // sim/solvers/patches.h
+#define BIND_MULTIPLIERS 7    // with compliance, of each of the patches' records
+#define BIND_SUMS 8           // constraint modes: sums of corrections
+#define BIND_RECORDS 9        // mode paper: of one constraint kind
+#define BIND_CLUSTERS 10      // sim/solvers/clusters.h
+#define BIND_CLUSTER_REST 11
+#define BIND_CLUSTER_SUMS 12
+#define BIND_CHECKPOINT_FROM 13
+#define BIND_CHECKPOINT_TO 14
+#define CLUSTER_ROW 48        // words of a cluster in each set of sums (clusters.glsl)
 // Uniform blocks.
 #define BIND_STEP 0
 // Atomic counters.

@@ -1,77 +1,77 @@
-// What a work-group does with a patch of constraints (sim/patches.h): reads the places of its vertices once, evaluates the constraints, an
-// invocation each, and adds up the corrections of summed vertices in shared memory. Sums are integers, so their order does not
-// matter and the result is the same bits every time, however constraints are cut into patches. A unit is params.delta_unit times the
-// vertex's number of constraints, and no correction exceeds params.limit = 2^30 units over that number: no sum can overflow.
-layout(std430, binding = BIND_PARTS) restrict readonly buffer Parts { uint parts[]; };
-layout(std430, binding = BIND_PATCH_VERTICES) restrict readonly buffer PatchVertices { uvec2 vertices[]; };
-layout(std430, binding = BIND_PATCH_RECORDS) restrict readonly buffer Records { uvec2 records[]; };
-shared ivec4 here[$HERE];
-shared uint names[$VERTICES];
-shared float units_per_metre[$SUMMED];
-shared int sums[3 * $SUMMED];
-// Bytes of a record: its vertices' numbers in the patch.
-uint slot_of(uint slots, int j) { return (slots >> (8 * j)) & 255u; }
-#ifdef COMPLIANT
+// What a work-group does with a patch of constraints (sim/solvers/patches.h): reads its vertices once, evaluates the constraints, an
+// invocation each, and adds up the corrections of the vertices it owns in shared memory. Sums are integers, so their order does not
+// matter and the result is the same bits every time, however constraints are cut into patches. A quantum of them is
+// params.correction_quantum times the vertex's number of constraints, and no correction exceeds params.max_correction = 2^30 quanta over
+// that number: no sum can overflow.
+// All of patches.h's words in pairs: headers of chunks, their vertices, their records.
+layout(std430, binding = BIND_PATCHES) restrict readonly buffer Patches { uvec2 patch_words[]; };
+#if COMPLIANT
 layout(std430, binding = BIND_MULTIPLIERS) restrict buffer Multipliers { float multipliers[]; };  // of records, in this substep
-uint at_record;  // the index of the one being projected
-#if $GROUPED
-shared float counts[$VERTICES];  // n_i in the group
+shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
 #endif
-#ifdef DAMPED
-shared ivec4 starts[$VERTICES];  // places at the substep's start
-#endif
-#endif
+shared ivec4 local_positions[LOCAL_ROOM];  // quantized
+shared uint global_ids[MAX_VERTICES];
+shared float quanta_per_metre[MAX_OWNED];
+shared int sums[3 * MAX_OWNED];
+// Bytes of a record: its vertices' numbers in the chunk.
+uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
 #define Ids uint
-uint id_of(Ids slots, int j) { return names[slot_of(slots, j)]; }
+uint id_of(Ids record, int j) { return global_ids[local_id(record, j)]; }
 #include "constraints/types.glsl"
-#ifdef COMPLIANT
-#include "constraints/compliance.glsl"
-#endif
-#include "guards.glsl"
 #foreach #include "constraints/$KIND.glsl"
+
+#if COUNT_GUARDS
+layout(binding = BIND_GUARDS) uniform atomic_uint guard_counts[GUARDS];
+// Counts the guards that triggered, where a run asks for it.
+void count_guards(uint guards) {
+  if (guards == 0u) return;
+  if ((guards & GUARD_DIRECTION) != 0u) atomicCounterIncrement(guard_counts[0]);
+  if ((guards & GUARD_HINGE) != 0u) atomicCounterIncrement(guard_counts[1]);
+  if ((guards & GUARD_ANGLE) != 0u) atomicCounterIncrement(guard_counts[2]);
+  if ((guards & GUARD_FLOOR) != 0u) atomicCounterIncrement(guard_counts[3]);
+  if ((guards & GUARD_COLLAPSED) != 0u) atomicCounterIncrement(guard_counts[4]);
+  if ((guards & GUARD_LIMIT) != 0u) atomicCounterIncrement(guard_counts[5]);
+  if ((guards & GUARD_NOT_FINITE) != 0u) atomicCounterIncrement(guard_counts[6]);
+}
+#endif
 #foreach #include "project.glsl"
 
-void clear_sums() {
-  for (uint k = gl_LocalInvocationIndex; k < 3u * $SUMMEDu; k += $GROUPu) sums[k] = 0;
+// A patch is one chunk, or more where its vertices are too many for one; those it owns come first in each.
+struct Chunk {
+  uint number;
+  uint vertices;  // of which the first are
+  uint owned;
+  uint first;     // global id of the first owned one (mode node)
+  uint next;      // chunk of the patch; 0: none
+};
+Chunk chunk_at(uint number) {
+  uvec2 counts = patch_words[CHUNK_PAIRS * number], links = patch_words[CHUNK_PAIRS * number + 1];
+  return Chunk(number, counts.x, counts.y, links.x, links.y);
 }
-/// The places of a part's vertices; `part`: its index in parts[]. Needs a barrier behind it.
-void load_part(uint part) {
-  // Every part has room for as many vertices, so that none waits for its words before it looks for them.
-  for (uint k = gl_LocalInvocationIndex; k < $VERTICESu; k += $GROUPu) {
-    uvec2 vertex = vertices[$VERTICESu * part + k];
-    names[k] = vertex.x;
-    here[k] = places[vertex.x];
-#ifdef COMPLIANT
-#if $GROUPED
-    counts[k] = uintBitsToFloat(vertex.y);
-    here[k].w = floatBitsToInt(inverse_mass_of(here[k]) * counts[k]);
+
+void clear_sums() {
+  for (uint k = gl_LocalInvocationIndex; k < 3 * MAX_OWNED; k += GROUP_SIZE) sums[k] = 0;
+}
+/// A chunk's vertices as their neighbours see them. Needs a barrier behind it.
+void load_chunk(uint number) {
+  // Every chunk has room for as many vertices, so that none waits for its words before it looks for them.
+  for (uint k = gl_LocalInvocationIndex; k < MAX_VERTICES; k += GROUP_SIZE) {
+    uvec2 vertex = patch_words[VERTICES_AT + MAX_VERTICES * number + k];
+    global_ids[k] = vertex.x;
+    local_positions[k] = quantized[vertex.x];
+#if COMPLIANT
+    if (params.damping > 0.0) start_positions[k] = quantized[params.vertex_count + vertex.x];
 #endif
-#ifdef DAMPED
-    starts[k] = places[params.vertex_count + vertex.x];
-#endif
-#endif
-    if (k < $SUMMEDu) units_per_metre[k] = 1.0 / (params.delta_unit * uintBitsToFloat(vertex.y));
+    if (k < MAX_OWNED) quanta_per_metre[k] = 1.0 / (params.correction_quantum * uintBitsToFloat(vertex.y));
   }
 }
-/// Adds the corrections of a part that is loaded; `some`: whether there is one. Needs a barrier behind it.
-void project_part(uint part, bool some) {
-  uint me = gl_LocalInvocationIndex, row = $PART_WORDSu * part;
-  uint summed = parts[row + 1u];
-  #foreach uint from_$KIND = parts[row + 4u + 2u * $INDEXu], count_$KIND = some ? parts[row + 5u + 2u * $INDEXu] : 0u;
+/// Adds the corrections of a chunk that is loaded; `exists`: whether there is one. Needs a barrier behind it.
+void project_chunk(Chunk chunk, bool exists) {
+  #foreach uvec2 records_$KIND = patch_words[CHUNK_PAIRS * chunk.number + 2 + $INDEX];  // the first, and how many
   // Each kind begins with a warp of its own.
   uint end = 0u;
-  #foreach uint begin_$KIND = end; end = (end + count_$KIND + 31u) & ~31u;
-  for (uint t = me; t < end; t += $GROUPu) {
-#ifdef COMPLIANT
-    #foreach if (t - begin_$KIND < count_$KIND) at_record = from_$KIND + (t - begin_$KIND);
-#endif
-    #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records[from_$KIND + (t - begin_$KIND)], summed);
+  #foreach uint begin_$KIND = end, count_$KIND = exists ? records_$KIND.y : 0u; end = (end + count_$KIND + 31u) & ~31u;
+  for (uint t = gl_LocalInvocationIndex; t < end; t += GROUP_SIZE) {
+    #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records_$KIND.x + (t - begin_$KIND), chunk.owned);
   }
-}
-/// All invocations of a work-group call it; sums are complete when it returns.
-void solve_part(uint part, bool some) {
-  load_part(part);
-  barrier();
-  project_part(part, some);
-  barrier();
 }

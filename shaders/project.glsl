@@ -1,45 +1,42 @@
-// One constraint of a patch: evaluates it and adds its corrections to the sums of its summed vertices.
-void project_$KIND(uvec2 record, uint summed) {
+// One constraint of a chunk: evaluates it and adds its corrections to the sums of its owned vertices (method.md eqs. 4, 25-26).
+void project_$KIND(uint number, uint owned) {
+  uvec2 record = patch_words[RECORDS_AT + number];  // its vertices, a byte each; rest
   vec3 x[$ARITY];
   float w[$ARITY];
-  ivec4 first = here[record.x & 255u];
+  ivec4 first = local_positions[record.x & 255u];
   for (int j = 0; j < $ARITY; ++j) {
-    ivec4 place = here[slot_of(record.x, j)];
-    x[j] = between(place, first);
-    w[j] = inverse_mass_of(place);
+    ivec4 q = local_positions[local_id(record.x, j)];
+    x[j] = between(q, first);
+    w[j] = inverse_mass_of(q);
   }
   Constraint$ARITY c = $KIND(x, uintBitsToFloat(record.y), record.x);
-  float stiffness = params.stiffness[$KIND_ROW][$KIND_COLUMN];
-#ifdef COMPLIANT
-  float a = params.softness[$KIND_ROW][$KIND_COLUMN], gamma = params.relaxation.x, omega = params.relaxation.y, before = 0.0;
-  if ((turn.x & PHASE_FIRST) == 0u) before = multipliers[at_record];
-#if $GROUPED
-  // No further than the full correction where no other constraint of the group is on any of its vertices.
-  float most = 0.0;
-  for (int j = 0; j < $ARITY; ++j) most = max(most, counts[slot_of(record.x, j)]);
-  omega = min(omega, most);
-#endif
-#ifdef DAMPED
-  vec3 start[$ARITY];
-  ivec4 first_start = starts[record.x & 255u];
-  for (int j = 0; j < $ARITY; ++j) start[j] = between(starts[slot_of(record.x, j)], first_start);
-  c.C += gamma * (c.C - $KIND(start, uintBitsToFloat(record.y), record.x).C);
-#endif
+  float k = params.stiffness[$KIND_ROW][$KIND_COLUMN];
+#if COMPLIANT
+  float a = params.compliance[$KIND_ROW][$KIND_COLUMN], before = 0.0, gamma = params.damping, share = (1.0 + gamma) / params.soft_omega;
+  if ((phases & PHASE_PREDICT) == 0u) before = multipliers[number];
+  if (gamma > 0.0) {
+    vec3 start[$ARITY];
+    ivec4 first_start = start_positions[record.x & 255u];
+    for (int j = 0; j < $ARITY; ++j) start[j] = between(start_positions[local_id(record.x, j)], first_start);
+    c.C += gamma * (c.C - $KIND(start, uintBitsToFloat(record.y), record.x).C);
+  }
   c.C += a * before;
-  float share = (1.0 + gamma) / omega, lambda = multiplier(c, w, stiffness, params.limit, a, share);
-  if (slot_of(record.x, 0) < summed) count_guards(guards_of(c, w, stiffness, params.limit, a, share));
-  if ((turn.x & PHASE_LAST) == 0u) multipliers[at_record] = before + lambda;
+  float lambda = multiplier(c, w, k, params.max_correction, a, share);
+  if ((phases & PHASE_FINISH) == 0u) multipliers[number] = before + lambda;
 #else
-  float lambda = multiplier(c, w, stiffness, params.limit);
-  if (slot_of(record.x, 0) < summed) count_guards(guards_of(c, w, stiffness, params.limit));  // in one patch of those that have it
+  const float a = 0.0, share = 1.0;
+  float lambda = multiplier(c, w, k, params.max_correction, a, share);
+#endif
+#if COUNT_GUARDS
+  if (local_id(record.x, 0) < owned) count_guards(guards_of(c, w, k, params.max_correction, a, share));  // in one patch of those that have it
 #endif
   for (int j = 0; j < $ARITY; ++j) {
-    uint slot = slot_of(record.x, j);
-    if (slot < summed && lambda != 0.0) {
-      ivec3 units = ivec3(round(lambda * w[j] * c.gradient[j] * units_per_metre[slot]));
-      atomicAdd(sums[3u * slot], units.x);
-      atomicAdd(sums[3u * slot + 1u], units.y);
-      atomicAdd(sums[3u * slot + 2u], units.z);
+    uint local = local_id(record.x, j);
+    if (local < owned && lambda != 0.0) {
+      ivec3 quanta = ivec3(round(lambda * w[j] * c.gradient[j] * quanta_per_metre[local]));
+      atomicAdd(sums[3u * local], quanta.x);
+      atomicAdd(sums[3u * local + 1u], quanta.y);
+      atomicAdd(sums[3u * local + 2u], quanta.z);
     }
   }
 }

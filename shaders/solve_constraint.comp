@@ -2,18 +2,22 @@
 // constraints, each of which is in one patch, and adds the patch's sums to the vertices' with global atomics.
 #include "types.glsl"
 #include "pair.glsl"
-#include "places.glsl"
-layout(local_size_x = $GROUP) in;
-layout(std430, binding = BIND_DELTAS) buffer Deltas { int deltas[]; };
+#include "quantized.glsl"
+layout(local_size_x = GROUP_SIZE) in;
+uniform uint phases;
+layout(std430, binding = BIND_SUMS) buffer Sums { int correction_sums[]; };
 #include "patch.glsl"
 
 void main() {
-  bool some = group_index() < $PATCHESu;
-  uint part = some ? group_index() : 0u;
+  bool exists = group_index() < PATCH_COUNT;
+  Chunk chunk = chunk_at(exists ? group_index() : 0u);
   clear_sums();
-  solve_part(part, some);
-  uint count = some ? parts[$PART_WORDSu * part] : 0u;
-  for (uint k = gl_LocalInvocationIndex; k < count; k += $GROUPu)
+  load_chunk(chunk.number);
+  barrier();
+  project_chunk(chunk, exists);
+  barrier();
+  uint count = exists ? chunk.vertices : 0u;
+  for (uint k = gl_LocalInvocationIndex; k < count; k += GROUP_SIZE)
     for (uint a = 0u; a < 3u; ++a)
-      if (sums[3u * k + a] != 0) atomicAdd(deltas[4u * names[k] + a], sums[3u * k + a]);
+      if (sums[3u * k + a] != 0) atomicAdd(correction_sums[4u * global_ids[k] + a], sums[3u * k + a]);
 }

@@ -1,70 +1,73 @@
-// Node-centric Jacobi (paper algorithm 2; method.md eqs. 4, 13): every vertex gathers the corrections of all constraints on it, of every
-// kind present, in one dispatch. A work-group owns a patch of neighbouring vertices and evaluates each constraint that has one of
-// them; one on the border of patches is evaluated in each. Places are read from one buffer and written to another. Mode groups takes
-// the constraints of one group, and averages by the number of those on the vertex, without ever exceeding the full correction.
+// Node-centric Jacobi (paper algorithm 2): every vertex gathers the corrections of all constraints on it, of every kind present, and
+// moves, in one dispatch. A work-group owns a patch of neighbouring vertices and evaluates each constraint that has one of them; one on
+// the border of patches is evaluated in each. Vertices are read from one buffer and written to another.
 #include "types.glsl"
 #include "pair.glsl"
-#include "places.glsl"
-layout(local_size_x = $GROUP) in;
+#include "quantized.glsl"
+layout(local_size_x = GROUP_SIZE) in;
 #include "vertex.glsl"
 #include "patch.glsl"
-#if $HANDLES
-#include "handles.glsl"
+#if CLUSTERS
+#include "clusters.glsl"
 #endif
 
 void main() {
-  uint me = gl_LocalInvocationIndex;
-  bool some = group_index() < $PATCHESu;
-  uint part = some ? ((turn.x >> PHASE_BITS) & 127u) * $PATCHESu + group_index() : 0u;
-  uint i = parts[$PART_WORDSu * part + 2u] + me;
-  uint count = some ? parts[$PART_WORDSu * part + 1u] : 0u;
-  bool mine = me < count;
-  vec3 correction = vec3(0.0);
-  bool solves = (turn.x & PHASE_SOLVE) != 0u;
-#if $HANDLES
-  load_handles(group_index(), i - me, count);
+  uint lane = gl_LocalInvocationIndex;
+  bool exists = group_index() < PATCH_COUNT, solves = (phases & PHASE_SOLVE) != 0u;
+  Chunk chunk = chunk_at(exists ? group_index() : 0u);
+  uint i = chunk.first + lane, owned = exists ? chunk.owned : 0u;
+  bool mine = lane < owned;
+
+  // Gather: the sum of all corrections on a vertex, over their number, times omega (method.md eqs. 4, 13).
+#if CLUSTERS
+  load_clusters(group_index(), chunk.first, owned);
 #endif
   if (solves) {
     clear_sums();
-    load_part(part);
+    load_chunk(chunk.number);
   }
   barrier();
-#if $HANDLES
+#if CLUSTERS
   find_poses();  // while others evaluate constraints
   if (!solves) barrier();
 #endif
+  vec3 correction = vec3(0.0);
   if (solves) {
-    float share = params.omega;
-#if $GROUPED
-    share = min(share, uintBitsToFloat(vertices[$VERTICESu * part + (mine ? me : 0u)].y));
-#endif
-    project_part(part, some);
+    project_chunk(chunk, exists);
     barrier();
-#if $PARTED
-    for (uint next = parts[$PART_WORDSu * part + 3u]; next != 0u; next = parts[$PART_WORDSu * next + 3u]) solve_part(next, some);
+#if CHUNKED
+    for (uint next = chunk.next; next != 0u; next = chunk_at(next).next) {
+      load_chunk(next);
+      barrier();
+      project_chunk(chunk_at(next), exists);
+      barrier();
+    }
 #endif
-    if (mine) correction = vec3(sums[3u * me], sums[3u * me + 1u], sums[3u * me + 2u]) * (params.delta_unit * share);
-#if $HANDLES
-    correction += params.handles * handle_pull(i - me, count);
+    if (mine) correction = vec3(sums[3u * lane], sums[3u * lane + 1u], sums[3u * lane + 2u]) * (params.correction_quantum * params.omega);
+#if CLUSTERS
+    correction += params.cluster_strength * cluster_pull(chunk.first, owned);
 #endif
   }
+
+  // Move: prediction before the first iteration of a substep, contacts in each, velocity after the last (eqs. 1-2, 5, 11-13).
   if (mine) {  // read here only: fewer registers while constraints are evaluated
-    ivec4 place = places[i];
-    if ((turn.x & PHASE_PLACES) != 0u) {
-      places_out[i] = place;
+    ivec4 seen = quantized[i];
+    if ((phases & PHASE_SUMS) != 0u) {
+      quantized_out[i] = seen;
     } else {
       Velocity speed;
-      if ((turn.x & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
-      place = advance(i, positions[i], speed, correction);
+      if ((phases & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+      seen = advance(i, positions[i], speed, correction);
     }
-#ifdef DAMPED
-    if ((turn.x & PHASE_FINISH) == 0u) places_out[params.vertex_count + i] = places[params.vertex_count + i];
+#if COMPLIANT
+    if (params.damping > 0.0 && (phases & PHASE_FINISH) == 0u)
+      quantized_out[params.vertex_count + i] = quantized[params.vertex_count + i];
 #endif
-#if $HANDLES
-    here[me] = place;
+#if CLUSTERS
+    local_positions[lane] = seen;
 #endif
   }
-#if $HANDLES
-  add_to_handles(group_index(), count);
+#if CLUSTERS
+  add_to_clusters(group_index(), owned);
 #endif
 }

@@ -1,14 +1,19 @@
 // What happens to a vertex besides gathering its corrections: prediction before the first iteration of a substep, contacts in
-// each, velocity after the last (method.md eqs. 1-2, 5, 11-13); and what its neighbours see next, its place.
+// each, velocity after the last (method.md eqs. 1-2, 5, 11-13); and what its neighbours see next.
 layout(std430, binding = BIND_POSITIONS) buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_VELOCITIES) buffer Velocities { Velocity velocities[]; };
 layout(std430, binding = BIND_PREDICTED) buffer Predicted { Velocity predicted[]; };  // a Pair, padded
+// The first step whose state is not finite, and the lowest vertex that is not; ~0: none.
+layout(std430, binding = BIND_CHECK) buffer Check { uint bad_step, bad_vertex; };
+// Dispatch parameters: what this one does (PHASE_ bits), and the number of the step, for the check.
+uniform uint phases;
+uniform uint step_number;
 #include "contact.glsl"
-#include "first_bad.glsl"
+#include "finite.glsl"
 
 Pair predict_velocity(Pair v) {
   v = pair_add(v, params.gravity * params.h);
-  return Pair(v.high * params.keep, v.low * params.keep);
+  return Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
 }
 Pair predict_position(Pair x, Pair v) {
   precise vec3 move = params.h * v.high;
@@ -17,56 +22,81 @@ Pair predict_position(Pair x, Pair v) {
 // The inverse mass that constraints see. With mass splitting (Tonge et al. 2012) each of n_i constraints has 1/n_i of the mass: the
 // average over them then keeps momentum (method.md eq. 13m).
 float weight_of(Position own) { return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass; }
-ivec4 predicted_place(Position own, Velocity speed) {
-  Pair x = Pair(own.high, own.low);
-  if (own.inverse_mass > 0.0) x = predict_position(x, predict_velocity(Pair(speed.high, speed.low)));
-  return place_of(x, weight_of(own));
+
+float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
+bool touches(Pair x) {
+  bool any = params.plane_count > 0 && depth_of(x, params.planes[0]) < 0.0;  // mostly there is one, or none
+  for (int k = 1; k < params.plane_count; ++k) any = any || depth_of(x, params.planes[k]) < 0.0;
+  return any;
+}
+// Corrects a vertex out of all half spaces; `moved`: its displacement in this substep before the correction.
+Pair resolve_contacts(Pair x, vec3 moved) {
+  for (int k = 0; k < params.plane_count; ++k) {
+    vec4 plane = params.planes[k];
+    float depth = depth_of(x, plane);
+    if (depth < 0.0) {
+      vec3 correction = plane_correction(plane.xyz, depth, moved, params.friction);
+      x = pair_add(x, correction);
+      moved += correction;
+    }
+  }
+  return x;
+}
+
+// Notes a vertex that is not finite. Taken almost never, so it costs a test of numbers that are in registers anyway.
+void note_unless_finite(uint i, vec3 position, vec3 velocity) {
+  if (!is_finite(position) || !is_finite(velocity)) {
+    if (atomicMin(bad_step, step_number) >= step_number) atomicMin(bad_vertex, i);
+  }
 }
 
 // Moves vertex i, which is not fixed; returns where its neighbours see it.
 Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
-  uint phase = turn.x;
+  bool predicts = (phases & PHASE_PREDICT) != 0u, finishes = (phases & PHASE_FINISH) != 0u;
   Pair x = Pair(own.high, own.low), v = Pair(speed.high, speed.low), start = x;
-  if ((phase & PHASE_PREDICT) != 0u) {
+  if (predicts) {
     v = predict_velocity(v);
     start = x = predict_position(x, v);
   }
-  if ((phase & PHASE_SOLVE) != 0u) {
+  if ((phases & PHASE_SOLVE) != 0u) {
     Pair corrected = pair_add(x, correction);
-    if ((phase & PHASE_CONTACT) != 0u && touches(corrected)) {
+    if (touches(corrected)) {
       vec3 moved = correction;
-      if ((phase & PHASE_PREDICT) != 0u) moved += params.h * v.high;
+      if (predicts) moved += params.h * v.high;
       else moved += params.h * velocities[i].high + relative(x, Pair(predicted[i].high, predicted[i].low));
       corrected = resolve_contacts(corrected, moved);
     }
     x = corrected;
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  if ((phase & PHASE_FINISH) != 0u) {
-    if ((phase & PHASE_PREDICT) == 0u) start = Pair(predicted[i].high, predicted[i].low);
+  if (finishes) {
+    if (!predicts) start = Pair(predicted[i].high, predicted[i].low);
     v = pair_add(v, relative(x, start) * params.inverse_h);
-    note_unless_finite(i, turn.y, x.high + x.low, v.high + v.low);
-  } else if ((phase & PHASE_PREDICT) != 0u) {
+    note_unless_finite(i, x.high + x.low, v.high + v.low);
+  } else if (predicts) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
   }
-  if ((phase & (PHASE_PREDICT | PHASE_FINISH)) != 0u) velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
-#ifdef DAMPED
-  if ((phase & PHASE_FINISH) != 0u) places_out[params.vertex_count + i] = place_of(x, 0.0);
+  if (predicts || finishes) velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+#if COMPLIANT
+  if (finishes && params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
   // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
-  if ((phase & PHASE_FINISH) != 0u) x = predict_position(x, predict_velocity(v));
+  if (finishes) x = predict_position(x, predict_velocity(v));
   return x;
 }
-// Reads and writes vertex i alone; returns its new place. `own`: its position; `speed`: its velocity, read if the phase predicts or
-// finishes.
+// Reads and writes vertex i alone; returns what its neighbours see of it. `own`: its position; `speed`: its velocity, read if the phases
+// predict or finish.
 ivec4 advance(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = Pair(own.high, own.low);
-  if (own.inverse_mass > 0.0) x = moved(i, own, speed, correction);
-  else if ((turn.x & PHASE_FINISH) != 0u) note_unless_finite(i, turn.y, x.high + x.low, vec3(0.0));
-#ifdef DAMPED
-  if (own.inverse_mass <= 0.0 && (turn.x & PHASE_FINISH) != 0u) places_out[params.vertex_count + i] = place_of(x, 0.0);
+  if (own.inverse_mass > 0.0) {
+    x = moved(i, own, speed, correction);
+  } else if ((phases & PHASE_FINISH) != 0u) {
+    note_unless_finite(i, x.high + x.low, vec3(0.0));
+#if COMPLIANT
+    if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
-  ivec4 place = place_of(x, weight_of(own));
-  places_out[i] = place;
-  return place;
+  }
+  ivec4 seen = quantize(x, weight_of(own));
+  quantized_out[i] = seen;
+  return seen;
 }

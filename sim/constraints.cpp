@@ -4,6 +4,7 @@
 #include <array>
 
 #include "sim/parallel.h"
+#include "sim/settings.h"
 
 namespace tetpbd {
 
@@ -71,28 +72,6 @@ void Bend::build(const TetMesh& mesh, ConstraintList& list) {
 
 void Volume::build(const TetMesh& mesh, ConstraintList& list) { measure_all<Volume>(mesh, mesh.tets, list); }
 
-const std::vector<ConstraintKind>& constraint_kinds() {
-  static const std::vector<ConstraintKind> rows = [] {
-    std::vector<ConstraintKind> result;
-    for_each_kind([&]<class Kind>(Kind, int) {
-      result.push_back({Kind::name, Kind::arity, Kind::stiffness, Kind::compliance});
-    });
-    return result;
-  }();
-  return rows;
-}
-
-bool compliant(const Settings& settings) {
-  bool any = damped(settings);
-  const auto wanted = split(settings.constraints, ',');
-  for (const ConstraintKind& kind : constraint_kinds())
-    any = any || (settings.*kind.compliance > 0 &&
-                  std::find(wanted.begin(), wanted.end(), kind.name) != wanted.end());
-  return any;
-}
-
-bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
-
 std::size_t ConstraintSystem::count() const {
   std::size_t sum = 0;
   for (const ConstraintList& list : lists) sum += list.count();
@@ -105,8 +84,8 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names
   const auto wanted = split(names, ',');
   for_each_kind([&](auto kind, int) {
     ConstraintList list;
-    list.arity = kind.arity;
-    const bool present = std::find(wanted.begin(), wanted.end(), kind.name) != wanted.end();
+    list.arity = kind.row.arity;
+    const bool present = std::find(wanted.begin(), wanted.end(), kind.row.name) != wanted.end();
     if (present) kind.build(mesh, list);
     for (std::uint32_t v : list.vertices) ++system.at_vertex[v];
     system.present.push_back(present && list.count() > 0);

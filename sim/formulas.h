@@ -28,7 +28,7 @@ struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
-  static constexpr real grain = 0;  // positions are kept in full here
+  static constexpr real quantization_size = 0;  // positions are kept in full here
   static real atan(real y, real x) { return Math::atan(y, x); }
   static real pow(real x, real y) { return Math::pow(x, y); }
   using Ids = const uint*;
@@ -38,11 +38,8 @@ struct Formulas {
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #include "shaders/constraints/types.glsl"
-#include "shaders/constraints/stretch.glsl"
-#include "shaders/constraints/bend.glsl"
-#include "shaders/constraints/volume.glsl"
-#include "shaders/constraints/compliance.glsl"
-#include "shaders/collision.glsl"
+#include "constraint_formulas.inc"  // CMake's: every other file there
+#include "shaders/contact.glsl"
 #pragma GCC diagnostic pop
   // clang-format on
 };

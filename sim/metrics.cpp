@@ -32,7 +32,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     return std::size_t(k) < made.present.size() && made.present[std::size_t(k)];
   };
   for_each_kind([&](auto kind, int k) {
-    if (!is_made(k)) missing += std::string(kind.name) + ",";
+    if (!is_made(k)) missing += std::string(kind.row.name) + ",";
   });
   ConstraintSystem others;
   if (!missing.empty()) others = build_constraints(model.rest, missing.substr(0, missing.size() - 1));
@@ -40,7 +40,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   for_each_kind([&](auto kind, int k) {
     lists.push_back(&(is_made(k) ? made : others).lists[std::size_t(k)]);
     // A mesh can lack hinges (no two surface triangles share an edge): an empty buffer then.
-    m.records.push_back(record_buffer(*lists.back(), kind.name));
+    m.records.push_back(record_buffer(*lists.back(), kind.row.name));
   });
   std::vector<glm::vec4> rest(model.rest.positions.size());
   const std::vector<double> volumes = tet_volumes(model.rest);

@@ -8,6 +8,12 @@
 
 namespace tetpbd {
 
+/// State on the CPU, in double: what CPU modes step and what tests compare.
+struct State {
+  std::vector<glm::dvec3> positions;   ///< m
+  std::vector<glm::dvec3> velocities;  ///< m/s
+};
+
 /// A contiguous part of the rest mesh.
 struct Body {
   std::string name;

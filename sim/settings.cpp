@@ -8,9 +8,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "sim/constraints.h"
 #include "sim/error.h"
-#include "sim/solvers/handles.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -18,47 +16,55 @@ namespace tetpbd {
 const std::vector<Parameter>& parameters() {
   using S = Settings;
   using enum Effect;
-  static const std::vector<Parameter> rows = {
-      {"mode", "solver", &S::mode, 0, 0, false, "", "solver mode", rebuild},
-      {"constraints", "solver", &S::constraints, 0, 0, false, "", "constraint kinds, separated by commas",
-       rebuild},
-      {"k_stretch", "solver", &S::k_stretch, 0, 1, false, "", "stiffness of stretch", live},
-      {"k_bend", "solver", &S::k_bend, 0, 1, false, "", "stiffness of bending", live},
-      {"k_volume", "solver", &S::k_volume, 0, 1, false, "", "stiffness of volume", live},
-      {"compliance_stretch", "solver", &S::compliance_stretch, 0, 1, true, "m/N",
-       "softness of edges, 1 over a spring's stiffness; 0: as hard as iterations make it. Any compliance or "
-       "constraint_damping above 0 brings mass_splitting with it",
-       live},
-      {"compliance_bend", "solver", &S::compliance_bend, 0, 1e4, true, "rad^2/J",
-       "softness of hinges; 0: as hard as iterations make it", live},
-      {"compliance_volume", "solver", &S::compliance_volume, 0, 1, true, "m^3/Pa",
-       "softness of tets' volumes, rest volume over bulk modulus; 0: as hard as iterations make it", live},
-      {"constraint_damping", "solver", &S::constraint_damping, 0, 10, true, "s",
-       "time over which constraints resist their rate: a spring's damping is this times its stiffness", live},
-      {"omega", "solver", &S::omega, 0, 4, false, "",
-       "over-relaxation of averaged corrections, 1 to 2 recommended (Jacobi modes)", live},
-      {"mass_splitting", "solver", &S::mass_splitting, 0, 1, false, "",
-       "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
-       "with compliance always",
-       live},
-      {"handles", "solver", &S::handles, 0, 1, false, "",
-       "how far rigid handles pull towards the rest shape in an iteration: for hard bodies, 0.4 to 0.8 "
-       "(mode node, without compliance)",
-       live},
-      {"groups", "solver", &S::groups, 1, 128, true, "",
-       "groups of constraints, solved one after the other (mode groups); many are a colouring", rebuild},
-      {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations a substep", live},
-      {"substeps", "solver", &S::substeps, 1, 100000, true, "", "substeps a step", live},
-      {"dt", "solver", &S::dt, 1e-6, 1, true, "s", "time of one step", live},
-      {"damping", "solver", &S::damping, 0, 1000, false, "1/s",
-       "rate at which velocity decays, exp(-damping t)", live},
-      {"gravity", "world", &S::gravity, -1000, 1000, false, "m/s^2", "gravity, downwards", live},
-      {"ground", "world", &S::ground, 0, 1, false, "", "whether there is a ground plane", live},
-      {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane",
-       live},
-      {"friction", "world", &S::friction, 0, 10, false, "", "Coulomb friction of ground and obstacles", live},
-      {"seed", "solver", &S::seed, 0, 2147483647, false, "", "seed of random start positions", restart},
-  };
+  static const std::vector<Parameter> rows = [] {
+    std::vector<Parameter> all = {
+        {"mode", "solver", &S::mode, 0, 0, false, "", "solver mode", rebuild},
+        {"constraints", "solver", &S::constraints, 0, 0, false, "", "constraint kinds, separated by commas",
+         rebuild},
+    };
+    for (std::size_t k = 0; k < kind_count; ++k)
+      all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k}, 0,
+                     1, false, "", fmt::format("stiffness of {}", constraint_kinds[k].noun), live});
+    for (std::size_t k = 0; k < kind_count; ++k)
+      all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
+                     KindMember{&S::compliance, k}, 0, constraint_kinds[k].most_compliance, true,
+                     constraint_kinds[k].compliance_unit,
+                     fmt::format("softness of {}; 0: as hard as iterations make it. Any compliance or "
+                                 "constraint_damping above 0 brings mass_splitting with it",
+                                 constraint_kinds[k].noun),
+                     live});
+    const std::vector<Parameter> others = {
+        {"constraint_damping", "solver", &S::constraint_damping, 0, 10, true, "s",
+         "time over which constraints resist their rate: a spring's damping is this times its stiffness",
+         live},
+        {"omega", "solver", &S::omega, 0, 4, false, "",
+         "over-relaxation of averaged corrections, 1 to 2 recommended, with compliance at most 2 (Jacobi "
+         "modes)",
+         live},
+        {"mass_splitting", "solver", &S::mass_splitting, 0, 1, false, "",
+         "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
+         "with compliance always",
+         live},
+        {"handles", "solver", &S::handles, 0, 1, false, "",
+         "how far rigid handles pull towards the rest shape per iteration, 0.4 to 0.8: for hard bodies alone "
+         "(mode node, stretch in use, every k 1, no compliance)",
+         live},
+        {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations per substep", live},
+        {"substeps", "solver", &S::substeps, 1, 100000, true, "", "substeps per step", live},
+        {"dt", "solver", &S::dt, 1e-6, 1, true, "s", "time of one step", live},
+        {"damping", "solver", &S::damping, 0, 1000, false, "1/s",
+         "rate at which velocity decays, exp(-damping t)", live},
+        {"gravity", "world", &S::gravity, -1000, 1000, false, "m/s^2", "gravity, downwards", live},
+        {"ground", "world", &S::ground, 0, 1, false, "", "whether there is a ground plane", live},
+        {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane",
+         live},
+        {"friction", "world", &S::friction, 0, 10, false, "", "Coulomb friction of ground and obstacles",
+         live},
+        {"seed", "solver", &S::seed, 0, 2147483647, false, "", "seed of random start positions", restart},
+    };
+    all.insert(all.end(), others.begin(), others.end());
+    return all;
+  }();
   return rows;
 }
 
@@ -71,7 +77,7 @@ const Parameter* find_parameter(const std::string& name) {
 }
 
 std::string flag_name(const Parameter& parameter) {
-  std::string name = std::string("--") + parameter.name;
+  std::string name = "--" + parameter.name;
   std::replace(name.begin(), name.end(), '_', '-');
   return name;
 }
@@ -86,10 +92,10 @@ std::vector<std::string> split(const std::string& text, char separator) {
 
 std::vector<std::string> choices(const Parameter& parameter) {
   std::vector<std::string> names;
-  if (std::string_view(parameter.name) == "mode")
+  if (parameter.name == "mode")
     for (const SolverMode& mode : solver_modes()) names.push_back(mode.name);
-  if (std::string_view(parameter.name) == "constraints")
-    for (const ConstraintKind& kind : constraint_kinds()) names.push_back(kind.name);
+  if (parameter.name == "constraints")
+    for (const ConstraintKind& kind : constraint_kinds) names.push_back(kind.name);
   return names;
 }
 
@@ -106,9 +112,13 @@ std::string range_text(const Parameter& row) {
                      row.unit);
 }
 
+bool in_range(const Parameter& row, double value) {
+  return std::isfinite(value) && value >= row.low && value <= row.high;
+}
+
 void check_words(const Parameter& row, const std::string& text, const std::string& where) {
   const auto allowed = choices(row);
-  const bool list = std::string_view(row.name) == "constraints";
+  const bool list = row.name == "constraints";
   const auto words = list ? split(text, ',') : std::vector<std::string>{text};
   for (const std::string& word : words)
     if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
@@ -122,43 +132,36 @@ void check_words(const Parameter& row, const std::string& text, const std::strin
 
 void set_parameter(Settings& settings, const Parameter& row, const std::string& text,
                    const std::string& where) {
-  const auto number = [&]<class T>(T& target) {
-    T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(double(value)) ||
-        double(value) < row.low || double(value) > row.high)
-      refuse(row, text, where, range_text(row));
-    target = value;
-  };
-  if (const auto* member = std::get_if<double Settings::*>(&row.member)) number(settings.**member);
-  if (const auto* member = std::get_if<int Settings::*>(&row.member)) number(settings.**member);
-  if (const auto* member = std::get_if<bool Settings::*>(&row.member)) {
-    if (text != "true" && text != "false" && text != "1" && text != "0")
-      refuse(row, text, where, "give true or false");
-    settings.** member = text == "true" || text == "1";
-  }
-  if (const auto* member = std::get_if<std::string Settings::*>(&row.member)) {
-    if (text.empty())
-      refuse(row, text, where,
-             std::string_view(row.name) == "constraints" ? "write none for no constraints" : "name one");
-    const std::string value = text == "none" && std::string_view(row.name) == "constraints" ? "" : text;
-    check_words(row, value, where);
-    settings.** member = value;
-  }
+  with_value(settings, row, [&]<class T>(T& target) {
+    if constexpr (std::is_same_v<T, bool>) {
+      if (text != "true" && text != "false" && text != "1" && text != "0")
+        refuse(row, text, where, "give true or false");
+      target = text == "true" || text == "1";
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      const bool list = row.name == "constraints";
+      if (text.empty()) refuse(row, text, where, list ? "write none for no constraints" : "name one");
+      const std::string value = text == "none" && list ? "" : text;
+      check_words(row, value, where);
+      target = value;
+    } else {
+      T value{};
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+      if (error != std::errc() || end != text.data() + text.size() || !in_range(row, double(value)))
+        refuse(row, text, where, range_text(row));
+      target = value;
+    }
+  });
 }
 
 std::string parameter_text(const Settings& settings, const Parameter& row) {
-  return std::visit(
-      [&](auto member) -> std::string {
-        using T = std::remove_cvref_t<decltype(settings.*member)>;
-        if constexpr (std::is_same_v<T, bool>)
-          return settings.*member ? "true" : "false";
-        else if constexpr (std::is_same_v<T, std::string>)
-          return (settings.*member).empty() ? "none" : settings.*member;
-        else
-          return fmt::format("{}", settings.*member);
-      },
-      row.member);
+  return with_value(settings, row, []<class T>(const T& value) -> std::string {
+    if constexpr (std::is_same_v<T, bool>)
+      return value ? "true" : "false";
+    else if constexpr (std::is_same_v<T, std::string>)
+      return value.empty() ? "none" : value;
+    else
+      return fmt::format("{}", value);
+  });
 }
 
 constexpr double usual_handles = 0.4;
@@ -188,7 +191,7 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
 }
 
 std::string mode_word(const Settings& settings) {
-  if (!wants_handles(settings)) return settings.mode;
+  if (settings.handles == 0) return settings.mode;
   return settings.mode + "+handles" +
          (settings.handles == usual_handles ? "" : fmt::format("-{:g}", settings.handles));
 }
@@ -222,9 +225,43 @@ void apply_preset(Settings& settings, const SolverPreset& preset) {
     set_parameter(settings, *find_parameter(name), text, preset.name);
 }
 
+bool uses(const Settings& settings, const ConstraintKind& kind) {
+  const auto names = split(settings.constraints, ',');
+  return std::find(names.begin(), names.end(), kind.name) != names.end();
+}
+
+bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
+
+bool compliant(const Settings& settings) {
+  bool any = damped(settings);
+  for (std::size_t k = 0; k < kind_count; ++k)
+    any = any || (settings.compliance[k] > 0 && uses(settings, constraint_kinds[k]));
+  return any;
+}
+
 void check_settings(const Settings& settings, const std::string& where) {
-  Settings copy = settings;
-  for (const Parameter& row : parameters()) set_parameter(copy, row, parameter_text(settings, row), where);
+  for (const Parameter& row : parameters())
+    with_value(settings, row, [&]<class T>(const T& value) {
+      if constexpr (std::is_same_v<T, std::string>) {
+        if (row.name != "mode" || !find_solver_mode(value)) check_words(row, value, where);  // also "paper"
+      } else if (!in_range(row, double(value)))
+        refuse(row, parameter_text(settings, row), where, range_text(row));
+    });
+  if (compliant(settings) && settings.omega > 2)
+    throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
+                "give at most 2: beyond it corrections grow");
+  if (settings.handles == 0) return;
+  // Handles pull to the rest shape, which is the answer only where every constraint is to be met.
+  const auto no_handles = [&](const std::string& why) {
+    throw Error("'handles' are for hard bodies: " + why, where, "set handles to 0");
+  };
+  const SolverMode* mode = find_solver_mode(settings.mode);
+  if (!mode || !mode->clusters) no_handles("mode " + settings.mode + " has none");
+  if (compliant(settings)) no_handles("compliance or constraint_damping is above 0");
+  if (!uses(settings, Stretch::row)) no_handles("stretch is left out");
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (uses(settings, constraint_kinds[k]) && settings.stiffness[k] < 1)
+      no_handles(fmt::format("k_{} is below 1", constraint_kinds[k].name));
 }
 
 }  // namespace tetpbd

@@ -2,23 +2,29 @@
 // widget and the docs.
 #pragma once
 
+#include <array>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include "sim/constraint_kinds.h"
 
 namespace tetpbd {
 
 struct Settings {
   std::string mode = "node";
   std::string constraints = "stretch,bend,volume";
-  double k_stretch = 1, k_bend = 1, k_volume = 1;
-  double compliance_stretch = 0, compliance_bend = 0, compliance_volume = 0;
+  std::array<double, kind_count> stiffness = [] {  ///< k_NAME by kind, 0 to 1
+    std::array<double, kind_count> hard;
+    hard.fill(1);
+    return hard;
+  }();
+  std::array<double, kind_count> compliance{};  ///< compliance_NAME by kind
   double constraint_damping = 0;
   double omega = 1.5;
   bool mass_splitting = false;
   double handles = 0;
-  int groups = 8;
   int iterations = 1;
   int substeps = 20;
   double dt = 0.005;
@@ -35,16 +41,35 @@ struct Settings {
 /// scene starts anew.
 enum class Effect { live, rebuild, restart };
 
+/// Of an array by constraint kind.
+struct KindMember {
+  std::array<double, kind_count> Settings::*array;
+  std::size_t kind;
+};
+
 struct Parameter {
-  const char* name;     ///< scene key; the flag is --name with - for _
+  std::string name;     ///< scene key; the flag is --name with - for _
   const char* section;  ///< scene section: "solver" or "world"
-  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*> member;
+  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*, KindMember>
+      member;
   double low, high;  ///< allowed range; numbers only
   bool logarithmic;  ///< slider scale
   const char* unit;
-  const char* help;
+  std::string help;
   Effect effect;
 };
+/// Calls f with a reference to the parameter's value in `settings`: double, int, bool or std::string.
+template <class S, class F>
+decltype(auto) with_value(S& settings, const Parameter& parameter, F&& f) {
+  return std::visit(
+      [&](auto member) -> decltype(auto) {
+        if constexpr (std::is_same_v<decltype(member), KindMember>)
+          return f((settings.*member.array)[member.kind]);
+        else
+          return f(settings.*member);
+      },
+      parameter.member);
+}
 
 const std::vector<Parameter>& parameters();
 const Parameter* find_parameter(const std::string& name);  ///< name with - or _; nullptr if there is none
@@ -72,7 +97,15 @@ struct SolverPreset {
 const std::vector<SolverPreset>& solver_presets();
 void apply_preset(Settings& settings, const SolverPreset& preset);
 
-/// Throws Error for values out of range; `where` names the file or flag.
+/// Whether constraints are XPBD's (method.md eq. 25): any kind in use has compliance, or there is damping.
+bool compliant(const Settings& settings);
+/// Whether constraints resist their rate.
+bool damped(const Settings& settings);
+/// Whether the list `constraints` names this kind.
+bool uses(const Settings& settings, const ConstraintKind& kind);
+
+/// Throws Error for values out of range, and for those that do not go together; `where` names the file or
+/// flag.
 void check_settings(const Settings& settings, const std::string& where);
 std::vector<std::string> split(const std::string& text, char separator);
 

@@ -1,4 +1,6 @@
 // A simulation: a model, settings, GPU buffers and the passes of a step. Any number can live side by side.
+// step.cpp takes steps, sim.cpp makes, sets and reads simulations, explain.cpp says what one costs. Whoever
+// uses it calls these functions and reads its members; only they write them.
 #pragma once
 
 #include <memory>
@@ -20,20 +22,22 @@ struct Sim {
   ConstraintSystem system;
   std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
 
-  Buffer positions;   ///< Position
-  Buffer velocities;  ///< Velocity
-  Buffer predicted;   ///< Velocity (a pair as well), from the first iteration of a substep to the last
-  Buffer places[2];  ///< what neighbours see (places.glsl); a double-buffered solver reads one and writes the
-                     ///< other
+  Buffer positions;     ///< Position
+  Buffer velocities;    ///< Velocity
+  Buffer predicted;     ///< Velocity (a pair as well), from the first iteration of a substep to the last
+  Buffer quantized[2];  ///< what neighbours see (quantized.glsl); a double-buffered solver reads one and
+                        ///< writes the other
   Buffer step_block;    ///< Step
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
-  Pass predict;         ///< makes the places of the next step, after a change from outside
   Solver solver;
+  Pass predict;  ///< makes the quantized positions of the next step, after a change from outside
+  std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;
-  double unit = 1;                  ///< m, of places
-  bool stale = true;                ///< the places are not those of the next step
-  unsigned side = 0;                ///< which of `places` is read next
-  unsigned turn = 0;                ///< which set of handles' sums is (Solver::handles)
+  bool compliant = false;           ///< what the solver was made for
+  double quantum = 1;               ///< m, of quantized positions
+  bool needs_predict = true;        ///< the quantized positions are not those of the next step
+  unsigned read_index = 0;          ///< which of `quantized` is read next
+  unsigned cluster_set = 0;         ///< which of the three sets of the clusters' sums is
   long steps = 0;                   ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
@@ -46,14 +50,11 @@ struct Sim {
   const Buffer& current_positions() const { return positions; }
 };
 
+/// Throws Error where settings do not go together, or the driver's limits do not allow the size.
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
-/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count.
-/// Waits.
-GuardCounts guard_counts(Sim& sim);
 /// Throws Error naming what the driver's limits do not allow.
-void check_limits(const ConstraintSystem& system, const Capabilities& limits, bool compliant = false,
-                  bool handles = false);
+void check_limits(const ConstraintSystem& system, const Capabilities& limits, bool clusters = false);
 /// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
 /// solver again if the mode, the constraint kinds or whether there is compliance changed; where that fails,
 /// throws and leaves the simulation as it was.
@@ -68,16 +69,27 @@ void reset(Sim& sim);
 
 /// Whether the mode steps on the CPU: then `host` is the state.
 inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
+inline bool has_clusters(const Sim& sim) { return !sim.solver.clusters.clusters.empty(); }
 
 /// Waits for the GPU.
 State read_state(const Sim& sim);
-/// Of any buffers of Position and Velocity. Waits for the GPU.
-State read_state(const Buffer& positions, const Buffer& velocities);
 /// A state that is not finite is taken, and found by check_finite() at once.
 void write_state(Sim& sim, const State& state);
+/// The GPU's buffers of a state that CPU code stepped.
+void upload(Sim& sim, const State& state);
 /// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.
 /// Waits.
 std::uint64_t state_hash(const Sim& sim);
+/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count.
+/// Waits.
+GuardCounts guard_counts(Sim& sim);
+
+/// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
+/// ContextLost.
+const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
+/// Back to the last good state that was kept, at most 64 steps before the one found, and to its step; false
+/// where there is none.
+bool restore_checkpoint(Sim& sim);
 
 /// A pinned vertex stays where it is or is put (infinite mass). Does not wait.
 void pin(Sim& sim, std::uint32_t vertex);
@@ -92,14 +104,14 @@ struct Explanation {
     std::string name;
     std::size_t bytes;
   };
-  struct Dispatch {
+  struct Kernel {
     std::string name;
-    std::size_t groups;
+    std::size_t work_groups;
     long per_step;      ///< 0: only after a change from outside
     std::size_t bytes;  ///< of one dispatch
   };
   std::vector<Item> buffers;
-  std::vector<Dispatch> dispatches;
+  std::vector<Kernel> dispatches;
   std::size_t bytes = 0;
   long dispatches_per_step = 0;
   std::size_t bytes_per_step = 0;  ///< read and written by all dispatches; caches may serve part of it

@@ -65,14 +65,14 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
 
   // What handles or over-relaxation would change is not tried with them.
   Settings soft = scene.settings;
-  soft.k_stretch = 0.5;
+  soft.stiffness[index_of<Stretch>] = 0.5;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 3);
   Settings liquid = scene.settings;  // keeps its volume and no shape: handles would freeze it
   liquid.handles = 0;
   liquid.constraints = "volume";
   for (const SolverTrial& trial : choose_solver(model, liquid, 1, 3).trials)
     CHECK(trial.settings.handles == 0);
-  soft.compliance_volume = 1e-6;
+  soft.compliance[index_of<Volume>] = 1e-6;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
   // No budget is too small for one substep, and a hundred times the budget holds more.
   CHECK(choose_solver(model, scene.settings, 1e-6, 2).settings().substeps == 1);

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/solvers/colours.h"
-#include "sim/solvers/cpu_pbd.h"
 #include "sim/error.h"
 #include "sim/reference/reference.h"
 #include "sim/sim.h"
+#include "sim/solvers/colours.h"
+#include "sim/solvers/cpu_pbd.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;
@@ -66,7 +66,8 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, double height, const 
 Settings soft(const std::string& mode, int iterations, int substeps, double tau = 0) {
   Settings s{.iterations = 25, .substeps = 1};
   s.mode = mode, s.iterations = iterations, s.substeps = substeps;
-  s.compliance_stretch = 1e-6, s.compliance_bend = 1e-4, s.compliance_volume = 1e-10;
+  s.compliance[index_of<Stretch>] = 1e-6, s.compliance[index_of<Bend>] = 1e-4,
+  s.compliance[index_of<Volume>] = 1e-10;
   s.constraint_damping = tau;
   return s;
 }
@@ -98,10 +99,11 @@ struct Beam {
       if (mesh.positions[i].x < -0.29) fixed.push_back(i);
     add_body(model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), fixed);
     settings.ground = false;
-    settings.compliance_stretch = 5e-5, settings.compliance_bend = 1e-2, settings.compliance_volume = 1e-8;
+    settings.compliance[index_of<Stretch>] = 5e-5, settings.compliance[index_of<Bend>] = 1e-2,
+    settings.compliance[index_of<Volume>] = 1e-8;
     system = build_constraints(model.rest, settings.constraints);
-    const Compliances alpha = {settings.compliance_stretch, settings.compliance_bend,
-                               settings.compliance_volume};
+    const Compliances alpha = {settings.compliance[index_of<Stretch>], settings.compliance[index_of<Bend>],
+                               settings.compliance[index_of<Volume>]};
     equilibrium = static_equilibrium({model, system, settings, model.inverse_masses}, model.positions, alpha)
                       .state.positions;
     sag = -tip(equilibrium);
@@ -164,7 +166,8 @@ TEST_CASE("a spring takes the step of implicit Euler, damped or not, in one iter
         const double mass = 0.7, alpha = 2e-4, stretched = 0.05, speed = 3;
         Spring spring(mass);
         Settings& s = spring.settings;
-        s.compliance_stretch = alpha, s.constraint_damping = tau, s.iterations = iterations, s.omega = 1;
+        s.compliance[index_of<Stretch>] = alpha, s.constraint_damping = tau, s.iterations = iterations,
+        s.omega = 1;
         spring.state.positions[1].x += stretched, spring.state.velocities[1].x = speed;
         const double h = s.dt, inertia = mass / (h * h), k = 1 / alpha, c = tau / alpha / h;
         const double expected = (inertia * (stretched + h * speed) + c * stretched) / (inertia + k + c);
@@ -179,7 +182,7 @@ TEST_CASE("a hanging mass stretches its spring by compliance times weight") {
       const double mass = 0.7, alpha = 2e-4;
       Spring spring(mass);
       Settings& s = spring.settings;
-      s.compliance_stretch = alpha, s.iterations = iterations, s.substeps = substeps, s.omega = 1;
+      s.compliance[index_of<Stretch>] = alpha, s.iterations = iterations, s.substeps = substeps, s.omega = 1;
       s.gravity = 9.81, s.damping = 30;
       spring.state.positions[1] = {0, -1, 0};
       double stretch = 0;
@@ -197,7 +200,7 @@ TEST_CASE("constraint damping makes an oscillation decay at the rate of its dash
   for (const double tau : {0.0, 0.02 / w, 0.1 / w}) {
     Spring spring(mass);
     Settings& s = spring.settings;
-    s.compliance_stretch = alpha, s.constraint_damping = tau, s.iterations = 1, s.omega = 1;
+    s.compliance[index_of<Stretch>] = alpha, s.constraint_damping = tau, s.iterations = 1, s.omega = 1;
     s.dt = period / 2000;
     spring.state.positions[1].x += 0.01;
     const double rate = w * w * (tau + s.dt) / 2;
@@ -215,7 +218,7 @@ TEST_CASE("constraint damping makes an oscillation decay at the rate of its dash
 TEST_CASE("constraint damping does not resist turning") {
   Spring spring(0.7);
   Settings& s = spring.settings;
-  s.compliance_stretch = 1e-7, s.constraint_damping = 0.1, s.iterations = 20;
+  s.compliance[index_of<Stretch>] = 1e-7, s.constraint_damping = 0.1, s.iterations = 20;
   spring.state.velocities[1].y = 3;
   // A rate of grad C . (x - x at the start) would hold it 2 mm short: tau times half v^2 h.
   for (int step = 0; step < 200; ++step) CHECK(std::abs(spring.step(Sweep::gauss_seidel)) < 1e-4);
@@ -285,35 +288,9 @@ TEST_CASE(
       }
 }
 
-TEST_CASE("mode groups with compliance: one group is mode node, and any number ends at the same step") {
-  GlTest gl;
-  const auto model = block_model({4, 3, 2}, 0.2, "stretch:1.05");
-  for (const double tau : {0.0, 2e-3}) {
-    Sim node = create_sim(model, soft("node", 3, 2, tau));
-    Settings settings = soft("groups", 3, 2, tau);
-    settings.groups = 1;
-    Sim one = create_sim(model, settings);
-    step(node), step(one);
-    CHECK(distance(read_state(one).positions, read_state(node).positions) < 1e-6);
-    Sim many = create_sim(model, soft("node", 1000, 1, tau));
-    step(many);
-    for (const int groups : {3, 128}) {
-      CAPTURE(groups);
-      settings = soft("groups", 200, 1, tau), settings.groups = groups;
-      Sim sim = create_sim(model, settings);
-      const State before = read_state(sim);
-      step(sim);
-      const double moved = distance(before.positions, read_state(many).positions);
-      MESSAGE(groups << " groups differ by "
-                     << distance(read_state(sim).positions, read_state(many).positions) / moved);
-      CHECK(distance(read_state(sim).positions, read_state(many).positions) < 0.02 * moved);
-    }
-  }
-}
-
 TEST_CASE("compliance and damping keep momentum") {
   GlTest gl;
-  for (const char* mode : {"node", "constraint", "groups", "cpu-fast"}) {
+  for (const char* mode : {"node", "constraint", "cpu-fast"}) {
     CAPTURE(mode);
     Settings settings = soft(mode, 5, 2, 2e-3);
     settings.gravity = 0, settings.ground = false;
@@ -352,8 +329,9 @@ TEST_CASE("a beam's sag and frequency are those of its compliance, whatever the 
   const ReferenceInput input{beam.model, beam.system, beam.settings, beam.model.inverse_masses};
   set(1e-3, 1, 1);
   const Swing reference = swing(beam, [&](State& state) {
-    const Compliances alpha = {beam.settings.compliance_stretch, beam.settings.compliance_bend,
-                               beam.settings.compliance_volume};
+    const Compliances alpha = {beam.settings.compliance[index_of<Stretch>],
+                               beam.settings.compliance[index_of<Bend>],
+                               beam.settings.compliance[index_of<Volume>]};
     state = implicit_euler_step(input, state, alpha).state;
   });
   MESSAGE("sag " << 100 * beam.sag / 0.6 << " % of the length, implicit Euler's half period "
@@ -400,14 +378,14 @@ TEST_CASE("without compliance nothing is different, and it comes and goes while 
       if (buffer.name == name) return true;
     return false;
   };
-  for (const char* mode : {"node", "constraint", "groups", "cpu", "cpu-fast"}) {
+  for (const char* mode : {"node", "constraint", "cpu", "cpu-fast"}) {
     CAPTURE(mode);
     Settings hard = soft(mode, 3, 2);
-    hard.compliance_stretch = hard.compliance_bend = hard.compliance_volume = 0;
+    hard.compliance.fill(0);
     hard.constraints = "stretch,volume";
     Sim plain = create_sim(model, hard);
     Settings unused = hard;
-    unused.compliance_bend = 1;  // of a kind that is not there
+    unused.compliance[index_of<Bend>] = 1;  // of a kind that is not there
     Sim sim = create_sim(model, unused);
     const std::size_t bytes = explain(plain).bytes;
     CHECK(explain(sim).bytes == bytes);
@@ -416,7 +394,7 @@ TEST_CASE("without compliance nothing is different, and it comes and goes while 
 
     const State before = read_state(sim);
     Settings softer = unused;
-    softer.compliance_stretch = 1e-6, softer.constraint_damping = 1e-3;
+    softer.compliance[index_of<Stretch>] = 1e-6, softer.constraint_damping = 1e-3;
     apply_settings(sim, softer);
     if (!on_cpu(sim)) CHECK(has(sim, "multipliers"));
     CHECK(distance(read_state(sim).positions, before.positions) < 1e-12);

@@ -85,8 +85,7 @@ TEST_CASE("a given state that is not finite is found at once, with its lowest ve
         CHECK(sim.check.found->vertex == 17);
         CHECK(sim.check.found->step == 3);
         CHECK(has(error_of(*sim.check.found).what(), "at step 3, vertex 17"));
-        CHECK(has(sim.check.found->cause, "given"));
-        CHECK(!return_to_kept(sim));
+        CHECK(!restore_checkpoint(sim));
         write_state(sim, good);
         CHECK(!check_finite(sim, true));
         step(sim);
@@ -95,7 +94,7 @@ TEST_CASE("a given state that is not finite is found at once, with its lowest ve
 }
 
 TEST_CASE(
-    "what stops being a number on the GPU is found in its step, and the step before comes back bit for bit") {
+    "what stops being a number on the GPU is found in its step, and the checkpoint comes back bit for bit") {
   GlTest gl;
   for (const char* mode : {"node", "constraint"})
     for (const bool velocity : {false, true})
@@ -106,19 +105,21 @@ TEST_CASE(
         Settings settings = quick(mode);
         settings.iterations = 1;
         Sim sim = create_sim(block(), settings);
-        for (int s = 0; s < good_steps; ++s) step(sim);
-        CHECK(!check_finite(sim, good_steps == 5));
+        const int checkpoint = good_steps / 64 * 64;
+        for (int s = 0; s < checkpoint; ++s) step(sim);
         const std::uint64_t hash = state_hash(sim);
+        for (int s = checkpoint; s < good_steps; ++s) step(sim);
+        CHECK(!check_finite(sim, good_steps == 5));
         spoil(sim, 33, velocity, std::numeric_limits<float>::quiet_NaN());
         for (int s = 0; s < 40; ++s) step(sim);  // nobody asks for a while
         REQUIRE(check_finite(sim, true));
         CHECK(sim.check.found->step == good_steps + 1);
         CHECK(sim.check.found->vertex <= 33);
-        REQUIRE(return_to_last_good(sim));
-        CHECK(sim.steps == good_steps);
+        REQUIRE(restore_checkpoint(sim));
+        CHECK(sim.steps == checkpoint);
         CHECK(state_hash(sim) == hash);
-        CHECK(sim.check.found);  // for whoever reports it
-        reset(sim);
+        CHECK(!check_finite(sim, true));
+        for (int s = checkpoint; s < good_steps; ++s) step(sim);
         CHECK(!check_finite(sim, true));
       }
 }
@@ -137,7 +138,7 @@ TEST_CASE("a fixed vertex that is moved nowhere is found too") {
     REQUIRE(check_finite(sim, true));
     CHECK(sim.check.found->step == 2);
     CHECK(sim.check.found->vertex == 7);
-    CHECK(return_to_kept(sim));
+    CHECK(restore_checkpoint(sim));
     CHECK(sim.steps == 0);
     CHECK(is_pinned(sim, 7));
     CHECK(is_finite(read_state(sim)));
@@ -147,7 +148,7 @@ TEST_CASE("a fixed vertex that is moved nowhere is found too") {
   }
 }
 
-TEST_CASE("absurd settings either stay numbers or are found, and the message says which of them it was") {
+TEST_CASE("absurd settings either stay numbers or are found, and the last good state comes back") {
   GlTest gl;
   struct Absurd {
     const char* name;
@@ -170,10 +171,10 @@ TEST_CASE("absurd settings either stay numbers or are found, and the message say
       CHECK(found.has_value() == !is_finite(read_state(sim)));
       if (!found) continue;
       MESSAGE(mode.name << " " << a.name << ": " << error_of(*found).what());
-      CHECK(!has(found->cause, "unknown"));
-      REQUIRE(return_to_last_good(sim));
+      REQUIRE(restore_checkpoint(sim));
       CHECK(is_finite(read_state(sim)));
-      CHECK(sim.steps == found->step - 1);
+      CHECK(sim.steps < found->step);
+      CHECK(sim.steps >= found->step - 64);
     }
 }
 
@@ -198,7 +199,6 @@ TEST_CASE("a measured run ends with the numbers of the last good step and never 
     CHECK(run.timing.wall_ms.count == 6);
     const auto text = non_finite_json(run.errors.non_finite).dump();
     CHECK(has(text, "\"step\":7"));
-    CHECK(has(text, "\"cause\":\""));
     Measurement bad = *run.errors.last;
     bad.non_finite = 1;
     bad.kinetic = not_a_number;
@@ -315,9 +315,9 @@ TEST_CASE("limits of a driver are named with what is needed and what there is") 
   const ConstraintSystem system = build_constraints(block()->rest, "stretch,bend,volume");
   check_limits(system, real);
   Capabilities few = real;
-  few.storage_blocks = 9;
+  few.storage_blocks = 7;
   CHECK(has(what_of([&] { check_limits(system, few); }),
-            "too few shader storage blocks: 10 needed, the driver offers 9"));
+            "too few shader storage blocks: 8 needed, the driver offers 7"));
   few = real;
   few.storage_bytes = 100;
   CHECK(has(what_of([&] { check_limits(system, few); }), "a storage buffer is too large"));
@@ -424,9 +424,8 @@ TEST_CASE("shader faults name file and line, or the uniform") {
     CHECK(sim.check.found->vertex == 12);
     CHECK(sim.check.found->step == steps);
     CHECK(steps > 5);
-    CHECK(has(sim.check.found->cause, "a shader of " + folder.string()));
-    REQUIRE(return_to_last_good(sim));
-    CHECK(sim.steps == steps - 1);
+    REQUIRE(restore_checkpoint(sim));
+    CHECK(sim.steps == (steps - 1) / 64 * 64);
     CHECK(is_finite(read_state(sim)));
   }
   set_shader_folder("");

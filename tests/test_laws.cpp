@@ -10,7 +10,7 @@ using namespace samples;
 
 TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
   GlTest gl;
-  for (const char* mode : {"node", "constraint", "groups", "cpu", "cpu-fast"})
+  for (const char* mode : {"node", "constraint", "cpu", "cpu-fast"})
     for (int substeps : {1, 10, 100, 1000}) {
       CAPTURE(mode);
       CAPTURE(substeps);
@@ -79,7 +79,7 @@ TEST_CASE("friction stops a sliding block and none does not") {
   TetMesh mesh = make_block(glm::dvec3(1.0, 0.5, 0.5), {2, 1, 1});
   for (auto& p : mesh.positions) p.y += 0.25;
   for (const auto& [mode, friction] :
-       {std::pair("node", 0.0), std::pair("node", 0.5), std::pair("groups", 0.5)}) {
+       {std::pair("node", 0.0), std::pair("node", 0.5)}) {
     CAPTURE(mode);
     auto model = std::make_shared<Model>();
     add_body(*model, "block", mesh, 1000, mesh.positions, glm::dvec3(1, 0, 0), glm::dvec3(0), {});

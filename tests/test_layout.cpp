@@ -28,7 +28,7 @@ GLint property(const Program& program, GLenum interface, const std::string& name
 
 TEST_CASE("struct offsets and strides are GL's") {
   GlTest gl;
-  const Program predict = Program::compute("predict.comp");
+  const Program predict = Program::compute("predict.comp", {}, {"COMPLIANT 1"});
   const auto variable = [&](const std::string& name) {
     return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET);
   };
@@ -42,15 +42,17 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(Velocity));
 
-  Substitutions words = {{"KIND", "volume"}, {"ARITY", "4"},       {"BINDING", "7"}, {"KIND_ROW", "0"},
-                         {"GROUP", "1024"},  {"KIND_COLUMN", "2"}, {"COUNT", "7"}};
-  const Program volume = Program::compute("solve_paper.comp", {words, {}});
+  const auto paper = [](Substitutions words) {
+    return Program::compute("solve_paper.comp", {words, {}}, {"GROUP_SIZE 1024", "COUNT 7"});
+  };
+  const Program volume =
+      paper({{"KIND", "volume"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "2"}});
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
         offsetof(layout::Record4, rest));
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(layout::Record4));
-  words["KIND"] = "stretch", words["ARITY"] = "2", words["KIND_COLUMN"] = "0";
-  const Program stretch = Program::compute("solve_paper.comp", {words, {}});
+  const Program stretch =
+      paper({{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}});
   CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
         sizeof(layout::Record2));
 
@@ -63,16 +65,16 @@ TEST_CASE("struct offsets and strides are GL's") {
   };
   CHECK(nested("gravity") == offsetof(Step, gravity));
   CHECK(nested("h") == offsetof(Step, h));
-  CHECK(nested("keep") == offsetof(Step, keep));
-  CHECK(nested("limit") == offsetof(Step, limit));
+  CHECK(nested("velocity_scale") == offsetof(Step, velocity_scale));
+  CHECK(nested("max_correction") == offsetof(Step, max_correction));
   CHECK(nested("vertex_count") == offsetof(Step, vertex_count));
-  CHECK(nested("unit") == offsetof(Step, unit));
-  CHECK(nested("position_grain") == offsetof(Step, position_grain));
+  CHECK(nested("quantum") == offsetof(Step, quantum));
+  CHECK(nested("quantized_size") == offsetof(Step, quantized_size));
   CHECK(nested("plane_count") == offsetof(Step, plane_count));
   CHECK(nested("stiffness[0]") == offsetof(Step, stiffness));
   CHECK(nested("planes[0]") == offsetof(Step, planes));
-  CHECK(nested("softness[0]") == offsetof(Step, softness));
-  CHECK(nested("relaxation") == offsetof(Step, relaxation));
+  CHECK(nested("compliance[0]") == offsetof(Step, compliance));
+  CHECK(nested("damping") == offsetof(Step, damping));
   CHECK(property(predict, GL_UNIFORM_BLOCK, "StepBlock", GL_BUFFER_DATA_SIZE) == sizeof(Step));
 }
 
@@ -103,15 +105,15 @@ TEST_CASE("a shader that does not compile names its file and line") {
 
 TEST_CASE("#include, #foreach and words expand") {
   std::vector<std::string> files;
-  const std::string text =
-      shader_text("solve_node.comp",
-                  {{{"KINDS", "2"}},
-                   {{{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
-                    {{"KIND", "bend"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}},
-                  files);
-  CHECK(text.find("project_stretch(records[from_stretch + (t - begin_stretch)], summed)") !=
+  const std::string text = shader_text(
+      "solve_node.comp",
+      {{},
+       {{{"KIND", "stretch"}, {"ARITY", "2"}, {"INDEX", "0"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
+        {{"KIND", "bend"}, {"ARITY", "4"}, {"INDEX", "1"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}},
+      files);
+  CHECK(text.find("project_stretch(records_stretch.x + (t - begin_stretch), chunk.owned)") !=
         std::string::npos);
-  CHECK(text.find("project_bend(records[from_bend + (t - begin_bend)], summed)") != std::string::npos);
+  CHECK(text.find("project_bend(records_bend.x + (t - begin_bend), chunk.owned)") != std::string::npos);
   CHECK(text.find("project_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);

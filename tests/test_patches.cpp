@@ -7,7 +7,6 @@
 
 #include "sim/sim.h"
 #include "sim/solvers/cpu_pbd.h"
-#include "sim/solvers/groups.h"
 #include "sim/solvers/patches.h"
 #include "tests/gl_test.h"
 
@@ -38,12 +37,12 @@ std::vector<Constraint> given(const ConstraintSystem& system) {
 }
 
 // Also checks what holds for every part.
-std::vector<Constraint> of_part(const Patches& patches, const ConstraintSystem& system, std::size_t part) {
-  const std::uint32_t* words = patches.parts.data() + part * patches.part_words;
+std::vector<Constraint> of_chunk(const Patches& patches, const ConstraintSystem& system, std::size_t part) {
+  const std::uint32_t* words = patches.chunks.data() + part * patches.chunk_words;
   CHECK(patches.largest <= Patches::most_vertices);
   CHECK(words[0] <= patches.largest);
-  CHECK(words[1] <= patches.most_summed);
-  CHECK(patches.vertices.size() == patches.parts.size() / patches.part_words * patches.largest);
+  CHECK(words[1] <= patches.most_owned);
+  CHECK(patches.vertices.size() == patches.chunks.size() / patches.chunk_words * patches.largest);
   std::vector<Constraint> all;
   for (std::uint32_t k = 0; k < 3; ++k)
     for (std::uint32_t r = words[4 + 2 * k]; r < words[4 + 2 * k] + words[5 + 2 * k]; ++r) {
@@ -79,12 +78,12 @@ TEST_CASE("patches: each constraint in one, on at most 256 vertices") {
   for (std::size_t most : {1, 50, 5000}) {
     CAPTURE(most);
     const Patches patches = constraint_patches(*model, system, most);
-    CHECK(patches.parts.size() == patches.count * patches.part_words);
+    CHECK(patches.chunks.size() == patches.count * patches.chunk_words);
     std::vector<Constraint> found;
     for (std::size_t p = 0; p < patches.count; ++p) {
-      const auto here = of_part(patches, system, p);
+      const auto here = of_chunk(patches, system, p);
       CHECK(here.size() <= most);
-      CHECK(patches.parts[p * patches.part_words] == patches.parts[p * patches.part_words + 1]);
+      CHECK(patches.chunks[p * patches.chunk_words] == patches.chunks[p * patches.chunk_words + 1]);
       found.insert(found.end(), here.begin(), here.end());
     }
     std::sort(found.begin(), found.end());
@@ -97,54 +96,48 @@ TEST_CASE(
   struct Case {
     TetMesh mesh;
     std::size_t own;
-    bool parted;
+    bool chunked;
   };
   omp_set_num_threads(4);
   const Case cases[] = {{make_block({1, 0.7, 0.5}, {8, 6, 4}), 1, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 17, false},
                         {make_block({1, 0.7, 0.5}, {8, 6, 4}), 200, false},
                         {wheel(300), 16, true}};
-  for (const Case& c : cases)
-    for (int groups : {1, 5, 40}) {
-      CAPTURE(c.own);
-      CAPTURE(groups);
-      const auto model = model_of(c.mesh);
-      const ConstraintSystem system = build_constraints(model->rest, "stretch,bend,volume");
-      const auto members = balanced_groups(system, groups);
-      const Patches patches = vertex_patches(system, c.own, groups, members);
-      if (groups == 1) CHECK(patches.parted == c.parted);
-      std::vector<Constraint> of_groups;
-      for (std::size_t g = 0; g < std::size_t(groups); ++g) {
-        std::vector<std::vector<Constraint>> at(
-            system.at_vertex.size());  // by vertex, what its patch has of it
-        std::vector<float> counted(at.size());
-        std::vector<int> times_own(at.size());
-        for (std::size_t p = 0; p < patches.count; ++p) {
-          bool first = true;
-          for (std::size_t part = g * patches.count + p; first || part != 0; first = false) {
-            const std::uint32_t* words = patches.parts.data() + part * patches.part_words;
-            for (std::uint32_t own = 0; own < words[1]; ++own) {
-              const auto& vertex = patches.vertices[part * patches.largest + own];
-              CHECK(vertex[0] == words[2] + own);
-              if (first) ++times_own[vertex[0]];
-              counted[vertex[0]] = std::bit_cast<float>(vertex[1]);
-            }
-            for (const Constraint& constraint : of_part(patches, system, part))
-              for (std::size_t j = 1; j < constraint.size(); ++j)
-                if (constraint[j] - words[2] < words[1]) at[constraint[j]].push_back(constraint);
-            part = words[3];
-          }
+  for (const Case& c : cases) {
+    CAPTURE(c.own);
+    const auto model = model_of(c.mesh);
+    const ConstraintSystem system = build_constraints(model->rest, "stretch,bend,volume");
+    const Patches patches = vertex_patches(system, c.own);
+    CHECK(patches.chunked == c.chunked);
+    std::vector<Constraint> found;
+    std::vector<std::vector<Constraint>> at(system.at_vertex.size());  // by vertex, what its patch has of it
+    std::vector<float> counted(at.size());
+    std::vector<int> times_own(at.size());
+    for (std::size_t p = 0; p < patches.count; ++p) {
+      bool first = true;
+      for (std::size_t part = p; first || part != 0; first = false) {
+        const std::uint32_t* words = patches.chunks.data() + part * patches.chunk_words;
+        for (std::uint32_t own = 0; own < words[1]; ++own) {
+          const auto& vertex = patches.vertices[part * patches.largest + own];
+          CHECK(vertex[0] == words[2] + own);
+          if (first) ++times_own[vertex[0]];
+          counted[vertex[0]] = std::bit_cast<float>(vertex[1]);
         }
-        for (std::size_t v = 0; v < at.size(); ++v) {
-          CHECK(times_own[v] == 1);
-          CHECK(counted[v] == float(at[v].size()));
-          for (const Constraint& constraint : at[v])
-            if (constraint[1] == v) of_groups.push_back(constraint);
-        }
+        for (const Constraint& constraint : of_chunk(patches, system, part))
+          for (std::size_t j = 1; j < constraint.size(); ++j)
+            if (constraint[j] - words[2] < words[1]) at[constraint[j]].push_back(constraint);
+        part = words[3];
       }
-      std::sort(of_groups.begin(), of_groups.end());
-      CHECK(of_groups == given(system));
     }
+    for (std::size_t v = 0; v < at.size(); ++v) {
+      CHECK(times_own[v] == 1);
+      CHECK(counted[v] == float(at[v].size()));
+      for (const Constraint& constraint : at[v])
+        if (constraint[1] == v) found.push_back(constraint);
+    }
+    std::sort(found.begin(), found.end());
+    CHECK(found == given(system));
+  }
   omp_set_num_threads(omp_get_num_procs());
 }
 

@@ -98,7 +98,7 @@ TEST_CASE("fixed and pinned vertices stay, moved ones pull, unpinned ones fall")
 TEST_CASE("settings change while running: mode, kinds and numbers, and the state stays") {
   GlTest gl;
   Sim sim = create_sim(block_model({4, 3, 2}, 0.1), quick("node"));
-  for (const char* mode : {"constraint", "cpu", "node", "groups", "cpu", "constraint"})
+  for (const char* mode : {"constraint", "cpu", "node", "cpu", "constraint"})
     for (const char* kinds : {"stretch", "stretch,bend,volume", "", "volume,stretch"}) {
       for (int s = 0; s < 3; ++s) step(sim);
       const State before = read_state(sim);
@@ -203,17 +203,6 @@ TEST_CASE("only what a scene needs is allocated and dispatched") {
   settings.mode = "node";
   CHECK(explain(create_sim(model, settings)).dispatches_per_step == 10);
   settings.constraints = "stretch,bend,volume";
-  const auto streams = [](const Explanation& e) {
-    std::size_t bytes = 0;
-    for (const auto& b : e.buffers)
-      if (b.name.starts_with("stream ") && b.name != "stream table") bytes += b.bytes;
-    return bytes;
-  };
-  const std::size_t node_streams = streams(explain(create_sim(model, settings)));
-  settings.mode = "groups";
-  const Explanation groups = explain(create_sim(model, settings));
-  CHECK(groups.dispatches_per_step == 10 * settings.groups);
-  CHECK(streams(groups) == node_streams);
   settings.mode = "paper";
   settings.constraints = "stretch,bend,volume";
   CHECK(explain(create_sim(model, settings)).dispatches_per_step == 1 + 10 * 4 + 1);

@@ -33,8 +33,8 @@ Constraint4 bend(vec3 x[4], real rest, Ids ids) {
   vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b0 = x[1] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
   real a22 = dot(a2, a2), a33 = dot(a3, a3), b22 = dot(b2, b2), b33 = dot(b3, b3);
   real longest = max(max(max(a22, a33), max(b22, b33)), dot(b0, b0));
-  real noise = pi + real(4) * (longest + grain * sqrt(longest)) / (sound ? sqrt(min(aa, bb)) : real(1));
-  c.C = sound ? clamp(resolved(turn, noise), real(-1), real(1)) : real(0);
+  real noise = pi + real(4) * (longest + quantization_size * sqrt(longest)) / (sound ? sqrt(min(aa, bb)) : real(1));
+  c.C = sound ? clamp(apply_dead_zone(turn, noise), real(-1), real(1)) : real(0);
   c.guards = !sound ? GUARD_HINGE : abs(turn) > real(1) ? GUARD_ANGLE : 0u;
   c.floor = real(0);
   c.gradient[0] = -l * a;

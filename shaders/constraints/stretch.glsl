@@ -7,7 +7,7 @@ Constraint2 stretch(vec3 x[2], real rest, Ids ids) {
   bool apart = l > real(1e-6) * rest;
   vec3 n = apart ? d / l : any_direction(id_of(ids, 0), id_of(ids, 1));
   c.guards = apart ? 0u : GUARD_DIRECTION;
-  c.C = resolved(l - rest, rest + grain);
+  c.C = apply_dead_zone(l - rest, rest + quantization_size);
   c.gradient[0] = n;
   c.gradient[1] = -n;
   c.floor = real(0);

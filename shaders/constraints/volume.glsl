@@ -13,8 +13,8 @@ Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   c.gradient[3] = cross(a, b) * sixth;
   c.gradient[0] = -(c.gradient[1] + c.gradient[2] + c.gradient[3]);
   real side = sqrt(max(max(dot(a, a), dot(b, b)), dot(d, d)));  // the longest; the noise is that of a tet of such sides
-  real noise = side * side * (side + real(3) * grain);
-  c.C = resolved(dot(c.gradient[3], d) - rest, noise * sixth);
+  real noise = side * side * (side + real(3) * quantization_size);
+  c.C = apply_dead_zone(dot(c.gradient[3], d) - rest, noise * sixth);
   c.guards = 0u;
   real area = pow(abs(rest), real(2) / real(3));
   c.floor = real(0.01) * area * area;

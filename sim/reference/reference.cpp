@@ -98,7 +98,7 @@ Objective objective_of(const ReferenceInput& input, const Compliances& complianc
   for (std::size_t k = 0; k < compliances.size(); ++k)
     if (!(compliances[k] > 0))
       throw Error("compliance must be above 0",
-                  fmt::format("{} of {}", compliances[k], constraint_kinds()[k].name),
+                  fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
                   "rigid_step is the limit of 0, infinity leaves a kind out");
   Objective o{input.system, compliances, {}, {}, 0, glm::dvec3(0), 1};
   for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);

@@ -192,7 +192,7 @@ template <class Kind, Soft soft>
     }
     float lambda;
     if constexpr (soft == Soft::no) {
-      lambda = formulas.multiplier(c, w, k, limit);
+      lambda = formulas.multiplier(c, w, k, limit, 0.0f, 1.0f);
     } else {
       c.C += a * before[lane];
       lambda = formulas.multiplier(c, w, k, limit, a, 1 + gamma);
@@ -373,8 +373,8 @@ class FastPbd {
       if (!shared && thread > 0) continue;
       const std::size_t begin = shared ? count * thread / threads : 0;
       const std::size_t end = shared ? count * (thread + 1) / threads : count;
-      const ConstraintKind& kind = constraint_kinds()[std::size_t(turn.kind)];
-      const Rule rule{float(settings.*kind.stiffness), float(settings.*kind.compliance / (h * h)),
+      const std::size_t kind = std::size_t(turn.kind);
+      const Rule rule{float(settings.stiffness[kind]), float(settings.compliance[kind] / (h * h)),
                       float(settings.constraint_damping / h), soft, first || !soft};
       project(work_, turn.kind, turn.begin + begin, turn.begin + end, rule, guards_[thread]);
     }

@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "sim/constraints.h"
-#include "sim/solvers/handles.h"
 #include "sim/model.h"
 #include "sim/settings.h"
+#include "sim/solvers/clusters.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -49,8 +49,8 @@ inline double longest_correction(const Model& model, const Settings& settings) {
   return settings.mass_splitting ? model.size / 64 : model.size;
 }
 
-/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and rigid handles; with
-/// compliance masses are split, and there are no handles. `gauss_seidel`: one after the other.
+/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and shape-matching clusters;
+/// with compliance masses are split, and there are no clusters. `gauss_seidel`: one after the other.
 enum class Sweep { jacobi, gauss_seidel };
 
 template <class real>
@@ -84,7 +84,7 @@ class CpuPbd {
     const bool soft = compliant(settings);
     const bool held = sweep == Sweep::jacobi && settings.handles > 0 && !soft;
     const double omega = soft ? 1 : relaxation(settings.omega, held ? settings.handles : 0);
-    if (held && handles_.rest.empty()) handles_ = build_handles(model_);
+    if (held && clusters_.rest.empty()) clusters_ = build_clusters(model_);
     inverse_masses_.assign(inverse_masses.begin(), inverse_masses.end());
     for (int s = 0; s < settings.substeps; ++s) {
       if (damped(settings)) start_ = x;
@@ -101,14 +101,10 @@ class CpuPbd {
       predicted_ = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
         std::vector<glm::dvec3> pulls;
-        if (held) pulls = handle_pulls(handles_, x);
+        if (held) pulls = cluster_pulls(clusters_, x);
         if (sweep == Sweep::jacobi) deltas_.assign(x.size(), glm::dvec3(0));
-        for_each_kind([&](auto kind, int) {
-          if (soft)
-            project<decltype(kind), true>(x, settings, sweep);
-          else
-            project<decltype(kind), false>(x, settings, sweep);
-        });
+        for_each_kind(
+            [&](auto kind, int k) { project<decltype(kind)>(std::size_t(k), soft, x, settings, sweep); });
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (omega / at_vertex_[i]);
@@ -122,17 +118,18 @@ class CpuPbd {
   }
 
  private:
-  template <class Kind, bool soft>
-  void project(std::vector<glm::dvec3>& x, const Settings& settings, Sweep sweep) {
+  template <class Kind>
+  void project(std::size_t kind, bool soft, std::vector<glm::dvec3>& x, const Settings& settings,
+               Sweep sweep) {
     constexpr std::size_t arity = std::size_t(Kind::arity);
     using vec = glm::vec<3, real>;
-    const real k = real(settings.*Kind::stiffness);
+    const real k = real(settings.stiffness[kind]);
     const real limit = real(sweep == Sweep::jacobi ? longest_correction(model_, settings) : model_.size);
     const bool split = (soft || settings.mass_splitting) && sweep == Sweep::jacobi;
     const double h = settings.dt / settings.substeps;
-    [[maybe_unused]] const real a = real(settings.*Kind::compliance / (h * h)),
-                                gamma = real(settings.constraint_damping / h),
-                                share = (1 + gamma) / real(sweep == Sweep::jacobi ? settings.omega : 1);
+    const real a = soft ? real(settings.compliance[kind] / (h * h)) : 0,
+               gamma = soft ? real(settings.constraint_damping / h) : 0,
+               share = soft ? (1 + gamma) / real(sweep == Sweep::jacobi ? settings.omega : 1) : 1;
     Formulas<real> formulas;
     auto& batch = std::get<Batch<Kind, real>>(batches_);
     for (std::size_t number = 0; number < batch.items.size(); ++number) {
@@ -145,23 +142,16 @@ class CpuPbd {
         if (split) w[j] *= real(at_vertex_[item.vertices[j]]);
       }
       auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
-      real lambda;
-      std::uint32_t triggered;
-      if constexpr (soft) {
-        if (gamma > 0) {
-          vec start[arity];
-          for (std::size_t j = 0; j < arity; ++j)
-            start[j] = vec(start_[item.vertices[j]] - start_[item.vertices[0]]);
-          c.C += gamma * (c.C - Kind::template evaluate<real>(start, item.rest, item.vertices.data()).C);
-        }
-        c.C += a * batch.multipliers[number];
-        lambda = formulas.multiplier(c, w, k, limit, a, share);
-        triggered = formulas.guards_of(c, w, k, limit, a, share);
-        batch.multipliers[number] += lambda;
-      } else {
-        lambda = formulas.multiplier(c, w, k, limit);
-        triggered = formulas.guards_of(c, w, k, limit);
+      if (gamma > 0) {
+        vec start[arity];
+        for (std::size_t j = 0; j < arity; ++j)
+          start[j] = vec(start_[item.vertices[j]] - start_[item.vertices[0]]);
+        c.C += gamma * (c.C - Kind::template evaluate<real>(start, item.rest, item.vertices.data()).C);
       }
+      if (soft) c.C += a * batch.multipliers[number];
+      const real lambda = formulas.multiplier(c, w, k, limit, a, share);
+      const std::uint32_t triggered = formulas.guards_of(c, w, k, limit, a, share);
+      if (soft) batch.multipliers[number] += lambda;
       for (std::size_t j = 0; lambda != real(0) && j < arity; ++j)
         (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += glm::dvec3(lambda * w[j] * c.gradient[j]);
       if (triggered)
@@ -181,7 +171,7 @@ class CpuPbd {
   typename Batches<Kinds>::type batches_;
   std::vector<glm::dvec3> start_, predicted_, deltas_;
   std::vector<real> inverse_masses_;
-  Handles handles_;  // made when they are first asked for
+  Clusters clusters_;  // made when they are first asked for
 };
 
 }  // namespace tetpbd

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 #include <span>
+#include <utility>
 
 #include "sim/hilbert.h"
 #include "sim/parallel.h"
@@ -50,23 +52,23 @@ void spread(std::vector<Record>& records) {
     for (std::size_t r = start; r < near.size(); r += stride) records.push_back(near[r]);
 }
 
-// One part of a patch after the other.
-class PartWriter {
+// A chunk as it is written.
+struct Chunk {
+  std::vector<std::uint32_t> vertices;
+  std::array<std::vector<Record>, kind_count> records;
+  std::size_t owned = 0;
+};
+
+// Adds constraints to one chunk after the other.
+class ChunkWriter {
  public:
-  /// With room for `parts` parts; those that add_part() gives come behind them.
-  explicit PartWriter(const ConstraintSystem& system, std::size_t parts = 0)
-      : system_(system),
-        part_words_(4 + 2 * std::size_t(std::count(system.present.begin(), system.present.end(), true))),
-        local_(system.at_vertex.size(), none),
-        records_of_(system.lists.size()),
-        parts_(parts * part_words_),
-        firsts_(parts) {}
-  std::size_t vertices() const { return gathered_.size() - first_; }
-  /// The vertex's number in the part, which has it from now on.
+  explicit ChunkWriter(const ConstraintSystem& system)
+      : system_(system), local_(system.at_vertex.size(), none) {}
+  /// The vertex's number in the chunk, which has it from now on.
   std::uint32_t vertex(std::uint32_t v) {
     if (local_[v] == none) {
-      local_[v] = std::uint32_t(vertices());
-      gathered_.push_back({v, std::bit_cast<std::uint32_t>(float(system_.at_vertex[v]))});
+      local_[v] = std::uint32_t(chunk_.vertices.size());
+      chunk_.vertices.push_back(v);
     }
     return local_[v];
   }
@@ -77,108 +79,69 @@ class PartWriter {
     const std::span of(list.vertices.data() + std::size_t(constraint) * arity, arity);
     const auto added =
         std::count_if(of.begin(), of.end(), [&](std::uint32_t v) { return local_[v] == none; });
-    if (vertices() + std::size_t(added) > Patches::most_vertices) return false;
-    std::array<std::uint32_t, 2> record = {0, std::bit_cast<std::uint32_t>(float(list.rest[constraint]))};
+    if (chunk_.vertices.size() + std::size_t(added) > Patches::most_vertices) return false;
+    Record record = {0, std::bit_cast<std::uint32_t>(float(list.rest[constraint]))};
     for (std::size_t j = 0; j < arity; ++j) record[0] |= vertex(of[j]) << (8 * j);
-    records_of_[kind].push_back(record);
+    chunk_.records[kind].push_back(record);
     return true;
   }
-  std::size_t add_part() {
-    parts_.resize(parts_.size() + part_words_);
-    firsts_.push_back(0);
-    return firsts_.size() - 1;
+  /// The chunk, of whose vertices the first `owned` are owned (all: none given); the next one begins.
+  Chunk close(std::optional<std::size_t> owned = std::nullopt) {
+    for (std::uint32_t v : chunk_.vertices) local_[v] = none;
+    for (auto& records : chunk_.records) spread(records);
+    chunk_.owned = owned.value_or(chunk_.vertices.size());
+    return std::exchange(chunk_, {});
   }
-  /// Writes the part's words; `summed`: how many of its first vertices are.
-  void close(std::size_t part, std::size_t summed) {
-    firsts_[part] = first_;
-    std::uint32_t* words = parts_.data() + part * part_words_;
-    words[0] = std::uint32_t(vertices());
-    words[1] = std::uint32_t(summed);
-    words[2] = summed ? gathered_[first_][0] : 0;
-    words[3] = 0;
-    words += 4;
-    for (std::size_t k = 0; k < records_of_.size(); ++k) {
-      if (!system_.present[k]) continue;
-      *words++ = std::uint32_t(records_.size());
-      *words++ = std::uint32_t(records_of_[k].size());
-      spread(records_of_[k]);
-      records_.insert(records_.end(), records_of_[k].begin(), records_of_[k].end());
-      records_of_[k].clear();
-    }
-    largest_ = std::max(largest_, vertices());
-    most_summed_ = std::max(most_summed_, summed);
-    for (std::size_t v = first_; v < gathered_.size(); ++v) local_[gathered_[v][0]] = none;
-    first_ = gathered_.size();
-  }
-  /// The patch of `part` goes on in `next`.
-  void link(std::size_t part, std::size_t next) { parts_[part * part_words_ + 3] = std::uint32_t(next); }
-
-  friend void assemble(Patches& patches, const std::vector<PartWriter>& writers,
-                       const std::vector<std::size_t>& given);
 
  private:
   static constexpr std::uint32_t none = ~0u;
   const ConstraintSystem& system_;
-  std::size_t part_words_;
-  std::vector<std::uint32_t> local_;                    // of a vertex, its number in the part being written
-  std::vector<std::vector<Record>> records_of_;         // by kind, of the part being written
-  std::vector<std::uint32_t> parts_;                    // words, as in Patches
-  std::vector<std::size_t> firsts_;                     // of each part's vertices among `gathered_`
-  std::vector<std::array<std::uint32_t, 2>> gathered_;  // vertices of parts, as they were closed
-  std::vector<Record> records_;
-  std::size_t first_ = 0;  // of the part being written
-  std::size_t largest_ = 0, most_summed_ = 0;
+  std::vector<std::uint32_t> local_;  // of a vertex, its number in the chunk
+  Chunk chunk_;
 };
 
-// Writers' parts in order: first the `given` many that each began with, then what they added. Each part gets
-// the same room for its vertices, the rest of it copies of the first.
-void assemble(Patches& patches, const std::vector<PartWriter>& writers,
-              const std::vector<std::size_t>& given) {
-  std::size_t given_parts = 0, parts = 0, records = 0;
-  for (std::size_t w = 0; w < writers.size(); ++w) {
-    given_parts += given[w];
-    parts += writers[w].firsts_.size();
-    records += writers[w].records_.size();
-    patches.largest = std::max(patches.largest, writers[w].largest_);
-    patches.most_summed = std::max(patches.most_summed, writers[w].most_summed_);
+// The chunks of all patches as patches.h lays them out: the first of each patch, then what they need beyond.
+// Each gets the same room for its vertices, the rest of it copies of the first.
+Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<Chunk>>& patches) {
+  Patches result;
+  result.count = patches.size();
+  result.chunk_words = 4 + 2 * std::size_t(std::count(system.present.begin(), system.present.end(), true));
+  std::size_t chunks = 0;
+  for (const auto& patch : patches) {
+    chunks += patch.size();
+    for (const Chunk& chunk : patch) {
+      result.largest = std::max(result.largest, chunk.vertices.size());
+      result.most_owned = std::max(result.most_owned, chunk.owned);
+    }
   }
-  patches.part_words = writers[0].part_words_;
-  patches.parts.resize(parts * patches.part_words);
-  patches.records.resize(records);
-  patches.vertices.resize(parts * patches.largest);
-  patches.parted = parts > given_parts;
-  struct Place {
-    std::size_t given, added, record;
-  };
-  std::vector<Place> places(writers.size(), {0, given_parts, 0});
-  for (std::size_t w = 1; w < writers.size(); ++w)
-    places[w] = {places[w - 1].given + given[w - 1],
-                 places[w - 1].added + writers[w - 1].firsts_.size() - given[w - 1],
-                 places[w - 1].record + writers[w - 1].records_.size()};
-  const auto place_one = [&](std::size_t w) {
-    const PartWriter& writer = writers[w];
-    const auto number = [&](std::size_t part) {
-      return part < given[w] ? places[w].given + part : places[w].added + part - given[w];
-    };
-    std::copy(writer.records_.begin(), writer.records_.end(),
-              patches.records.begin() + std::ptrdiff_t(places[w].record));
-    for (std::size_t p = 0; p < writer.firsts_.size(); ++p) {
-      std::uint32_t* words = patches.parts.data() + number(p) * patches.part_words;
-      std::copy_n(writer.parts_.data() + p * patches.part_words, patches.part_words, words);
-      if (words[3] != 0) words[3] = std::uint32_t(number(words[3]));
-      for (std::size_t word = 4; word < patches.part_words; word += 2)
-        words[word] += std::uint32_t(places[w].record);
-      auto* to = patches.vertices.data() + number(p) * patches.largest;
-      for (std::size_t v = 0; v < patches.largest; ++v)
-        to[v] = writer.gathered_[writer.firsts_[p] + (v < words[0] ? v : 0)];
+  result.chunked = chunks > patches.size();
+  result.chunks.resize(chunks * result.chunk_words);
+  result.vertices.resize(chunks * result.largest);
+  std::size_t further = patches.size();  // where the next chunk goes that is not the first of its patch
+  const auto write = [&](const Chunk& chunk, std::size_t number, std::size_t next) {
+    std::uint32_t* words = result.chunks.data() + number * result.chunk_words;
+    *words++ = std::uint32_t(chunk.vertices.size());
+    *words++ = std::uint32_t(chunk.owned);
+    *words++ = chunk.vertices[0];
+    *words++ = std::uint32_t(next);
+    for (std::size_t k = 0; k < kind_count; ++k) {
+      if (!system.present[k]) continue;
+      *words++ = std::uint32_t(result.records.size());
+      *words++ = std::uint32_t(chunk.records[k].size());
+      result.records.insert(result.records.end(), chunk.records[k].begin(), chunk.records[k].end());
+    }
+    for (std::size_t v = 0; v < result.largest; ++v) {
+      const std::uint32_t vertex = chunk.vertices[v < chunk.vertices.size() ? v : 0];
+      result.vertices[number * result.largest + v] = {
+          vertex, std::bit_cast<std::uint32_t>(float(system.at_vertex[vertex]))};
     }
   };
-  parallel_for(
-      writers.size(),
-      [&](std::size_t first, std::size_t end) {
-        for (std::size_t w = first; w < end; ++w) place_one(w);
-      },
-      1);
+  for (std::size_t p = 0; p < patches.size(); ++p)
+    for (std::size_t c = 0; c < patches[p].size(); ++c) {
+      const std::size_t number = c == 0 ? p : further++;
+      write(patches[p][c], number, c + 1 < patches[p].size() ? further : 0);
+    }
+  return result;
 }
 
 // The constraints of one kind on each vertex, in order.
@@ -190,8 +153,8 @@ Grouped constraints_at(const ConstraintList& list, std::size_t vertices) {
 }
 
 // Where patches of at most `own` consecutive vertices begin, and the end: fewer vertices where these and the
-// ones that share a constraint with them would not fit a part, and at every `stretch` vertices, between which
-// nothing depends on the rest.
+// ones that share a constraint with them would not fit a chunk, and at every `stretch` vertices, between
+// which nothing depends on the rest.
 std::vector<std::size_t> starts_of_patches(const ConstraintSystem& system, const std::vector<Grouped>& at,
                                            std::size_t own) {
   constexpr std::size_t stretch = 4096;
@@ -238,53 +201,40 @@ std::vector<std::size_t> starts_of_patches(const ConstraintSystem& system, const
 }  // namespace
 
 Patches constraint_patches(const Model& model, const ConstraintSystem& system, std::size_t most) {
-  Patches patches;
-  std::vector<PartWriter> writers(1, PartWriter(system));
-  PartWriter& writer = writers[0];
+  std::vector<std::vector<Chunk>> patches;
+  ChunkWriter writer(system);
   std::size_t filled = 0;
-  const auto close = [&] {
-    writer.close(writer.add_part(), writer.vertices());
-    ++patches.count;
-    filled = 0;
-  };
   for (const Item& item : ordered(model, system)) {
     if (filled == most || !writer.add(item.kind, item.constraint)) {
-      close();
+      patches.push_back({writer.close()});
       writer.add(item.kind, item.constraint);
+      filled = 0;
     }
     ++filled;
   }
-  if (filled > 0) close();
-  assemble(patches, writers, {patches.count});
-  return patches;
+  if (filled > 0) patches.push_back({writer.close()});
+  return assemble(system, patches);
 }
 
-Patches vertex_patches(const ConstraintSystem& system, std::size_t own, int groups,
-                       const std::vector<std::vector<std::uint8_t>>& members) {
+Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
   const std::size_t vertices = system.at_vertex.size();
-  Patches patches;
   std::vector<Grouped> at;
   for (const ConstraintList& list : system.lists) at.push_back(constraints_at(list, vertices));
   const std::vector<std::size_t> starts = starts_of_patches(system, at, own);
-  patches.count = starts.size() - 1;
-  const auto write_patch = [&](PartWriter& writer, std::size_t part, std::size_t g, std::size_t p,
-                               std::vector<std::uint32_t>& found) {
+  std::vector<std::vector<Chunk>> patches(starts.size() - 1);
+  const auto write_patch = [&](ChunkWriter& writer, std::size_t p, std::vector<std::uint32_t>& found) {
     const std::size_t first = starts[p], end = starts[p + 1];
-    const auto begin_part = [&] {
+    const auto begin_chunk = [&] {
       for (std::size_t v = first; v < end; ++v) writer.vertex(std::uint32_t(v));
     };
-    begin_part();
-    for (std::size_t k = 0; k < system.lists.size(); ++k) {
+    begin_chunk();
+    for (std::size_t k = 0; k < kind_count; ++k) {
       const ConstraintList& list = system.lists[k];
       const std::size_t arity = std::size_t(list.arity);
       found.clear();
       for (std::size_t v = first; v < end; ++v)
         for (std::uint32_t i = at[k].first[v]; i < at[k].first[v + 1]; ++i) {
           const std::uint32_t c = at[k].values[i];
-          // Tets lie about in memory; the list is long enough to look ahead.
-          const std::uint32_t soon = at[k].values[std::min<std::size_t>(i + 16, at[k].values.size() - 1)];
-          __builtin_prefetch(list.vertices.data() + std::size_t(soon) * arity);
-          __builtin_prefetch(list.rest.data() + soon);
           // Taken at the first of the patch's vertices that it has.
           const auto earlier = [&](std::uint32_t u) { return u >= first && u < v; };
           const std::uint32_t* of = list.vertices.data() + std::size_t(c) * arity;
@@ -292,55 +242,23 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own, int grou
         }
       std::sort(found.begin(), found.end());
       for (std::uint32_t c : found) {
-        if (!members.empty() && members[k][c] != g) continue;
         if (writer.add(k, c)) continue;
-        writer.close(part, end - first);
-        const std::size_t next = writer.add_part();
-        writer.link(part, next);
-        part = next;
-        begin_part();
+        patches[p].push_back(writer.close(end - first));
+        begin_chunk();
         writer.add(k, c);
       }
     }
-    writer.close(part, end - first);
+    patches[p].push_back(writer.close(end - first));
   };
-  const std::size_t all = patches.count * std::size_t(groups);
-  const std::size_t parts = std::clamp<std::size_t>(all / 64, 1, thread_count());
-  std::vector<PartWriter> writers;
-  std::vector<std::size_t> given;
-  for (std::size_t w = 0; w < parts; ++w) {
-    given.push_back(all * (w + 1) / parts - all * w / parts);
-    writers.emplace_back(system, given.back());
-  }
   parallel_for(
-      parts,
+      patches.size(),
       [&](std::size_t begin, std::size_t end) {
+        ChunkWriter writer(system);
         std::vector<std::uint32_t> found;
-        for (std::size_t w = begin; w < end; ++w)
-          for (std::size_t part = 0; part < given[w]; ++part) {
-            const std::size_t patch = all * w / parts + part;  // group after group
-            write_patch(writers[w], part, patch / patches.count, patch % patches.count, found);
-          }
+        for (std::size_t p = begin; p < end; ++p) write_patch(writer, p, found);
       },
-      1);
-  assemble(patches, writers, given);
-  if (!members.empty()) {  // count those of the group alone
-    std::vector<std::uint32_t> here(vertices * std::size_t(groups));
-    for (std::size_t k = 0; k < system.lists.size(); ++k)
-      for (std::size_t at = 0; at < system.lists[k].vertices.size(); ++at)
-        ++here[members[k][at / std::size_t(system.lists[k].arity)] * vertices + system.lists[k].vertices[at]];
-    for (std::size_t g = 0; g < std::size_t(groups); ++g)
-      for (std::size_t p = 0; p < patches.count; ++p)
-        for (std::size_t part = g * patches.count + p;;) {
-          const std::uint32_t* words = patches.parts.data() + part * patches.part_words;
-          for (std::size_t v = part * patches.largest; v < (part + 1) * patches.largest; ++v)
-            patches.vertices[v][1] =
-                std::bit_cast<std::uint32_t>(float(here[g * vertices + patches.vertices[v][0]]));
-          part = words[3];
-          if (part == 0) break;
-        }
-  }
-  return patches;
+      64);
+  return assemble(system, patches);
 }
 
 }  // namespace tetpbd

@@ -10,30 +10,28 @@
 
 namespace tetpbd {
 
+/// A patch has one chunk, or more where it has too many vertices for one.
 struct Patches {
-  static constexpr std::size_t most_vertices = 256;  ///< of a part: a byte holds their number
-  std::size_t count = 0;  ///< of patches; for several groups of constraints, of each
-  /// A patch has more than one part where it has too many vertices for one. Words of a part: how many
-  /// vertices, how many of these are summed (they come first), the first summed one (vertex_patches), the
-  /// next part of the patch (0: none); then for each kind present its first record and how many. The patches'
-  /// first parts come first, group after group.
-  std::vector<std::uint32_t> parts;
-  std::size_t part_words = 0;
-  std::vector<std::array<std::uint32_t, 2>>
-      vertices;  ///< `largest` a part; vertex, constraints on it (of the group) as float bits
-  std::vector<std::array<std::uint32_t, 2>>
-      records;                               ///< the part's vertices, a byte each; rest as float bits
-  std::size_t largest = 0, most_summed = 0;  ///< vertices, summed ones, of any part
-  bool parted = false;                       ///< any patch has several parts
+  static constexpr std::size_t most_vertices = 256;  ///< of a chunk: a byte holds their number
+  std::size_t count = 0;                             ///< of patches
+  /// Words of a chunk: how many vertices, how many of these are owned (they come first), the first of them,
+  /// the next chunk of the patch (0: none); then for each kind present its first record and how many. The
+  /// patches' first chunks come first.
+  std::vector<std::uint32_t> chunks;
+  std::size_t chunk_words = 0;
+  /// `largest` per chunk: the vertex, and the number of constraints on it as float bits.
+  std::vector<std::array<std::uint32_t, 2>> vertices;
+  /// The chunk's vertices, a byte each; rest value as float bits.
+  std::vector<std::array<std::uint32_t, 2>> records;
+  std::size_t largest = 0, most_owned = 0;  ///< vertices, owned ones, of any chunk
+  bool chunked = false;                     ///< any patch has several chunks
 };
 
-/// Each constraint in one patch of at most `most`; all its vertices are summed.
+/// Each constraint in one patch of at most `most`; all its vertices are owned.
 Patches constraint_patches(const Model& model, const ConstraintSystem& system, std::size_t most);
 
-/// Patches of at most `own` consecutive vertices, which are summed, and of all constraints on these: a
-/// constraint is in each patch that has a vertex of it. `members`, if not empty: by kind, which of `groups`
-/// each constraint is in; all groups have the same patches of vertices. `own` is at most most_vertices - 4.
-Patches vertex_patches(const ConstraintSystem& system, std::size_t own, int groups = 1,
-                       const std::vector<std::vector<std::uint8_t>>& members = {});
+/// Patches of at most `own` consecutive vertices, which are owned, and of all constraints on these: a
+/// constraint is in each patch that has a vertex of it. `own` is at most most_vertices - 4.
+Patches vertex_patches(const ConstraintSystem& system, std::size_t own);
 
 }  // namespace tetpbd

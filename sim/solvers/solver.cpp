@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cstdlib>
@@ -12,30 +13,71 @@
 
 namespace tetpbd {
 
+// Each in the file of its mode.
+Solver create_node_solver(const SolverInput&);
+Solver create_constraint_solver(const SolverInput&);
+Solver create_cpu_solver(const SolverInput&);
+Solver create_cpu_double_solver(const SolverInput&);
+Solver create_cpu_fast_solver(const SolverInput&);
+Solver create_paper_solver(const SolverInput&);
+
+namespace {
+
+const std::vector<SolverMode> rows = {
+    {.name = "node",
+     .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch",
+     .create = create_node_solver,
+     .clusters = true},
+    {.name = "constraint",
+     .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics",
+     .create = create_constraint_solver},
+    {.name = "cpu",
+     .help = "non-linear Gauss-Seidel on one CPU core, the paper's baseline",
+     .create = create_cpu_solver},
+    {.name = "cpu-double",
+     .help = "the same in double precision: what stability is held against",
+     .create = create_cpu_double_solver},
+    {.name = "cpu-fast",
+     .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions",
+     .create = create_cpu_fast_solver},
+    {.name = "paper",
+     .help = "the paper's GPU pipeline: a kernel per kind, floats added by compare-and-swap",
+     .create = create_paper_solver,
+     .compliance = false,
+     .offered = false},
+};
+
+}  // namespace
+
 const std::vector<SolverMode>& solver_modes() {
-  static const std::vector<SolverMode> rows = {
-      {"node", "Jacobi on the GPU, a thread a vertex gathers all its constraints in one dispatch",
-       create_node_solver},
-      {"constraint", "Jacobi on the GPU, a thread a constraint adds to its vertices with integer atomics",
-       create_constraint_solver},
-      {"cpu", "non-linear Gauss-Seidel on one CPU core, the paper's baseline", create_cpu_solver},
-      {"cpu-double", "the same in double precision: what stability is held against",
-       create_cpu_double_solver},
-      {"cpu-fast", "Gauss-Seidel by colours on all CPU cores, with vector instructions",
-       create_cpu_fast_solver},
-      {"groups", "Gauss-Seidel on the GPU between K groups of constraints, averaged inside each",
-       create_groups_solver},
-  };
-  return rows;
+  static const std::vector<SolverMode> offered = [] {
+    std::vector<SolverMode> some;
+    std::copy_if(rows.begin(), rows.end(), std::back_inserter(some),
+                 [](const SolverMode& mode) { return mode.offered; });
+    return some;
+  }();
+  return offered;
 }
 
 const SolverMode* find_solver_mode(const std::string& name) {
-  static const SolverMode paper = {
-      "paper", "the paper's GPU pipeline: a kernel a kind, floats added by compare-and-swap",
-      create_paper_solver};
-  for (const SolverMode& mode : solver_modes())
-    if (name == mode.name) return &mode;
-  return name == paper.name ? &paper : nullptr;
+  const auto row =
+      std::find_if(rows.begin(), rows.end(), [&](const SolverMode& mode) { return name == mode.name; });
+  return row == rows.end() ? nullptr : &*row;
+}
+
+std::vector<Dispatch> substep_dispatches(const Solver& solver, int iterations) {
+  const std::size_t move = solver.iteration.size() - 1;
+  const bool apart = solver.unfused || iterations == 0;
+  std::vector<Dispatch> dispatches;
+  if (apart) dispatches.push_back({move, PHASE_PREDICT});
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    unsigned phases = PHASE_SOLVE;
+    if (!apart && iteration == 0) phases |= PHASE_PREDICT;
+    if (!apart && iteration + 1 == iterations) phases |= PHASE_FINISH;
+    for (std::size_t pass = 0; pass <= move; ++pass) dispatches.push_back({pass, phases});
+  }
+  if (apart) dispatches.push_back({move, PHASE_FINISH});
+  return dispatches;
 }
 
 Tuning tuning_from_environment() {
@@ -57,18 +99,15 @@ Tuning tuning_from_environment() {
 }
 
 std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
-  std::vector<Substitutions> rows;
-  for (std::size_t k = 0; k < system.lists.size(); ++k) {
-    if (!system.present[k]) continue;
-    const std::size_t index = rows.size();
-    rows.push_back({{"KIND", constraint_kinds()[k].name},
-                    {"ARITY", std::to_string(constraint_kinds()[k].arity)},
-                    {"INDEX", std::to_string(index)},
-                    {"BINDING", std::to_string(BIND_RECORDS + index)},
-                    {"KIND_ROW", std::to_string(k / 4)},
-                    {"KIND_COLUMN", std::to_string(k % 4)}});
-  }
-  return rows;
+  std::vector<Substitutions> words;
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (system.present[k])
+      words.push_back({{"KIND", constraint_kinds[k].name},
+                       {"ARITY", std::to_string(constraint_kinds[k].arity)},
+                       {"INDEX", std::to_string(words.size())},
+                       {"KIND_ROW", std::to_string(k / 4)},
+                       {"KIND_COLUMN", std::to_string(k % 4)}});
+  return words;
 }
 
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
@@ -83,18 +122,17 @@ Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
   return Buffer("records " + kind, words);
 }
 
-std::vector<Buffer> record_buffers(const ConstraintSystem& system) {
-  std::vector<Buffer> buffers;
-  for (std::size_t k = 0; k < system.lists.size(); ++k)
-    if (system.present[k]) buffers.push_back(record_buffer(system.lists[k], constraint_kinds()[k].name));
-  return buffers;
-}
-
 void check_storage(const Tuning& tuning, const std::string& label, std::size_t bytes) {
   if (tuning.storage > 0 && bytes > tuning.storage)
     throw Error("a storage buffer is too large",
                 fmt::format("'{}' of {} bytes, the driver allows {}", label, bytes, tuning.storage),
                 "use a smaller mesh", 1);
+}
+
+void add_buffer(Solver& solver, const Tuning& tuning, int binding, Buffer buffer) {
+  check_storage(tuning, buffer.label(), buffer.bytes());
+  solver.bindings.push_back({binding, buffer.id()});
+  solver.buffers.push_back(std::move(buffer));
 }
 
 Cut tuned(Cut cut, const Tuning& tuning) {
@@ -105,115 +143,105 @@ Cut tuned(Cut cut, const Tuning& tuning) {
   return cut;
 }
 
-std::vector<std::string> compliance_defines(bool compliant, bool damped) {
-  std::vector<std::string> defines;
-  if (compliant) defines.push_back("COMPLIANT");
-  if (damped) defines.push_back("DAMPED");
-  return defines;
-}
-
 namespace {
 
-constexpr std::size_t few_handles = 8;  // up to here each patch has all, in their order
+std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
 
-// The lists of each patch's handles, and the buffers of handles.glsl; returns the length of the longest list.
-std::size_t add_handles(Solver& solver, const SolverInput& input, const Patches& patches, Handles& handles) {
+constexpr std::size_t few_clusters = 8;  // up to here each patch has all, in their order
+
+// The buffers of clusters.glsl, among them each patch's list of clusters; returns the length of the longest.
+std::size_t add_clusters(Solver& solver, const SolverInput& input, const Patches& patches) {
+  std::vector<layout::Cluster>& clusters = solver.clusters.clusters;
+  const std::vector<glm::vec4>& rest = solver.clusters.rest;
   if (patches.count > 65536)  // as many numbers of 16 bits fit 32
     throw Error("the body is too large for handles", fmt::format("{} patches", patches.count),
                 "set handles to 0, or take a mesh of at most 20 million tets");
-  for (layout::Handle& handle : handles.handles) handle.keeper = ~0u;
+  for (layout::Cluster& cluster : clusters) cluster.owner = ~0u;
   std::vector<std::vector<std::uint32_t>> lists(patches.count);
   std::size_t most = 1;
   for (std::size_t p = 0; p < patches.count; ++p) {
-    const std::uint32_t* words = patches.parts.data() + p * patches.part_words;
-    for (std::uint32_t h = 0; h < handles.handles.size(); ++h) {
-      const auto held = [&](std::uint32_t v) {
-        return glsl::Rigid{}.handle_weight(handles.rest[v], handles.handles[h].node) > 0;
-      };
-      bool any = handles.handles.size() <= few_handles;
-      for (std::uint32_t v = words[2]; v < words[2] + words[1] && !any; ++v) any = held(v);
+    const std::uint32_t* header = patches.chunks.data() + p * patches.chunk_words;
+    for (std::uint32_t k = 0; k < clusters.size(); ++k) {
+      bool any = clusters.size() <= few_clusters;
+      for (std::uint32_t v = header[2]; v < header[2] + header[1] && !any; ++v)
+        any = glsl::ShapeMatching{}.cluster_weight(rest[v], clusters[k].node) > 0;
       if (!any) continue;
-      lists[p].push_back(h);
-      if (handles.handles[h].keeper == ~0u) handles.handles[h].keeper = std::uint32_t(p);
+      lists[p].push_back(k);
+      if (clusters[k].owner == ~0u) clusters[k].owner = std::uint32_t(p);
     }
     most = std::max(most, lists[p].size());
   }
-  layout::Handle none{};
+  layout::Cluster none{};
   none.number = ~0u;
-  std::vector<layout::Handle> copies(patches.count * most, none);  // beside each other, for each patch
+  std::vector<layout::Cluster> copies(patches.count * most, none);  // beside each other, for each patch
   for (std::size_t p = 0; p < patches.count; ++p)
     for (std::size_t k = 0; k < lists[p].size(); ++k) {
-      layout::Handle& copy = copies[p * most + k] = handles.handles[lists[p][k]];
+      layout::Cluster& copy = copies[p * most + k] = clusters[lists[p][k]];
       copy.number = lists[p][k];
     }
-  const auto add = [&](const char* label, int binding, const auto& data) {
-    solver.buffers.push_back(storage_buffer(input.tuning, label, data));
-    solver.bindings.push_back({binding, solver.buffers.back().id()});
-  };
-  add("handles", BIND_HANDLES, copies);
-  add("handle rest", BIND_HANDLE_REST, handles.rest);
-  add("handle sums", BIND_HANDLE_SUMS, std::vector<std::uint32_t>(3 * HANDLE_ROW * handles.handles.size()));
+  add_buffer(solver, input.tuning, BIND_CLUSTERS, Buffer("clusters", copies));
+  add_buffer(solver, input.tuning, BIND_CLUSTER_REST, Buffer("cluster rest", rest));
+  solver.cluster_sums = Buffer("cluster sums", std::vector<std::uint32_t>(3 * CLUSTER_ROW * clusters.size()));
+  solver.bindings.push_back({BIND_CLUSTER_SUMS, solver.cluster_sums.id()});
   return most;
 }
 
 }  // namespace
 
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
-                 unsigned group, bool grouped, Handles* handles) {
-  std::size_t bytes = 0, most_handles = 0;
-  const auto add = [&](const char* label, int binding, const auto& data) {
-    solver.buffers.push_back(storage_buffer(input.tuning, label, data));
-    solver.bindings.push_back({binding, solver.buffers.back().id()});
-    bytes += solver.buffers.back().bytes();
-  };
-  add("patches", BIND_PARTS, patches.parts);
-  add("patch vertices", BIND_PATCH_VERTICES, patches.vertices);
-  add("patch records", BIND_PATCH_RECORDS, patches.records);
-  if (handles) {
-    most_handles = add_handles(solver, input, patches, *handles);
-    bytes += 32 * patches.count * patches.most_summed + 2 * solver.buffers.back().bytes();
+                 unsigned group) {
+  const std::size_t chunk_bytes = patches.chunks.size() * 4, vertex_bytes = patches.vertices.size() * 8,
+                    record_bytes = patches.records.size() * 8;
+  check_storage(input.tuning, "patches", chunk_bytes + vertex_bytes + record_bytes);
+  Buffer words("patches", chunk_bytes + vertex_bytes + record_bytes);
+  words.write(0, chunk_bytes, patches.chunks.data());
+  words.write(chunk_bytes, vertex_bytes, patches.vertices.data());
+  words.write(chunk_bytes + vertex_bytes, record_bytes, patches.records.data());
+  std::size_t bytes = words.bytes() + 16 * patches.vertices.size();  // and quantized positions
+  add_buffer(solver, input.tuning, BIND_PATCHES, std::move(words));
+  std::size_t most_clusters = 0;
+  if (input.clusters) {
+    solver.clusters = build_clusters(input.model);
+    most_clusters = add_clusters(solver, input, patches);
+    bytes += 32 * patches.count * patches.most_owned + 2 * solver.cluster_sums.bytes();
   }
-  const std::size_t summed = std::max<std::size_t>(patches.most_summed, 1);
-  const std::size_t chunk =
-      std::clamp<std::size_t>(group / summed, 1, std::clamp<std::size_t>(most_handles, 1, 8));
-  const ShaderWords words = {
-      {{"GROUP", std::to_string(group)},
-       {"HANDLES", std::to_string(most_handles)},
-       {"ALL_HANDLES", handles && handles->handles.size() <= few_handles ? "1" : "0"},
-       {"HANDLE_COUNT", std::to_string(handles ? handles->handles.size() : 0)},
-       {"PATCHES", std::to_string(patches.count)},
-       {"PART_WORDS", std::to_string(patches.part_words)},
-       {"CHUNK", std::to_string(chunk)},
-       {"HERE",
-        std::to_string(std::max({patches.largest, std::size_t(1), handles ? (1 + chunk) * summed : 0}))},
-       {"VERTICES", std::to_string(std::max<std::size_t>(patches.largest, 1))},
-       {"SUMMED", std::to_string(summed)},
-       {"PARTED", patches.parted ? "1" : "0"},
-       {"GROUPED", grouped ? "1" : "0"},
-       {"COUNT_GUARDS", input.tuning.count_guards ? "1" : "0"}},
-      kind_words(input.system)};
-  bytes += 16 * patches.vertices.size() * (input.damped ? 2 : 1);  // places
   if (input.compliant) {
-    add("multipliers", BIND_MULTIPLIERS, std::vector<float>(patches.records.size()));
-    bytes += solver.buffers.back().bytes();  // read and written
+    add_buffer(solver, input.tuning, BIND_MULTIPLIERS,
+               Buffer("multipliers", std::vector<float>(patches.records.size())));
+    bytes += 2 * 4 * patches.records.size();  // read and written
   }
-  const auto defines = compliance_defines(input.compliant, input.damped);
-  solver.iteration.push_back({Program::compute(shader, words, defines), patches.count,
-                              bytes / std::size_t(grouped ? input.groups : 1)});
+  const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
+                    vertices = std::max<std::size_t>(patches.largest, 1);
+  // Clusters work on so many at a time, with an invocation for each pair of one and a vertex.
+  const std::size_t pair_clusters =
+      std::clamp<std::size_t>(group / owned, 1, std::clamp<std::size_t>(most_clusters, 1, 8));
+  const std::size_t room = input.clusters ? (1 + pair_clusters) * owned : 0;
+  const std::size_t cluster_count = solver.clusters.clusters.size();
+  solver.iteration.push_back(
+      {Program::compute(
+           shader, {{}, kind_words(input.system)},
+           {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
+            define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
+            define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8), define("MAX_VERTICES", vertices),
+            define("MAX_OWNED", owned), define("LOCAL_ROOM", std::max(vertices, room)),
+            define("CHUNKED", patches.chunked), define("COMPLIANT", input.compliant),
+            define("COUNT_GUARDS", input.tuning.count_guards), define("CLUSTERS", most_clusters),
+            define("CLUSTER_COUNT", cluster_count), define("ALL_CLUSTERS", cluster_count <= few_clusters),
+            define("PAIR_CLUSTERS", pair_clusters)}),
+       patches.count, bytes});
 }
 
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {
   const std::size_t vertices = input.model.positions.size();
-  const ShaderWords words = {{{"GROUP", std::to_string(group)}, {"FLOAT_SUMS", float_sums ? "1" : "0"}}, {}};
-  const std::size_t bytes =
-      vertices * (2 * sizeof(Position) + 3 * 16);  // itself, its sum there and back, its place
-  const auto defines = compliance_defines(input.compliant, input.damped);
-  solver.iteration.push_back(
-      {Program::compute("average.comp", words, defines), work_groups(vertices, group), bytes});
-  Buffer deltas("deltas", vertices * 16);
-  deltas.clear();
-  solver.bindings.push_back({BIND_DELTAS, deltas.id()});
-  solver.buffers.push_back(std::move(deltas));
+  // Itself, its sum there and back, what neighbours see of it.
+  const std::size_t bytes = vertices * (2 * sizeof(Position) + 3 * 16);
+  solver.iteration.push_back({Program::compute("average.comp", {},
+                                               {define("GROUP_SIZE", group), define("FLOAT_SUMS", float_sums),
+                                                define("COMPLIANT", input.compliant)}),
+                              work_groups(vertices, group), bytes});
+  Buffer sums("correction sums", vertices * 16);
+  sums.clear();
+  add_buffer(solver, input.tuning, BIND_SUMS, std::move(sums));
 }
 
 }  // namespace tetpbd

@@ -1,35 +1,33 @@
-// Solver modes: how one substep's constraints are solved. A mode is a solve_*.cpp and a row of
-// solver_modes().
+// Solver modes: how one substep's constraints are solved. A mode is a file of this folder and a row in
+// solver.cpp; what is the same for several stands here. May use mesh, gl, model, constraints and settings,
+// and knows nothing of Sim.
 #pragma once
 
 #include <array>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "sim/constraints.h"
 #include "sim/gl/gpu.h"
-#include "sim/solvers/handles.h"
 #include "sim/layout.h"
 #include "sim/model.h"
-#include "sim/solvers/patches.h"
 #include "sim/settings.h"
+#include "sim/solvers/clusters.h"
+#include "sim/solvers/patches.h"
 
 namespace tetpbd {
 
-/// One dispatch. The barrier for its storage writes stands behind it.
+/// A kernel, and how many work-groups of it a dispatch has.
 struct Pass {
   Program program;
-  std::size_t groups = 0;
+  std::size_t work_groups = 0;
   std::size_t bytes = 0;  ///< read and written by all invocations together; caches may serve part of it
-  glm::uvec2 turn{~0u};   ///< the uniform `turn` (places.glsl) as it was last set
-};
-
-/// State on the CPU, in double: what CPU modes step and what tests compare.
-struct State {
-  std::vector<glm::dvec3> positions;   ///< m
-  std::vector<glm::dvec3> velocities;  ///< m/s
+  GLuint records = 0;     ///< buffer to bind to BIND_RECORDS before it (mode paper)
+  /// Where the program has its dispatch parameters (-1: nowhere), and their values; asked for and set in
+  /// step.cpp.
+  std::array<GLint, 3> locations{};
+  std::array<unsigned, 3> parameters{~0u, ~0u, ~0u};
 };
 
 /// How often each guard of layout.glsl triggered, in its order. A projection counts once where each
@@ -42,26 +40,33 @@ inline constexpr std::array<const char*, GUARDS> guard_names = {
 struct Solver {
   std::vector<Buffer> buffers;
   std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every mode shares
-  std::vector<Pass>
-      iteration;  ///< the dispatches of one iteration, in order; the last one moves the vertices
-  bool double_buffered = false;  ///< an iteration reads one buffer of places and writes the other
-  int groups = 1;   ///< the last dispatch runs once for each group of constraints, swapping sides every time
-  Handles handles;  ///< none but where dispatches keep sums for them, in three sets by turns
-  bool compliant = false, damped = false;  ///< what it was made for (constraints.h)
-  bool separate = false;                   ///< prediction and velocities in dispatches of their own
+  std::vector<Pass> iteration;  ///< the passes of one iteration, in order; the last one moves the vertices
+  bool double_buffered =
+      false;             ///< an iteration reads one buffer of quantized positions and writes the other
+  bool unfused = false;  ///< prediction and velocities in dispatches of their own
+  Clusters clusters;     ///< none but where passes keep sums for them
+  Buffer cluster_sums;   ///< three sets: read, added to, cleared, by turns
   std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
-  std::function<GuardCounts()> guards_on_cpu;
+  std::function<GuardCounts()> guards_on_cpu;  ///< counted so far; none where the mode does not count
 };
+
+/// A pass in a substep, and the phases (layout.glsl PHASE_) it goes through.
+struct Dispatch {
+  std::size_t pass;
+  unsigned phases;
+};
+/// The dispatches of a substep in order (method.md, "A step"): predict, solve x iterations, finish.
+/// Prediction and velocities ride on the first and last iteration, but where the solver has them apart.
+std::vector<Dispatch> substep_dispatches(const Solver& solver, int iterations);
 
 /// How kernels are cut into invocations; 0: by the mesh's size or the driver's limit. For measurements and
 /// tests.
 struct Tuning {
-  unsigned group = 0;  ///< invocations of a work-group of the solving kernel, a power of two up to 1024
-  unsigned patch =
-      0;             ///< constraints of a patch in mode constraint, vertices of one in modes node and groups
-  unsigned row = 0;  ///< most work-groups in a dispatch's first dimension
-  std::size_t storage = 0;    ///< most bytes of a storage buffer
-  unsigned threads = 0;       ///< of mode cpu-fast; 0: as many as the machine has cores and work is for
+  unsigned group = 0;       ///< invocations of a work-group of the solving kernel, a power of two up to 1024
+  unsigned patch = 0;       ///< constraints of a patch in mode constraint, vertices of one in mode node
+  unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
+  std::size_t storage = 0;  ///< most bytes of a storage buffer
+  unsigned threads = 0;     ///< of mode cpu-fast; 0: as many as the machine has cores and work is for
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };
 /// From the variable TETPBD_TUNE, as in "patch=8,group=128"; throws Error for anything else.
@@ -70,44 +75,35 @@ Tuning tuning_from_environment();
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
-  bool software = false;                   ///< the "GPU" is a CPU
-  Tuning tuning;                           ///< `row` and `storage` filled in
-  int groups = 1;                          ///< of mode groups
-  bool compliant = false, damped = false;  ///< constraints.h
-  bool handles = false;                    ///< rigid handles are asked for
+  Tuning tuning;           ///< `row` and `storage` filled in
+  bool software = false;   ///< the "GPU" is a CPU
+  bool compliant = false;  ///< settings.h
+  bool clusters = false;   ///< shape-matching clusters are asked for
 };
 
+/// A row of the table: what the mode is called, what makes it, and what it can do.
 struct SolverMode {
   const char* name;
   const char* help;
   Solver (*create)(const SolverInput&);
+  bool clusters = false;   ///< takes shape-matching clusters
+  bool compliance = true;  ///< and compliance
+  bool offered = true;     ///< in --mode and the window; else in bench and compare alone
 };
+/// Those that are offered.
 const std::vector<SolverMode>& solver_modes();
-/// Also finds what is not offered but for `bench`: "paper". nullptr if there is none.
+/// Of all modes; nullptr if there is none.
 const SolverMode* find_solver_mode(const std::string& name);
 
-Solver create_constraint_solver(const SolverInput&);  ///< solve_constraint.cpp
-Solver create_node_solver(const SolverInput&);        ///< solve_node.cpp
-Solver create_groups_solver(const SolverInput&);      ///< solve_node.cpp
-Solver create_cpu_solver(const SolverInput&);         ///< solve_cpu.cpp, float
-Solver create_cpu_double_solver(const SolverInput&);  ///< solve_cpu.cpp, double
-Solver create_cpu_fast_solver(const SolverInput&);    ///< solve_cpu_fast.cpp
-Solver create_paper_solver(const SolverInput&);       ///< solve_paper.cpp
-
-/// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), BINDING (of its
-/// records), KIND_ROW and KIND_COLUMN (of the stiffness).
+/// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), KIND_ROW and
+/// KIND_COLUMN (of the stiffness).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
 /// The records of one list (layout.glsl: Record2, Record4).
 Buffer record_buffer(const ConstraintList& list, const std::string& kind);
-/// Record buffers of the kinds present, in the order of kind_words.
-std::vector<Buffer> record_buffers(const ConstraintSystem& system);
 /// Throws Error if a buffer is larger than a storage block may be.
 void check_storage(const Tuning& tuning, const std::string& label, std::size_t bytes);
-template <class T>
-Buffer storage_buffer(const Tuning& tuning, const std::string& label, const std::vector<T>& data) {
-  check_storage(tuning, label, data.size() * sizeof(T));
-  return Buffer(label, data);
-}
+/// A buffer of the solver, bound to `binding` in every step.
+void add_buffer(Solver& solver, const Tuning& tuning, int binding, Buffer buffer);
 
 /// How constraints are cut: `patch` as in Tuning, invocations of a work-group.
 struct Cut {
@@ -115,13 +111,11 @@ struct Cut {
 };
 /// With what `tuning` overrides; throws Error if a work-group cannot have that size.
 Cut tuned(Cut cut, const Tuning& tuning);
-/// Words defined in kernels for compliance and constraint damping; none without.
-std::vector<std::string> compliance_defines(bool compliant, bool damped);
-/// Gives a solver a dispatch of `shader`, a work-group a patch, and the patches' buffers (patch.glsl); with
-/// `handles`, theirs (handles.glsl).
+/// Gives a solver a pass of `shader`, a work-group per patch, and the patches' buffers (patch.glsl), and with
+/// `input.clusters` those of its clusters (clusters.glsl).
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
-                 unsigned group, bool grouped, Handles* handles = nullptr);
-/// Gives a solver its sums of corrections, at zero, and its last dispatch, which averages them and moves the
+                 unsigned group);
+/// Gives a solver its sums of corrections, at zero, and its last pass, which averages them and moves the
 /// vertices (average.comp).
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums);
 

@@ -1,17 +1,16 @@
-#include "sim/solvers/handles.h"
+#include "sim/solvers/clusters.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "sim/constraints.h"
 #include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 
 namespace {
 
-constexpr double spacing = 0.6;  // of a body's diagonal: eight handles for a compact body
+constexpr double spacing = 0.6;  // of a body's diagonal: eight clusters for a compact body
 
 glm::dvec3 cell_of(const glm::dvec3& size) {
   const double diagonal = glm::length(size);
@@ -23,27 +22,27 @@ glm::dvec3 cell_of(const glm::dvec3& size) {
   return cell;
 }
 
-// Calls visit(vertex, weight, arm in m) for every vertex of a handle.
+// Calls visit(vertex, weight, arm in m) for every vertex of a cluster.
 template <class F>
-void for_each_vertex(const Handles& handles, const layout::Handle& handle, const Body& body, F&& visit) {
-  glsl::Rigid rigid;
+void for_each_vertex(const Clusters& clusters, const layout::Cluster& cluster, const Body& body, F&& visit) {
+  glsl::ShapeMatching matching;
   for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
-    if (const int weight = rigid.handle_weight(handles.rest[v], handle.node))
-      visit(v, weight, rigid.handle_arm(handles.rest[v], handle.centre, handle.cell));
+    if (const int weight = matching.cluster_weight(clusters.rest[v], cluster.node))
+      visit(v, weight, matching.cluster_arm(clusters.rest[v], cluster.centre, cluster.cell));
 }
 // Of all bodies: those of others have no weight.
 template <class F>
-void for_each_vertex(const Handles& handles, const layout::Handle& handle, F&& visit) {
+void for_each_vertex(const Clusters& clusters, const layout::Cluster& cluster, F&& visit) {
   Body all;
-  all.vertices = handles.rest.size();
-  for_each_vertex(handles, handle, all, visit);
+  all.vertices = clusters.rest.size();
+  for_each_vertex(clusters, cluster, all, visit);
 }
 
 }  // namespace
 
-Handles build_handles(const Model& model) {
-  glsl::Rigid rigid;
-  Handles result;
+Clusters build_clusters(const Model& model) {
+  glsl::ShapeMatching matching;
+  Clusters result;
   result.rest.resize(model.rest.positions.size());
   for (std::size_t b = 0; b < model.bodies.size(); ++b) {
     const Body& body = model.bodies[b];
@@ -68,7 +67,7 @@ Handles build_handles(const Model& model) {
             share.x * share.y * share.z * model.masses[v];
       }
     }
-    // Weight times steps times deviation fit 64 bits (handles.glsl), the first two 31.
+    // Weight times steps times deviation fit 64 bits (clusters.glsl), the first two 31.
     const double unit = std::min(std::exp2(16.0) / heaviest,
                                  0.99 * std::exp2(22.0) / *std::max_element(masses.begin(), masses.end()));
     for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
@@ -76,42 +75,39 @@ Handles build_handles(const Model& model) {
     for (int k = 0; k < nodes.z; ++k)
       for (int j = 0; j < nodes.y; ++j)
         for (int i = 0; i < nodes.x; ++i) {
-          layout::Handle handle{};
-          handle.node = origin + glm::vec3(i, j, k);
-          handle.cell = glm::vec3(cell);
-          handle.steps_per_metre = float(16320 / (2 * glm::length(cell)));  // no arm is longer than two cells
+          layout::Cluster cluster{};
+          cluster.node = origin + glm::vec3(i, j, k);
+          cluster.cell = glm::vec3(cell);
+          cluster.steps_per_metre =
+              float(16320 / (2 * glm::length(cell)));  // no arm is longer than two cells
           double weight = 0;
           glm::dvec3 centre(0);
-          for_each_vertex(result, handle, body, [&](std::size_t v, int w, const glm::vec3&) {
+          for_each_vertex(result, cluster, body, [&](std::size_t v, int w, const glm::vec3&) {
             weight += w, centre += double(w) * glm::dvec3(result.rest[v]);
           });
           if (weight == 0) continue;
-          handle.weight = float(weight);
-          handle.centre = glm::vec3(centre / weight);
+          cluster.weight = float(weight);
+          cluster.centre = glm::vec3(centre / weight);
           glm::dvec3 sum(0);
           glm::dmat3 squares(0);
-          for_each_vertex(result, handle, body, [&](std::size_t, int w, const glm::vec3& arm) {
-            const glm::dvec3 steps(rigid.handle_steps(arm, handle.steps_per_metre));
+          for_each_vertex(result, cluster, body, [&](std::size_t, int w, const glm::vec3& arm) {
+            const glm::dvec3 steps(matching.cluster_steps(arm, cluster.steps_per_metre));
             sum += double(w) * steps, squares += double(w) * glm::outerProduct(steps, steps);
           });
           squares -= glm::outerProduct(sum, sum) / weight;
-          handle.steps = glm::vec3(sum);
-          handle.squares = glm::vec3(squares[0][0], squares[1][1], squares[2][2]);
-          handle.products = glm::vec3(squares[1][2], squares[0][2], squares[0][1]);
+          cluster.steps = glm::vec3(sum);
+          cluster.squares = glm::vec3(squares[0][0], squares[1][1], squares[2][2]);
+          cluster.products = glm::vec3(squares[1][2], squares[0][2], squares[0][1]);
           const double trace = squares[0][0] + squares[1][1] + squares[2][2];
           // Points on a line have no inverse: then a small one, and about the line nothing turns.
           const glm::dmat3 inverse =
               trace > 0 ? glm::inverse(glm::dmat3(trace * (1 + 1e-6)) - squares) : glm::dmat3(0);
-          handle.inverse_squares = glm::vec3(inverse[0][0], inverse[1][1], inverse[2][2]);
-          handle.inverse_products = glm::vec3(inverse[1][2], inverse[0][2], inverse[0][1]);
-          result.handles.push_back(handle);
+          cluster.inverse_squares = glm::vec3(inverse[0][0], inverse[1][1], inverse[2][2]);
+          cluster.inverse_products = glm::vec3(inverse[1][2], inverse[0][2], inverse[0][1]);
+          result.clusters.push_back(cluster);
         }
   }
   return result;
-}
-
-bool wants_handles(const Settings& settings) {
-  return settings.handles > 0 && settings.mode == "node" && !compliant(settings);
 }
 
 // The rotation R with the largest trace(R^T A), for A = sum w x X^T (Horn 1987): the one that turns the X
@@ -129,21 +125,21 @@ glm::dmat3 rotation_of(const glm::dmat3& A) {
   return R;
 }
 
-std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<glm::dvec3>& positions) {
-  std::vector<HandlePose> poses;
-  for (const layout::Handle& handle : handles.handles) {
+std::vector<ClusterPose> cluster_poses(const Clusters& clusters, const std::vector<glm::dvec3>& positions) {
+  std::vector<ClusterPose> poses;
+  for (const layout::Cluster& cluster : clusters.clusters) {
     glm::dvec3 x(0), arms(0);
-    for_each_vertex(handles, handle, [&](std::size_t v, int weight, const glm::vec3& arm_m) {
+    for_each_vertex(clusters, cluster, [&](std::size_t v, int weight, const glm::vec3& arm_m) {
       const glm::dvec3 arm(arm_m);
       x += double(weight) * positions[v], arms += double(weight) * arm;
     });
-    x /= double(handle.weight), arms /= double(handle.weight);
+    x /= double(cluster.weight), arms /= double(cluster.weight);
     glm::dmat3 A(0);
-    for_each_vertex(handles, handle, [&](std::size_t v, int weight, const glm::vec3& arm_m) {
+    for_each_vertex(clusters, cluster, [&](std::size_t v, int weight, const glm::vec3& arm_m) {
       const glm::dvec3 arm(arm_m);
       A += double(weight) * glm::outerProduct(positions[v] - x, arm - arms);
     });
-    HandlePose pose;
+    ClusterPose pose;
     pose.R = rotation_of(A);
     pose.place = x - pose.R * arms;
     poses.push_back(pose);
@@ -151,20 +147,20 @@ std::vector<HandlePose> handle_poses(const Handles& handles, const std::vector<g
   return poses;
 }
 
-std::vector<glm::dvec3> handle_pulls(const Handles& handles, const std::vector<glm::dvec3>& positions) {
+std::vector<glm::dvec3> cluster_pulls(const Clusters& clusters, const std::vector<glm::dvec3>& positions) {
   std::vector<glm::dvec3> pulls(positions.size());
-  const std::vector<HandlePose> poses = handle_poses(handles, positions);
+  const std::vector<ClusterPose> poses = cluster_poses(clusters, positions);
   for (std::size_t h = 0; h < poses.size(); ++h)
-    for_each_vertex(handles, handles.handles[h], [&](std::size_t v, int weight, const glm::vec3& arm_m) {
+    for_each_vertex(clusters, clusters.clusters[h], [&](std::size_t v, int weight, const glm::vec3& arm_m) {
       const glm::dvec3 arm(arm_m);
       pulls[v] +=
-          double(weight) / double(handles.rest[v].w) * (poses[h].place + poses[h].R * arm - positions[v]);
+          double(weight) / double(clusters.rest[v].w) * (poses[h].place + poses[h].R * arm - positions[v]);
     });
   return pulls;
 }
 
-double relaxation(double omega, double handles) {
-  return handles > 0 ? std::min(omega, 3 * (1.2 - handles)) : omega;
+double relaxation(double omega, double clusters) {
+  return clusters > 0 ? std::min(omega, 3 * (1.2 - clusters)) : omega;
 }
 
 }  // namespace tetpbd

@@ -7,7 +7,7 @@
 
 #include "app/measure_run.h"
 #include "sim/solvers/cpu_pbd.h"
-#include "sim/solvers/handles.h"
+#include "sim/solvers/clusters.h"
 #include "sim/metrics.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
@@ -100,22 +100,22 @@ TEST_CASE("the best rotation is found, also of mirrored and of flat points, and 
 
 TEST_CASE("shares of a vertex make 1, a handle's weights fit their integers, two bodies share none") {
   const auto model = block_model({8, 6, 4}, "none", glm::dvec3(0), 2);
-  const Handles handles = build_handles(*model);
-  CHECK(handles.handles.size() >= 16);
-  for (const glm::vec4& vertex : handles.rest) {
+  const Clusters clusters = build_clusters(*model);
+  CHECK(clusters.clusters.size() >= 16);
+  for (const glm::vec4& vertex : clusters.rest) {
     int sum = 0;
-    for (const layout::Handle& handle : handles.handles)
-      sum += glsl::Rigid{}.handle_weight(vertex, handle.node);
+    for (const layout::Cluster& handle : clusters.clusters)
+      sum += glsl::ShapeMatching{}.cluster_weight(vertex, handle.node);
     CHECK(std::abs(float(sum) - vertex.w) <= 4);
   }
-  for (const layout::Handle& handle : handles.handles) {
+  for (const layout::Cluster& handle : clusters.clusters) {
     double weight = 0;
     glm::dvec3 steps(0);
     std::size_t of[2] = {0, 0};
-    for (std::size_t v = 0; v < handles.rest.size(); ++v) {
-      glsl::Rigid rigid;
-      const int w = rigid.handle_weight(handles.rest[v], handle.node);
-      const glm::ivec3 s = rigid.handle_steps(rigid.handle_arm(handles.rest[v], handle.centre, handle.cell),
+    for (std::size_t v = 0; v < clusters.rest.size(); ++v) {
+      glsl::ShapeMatching matching;
+      const int w = matching.cluster_weight(clusters.rest[v], handle.node);
+      const glm::ivec3 s = matching.cluster_steps(matching.cluster_arm(clusters.rest[v], handle.centre, handle.cell),
                                               handle.steps_per_metre);
       weight += w;
       steps += double(w) * glm::dvec3(s);
@@ -179,9 +179,9 @@ TEST_CASE("at rest handles pull nowhere") {
   Settings settings = held(0.8, 1, 1);
   settings.gravity = 0, settings.ground = false, settings.omega = 0;
   const auto model = block_model({4, 3, 2});
-  const Handles handles = build_handles(*model);
+  const Clusters clusters = build_clusters(*model);
   double largest = 0;
-  for (const glm::dvec3& pull : handle_pulls(handles, model->positions))
+  for (const glm::dvec3& pull : cluster_pulls(handles, model->positions))
     largest = std::max(largest, glm::length(pull));
   Sim sim = create_sim(model, settings);
   step(sim);

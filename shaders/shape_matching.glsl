@@ -1,19 +1,19 @@
-// Rigid handles (method.md eqs. 28-31), as GLSL and as C++. `precise`: both round alike, so that their integers are the same.
+// Shape-matching clusters (method.md eqs. 28-31), as GLSL and as C++. `precise`: both round alike, so that their integers are the same.
 
-// A vertex's weight: mass times a trilinear share, so that the shares of a vertex's eight handles make 1. `vertex`: in cells of the
-// handles' lattice, and its mass in units of a weight.
-int handle_weight(vec4 vertex, vec3 node) {
+// A vertex's weight: mass times a trilinear share, so that the shares of a vertex's eight clusters make 1. `vertex`: in cells of the
+// clusters' lattice, and its mass in units of a weight.
+int cluster_weight(vec4 vertex, vec3 node) {
   precise vec3 near = max(vec3(1.0f) - abs(vec3(vertex) - node), vec3(0.0f));
   precise float weight = near.x * near.y * near.z * vertex.w + 0.5f;
   return int(floor(weight));
 }
-// From the handle's centre to a vertex at rest, m.
-vec3 handle_arm(vec4 vertex, vec3 centre, vec3 cell) {
+// From the cluster's centre to a vertex at rest, m.
+vec3 cluster_arm(vec4 vertex, vec3 centre, vec3 cell) {
   precise vec3 arm = (vec3(vertex) - centre) * cell;
   return arm;
 }
 // The same in whole steps, at most 2^14.
-ivec3 handle_steps(vec3 arm, float steps_per_metre) {
+ivec3 cluster_steps(vec3 arm, float steps_per_metre) {
   precise vec3 steps = arm * steps_per_metre + vec3(0.5f);
   return ivec3(floor(steps));
 }

@@ -1,0 +1,86 @@
+// The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and
+// a row here; its stiffness k_NAME and compliance compliance_NAME, its kernels and its CPU loops follow from
+// these. Order is the order of projection in Gauss-Seidel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "sim/formulas.h"
+
+namespace tetpbd {
+
+struct TetMesh;
+struct ConstraintList;
+
+/// For whoever evaluates a constraint without a mesh.
+inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
+
+struct ConstraintKind {
+  const char* name;
+  int arity;                    ///< vertices, 2 or 4
+  const char* noun;             ///< what has it, as help texts call them
+  const char* compliance_unit;  ///< 1 over that of C^2 / J
+  double most_compliance;       ///< the largest that settings take
+};
+
+struct Stretch {
+  static constexpr ConstraintKind row{"stretch", 2, "edges", "m/N", 1};
+  static constexpr int arity = row.arity;
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.stretch(x, rest, id);
+  }
+  static void build(const TetMesh& mesh, ConstraintList& list);  ///< every edge of every tet
+};
+struct Bend {
+  static constexpr ConstraintKind row{"bend", 4, "hinges", "rad^2/J", 1e4};
+  static constexpr int arity = row.arity;
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.bend(x, rest, id);
+  }
+  /// Every edge that two surface triangles share.
+  static void build(const TetMesh& mesh, ConstraintList& list);
+};
+struct Volume {
+  static constexpr ConstraintKind row{"volume", 4, "tets' volumes", "m^3/Pa", 1};
+  static constexpr int arity = row.arity;
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.volume(x, rest, id);
+  }
+  static void build(const TetMesh& mesh, ConstraintList& list);  ///< every tet
+};
+using Kinds = std::tuple<Stretch, Bend, Volume>;
+
+constexpr std::size_t kind_count = std::tuple_size_v<Kinds>;
+
+/// Calls f(Kind{}, index) for every kind, in order.
+template <class F>
+void for_each_kind(F&& f) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) { (f(std::tuple_element_t<I, Kinds>{}, int(I)), ...); }
+  (std::make_index_sequence<kind_count>{});
+}
+
+/// Where a kind stands in the table, and in the settings' arrays by kind.
+template <class Kind>
+constexpr std::size_t index_of = [] {
+  std::size_t index = 0;
+  for_each_kind([&](auto kind, int k) {
+    if (std::is_same_v<decltype(kind), Kind>) index = std::size_t(k);
+  });
+  return index;
+}();
+
+/// The rows of the table.
+inline constexpr std::array<ConstraintKind, kind_count> constraint_kinds =
+    []<std::size_t... I>(std::index_sequence<I...>) {
+  return std::array<ConstraintKind, kind_count>{std::tuple_element_t<I, Kinds>::row...};
+}
+(std::make_index_sequence<kind_count>{});
+
+}  // namespace tetpbd

@@ -1,0 +1,115 @@
+// A step (method.md, "A step"): dt / substeps at a time, predict, solve x iterations, finish.
+#include <algorithm>
+
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Dispatches one after the other. Whatever does not change from one to the next is not set again: at a few
+// microseconds per dispatch, every call counts.
+struct Dispatcher {
+  Sim& sim;
+  GLuint program = 0;
+  void bind_quantized() const {  // read these, write the others
+    sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED);
+    sim.quantized[sim.solver.double_buffered ? 1 - sim.read_index : sim.read_index].bind_storage(
+        BIND_QUANTIZED_OUT);
+  }
+  void run(Pass& pass, unsigned phases) {
+    if (pass.program.id() != program) pass.program.use(), program = pass.program.id();
+    constexpr std::array names = {"phases", "step_number", "cluster_set"};
+    const std::array<unsigned, 3> parameters = {phases, unsigned(sim.steps + 1), sim.cluster_set};
+    if (pass.parameters[0] == ~0u)
+      for (std::size_t p = 0; p < names.size(); ++p)
+        pass.locations[p] = glGetUniformLocation(program, names[p]);
+    for (std::size_t p = 0; p < names.size(); ++p)
+      if (pass.locations[p] >= 0 && parameters[p] != pass.parameters[p])
+        glUniform1ui(pass.locations[p], parameters[p]);
+    pass.parameters = parameters;
+    if (pass.records) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RECORDS, pass.records);
+    const std::size_t row = std::min<std::size_t>(pass.work_groups, sim.tuning.row);
+    glDispatchCompute(GLuint(row), GLuint((pass.work_groups + row - 1) / row), 1);
+    // The next dispatch reads what this one wrote.
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  }
+  // The pass that moves the vertices: what it wrote is read from then on.
+  void move(unsigned phases) {
+    run(sim.solver.iteration.back(), phases);
+    if (sim.solver.double_buffered) sim.read_index = 1 - sim.read_index, bind_quantized();
+    sim.cluster_set = (sim.cluster_set + 1) % 3;
+  }
+};
+
+void bind(Sim& sim) {
+  sim.step_block.bind_uniform(BIND_STEP);
+  sim.positions.bind_storage(BIND_POSITIONS);
+  sim.velocities.bind_storage(BIND_VELOCITIES);
+  sim.predicted.bind_storage(BIND_PREDICTED);
+  sim.check.words.bind_storage(BIND_CHECK);
+  for (const auto& [binding, buffer] : sim.solver.bindings)
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
+  if (!sim.guard_counts) return;
+  // Counters have 32 bits: read before they can wrap.
+  const Settings& s = sim.settings;
+  const double per_step = 4.0 * double(sim.system.count()) * s.iterations * s.substeps;
+  if (sim.steps % std::max(1L, long(2e9 / std::max(per_step, 1.0))) == 0) guard_counts(sim);
+  glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
+}
+
+void step_on_gpu(Sim& sim) {
+  bind(sim);
+  if (sim.timed) sim.timer.begin();
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
+  Dispatcher dispatcher{sim};
+  if (sim.needs_predict) {
+    sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
+    dispatcher.run(sim.predict, 0);
+  }
+  dispatcher.bind_quantized();
+  if (sim.needs_predict && has_clusters(sim)) dispatcher.move(PHASE_SUMS);
+  sim.needs_predict = false;
+  for (int substep = 0; substep < sim.settings.substeps; ++substep)
+    for (const Dispatch& dispatch : sim.substep)
+      if (dispatch.pass + 1 == sim.solver.iteration.size())
+        dispatcher.move(dispatch.phases);
+      else
+        dispatcher.run(sim.solver.iteration[dispatch.pass], dispatch.phases);
+  // Vertex fetches and copies read the state next.
+  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  if (sim.timed) sim.timer.end();
+}
+
+void check_step(Sim& sim) {
+  FiniteCheck& check = sim.check;
+  if (check.found) return;
+  if (on_cpu(sim)) {
+    if (const auto vertex = first_non_finite(sim.host)) check.found = {sim.steps, *vertex};
+    check.known = sim.steps;
+  } else if (sim.steps % FiniteCheck::ask_every == 0) {
+    check_context();
+    ask(check, check.asked_step, true);  // the CPU is never further ahead than two questions
+    if (!check.found) ask(check, sim.steps, false);
+  }
+  if (check.found || sim.steps % FiniteCheck::checkpoint_every != 0) return;
+  if (on_cpu(sim))
+    check.host = sim.host;
+  else
+    save_checkpoint(check, sim.positions, sim.velocities);
+}
+
+}  // namespace
+
+void step(Sim& sim) {
+  if (on_cpu(sim)) {
+    sim.solver.step_on_cpu(sim.host, sim.settings, sim.inverse_masses);
+    upload(sim, sim.host);
+  } else {
+    step_on_gpu(sim);
+  }
+  ++sim.steps;
+  check_step(sim);
+}
+
+}  // namespace tetpbd

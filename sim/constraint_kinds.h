@@ -1,23 +1,25 @@
 // The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and
-// a row here; its stiffness k_NAME and compliance compliance_NAME, its kernels and its CPU loops follow from
-// these. Order is the order of projection in Gauss-Seidel.
+// a row here, named in the list at the end; its stiffness k_NAME and compliance compliance_NAME, its kernels
+// and its CPU loops follow. Order is the order of projection in Gauss-Seidel.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <string>
 #include <tuple>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "sim/formulas.h"
+#include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 
-struct TetMesh;
-struct ConstraintList;
-
 /// For whoever evaluates a constraint without a mesh.
 inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
+
+/// The hinges of the surface: both wings, then their edge; each edge that two triangles share.
+std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh);
 
 struct ConstraintKind {
   const char* name;
@@ -27,41 +29,45 @@ struct ConstraintKind {
   double most_compliance;       ///< the largest that settings take
 };
 
+// A row: what it is called, its formula, the vertices of each, and what these measure at rest.
 struct Stretch {
   static constexpr ConstraintKind row{"stretch", 2, "edges", "m/N", 1};
-  static constexpr int arity = row.arity;
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.stretch(x, rest, id);
   }
-  static void build(const TetMesh& mesh, ConstraintList& list);  ///< every edge of every tet
+  static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
+  static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
 struct Bend {
   static constexpr ConstraintKind row{"bend", 4, "hinges", "rad^2/J", 1e4};
-  static constexpr int arity = row.arity;
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.bend(x, rest, id);
   }
-  /// Every edge that two surface triangles share.
-  static void build(const TetMesh& mesh, ConstraintList& list);
+  static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
+  // The clamp of the formula to 1 rad is for errors, not for rest angles.
+  static double rest(glm::dvec3* x) { return Formulas<double>{}.hinge_angle(x); }
 };
 struct Volume {
   static constexpr ConstraintKind row{"volume", 4, "tets' volumes", "m^3/Pa", 1};
-  static constexpr int arity = row.arity;
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.volume(x, rest, id);
   }
-  static void build(const TetMesh& mesh, ConstraintList& list);  ///< every tet
+  static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
+  static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
-using Kinds = std::tuple<Stretch, Bend, Volume>;
+// The next row goes here.
+
+using Kinds = std::tuple<Stretch, Bend, Volume  // and its name here
+                         >;
 
 constexpr std::size_t kind_count = std::tuple_size_v<Kinds>;
 
 /// Calls f(Kind{}, index) for every kind, in order.
 template <class F>
-void for_each_kind(F&& f) {
+constexpr void for_each_kind(F&& f) {
   [&]<std::size_t... I>(std::index_sequence<I...>) { (f(std::tuple_element_t<I, Kinds>{}, int(I)), ...); }
   (std::make_index_sequence<kind_count>{});
 }

@@ -11,33 +11,26 @@ namespace tetpbd {
 namespace {
 
 template <class Kind>
-double measure(const TetMesh& mesh, const std::array<std::uint32_t, std::size_t(Kind::arity)>& vertices) {
-  // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
-  std::array<glm::dvec3, std::size_t(Kind::arity)> x;
-  for (std::size_t j = 0; j < x.size(); ++j) x[j] = mesh.positions[vertices[j]] - mesh.positions[vertices[0]];
-  return Kind::template evaluate<double>(x.data(), 0.0).C;
-}
-
-template <class Kind, class Vertices>
-void measure_all(const TetMesh& mesh, const std::vector<Vertices>& of, ConstraintList& list) {
-  constexpr std::size_t arity = std::size_t(Kind::arity);
-  list.vertices.resize(of.size() * arity);
-  list.rest.resize(of.size());
-  parallel_for(of.size(), [&](std::size_t first, std::size_t end) {
+ConstraintList list_of(const TetMesh& mesh) {
+  constexpr std::size_t arity = std::size_t(Kind::row.arity);
+  const auto& all = Kind::vertices(mesh);
+  ConstraintList list{Kind::row.arity, std::vector<std::uint32_t>(all.size() * arity),
+                      std::vector<double>(all.size())};
+  parallel_for(all.size(), [&](std::size_t first, std::size_t end) {
     for (std::size_t c = first; c < end; ++c) {
-      std::copy_n(of[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
-      list.rest[c] = measure<Kind>(mesh, of[c]);
+      std::copy_n(all[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
+      // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
+      std::array<glm::dvec3, arity> x;
+      for (std::size_t j = 0; j < arity; ++j) x[j] = mesh.positions[all[c][j]] - mesh.positions[all[c][0]];
+      list.rest[c] = Kind::rest(x.data());
     }
   });
+  return list;
 }
 
 }  // namespace
 
-void Stretch::build(const TetMesh& mesh, ConstraintList& list) {
-  measure_all<Stretch>(mesh, tet_edges(mesh), list);
-}
-
-void Bend::build(const TetMesh& mesh, ConstraintList& list) {
+std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh) {
   // Each directed edge of the surface once; an edge and its opposite make a hinge.
   struct Side {
     std::uint32_t low, high, wing;
@@ -53,24 +46,18 @@ void Bend::build(const TetMesh& mesh, ConstraintList& list) {
   std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
     return std::tie(l.low, l.high, l.forward, l.wing) < std::tie(r.low, r.high, r.forward, r.wing);
   });
+  std::vector<std::array<std::uint32_t, 4>> result;
   // A non-manifold edge of four sides (two bodies of tets that touch along it) makes no hinge.
   for (std::size_t i = 0; i < sides.size();) {
     std::size_t end = i;
     while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
-    if (end - i == 2 && sides[i].forward != sides[i + 1].forward) {
-      // Wing 0 sees the edge x2 -> x3 run forwards, so a convex hinge has the same sign everywhere.
-      const std::array<std::uint32_t, 4> hinge = {sides[i + 1].wing, sides[i].wing, sides[i].low,
-                                                  sides[i].high};
-      // The clamp of the formula to 1 rad is for errors, not for rest angles: measure the angle itself.
-      std::array<glm::dvec3, 4> x;
-      for (std::size_t j = 0; j < 4; ++j) x[j] = mesh.positions[hinge[j]] - mesh.positions[hinge[0]];
-      list.add(hinge, Formulas<double>{}.hinge_angle(x.data()));
-    }
+    // Wing 0 sees the edge x2 -> x3 run forwards, so a convex hinge has the same sign everywhere.
+    if (end - i == 2 && sides[i].forward != sides[i + 1].forward)
+      result.push_back({sides[i + 1].wing, sides[i].wing, sides[i].low, sides[i].high});
     i = end;
   }
+  return result;
 }
-
-void Volume::build(const TetMesh& mesh, ConstraintList& list) { measure_all<Volume>(mesh, mesh.tets, list); }
 
 std::size_t ConstraintSystem::count() const {
   std::size_t sum = 0;
@@ -82,13 +69,11 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names
   ConstraintSystem system;
   system.at_vertex.assign(mesh.positions.size(), 0);
   const auto wanted = split(names, ',');
-  for_each_kind([&](auto kind, int) {
-    ConstraintList list;
-    list.arity = kind.row.arity;
-    const bool present = std::find(wanted.begin(), wanted.end(), kind.row.name) != wanted.end();
-    if (present) kind.build(mesh, list);
+  for_each_kind([&]<class Kind>(Kind, int) {
+    const bool present = std::find(wanted.begin(), wanted.end(), Kind::row.name) != wanted.end();
+    ConstraintList list = present ? list_of<Kind>(mesh) : ConstraintList{Kind::row.arity, {}, {}};
     for (std::uint32_t v : list.vertices) ++system.at_vertex[v];
-    system.present.push_back(present && list.count() > 0);
+    system.present.push_back(list.count() > 0);
     system.lists.push_back(std::move(list));
   });
   return system;

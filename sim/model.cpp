@@ -8,7 +8,7 @@
 #include <random>
 #include <span>
 
-#include "sim/constraints.h"
+#include "sim/constraint_kinds.h"
 #include "sim/error.h"
 #include "sim/hilbert.h"
 #include "sim/parallel.h"
@@ -166,10 +166,9 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
     }
   } else if (how == "fold") {
     // The first surface hinge: one wing is laid onto the other triangle.
-    ConstraintList hinges;
-    Bend::build(rest, hinges);
-    if (hinges.vertices.empty()) return;
-    const auto* v = hinges.vertices.data();
+    const auto all = hinges(rest);
+    if (all.empty()) return;
+    const auto& v = all[0];
     const glm::dvec3 e = glm::normalize(x[v[3]] - x[v[2]]);
     const auto across = [&](const glm::dvec3& p) { return (p - x[v[2]]) - e * glm::dot(p - x[v[2]], e); };
     const glm::dvec3 a = across(x[v[0]]), b = across(x[v[1]]);

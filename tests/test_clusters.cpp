@@ -181,7 +181,7 @@ TEST_CASE("at rest handles pull nowhere") {
   const auto model = block_model({4, 3, 2});
   const Clusters clusters = build_clusters(*model);
   double largest = 0;
-  for (const glm::dvec3& pull : cluster_pulls(handles, model->positions))
+  for (const glm::dvec3& pull : cluster_pulls(clusters, model->positions))
     largest = std::max(largest, glm::length(pull));
   Sim sim = create_sim(model, settings);
   step(sim);

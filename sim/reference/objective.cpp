@@ -33,7 +33,7 @@ auto unclamped(Positions& x, double rest) {
 template <class F>
 void for_each_constraint(const Objective& o, const Points& positions, F&& visit) {
   for_each_kind([&](auto kind, int k) {
-    constexpr std::size_t arity = std::size_t(decltype(kind)::arity);
+    constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
     const double alpha = o.compliances[std::size_t(k)];
     if (std::isinf(alpha)) return;
     const ConstraintList& list = o.system.lists[std::size_t(k)];

@@ -31,7 +31,7 @@ using FloatRow = float __attribute__((vector_size(16)));  // a difference or cor
 
 template <class Kind>
 struct LaneBatch {
-  std::uint32_t vertices[std::size_t(Kind::arity)][lanes];
+  std::uint32_t vertices[std::size_t(Kind::row.arity)][lanes];
   float rest[lanes];
   std::uint32_t count;  // lanes in use; the others repeat the first
 };
@@ -69,7 +69,7 @@ struct Work {
 
 template <class Kind>
 LaneBatches<Kind> cut(const ConstraintList& list, std::size_t vertices) {
-  constexpr std::size_t arity = std::size_t(Kind::arity);
+  constexpr std::size_t arity = std::size_t(Kind::row.arity);
   LaneBatches<Kind> result;
   const Coloured colours = coloured(list, vertices);
   for (std::size_t colour = 0; colour + 1 < colours.first.size(); ++colour) {
@@ -95,7 +95,7 @@ LaneBatches<Kind> cut(const ConstraintList& list, std::size_t vertices) {
 template <class Kind, bool damped>
 [[gnu::noinline]] void project_guarded(const LaneBatch<Kind>& batch, Work& work, const Rule& rule,
                                        float* multipliers, GuardCounts& guards) {
-  constexpr std::size_t arity = std::size_t(Kind::arity);
+  constexpr std::size_t arity = std::size_t(Kind::row.arity);
   const float share = 1 + rule.gamma;
   Formulas<float> formulas;
   for (std::size_t lane = 0; lane < batch.count; ++lane) {
@@ -135,7 +135,7 @@ inline FloatRow load(const float* from) {
 
 // By vertex and lane: first positions relative to the first vertex and inverse masses, then corrections.
 template <class Kind>
-using Rows = float[std::size_t(Kind::arity)][lanes][4];
+using Rows = float[std::size_t(Kind::row.arity)][lanes][4];
 
 template <class Kind>
 [[gnu::always_inline]] inline void gather(const LaneBatch<Kind>& batch, const std::vector<Vertex>& x,
@@ -144,7 +144,7 @@ template <class Kind>
     Row origin = x[batch.vertices[0][lane]].row;
     store(rows[0][lane], FloatRow{0, 0, 0, float(origin[3])});
     origin[3] = 0;
-    for (std::size_t j = 1; j < std::size_t(Kind::arity); ++j)
+    for (std::size_t j = 1; j < std::size_t(Kind::row.arity); ++j)
       store(rows[j][lane], __builtin_convertvector(x[batch.vertices[j][lane]].row - origin, FloatRow));
   }
 }
@@ -152,7 +152,7 @@ template <class Kind>
 template <class Kind>
 [[gnu::always_inline]] inline void scatter(const LaneBatch<Kind>& batch, Work& work, const Rows<Kind>& rows) {
   for (std::size_t lane = 0; lane < batch.count; ++lane)
-    for (std::size_t j = 0; j < std::size_t(Kind::arity); ++j)
+    for (std::size_t j = 0; j < std::size_t(Kind::row.arity); ++j)
       work.x[batch.vertices[j][lane]].row += __builtin_convertvector(load(rows[j][lane]), Row);
 }
 
@@ -162,7 +162,7 @@ template <class Kind, Soft soft>
 [[gnu::always_inline]] inline bool evaluate(const LaneBatch<Kind>& batch, float limit, const Rule& rule,
                                             Rows<Kind>& rows, [[maybe_unused]] const Rows<Kind>& starts,
                                             [[maybe_unused]] float* multipliers) {
-  constexpr std::size_t arity = std::size_t(Kind::arity);
+  constexpr std::size_t arity = std::size_t(Kind::row.arity);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   // What tells whether a guard may have triggered. Kept by lane and looked at below: in the loop itself, bits
   // of guards keep GCC 12 from vectorising it.

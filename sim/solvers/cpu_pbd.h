@@ -36,7 +36,7 @@ inline glm::dvec3 out_of(const std::vector<glm::dvec4>& planes, glm::dvec3 x, co
 template <class Kind, class real>
 struct Batch {
   struct Item {
-    std::array<std::uint32_t, std::size_t(Kind::arity)> vertices;
+    std::array<std::uint32_t, std::size_t(Kind::row.arity)> vertices;
     real rest;
   };
   std::vector<Item> items;
@@ -63,7 +63,7 @@ class CpuPbd {
       const ConstraintList& list = system.lists[std::size_t(k)];
       items.resize(list.count());
       for (std::size_t c = 0; c < items.size(); ++c) {
-        std::copy_n(list.vertices.begin() + std::ptrdiff_t(c * Kind::arity), Kind::arity,
+        std::copy_n(list.vertices.begin() + std::ptrdiff_t(c * Kind::row.arity), Kind::row.arity,
                     items[c].vertices.begin());
         items[c].rest = real(list.rest[c]);
       }
@@ -121,7 +121,7 @@ class CpuPbd {
   template <class Kind>
   void project(std::size_t kind, bool soft, std::vector<glm::dvec3>& x, const Settings& settings,
                Sweep sweep) {
-    constexpr std::size_t arity = std::size_t(Kind::arity);
+    constexpr std::size_t arity = std::size_t(Kind::row.arity);
     using vec = glm::vec<3, real>;
     const real k = real(settings.stiffness[kind]);
     const real limit = real(sweep == Sweep::jacobi ? longest_correction(model_, settings) : model_.size);

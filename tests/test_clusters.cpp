@@ -6,10 +6,11 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "app/measure_run.h"
-#include "sim/solvers/cpu_pbd.h"
-#include "sim/solvers/clusters.h"
 #include "sim/metrics.h"
+#include "sim/rotation.h"
 #include "sim/sim.h"
+#include "sim/solvers/clusters.h"
+#include "sim/solvers/cpu_pbd.h"
 #include "tests/gl_test.h"
 #include "tests/mesh_samples.h"
 
@@ -70,6 +71,7 @@ Momenta momenta(const Sim& sim) {
 }  // namespace
 
 TEST_CASE("the best rotation is found, also of mirrored and of flat points, and is one whatever comes in") {
+  const auto rotation_of = [](const glm::dmat3& A) { return best_rotation(A).R; };
   const auto is_rotation = [](const glm::dmat3& R) {
     double off = std::abs(glm::determinant(R) - 1);
     const glm::dmat3 unit = glm::transpose(R) * R - glm::dmat3(1);
@@ -115,8 +117,8 @@ TEST_CASE("shares of a vertex make 1, a handle's weights fit their integers, two
     for (std::size_t v = 0; v < clusters.rest.size(); ++v) {
       glsl::ShapeMatching matching;
       const int w = matching.cluster_weight(clusters.rest[v], handle.node);
-      const glm::ivec3 s = matching.cluster_steps(matching.cluster_arm(clusters.rest[v], handle.centre, handle.cell),
-                                              handle.steps_per_metre);
+      const glm::ivec3 s = matching.cluster_steps(
+          matching.cluster_arm(clusters.rest[v], handle.centre, handle.cell), handle.steps_per_metre);
       weight += w;
       steps += double(w) * glm::dvec3(s);
       of[v >= model->bodies[1].first_vertex] += w > 0;

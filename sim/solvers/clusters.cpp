@@ -1,10 +1,10 @@
 #include "sim/solvers/clusters.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "sim/mesh/tet_mesh.h"
+#include "sim/rotation.h"
 
 namespace tetpbd {
 
@@ -110,21 +110,6 @@ Clusters build_clusters(const Model& model) {
   return result;
 }
 
-// The rotation R with the largest trace(R^T A), for A = sum w x X^T (Horn 1987): the one that turns the X
-// nearest to the x.
-glm::dmat3 rotation_of(const glm::dmat3& A) {
-  Eigen::Matrix3d a;
-  for (int column = 0; column < 3; ++column)
-    for (int row = 0; row < 3; ++row) a(row, column) = A[column][row];
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  const Eigen::Matrix3d r = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-  glm::dmat3 R;
-  for (int column = 0; column < 3; ++column)
-    for (int row = 0; row < 3; ++row) R[column][row] = r(row, column);
-  return R;
-}
-
 std::vector<ClusterPose> cluster_poses(const Clusters& clusters, const std::vector<glm::dvec3>& positions) {
   std::vector<ClusterPose> poses;
   for (const layout::Cluster& cluster : clusters.clusters) {
@@ -140,7 +125,7 @@ std::vector<ClusterPose> cluster_poses(const Clusters& clusters, const std::vect
       A += double(weight) * glm::outerProduct(positions[v] - x, arm - arms);
     });
     ClusterPose pose;
-    pose.R = rotation_of(A);
+    pose.R = best_rotation(A).R;
     pose.place = x - pose.R * arms;
     poses.push_back(pose);
   }

@@ -31,9 +31,6 @@ struct Clusters {
 /// vertices. Lattices do not touch.
 Clusters build_clusters(const Model& model);
 
-/// The rotation nearest to A = sum w x X^T, in trace(R^T A); a rotation whatever A is.
-glm::dmat3 rotation_of(const glm::dmat3& A);
-
 struct ClusterPose {
   glm::dmat3 R{1};
   glm::dvec3 place{0};  ///< m, of the cluster's centre

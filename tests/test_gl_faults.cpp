@@ -348,7 +348,7 @@ TEST_CASE("a GPU that was reset ends the program, whatever it was doing") {
     set_reset_status([] { return answer; });
     CHECK_THROWS_AS(check_finite(sim), ContextLost);
     CHECK_THROWS_AS(([&] {
-                      for (int s = 0; s < CHECK_STEPS; ++s) step(sim);
+                      for (int s = 0; s < FiniteCheck::checkpoint_every; ++s) step(sim);
                     }()),
                     ContextLost);  // nobody asks
     CHECK(has(what_of([&] { check_context(); }), "the GPU was reset: "));

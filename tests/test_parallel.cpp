@@ -85,9 +85,9 @@ TEST_CASE("parallel: models, constraints, patches and reports have the same bits
   const auto same = [](const Patches& a, const Patches& b) {
     CHECK(a.count == b.count);
     CHECK(a.largest == b.largest);
-    CHECK(a.most_summed == b.most_summed);
-    CHECK(a.parted == b.parted);
-    CHECK((a.parts == b.parts && a.vertices == b.vertices && a.records == b.records));
+    CHECK(a.most_owned == b.most_owned);
+    CHECK(a.chunked == b.chunked);
+    CHECK((a.chunks == b.chunks && a.vertices == b.vertices && a.records == b.records));
   };
   for (const unsigned count : {2u, 3u, 8u}) {
     const Threads threads(count);

@@ -58,7 +58,8 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
     CHECK(trial.settings.iterations == 1);
     CHECK(trial.settings.substeps >= 1);
     CHECK(trial.ms > 0);
-    CHECK(0.99 * choice->trials[choice->best].loss_percent <= trial.loss_percent);
+    CHECK(0.99 * choice->trials[choice->best].loss_percent <=
+          trial.loss_percent + 1e-4);  // nothing lost: any
   }
   CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
   CHECK(solver_choice_json(*choice)["trials"].size() == 4);

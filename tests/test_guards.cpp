@@ -42,13 +42,13 @@ TEST_CASE("a guard that does not trigger changes no bit") {
     std::filesystem::copy(TEST_MODELS "/../shaders", folder, std::filesystem::copy_options::recursive);
     replace("constraints/stretch.glsl", "l > real(1e-6) * rest", "true");
     replace("constraints/bend.glsl", "bool sound = aa > tiny && bb > tiny;", "bool sound = true;");
-    replace("constraints/bend.glsl", "clamp(resolved(turn, noise), real(-1), real(1))",
-            "resolved(turn, noise)");
+    replace("constraints/bend.glsl", "clamp(apply_dead_zone(turn, noise), real(-1), real(1))",
+            "apply_dead_zone(turn, noise)");
     replace("constraints/volume.glsl", "if (sum <= real(1e-10) * c.floor) {", "if (false) {");
+    replace("constraints/types.glsl", "share * max(s.sum, s.least) + a, s.longest, max_correction);",
+            "share * s.sum + a, s.longest, max_correction);");
     replace("constraints/types.glsl",
-            "max(sum, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3])), longest, limit);",
-            "sum, longest, limit);");
-    replace("constraints/types.glsl", "if (squared > limit * limit) lambda *= limit / sqrt(squared);", "");
+            "if (squared > max_correction * max_correction) lambda *= max_correction / sqrt(squared);", "");
     replace("constraints/types.glsl", "return squared * real(0) == real(0) ? lambda : real(0);",
             "return lambda;");
     set_shader_folder(folder.string());

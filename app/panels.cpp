@@ -151,7 +151,7 @@ bool parameter_widget(Session& s, Ui& ui, const Parameter& row, Settings& settin
     return chosen.has_value();
   }
   ImGui::BeginDisabled(is_idle(settings, row));
-  const std::string id = begin_row(label_of(row.name));
+  const std::string id = begin_row(label_of(row.name.c_str()));
   bool changed = false;
   with_value(settings, row, [&]<class T>(T& value) {
     if constexpr (std::is_same_v<T, bool>)

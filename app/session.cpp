@@ -29,7 +29,7 @@ void forget_non_finite(Session& s) {
 }
 
 bool differs(const Settings& a, const Settings& b, const Parameter& row) {
-  return std::visit([&](auto member) { return a.*member != b.*member; }, row.member);
+  return parameter_text(a, row) != parameter_text(b, row);
 }
 
 void one_step(Session& s) {

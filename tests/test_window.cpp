@@ -19,7 +19,7 @@ TEST_CASE("window: every setting's label fits its column, whatever fonts the mac
     ImGui::GetIO().DisplaySize = {100, 100};
     ImGui::NewFrame();
     for (const Parameter& row : parameters()) {
-      const std::string label = label_of(row.name);
+      const std::string label = label_of(row.name.c_str());
       CAPTURE(label);
       CHECK(ImGui::CalcTextSize(label.c_str()).x < label_width());
     }

@@ -189,12 +189,7 @@ int print_explanation(Scene scene, int gpu) {
 }
 
 int print_info(int gpu) {
-  fmt::print("tetpbd {} ({} build{})\n", TETPBD_VERSION, TETPBD_BUILD,
-#ifdef TETPBD_TETGEN
-             ", with TetGen");
-#else
-             ", without TetGen");
-#endif
+  fmt::print("tetpbd {} ({} build)\n", TETPBD_VERSION, TETPBD_BUILD);
   const auto devices = list_devices();
   for (std::size_t i = 0; i < devices.size(); ++i) fmt::print("--gpu {}: {}\n", i, devices[i]);
   HeadlessContext context(gpu);
@@ -209,10 +204,7 @@ int print_info(int gpu) {
   fmt::print("extensions used: none beyond OpenGL 4.3 core\nmodels:          {}\n", models_folder().string());
   fmt::print("shaders:         {}\n", shader_folder().empty() ? "embedded" : shader_folder());
   fmt::print(
-      "licences:        tetpbd MIT; "
-#ifdef TETPBD_TETGEN
-      "TetGen AGPL-3+ (so this program as a whole is); "
-#endif
+      "licences:        tetpbd MIT; TetGen, a program of its own, AGPL-3+; "
       "Stanford models: see models/README.md\n");
   return 0;
 }

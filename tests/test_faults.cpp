@@ -307,7 +307,6 @@ TEST_CASE("faults: interrupted, what was finished is whole") {
     CHECK(contains(entry.path().filename().string(), ".part"));
 }
 
-#ifdef TETPBD_TETGEN
 TEST_CASE("faults: an interrupted reproduce keeps the tables it has") {
   const Folder folder;
   Program program(folder, {"reproduce", "--quick", "--out", "r"});
@@ -393,4 +392,3 @@ TEST_CASE("faults: cache folders that cannot be used cost time alone") {
   again("a folder", [&] { fs::remove(kept), fs::create_directory(kept); });
   again("a pipe", [&] { fs::remove(kept), ::mkfifo(kept.c_str(), 0600); });
 }
-#endif

@@ -135,7 +135,6 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
   CHECK(program("compare --modes node+handle --out x", folder).err.find("node+handles") != std::string::npos);
 }
 
-#ifdef TETPBD_TETGEN
 TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contained report") {
   const Folder folder;
   const Outcome run = program("reproduce --quick --out r", folder);
@@ -152,7 +151,6 @@ TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contai
   CHECK(read(folder.path / "r/tables/table4.csv").find("31800,10582,42072,15419,36690,31709") ==
         std::string::npos);  // quick: bunny alone
 }
-#endif
 
 TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the reference; shards merge") {
   const Folder folder;

@@ -179,9 +179,6 @@ TEST_CASE("every shipped scene runs in every mode") {
         std::vector<std::string>{"armadillo-drop", "beam", "bunny-drop", "dragon-drop", "jelly-beam"});
   for (const std::string& name : scene_names()) {
     CAPTURE(name);
-#ifndef TETPBD_TETGEN
-    if (name != "beam") continue;  // the others start from surfaces
-#endif
     const auto model = build_model(load_scene(name));
     for (const SolverMode& mode : solver_modes()) {
       CAPTURE(mode.name);

@@ -261,7 +261,7 @@ TEST_CASE("tet files: msh 4.1 and 2.2 with other elements, sparse numbers, unuse
   CHECK(contains(error(v4, "4.1 0 8", "4 0 8"), ".msh version 4 is not supported"));
   CHECK(contains(error(v4, "$MeshFormat\n4.1", "$Comments\n4.1"), "not Gmsh's .msh"));
   CHECK(contains(error(v4, "2 20 10 30 70", "2 20 10 30 71"), "names node 71, which is not there"));
-  CHECK(contains(error(v4, "2 5 10 70", "2 6 10 70"), "6 nodes claimed, 5 found"));
+  CHECK(contains(error(v4, "2 5 10 70", "2 6 10 70"), "6 nodes declared, 5 found"));
   CHECK(contains(error(v4, "2 5 10 70", "2 999999999999 10 70"), "bytes can hold"));
   CHECK(contains(error(v2, "20 1 0 0", "10 1 0 0"), "node 10 appears twice"));
   CHECK(contains(error(v2, "$Elements", "$Nodes\n0\n$Elements"), "$Nodes twice"));

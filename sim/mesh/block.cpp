@@ -26,17 +26,16 @@ TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
     for (int y = 0; y < nodes.y; ++y)
       for (int x = 0; x < nodes.x; ++x)
         mesh.positions.push_back(size * (glm::dvec3(x, y, z) / glm::dvec3(cells) - 0.5));
-  const std::array<std::uint32_t, 3> step{
-      1, static_cast<std::uint32_t>(nodes.x),
-      static_cast<std::uint32_t>(nodes.x) * static_cast<std::uint32_t>(nodes.y)};
+  const std::array<std::uint32_t, 3> step{1, std::uint32_t(nodes.x),
+                                          std::uint32_t(nodes.x) * std::uint32_t(nodes.y)};
   constexpr std::array<std::array<std::uint8_t, 3>, 6> orders{
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
-  mesh.tets.reserve(static_cast<std::size_t>(count));
+  mesh.tets.reserve(std::size_t(count));
   for (int z = 0; z < cells.z; ++z)
     for (int y = 0; y < cells.y; ++y)
       for (int x = 0; x < cells.x; ++x) {
-        const std::uint32_t corner = static_cast<std::uint32_t>(x) + static_cast<std::uint32_t>(y) * step[1] +
-                                     static_cast<std::uint32_t>(z) * step[2];
+        const std::uint32_t corner =
+            std::uint32_t(x) + std::uint32_t(y) * step[1] + std::uint32_t(z) * step[2];
         for (const auto& order : orders) {
           const std::uint32_t first = corner + step[order[0]], second = first + step[order[1]];
           mesh.tets.push_back({corner, first, second, second + step[order[2]]});

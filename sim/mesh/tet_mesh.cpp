@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "sim/error.h"
+#include "sim/mesh/weld.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -24,8 +25,8 @@ double longest_edge(const TetMesh& mesh, const Tet& tet) {
   double longest = 0;
   for (int a = 0; a < 4; ++a)
     for (int b = a + 1; b < 4; ++b)
-      longest = std::max(longest, glm::distance(mesh.positions[tet[static_cast<std::size_t>(a)]],
-                                                mesh.positions[tet[static_cast<std::size_t>(b)]]));
+      longest = std::max(
+          longest, glm::distance(mesh.positions[tet[std::size_t(a)]], mesh.positions[tet[std::size_t(b)]]));
   return longest;
 }
 
@@ -72,64 +73,39 @@ void orient_tets(TetMesh& mesh, const std::string& source) {
   }
 }
 
-void drop_unused_vertices(TetMesh& mesh) {
-  constexpr std::uint32_t none = ~0u;
-  std::vector<std::uint32_t> renumbered(mesh.positions.size(), none);
-  for (const Tet& tet : mesh.tets)
-    for (const std::uint32_t v : tet) renumbered[v] = 0;
-  std::uint32_t count = 0;
-  for (std::size_t v = 0; v < renumbered.size(); ++v)
-    if (renumbered[v] != none) {
-      renumbered[v] = count;
-      mesh.positions[count++] = mesh.positions[v];
-    }
-  if (count == mesh.positions.size()) return;
-  mesh.positions.resize(count);
-  for (Tet& tet : mesh.tets)
-    for (std::uint32_t& v : tet) v = renumbered[v];
-}
-
 struct Face {
-  std::uint32_t middle, high;  // the other two vertices, sorted; the smallest is the bucket
+  std::uint32_t middle, high;  // its vertices beside the smallest, sorted
   std::uint32_t tet_and_side;  // tet * 4 + side
   bool even;                   // outward order is an even permutation of the sorted one
 };
 
-// Faces are put in buckets by their smallest vertex (about 24 in each) and sorted there: 0.2 s for a million
-// tets, where one sort of all faces takes four times as long.
+// Faces are grouped by their smallest vertex (about 24 in each) and sorted there: one sort of all faces takes
+// four times as long.
 void find_boundary(TetMesh& mesh, const std::string& source) {
-  const std::size_t vertices = mesh.positions.size();
-  std::vector<std::uint32_t> start(vertices + 1, 0);
   const auto outward = [&](std::size_t tet, std::size_t side) -> Triangle {
     const Tet& t = mesh.tets[tet];
     const Triangle& f = outward_faces[side];
     return {t[f[0]], t[f[1]], t[f[2]]};
   };
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
-    for (std::size_t side = 0; side < 4; ++side) {
-      const Triangle f = outward(i, side);
-      ++start[std::min({f[0], f[1], f[2]}) + 1];
-    }
-  for (std::size_t v = 0; v < vertices; ++v) start[v + 1] += start[v];
-  std::vector<Face> faces(mesh.tets.size() * 4);
-  std::vector<std::uint32_t> at(start.begin(), start.end() - 1);
-  for (std::size_t i = 0; i < mesh.tets.size(); ++i)
-    for (std::size_t side = 0; side < 4; ++side) {
-      Triangle f = outward(i, side);
-      std::rotate(f.begin(), std::min_element(f.begin(), f.end()), f.end());
-      faces[at[f[0]]++] = {std::min(f[1], f[2]), std::max(f[1], f[2]),
-                           static_cast<std::uint32_t>(i * 4 + side), f[1] < f[2]};
-    }
-
+  const auto each = [&](std::size_t tet, const auto& emit) {
+    for (std::size_t side = 0; side < 4; ++side)
+      emit(std::ranges::min(outward(tet, side)), std::uint32_t(tet * 4 + side));
+  };
+  const Grouped grouped = group_by_key(mesh.tets.size(), mesh.positions.size(), each);
   std::vector<std::uint32_t> boundary;
-  for (std::size_t v = 0; v < vertices; ++v) {
-    const auto first = faces.begin() + start[v], last = faces.begin() + start[v + 1];
-    std::sort(first, last, [](const Face& a, const Face& b) {
-      return a.middle != b.middle ? a.middle < b.middle : a.high < b.high;
-    });
-    for (auto f = first; f != last;) {
+  std::vector<Face> faces;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    faces.clear();
+    for (std::uint32_t i = grouped.first[v]; i < grouped.first[v + 1]; ++i) {
+      const std::uint32_t id = grouped.values[i];
+      Triangle f = outward(id / 4, id % 4);
+      std::ranges::rotate(f, std::ranges::min_element(f));
+      faces.push_back({std::min(f[1], f[2]), std::max(f[1], f[2]), id, f[1] < f[2]});
+    }
+    std::ranges::sort(faces, {}, [](const Face& f) { return std::pair(f.middle, f.high); });
+    for (auto f = faces.begin(); f != faces.end();) {
       auto next = f + 1;
-      while (next != last && next->middle == f->middle && next->high == f->high) ++next;
+      while (next != faces.end() && next->middle == f->middle && next->high == f->high) ++next;
       const bool overlap = next - f > 2 || (next - f == 2 && f->even == (f + 1)->even);
       if (overlap)
         throw Error(
@@ -141,9 +117,8 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
       f = next;
     }
   }
-  std::sort(boundary.begin(), boundary.end());  // the order of the tets, whatever the buckets
+  std::ranges::sort(boundary);  // the order of the tets
   mesh.surface.clear();
-  mesh.surface.reserve(boundary.size());
   for (const std::uint32_t face : boundary) mesh.surface.push_back(outward(face / 4, face % 4));
 }
 
@@ -152,7 +127,7 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
 void finish_tets(TetMesh& mesh, const std::string& source) {
   check_indices(mesh, source);
   orient_tets(mesh, source);
-  drop_unused_vertices(mesh);
+  drop_unused_vertices(mesh.positions, mesh.tets);
   find_boundary(mesh, source);
 }
 
@@ -187,38 +162,21 @@ std::vector<double> lumped_masses(const TetMesh& mesh, double density) {
   return masses;
 }
 
-// An edge is met in about five tets. Each vertex keeps the others it meets that are higher; repetitions go by
-// a mark before sorting, which leaves seven of 34 to sort.
 std::vector<std::array<std::uint32_t, 2>> tet_edges(const TetMesh& mesh) {
-  const std::size_t vertices = mesh.positions.size();
-  Grouped others = group_by_key(mesh.tets.size(), vertices, [&](std::size_t i, const auto& emit) {
+  const auto each = [&](std::size_t i, const auto& emit) {
     const Tet& t = mesh.tets[i];
     for (std::size_t a = 0; a < 4; ++a)
       for (std::size_t b = a + 1; b < 4; ++b) emit(std::min(t[a], t[b]), std::max(t[a], t[b]));
-  });
-  std::vector<std::uint32_t> start(vertices + 1, 0);  // of each vertex among the edges
-  parallel_for(vertices, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> seen_by(vertices, ~0u);
-    for (std::size_t v = begin; v < end; ++v) {
-      std::uint32_t* const first = others.values.data() + others.first[v];
-      std::uint32_t* last = first;
-      for (std::uint32_t i = others.first[v]; i < others.first[v + 1]; ++i) {
-        const std::uint32_t other = others.values[i];
-        if (seen_by[other] == v) continue;
-        seen_by[other] = std::uint32_t(v);
-        *last++ = other;
-      }
-      std::sort(first, last);
-      start[v + 1] = std::uint32_t(last - first);
-    }
-  });
-  for (std::size_t v = 0; v < vertices; ++v) start[v + 1] += start[v];
-  std::vector<std::array<std::uint32_t, 2>> edges(start[vertices]);
-  parallel_for(vertices, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v)
-      for (std::uint32_t i = 0; i < start[v + 1] - start[v]; ++i)
-        edges[start[v] + i] = {std::uint32_t(v), others.values[others.first[v] + i]};
-  });
+  };
+  Grouped others = group_by_key(mesh.tets.size(), mesh.positions.size(), each);
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    const auto first = others.values.begin() + others.first[v],
+               end = others.values.begin() + others.first[v + 1];
+    std::sort(first, end);
+    const auto last = std::unique(first, end);
+    for (auto other = first; other != last; ++other) edges.push_back({v, *other});
+  }
   return edges;
 }
 

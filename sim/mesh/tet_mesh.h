@@ -1,4 +1,6 @@
-// Surface and tetrahedral meshes in double precision (metres): loading, checking, tetrahedralising, writing.
+// Head of sim/mesh: surface and tetrahedral meshes in double precision (metres), from files, checked, filled
+// by TetGen, kept in the cache, reported, written. Other rooms need this header alone, beside cache.h. A new
+// format is a reader in surface_files.cpp or tet_files.cpp; nothing here knows of solvers.
 #pragma once
 
 #include <array>
@@ -30,32 +32,32 @@ struct TetMesh {
 /// Largest coordinate of a mesh file: volumes (cubes of it) and their products stay far inside a double.
 constexpr double largest_coordinate = 1e30;
 
-/// PLY, OBJ, STL, OFF (through assimp, in a contained child process): vertices welded, polygons triangulated,
-/// vertices without a triangle dropped. Throws Error (status 2) for files that cannot be read or hold no
-/// triangle.
+/// PLY, OBJ, STL, OFF: polygons cut into triangles, vertices welded, those without a triangle dropped. Throws
+/// Error (status 2) for files that cannot be read or hold no triangle.
 SurfaceMesh load_surface(const std::filesystem::path& file);
 
 /// What stands in the way of tetrahedralising; an empty `defect` means sound.
 struct SurfaceCheck {
-  std::size_t bad_indices = 0, non_finite = 0, degenerate = 0, open_edges = 0, non_manifold_edges = 0,
-              non_manifold_vertices = 0, duplicate_triangles = 0, misoriented_edges = 0, flat_components = 0,
-              flipped_triangles = 0;
   int components = 0;
   int euler_characteristic = 0;
-  double volume = 0;   ///< of all parts, m^3
-  std::string defect;  ///< which defect; empty when there is none
-  std::string place;   ///< how many and where the first is
-  std::string mend;    ///< what to do about it
+  double volume = 0;  ///< of all parts, m^3
+  std::size_t flipped_triangles = 0;
+  std::string defect;     ///< which defect; empty when there is none
+  std::size_t count = 0;  ///< how many of it
+  std::string place;      ///< the same in words, and where the first is
+  std::string hint;       ///< what to do about it
 };
 /// Orients triangles consistently and outward where possible (that is no defect), then checks: indices,
-/// finite, enough triangles, not degenerate, no duplicates, 2-manifold, closed, orientable, not flat. The
-/// first defect found is named. Self-intersections are not looked for here: TetGen finds them, and
-/// tetrahedralise() names them.
+/// finite, enough triangles, not degenerate, no duplicates, 2-manifold, closed, orientable, not flat. Ends at
+/// the first defect. Self-intersections are not looked for here: TetGen finds them, and tetrahedralise()
+/// names them.
 SurfaceCheck check_surface(SurfaceMesh& surface);
 
-/// Runs TetGen with `switches` (for example "pYq1.85o/140") in a contained child process with a time limit in
-/// seconds. Results are cached by content and switches in the user's cache folder. Throws Error naming the
-/// defect of `source`.
+/// TetGen's switches without a leading '-' and with Q. Throws Error for those that need files, do something
+/// else than fill a surface or do not exist, and when p is missing.
+std::string checked_switches(const std::string& switches);
+/// Runs the program tetgen with `switches` (for example "pYq1.85o/140") and a time limit in seconds. Results
+/// are cached by content and switches in the user's cache folder. Throws Error naming the defect of `source`.
 TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, double time_limit = 600,
                        const std::string& source = "surface");
 

@@ -1,137 +1,114 @@
 #include <fmt/format.h>
-
-#include <cmath>
-
-#include "sim/mesh/bytes.h"
-#include "sim/mesh/contained.h"
-#include "sim/error.h"
-#include "sim/mesh/mesh_cache.h"
-#include "sim/mesh/tet_mesh.h"
-#include "sim/mesh/tetgen_switches.h"
-
-#if TETPBD_TETGEN
-#include <sys/resource.h>
-#include <tetgen.h>
 #include <unistd.h>
 
-#include <csignal>
-#include <cstdio>
-#endif
+#include <cmath>
+#include <cstdlib>
+#include <regex>
+
+#include "sim/error.h"
+#include "sim/files.h"
+#include "sim/mesh/cache.h"
+#include "sim/mesh/formats.h"
+#include "sim/mesh/subprocess.h"
+#include "sim/mesh/tet_mesh.h"
+#include "sim/mesh/text_file.h"
 
 namespace tetpbd {
-
-#if TETPBD_TETGEN
+namespace fs = std::filesystem;
 namespace {
 
-constexpr std::size_t tetgen_bytes = std::size_t{16} << 30;  // three million tets take 0.6 GB
-constexpr double diagnosis_seconds = 60;
-
-// All functions down to diagnose() run in the child: a tetgenio frees what it is given with delete[], and on
-// bad input TetGen 1.5 frees its mesh twice and dies, whatever is caught.
-
-void fill(tetgenio& in, const SurfaceMesh& surface) {
-  in.firstnumber = 0;
-  in.numberofpoints = static_cast<int>(surface.positions.size());
-  in.pointlist = new REAL[surface.positions.size() * 3];
-  for (std::size_t v = 0; v < surface.positions.size(); ++v)
-    for (int axis = 0; axis < 3; ++axis)
-      in.pointlist[v * 3 + static_cast<std::size_t>(axis)] = surface.positions[v][axis];
-  in.numberoffacets = static_cast<int>(surface.triangles.size());
-  in.facetlist = new tetgenio::facet[surface.triangles.size()];
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
-    tetgenio::facet& facet = in.facetlist[t];
-    tetgenio::init(&facet);
-    facet.numberofpolygons = 1;
-    facet.polygonlist = new tetgenio::polygon[1];
-    facet.polygonlist->numberofvertices = 3;
-    facet.polygonlist->vertexlist = new int[3];
-    for (std::size_t k = 0; k < 3; ++k)
-      facet.polygonlist->vertexlist[k] = static_cast<int>(surface.triangles[t][k]);
+struct TemporaryFolder {
+  fs::path path;
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "tetpbd_XXXXXX").string();
+    if (!::mkdtemp(name.data())) throw Error("cannot make a folder for TetGen", name, "set TMPDIR", 1);
+    path = name;
   }
-}
-
-std::string mesh_in_child(const SurfaceMesh& surface, std::string switches) {
-  tetgenio in, out;
-  fill(in, surface);
-  tetrahedralize(switches.data(), &in, &out);
-  TetMesh mesh;
-  for (int v = 0; v < out.numberofpoints; ++v)
-    mesh.positions.emplace_back(out.pointlist[3 * v], out.pointlist[3 * v + 1], out.pointlist[3 * v + 2]);
-  for (int t = 0; t < out.numberoftetrahedra; ++t) {
-    const int* corners = out.tetrahedronlist + static_cast<std::ptrdiff_t>(t) * out.numberofcorners;
-    Tet tet;
-    for (std::size_t k = 0; k < 4; ++k) tet[k] = static_cast<std::uint32_t>(corners[k] - out.firstnumber);
-    mesh.tets.push_back(tet);
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
   }
-  std::string bytes;
-  put_array(bytes, mesh.positions);
-  put_array(bytes, mesh.tets);
-  return bytes;
-}
-
-struct Intersections {
-  std::uint64_t pairs = 0;
-  glm::dvec3 first{0};
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 };
 
-// TetGen's switch d only prints its pairs ("Facet #4 intersects facet #5 at triangles: ..."), so its output
-// is read.
-std::string intersections_in_child(const SurfaceMesh& surface) {
-  std::FILE* printed = std::tmpfile();
-  if (!printed) throw std::runtime_error("no temporary file");
-  std::signal(SIGXFSZ, SIG_IGN);  // n triangles can have n^2 pairs: what goes beyond is not printed
-  const rlimit most{64u << 20, 64u << 20};
-  ::setrlimit(RLIMIT_FSIZE, &most);
-  std::fflush(stdout);
-  ::dup2(::fileno(printed), STDOUT_FILENO);
-  tetgenio in, out;
-  fill(in, surface);
-  std::string switches = "pd";
-  tetrahedralize(switches.data(), &in, &out);
-  std::fflush(stdout);
-  std::rewind(printed);
-  Intersections found;
-  char line[512];
-  while (std::fgets(line, sizeof line, printed)) {
-    unsigned long facet = 0;  // counted from 1
-    if (std::sscanf(line, " Facet #%lu", &facet) != 1 || facet < 1 || facet > surface.triangles.size())
-      continue;
-    if (found.pairs++ > 0) continue;
+// $TETPBD_TETGEN_PROGRAM, else the one beside ours (a bundle brings its own), else PATH's.
+std::string tetgen_program() {
+  if (const char* named = std::getenv("TETPBD_TETGEN_PROGRAM")) return named;
+  std::error_code failed;
+  const fs::path beside = fs::read_symlink("/proc/self/exe", failed).parent_path() / "tetgen";
+  return fs::exists(beside, failed) ? beside.string() : "tetgen";
+}
+
+SubprocessEnd run_tetgen(const std::string& switches, const fs::path& input, double seconds) {
+  const std::string program = tetgen_program();
+  SubprocessEnd end = run_subprocess({program, "-" + switches, input.string()}, {seconds});
+  if (end.kind == SubprocessEnd::not_started)
+    throw Error("TetGen cannot be started, so surfaces cannot be filled", program,
+                "install the package tetgen, or name the program in TETPBD_TETGEN_PROGRAM");
+  return end;
+}
+
+std::string smesh_text(const SurfaceMesh& surface) {
+  std::string text = fmt::format("{} 3 0 0\n", surface.positions.size());
+  put_rows(text, surface.positions, "", 0, 0);
+  text += fmt::format("{} 0\n", surface.triangles.size());
+  put_rows(text, surface.triangles, "3 ");
+  return text + "0\n0\n";  // holes, regions
+}
+
+// TetGen's switch d prints the pairs: "Facet #4 intersects facet #5 at triangles: ...", counted from 1.
+void throw_intersections(const SurfaceMesh& surface, const fs::path& input, const std::string& source) {
+  const std::string printed = run_tetgen("pd", input, 60).output;
+  const std::string mark = "  Facet #";
+  std::size_t pairs = 0;
+  for (std::size_t at = 0; (at = printed.find(mark, at)) != printed.npos; ++at) ++pairs;
+  if (pairs == 0) return;
+  const std::size_t facet = std::strtoul(printed.c_str() + printed.find(mark) + mark.size(), nullptr, 10);
+  glm::dvec3 first(NAN);
+  if (facet >= 1 && facet <= surface.triangles.size()) {
     const Triangle& t = surface.triangles[facet - 1];
-    found.first = (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
+    first = (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
   }
-  std::string bytes;
-  put_array(bytes, std::vector<Intersections>{found});
-  return bytes;
+  throw Error(
+      "surface intersects itself",
+      fmt::format("{} of triangles, first near ({:.6g}, {:.6g}, {:.6g}) in {}",
+                  pairs == 1 ? "1 pair" : fmt::format("{} pairs", pairs), first.x, first.y, first.z, source),
+      "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
 }
 
-Intersections diagnose(const SurfaceMesh& surface) {
-  const ContainedResult answer =
-      run_contained([&] { return intersections_in_child(surface); }, {diagnosis_seconds, tetgen_bytes});
-  std::vector<Intersections> found;
-  std::string_view bytes = answer.bytes;
-  if (answer.end != ContainedResult::End::done || !take_array(bytes, found) || found.size() != 1) return {};
-  return found[0];
-}
-
-[[noreturn]] void throw_failure(const SurfaceMesh& surface, const ContainedResult& answer,
-                                const std::string& switches, double time_limit, const std::string& source) {
-  if (answer.end == ContainedResult::End::timed_out)
-    throw Error(fmt::format("tetrahedralising with {} took longer than {:g} s", switches, time_limit), source,
+TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seconds,
+            const std::string& source) {
+  const TemporaryFolder folder;
+  const fs::path input = folder.path / "surface.smesh", output = folder.path / "surface.1.node";
+  write_whole(input, smesh_text(surface));
+  const SubprocessEnd end = run_tetgen(switches + "F", input, seconds);  // F: no files of faces
+  if (end.kind == SubprocessEnd::timed_out)
+    throw Error(fmt::format("tetrahedralising with {} took longer than {:g} s", switches, seconds), source,
                 "allow larger tets (a), ask for less quality (q), or use a coarser surface");
-  const Intersections found = diagnose(surface);
-  if (found.pairs > 0)
-    throw Error("surface intersects itself",
-                fmt::format("{} of triangles, first near ({:.6g}, {:.6g}, {:.6g}) in {}",
-                            found.pairs == 1 ? "1 pair" : fmt::format("{} pairs", found.pairs), found.first.x,
-                            found.first.y, found.first.z, source),
-                "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
+  if (end.kind == SubprocessEnd::done && fs::exists(output)) return read_node_ele(output);
+  throw_intersections(surface, input, source);
   throw Error(fmt::format("TetGen failed with {} ({})", switches,
-                          answer.end == ContainedResult::End::done ? "it made no tet" : answer.reason),
+                          end.kind == SubprocessEnd::done ? "it made no tet" : end.reason),
               source, "try other switches, such as pYq1.85o/140, or remesh the surface");
 }
 
 }  // namespace
+
+std::string checked_switches(const std::string& switches) {
+  const std::string clean = switches.starts_with('-') ? switches.substr(1) : switches;
+  const std::string where = fmt::format("TetGen switches '{}'", switches);
+  const char* hint = "use p with Y, q, a and others, for example pYq1.85o/140 (docs: Meshes)";
+  if (clean.size() > 200) throw Error("too long", where, hint);
+  const std::regex known(
+      "(?:[pYqOSTMXAVCDLlbxzJQ][0-9./]*(?:e[-+]?[0-9]+)?|a[0-9.]+(?:e[-+]?[0-9]+)?|o/[0-9.]+)*");
+  std::smatch match;
+  std::regex_search(clean, match, known, std::regex_constants::match_continuous);
+  if (match.length() != std::ptrdiff_t(clean.size()))
+    throw Error(fmt::format("'{}' is not for filling a surface", match.suffix().str()), where, hint);
+  if (clean.find('p') == clean.npos) throw Error("'p' is missing", where, hint);
+  return clean.find('Q') == clean.npos ? clean + "Q" : clean;
+}
 
 TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switches, double time_limit,
                        const std::string& source) {
@@ -141,15 +118,8 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
 
   SurfaceMesh surface = given;
   const SurfaceCheck check = check_surface(surface);
-  if (!check.defect.empty()) throw Error(check.defect, check.place + " in " + source, check.mend);
-
-  const ContainedResult answer =
-      run_contained([&] { return mesh_in_child(surface, switches); }, {time_limit, tetgen_bytes});
-  TetMesh mesh;
-  std::string_view bytes = answer.bytes;
-  const bool whole = answer.end == ContainedResult::End::done && take_array(bytes, mesh.positions) &&
-                     take_array(bytes, mesh.tets);
-  if (!whole || mesh.tets.empty()) throw_failure(surface, answer, switches, time_limit, source);
+  if (!check.defect.empty()) throw Error(check.defect, check.place + " in " + source, check.hint);
+  TetMesh mesh = run(surface, switches, time_limit, source);
   finish_tets(mesh, source);
   // TetGen fills everything inside the outermost surface. Where parts lie inside one another their volumes
   // count twice.
@@ -161,14 +131,5 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
   keep_mesh(key, mesh);
   return mesh;
 }
-
-#else
-
-TetMesh tetrahedralise(const SurfaceMesh&, const std::string&, double, const std::string& source) {
-  throw Error("built without TetGen, so surfaces cannot be filled", source,
-              "give a tetrahedral mesh (.node/.ele, .msh) or build with -DTETPBD_TETGEN=ON");
-}
-
-#endif
 
 }  // namespace tetpbd

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+                 [](unsigned char c) { return char(std::tolower(c)); });
   return extension;
 }
 
@@ -31,8 +31,8 @@ void require_readable(const fs::path& file) {
 TextFile::TextFile(const fs::path& file, char comment) : file_(file), comment_(comment) {
   require_readable(file);
   std::ifstream in(file, std::ios::binary);
-  text_.resize(static_cast<std::size_t>(fs::file_size(file)));
-  in.read(text_.data(), static_cast<std::streamsize>(text_.size()));
+  text_.resize(fs::file_size(file));
+  in.read(text_.data(), std::streamsize(text_.size()));
   if (!in) throw Error("cannot be read to its end", file.string(), "check the disk");
 }
 
@@ -43,9 +43,9 @@ bool TextFile::next_line() {
     at_ = end + 1;
     ++line_number_;
     if (comment_ != '\0') line_ = line_.substr(0, line_.find(comment_));
-    const std::size_t first = line_.find_first_not_of(" \t\r,");
+    const std::size_t first = line_.find_first_not_of(blank);
     if (first == std::string_view::npos) continue;
-    line_ = line_.substr(first, line_.find_last_not_of(" \t\r,") - first + 1);
+    line_ = line_.substr(first, line_.find_last_not_of(blank) - first + 1);
     rest_ = line_;
     return true;
   }
@@ -53,15 +53,14 @@ bool TextFile::next_line() {
   return false;
 }
 
-void TextFile::require_line(const char* wanted) {
-  if (!next_line()) fail(fmt::format("file ends before {}", wanted));
+void TextFile::require_line(const std::string& wanted) {
+  if (!next_line()) fail("file ends before " + wanted);
 }
 
 std::string_view TextFile::word(const char* wanted) {
-  const std::size_t first = rest_.find_first_not_of(" \t\r,");
-  if (first == std::string_view::npos) fail(fmt::format("line has no {}", wanted));
-  rest_.remove_prefix(first);
-  const std::string_view found = rest_.substr(0, rest_.find_first_of(" \t\r,"));
+  if (!more()) fail(fmt::format("line has no {}", wanted));
+  rest_.remove_prefix(rest_.find_first_not_of(blank));
+  const std::string_view found = rest_.substr(0, rest_.find_first_of(blank));
   rest_.remove_prefix(found.size());
   return found;
 }
@@ -76,6 +75,11 @@ double TextFile::number(const char* wanted) {
   return value;
 }
 
+glm::dvec3 TextFile::position() {
+  const double x = number("x"), y = number("y"), z = number("z");
+  return {x, y, z};
+}
+
 long long TextFile::integer(const char* wanted) {
   const std::string_view found = word(wanted);
   long long value = 0;
@@ -85,24 +89,17 @@ long long TextFile::integer(const char* wanted) {
   return value;
 }
 
-std::size_t TextFile::count(const char* wanted, std::size_t most) {
-  const long long value = integer(wanted);
-  if (value < 0 || static_cast<unsigned long long>(value) > most)
-    fail(fmt::format("{} is {}, outside 0 .. {}", wanted, value, most));
-  return static_cast<std::size_t>(value);
-}
-
-std::size_t TextFile::count_fitting(const char* wanted, std::size_t bytes_each) {
+std::size_t TextFile::count(const char* wanted, std::size_t bytes_each) {
   const long long value = integer(wanted);
   if (value < 0) fail(fmt::format("{} is {}", wanted, value));
   if (static_cast<unsigned long long>(value) > text_.size() / bytes_each + 1)
     fail(fmt::format("{} is {}, more than {} bytes can hold", wanted, value, text_.size()));
-  return static_cast<std::size_t>(value);
+  return std::size_t(value);
 }
 
 void TextFile::fail(const std::string& what) const {
-  throw Error(what, fmt::format("{} line {}", file_.string(), line_number_),
-              "mend the file or export it again");
+  const std::string line = line_number_ > 0 ? fmt::format(" line {}", line_number_) : "";
+  throw Error(what, file_.string() + line, "mend the file or export it again");
 }
 
 }  // namespace tetpbd

@@ -12,12 +12,9 @@
 
 #include "app/command_line.h"
 #include "app/scene.h"
-#include "sim/mesh/bytes.h"
 #include "sim/error.h"
-#include "sim/mesh/mesh_cache.h"
-#include "sim/mesh/surface_claims.h"
+#include "sim/mesh/cache.h"
 #include "sim/mesh/tet_mesh.h"
-#include "sim/mesh/tetgen_switches.h"
 #include "sim/mesh/weld.h"
 
 namespace fuzz {
@@ -124,12 +121,6 @@ void read_surface(std::string_view bytes) {
   expect_errors_only([&] { check(load_surface(file)); });
 }
 
-template <const auto& extension>
-void read_claims(std::string_view bytes) {
-  const fs::path file = write(extension, bytes);
-  expect_errors_only([&] { read_surface_claims(file); });
-}
-
 constexpr char ply[] = "mesh.ply", obj[] = "mesh.obj", stl[] = "mesh.stl", off[] = "mesh.off";
 
 template <class T>
@@ -190,7 +181,7 @@ void read_tets(std::string_view bytes) {
   });
 }
 
-// The whole chain with TetGen, which runs in a child.
+// The whole chain with TetGen.
 void fill_surface(std::string_view bytes) {
   ::setenv("TETPBD_CACHE", "/dev/null/none", 1);
   expect_errors_only([&] {
@@ -280,13 +271,10 @@ void read_words(std::string_view bytes) {
 
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> rows = {
-      {"ply", "ply", read_surface<ply>, true},
-      {"obj", "obj", read_surface<obj>, true},
-      {"stl", "stl", read_surface<stl>, true},
-      {"off", "off", read_surface<off>, true},
-      {"ply_claims", "ply", read_claims<ply>, false},
-      {"stl_claims", "stl", read_claims<stl>, false},
-      {"off_claims", "off", read_claims<off>, false},
+      {"ply", "ply", read_surface<ply>, false},
+      {"obj", "obj", read_surface<obj>, false},
+      {"stl", "stl", read_surface<stl>, false},
+      {"off", "off", read_surface<off>, false},
       {"triangles", "triangles", read_triangles, false},
       {"tets", "tets", read_tets, false},
       {"fill", "fill", fill_surface, true},

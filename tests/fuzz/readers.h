@@ -12,7 +12,7 @@ struct Reader {
   const char* name;
   const char* corpus;  ///< folder in tests/corpus
   void (*read)(std::string_view bytes);
-  bool forks;  ///< reads in a child process, so a run takes milliseconds
+  bool forks;  ///< starts a program, so a run takes milliseconds
 };
 
 /// Each returns whether it liked the bytes or not, and ends the process with a message where it broke a

@@ -8,12 +8,12 @@ shift
 program=build/fuzz/tetpbd_fuzz
 cmake --preset fuzz >/dev/null
 cmake --build --preset fuzz
-[ $# -gt 0 ] || set -- triangles tets node msh cache scene overrides words ply_claims stl_claims off_claims
+[ $# -gt 0 ] || set -- triangles tets node msh cache ply obj stl off scene overrides words
 export ASAN_OPTIONS=allocator_may_return_null=0 UBSAN_OPTIONS=print_stacktrace=1
 for reader in "$@"; do
   grown=build/fuzz/corpus/$reader
   mkdir -p "$grown"
   echo "== $reader"
   FUZZ_READER=$reader $program -runs="$runs" -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=10 -verbosity=0 \
-    -print_final_stats=1 -close_fd_mask=1 -artifact_prefix="$grown/" "$grown" "tests/corpus/${reader%_claims}"
+    -print_final_stats=1 -close_fd_mask=1 -artifact_prefix="$grown/" "$grown" "tests/corpus/$reader"
 done

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/parallel.h"
-#include "sim/mesh/surface_topology.h"
 #include "sim/mesh/tet_mesh.h"
+#include "sim/mesh/topology.h"
+#include "sim/parallel.h"
 
 namespace tetpbd {
 namespace {
@@ -36,9 +36,8 @@ MeshReport report(const TetMesh& mesh) {
   r.surface_triangles = mesh.surface.size();
   r.edges = tet_edges(mesh).size();
   r.faces = (4 * r.tets + r.surface_triangles) / 2;
-  r.euler_characteristic =
-      static_cast<int>(static_cast<long long>(r.vertices) - static_cast<long long>(r.edges) +
-                       static_cast<long long>(r.faces) - static_cast<long long>(r.tets));
+  r.euler_characteristic = int(static_cast<long long>(r.vertices) - static_cast<long long>(r.edges) +
+                               static_cast<long long>(r.faces) - static_cast<long long>(r.tets));
 
   const SurfaceTopology surface = surface_topology(mesh.surface, mesh.positions.size());
   r.surface_vertices = surface.vertices;
@@ -50,12 +49,12 @@ MeshReport report(const TetMesh& mesh) {
   for (std::size_t e = 0; e < surface.edge_count(); ++e)
     joined_edges += static_cast<long long>(surface.uses_of(e) / 2);
   const long long euler = fans - joined_edges + static_cast<long long>(mesh.surface.size());
-  r.genus = static_cast<int>(static_cast<long long>(surface.patches) - euler / 2);
+  r.genus = int(static_cast<long long>(surface.patches) - euler / 2);
 
   DisjointSets parts(mesh.positions.size());
   for (const Tet& tet : mesh.tets)
     for (std::size_t k = 1; k < 4; ++k) parts.join(tet[0], tet[k]);
-  r.components = static_cast<int>(parts.count());
+  r.components = int(parts.count());
 
   r.smallest_tet_volume = mesh.tets.empty() ? 0 : INFINITY;
   r.min_dihedral_deg = 180;
@@ -80,8 +79,8 @@ MeshReport report(const TetMesh& mesh) {
     r.slivers += low < 5 || high > 175;
   }
   if (r.tets > 0) {
-    r.mean_tet_volume = r.volume / static_cast<double>(r.tets);
-    r.mean_min_dihedral_deg /= static_cast<double>(r.tets);
+    r.mean_tet_volume = r.volume / double(r.tets);
+    r.mean_min_dihedral_deg /= double(r.tets);
   }
   return r;
 }

@@ -1,4 +1,4 @@
-#include "sim/mesh/surface_topology.h"
+#include "sim/mesh/topology.h"
 
 #include <algorithm>
 #include <tuple>
@@ -20,30 +20,30 @@ SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::si
   for (std::uint32_t i = 0; i < uses.size(); ++i)
     if (i == 0 || uses[i].low != uses[i - 1].low || uses[i].high != uses[i - 1].high)
       topology.edges.push_back(i);
-  topology.edges.push_back(static_cast<std::uint32_t>(uses.size()));
+  topology.edges.push_back(std::uint32_t(uses.size()));
 
   DisjointSets patches(triangles.size()), corners(triangles.size() * 3);
   const auto corner = [&](const EdgeUse& use, std::uint32_t vertex) {
     const bool first = triangles[use.triangle][use.side] == vertex;
     return use.triangle * 3 + (first ? use.side : (use.side + 1) % 3);
   };
-  for (std::size_t e = 0; e < topology.edge_count(); ++e) {
+  for (std::uint32_t e = 0; e < topology.edge_count(); ++e) {
     if (topology.uses_of(e) != 2) continue;
     const EdgeUse &a = uses[topology.edges[e]], &b = uses[topology.edges[e] + 1];
-    patches.join(a.triangle, b.triangle);
+    if (!patches.join(a.triangle, b.triangle, a.forward == b.forward)) topology.one_sided.push_back(e);
     corners.join(corner(a, a.low), corner(b, a.low));
     corners.join(corner(a, a.high), corner(b, a.high));
   }
-  topology.patch.resize(triangles.size());
   std::vector<std::uint32_t> number(triangles.size(), ~0u);
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    std::uint32_t& n = number[patches.root(t)];
-    if (n == ~0u) n = static_cast<std::uint32_t>(topology.patches++);
-    topology.patch[t] = n;
+    const auto [root, turned] = patches.root(t);
+    if (number[root] == ~0u) number[root] = std::uint32_t(topology.patches++);
+    topology.patch.push_back(number[root]);
+    topology.turned.push_back(turned);
   }
   topology.fans.assign(vertex_count, 0);
   for (std::uint32_t c = 0; c < triangles.size() * 3; ++c)
-    if (corners.root(c) == c) ++topology.fans[triangles[c / 3][c % 3]];
+    if (corners.root(c).first == c) ++topology.fans[triangles[c / 3][c % 3]];
   for (const std::uint32_t fans : topology.fans) topology.vertices += fans > 0;
   return topology;
 }

@@ -3,14 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
-#include "app/measure_run.h"
+#include "app/run_loop.h"
 #include "app/scene.h"
-#include "sim/error.h"
+#include "app/sweep.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
 #include "sim/solvers/clusters.h"
@@ -19,9 +17,8 @@ namespace tetpbd {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr double most_seconds = 3;  // of a trial: a slow machine compares fewer steps
-constexpr int most_substeps = 1000;
+constexpr double most_substeps = 1000;
 
 // On the front wherever it was measured (docs/results.md): one iteration a substep, never several.
 std::vector<Settings> candidates(const Settings& settings) {
@@ -50,25 +47,27 @@ std::vector<Settings> candidates(const Settings& settings) {
   return all;
 }
 
-// The median of steps taken one after the other for so long, one at least.
-double step_ms(Sim& sim, double seconds) {
-  const auto begin = Clock::now();
-  const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  sim.timed = true;
-  std::vector<double> times;
-  do {
-    step(sim);
-    while (const auto ms = sim.timer.poll()) times.push_back(*ms);
-  } while (elapsed() < seconds && !interrupted());
-  while (const auto ms = sim.timer.poll(true)) times.push_back(*ms);
-  if (interrupted()) throw Interrupted();
-  return percentiles(times).median;
+/// As many substeps as fit the budget, from one substep's time, then from what so many took.
+void fit_substeps(Sim& sim, SolverTrial& trial, double budget_ms) {
+  for (int round = 0; round < 2; ++round) {
+    reset(sim);
+    const double seconds = is_software_renderer() ? 0 : 0.03;
+    const MeasuredRun run =
+        run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
+    if (interrupted()) throw Interrupted();
+    const double ms = percentiles(run.gpu_ms.values).median;
+    trial.settings.substeps =
+        int(std::clamp(std::floor(trial.settings.substeps * budget_ms / ms), 1.0, most_substeps));
+    apply_settings(sim, trial.settings);
+  }
 }
 
+/// Largest volume loss; infinite if the state did not stay finite.
 double loss_until(const MeasuredRun& run, long steps) {
+  if (!run.errors.finite) return std::numeric_limits<double>::infinity();
   double loss = 0;
   for (const Measurement& m : run.measurements)
-    if (m.step <= steps && m.finite()) loss = std::max(loss, -m.volume_error_percent);
+    if (m.step <= steps) loss = std::max(loss, -m.volume_error_percent);
   return loss;
 }
 
@@ -88,38 +87,24 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     Sim sim = create_sim(model, trial.settings);
     if (runs.empty()) warm_up(sim);
     step(sim);  // the first of a new solver is not like the others
-    // Twice: from one substep's time to how many fit, and from what so many took.
-    for (int round = 0; round < 2; ++round) {
-      const double ms = step_ms(sim, is_software_renderer() ? 0 : 0.03);
-      trial.settings.substeps =
-          int(std::clamp(std::floor(trial.settings.substeps * budget_ms / ms), 1.0, double(most_substeps)));
-      apply_settings(sim, trial.settings);
-    }
+    fit_substeps(sim, trial, budget_ms);
     reset(sim);
     Metrics metrics = create_metrics(*model, sim.system);
-    const auto begin = Clock::now();
-    runs.push_back(measure_run(sim, metrics, choice.steps, [&](long) {
-      return std::chrono::duration<double>(Clock::now() - begin).count() < most_seconds;
-    }));
-    const MeasuredRun& run = runs.back();
-    if (run.errors.finite && !run.measurements.empty())
-      choice.steps = std::min(choice.steps, run.measurements.back().step);
-    if (!run.timing.gpu_ms.values.empty()) trial.ms = percentiles(run.timing.gpu_ms.values).median;
+    runs.push_back(run_loop(sim, &metrics, choice.steps, {.most_seconds = most_seconds}));
+    if (interrupted()) throw Interrupted();
+    if (runs.back().errors.finite) choice.steps = std::min(choice.steps, runs.back().steps);
+    trial.ms = percentiles(runs.back().gpu_ms.values).median;
     choice.trials.push_back(trial);
   }
-  const auto badness = [](const SolverTrial& trial) {
-    return std::isnan(trial.loss_percent) ? std::numeric_limits<double>::infinity() : trial.loss_percent;
-  };
   for (std::size_t t = 0; t < runs.size(); ++t) {
-    SolverTrial& trial = choice.trials[t];
-    trial.loss_percent = runs[t].errors.finite ? loss_until(runs[t], choice.steps) : std::nan("");
+    choice.trials[t].loss_percent = loss_until(runs[t], choice.steps);
     // Losses that agree to a hundredth are the same: then the plainer one.
-    if (badness(trial) < 0.99 * badness(choice.trials[choice.best])) choice.best = t;
+    if (choice.trials[t].loss_percent < 0.99 * choice.trials[choice.best].loss_percent) choice.best = t;
   }
   // Where nothing was lost the trials say nothing: a body that has not fallen yet, a machine too slow to wait
   // for it. Handles, which come last, were best wherever something was.
-  choice.lost_nothing =
-      std::all_of(choice.trials.begin(), choice.trials.end(), [&](auto& t) { return badness(t) < 0.01; });
+  choice.lost_nothing = std::all_of(choice.trials.begin(), choice.trials.end(),
+                                    [](const SolverTrial& trial) { return trial.loss_percent < 0.01; });
   if (choice.lost_nothing && choice.trials.back().settings.handles > 0) choice.best = runs.size() - 1;
   return choice;
 }
@@ -145,15 +130,15 @@ std::string describe(const SolverChoice& choice) {
 }
 
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {
-  nlohmann::ordered_json trials = nlohmann::ordered_json::array();
+  ordered_json trials = ordered_json::array();
   for (const SolverTrial& trial : choice.trials)
     trials.push_back({{"mode", mode_word(trial.settings)},
                       {"omega", effective_omega(trial.settings)},
                       {"mass_splitting", trial.settings.mass_splitting},
                       {"iterations", trial.settings.iterations},
                       {"substeps", trial.settings.substeps},
-                      {"gpu_ms_per_step", json_number(trial.ms)},
-                      {"max_volume_loss_percent", json_number(trial.loss_percent)}});
+                      {"gpu_ms_per_step", trial.ms},
+                      {"max_volume_loss_percent", trial.loss_percent}});
   return {
       {"budget_ms", choice.budget_ms}, {"steps", choice.steps}, {"chosen", choice.best}, {"trials", trials}};
 }

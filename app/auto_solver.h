@@ -15,7 +15,7 @@ namespace tetpbd {
 struct SolverTrial {
   Settings settings;
   double ms = 0;            ///< a step, median; GPU time
-  double loss_percent = 0;  ///< largest volume loss; NaN if the state did not stay finite
+  double loss_percent = 0;  ///< largest volume loss; infinite if the state did not stay finite
 };
 struct SolverChoice {
   double budget_ms = 0;

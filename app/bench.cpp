@@ -1,18 +1,14 @@
-#include "app/bench.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "app/files.h"
-#include "app/floors.h"
-#include "app/measure_run.h"
-#include "app/progress.h"
+#include "app/lab.h"
+#include "app/statistics.h"
+#include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
@@ -23,255 +19,198 @@ namespace tetpbd {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
-Percentiles spread(std::vector<double> values) {
+const std::vector<std::string> columns = split(
+    "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_"
+    "step,"
+    "draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent",
+    ',');
+constexpr const char* table =
+    "scene -16, mode -18, constraints -20, iterations:iter 5, substeps:sub 5, size 10, picture 8, fps 10, "
+    "gpu_ms_per_step:GPU-ms 10, gpu_us_per_iteration:us/iter 10, draw_ms 10, max_volume_loss_percent:loss-% "
+    "11";
+
+ordered_json spread(std::vector<double> values) {
+  if (values.empty()) values = {0};
   std::sort(values.begin(), values.end());
-  return {values[values.size() / 2], values.front(), values.back()};
+  return {{"median", values[values.size() / 2]}, {"min", values.front()}, {"max", values.back()}};
 }
 
-void mark_non_finite(BenchRow& row, const NonFinite& found) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  row.non_finite = found;
-  row.fps = row.gpu_ms = row.wall_ms = {nan, nan, nan};
-  row.max_volume_loss_percent = nan;
+struct Subject {
+  Scene scene;
+  std::shared_ptr<const Model> model;
+  std::vector<Settings> settings;
+};
+
+// A run that is not finite says nothing else.
+void judge(ordered_json& row, const MeasuredRun& run) {
+  row["finite"] = run.errors.finite;
+  row["non_finite"] = non_finite_json(run.errors.non_finite);
+  if (!run.errors.finite) row["max_volume_loss_percent"] = nullptr;
+  say_non_finite(run, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", text_of(row["scene"]),
+                                  text_of(row["mode"]), text_of(row["constraints"]),
+                                  text_of(row["iterations"]), text_of(row["substeps"])));
 }
 
-/// Frames as fast as they come: a step, and a picture of it if there is a target. One wait, at the end.
-void time_frames(BenchRow& row, Sim& sim, const BenchOptions& options, Renderer* renderer,
-                 const Frame& view) {
-  std::vector<double> fps, gpu, wall, still;
-  warm_up(sim);
-  for (int repeat = 0; repeat < options.repeats; ++repeat) {
-    reset(sim);
-    sim.timed = false;
-    const auto picture = [&] {
-      if (renderer) draw(*renderer, view);
-    };
-    const auto frame = [&] {
-      step(sim);
-      picture();
-    };
-    const auto time_picture = [&] {
-      if (!renderer) return;
-      const auto begin = Clock::now();
-      const long count = std::min(options.frames, 100L);
-      for (long f = 0; f < count; ++f) picture();
+/// What a dispatch and a byte cost on this GPU at least, what speeds are held against: a dispatch of as many
+/// invocations as a small mesh has, and its barrier; bytes read and written by a kernel that copies from
+/// memory, not from a cache. About a tenth of a second.
+ordered_json launch_and_bandwidth_limits(bool software) {
+  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, invocations = bytes / 16 / 8;
+  const Buffer from("probe, from", bytes), to("probe, to", bytes);
+  from.clear();
+  from.bind_storage(0);
+  to.bind_storage(1);
+  const auto seconds_each = [&](const char* copy, std::size_t work_groups, int times) {
+    const Program program = Program::compute("probe.comp", {{{"COPY", copy}}, {}});
+    program.use();
+    const auto run = [&] {
+      for (int k = 0; k < times; ++k) {
+        const std::size_t row = std::min<std::size_t>(work_groups, 32768);
+        glDispatchCompute(unsigned(row), unsigned(work_groups / row), 1);
+        glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+      }
       glFinish();
-      still.push_back(std::chrono::duration<double, std::milli>(Clock::now() - begin).count() /
-                      double(count));
     };
-    for (long f = 0; f < options.warm_up && !interrupted(); ++f) frame();
-    glFinish();
-    time_picture();
-    sim.timed = true;
-    std::vector<double> steps;
+    run();
     const auto begin = Clock::now();
-    const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-    long frames = 0;
-    for (; frames < options.frames && elapsed() < options.most_seconds; ++frames) {
-      if (interrupted()) throw Interrupted();
-      frame();
-      while (const auto ms = sim.timer.poll()) steps.push_back(*ms);
-    }
-    glFinish();
-    const double seconds = elapsed();
-    while (const auto ms = sim.timer.poll(true)) steps.push_back(*ms);
-    if (check_finite(sim, true)) return mark_non_finite(row, *sim.check.found);
-    fps.push_back(double(frames) / seconds);
-    wall.push_back(seconds * 1e3 / double(frames));
-    if (!steps.empty()) gpu.push_back(percentiles(steps).median);
-    time_picture();
-  }
-  if (!still.empty()) row.draw_ms = std::accumulate(still.begin(), still.end(), 0.0) / double(still.size());
-  row.fps = spread(fps);
-  row.wall_ms = spread(wall);
-  if (!gpu.empty()) row.gpu_ms = spread(gpu);
-}
-
-std::string csv_line(const BenchRow& r) {
-  const auto number = [](double value, bool known = true) {
-    return known && std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string();
+    run();
+    return seconds_since(begin) / times;
   };
-  const bool on_gpu = r.gpu_ms.median > 0;
-  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(r.scene), r.mode,
-                     r.constraints, r.iterations, r.substeps, r.size, r.picture, r.vertices, r.tets,
-                     number(r.fps.median), number(r.gpu_ms.median, on_gpu), number(r.wall_ms.median),
-                     number(r.draw_ms, r.draw_ms > 0),
-                     number(1e3 * r.gpu_ms.median / r.iterations / r.substeps, on_gpu), r.dispatches,
-                     r.gpu_bytes, number(r.max_volume_loss_percent));
+  return {{"dispatch_us", seconds_each("0", 256, software ? 20 : 5000) * 1e6},
+          {"copy_gb_s", 2 * double(bytes) / seconds_each("1", invocations / 256, software ? 2 : 50) * 1e-9}};
 }
 
-std::string kinds_of(std::string set) {
-  std::replace(set.begin(), set.end(), '+', ',');
-  return set;
-}
-
-// Over the same frames, but NaN where time ran out: an error over part of the run would be another quantity.
-void error_run(BenchRow& row, Sim& sim, const Model& model, const BenchOptions& options) {
-  Metrics metrics = create_metrics(model, sim.system);
-  const auto begin = Clock::now();
-  bool whole = true;
-  const MeasuredRun run = measure_run(sim, metrics, options.frames, [&](long) {
-    return whole = std::chrono::duration<double>(Clock::now() - begin).count() < 12 * options.most_seconds;
-  });
-  row.max_volume_loss_percent = whole ? run.errors.max_volume_loss_percent : std::nan("");
-  if (run.errors.non_finite) mark_non_finite(row, *run.errors.non_finite);
-}
-
-}  // namespace
-
-std::vector<BenchRow> bench_rows(const BenchOptions& options,
-                                 const std::function<void(const BenchRow&)>& report) {
-  std::vector<std::pair<Scene, std::shared_ptr<const Model>>> scenes;
-  for (const std::string& name : options.scenes) {
-    Scene scene = load_scene(name, options.overrides);
-    for (const std::string& mode : options.modes) set_mode(scene.settings, mode, "--modes");
-    for (const std::string& set : options.constraint_sets)
-      set_parameter(scene.settings, *find_parameter("constraints"), kinds_of(set), "--constraint-sets");
-    auto model = build_model(scene);
-    scenes.emplace_back(std::move(scene), std::move(model));
+/// Frames as fast as they come: a step, and a picture of it if there is one. One wait, at the end.
+void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
+                 const std::function<void()>& picture) {
+  std::vector<double> fps, gpu, wall, still;
+  const auto time_picture = [&] {
+    if (!picture) return;
+    const long count = std::min(options.frames, 100L);
+    const auto begin = Clock::now();
+    for (long f = 0; f < count; ++f) picture();
+    glFinish();
+    still.push_back(1e3 * seconds_since(begin) / double(count));
+  };
+  RunPlan plan{.most_seconds = options.most_seconds, .wait = false};
+  if (picture) plan.stepped = [&](long) { return picture(), true; };
+  warm_up(sim);
+  for (int repeat = 0; repeat < options.repeats && row["finite"] == true; ++repeat) {
+    reset(sim);
+    run_loop(sim, nullptr, options.warm_up, plan);
+    time_picture();
+    const MeasuredRun run = run_loop(sim, nullptr, options.frames, plan);
+    time_picture();
+    fps.push_back(double(run.steps) / run.seconds);
+    wall.push_back(run.seconds * 1e3 / double(run.steps));
+    if (!run.gpu_ms.values.empty()) gpu.push_back(percentiles(run.gpu_ms.values).median);
+    judge(row, run);
   }
-  std::vector<BenchRow> rows;
-  Progress progress("bench", long(scenes.size() * options.modes.size() * options.constraint_sets.size() *
-                                  options.iterations.size() * options.substeps.size()));
-  long done = 0;
-  for (const auto& [scene, model] : scenes) {
-    std::optional<Renderer> renderer;
-    if (!options.sizes.empty()) renderer = make_renderer(model->rest);
-    for (const std::string& set : options.constraint_sets)
-      for (const std::string& mode : options.modes)
-        for (int iterations : options.iterations)
-          for (int substeps : options.substeps) {
-            Settings settings = scene.settings;
-            settings.constraints = kinds_of(set);
-            set_mode(settings, mode, "--modes");
-            settings.iterations = iterations;
-            settings.substeps = substeps;
-            Sim sim = create_sim(model, settings);
-            const Explanation cost = explain(sim);
-            BenchRow row;
-            row.scene = scene.name, row.mode = mode, row.constraints = set;
-            row.iterations = iterations, row.substeps = substeps;
-            row.omega = effective_omega(settings);
-            row.vertices = model->positions.size(), row.tets = model->rest.tets.size();
-            row.gpu_bytes = cost.bytes, row.dispatches = cost.dispatches_per_step;
-            row.bytes_per_step = cost.bytes_per_step;
-            error_run(row, sim, *model, options);
-            const auto add = [&](Renderer* drawn_by, const Frame& view) {
-              if (!row.non_finite) time_frames(row, sim, options, drawn_by, view);
-              rows.push_back(row);
-              if (report) report(row);
-            };
-            add(nullptr, {});
-            for (const auto& [width, height] : options.sizes) {
-              const Target target = make_target(width, height, options.samples);
-              const Camera camera = scene_camera(scene, *model, float(width) / float(height));
-              for (const std::string& picture : options.pictures) {
-                row.size = fmt::format("{}x{}", width, height);
-                row.picture = picture;
-                const ViewOptions look = picture == "plain" ? plain_view({}) : ViewOptions{};
-                add(&*renderer, frame_of(sim, camera, look, target));
-              }
-            }
-            progress.update(++done);
-          }
+  if (row["finite"] == false) fps = gpu = wall = {std::nan("")};  // they say nothing
+  row["fps"] = spread(fps);
+  row["gpu_ms_per_step"] = spread(gpu);
+  row["wall_ms_per_step"] = spread(wall);
+  row["draw_ms"] = std::accumulate(still.begin(), still.end(), 0.0) / double(still.size());
+  row["gpu_us_per_iteration"] =
+      1e3 * number(row, "gpu_ms_per_step") / (number(row, "iterations") * number(row, "substeps"));
+}
+
+std::vector<ordered_json> rows_of(const Subject& subject, const Settings& settings,
+                                  const BenchOptions& options) {
+  const Model& model = *subject.model;
+  std::string kinds = settings.constraints;
+  std::replace(kinds.begin(), kinds.end(), ',', '+');
+  Sim sim = create_sim(subject.model, settings);
+  const Explanation cost = explain(sim);
+  Metrics metrics = create_metrics(model, sim.system);
+  const MeasuredRun run =
+      run_loop(sim, &metrics, options.frames, {.most_seconds = 12 * options.most_seconds});
+  // NaN where time ran out: an error over part of the run would be another quantity.
+  const bool whole = run.steps == options.frames;
+  ordered_json row = {{"scene", subject.scene.name},
+                      {"mode", mode_word(settings)},
+                      {"omega", settings.omega},
+                      {"constraints", kinds},
+                      {"iterations", settings.iterations},
+                      {"substeps", settings.substeps},
+                      {"size", ""},
+                      {"picture", ""},
+                      {"vertices", model.positions.size()},
+                      {"tets", model.rest.tets.size()},
+                      {"dispatches_per_step", cost.dispatches_per_step},
+                      {"bytes_per_step", cost.bytes_per_step},
+                      {"gpu_bytes", cost.bytes},
+                      {"max_volume_loss_percent", whole ? run.errors.max_volume_loss_percent : std::nan("")}};
+  judge(row, run);
+  std::vector<ordered_json> rows{row};
+  time_frames(rows[0], sim, options, {});
+  if (options.sizes.empty()) return rows;
+  Renderer renderer = make_renderer(model);
+  for (const auto& [width, height] : options.sizes) {
+    const Target target = make_target(width, height, options.samples);
+    const Camera camera = scene_camera(subject.scene, model, float(width) / float(height));
+    for (const std::string& picture : options.pictures) {
+      const Frame frame = frame_of(sim, camera, picture == "plain" ? plain_view({}) : ViewOptions{}, target);
+      row["size"] = fmt::format("{}x{}", width, height);
+      row["picture"] = picture;
+      rows.push_back(row);
+      time_frames(rows.back(), sim, options, [&] { draw(renderer, frame); });
+    }
   }
   return rows;
 }
 
-std::string bench_csv(const std::vector<BenchRow>& rows) {
-  std::string csv =
-      "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_"
-      "step,draw_ms,"
-      "gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent\n";
-  for (const BenchRow& row : rows) csv += csv_line(row);
-  return csv;
+}  // namespace
+
+Sweep bench_sweep(const BenchOptions& options) {
+  std::vector<Subject> subjects;
+  for (const std::string& name : options.scenes) {
+    const Scene scene = load_scene(name, options.overrides);
+    const auto all = combinations(
+        scene.settings, {options.modes, options.constraint_sets, {}, options.iterations, options.substeps});
+    subjects.push_back({scene, nullptr, all});
+  }
+  Sweep sweep{"bench", "bench", columns, 0, table, {}};
+  for (Subject& subject : subjects) {
+    subject.model = build_model(subject.scene);
+    sweep.combinations += subject.settings.size();
+  }
+  sweep.make = [subjects, options](std::size_t i) {
+    auto subject = subjects.begin();
+    for (; i >= subject->settings.size(); ++subject) i -= subject->settings.size();
+    return rows_of(*subject, subject->settings[i], options);
+  };
+  return sweep;
 }
 
 int run_bench(const BenchOptions& options) {
   catch_interrupts();
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
-  const Capabilities& device = context.capabilities();
+  Sweep sweep = bench_sweep(options);
+  const ordered_json device = device_json(context.capabilities());
+  const ordered_json limits = launch_and_bandwidth_limits(context.capabilities().software);
+  sweep.facts = {{"device", device},
+                 {"frames", options.frames},
+                 {"warm_up", options.warm_up},
+                 {"repeats", options.repeats},
+                 {"floors", limits}};
+  sweep.print_each = true;
+  print_device(device);
   fmt::print(
-      "{}{}\n{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing "
-      "waits between frames\n",
-      device.renderer,
-      device.software ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
-                      : ", OpenGL " + device.version,
-      options.frames, options.warm_up, options.repeats);
-  const Floors floors = measure_floors(device.software);
-  fmt::print("floors: {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n\n", floors.dispatch_us,
-             floors.copy_gb_s);
-  fmt::print("{:<16}{:<14}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", "scene", "mode",
-             "constraints", "iter", "sub", "picture", "fps", "GPU us", "us/iter", "draw us", "loss %");
-  std::vector<BenchRow> rows;
-  const auto report = [&](const BenchRow& row) {
-    rows.push_back(row);
-    const auto gpu = [&](double value) {
-      return row.gpu_ms.median > 0 ? fmt::format("{:.1f}", value) : std::string("-");
-    };
-    const std::string fps = row.non_finite ? "-" : fmt::format("{:.1f}", row.fps.median);
-    fmt::print("{:<16}{:<14}{:<22}{:>5}{:>5}{:>16}{:>11}{:>11}{:>10}{:>11}{:>11}\n", row.scene, row.mode,
-               row.constraints, row.iterations, row.substeps,
-               row.size.empty() ? "none" : row.size + " " + row.picture, fps, gpu(1e3 * row.gpu_ms.median),
-               gpu(1e3 * row.gpu_ms.median / row.iterations / row.substeps),
-               row.draw_ms > 0 ? fmt::format("{:.1f}", 1e3 * row.draw_ms) : "-",
-               std::isfinite(row.max_volume_loss_percent) ? fmt::format("{:.2f}", row.max_volume_loss_percent)
-                                                          : "-");
-    std::fflush(stdout);
-  };
-  bool whole = true;
-  try {
-    bench_rows(options, report);
-  } catch (const Interrupted&) {
-    whole = false;
-  }
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  const auto triple = [](const Percentiles& p) {
-    return nlohmann::ordered_json{{"median", p.median}, {"min", p.p05}, {"max", p.p95}};
-  };
-  for (const BenchRow& r : rows) {
-    nlohmann::ordered_json loss;  // null; so is what is not a number below
-    if (std::isfinite(r.max_volume_loss_percent)) loss = r.max_volume_loss_percent;
-    list.push_back({{"scene", r.scene},
-                    {"mode", r.mode},
-                    {"omega", r.omega},
-                    {"constraints", r.constraints},
-                    {"iterations", r.iterations},
-                    {"substeps", r.substeps},
-                    {"size", r.size},
-                    {"picture", r.picture},
-                    {"vertices", r.vertices},
-                    {"tets", r.tets},
-                    {"fps", triple(r.fps)},
-                    {"gpu_ms_per_step", triple(r.gpu_ms)},
-                    {"wall_ms_per_step", triple(r.wall_ms)},
-                    {"draw_ms", r.draw_ms > 0 ? nlohmann::ordered_json(r.draw_ms) : nlohmann::ordered_json()},
-                    {"dispatches_per_step", r.dispatches},
-                    {"bytes_per_step", r.bytes_per_step},
-                    {"gpu_bytes", r.gpu_bytes},
-                    {"max_volume_loss_percent", loss},
-                    {"finite", !r.non_finite},
-                    {"non_finite", non_finite_json(r.non_finite)}});
-  }
-  write_file(options.out / "bench.csv", bench_csv(rows));
-  const nlohmann::ordered_json document = {
-      {"device", device_json(device)},
-      {"frames", options.frames},
-      {"warm_up", options.warm_up},
-      {"repeats", options.repeats},
-      {"floors", {{"dispatch_us", floors.dispatch_us}, {"copy_gb_s", floors.copy_gb_s}}},
-      {"rows", list}};
-  write_file(options.out / "bench.json", json_text(document, 1) + "\n");
-  fmt::print("\n{}\n", (options.out / "bench.csv").string());
-  for (const BenchRow& r : rows)
-    if (r.non_finite)
-      throw error_of(*r.non_finite, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", r.scene,
-                                                r.mode, r.constraints, r.iterations, r.substeps));
-  if (!whole)
-    throw Error("interrupted", fmt::format("after {} rows", rows.size()), "what was finished is written", 1);
-  return 0;
+      "{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing waits "
+      "between frames\nat least {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n\n",
+      options.frames, options.warm_up, options.repeats, number(limits, "dispatch_us"),
+      number(limits, "copy_gb_s"));
+  print_table(table);
+  const ordered_json document = run_sweep(sweep);
+  write_sweep(sweep, options.out, document);
+  const auto& rows = document["rows"];
+  return std::all_of(rows.begin(), rows.end(), [](const auto& row) { return row["finite"] == true; }) ? 0 : 1;
 }
 
 }  // namespace tetpbd

@@ -16,28 +16,17 @@ struct Series {
 struct Chart {
   std::string title, subtitle, x_label, y_label;
   bool log_x = false, log_y = false;
-  std::vector<Series> series;
+  std::vector<Series> series{};
   struct Note {
     double x, y;
     std::string text;
   };
-  std::vector<Note> notes;
-};
-
-/// Groups of bars, one bar a series in each; values by [series][group], NaN leaves a gap.
-struct BarChart {
-  std::string title, subtitle, y_label;
-  bool log_y = true;
-  std::vector<std::string> groups;
-  struct Bars {
-    std::string name, colour;
-    std::vector<double> values;
-  };
-  std::vector<Bars> series;
+  std::vector<Note> notes{};
+  /// Bars instead, in groups, one a series in each: y by group, NaN leaves a gap.
+  std::vector<std::string> groups{};
 };
 
 std::string to_svg(const Chart& chart);
-std::string to_svg(const BarChart& chart);
 
 /// The colour of a solver mode; palette_colour(k): of anything else, in order.
 std::string mode_colour(const std::string& mode);

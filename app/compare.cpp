@@ -1,58 +1,43 @@
-#include "app/compare.h"
-
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
-#include <nlohmann/json.hpp>
+#include <limits>
 
 #include "app/chart.h"
 #include "app/files.h"
-#include "app/measure_run.h"
-#include "app/progress.h"
+#include "app/lab.h"
+#include "app/statistics.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
 
 namespace tetpbd {
 
-using nlohmann::ordered_json;
-
 namespace {
 
-// Columns of compare.csv in order; a row is a JSON object with these keys (null: not a number).
-const std::vector<std::string> columns = {"scene",
-                                          "mode",
-                                          "omega",
-                                          "iterations",
-                                          "substeps",
-                                          "vertices",
-                                          "tets",
-                                          "gpu_ms_per_step",
-                                          "wall_ms_per_step",
-                                          "max_volume_loss_percent",
-                                          "tet_volume_rms",
-                                          "stretch_rms",
-                                          "rigid_distance",
-                                          "reference_distance",
-                                          "linear_drift",
-                                          "angular_drift",
-                                          "inverted_tets",
-                                          "finite",
-                                          "pareto"};
+const std::vector<std::string> columns = split(
+    "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,max_volume_loss_"
+    "percent,"
+    "tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,angular_drift,inverted_tets,"
+    "finite,"
+    "pareto",
+    ',');
+constexpr const char* table =
+    "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
+    "wall_ms_per_step:wall-ms 11, "
+    "max_volume_loss_percent:loss-% 11, rigid_distance 16, reference_distance:one-step 11, pareto 8";
 
 /// What a step costs: GPU time, or wall time where the CPU does the work.
 double cost_ms(const ordered_json& row) {
-  const auto& gpu = row["gpu_ms_per_step"];
-  return gpu.is_number() ? gpu.get<double>() : row["wall_ms_per_step"].get<double>();
+  const double gpu = number(row, "gpu_ms_per_step");
+  return gpu > 0 ? gpu : number(row, "wall_ms_per_step");
 }
+
 double loss(const ordered_json& row) {
-  const auto& value = row["max_volume_loss_percent"];
-  return value.is_number() && row["finite"] == true ? std::max(0.0, value.get<double>())
-                                                    : std::numeric_limits<double>::infinity();
+  const double value = number(row, "max_volume_loss_percent");
+  return row["finite"] == true && std::isfinite(value) ? std::max(0.0, value)
+                                                       : std::numeric_limits<double>::infinity();
 }
 
 /// One step from the rest shape stretched by 5 % without gravity or ground: the exact answer is the rest
@@ -62,13 +47,12 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
     if (!(w > 0)) return std::nan("");  // a clamped body has another answer
   auto stretched = std::make_shared<Model>(*model);
   for (const Body& body : stretched->bodies) {
-    std::vector<glm::dvec3> shape(
-        model->rest.positions.begin() + std::ptrdiff_t(body.first_vertex),
-        model->rest.positions.begin() + std::ptrdiff_t(body.first_vertex + body.vertices));
-    const double middle = bounds(shape).centre().y;
-    for (std::size_t i = 0; i < shape.size(); ++i) {
-      shape[i].y = middle + 1.05 * (shape[i].y - middle);
-      stretched->positions[body.first_vertex + i] = shape[i];
+    const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
+    const auto& rest = model->rest.positions;
+    const double middle = bounds({rest.begin() + first, rest.begin() + end}).centre().y;
+    for (auto v = std::size_t(first); v < std::size_t(end); ++v) {
+      stretched->positions[v] = rest[v];
+      stretched->positions[v].y = middle + 1.05 * (rest[v].y - middle);
     }
   }
   std::fill(stretched->velocities.begin(), stretched->velocities.end(), glm::dvec3(0));
@@ -77,48 +61,36 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   settings.ground = false;
   Sim sim = create_sim(stretched, settings);
   Metrics metrics = create_metrics(*stretched, sim.system);
-  const double before = measure_now(metrics, sim).rigid_distance;
-  step(sim);
-  if (check_finite(sim, true)) return std::nan("");
-  return measure_now(metrics, sim).rigid_distance / before;
+  const MeasuredRun run = run_loop(sim, &metrics, 1);
+  if (!run.errors.finite || interrupted()) return std::nan("");
+  return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }
 
-ordered_json run_one(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings,
-                     long steps) {
+ordered_json row_of(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings,
+                    long steps) {
   Sim sim = create_sim(model, settings);
   Metrics metrics = create_metrics(*model, sim.system);
-  const MeasuredRun run = measure_run(sim, metrics, steps);
-  if (run.errors.non_finite) {
-    const std::string where =
-        fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", mode_word(settings), settings.omega,
-                    settings.iterations, settings.substeps);
-    fmt::print(stderr, "tetpbd: {}\n", error_of(*run.errors.non_finite, where).what());
-  }
-  const Measurement last = run.errors.last.value_or(nothing_measured());  // of the last good step
-  ordered_json row;
-  row["scene"] = scene.name;
-  row["mode"] = mode_word(settings);
-  row["omega"] = settings.omega;
-  row["iterations"] = settings.iterations;
-  row["substeps"] = settings.substeps;
-  row["vertices"] = model->positions.size();
-  row["tets"] = model->rest.tets.size();
-  row["gpu_ms_per_step"] = run.timing.gpu_ms.values.empty()
-                               ? ordered_json()
-                               : json_number(percentiles(run.timing.gpu_ms.values).median);
-  row["wall_ms_per_step"] = json_number(percentiles(run.timing.wall_ms.values).median);
-  row["max_volume_loss_percent"] = json_number(run.errors.max_volume_loss_percent);
-  row["tet_volume_rms"] = json_number(last.tet_volume_rms);
-  row["stretch_rms"] = json_number(last.stretch_rms);
-  row["bend_rms_rad"] = json_number(last.bend_rms_rad);
-  row["rigid_distance"] = json_number(last.rigid_distance);
-  row["reference_distance"] = json_number(remaining_after_one_step(model, settings));
-  row["linear_drift"] = json_number(run.errors.linear_drift);
-  row["angular_drift"] = json_number(run.errors.angular_drift);
-  row["inverted_tets"] = json_number(last.inverted_tets);
-  row["finite"] = run.errors.finite;
-  row["non_finite"] = non_finite_json(run.errors.non_finite);
-  row["pareto"] = false;
+  const MeasuredRun run = run_loop(sim, &metrics, steps);
+  say_non_finite(run, fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", mode_word(settings),
+                                  settings.omega, settings.iterations, settings.substeps));
+  const auto median = [](const Samples& samples) {
+    return samples.values.empty() ? std::nan("") : percentiles(samples.values).median;
+  };
+  ordered_json row = {{"scene", scene.name},
+                      {"mode", mode_word(settings)},
+                      {"omega", settings.omega},
+                      {"iterations", settings.iterations},
+                      {"substeps", settings.substeps},
+                      {"vertices", model->positions.size()},
+                      {"tets", model->rest.tets.size()},
+                      {"gpu_ms_per_step", median(run.gpu_ms)},
+                      {"wall_ms_per_step", median(run.wall_ms)},
+                      {"reference_distance", remaining_after_one_step(model, settings)},
+                      {"finite", run.errors.finite},
+                      {"non_finite", non_finite_json(run.errors.non_finite)},
+                      {"pareto", false}};
+  row.update(error_json(run.errors));
+  row.update(drift_json(run.errors));
   return row;
 }
 
@@ -136,189 +108,50 @@ void mark_front(ordered_json& rows) {
   }
 }
 
-std::string setting_name(const ordered_json& row) {
-  const std::string omega =
-      row["omega"] == Settings{}.omega ? "" : fmt::format(", omega {}", row["omega"].dump());
-  return fmt::format("{} {} it x {} sub{}", row["mode"].get<std::string>(), row["iterations"].get<int>(),
-                     row["substeps"].get<int>(), omega);
-}
-
 Chart chart_of(const ordered_json& document) {
-  Chart chart;
   const auto& rows = document["rows"];
-  chart.title = fmt::format("Speed against error: {}", rows[0]["scene"].get<std::string>());
-  chart.subtitle =
-      fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps", rows[0]["tets"].get<long>(),
-                  document["steps"].get<long>(), document["dt"].get<double>(),
-                  document["device"]["gl_renderer"].get<std::string>());
+  Chart chart;
+  chart.title = "Speed against error: " + text_of(rows[0]["scene"]);
+  chart.subtitle = fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
+                               text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
+                               text_of(document["device"]["gl_renderer"]));
   chart.x_label = "time of a step, ms (GPU time; cpu modes: wall time)";
   chart.y_label = "largest volume loss, %";
   chart.log_x = chart.log_y = true;
+  std::vector<ordered_json> sorted(rows.begin(), rows.end());
+  std::sort(sorted.begin(), sorted.end(), [](auto& a, auto& b) { return cost_ms(a) < cost_ms(b); });
   Series front{"Pareto front", "#999999", {}, {}, true, false, true};
-  std::vector<const ordered_json*> best;
-  for (const auto& row : rows)
-    if (row["pareto"] == true) best.push_back(&row);
-  std::sort(best.begin(), best.end(), [](auto* a, auto* b) { return cost_ms(*a) < cost_ms(*b); });
-  for (const auto* row : best) {
-    front.x.push_back(cost_ms(*row)), front.y.push_back(loss(*row));
-    chart.notes.push_back(
-        {cost_ms(*row), loss(*row),
-         fmt::format("{} x {}", (*row)["iterations"].get<int>(), (*row)["substeps"].get<int>())});
-  }
-  for (const auto& row : rows) {
-    if (!std::isfinite(loss(row))) continue;
-    const std::string mode = row["mode"];
+  for (const auto& row : sorted) {
+    const double x = cost_ms(row), y = loss(row);
+    if (!std::isfinite(y)) continue;
+    if (row["pareto"] == true) {
+      front.x.push_back(x), front.y.push_back(y);
+      chart.notes.push_back({x, y, text_of(row["iterations"]) + " x " + text_of(row["substeps"])});
+    }
+    const std::string mode = text_of(row["mode"]);
     auto series = std::find_if(chart.series.begin(), chart.series.end(),
                                [&](const Series& other) { return other.name == mode; });
     if (series == chart.series.end())
       series = chart.series.insert(series, {mode, mode_colour(mode), {}, {}, false, true, false});
-    series->x.push_back(cost_ms(row)), series->y.push_back(loss(row));
+    series->x.push_back(x), series->y.push_back(y);
   }
   chart.series.push_back(front);
   return chart;
 }
 
-// Whatever stands in the file, what follows finds the keys and types it looks for.
-bool is_comparison(const ordered_json& part) {
-  const auto has = [](const ordered_json& object, const char* key, auto type) {
-    return object.is_object() && object.contains(key) && (object.at(key).*type)();
-  };
-  using J = ordered_json;
-  const auto is_row = [&](const ordered_json& row) {
-    for (const std::string& column : columns)
-      if (!row.is_object() || !row.contains(column)) return false;
-    for (const char* key : {"omega", "gpu_ms_per_step", "wall_ms_per_step", "max_volume_loss_percent"})
-      if (!row[key].is_number() && !row[key].is_null()) return false;
-    return has(row, "scene", &J::is_string) && has(row, "mode", &J::is_string) &&
-           has(row, "iterations", &J::is_number_integer) && has(row, "substeps", &J::is_number_integer) &&
-           has(row, "tets", &J::is_number_integer) && has(row, "finite", &J::is_boolean) &&
-           (row["gpu_ms_per_step"].is_number() || row["wall_ms_per_step"].is_number());
-  };
-  if (!has(part, "steps", &J::is_number_integer) || !has(part, "dt", &J::is_number) ||
-      !has(part, "combinations", &J::is_number_unsigned) || !has(part, "shards", &J::is_number_integer) ||
-      !has(part, "shard", &J::is_array) || !has(part, "device", &J::is_object) ||
-      !has(part, "rows", &J::is_array) || !has(part["device"], "gl_renderer", &J::is_string) ||
-      !has(part["device"], "software", &J::is_boolean))
-    return false;
-  return std::all_of(part["shard"].begin(), part["shard"].end(),
-                     [](const J& s) { return s.is_number_integer(); }) &&
-         std::all_of(part["rows"].begin(), part["rows"].end(), is_row);
-}
-
-ordered_json merged(const std::vector<std::filesystem::path>& folders) {
-  ordered_json document;
-  for (const auto& folder : folders) {
-    std::ifstream stream(folder / "compare.json");
-    const auto shallow = [](int depth, ordered_json::parse_event_t, ordered_json&) { return depth < 16; };
-    const ordered_json part = ordered_json::parse(stream, shallow, false);
-    if (!is_comparison(part))
-      throw Error("not a finished comparison", (folder / "compare.json").string(), "run that shard again");
-    if (document.is_null()) {
-      document = part;
-      continue;
-    }
-    // Shards of one command, or whole comparisons: other modes and other numbers of substeps.
-    const bool whole = part["shards"] == 1 && document["shards"] == 1;
-    for (const char* key : {"steps", "dt", "combinations", "shards"})
-      if (part[key] != document[key] && !(whole && key == std::string_view("combinations")))
-        throw Error("these shards differ", fmt::format("'{}' in {}", key, folder.string()),
-                    "merge runs of one command");
-    if (part["device"] != document["device"])
-      throw Error("these shards ran on different devices", folder.string(),
-                  "times can only be compared on one kind of GPU");
-    for (const auto& row : part["rows"]) {
-      for (const auto& other : document["rows"]) {
-        if (row["scene"] != other["scene"])
-          throw Error("these are of different scenes", folder.string(), "merge comparisons of one scene");
-        if (setting_name(row) == setting_name(other))
-          throw Error("a setting is in two of these",
-                      fmt::format("{}: {}", folder.string(), setting_name(row)), "name each folder once");
-      }
-    }
-    for (const auto& row : part["rows"]) document["rows"].push_back(row);
-    if (whole)
-      document["combinations"] =
-          document["combinations"].get<std::size_t>() + part["combinations"].get<std::size_t>();
-    else
-      for (const auto& shard : part["shard"]) document["shard"].push_back(shard);
-  }
-  auto shards = document["shard"].get<std::vector<int>>();
-  std::sort(shards.begin(), shards.end());
-  if (std::adjacent_find(shards.begin(), shards.end()) != shards.end())
-    throw Error("a shard was given twice", fmt::format("--merge, shards {}", fmt::join(shards, ", ")),
-                "name each folder once");
-  if (document["rows"].size() < document["combinations"].get<std::size_t>())
-    std::fputs(fmt::format("tetpbd: only {} of {} combinations: shards {} of {}\n", document["rows"].size(),
-                           document["combinations"].get<std::size_t>(), fmt::join(shards, ", "),
-                           document["shards"].get<int>())
-                   .c_str(),
-               stderr);
-  return document;
-}
-
-ordered_json measured(const CompareOptions& options) {
-  Scene scene = load_scene(options.scene, options.overrides);
-  std::vector<Settings> combinations;
-  for (const std::string& mode : options.modes)
-    for (double omega : options.omegas.empty() ? std::vector<double>{scene.settings.omega} : options.omegas)
-      for (int iterations : options.iterations)
-        for (int substeps : options.substeps) {
-          Settings settings = scene.settings;
-          set_mode(settings, mode, "--modes");
-          settings.omega = omega, settings.iterations = iterations, settings.substeps = substeps;
-          settings.omega = effective_omega(settings);
-          if (std::find(combinations.begin(), combinations.end(), settings) == combinations.end())
-            combinations.push_back(settings);  // two omegas beyond what handles allow are one
-        }
-  const auto model = build_model(scene);
-  HeadlessContext context(options.gpu);
-  const Capabilities& device = context.capabilities();
-  ordered_json rows = ordered_json::array();
-  Progress progress("compare", long(combinations.size()) / options.shards);
-  for (std::size_t i = std::size_t(options.shard - 1); i < combinations.size();
-       i += std::size_t(options.shards)) {
-    try {
-      rows.push_back(run_one(scene, model, combinations[i], options.steps));
-    } catch (const Interrupted&) {
-      break;  // the finished rows are written; merging says how many there should be
-    }
-    progress.update(long(rows.size()));
-  }
-  return {{"device", device_json(device)},
-          {"steps", options.steps},
-          {"dt", scene.settings.dt},
-          {"combinations", combinations.size()},
-          {"shard", std::vector<int>{options.shard}},
-          {"shards", options.shards},
-          {"rows", rows}};
-}
-
-void print_choice(const ordered_json& rows, const CompareOptions& options) {
-  // The better of two by `first`, then by `second`; rows that do not qualify are left out.
-  const auto best = [&](auto qualifies, auto first, auto second) -> const ordered_json* {
-    const ordered_json* found = nullptr;
-    for (const auto& row : rows)
-      if (std::isfinite(loss(row)) && qualifies(row) &&
-          (!found || std::pair(first(row), second(row)) < std::pair(first(*found), second(*found))))
-        found = &row;
-    return found;
-  };
-  if (options.budget_ms) {
-    const double budget = *options.budget_ms;
-    if (const auto* row = best([&](const auto& r) { return cost_ms(r) <= budget; }, loss, cost_ms))
-      fmt::print("best within {:g} ms a step: {} ({:.3g} ms, loss {:.3g} %)\n", budget, setting_name(*row),
-                 cost_ms(*row), loss(*row));
-    else
-      fmt::print("nothing measured stays within {:g} ms a step\n", budget);
-  }
-  if (options.error_percent) {
-    const double error = *options.error_percent;
-    if (const auto* row = best([&](const auto& r) { return loss(r) <= error; }, cost_ms, loss))
-      fmt::print("cheapest with a loss of at most {:g} %: {} ({:.3g} ms, loss {:.3g} %)\n", error,
-                 setting_name(*row), cost_ms(*row), loss(*row));
-    else
-      fmt::print("nothing measured loses at most {:g} %\n", error);
-  }
+/// The row within a limit that is best by something else.
+template <class Limited, class Judged>
+void print_best(const ordered_json& rows, const std::string& what, double limit, const Limited& limited,
+                const Judged& judged) {
+  const ordered_json* best = nullptr;
+  for (const auto& row : rows)
+    if (std::isfinite(loss(row)) && limited(row) <= limit &&
+        (!best || std::pair(judged(row), limited(row)) < std::pair(judged(*best), limited(*best))))
+      best = &row;
+  if (!best) return fmt::print("{}: nothing measured is\n", what);
+  fmt::print("{}: {}, {} it x {} sub, omega {} ({:.3g} ms, loss {:.3g} %)\n", what, text_of((*best)["mode"]),
+             text_of((*best)["iterations"]), text_of((*best)["substeps"]), text_of((*best)["omega"]),
+             cost_ms(*best), loss(*best));
 }
 
 }  // namespace
@@ -326,41 +159,38 @@ void print_choice(const ordered_json& rows, const CompareOptions& options) {
 int run_compare(const CompareOptions& options) {
   catch_interrupts();
   make_output_folder(options.out);
-  ordered_json document = options.merge.empty() ? measured(options) : merged(options.merge);
-  ordered_json& rows = document["rows"];
-  if (rows.empty() && interrupted())
-    throw Error("interrupted", "before the first row", "nothing was written", 1);
-  if (rows.empty())
-    throw Error("nothing to compare", fmt::format("--shard {}/{}", options.shard, options.shards),
-                "there are fewer combinations than shards");
-  mark_front(rows);
-  if (document["device"]["software"] == true)
-    fmt::print("{}: a SOFTWARE renderer on the CPU. These are not a GPU's numbers.\n",
-               document["device"]["gl_renderer"].get<std::string>());
-  fmt::print("{:<14}{:>7}{:>6}{:>6}{:>12}{:>10}{:>12}{:>12}{:>12}\n", "mode", "omega", "iter", "sub",
-             "ms a step", "loss %", "rigid dist", "one step", "front");
-  for (const auto& row : rows) {
-    const auto value = [&](const char* key) {
-      return row[key].is_number() ? fmt::format("{:.4g}", row[key].get<double>()) : std::string("-");
-    };
-    fmt::print("{:<14}{:>7}{:>6}{:>6}{:>12.4g}{:>10}{:>12}{:>12}{:>12}\n", row["mode"].get<std::string>(),
-               value("omega"), value("iterations"), value("substeps"), cost_ms(row),
-               std::isfinite(loss(row)) ? fmt::format("{:.3g}", loss(row)) : "-", value("rigid_distance"),
-               value("reference_distance"), row["pareto"] == true ? "*" : "");
+  Sweep sweep{"compare", "comparison", columns, 5, table, {{"steps", options.steps}, {"dt", 0.005}}};
+  std::optional<HeadlessContext> context;
+  Scene scene;
+  std::shared_ptr<const Model> model;
+  std::vector<Settings> all;
+  if (options.merge.empty()) {
+    scene = load_scene(options.scene, options.overrides);
+    all = combinations(scene.settings,
+                       {options.modes, {}, options.omegas, options.iterations, options.substeps});
+    model = build_model(scene);
+    context.emplace(options.gpu);
+    sweep.facts["dt"] = scene.settings.dt;
+    sweep.facts["device"] = device_json(context->capabilities());
+    sweep.combinations = all.size();
+    sweep.make = [&](std::size_t i) { return std::vector{row_of(scene, model, all[i], options.steps)}; };
   }
+  ordered_json document = run_sweep(sweep, {options.shard, options.shards, options.merge});
+  ordered_json& rows = document["rows"];
+  mark_front(rows);
+  print_device(document["device"]);
+  print_table(table, rows);
   if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return loss(row) == 0; }))
     fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
-               document["steps"].get<long>());
-  write_file(options.out / "compare.json", json_text(document, 1) + "\n");
-  write_file(options.out / "compare.csv", csv_text(columns, rows));
+               text_of(document["steps"]));
+  if (options.budget_ms)
+    print_best(rows, fmt::format("best within {:g} ms a step", *options.budget_ms), *options.budget_ms,
+               cost_ms, loss);
+  if (options.error_percent)
+    print_best(rows, fmt::format("cheapest with a loss of at most {:g} %", *options.error_percent),
+               *options.error_percent, loss, cost_ms);
   write_chart(options.out / "compare", to_svg(chart_of(document)));
-  print_choice(rows, options);
-  fmt::print("{}\n", (options.out / "compare.csv").string());
-  if (interrupted())
-    throw Error(
-        "interrupted",
-        fmt::format("after {} of {} combinations", rows.size(), document["combinations"].get<std::size_t>()),
-        "what was finished is written", 1);
+  write_sweep(sweep, options.out, document);
   return 0;
 }
 

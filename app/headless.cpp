@@ -1,75 +1,95 @@
-#include "app/headless.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <optional>
+#include <deque>
+#include <memory>
 
-#include "app/auto_solver.h"
 #include "app/files.h"
-#include "app/progress.h"
+#include "app/lab.h"
 #include "app/statistics.h"
+#include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/metrics.h"
 
 namespace tetpbd {
 
 namespace {
 
-/// Draws what a run asked for and writes it as it arrives.
+/// Draws what a run asked for and writes it as it arrives, up to two frames late.
 struct FrameWriter {
   const RunOptions& options;
-  Camera camera;
+  Frame frame;
   Renderer renderer;
   Target target;
-  long drawn = 0;  ///< step of the last frame
+  long video_every;  ///< steps
+  double dt;         ///< s
+  long drawn = 0;    ///< step of the last frame
   std::optional<Video> video;
   ReadBack read_back;
   struct Use {
-    long png_step;
+    long png_step;  ///< below 0: none
     bool video;
   };
-  std::deque<Use> uses;
+  std::deque<Use> uses{};
 
-  FrameWriter(const RunOptions& run, Camera view, Renderer with, Target to)
-      : options(run), camera(view), renderer(std::move(with)), target(std::move(to)) {}
-
-  void draw_frame(const Sim& sim, long png_step, bool to_video) {
-    draw(renderer, frame_of(sim, camera, options.view, target));
+  void draw_frame(long s) {
+    const bool png = options.png_every > 0 && s % options.png_every == 0;
+    const bool film = video && s % video_every == 0;
+    if (!png && !film) return;
+    draw(renderer, frame);
     if (const auto centre = poll_centre(renderer, true))  // for the next frame
-      follow(camera, *centre, float(double(sim.steps - drawn) * sim.settings.dt));
-    drawn = sim.steps;
+      follow(frame.camera, *centre, float(double(s - drawn) * dt));
+    drawn = s;
     read_back.push(target);
-    uses.push_back({png_step, to_video});
-    while (uses.size() > 2) write_one(true);
+    uses.push_back({png ? s : -1, film});
+    if (uses.size() > 2) write_one();
   }
 
-  bool write_one(bool wait) {
-    const auto image = read_back.poll(wait);
-    if (!image) return false;
+  void write_one() {
+    const Image image = *read_back.poll(true);
     const Use use = uses.front();
     uses.pop_front();
-    if (use.png_step >= 0) write_png(options.out / fmt::format("frame_{:05}.png", use.png_step), *image);
-    if (use.video) video->add(*image);
-    return true;
+    if (use.png_step >= 0) write_png(options.out / fmt::format("frame_{:05}.png", use.png_step), image);
+    if (use.video) video->add(image);
   }
 
   void finish() {
-    while (!uses.empty() && write_one(true)) {
-    }
+    while (!uses.empty()) write_one();
     if (video) video->close();
   }
 };
 
+std::unique_ptr<FrameWriter> frame_writer(const Scene& scene, const Sim& sim, const RunOptions& options) {
+  if (options.png_every == 0 && options.video.empty()) return nullptr;
+  const double dt = scene.settings.dt;
+  const long video_every =
+      options.video_every > 0 ? options.video_every : std::max(1L, std::lround(1.0 / 30 / dt));
+  const Camera camera = scene_camera(scene, *sim.model, float(options.width) / float(options.height));
+  Target target = make_target(options.width, options.height, options.samples);
+  const Frame frame = frame_of(sim, camera, options.view, target);
+  std::unique_ptr<FrameWriter> frames(new FrameWriter{
+      options, frame, make_renderer(*sim.model), std::move(target), video_every, dt, 0, {}, {}});
+  if (!options.video.empty()) {
+    const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
+    frames->video.emplace(options.video, options.width, options.height, rate);
+  }
+  return frames;
+}
+
+void write_positions(const Sim& sim, const std::filesystem::path& out) {
+  std::vector<glm::vec3> positions;
+  for (const glm::dvec3& p : in_original_order(*sim.model, read_state(sim).positions))
+    positions.emplace_back(p);
+  write_npy(out / "positions.npy", positions);
+  write_npy(out / "tets.npy", original_tets(*sim.model));
+}
+
 }  // namespace
 
 int run_headless(Scene scene, const RunOptions& options) {
-  using Clock = std::chrono::steady_clock;
   catch_interrupts();
   make_output_folder(options.out);
   const auto model = build_model(scene);
@@ -79,88 +99,43 @@ int run_headless(Scene scene, const RunOptions& options) {
   Tuning tuning = tuning_from_environment();
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
-  sim.timed = true;
   Metrics metrics = create_metrics(*model, sim.system);
   const long steps =
       options.steps > 0 ? options.steps : std::max(1L, std::lround(scene.duration / scene.settings.dt));
-  const long video_every =
-      options.video_every > 0 ? options.video_every : std::max(1L, std::lround(1.0 / 30 / scene.settings.dt));
-
-  std::optional<FrameWriter> frames;
-  if (options.png_every > 0 || !options.video.empty()) {
-    frames.emplace(options, scene_camera(scene, *model, float(options.width) / float(options.height)),
-                   make_renderer(*model), make_target(options.width, options.height, options.samples));
-    if (!options.video.empty()) {
-      const int rate = std::clamp(int(std::lround(1 / (double(video_every) * scene.settings.dt))), 1, 120);
-      frames->video.emplace(options.video, options.width, options.height, rate);
-    }
-  }
-
+  auto frames = frame_writer(scene, sim, options);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
-  RunErrors errors;
-  Timing timing;
-  const auto take = [&](const std::optional<Measurement>& measurement) {
-    if (!measurement) return false;
-    add_measurement(errors, *measurement, sim);
-    if (csv && measurement->step % options.csv_every == 0) csv->add(csv_row(*measurement, errors));
-    return true;
-  };
+
+  MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
-    measure(metrics, sim);
-    if (frames && !check_finite(sim))
-      frames->draw_frame(sim, options.png_every > 0 ? 0 : -1, bool(frames->video));
-    for (long s = 1; s <= steps && !interrupted() && !check_finite(sim); ++s) {
-      const auto begin = Clock::now();
-      step(sim);
-      if (sim.solver.step_on_cpu == nullptr) glFinish();  // wall time of the work itself, not of queueing it
-      const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-      const bool bad = check_finite(sim, true).has_value();  // the step is done, so this waits for nothing
-      if (bad || s % options.measure_every == 0 || s == steps) measure(metrics, sim);
-      if (bad) break;
-      timing.wall_ms.add(seconds * 1e3);
-      timing.total_s += seconds;
-      while (const auto ms = sim.timer.poll()) timing.gpu_ms.add(*ms);
-      while (take(collect(metrics))) {
-      }
-      if (frames) {
-        const bool png = options.png_every > 0 && s % options.png_every == 0;
-        const bool film = frames->video && s % video_every == 0;
-        if (png || film) frames->draw_frame(sim, png ? s : -1, film);
-      }
-      progress.update(s);
-    }
+    RunPlan plan{.measure_every = options.measure_every, .progress = &progress};
+    plan.measured = [&](const Measurement& measurement, const RunErrors& errors) {
+      if (csv && measurement.step % options.csv_every == 0) csv->add(csv_row(measurement, errors));
+    };
+    plan.stepped = [&](long s) {
+      if (frames) frames->draw_frame(s);
+      return true;
+    };
+    if (!check_finite(sim)) plan.stepped(0);
+    run = run_loop(sim, &metrics, steps, plan);
   }
-  while (take(collect(metrics, true))) {
-  }
-  while (const auto ms = sim.timer.poll(true)) timing.gpu_ms.add(*ms);
   if (frames) frames->finish();
-  errors.non_finite = check_finite(sim, true);
-  errors.finite = errors.finite && !errors.non_finite;
-  const bool good = !errors.non_finite || restore_checkpoint(sim);
-  write_file(
-      options.out / "stats.json",
-      statistics_json(scene, sim, context.capabilities(), report(model->rest), timing, errors,
-                      guard_counts(sim), good ? std::optional(state_hash(sim)) : std::nullopt, choice));
+  const bool good = !run.errors.non_finite || restore_checkpoint(sim);
+  const auto hash = good ? std::optional(state_hash(sim)) : std::nullopt;
+  write_file(options.out / "stats.json",
+             statistics_json(scene, sim, context.capabilities(), run, guard_counts(sim), hash, choice));
   if (csv) csv->close();
-  if (options.positions && good) {
-    std::vector<glm::vec3> positions;
-    for (const glm::dvec3& p : in_original_order(*model, read_state(sim).positions))
-      positions.emplace_back(p);
-    write_npy(options.out / "positions.npy", positions);
-    write_npy(options.out / "tets.npy", original_tets(*model));
-  }
+  if (options.positions && good) write_positions(sim, options.out);
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
-             sim.steps, context.capabilities().renderer, errors.max_volume_loss_percent,
-             percentiles(timing.wall_ms.values).median, (options.out / "stats.json").string());
+             sim.steps, context.capabilities().renderer, run.errors.max_volume_loss_percent,
+             percentiles(run.wall_ms.values).median, (options.out / "stats.json").string());
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);
-  if (errors.non_finite) throw error_of(*errors.non_finite);
-  if (!errors.finite)
-    throw Error("a measurement is not finite",
-                fmt::format("after step {}", errors.last ? errors.last->step : 0),
+  if (run.errors.non_finite) throw error_of(*run.errors.non_finite);
+  if (!run.errors.finite)
+    throw Error("a measurement is not finite", fmt::format("after step {}", run.steps),
                 "use a smaller --dt, more --substeps or a lower stiffness", 1);
   return 0;
 }

@@ -13,15 +13,10 @@
 #include <sstream>
 #include <tuple>
 
-#include "app/bench.h"
 #include "app/command_line.h"
-#include "app/compare.h"
-#include "app/hard_cases.h"
-#include "app/headless.h"
+#include "app/lab.h"
 #include "app/mesh_command.h"
-#include "app/reproduce.h"
 #include "app/scene.h"
-#include "app/soak.h"
 #include "app/window.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"

@@ -1,5 +1,3 @@
-#include "app/soak.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -7,19 +5,15 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
-#include "app/auto_solver.h"
 #include "app/files.h"
-#include "app/progress.h"
+#include "app/lab.h"
 #include "app/statistics.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
-#include "sim/metrics.h"
+#include "sim/interrupt.h"
 
 namespace tetpbd {
-
-using nlohmann::ordered_json;
 
 namespace {
 
@@ -37,149 +31,115 @@ double resident_bytes() {
   return resident * double(sysconf(_SC_PAGESIZE));
 }
 
-/// The run at one of its steps, counted from the end of settling.
-struct Sample {
-  long step = 0;
-  double seconds = 0;
-  Measurement measurement;
-  double resident = 0;
-  GlLive gl;
-};
-
-struct Watch {
-  std::vector<Sample> samples;  ///< the first at step 0
-  double size = 1;              ///< m
-  double largest_shift = 0;     ///< m, of a vertex from start to end
-
-  double drift(const Sample& sample) const {
-    return glm::length(sample.measurement.centre - samples.front().measurement.centre) / size;
-  }
-  const Sample& at(double part) const {
-    const long step = std::lround(part * double(samples.back().step));
-    return *std::find_if(samples.begin(), samples.end(), [&](const Sample& s) { return s.step >= step; });
-  }
-  double speed(const Sample& from, const Sample& to) const {
-    return to.seconds > from.seconds ? double(to.step - from.step) / (to.seconds - from.seconds) : 0;
-  }
-};
-
-// Steps are queued, never waited for one by one; the GPU is at most two samples behind.
-Watch watch_rest(Sim& sim, Metrics& metrics, const SoakOptions& options) {
-  using Clock = std::chrono::steady_clock;
-  Progress progress("stepping", options.settle + options.steps, options.progress);
-  const long every = std::max(1L, options.steps / most_samples);
-  for (long s = 1; s <= options.settle; ++s) {
-    step(sim);
-    if (s % every == 0) measure_now(metrics, sim), progress.update(s);
-  }
-  Watch watch;
-  watch.size = sim.model->size;
-  const State before = read_state(sim);
-  const Measurement start = measure_now(metrics, sim);
-  const auto begin = Clock::now();
-  watch.samples.push_back({0, 0, start, resident_bytes(), gl_live()});
-  const auto take = [&] {
-    const auto measurement = collect(metrics, true);
-    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    watch.samples.push_back(
-        {measurement->step - start.step, seconds, *measurement, resident_bytes(), gl_live()});
-    return measurement->finite();
-  };
-  bool finite = start.finite();
-  for (long s = 1; s <= options.steps && finite; ++s) {
-    step(sim);
-    if (s % every != 0 && s != options.steps) continue;
-    measure(metrics, sim);
-    if (metrics.pending.size() > 1) finite = take();
-    progress.update(options.settle + s);
-  }
-  while (!metrics.pending.empty()) take();
-  const State after = read_state(sim);
-  for (std::size_t i = 0; i < before.positions.size(); ++i)
-    watch.largest_shift =
-        std::max(watch.largest_shift, glm::length(after.positions[i] - before.positions[i]));
-  return watch;
+/// The run at one of its steps, counted from the end of settling: a row of soak.csv.
+ordered_json sample_of(const Measurement& m, const Measurement& start, double size, double seconds) {
+  return {{"step", m.step - start.step},
+          {"seconds", seconds},
+          {"centre_x", m.centre.x},
+          {"centre_y", m.centre.y},
+          {"centre_z", m.centre.z},
+          {"drift", glm::length(m.centre - start.centre) / size},
+          {"kinetic_energy", m.kinetic},
+          {"resident_bytes", resident_bytes()},
+          {"gl_buffer_bytes", gl_live().buffer_bytes}};
 }
 
-std::string csv_of(const Watch& watch) {
-  std::string csv =
-      "step,seconds,centre_x,centre_y,centre_z,drift,kinetic_energy,resident_bytes,gl_buffer_bytes\n";
-  for (const Sample& s : watch.samples) {
-    const Measurement& m = s.measurement;
-    csv +=
-        fmt::format("{},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{:.0f},{}\n", s.step, s.seconds, m.centre.x,
-                    m.centre.y, m.centre.z, watch.drift(s), m.kinetic, s.resident, s.gl.buffer_bytes);
-  }
-  return csv;
+double steps_per_second(const ordered_json& from, const ordered_json& to) {
+  return (number(to, "step") - number(from, "step")) / (number(to, "seconds") - number(from, "seconds"));
+}
+
+double largest_shift(const State& before, const State& after) {
+  double shift = 0;
+  for (std::size_t i = 0; i < before.positions.size(); ++i)
+    shift = std::max(shift, glm::length(after.positions[i] - before.positions[i]));
+  return shift;
 }
 
 }  // namespace
 
 int run_soak(Scene scene, const SoakOptions& options) {
+  catch_interrupts();
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
   if (const auto choice = choose_for(scene, model)) fmt::print("solver: {}\n", describe(*choice));
   Sim sim = create_sim(model, scene.settings);
   Metrics metrics = create_metrics(*model, sim.system);
-  const Watch watch = watch_rest(sim, metrics, options);
+  const double size = model->size;
 
-  const Sample &first = watch.samples.front(), &last = watch.samples.back(), &tenth = watch.at(0.1);
+  // Steps are queued, never waited for one by one; the GPU is at most a ring of measurements behind.
+  Progress progress("stepping", options.steps, options.progress);
+  RunPlan plan{.measure_every = std::max(1L, options.steps / most_samples), .wait = false, .timed = false};
+  run_loop(sim, &metrics, options.settle, plan);
+  const State before = read_state(sim);
+  const GlLive live = gl_live();  // no measurement under way, as at the end: their fences count
+  std::vector<ordered_json> samples;
+  plan.progress = &progress;
+  const auto begin = std::chrono::steady_clock::now();
+  plan.measured = [&](const Measurement& m, const RunErrors& errors) {
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    if (m.finite()) samples.push_back(sample_of(m, *errors.first, size, seconds.count()));
+  };
+  const MeasuredRun run = run_loop(sim, &metrics, options.steps, plan);
+  if (run.errors.non_finite) throw error_of(*run.errors.non_finite);
+  if (interrupted()) throw Interrupted();
+  const GlLive live_after = gl_live();
+
+  const auto at = [&](double part) -> const ordered_json& {
+    return samples[std::size_t(std::ceil(part * double(samples.size() - 1)))];
+  };
+  const ordered_json &first = at(0), &tenth = at(0.1), &last = at(1);
   double drift = 0;
-  bool finite = true;
-  for (const Sample& s : watch.samples) {
-    drift = std::max(drift, watch.drift(s));
-    finite = finite && s.measurement.finite();
-  }
-  const double first_speed = watch.speed(first, tenth), last_speed = watch.speed(watch.at(0.9), last);
+  for (const auto& sample : samples) drift = std::max(drift, number(sample, "drift"));
+  const double first_speed = steps_per_second(first, tenth), last_speed = steps_per_second(at(0.9), last);
+  const double growth = number(last, "resident_bytes") - number(tenth, "resident_bytes");
   ordered_json checks = ordered_json::array();
   std::string failed;
   const auto check = [&](const char* name, double value, double limit, bool good) {
-    checks.push_back({{"name", name}, {"value", json_number(value)}, {"limit", limit}, {"passed", good}});
+    checks.push_back({{"name", name}, {"value", value}, {"limit", limit}, {"passed", good}});
     if (!good)
       failed += (failed.empty() ? "" : ", ") + fmt::format("{} {:.3g} (limit {:.3g})", name, value, limit);
   };
-  check("drift", drift, most_drift, finite && drift <= most_drift);
-  const double growth = last.resident - tenth.resident;
-  check("resident_growth_bytes", growth, most_growth, growth <= most_growth);
-  const double buffers = double(last.gl.buffer_bytes - first.gl.buffer_bytes);
-  check("gl_buffer_growth_bytes", buffers, 0, buffers == 0);
-  const double objects = double(last.gl.objects - first.gl.objects);
-  check("gl_object_growth", objects, 0, objects == 0);
+  const auto check_most = [&](const char* name, double value, double limit) {
+    check(name, value, limit, value <= limit);
+  };
+  check_most("drift", drift, most_drift);
+  check_most("resident_growth_bytes", growth, most_growth);
+  check_most("gl_buffer_growth_bytes", std::abs(double(live_after.buffer_bytes - live.buffer_bytes)), 0);
+  check_most("gl_object_growth", std::abs(double(live_after.objects - live.objects)), 0);
   check("speed_ratio", last_speed / first_speed, least_speed_ratio,
         last_speed >= least_speed_ratio * first_speed);
 
-  ordered_json j;
-  j["scene"] = scene.name;
-  j["mode"] = sim.settings.mode;
-  j["device"] = device_json(context.capabilities());
-  j["settle"] = options.settle;
-  j["steps"] = last.step;
-  j["size"] = watch.size;
-  j["centre"] = {{"drift", json_number(drift)}, {"final_drift", json_number(watch.drift(last))}};
-  j["largest_vertex_shift"] = json_number(watch.largest_shift / watch.size);
-  j["kinetic_energy"] = {{"start", json_number(first.measurement.kinetic)},
-                         {"end", json_number(last.measurement.kinetic)}};
-  j["resident_bytes"] = {{"start", first.resident}, {"tenth", tenth.resident}, {"end", last.resident}};
-  j["gl_buffer_bytes"] = {{"start", first.gl.buffer_bytes}, {"end", last.gl.buffer_bytes}};
-  j["gl_objects"] = {{"start", first.gl.objects}, {"end", last.gl.objects}};
-  j["steps_per_second"] = {{"first_tenth", json_number(first_speed)},
-                           {"last_tenth", json_number(last_speed)}};
-  j["finite"] = finite;
-  j["state_hash"] = fmt::format("{:016x}", state_hash(sim));
-  j["checks"] = checks;
-  j["passed"] = failed.empty();
-  write_file(options.out / "soak.csv", csv_of(watch));
-  write_file(options.out / "soak.json", json_text(j, 2) + "\n");
+  const auto both = [&](const char* key) {
+    return ordered_json{{"start", first[key]}, {"tenth", tenth[key]}, {"end", last[key]}};
+  };
+  const ordered_json document = {
+      {"scene", scene.name},
+      {"mode", sim.settings.mode},
+      {"device", device_json(context.capabilities())},
+      {"settle", options.settle},
+      {"steps", last["step"]},
+      {"size", size},
+      {"centre", {{"drift", drift}, {"final_drift", last["drift"]}}},
+      {"largest_vertex_shift", largest_shift(before, read_state(sim)) / size},
+      {"kinetic_energy", both("kinetic_energy")},
+      {"resident_bytes", both("resident_bytes")},
+      {"gl_buffer_bytes", both("gl_buffer_bytes")},
+      {"gl_objects", {{"start", live.objects}, {"end", live_after.objects}}},
+      {"steps_per_second", {{"first_tenth", first_speed}, {"last_tenth", last_speed}}},
+      {"finite", run.errors.finite},
+      {"state_hash", fmt::format("{:016x}", state_hash(sim))},
+      {"checks", checks},
+      {"passed", failed.empty()}};
+  const auto columns = split(
+      "step,seconds,centre_x,centre_y,centre_z,drift,kinetic_energy,resident_bytes,gl_buffer_bytes", ',');
+  write_file(options.out / "soak.csv", csv_text(columns, samples));
+  write_file(options.out / "soak.json", json_text(document, 2) + "\n");
   fmt::print(
       "{}: {} steps at rest on {}: drift {:.2g} of the size, resident {:+.1f} MiB, {:.0f} then {:.0f} steps "
-      "a "
-      "second; {}\n",
-      scene.name, last.step, context.capabilities().renderer, drift, growth / (1 << 20), first_speed,
+      "a second; {}\n",
+      scene.name, run.steps, context.capabilities().renderer, drift, growth / (1 << 20), first_speed,
       last_speed, (options.out / "soak.json").string());
-  if (!finite)
-    throw Error("the state is not finite", fmt::format("at step {} after settling", last.step),
-                "use a smaller --dt, more --substeps or a lower stiffness", 1);
   if (!failed.empty())
     throw Error("the soak test failed", failed,
                 "see soak.csv; a body that still moves needs a longer --settle", 1);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
-#include "app/measure_run.h"
+#include "app/run_loop.h"
 #include "sim/metrics.h"
 #include "sim/rotation.h"
 #include "sim/sim.h"
@@ -219,7 +219,7 @@ TEST_CASE("handles lose less volume in a fall than iterations of the same number
   const auto loss = [&](double handles) {
     Sim sim = create_sim(model, held(handles, 1, 8));
     Metrics metrics = create_metrics(*model);
-    const RunErrors errors = measure_run(sim, metrics, 120).errors;
+    const RunErrors errors = run_loop(sim, &metrics, 120).errors;
     CHECK(errors.finite);
     return errors.max_volume_loss_percent;
   };

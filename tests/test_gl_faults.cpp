@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/files.h"
-#include "app/headless.h"
-#include "app/measure_run.h"
+#include "app/lab.h"
+#include "app/run_loop.h"
 #include "app/session.h"
 #include "app/statistics.h"
 #include "render/target.h"
@@ -184,11 +184,12 @@ TEST_CASE("a measured run ends with the numbers of the last good step and never 
   for (const char* mode : {"node", "cpu"}) {
     Sim sim = create_sim(model, quick(mode));
     Metrics metrics = create_metrics(*model);
-    const MeasuredRun run = measure_run(sim, metrics, 50, [&](long s) {
+    const auto spoil_after_6 = [&](long s) {
       if (s == 6 && std::string(mode) == "cpu") sim.host.velocities[9].x = infinity;
       if (s == 6) spoil(sim, 9, true, std::numeric_limits<float>::infinity());
       return true;
-    });
+    };
+    const MeasuredRun run = run_loop(sim, &metrics, 50, {.stepped = spoil_after_6});
     REQUIRE(run.errors.non_finite);
     CHECK(run.errors.non_finite->step == 7);
     CHECK(!run.errors.finite);
@@ -196,7 +197,7 @@ TEST_CASE("a measured run ends with the numbers of the last good step and never 
     CHECK(run.errors.last->step == 6);
     CHECK(run.errors.last->finite());
     CHECK(std::isfinite(run.errors.max_volume_loss_percent));
-    CHECK(run.timing.wall_ms.count == 6);
+    CHECK(run.wall_ms.count == 6);
     const auto text = non_finite_json(run.errors.non_finite).dump();
     CHECK(has(text, "\"step\":7"));
     Measurement bad = *run.errors.last;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "app/hard_cases.h"
+#include "app/lab.h"
 #include "tests/run_program.h"
 
 using nlohmann::json;
@@ -233,5 +233,5 @@ TEST_CASE("hard cases: where no constraint acts there is nothing to recover by")
   const Outcome run = program(
       "compare --hard-cases --cases stiffness-0 --meshes tet --modes node+handles --steps 2 --out h", folder);
   CHECK(run.status == 2);
-  CHECK(run.err.find("no hard case to run") != std::string::npos);
+  CHECK(run.err.find("nothing to run") != std::string::npos);
 }

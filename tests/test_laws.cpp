@@ -1,7 +1,7 @@
 // The laws that a run has to keep, in every mode.
 #include <doctest/doctest.h>
 
-#include "app/measure_run.h"
+#include "app/run_loop.h"
 #include "sim/metrics.h"
 #include "tests/gl_test.h"
 #include "tests/sim_samples.h"
@@ -136,7 +136,7 @@ TEST_CASE("iterations and the volume constraint lower the volume lost in a fall"
     settings.constraints = kinds;
     Sim sim = create_sim(model, settings);
     Metrics metrics = create_metrics(*model);
-    const RunErrors errors = measure_run(sim, metrics, 120).errors;
+    const RunErrors errors = run_loop(sim, &metrics, 120).errors;
     CHECK(errors.finite);
     return errors.max_volume_loss_percent;
   };

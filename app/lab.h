@@ -1,0 +1,123 @@
+// The laboratory: the commands that step scenes for their numbers. run_loop steps and measures, sweep
+// combines settings and merges shards, statistics names what is written, chart draws; a command is its
+// columns and its judgement. Names in files are relied upon by scripts (docs/guide.md): they may be added to,
+// not changed.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/scene.h"
+#include "app/sweep.h"
+#include "render/frame.h"
+#include "sim/metrics.h"
+
+namespace tetpbd {
+
+struct RunOptions {
+  long steps = 0;  ///< 0: the scene's duration
+  std::filesystem::path out = "out";
+  long png_every = 0;           ///< steps; 0: no frames
+  std::filesystem::path video;  ///< empty: none
+  long video_every = 0;         ///< steps a video frame; 0: real time at 30 frames a second
+  long csv_every = 1;           ///< steps; 0: no stats.csv
+  long measure_every = 1;       ///< steps between measurements; the last step is measured in any case
+  bool positions = false;       ///< positions.npy and tets.npy
+  int gpu = -1;
+  int width = 1280, height = 720, samples = 4;
+  ViewOptions view;
+  bool progress = false;  ///< show it even if standard error is no terminal
+};
+/// `tetpbd run`: steps a scene without a window and writes frames, video and statistics. Exit status: 0, or 1
+/// if the state became non-finite.
+int run_headless(Scene scene, const RunOptions& options);
+/// Prints buffers, bytes, kernels and dispatches a step.
+int print_explanation(Scene scene, int gpu);
+int print_info(int gpu);
+
+struct BenchOptions {
+  std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
+  std::vector<std::string> modes = {"cpu", "constraint", "node"};
+  std::vector<std::string> constraint_sets = {"stretch+bend", "stretch+bend+volume"};
+  std::vector<int> iterations = {1, 150};
+  std::vector<int> substeps = {1};
+  long frames = 400, warm_up = 50;
+  int repeats = 3;
+  double most_seconds = 5;                ///< a repetition stops there, with fewer frames (slow CPU modes)
+  std::vector<std::array<int, 2>> sizes;  ///< of rendered frames, in pixels; none: no rendering
+  std::vector<std::string> pictures = {"plain", "full"};  ///< rendered at each size
+  int samples = 0;
+  int gpu = -1;
+  std::filesystem::path out = "bench";
+  SceneOverrides overrides;  ///< for every scene
+};
+/// `tetpbd bench`: frames a second and milliseconds a step, by the paper's protocol, beside the error of the
+/// same setting. Prints a table, writes bench.csv and bench.json. Exit status 1 if any state became
+/// non-finite.
+int run_bench(const BenchOptions& options);
+/// Its rows, to be made in the current context.
+Sweep bench_sweep(const BenchOptions& options);
+
+struct CompareOptions {
+  std::string scene = "bunny-drop";
+  SceneOverrides overrides;
+  std::vector<std::string> modes = {"node", "constraint", "cpu"};
+  std::vector<int> iterations = {1, 5, 10, 25};
+  std::vector<int> substeps = {1};
+  std::vector<double> omegas;  ///< empty: the scene's
+  long steps = 400;
+  int gpu = -1;
+  std::filesystem::path out = "compare";
+  int shard = 1, shards = 1;
+  std::vector<std::filesystem::path> merge;
+  std::optional<double> budget_ms, error_percent;
+};
+/// `tetpbd compare`: speed against error over modes x iterations x substeps. Writes compare.csv,
+/// compare.json, compare.svg, compare.png; prints a table and what was asked for.
+int run_compare(const CompareOptions& options);
+
+struct HardCaseOptions {
+  std::vector<std::string> cases;  ///< empty: all of models/scenes/hard
+  std::vector<std::string> meshes = {"bunny", "block", "tet"};
+  /// Solver modes; NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the scene
+  /// has iterations; node+handles as in settings.h.
+  std::vector<std::string> modes = {"node", "constraint", "node-substeps", "node+handles-substeps",
+                                    "cpu",  "cpu-double"};
+  long steps = 0;  ///< 0: the scene's duration
+  int gpu = -1;
+  std::filesystem::path out = "stability";
+  int shard = 1, shards = 1;
+  std::vector<std::filesystem::path> merge;
+};
+/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double
+/// precision. Writes stability.csv and stability.json. Exit status 1 if any state became non-finite.
+int run_hard_cases(const HardCaseOptions& options);
+/// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
+/// 5 % of the run's `steps` at least: what is good for less long may be passing through.
+std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);
+
+struct ReproduceOptions {
+  std::filesystem::path out = "reproduce";
+  bool quick = false;  ///< bunny alone, few frames: checks the trends on a software renderer
+  int gpu = -1;
+};
+/// `tetpbd reproduce`: the paper's table and figures (Va, Choi, Hong 2023), measured here. Writes report.html
+/// (self-contained), figures/*.svg, tables/*.csv. Throws Error (status 1) if a trend of the paper does not
+/// show.
+int run_reproduce(const ReproduceOptions& options);
+
+struct SoakOptions {
+  long settle = 2000;   ///< steps before the watch begins
+  long steps = 100000;  ///< steps watched
+  std::filesystem::path out = "soak";
+  int gpu = -1;
+  bool progress = false;  ///< show it even if standard error is no terminal
+};
+/// `tetpbd soak`: a long run of a body at rest that must not drift, leak or slow down. Writes soak.json and
+/// soak.csv. Exit status: 0, or 1 if a check failed.
+int run_soak(Scene scene, const SoakOptions& options);
+
+}  // namespace tetpbd

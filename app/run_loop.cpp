@@ -1,0 +1,114 @@
+#include "app/run_loop.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "sim/gl/gpu.h"
+#include "sim/interrupt.h"
+
+namespace tetpbd {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+}  // namespace
+
+void Samples::add(double value) {
+  ++count;
+  if (values.size() < most) {
+    values.push_back(value);
+  } else if (const std::uint64_t chosen = random() % count; chosen < most) {
+    values[chosen] = value;
+  }
+}
+
+Percentiles percentiles(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double part) {
+    return values[std::size_t(std::lround(part * double(values.size() - 1)))];
+  };
+  return {at(0.5), at(0.05), at(0.95)};
+}
+
+Progress::Progress(std::string label, long total, bool force)
+    : label_(std::move(label)), total_(total), shown_(force || isatty(2)), start_(Clock::now()) {}
+
+Progress::~Progress() {
+  if (drawn_) std::fputs("\r\033[K", stderr);
+}
+
+void Progress::update(long done) {
+  if (!shown_ || (drawn_ && seconds_since(last_) < 0.1 && done != total_)) return;
+  last_ = Clock::now();
+  drawn_ = true;
+  const double part = total_ > 0 ? double(done) / double(total_) : 1.0;
+  const double left = part > 0 ? seconds_since(start_) * (1 - part) / part : 0.0;
+  // fmt::print() throws where nothing can be written.
+  std::fputs(fmt::format("\r\033[K{} [{:.<30}] {}/{}  {:.0f} s left", label_,
+                         std::string(std::size_t(part * 30), '#'), done, total_, left)
+                 .c_str(),
+             stderr);
+  std::fflush(stderr);
+}
+
+MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
+  MeasuredRun run;
+  sim.timed = plan.timed;
+  const auto take = [&](bool wait) {
+    while (const auto measurement = metrics ? collect(*metrics, wait) : std::nullopt) {
+      add_measurement(run.errors, *measurement, sim);
+      if (plan.measured)
+        plan.measured(*measurement, run.errors);
+      else
+        run.measurements.push_back(*measurement);
+    }
+    while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.add(*ms);
+  };
+  if (metrics) measure(*metrics, sim);
+  const auto begin = Clock::now();
+  while (run.steps < steps && !interrupted() && !check_finite(sim)) {
+    const auto step_begin = Clock::now();
+    step(sim);
+    if (plan.wait) glFinish();
+    const double seconds = seconds_since(step_begin);
+    const bool bad = check_finite(sim, plan.wait).has_value();  // a step waited for is done: no second wait
+    const long s = run.steps + 1;
+    if (metrics && (bad || s % plan.measure_every == 0 || s == steps)) measure(*metrics, sim);
+    if (bad) break;
+    run.steps = s;
+    if (plan.wait) run.wall_ms.add(seconds * 1e3), run.seconds += seconds;
+    take(false);
+    if (plan.progress) plan.progress->update(s);
+    if (plan.stepped && !plan.stepped(s)) break;
+    if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
+  }
+  if (!plan.wait) {
+    glFinish();
+    run.seconds = seconds_since(begin);
+  }
+  take(true);
+  run.errors.non_finite = check_finite(sim, true);
+  run.errors.finite = run.errors.finite && !run.errors.non_finite;
+  return run;
+}
+
+void say_non_finite(const MeasuredRun& run, const std::string& where) {
+  if (!run.errors.non_finite) return;
+  std::fputs(fmt::format("tetpbd: {}\n", error_of(*run.errors.non_finite, where).what()).c_str(), stderr);
+}
+
+void warm_up(Sim& sim) {
+  if (!is_software_renderer())
+    run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = 0.3});
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,64 @@
+// A sweep: rows of numbers, one for each combination of settings, made by one process or dealt out to several
+// and merged; as a table on the terminal, as CSV and as JSON.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "sim/gl/gpu.h"
+#include "sim/settings.h"
+
+namespace tetpbd {
+
+using nlohmann::ordered_json;
+
+/// Settings to combine; an empty list: the scene's own.
+struct Axes {
+  std::vector<std::string> modes{}, constraint_sets{};  ///< sets of kinds joined by +
+  std::vector<double> omegas{};
+  std::vector<int> iterations{}, substeps{};
+};
+/// Every combination, the last of the lists varying fastest, with the omega that acts. Throws Error.
+std::vector<Settings> combinations(const Settings& base, const Axes& axes);
+/// The over-relaxation that acts: rigid handles bound it.
+double effective_omega(const Settings& settings);
+
+/// A row is an object with the columns' keys: text, true or false, numbers (written as null where not
+/// finite), or {"median": number, ...}.
+struct Sweep {
+  std::string name, title;           ///< of its files; on the progress bar
+  std::vector<std::string> columns;  ///< of NAME.csv, of which the first so many ...
+  std::size_t identity;              ///< ... tell rows apart
+  std::string table;   ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
+  ordered_json facts;  ///< what all shards have in common: "device", the number of steps
+  std::size_t combinations = 0;
+  std::function<std::vector<ordered_json>(std::size_t)> make{};  ///< the rows of a combination
+  bool print_each = false;                                       ///< when they are there
+};
+struct Shards {
+  int shard = 1, shards = 1;                   ///< this process makes shard, shard + shards, ...
+  std::vector<std::filesystem::path> merge{};  ///< folders of finished shards, instead
+};
+
+/// The facts, "combinations", "shard", "shards" and "rows", those that were finished if interrupted. Throws
+/// Error if there are none.
+ordered_json run_sweep(const Sweep& sweep, const Shards& shards = {});
+/// Their head, then the rows.
+void print_table(const std::string& columns, const ordered_json& rows = ordered_json::array());
+/// Writes NAME.json and NAME.csv and says where. Throws Error if interrupted.
+void write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document);
+
+/// Column names, then a line a row; a field is empty where there is nothing.
+std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows);
+/// As people read it: four digits, "-" for null.
+std::string text_of(const ordered_json& value);
+/// NaN where it is no number.
+double number(const ordered_json& row, const char* key);
+/// The device as all files name it.
+ordered_json device_json(const Capabilities& device);
+void print_device(const ordered_json& device);
+
+}  // namespace tetpbd

@@ -25,7 +25,7 @@ std::vector<Settings> candidates(const Settings& settings) {
   Settings base = settings;
   set_mode(base, "node", "auto");
   base.iterations = 1;
-  if (compliant(settings)) return {base};  // neither over-relaxation nor handles apply
+  if (compliant(settings)) return {base};  // neither over-relaxation nor clusters apply
   std::vector<Settings> all;
   for (double omega : {1.5, 2.5}) {
     base.omega = omega;
@@ -35,13 +35,13 @@ std::vector<Settings> candidates(const Settings& settings) {
     all.push_back(base);
     all.back().mass_splitting = true;
   }
-  // Handles pull to the rest shape: right only where that is what the constraints ask for.
+  // Clusters pull to the rest shape: right only where that is what the constraints ask for.
   bool keeps_shape = uses(settings, Stretch::row);
   for (std::size_t k = 0; k < kind_count; ++k)
     keeps_shape = keeps_shape && (!uses(settings, constraint_kinds[k]) || settings.stiffness[k] == 1);
   if (keeps_shape) {
     base.omega = 1.5;
-    set_mode(base, "node+handles", "auto");
+    set_mode(base, "node+clusters", "auto");
     all.push_back(base);
   }
   return all;
@@ -102,10 +102,10 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     if (choice.trials[t].loss_percent < 0.99 * choice.trials[choice.best].loss_percent) choice.best = t;
   }
   // Where nothing was lost the trials say nothing: a body that has not fallen yet, a machine too slow to wait
-  // for it. Handles, which come last, were best wherever something was.
+  // for it. Clusters, which come last, were best wherever something was.
   choice.lost_nothing = std::all_of(choice.trials.begin(), choice.trials.end(),
                                     [](const SolverTrial& trial) { return trial.loss_percent < 0.01; });
-  if (choice.lost_nothing && choice.trials.back().settings.handles > 0) choice.best = runs.size() - 1;
+  if (choice.lost_nothing && choice.trials.back().settings.clusters > 0) choice.best = runs.size() - 1;
   return choice;
 }
 

@@ -83,8 +83,8 @@ struct HardCaseOptions {
   std::vector<std::string> cases;  ///< empty: all of models/scenes/hard
   std::vector<std::string> meshes = {"bunny", "block", "tet"};
   /// Solver modes; NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the scene
-  /// has iterations; node+handles as in settings.h.
-  std::vector<std::string> modes = {"node", "constraint", "node-substeps", "node+handles-substeps",
+  /// has iterations; node+clusters as in settings.h.
+  std::vector<std::string> modes = {"node", "constraint", "node-substeps", "node+clusters-substeps",
                                     "cpu",  "cpu-double"};
   long steps = 0;  ///< 0: the scene's duration
   int gpu = -1;

@@ -149,7 +149,7 @@ void add_overrides(CLI::App& command, SceneOverrides& overrides) {
 /// Lists of modes, iterations and substeps, every combination of which is run.
 template <class Options>
 void add_sweep(CLI::App& command, Options& options) {
-  add(command, "--modes,--mode", options.modes, "solver modes; node+handles; paper: as published");
+  add(command, "--modes,--mode", options.modes, "solver modes; node+clusters; paper: as published");
   add(command, "--iterations", options.iterations, 1, 100000, "iterations a substep");
   add(command, "--substeps", options.substeps, 1, 100000, "substeps a step");
 }

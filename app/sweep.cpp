@@ -137,9 +137,7 @@ ordered_json measured(const Sweep& sweep, const Shards& part) {
 
 }  // namespace
 
-double effective_omega(const Settings& settings) {
-  return relaxation(settings.omega, settings.handles);
-}
+double effective_omega(const Settings& settings) { return relaxation(settings.omega, settings.clusters); }
 
 std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   std::vector<Settings> all{base};
@@ -159,7 +157,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   });
   vary(axes.modes, [](Settings& s, const std::string& mode) { set_mode(s, mode, "--modes"); });
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
-  std::vector<Settings> distinct;  // two omegas beyond what handles allow are one
+  std::vector<Settings> distinct;  // two omegas beyond what clusters allow are one
   for (Settings& settings : all) {
     settings.omega = effective_omega(settings);
     if (std::find(distinct.begin(), distinct.end(), settings) == distinct.end()) distinct.push_back(settings);

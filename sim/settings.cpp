@@ -45,8 +45,9 @@ const std::vector<Parameter>& parameters() {
          "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
          "with compliance always",
          live},
-        {"handles", "solver", &S::handles, 0, 1, false, "",
-         "how far rigid handles pull towards the rest shape per iteration, 0.4 to 0.8: for hard bodies alone "
+        {"clusters", "solver", &S::clusters, 0, 1, false, "",
+         "how far shape-matching clusters pull towards the rest shape per iteration, 0.4 to 0.8: for hard "
+         "bodies alone "
          "(mode node, stretch in use, every k 1, no compliance)",
          live},
         {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations per substep", live},
@@ -164,23 +165,23 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
   });
 }
 
-constexpr double usual_handles = 0.4;
+constexpr double usual_clusters = 0.4;
 
 void set_mode(Settings& settings, const std::string& word, const std::string& where) {
-  const std::string with = "node+handles";
+  const std::string with = "node+clusters";
   bool known = true;
   if (!word.starts_with(with)) {
     settings.mode = word;
-    settings.handles = 0;
+    settings.clusters = 0;
     known = find_solver_mode(word);
   } else {
     settings.mode = "node";
-    settings.handles = usual_handles;
+    settings.clusters = usual_clusters;
     if (word != with) {
       const char *begin = word.data() + with.size(), *end = word.data() + word.size();
-      const auto [stop, error] = std::from_chars(begin + 1, end, settings.handles);
-      known = *begin == '-' && error == std::errc() && stop == end && settings.handles > 0 &&
-              settings.handles <= 1;
+      const auto [stop, error] = std::from_chars(begin + 1, end, settings.clusters);
+      known = *begin == '-' && error == std::errc() && stop == end && settings.clusters > 0 &&
+              settings.clusters <= 1;
     }
   }
   if (known) return;
@@ -191,9 +192,9 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
 }
 
 std::string mode_word(const Settings& settings) {
-  if (settings.handles == 0) return settings.mode;
-  return settings.mode + "+handles" +
-         (settings.handles == usual_handles ? "" : fmt::format("-{:g}", settings.handles));
+  if (settings.clusters == 0) return settings.mode;
+  return settings.mode + "+clusters" +
+         (settings.clusters == usual_clusters ? "" : fmt::format("-{:g}", settings.clusters));
 }
 
 const std::vector<SolverPreset>& solver_presets() {
@@ -204,18 +205,18 @@ const std::vector<SolverPreset>& solver_presets() {
         {"iterations", "25"},
         {"substeps", "1"},
         {"omega", "1.5"},
-        {"handles", "0"},
+        {"clusters", "0"},
         {"mass_splitting", "false"}}},
       {"substeps",
        "20 substeps of 1 iteration",
-       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "20"}, {"omega", "1.5"}, {"handles", "0"}}},
+       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "20"}, {"omega", "1.5"}, {"clusters", "0"}}},
       {"hard",
-       "10 substeps of 1 iteration with rigid handles: the least error for hard bodies",
+       "10 substeps of 1 iteration with shape-matching clusters: the least net volume loss for hard bodies",
        {{"mode", "node"},
         {"iterations", "1"},
         {"substeps", "10"},
         {"omega", "1.5"},
-        {"handles", fmt::format("{}", usual_handles)}}},
+        {"clusters", fmt::format("{}", usual_clusters)}}},
   };
   return rows;
 }
@@ -250,10 +251,10 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");
-  if (settings.handles == 0) return;
-  // Handles pull to the rest shape, which is the answer only where every constraint is to be met.
+  if (settings.clusters == 0) return;
+  // Clusters pull to the rest shape, which is the answer only where every constraint is to be met.
   const auto no_handles = [&](const std::string& why) {
-    throw Error("'handles' are for hard bodies: " + why, where, "set handles to 0");
+    throw Error("'clusters' are for hard bodies: " + why, where, "set clusters to 0");
   };
   const SolverMode* mode = find_solver_mode(settings.mode);
   if (!mode || !mode->clusters) no_handles("mode " + settings.mode + " has none");

@@ -59,7 +59,7 @@ void start_clusters(Sim& sim, const State& state) {
 
 void write_step_block(Sim& sim) {
   const Settings& s = sim.settings;
-  const double h = s.dt / s.substeps, strength = has_clusters(sim) ? s.handles : 0;
+  const double h = s.dt / s.substeps, strength = has_clusters(sim) ? s.clusters : 0;
   Step block{};
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
   block.h = float(h);
@@ -127,7 +127,7 @@ void build_solver(Sim& sim) {
   const SolverMode* mode = find_solver_mode(sim.settings.mode);
   if (!mode) throw Error("no such mode", sim.settings.mode, "see tetpbd run --help");
   const std::size_t vertices = sim.model->positions.size();
-  const bool soft = compliant(sim.settings), clusters = sim.settings.handles > 0;
+  const bool soft = compliant(sim.settings), clusters = sim.settings.clusters > 0;
   if (soft && !mode->compliance)
     throw Error(fmt::format("mode {} has no compliance", mode->name),
                 "compliance or constraint_damping above 0", "set them to 0 or use another mode");
@@ -216,7 +216,7 @@ void check_limits(const ConstraintSystem& system, const Capabilities& limits, bo
   if (needed > limits.storage_blocks)
     throw Error("too few shader storage blocks",
                 fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),
-                clusters ? "set handles to 0 or use a newer driver" : "use a newer driver", 1);
+                clusters ? "set clusters to 0 or use a newer driver" : "use a newer driver", 1);
   std::size_t largest = system.at_vertex.size() * sizeof(Position);
   for (const ConstraintList& list : system.lists)
     largest = std::max(largest, list.count() * std::size_t(list.arity + 1) * 4);
@@ -282,7 +282,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const bool kinds = settings.constraints != sim.settings.constraints;
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   const bool softness = !on_cpu(sim) && compliant(settings) != sim.compliant;
-  const bool clusters = (settings.handles > 0) != (sim.settings.handles > 0);
+  const bool clusters = (settings.clusters > 0) != (sim.settings.clusters > 0);
   if (kinds || softness || clusters || settings.mode != sim.settings.mode) {
     if (check_finite(sim, true))
       restore_checkpoint(sim);  // a solver made anew has nothing better to start from

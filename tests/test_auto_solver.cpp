@@ -30,7 +30,7 @@ TEST_CASE("a solver by name puts its settings in place of the scene's; flags go 
   CHECK(paper.omega == 1.5);
   const Settings hard =
       load_scene("bunny-drop", {.solver = "hard", .parameters = {{"substeps", "7"}}}).settings;
-  CHECK(hard.handles > 0);
+  CHECK(hard.clusters > 0);
   CHECK(hard.iterations == 1);
   CHECK(hard.substeps == 7);
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "hardest"}));
@@ -51,9 +51,9 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   REQUIRE(choice);
   CHECK_FALSE(scene.budget_ms);
   CHECK(scene.settings == choice->settings());
-  CHECK(choice->trials.size() == 4);  // averaged, with more over-relaxation, with masses split, with handles
+  CHECK(choice->trials.size() == 4);  // averaged, with more over-relaxation, with masses split, with clusters
   CHECK(choice->trials[2].settings.mass_splitting);
-  CHECK(choice->trials[3].settings.handles > 0);
+  CHECK(choice->trials[3].settings.clusters > 0);
   for (const SolverTrial& trial : choice->trials) {
     CHECK(trial.settings.iterations == 1);
     CHECK(trial.settings.substeps >= 1);
@@ -64,15 +64,15 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
   CHECK(solver_choice_json(*choice)["trials"].size() == 4);
 
-  // What handles or over-relaxation would change is not tried with them.
+  // What clusters or over-relaxation would change is not tried with them.
   Settings soft = scene.settings;
   soft.stiffness[index_of<Stretch>] = 0.5;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 3);
-  Settings liquid = scene.settings;  // keeps its volume and no shape: handles would freeze it
-  liquid.handles = 0;
+  Settings liquid = scene.settings;  // keeps its volume and no shape: clusters would freeze it
+  liquid.clusters = 0;
   liquid.constraints = "volume";
   for (const SolverTrial& trial : choose_solver(model, liquid, 1, 3).trials)
-    CHECK(trial.settings.handles == 0);
+    CHECK(trial.settings.clusters == 0);
   soft.compliance[index_of<Volume>] = 1e-6;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
   // No budget is too small for one substep, and a hundred times the budget holds more.
@@ -80,6 +80,6 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   const SolverChoice early = choose_solver(model, scene.settings, 100, 2);
   CHECK(early.settings().substeps > 4);
   CHECK(early.lost_nothing);  // it has not hit the ground: what is best elsewhere
-  CHECK(early.settings().handles > 0);
+  CHECK(early.settings().clusters > 0);
   CHECK(describe(early).find("none lost volume in 2 steps") != std::string::npos);
 }

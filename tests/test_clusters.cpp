@@ -1,4 +1,5 @@
-// Rigid handles: the rotation, the GPU's integer sums against double, momentum, pins, and what they are for.
+// Shape-matching clusters: the rotation, the GPU's integer sums against double, momentum, pins, and what they
+// are for.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -32,10 +33,10 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, const std::string& de
   return model;
 }
 
-Settings held(double handles, int iterations = 1, int substeps = 1) {
+Settings held(double clusters, int iterations = 1, int substeps = 1) {
   Settings s;
   s.mode = "node";
-  s.handles = handles;
+  s.clusters = clusters;
   s.iterations = iterations;
   s.substeps = substeps;
   return s;
@@ -100,39 +101,39 @@ TEST_CASE("the best rotation is found, also of mirrored and of flat points, and 
   CHECK(is_rotation(rotation_of(glm::dmat3(-1))) < 1e-9);
 }
 
-TEST_CASE("shares of a vertex make 1, a handle's weights fit their integers, two bodies share none") {
+TEST_CASE("shares of a vertex make 1, a cluster's weights fit their integers, two bodies share none") {
   const auto model = block_model({8, 6, 4}, "none", glm::dvec3(0), 2);
   const Clusters clusters = build_clusters(*model);
   CHECK(clusters.clusters.size() >= 16);
   for (const glm::vec4& vertex : clusters.rest) {
     int sum = 0;
-    for (const layout::Cluster& handle : clusters.clusters)
-      sum += glsl::ShapeMatching{}.cluster_weight(vertex, handle.node);
+    for (const layout::Cluster& cluster : clusters.clusters)
+      sum += glsl::ShapeMatching{}.cluster_weight(vertex, cluster.node);
     CHECK(std::abs(float(sum) - vertex.w) <= 4);
   }
-  for (const layout::Cluster& handle : clusters.clusters) {
+  for (const layout::Cluster& cluster : clusters.clusters) {
     double weight = 0;
     glm::dvec3 steps(0);
     std::size_t of[2] = {0, 0};
     for (std::size_t v = 0; v < clusters.rest.size(); ++v) {
       glsl::ShapeMatching matching;
-      const int w = matching.cluster_weight(clusters.rest[v], handle.node);
+      const int w = matching.cluster_weight(clusters.rest[v], cluster.node);
       const glm::ivec3 s = matching.cluster_steps(
-          matching.cluster_arm(clusters.rest[v], handle.centre, handle.cell), handle.steps_per_metre);
+          matching.cluster_arm(clusters.rest[v], cluster.centre, cluster.cell), cluster.steps_per_metre);
       weight += w;
       steps += double(w) * glm::dvec3(s);
       of[v >= model->bodies[1].first_vertex] += w > 0;
       if (w > 0) CHECK(glm::length(glm::vec3(s)) < 16384);
       CHECK(w <= 1 << 16);
     }
-    CHECK(weight == double(handle.weight));
+    CHECK(weight == double(cluster.weight));
     CHECK(weight <= std::exp2(22.0));
-    CHECK(steps == glm::dvec3(handle.steps));
+    CHECK(steps == glm::dvec3(cluster.steps));
     CHECK(std::min(of[0], of[1]) == 0);
   }
 }
 
-TEST_CASE("a step with handles is the double CPU step, however it is cut, for one body and two") {
+TEST_CASE("a step with clusters is the double CPU step, however it is cut, for one body and two") {
   GlTest gl;
   for (const int bodies : {1, 2})
     for (const unsigned patch : {0u, 5u, 64u})
@@ -154,7 +155,7 @@ TEST_CASE("a step with handles is the double CPU step, however it is cut, for on
         }
 }
 
-TEST_CASE("handles keep momentum, linear and angular, over 400 steps of free flight") {
+TEST_CASE("clusters keep momentum, linear and angular, over 400 steps of free flight") {
   GlTest gl;
   for (const double strength : {0.0, 0.8})
     for (const bool split : {false, true}) {
@@ -168,15 +169,15 @@ TEST_CASE("handles keep momentum, linear and angular, over 400 steps of free fli
       const double drift =
           glm::length(after.centre - before.centre - time * before.velocity) / sim.model->size;
       const double turned = glm::length(after.angular - before.angular) / glm::length(before.angular);
-      MESSAGE("handles " << strength << ", splitting " << split << ": centre " << drift
-                         << ", angular momentum " << turned);
+      MESSAGE("clusters " << strength << ", splitting " << split << ": centre " << drift
+                          << ", angular momentum " << turned);
       if (!split) continue;
       CHECK(drift < 1e-5);
       CHECK(turned < 0.01);
     }
 }
 
-TEST_CASE("at rest handles pull nowhere") {
+TEST_CASE("at rest clusters pull nowhere") {
   GlTest gl;
   Settings settings = held(0.8, 1, 1);
   settings.gravity = 0, settings.ground = false, settings.omega = 0;
@@ -193,7 +194,7 @@ TEST_CASE("at rest handles pull nowhere") {
   CHECK(moved < 1e-7 * model->size);
 }
 
-TEST_CASE("what rests with handles stays at rest, floating and standing") {
+TEST_CASE("what rests with clusters stays at rest, floating and standing") {
   GlTest gl;
   Settings settings = held(0.8, 1, 5);
   settings.gravity = 0, settings.ground = false;
@@ -213,18 +214,19 @@ TEST_CASE("what rests with handles stays at rest, floating and standing") {
   CHECK(farthest(settled.positions, mesh.positions) < 0.01);
 }
 
-TEST_CASE("handles lose less volume in a fall than iterations of the same number, and recover from a point") {
+TEST_CASE(
+    "clusters lose less volume in a fall than iterations of the same number, and recover from a point") {
   GlTest gl;
   const auto model = block_model({8, 6, 4}, "none", glm::dvec3(0), 1, 1);
-  const auto loss = [&](double handles) {
-    Sim sim = create_sim(model, held(handles, 1, 8));
+  const auto loss = [&](double clusters) {
+    Sim sim = create_sim(model, held(clusters, 1, 8));
     Metrics metrics = create_metrics(*model);
     const RunErrors errors = run_loop(sim, &metrics, 120).errors;
     CHECK(errors.finite);
     return errors.max_volume_loss_percent;
   };
   const double without = loss(0), with = loss(0.8);
-  MESSAGE("largest loss " << without << " %, with handles " << with << " %");
+  MESSAGE("largest loss " << without << " %, with clusters " << with << " %");
   CHECK(with < 0.5 * without);
   for (const char* how : {"point", "line", "flatten", "random", "mirror", "stretch:10"}) {
     CAPTURE(how);
@@ -236,7 +238,7 @@ TEST_CASE("handles lose less volume in a fall than iterations of the same number
 }
 
 TEST_CASE(
-    "a pinned vertex leads its handles; handles come and go while running; the same run gives the same "
+    "a pinned vertex leads its clusters; clusters come and go while running; the same run gives the same "
     "bits") {
   GlTest gl;
   const auto run = [&] {
@@ -253,7 +255,7 @@ TEST_CASE(
     unpin(sim, 0);
     const std::size_t before = sim.solver.buffers.size();
     Settings without = sim.settings;
-    without.handles = 0;
+    without.clusters = 0;
     apply_settings(sim, without);
     CHECK(sim.solver.buffers.size() < before);
     CHECK(farthest(read_state(sim).positions, pulled.positions) == 0);

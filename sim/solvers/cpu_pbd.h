@@ -82,8 +82,8 @@ class CpuPbd {
     auto& x = state.positions;
     auto& v = state.velocities;
     const bool soft = compliant(settings);
-    const bool held = sweep == Sweep::jacobi && settings.handles > 0 && !soft;
-    const double omega = soft ? 1 : relaxation(settings.omega, held ? settings.handles : 0);
+    const bool held = sweep == Sweep::jacobi && settings.clusters > 0 && !soft;
+    const double omega = soft ? 1 : relaxation(settings.omega, held ? settings.clusters : 0);
     if (held && clusters_.rest.empty()) clusters_ = build_clusters(model_);
     inverse_masses_.assign(inverse_masses.begin(), inverse_masses.end());
     for (int s = 0; s < settings.substeps; ++s) {
@@ -108,7 +108,7 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (omega / at_vertex_[i]);
-          if (held) x[i] += settings.handles * pulls[i];
+          if (held) x[i] += settings.clusters * pulls[i];
           x[i] = out_of(planes, x[i], predicted_[i], h * v[i], settings.friction);
         }
       }

@@ -154,8 +154,8 @@ std::size_t add_clusters(Solver& solver, const SolverInput& input, const Patches
   std::vector<layout::Cluster>& clusters = solver.clusters.clusters;
   const std::vector<glm::vec4>& rest = solver.clusters.rest;
   if (patches.count > 65536)  // as many numbers of 16 bits fit 32
-    throw Error("the body is too large for handles", fmt::format("{} patches", patches.count),
-                "set handles to 0, or take a mesh of at most 20 million tets");
+    throw Error("the body is too large for clusters", fmt::format("{} patches", patches.count),
+                "set clusters to 0, or take a mesh of at most 20 million tets");
   for (layout::Cluster& cluster : clusters) cluster.owner = ~0u;
   std::vector<std::vector<std::uint32_t>> lists(patches.count);
   std::size_t most = 1;

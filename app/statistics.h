@@ -1,4 +1,4 @@
-// stats.json and stats.csv: names that scripts rely on (docs/statistics.md).
+// stats.json and stats.csv: names that scripts rely on (docs/guide.md).
 #pragma once
 
 #include <optional>

@@ -73,7 +73,7 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   liquid.constraints = "volume";
   for (const SolverTrial& trial : choose_solver(model, liquid, 1, 3).trials)
     CHECK(trial.settings.clusters == 0);
-  soft.compliance[index_of<Volume>] = 1e-6;
+  soft.compliance[index_of<Volume>] = 1e-6, soft.omega = 1.5;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
   // No budget is too small for one substep, and a hundred times the budget holds more.
   CHECK(choose_solver(model, scene.settings, 1e-6, 2).settings().substeps == 1);

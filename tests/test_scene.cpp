@@ -182,7 +182,8 @@ TEST_CASE("every shipped scene runs in every mode") {
     const auto model = build_model(load_scene(name));
     for (const SolverMode& mode : solver_modes()) {
       CAPTURE(mode.name);
-      const Scene scene = load_scene(name, {.parameters = {{"mode", mode.name}, {"iterations", "2"}}});
+      const Scene scene =
+          load_scene(name, {.parameters = {{"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}}});
       Sim sim = create_sim(model, scene.settings);
       for (int s = 0; s < 4; ++s) step(sim);
       Metrics metrics = create_metrics(*model, sim.system);

@@ -187,9 +187,10 @@ std::string csv_text(const std::vector<std::string>& columns, const ordered_json
     std::vector<std::string> fields;
     for (const std::string& column : columns) {
       const ordered_json& value = cell(row, column);
-      fields.push_back(value.is_string() ? csv_field(value.get<std::string>())
-                       : value.is_null() ? ""
-                                         : value.dump());
+      fields.push_back(value.is_string()         ? csv_field(value.get<std::string>())
+                       : value.is_null()         ? ""
+                       : value.is_number_float() ? fmt::format("{:.7g}", value.get<double>())
+                                                 : value.dump());
     }
     csv += fmt::format("{}\n", fmt::join(fields, ","));
   }

@@ -161,6 +161,7 @@ void measure(Metrics& m, const Sim& sim) {
       const bool one_group =
           &kernel == &m.kernels[2] || &kernel == &m.kernels[4];  // these add the groups' sums
       glDispatchCompute(one_group ? 1 : groups, 1, 1);
+      // The next kernel reads these sums; the next body's first overwrites what this body's last read.
       glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
   }

@@ -31,7 +31,8 @@ struct Dispatcher {
     if (pass.records) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RECORDS, pass.records);
     const std::size_t row = std::min<std::size_t>(pass.work_groups, sim.tuning.row);
     glDispatchCompute(GLuint(row), GLuint((pass.work_groups + row - 1) / row), 1);
-    // The next dispatch reads what this one wrote.
+    // The next dispatch reads what this one wrote, and overwrites what it read (the other quantized
+    // positions, the sums of corrections that average.comp clears, the clusters' set of sums before last).
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
   }
   // The pass that moves the vertices: what it wrote is read from then on.

@@ -55,7 +55,8 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
   label_object(GL_BUFFER, id, label_);
 }
 
-// Kernels queued before may still read or write the buffer.
+// Kernels queued before may still read or write the buffer: the barrier here is why pins, uploads, resets and
+// read-backs need none of their own. What no kernel wrote, GL orders by itself.
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   if (whole_at_once_ && offset == 0 && bytes == this->bytes()) {

@@ -121,7 +121,10 @@ int run_headless(Scene scene, const RunOptions& options) {
     run = run_loop(sim, &metrics, steps, plan);
   }
   if (frames) frames->finish();
-  const bool good = !run.errors.non_finite || restore_checkpoint(sim);
+  const auto& found = run.errors.non_finite;
+  const bool good = !found || restore_checkpoint(sim);
+  // To the last good step: the same steps again, the same bits.
+  while (good && found && sim.steps < found->step - 1) step(sim);
   const auto hash = good ? std::optional(state_hash(sim)) : std::nullopt;
   write_file(options.out / "stats.json",
              statistics_json(scene, sim, context.capabilities(), run, guard_counts(sim), hash, choice));

@@ -115,7 +115,6 @@ TEST_CASE("run writes what it says, twice the same") {
     CHECK(entry.path().string().find(".part") == std::string::npos);
 }
 
-
 TEST_CASE("every look and colour draws a body") {
   const Folder folder;
   int number = 0;
@@ -218,7 +217,7 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   REQUIRE(text.find(end) != std::string::npos);
   // The free end of the beam falls: at a certain speed its numbers end.
   text.insert(text.find(end),
-              "if ((phase & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
+              "if ((phases & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
   std::ofstream(folder.path / "shaders/vertex.glsl") << text;
   const std::string common = "--scene beam --iterations 2 --substeps 1 ";
   const Outcome bad = program("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
@@ -226,7 +225,6 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   CHECK(bad.status == 1);
   CHECK(std::count(bad.err.begin(), bad.err.end(), '\n') == 1);
   CHECK(bad.err.find("tetpbd: the state is not finite: at step ") == 0);
-  CHECK(bad.err.find("the state is not finite: at step") != std::string::npos);
   const json stats = json::parse(read(folder.path / "bad/stats.json"));
   CHECK(stats["finite"] == false);
   const long step = stats["non_finite"]["step"];

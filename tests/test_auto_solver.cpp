@@ -66,6 +66,7 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
 
   // What clusters or over-relaxation would change is not tried with them.
   Settings soft = scene.settings;
+  soft.mass_splitting = false;  // which of the trials was taken depends on the machine
   soft.stiffness[index_of<Stretch>] = 0.5;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 3);
   Settings liquid = scene.settings;  // keeps its volume and no shape: clusters would freeze it

@@ -16,14 +16,12 @@ ConstraintList list_of(const TetMesh& mesh) {
   const auto& all = Kind::vertices(mesh);
   ConstraintList list{Kind::row.arity, std::vector<std::uint32_t>(all.size() * arity),
                       std::vector<double>(all.size())};
-  parallel_for(all.size(), [&](std::size_t first, std::size_t end) {
-    for (std::size_t c = first; c < end; ++c) {
-      std::copy_n(all[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
-      // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
-      std::array<glm::dvec3, arity> x;
-      for (std::size_t j = 0; j < arity; ++j) x[j] = mesh.positions[all[c][j]] - mesh.positions[all[c][0]];
-      list.rest[c] = Kind::rest(x.data());
-    }
+  parallel_for(all.size(), [&](std::size_t c) {
+    std::copy_n(all[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
+    // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
+    std::array<glm::dvec3, arity> x;
+    for (std::size_t j = 0; j < arity; ++j) x[j] = mesh.positions[all[c][j]] - mesh.positions[all[c][0]];
+    list.rest[c] = Kind::rest(x.data());
   });
   return list;
 }

@@ -29,9 +29,8 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   const auto append_shifted = [&](auto& to, const auto& from) {
     const std::size_t start = to.size();
     to.resize(start + from.size());
-    parallel_for(from.size(), [&](std::size_t first, std::size_t end) {
-      for (std::size_t i = first; i < end; ++i)
-        for (std::size_t j = 0; j < from[i].size(); ++j) to[start + i][j] = from[i][j] + base;
+    parallel_for(from.size(), [&](std::size_t i) {
+      for (std::size_t j = 0; j < from[i].size(); ++j) to[start + i][j] = from[i][j] + base;
     });
   };
   model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
@@ -67,18 +66,16 @@ void renumber(Model& model) {
   for (const Body& body : model.bodies) {
     const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
     const Bounds box = bounds({model.rest.positions.begin() + first, model.rest.positions.begin() + end});
-    parallel_for(body.vertices, [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = body.first_vertex + from; i < body.first_vertex + to; ++i)
-        keys[i] = {hilbert_key(model.rest.positions[i], box), std::uint32_t(i)};
+    parallel_for(body.vertices, [&](std::size_t v) {
+      const std::size_t i = body.first_vertex + v;
+      keys[i] = {hilbert_key(model.rest.positions[i], box), std::uint32_t(i)};
     });
     parallel_sort(std::span(keys).subspan(body.first_vertex, body.vertices));
   }
   for (std::uint32_t i = 0; i < count; ++i) old[i] = keys[i].second, now[old[i]] = i;
   const auto reorder = [&](auto& rows) {
     const auto from = rows;
-    parallel_for(count, [&](std::size_t first, std::size_t end) {
-      for (std::size_t i = first; i < end; ++i) rows[i] = from[old[i]];
-    });
+    parallel_for(count, [&](std::size_t i) { rows[i] = from[old[i]]; });
   };
   reorder(model.rest.positions);
   reorder(model.inverse_masses);
@@ -87,9 +84,8 @@ void renumber(Model& model) {
   reorder(model.velocities);
   reorder(model.original);
   const auto rename = [&](auto& elements) {
-    parallel_for(elements.size(), [&](std::size_t first, std::size_t end) {
-      for (std::size_t i = first; i < end; ++i)
-        for (std::uint32_t& v : elements[i]) v = now[v];
+    parallel_for(elements.size(), [&](std::size_t i) {
+      for (std::uint32_t& v : elements[i]) v = now[v];
     });
   };
   rename(model.rest.tets);

@@ -20,7 +20,7 @@ inline std::size_t thread_count() { return std::size_t(std::clamp(omp_get_max_th
 /// Calls f(first, end) for parts of 0 .. count that follow each other, one a thread and `least` items or more
 /// each; what f writes must depend on the item alone. Rethrows what the first part that failed threw.
 template <class F>
-void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
+void parallel_parts(std::size_t count, std::size_t least, F&& f) {
   const std::size_t parts = std::clamp<std::size_t>(count / least, 1, thread_count());
   std::vector<std::exception_ptr> failed(parts);
 #pragma omp parallel for num_threads(int(parts)) schedule(static, 1)
@@ -31,6 +31,14 @@ void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
     }
   for (const std::exception_ptr& e : failed)
     if (e) std::rethrow_exception(e);
+}
+
+/// Calls f(item) for 0 .. count.
+template <class F>
+void parallel_for(std::size_t count, F&& f) {
+  parallel_parts(count, 8192, [&](std::size_t first, std::size_t end) {
+    for (std::size_t i = first; i < end; ++i) f(i);
+  });
 }
 
 /// Sorts items none of which are equal.
@@ -51,12 +59,11 @@ Grouped group_by_key(std::size_t items, std::size_t keys, Each&& each) {
   const std::size_t parts = std::clamp<std::size_t>(items / 65536, 1, thread_count());
   std::vector<std::vector<std::uint32_t>> at(parts);  // by part and key: how many, then where the next goes
   const auto each_part = [&](const auto& visit) {
-    const auto run = [&](std::size_t part, std::size_t) {
+    parallel_parts(parts, 1, [&](std::size_t part, std::size_t) {
       at[part].resize(keys);
       for (std::size_t i = items * part / parts; i < items * (part + 1) / parts; ++i)
         each(i, [&](std::uint32_t key, std::uint32_t value) { visit(at[part][key], value); });
-    };
-    parallel_for(parts, run, 1);
+    });
   };
   each_part([](std::uint32_t& count, std::uint32_t) { ++count; });
   Grouped result;

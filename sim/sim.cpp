@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <mutex>
 
 #include "sim/error.h"
 #include "sim/parallel.h"
@@ -94,20 +93,16 @@ void write_step_block(Sim& sim) {
 // is computed from quantized positions is blurred by it.
 double quantum_of(const Sim& sim, const State& state) {
   double reach = sim.model->size;
-  std::mutex taking;
-  for (const ConstraintList& list : sim.system.lists)
-    parallel_for(list.count(), [&](std::size_t first, std::size_t end) {
-      double largest = 0;
-      const std::size_t arity = std::size_t(list.arity);
-      for (std::size_t c = first * arity; c < end * arity; c += arity)
-        for (std::size_t j = 1; j < arity; ++j) {
-          const double apart =
-              glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]);
-          if (apart > largest && std::isfinite(apart)) largest = apart;
-        }
-      const std::lock_guard lock(taking);
-      reach = std::max(reach, largest);
-    });
+  for (const ConstraintList& list : sim.system.lists) {
+    const std::size_t arity = std::size_t(list.arity);
+#pragma omp parallel for reduction(max : reach)
+    for (std::size_t c = 0; c < list.vertices.size(); c += arity)
+      for (std::size_t j = 1; j < arity; ++j) {
+        const double apart =
+            glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]);
+        if (apart > reach && std::isfinite(apart)) reach = apart;
+      }
+  }
   return std::exp2(std::ceil(std::log2(reach)) - 27);
 }
 
@@ -249,11 +244,9 @@ void upload(Sim& sim, const State& state) {
   const std::size_t count = state.positions.size();
   std::vector<Position> positions(count);
   std::vector<Velocity> velocities(count);
-  parallel_for(count, [&](std::size_t first, std::size_t end) {
-    for (std::size_t i = first; i < end; ++i) {
-      positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
-      split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
-    }
+  parallel_for(count, [&](std::size_t i) {
+    positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
+    split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
   });
   sim.positions.write(0, count * sizeof(Position), positions.data());
   sim.velocities.write(0, count * sizeof(Velocity), velocities.data());

@@ -37,18 +37,15 @@ TEST_CASE("parallel: each item once, and the first failure is thrown") {
     CAPTURE(count);
     for (const std::size_t items : {0, 1, 7, 1000}) {
       std::vector<int> visits(items);
-      parallel_for(
-          items,
-          [&](std::size_t first, std::size_t end) {
-            for (std::size_t i = first; i < end; ++i) ++visits[i];
-          },
-          3);
+      parallel_parts(items, 3, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) ++visits[i];
+      });
       CHECK(std::count(visits.begin(), visits.end(), 1) == std::ptrdiff_t(items));
     }
     const auto fail = [](std::size_t, std::size_t end) {
       throw std::runtime_error(end == 100 ? "last" : "part");
     };
-    CHECK_THROWS_WITH(parallel_for(100, fail, 1), count == 1 ? "last" : "part");
+    CHECK_THROWS_WITH(parallel_parts(100, 1, fail), count == 1 ? "last" : "part");
   }
 }
 

@@ -62,12 +62,10 @@ MeshReport report(const TetMesh& mesh) {
     double volume, low, high;  // m^3, degrees
   };
   std::vector<Shape> shapes(mesh.tets.size());
-  parallel_for(shapes.size(), [&](std::size_t first, std::size_t end) {
-    for (std::size_t i = first; i < end; ++i) {
-      const auto angles = dihedral_angles(mesh, mesh.tets[i]);
-      const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
-      shapes[i] = {tet_volume(mesh, mesh.tets[i]), *low, *high};
-    }
+  parallel_for(shapes.size(), [&](std::size_t i) {
+    const auto angles = dihedral_angles(mesh, mesh.tets[i]);
+    const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
+    shapes[i] = {tet_volume(mesh, mesh.tets[i]), *low, *high};
   });
   for (const auto& [volume, low, high] : shapes) {
     r.volume += volume;

@@ -146,9 +146,7 @@ double mesh_volume(const TetMesh& mesh) {
 
 std::vector<double> tet_volumes(const TetMesh& mesh) {
   std::vector<double> volumes(mesh.tets.size());
-  parallel_for(volumes.size(), [&](std::size_t first, std::size_t end) {
-    for (std::size_t i = first; i < end; ++i) volumes[i] = tet_volume(mesh, mesh.tets[i]);
-  });
+  parallel_for(volumes.size(), [&](std::size_t i) { volumes[i] = tet_volume(mesh, mesh.tets[i]); });
   return volumes;
 }
 

@@ -28,12 +28,10 @@ std::vector<Item> ordered(const Model& model, const ConstraintSystem& system) {
     if (!system.present[k]) continue;
     const std::size_t start = items.size(), arity = std::size_t(list.arity);
     items.resize(start + list.count());
-    parallel_for(list.count(), [&](std::size_t first, std::size_t end) {
-      for (std::size_t c = first; c < end; ++c) {
-        glm::dvec3 middle(0);
-        for (std::size_t j = 0; j < arity; ++j) middle += model.rest.positions[list.vertices[c * arity + j]];
-        items[start + c] = {hilbert_key(middle / double(arity), box), k, std::uint32_t(c)};
-      }
+    parallel_for(list.count(), [&](std::size_t c) {
+      glm::dvec3 middle(0);
+      for (std::size_t j = 0; j < arity; ++j) middle += model.rest.positions[list.vertices[c * arity + j]];
+      items[start + c] = {hilbert_key(middle / double(arity), box), k, std::uint32_t(c)};
     });
   }
   parallel_sort(std::span(items));
@@ -160,38 +158,35 @@ std::vector<std::size_t> starts_of_patches(const ConstraintSystem& system, const
   constexpr std::size_t stretch = 4096;
   const std::size_t vertices = system.at_vertex.size();
   std::vector<std::vector<std::size_t>> of_stretch((vertices + stretch - 1) / stretch);
-  parallel_for(
-      of_stretch.size(),
-      [&](std::size_t first_stretch, std::size_t end_stretch) {
-        std::vector<std::uint32_t> last(vertices);  // patch that had the vertex last, from 1 on
-        std::uint32_t patch = 0;
-        std::size_t held = 0;
-        const auto add = [&](std::size_t v) {
-          const auto hold = [&](std::size_t u) {
-            if (last[u] != patch) last[u] = patch, ++held;
-          };
-          hold(v);
-          for (std::size_t k = 0; k < system.lists.size(); ++k) {
-            const ConstraintList& list = system.lists[k];
-            const std::size_t arity = std::size_t(list.arity);
-            for (std::size_t i = at[k].first[v]; i < at[k].first[v + 1]; ++i)
-              for (std::size_t j = 0; j < arity; ++j) hold(list.vertices[at[k].values[i] * arity + j]);
-          }
-        };
-        for (std::size_t s = first_stretch; s < end_stretch; ++s) {
-          auto& starts = of_stretch[s];
-          for (std::size_t v = s * stretch; v < std::min(vertices, (s + 1) * stretch); ++v) {
-            if (!starts.empty() && v - starts.back() < own) add(v);
-            if (starts.empty() || v - starts.back() == own || held > Patches::most_vertices) {
-              starts.push_back(v);
-              ++patch;
-              held = 0;
-              add(v);
-            }
-          }
+  parallel_parts(of_stretch.size(), 1, [&](std::size_t first_stretch, std::size_t end_stretch) {
+    std::vector<std::uint32_t> last(vertices);  // patch that had the vertex last, from 1 on
+    std::uint32_t patch = 0;
+    std::size_t held = 0;
+    const auto add = [&](std::size_t v) {
+      const auto hold = [&](std::size_t u) {
+        if (last[u] != patch) last[u] = patch, ++held;
+      };
+      hold(v);
+      for (std::size_t k = 0; k < system.lists.size(); ++k) {
+        const ConstraintList& list = system.lists[k];
+        const std::size_t arity = std::size_t(list.arity);
+        for (std::size_t i = at[k].first[v]; i < at[k].first[v + 1]; ++i)
+          for (std::size_t j = 0; j < arity; ++j) hold(list.vertices[at[k].values[i] * arity + j]);
+      }
+    };
+    for (std::size_t s = first_stretch; s < end_stretch; ++s) {
+      auto& starts = of_stretch[s];
+      for (std::size_t v = s * stretch; v < std::min(vertices, (s + 1) * stretch); ++v) {
+        if (!starts.empty() && v - starts.back() < own) add(v);
+        if (starts.empty() || v - starts.back() == own || held > Patches::most_vertices) {
+          starts.push_back(v);
+          ++patch;
+          held = 0;
+          add(v);
         }
-      },
-      1);
+      }
+    }
+  });
   std::vector<std::size_t> starts;
   for (const auto& some : of_stretch) starts.insert(starts.end(), some.begin(), some.end());
   starts.push_back(vertices);
@@ -250,14 +245,11 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
     }
     patches[p].push_back(writer.close(end - first));
   };
-  parallel_for(
-      patches.size(),
-      [&](std::size_t begin, std::size_t end) {
-        ChunkWriter writer(system);
-        std::vector<std::uint32_t> found;
-        for (std::size_t p = begin; p < end; ++p) write_patch(writer, p, found);
-      },
-      64);
+  parallel_parts(patches.size(), 64, [&](std::size_t begin, std::size_t end) {
+    ChunkWriter writer(system);
+    std::vector<std::uint32_t> found;
+    for (std::size_t p = begin; p < end; ++p) write_patch(writer, p, found);
+  });
   return assemble(system, patches);
 }
 

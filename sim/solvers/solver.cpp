@@ -113,11 +113,9 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
   const std::size_t arity = std::size_t(list.arity), row = arity + 1;
   std::vector<std::uint32_t> words(list.count() * row);
-  parallel_for(list.count(), [&](std::size_t first, std::size_t end) {
-    for (std::size_t c = first; c < end; ++c) {
-      std::copy_n(list.vertices.data() + c * arity, arity, words.data() + c * row);
-      words[c * row + arity] = std::bit_cast<std::uint32_t>(float(list.rest[c]));
-    }
+  parallel_for(list.count(), [&](std::size_t c) {
+    std::copy_n(list.vertices.data() + c * arity, arity, words.data() + c * row);
+    words[c * row + arity] = std::bit_cast<std::uint32_t>(float(list.rest[c]));
   });
   return Buffer("records " + kind, words);
 }

@@ -16,7 +16,7 @@ TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does n
   const Folder folder;
   std::ofstream(folder.path / "rest.json")
       << R"({"name": "rest", "bodies": [{"name": "block", "block": {"size": [1, 0.5, 0.5], "cells": [4, 2, 2]},
-             "position": [0, 0.02, 0]}], "solver": {"iterations": 10}})";
+             "position": [0, 0.02, 0]}], "solver": {"iterations": 10, "substeps": 2}})";
   for (const char* mode : {"node", "constraint"}) {
     CAPTURE(mode);
     program("soak --scene rest.json --settle 600 --steps 400 --out s --mode " + std::string(mode), folder);

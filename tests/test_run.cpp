@@ -49,7 +49,7 @@ Blob body_of(const Picture& picture) {
 TEST_CASE("run writes what it says, twice the same") {
   const Folder folder;
   const std::string arguments =
-      "run --scene bunny-drop --steps 30 --iterations 3 --set bodies.0.position=[0,0.02,0] --size 320x240 "
+      "run --scene bunny-drop --steps 30 --iterations 3 --substeps 2 --set bodies.0.position=[0,0.02,0] --size 320x240 "
       "--samples 0 "
       "--png-every 15 --video fall.mp4 --positions --out ";
   const Outcome first = program(arguments + "a", folder), second = program(arguments + "b", folder);

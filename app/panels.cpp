@@ -244,13 +244,12 @@ void draw_colour_range(Session& s, Ui& ui) {
     ImGui::ColorEdit3(id.c_str(), &view.body_colour.x, ImGuiColorEditFlags_NoInputs);
   } else if (view.colour == Colour::velocity) {
     const double low = 0.1, high = 50;
-    ImGui::SliderScalar(id.c_str(), ImGuiDataType_Double, &view.velocity.high, &low, &high, "0 .. %.2f m/s",
+    ImGui::SliderScalar(id.c_str(), ImGuiDataType_Double, &view.range().high, &low, &high, "0 .. %.2f m/s",
                         flags);
   } else {
-    ColourRange& range = view.colour == Colour::volume ? view.volume : view.stretch;
-    float percent = float(range.high * 100);
+    float percent = float(view.range().high * 100);
     if (ImGui::SliderFloat(id.c_str(), &percent, 0.1f, 100, "+/- %.1f %%", flags))
-      range = {-double(percent) / 100, double(percent) / 100};
+      view.range() = {-double(percent) / 100, double(percent) / 100};
   }
   mark(s, ui, "colour range");
 }

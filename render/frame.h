@@ -36,13 +36,15 @@ struct ViewOptions {
   bool follow = false;   ///< the camera goes where the bodies go: poll_centre() says where they are
   double shrink = 0.15;  ///< tets: each towards its centre, 0..1
   double explode = 0;    ///< tets: away from the bodies' centre, as a part of their distance from it
-  double cut =
-      1;  ///< tets: only those whose centre at rest is below this part of the rest shape's extent ...
-  int cut_axis = 0;                            ///< ... along x, y, z (0, 1, 2); 1 cuts nothing
+  double cut = 1;    ///< tets: those whose centre at rest is below this part of the rest shape's extent ...
+  int cut_axis = 0;  ///< ... along x, y, z (0, 1, 2)
   glm::vec3 body_colour{0.74f, 0.50f, 0.41f};  ///< sRGB; further bodies turn its hue
-  ColourRange volume{-0.2, 0.2};               ///< V/V0 - 1
-  ColourRange stretch{-0.2, 0.2};              ///< L/L0 - 1
-  ColourRange velocity{0, 5};                  ///< m/s
+  /// Of each Colour: none, V/V0 - 1, L/L0 - 1, m/s.
+  std::array<ColourRange, 4> ranges{{{}, {-0.2, 0.2}, {-0.2, 0.2}, {0, 5}}};
+
+  ColourRange& range() { return ranges[std::size_t(colour)]; }
+  const ColourRange& range() const { return ranges[std::size_t(colour)]; }
+  bool has_scale() const { return legend && colour != Colour::plain; }
 };
 
 /// The cheapest picture: flat faces on one colour, and nothing else.

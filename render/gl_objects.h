@@ -1,67 +1,52 @@
-// Move-only GL names that have no size of their own (vertex arrays, textures, renderbuffers, framebuffers,
-// samplers), and how values that the GPU wrote come back without waiting.
+// Move-only GL names that have no size of their own, and how values that the GPU wrote come back without
+// waiting.
 #pragma once
 
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "sim/gl/gpu.h"
 
 namespace tetpbd {
 
-enum class Named { vertex_array, texture, renderbuffer, framebuffer, sampler };
+template <GLenum kind>
+void delete_named(GLuint id) {
+  if constexpr (kind == GL_VERTEX_ARRAY) glDeleteVertexArrays(1, &id);
+  if constexpr (kind == GL_TEXTURE) glDeleteTextures(1, &id);
+  if constexpr (kind == GL_RENDERBUFFER) glDeleteRenderbuffers(1, &id);
+  if constexpr (kind == GL_FRAMEBUFFER) glDeleteFramebuffers(1, &id);
+  if constexpr (kind == GL_SAMPLER) glDeleteSamplers(1, &id);
+}
 
-/// Made by `make`, which leaves the object bound (a name is an object only once it was bound, and only then
-/// has a label).
-template <Named kind>
-class GlObject {
+/// Left bound by its making: a name is an object only once it was bound, and only then has a label.
+template <GLenum kind>
+class Named {
  public:
-  GlObject() = default;
-  static GlObject make(const std::string& label) {
-    GlObject object;
-    GLuint& id = object.id_;
-    GLenum space = GL_TEXTURE;
-    if constexpr (kind == Named::vertex_array)
-      glGenVertexArrays(1, &id), glBindVertexArray(id), space = GL_VERTEX_ARRAY;
-    if constexpr (kind == Named::texture) glGenTextures(1, &id), glBindTexture(GL_TEXTURE_2D, id);
-    if constexpr (kind == Named::renderbuffer)
-      glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id), space = GL_RENDERBUFFER;
-    if constexpr (kind == Named::framebuffer)
-      glGenFramebuffers(1, &id), glBindFramebuffer(GL_FRAMEBUFFER, id), space = GL_FRAMEBUFFER;
-    if constexpr (kind == Named::sampler)
-      glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0), space = GL_SAMPLER;
-    glObjectLabel(space, id, GLsizei(label.size()), label.data());
-    count_gl_objects(1);
-    return object;
+  Named() = default;
+  explicit Named(const std::string& label) {
+    GLuint id = 0;
+    if constexpr (kind == GL_VERTEX_ARRAY) glGenVertexArrays(1, &id), glBindVertexArray(id);
+    if constexpr (kind == GL_TEXTURE) glGenTextures(1, &id), glBindTexture(GL_TEXTURE_2D, id);
+    if constexpr (kind == GL_RENDERBUFFER)
+      glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id);
+    if constexpr (kind == GL_FRAMEBUFFER) glGenFramebuffers(1, &id), glBindFramebuffer(GL_FRAMEBUFFER, id);
+    if constexpr (kind == GL_SAMPLER) glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0);
+    label_object(kind, id, label);
+    object_ = Owned<GLuint, delete_named<kind>>(id);
   }
-  GlObject(GlObject&& other) noexcept { std::swap(id_, other.id_); }
-  GlObject& operator=(GlObject&& other) noexcept {
-    std::swap(id_, other.id_);
-    return *this;
-  }
-  ~GlObject() {
-    if (!id_) return;
-    count_gl_objects(-1);
-    if constexpr (kind == Named::vertex_array) glDeleteVertexArrays(1, &id_);
-    if constexpr (kind == Named::texture) glDeleteTextures(1, &id_);
-    if constexpr (kind == Named::renderbuffer) glDeleteRenderbuffers(1, &id_);
-    if constexpr (kind == Named::framebuffer) glDeleteFramebuffers(1, &id_);
-    if constexpr (kind == Named::sampler) glDeleteSamplers(1, &id_);
-  }
-  GLuint id() const { return id_; }
-  explicit operator bool() const { return id_ != 0; }
+  GLuint id() const { return object_.name(); }
+  explicit operator bool() const { return id() != 0; }
 
  private:
-  GLuint id_ = 0;
+  Owned<GLuint, delete_named<kind>> object_;
 };
 
-using VertexArray = GlObject<Named::vertex_array>;
-using Texture = GlObject<Named::texture>;
-using Renderbuffer = GlObject<Named::renderbuffer>;
-using Framebuffer = GlObject<Named::framebuffer>;
-using Sampler = GlObject<Named::sampler>;
+using VertexArray = Named<GL_VERTEX_ARRAY>;
+using Texture = Named<GL_TEXTURE>;
+using Renderbuffer = Named<GL_RENDERBUFFER>;
+using Framebuffer = Named<GL_FRAMEBUFFER>;
+using Sampler = Named<GL_SAMPLER>;
 
 /// What a buffer held when the GPU came to `fence`, once: nothing before that (with `wait`, after waiting for
 /// it) or without a fence. `what` is for the error.

@@ -27,9 +27,10 @@ struct Current {
   ~Current() { ImGui::SetCurrentContext(before); }
 };
 
-ImU32 scale_colour(const ViewOptions& options, float value, const ColourRange& range) {
+ImU32 scale_colour(const ViewOptions& options, double value) {
+  const ColourRange& range = options.range();
   const glm::vec3 c =
-      colour_maps::scale_colour(int(options.colour), value, float(range.low), float(range.high));
+      colour_maps::scale_colour(int(options.colour), float(value), float(range.low), float(range.high));
   const auto code = [](float linear) {
     return linear <= 0.0031308f ? linear * 12.92f : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
   };
@@ -40,19 +41,18 @@ void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, flo
   const bool speed = options.colour == Colour::velocity;
   const char* title = speed ? "Speed" : options.colour == Colour::volume ? "Volume error" : "Edge strain";
   const char* unit = speed ? "m/s" : "% of rest";
-  const ColourRange range = colour_range(options);
-  const int ticks = 5;
-  const float pad = 0.75f * line, bar_width = line,
-              bar_height = std::round(std::min(14.5f * line, 0.42f * height));
-  const auto value = [&](float part) { return range.low + (range.high - range.low) * double(part); };
-  const auto label = [&](int tick) {
-    const double shown = value(float(tick) / (ticks - 1)) * (speed ? 1 : 100);
-    if (std::abs(shown) < 1e-9) return std::string("0");
-    return speed ? fmt::format("{:.3g}", shown) : fmt::format("{:+.3g}", shown);
+  constexpr int ticks = 5;
+  const float pad = 0.75f * line, bar_height = std::round(std::min(14.5f * line, 0.42f * height));
+  const auto value = [&, range = options.range()](float part) {
+    return range.low + (range.high - range.low) * double(part);
   };
+  std::string labels[ticks];
   float width = std::max(ImGui::CalcTextSize(title).x, ImGui::CalcTextSize(unit).x);
-  for (int i = 0; i < ticks; ++i)
-    width = std::max(width, bar_width + pad + ImGui::CalcTextSize(label(i).c_str()).x);
+  for (int i = 0; i < ticks; ++i) {
+    const double shown = value(float(i) / (ticks - 1)) * (speed ? 1 : 100);
+    labels[i] = std::abs(shown) < 1e-9 ? "0" : fmt::format(fmt::runtime(speed ? "{:.3g}" : "{:+.3g}"), shown);
+    width = std::max(width, line + pad + ImGui::CalcTextSize(labels[i].c_str()).x);
+  }
   const ImVec2 low(std::round(corner.x - width - 2 * pad),
                    std::round(corner.y - bar_height - 2.25f * line - 2.5f * pad));
   draw.AddRectFilled(low, corner, paper, 0.6f * line);
@@ -60,23 +60,16 @@ void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, flo
   draw.AddText(ImVec2(low.x + pad, low.y + pad + line), ink, unit);
   const ImVec2 bar(std::round(low.x + pad), std::round(corner.y - 1.25f * pad - bar_height));
   for (float y = 0; y < bar_height; ++y)
-    draw.AddRectFilled(ImVec2(bar.x, bar.y + y), ImVec2(bar.x + bar_width, bar.y + y + 1),
-                       scale_colour(options, float(value(1 - y / (bar_height - 1))), range));
+    draw.AddRectFilled(ImVec2(bar.x, bar.y + y), ImVec2(bar.x + line, bar.y + y + 1),
+                       scale_colour(options, value(1 - y / (bar_height - 1))));
   for (int i = 0; i < ticks; ++i) {
-    const ImVec2 tick(bar.x + bar_width,
-                      std::round(bar.y + (bar_height - 1) * (1 - float(i) / float(ticks - 1))));
+    const ImVec2 tick(bar.x + line, std::round(bar.y + (bar_height - 1) * (1 - float(i) / (ticks - 1))));
     draw.AddRectFilled(tick, ImVec2(tick.x + 0.3f * line, tick.y + 1), ink);
-    draw.AddText(ImVec2(tick.x + pad, std::round(tick.y - line / 2)), ink, label(i).c_str());
+    draw.AddText(ImVec2(tick.x + pad, std::round(tick.y - line / 2)), ink, labels[i].c_str());
   }
 }
 
 }  // namespace
-
-ColourRange colour_range(const ViewOptions& options) {
-  if (options.colour == Colour::stretch) return options.stretch;
-  if (options.colour == Colour::velocity) return options.velocity;
-  return options.volume;
-}
 
 void set_font(ImFontAtlas& atlas, float size) {
   atlas.Clear();
@@ -87,7 +80,7 @@ void set_font(ImFontAtlas& atlas, float size) {
                              int(_binary_font_ttf_end - _binary_font_ttf_start), size, &config);
 }
 
-void Legend::Close::operator()(ImGuiContext* context) const {
+void CloseLegend::operator()(ImGuiContext* context) const {
   {
     const Current current(context);
     ImGui_ImplOpenGL3_Shutdown();
@@ -95,24 +88,20 @@ void Legend::Close::operator()(ImGuiContext* context) const {
   ImGui::DestroyContext(context);
 }
 
-Legend make_legend() {
-  const Current current(ImGui::GetCurrentContext());
-  Legend legend;
-  legend.context.reset(ImGui::CreateContext());
-  ImGui::SetCurrentContext(legend.context.get());
-  ImGui::GetIO().IniFilename = nullptr;
-  ImGui_ImplOpenGL3_Init("#version 430 core");
-  return legend;
-}
-
 void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options,
                  const std::string& caption) {
-  const Current current(legend.context.get());
+  const Current current(legend.get());
+  if (!legend) {
+    legend.reset(ImGui::CreateContext());
+    ImGui::SetCurrentContext(legend.get());
+    ImGui::GetIO().IniFilename = nullptr;
+    ImGui_ImplOpenGL3_Init("#version 430 core");
+  }
   ImGuiIO& io = ImGui::GetIO();
-  const float line = std::round(13.0f * std::max(1.0f, float(viewport.height) / 720.0f)),
-              margin = 1.4f * line;
-  if (line != legend.font_size) {
-    set_font(*io.Fonts, legend.font_size = line);
+  const float line = std::round(13.0f * std::max(1.0f, float(viewport.height) / 720.0f));
+  const float margin = 1.4f * line;
+  if (io.Fonts->Fonts.empty() || io.Fonts->Fonts[0]->FontSize != line) {
+    set_font(*io.Fonts, line);
     ImGui_ImplOpenGL3_DestroyFontsTexture();
     ImGui_ImplOpenGL3_CreateFontsTexture();
   }
@@ -122,7 +111,7 @@ void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& op
   ImGui_ImplOpenGL3_NewFrame();
   ImGui::NewFrame();
   ImDrawList& draw = *ImGui::GetBackgroundDrawList();
-  if (has_scale(options))
+  if (options.has_scale())
     draw_scale(draw, options, ImVec2(high.x - margin, high.y - margin), float(viewport.height), line);
   draw.AddText(ImVec2(low.x + std::round(margin), std::round(margin)), ink, caption.c_str());
   ImGui::Render();

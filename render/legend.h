@@ -14,23 +14,14 @@ namespace tetpbd {
 /// DejaVu Sans, which travels inside the program, in place of what fonts there are; `size` in pixels.
 void set_font(ImFontAtlas& atlas, float size);
 
-/// A context of Dear ImGui beside the window's. Contexts are current for the whole program: one thread draws.
-struct Legend {
-  struct Close {
-    void operator()(ImGuiContext* context) const;
-  };
-  std::unique_ptr<ImGuiContext, Close> context;
-  float font_size = 0;
+struct CloseLegend {
+  void operator()(ImGuiContext* context) const;
 };
-Legend make_legend();
-/// A colour scale at the lower right where the options ask for one, a caption at the upper left.
+/// A context of Dear ImGui beside the window's. Contexts are current for the whole program: one thread draws.
+using Legend = std::unique_ptr<ImGuiContext, CloseLegend>;
+/// A colour scale at the lower right where the options ask for one, a caption at the upper left. Makes the
+/// legend where there is none.
 void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options,
                  const std::string& caption);
-
-/// The range that the options' colour shows.
-ColourRange colour_range(const ViewOptions& options);
-inline bool has_scale(const ViewOptions& options) {
-  return options.legend && options.colour != Colour::plain;
-}
 
 }  // namespace tetpbd

@@ -12,55 +12,42 @@ namespace tetpbd {
 
 namespace {
 
+/// Shader files in render/, by whose endings their stages are known, and what they define.
 struct Recipe {
-  std::vector<Program::Stage> stages;
-  std::vector<std::string> defines;
+  std::vector<std::string> files, defines;
 };
 
-const Recipe& recipe(const std::string& name) {
-  const auto body = [](const char* geometry, const char* fragment, std::vector<std::string> defines) {
-    return Recipe{{{GL_VERTEX_SHADER, "render/body.vert"},
-                   {GL_GEOMETRY_SHADER, geometry},
-                   {GL_FRAGMENT_SHADER, fragment}},
-                  std::move(defines)};
-  };
-  const auto screen = [](const std::string& file) {
-    return Recipe{{{GL_VERTEX_SHADER, file + ".vert"}, {GL_FRAGMENT_SHADER, file + ".frag"}}, {}};
-  };
-  const auto compute = [](const char* file, std::vector<std::string> defines) {
-    return Recipe{{{GL_COMPUTE_SHADER, file}}, std::move(defines)};
-  };
-  static const std::map<std::string, Recipe> recipes = {
-      {"surface", body("render/surface.geom", "render/body.frag", {})},
-      {"surface shadow", body("render/surface.geom", "render/depth.frag", {"SHADOW"})},
-      {"tets", body("render/tets.geom", "render/body.frag", {})},
-      {"tets shadow", body("render/tets.geom", "render/depth.frag", {"SHADOW"})},
-      {"background", screen("render/background")},
-      {"plane", screen("render/plane")},
-      {"dots", screen("render/dots")},
-      {"normals", compute("render/gather.comp", {"NORMAL"})},
-      {"volume errors", compute("render/gather.comp", {"VOLUME"})},
-      {"stretch errors", compute("render/gather.comp", {})},
-      {"shadow fit", compute("render/shadow_fit.comp", {})}};
-  return recipes.at(name);
-}
+const std::map<std::string, Recipe> recipes = {
+    {"surface", {{"body.vert", "surface.geom", "body.frag"}, {}}},
+    {"surface shadow", {{"body.vert", "surface.geom", "depth.frag"}, {"SHADOW"}}},
+    {"tets", {{"body.vert", "tets.geom", "body.frag"}, {}}},
+    {"tets shadow", {{"body.vert", "tets.geom", "depth.frag"}, {"SHADOW"}}},
+    {"background", {{"background.vert", "background.frag"}, {}}},
+    {"plane", {{"plane.vert", "plane.frag"}, {}}},
+    {"dots", {{"dots.vert", "dots.frag"}, {}}},
+    {"normals", {{"gather.comp"}, {"NORMAL"}}},
+    {"volume errors", {{"gather.comp"}, {"VOLUME"}}},
+    {"stretch errors", {{"gather.comp"}, {}}},
+    {"shadow fit", {{"shadow_fit.comp"}, {}}}};
 
 Program compile(const std::string& name) {
-  return Program(name, recipe(name).stages, {}, recipe(name).defines);
+  const auto& [files, defines] = recipes.at(name);
+  std::vector<Program::Stage> stages;
+  for (const std::string& file : files) {
+    const GLenum type = file.ends_with(".vert")   ? GL_VERTEX_SHADER
+                        : file.ends_with(".geom") ? GL_GEOMETRY_SHADER
+                        : file.ends_with(".frag") ? GL_FRAGMENT_SHADER
+                                                  : GL_COMPUTE_SHADER;
+    stages.push_back({type, "render/" + file});
+  }
+  return Program(name, stages, {}, defines);
 }
 
 const Program& use(Renderer& renderer, const std::string& name) {
-  if (!renderer.programs.count(name)) renderer.programs[name] = compile(name);
+  if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
   const Program& program = renderer.programs.at(name);
   program.use();
   return program;
-}
-
-std::string body_program(const Frame& frame) { return frame.options.look == Look::tets ? "tets" : "surface"; }
-
-bool wants_rest(const Renderer& renderer, const ViewOptions& options) {
-  const bool error = options.colour == Colour::volume || options.colour == Colour::stretch;
-  return error || options.look == Look::tets || renderer.bodies.size() > 1;
 }
 
 Buffer rest_buffer(const Renderer& renderer) {
@@ -88,15 +75,13 @@ glm::vec3 turned(const glm::vec3& colour, float degrees) {
 
 View view_block(const Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
-  const Viewport& viewport = frame.viewport;
   View view{};
   const glm::mat4 seen = view_matrix(frame.camera);
   view.camera =
-      projection_matrix(frame.camera, float(viewport.width) / float(std::max(viewport.height, 1))) * seen;
+      projection_matrix(frame.camera, float(frame.viewport.width) / float(frame.viewport.height)) * seen;
   view.eye = glm::vec4(eye(frame.camera), options.smooth_normals && options.look != Look::tets ? 1.0f : 0.0f);
   view.right = glm::vec4(seen[0][0], seen[1][0], seen[2][0], options.shadow ? 1.0f : 0.0f);
-  const ColourRange range = colour_range(options);
-  view.colour = glm::vec4(float(options.colour), float(range.low), float(range.high),
+  view.colour = glm::vec4(float(options.colour), float(options.range().low), float(options.range().high),
                           options.look == Look::wire ? 0.85f : 0.0f);
   view.tets = glm::vec4(float(options.shrink), options.look == Look::tets ? float(options.explode) : 0.0f,
                         float(options.cut), float(options.cut_axis));
@@ -109,14 +94,6 @@ View view_block(const Renderer& renderer, const Frame& frame) {
         glm::vec4(linear(c.x), linear(c.y), linear(c.z), 1.0f) * (i < turns.size() ? 1.0f : 0.8f);
   }
   return view;
-}
-
-// Values of vertices from their kernel, in a buffer of which this is the name.
-GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values,
-                VertexGather (*make)(const TetMesh&), const char* program) {
-  if (!values) values = make(renderer.mesh);
-  update(values, use(renderer, program), frame.positions, renderer.rest);
-  return values.values.id();
 }
 
 // The vertex attributes of this frame, computed where they have to be, or the constants that stand for them.
@@ -133,18 +110,22 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
     glVertexAttribPointer(index, count, GL_FLOAT, GL_FALSE, GLsizei(stride),
                           reinterpret_cast<const void*>(offset));
   };
+  // Values of vertices from their kernel, in a buffer of which this is the name.
+  const auto gathered = [&](VertexGather& values, VertexGather make(const TetMesh&), const char* program) {
+    if (!values) values = make(renderer.mesh);
+    update(values, use(renderer, program), frame.positions, renderer.rest);
+    return values.values.id();
+  };
   const ViewOptions& options = frame.options;
-  GLuint normal = 0, value = 0, rest = 0;
-  if (wants_rest(renderer, options)) {
-    if (!renderer.rest) renderer.rest = rest_buffer(renderer);
-    rest = renderer.rest.id();
-  }
-  if (options.look != Look::tets) {  // the geometry shader of these has the whole tetrahedron
-    if (options.smooth_normals) normal = gathered(renderer, frame, renderer.normals, make_normals, "normals");
-    if (options.colour == Colour::volume)
-      value = gathered(renderer, frame, renderer.volume_errors, make_volume_errors, "volume errors");
-    if (options.colour == Colour::stretch)
-      value = gathered(renderer, frame, renderer.stretch_errors, make_stretch_errors, "stretch errors");
+  const bool tets = options.look == Look::tets, volume = options.colour == Colour::volume,
+             stretch = options.colour == Colour::stretch;
+  if (!renderer.rest && (tets || volume || stretch || renderer.bodies.size() > 1))
+    renderer.rest = rest_buffer(renderer);
+  GLuint normal = 0, value = 0;
+  if (!tets) {  // the geometry shader of these has the whole tetrahedron
+    if (options.smooth_normals) normal = gathered(renderer.normals, make_normals, "normals");
+    if (volume) value = gathered(renderer.volume_errors, make_volume_errors, "volume errors");
+    if (stretch) value = gathered(renderer.stretch_errors, make_stretch_errors, "stretch errors");
   }
   glBindVertexArray(renderer.vertex_array.id());
   attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
@@ -153,22 +134,22 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
   attribute(ATTRIBUTE_VALUE, value, 1, sizeof(float), 0);
   attribute(ATTRIBUTE_VELOCITY, options.colour == Colour::velocity ? frame.velocities : 0, 3,
             sizeof(Velocity), offsetof(Velocity, high));
-  attribute(ATTRIBUTE_REST, rest, 4, sizeof(glm::vec4), 0);
+  attribute(ATTRIBUTE_REST, renderer.rest.id(), 4, sizeof(glm::vec4), 0);
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);  // the step's and the kernels'
 }
 
-void draw_bodies(Renderer& renderer, const Frame& frame, const std::string& program) {
-  use(renderer, program);
+// To the image or, with `shadow`, to the map.
+void draw_bodies(Renderer& renderer, const Frame& frame, bool shadow) {
+  const bool tets = frame.options.look == Look::tets;
+  use(renderer, std::string(tets ? "tets" : "surface") + (shadow ? " shadow" : ""));
+  Buffer& indices = tets ? renderer.tets : renderer.triangles;
+  if (!indices)
+    indices =
+        tets ? Buffer("tet indices", renderer.mesh.tets) : Buffer("surface indices", renderer.mesh.surface);
   glBindVertexArray(renderer.vertex_array.id());
-  if (frame.options.look == Look::tets) {
-    if (!renderer.tets) renderer.tets = Buffer("tet indices", renderer.mesh.tets);
-    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.tets.id());
-    glDrawElements(GL_LINES_ADJACENCY, GLsizei(renderer.mesh.tets.size() * 4), GL_UNSIGNED_INT, nullptr);
-  } else {
-    if (!renderer.triangles) renderer.triangles = Buffer("surface indices", renderer.mesh.surface);
-    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.triangles.id());
-    glDrawElements(GL_TRIANGLES, GLsizei(renderer.mesh.surface.size() * 3), GL_UNSIGNED_INT, nullptr);
-  }
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.id());
+  glDrawElements(tets ? GL_LINES_ADJACENCY : GL_TRIANGLES, GLsizei(indices.bytes() / sizeof(std::uint32_t)),
+                 GL_UNSIGNED_INT, nullptr);
 }
 
 void draw_shadow_map(Renderer& renderer, const Frame& frame) {
@@ -182,7 +163,7 @@ void draw_shadow_map(Renderer& renderer, const Frame& frame) {
   glDepthFunc(GL_LESS);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
-  draw_bodies(renderer, frame, body_program(frame) + " shadow");
+  draw_bodies(renderer, frame, true);
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
@@ -206,25 +187,19 @@ void draw_plane(Renderer& renderer, const Frame& frame, const glm::vec4& plane, 
 }
 
 void draw_dots(Renderer& renderer, const Frame& frame) {
-  const std::size_t count = frame.pinned.size() + frame.grabbed.size(), bytes = count * sizeof(std::uint32_t);
-  if (renderer.dots.bytes() < bytes) renderer.dots = Buffer("dot indices", bytes, nullptr, GL_STREAM_DRAW);
-  std::vector<std::uint32_t> dots = frame.grabbed;  // first, so that it covers its own pin
-  dots.insert(dots.end(), frame.pinned.begin(), frame.pinned.end());
-  renderer.dots.write(0, bytes, dots.data());
+  if (frame.pinned.empty() && frame.grabbed.empty()) return;
   glBindVertexArray(renderer.vertex_array.id());
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.dots.id());
   glEnable(GL_PROGRAM_POINT_SIZE);
   const Program& program = use(renderer, "dots");
-  const float scale = std::max(1.0f, float(frame.viewport.height) / 720.0f);
-  const auto batch = [&](std::size_t n, std::size_t offset, const glm::vec3& colour, float size) {
-    if (!n) return;
+  const auto batch = [&](const std::vector<std::uint32_t>& vertices, const glm::vec3& colour, float size) {
     program.set("colour", colour);
-    program.set("size", size * scale);
-    glDrawElements(GL_POINTS, GLsizei(n), GL_UNSIGNED_INT, reinterpret_cast<const void*>(offset));
+    program.set("size", size * std::max(1.0f, float(frame.viewport.height) / 720.0f));
+    const std::vector<GLint> first(vertices.begin(), vertices.end());
+    const std::vector<GLsizei> ones(vertices.size(), 1);
+    glMultiDrawArrays(GL_POINTS, first.data(), ones.data(), GLsizei(first.size()));
   };
-  const std::size_t grabbed = frame.grabbed.size();
-  batch(grabbed, 0, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);
-  batch(frame.pinned.size(), grabbed * sizeof(std::uint32_t), glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
+  batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
+  batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_PROGRAM_POINT_SIZE);
 }
 
@@ -259,8 +234,8 @@ Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies) {
   renderer.rest_low = glm::vec3(rest.low), renderer.rest_high = glm::vec3(rest.high);
   renderer.mesh = std::move(mesh);
   renderer.bodies = std::move(bodies);
-  renderer.vertex_array = VertexArray::make("bodies");
-  renderer.empty_array = VertexArray::make("no attributes");
+  renderer.vertex_array = VertexArray("bodies");
+  renderer.empty_array = VertexArray("no attributes");
   glBindVertexArray(0);
   renderer.view = Buffer("view", sizeof(View), nullptr, GL_STREAM_DRAW);
   return renderer;
@@ -270,6 +245,21 @@ Renderer make_renderer(const Model& model) {
   std::vector<std::size_t> bodies;
   for (const Body& body : model.bodies) bodies.push_back(body.first_vertex);
   return make_renderer(model.rest, std::move(bodies));
+}
+
+Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target) {
+  Frame frame;
+  frame.positions = sim.positions.id();
+  frame.velocities = sim.velocities.id();
+  frame.camera = camera;
+  frame.viewport = {0, 0, target.width, target.height};
+  frame.options = options;
+  if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
+  frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
+  for (std::uint32_t v = 0; v < sim.inverse_masses.size(); ++v)
+    if (!(sim.inverse_masses[v] > 0)) frame.pinned.push_back(v);
+  frame.target = target.framebuffer.id();
+  return frame;
 }
 
 void draw(Renderer& renderer, const Frame& frame) {
@@ -319,13 +309,12 @@ void draw(Renderer& renderer, const Frame& frame) {
     for (const glm::vec4& plane : frame.planes) draw_plane(renderer, frame, plane, true);
   }
   glDisable(GL_BLEND);
-  draw_bodies(renderer, frame, body_program(frame));
+  draw_bodies(renderer, frame, false);
   glEnable(GL_BLEND);
-  if (!frame.pinned.empty() || !frame.grabbed.empty()) draw_dots(renderer, frame);
-  if (!has_scale(options) && frame.caption.empty()) return;
+  draw_dots(renderer, frame);
+  if (!options.has_scale() && frame.caption.empty()) return;
   glDisable(GL_FRAMEBUFFER_SRGB);
-  if (!renderer.legend) renderer.legend = make_legend();
-  draw_legend(*renderer.legend, viewport, options, frame.caption);
+  draw_legend(renderer.legend, viewport, options, frame.caption);
 }
 
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait) {

@@ -27,10 +27,9 @@ struct Renderer {
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer rest;             ///< vec4: rest position and body
-  Buffer dots;             ///< indices
   VertexGather normals, volume_errors, stretch_errors;
   Shadow shadow;
-  std::optional<Legend> legend;
+  Legend legend;
 };
 
 Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies = {});

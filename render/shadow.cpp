@@ -9,20 +9,20 @@
 namespace tetpbd {
 
 void make_map(Shadow& shadow) {
-  Texture depth = Texture::make("shadow depth");
+  Texture depth("shadow depth");
   clear_errors();
   glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, Shadow::size, Shadow::size, 0, GL_DEPTH_COMPONENT,
                GL_FLOAT, nullptr);
   check_memory("the shadow map", std::size_t(Shadow::size) * Shadow::size * 4);
   shadow.depth = std::move(depth);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
-  shadow.framebuffer = Framebuffer::make("shadow");
+  shadow.framebuffer = Framebuffer("shadow");
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, shadow.depth.id(), 0);
   glDrawBuffer(GL_NONE);
   glReadBuffer(GL_NONE);
   const std::array<float, 4> lit{1.0f, 1.0f, 1.0f, 1.0f};
-  shadow.compared = Sampler::make("shadow compared");
-  shadow.plain = Sampler::make("shadow plain");
+  shadow.compared = Sampler("shadow compared");
+  shadow.plain = Sampler("shadow plain");
   for (const auto& [sampler, filter] :
        {std::pair{shadow.compared.id(), GL_LINEAR}, {shadow.plain.id(), GL_NEAREST}}) {
     for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})

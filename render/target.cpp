@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "sim/error.h"
 
@@ -11,29 +10,39 @@ namespace tetpbd {
 
 namespace {
 
-Renderbuffer storage(const char* label, int width, int height, int samples, GLenum format) {
-  Renderbuffer buffer = Renderbuffer::make(label);
+std::size_t bytes_of(int width, int height) { return std::size_t(width) * std::size_t(height) * 4; }
+
+Renderbuffer storage(const char* label, const Target& target, int samples, GLenum format) {
+  Renderbuffer buffer(label);
   clear_errors();
-  glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height);
-  check_memory(fmt::format("image '{}', {}x{} with {} samples,", label, width, height, samples),
-               std::size_t(width) * std::size_t(height) * std::size_t(std::max(samples, 1)) * 4);
+  glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, target.width, target.height);
+  check_memory(fmt::format("image '{}', {}x{} with {} samples,", label, target.width, target.height, samples),
+               bytes_of(target.width, target.height) * std::size_t(std::max(samples, 1)));
   return buffer;
 }
 
-void check_complete(int width, int height) {
+Framebuffer framebuffer_of(const char* label, const Target& target, const Renderbuffer& colour,
+                           const Renderbuffer& depth) {
+  Framebuffer framebuffer(label);
+  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour.id());
+  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth.id());
   if (const GLenum status = glCheckFramebufferStatus(GL_FRAMEBUFFER); status != GL_FRAMEBUFFER_COMPLETE)
     throw Error("the driver cannot draw to an image",
-                fmt::format("{}x{}, status {:#x}", width, height, status),
+                fmt::format("{}x{}, status {:#x}", target.width, target.height, status),
                 "use a smaller image or fewer samples", 1);
+  return framebuffer;
 }
 
-// Rows come bottom first.
-Image flipped(int width, int height, const std::uint8_t* rows) {
-  Image image{width, height, std::vector<std::uint8_t>(std::size_t(width) * std::size_t(height) * 4)};
-  const std::size_t row = std::size_t(width) * 4;
-  for (std::size_t y = 0; y < std::size_t(height); ++y)
-    std::memcpy(image.rgba.data() + y * row, rows + (std::size_t(height) - 1 - y) * row, row);
-  return image;
+// The framebuffer to read from, after resolving samples where there are any.
+GLuint resolve(const Target& target) {
+  if (!target.samples) return target.framebuffer.id();
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.id());
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.resolved.id());
+  glEnable(GL_FRAMEBUFFER_SRGB);  // samples are averaged as light, not as codes
+  glBlitFramebuffer(0, 0, target.width, target.height, 0, 0, target.width, target.height, GL_COLOR_BUFFER_BIT,
+                    GL_NEAREST);
+  glDisable(GL_FRAMEBUFFER_SRGB);
+  return target.resolved.id();
 }
 
 }  // namespace
@@ -52,32 +61,15 @@ Target make_target(int width, int height, int samples) {
   target.height = height;
   samples = std::min(samples, int(most));
   target.samples = samples < 2 ? 0 : samples < 4 ? 2 : samples < 8 ? 4 : 8;
-  target.colour = storage("target colour", width, height, target.samples, GL_SRGB8_ALPHA8);
-  target.depth = storage("target depth", width, height, target.samples, GL_DEPTH_COMPONENT32F);
-  target.framebuffer = Framebuffer::make("target");
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, target.colour.id());
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, target.depth.id());
-  check_complete(width, height);
+  target.colour = storage("target colour", target, target.samples, GL_SRGB8_ALPHA8);
+  target.depth = storage("target depth", target, target.samples, GL_DEPTH_COMPONENT32F);
+  target.framebuffer = framebuffer_of("target", target, target.colour, target.depth);
   if (target.samples) {
-    target.resolved_colour = storage("target resolved colour", width, height, 0, GL_SRGB8_ALPHA8);
-    target.resolved = Framebuffer::make("target resolved");
-    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
-                              target.resolved_colour.id());
-    check_complete(width, height);
+    target.resolved_colour = storage("target resolved colour", target, 0, GL_SRGB8_ALPHA8);
+    target.resolved = framebuffer_of("target resolved", target, target.resolved_colour, {});
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   return target;
-}
-
-GLuint resolve(const Target& target) {
-  if (!target.samples) return target.framebuffer.id();
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.id());
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.resolved.id());
-  glEnable(GL_FRAMEBUFFER_SRGB);  // samples are averaged as light, not as codes
-  glBlitFramebuffer(0, 0, target.width, target.height, 0, 0, target.width, target.height, GL_COLOR_BUFFER_BIT,
-                    GL_NEAREST);
-  glDisable(GL_FRAMEBUFFER_SRGB);
-  return target.resolved.id();
 }
 
 Image read_rgba(const Target& target) {
@@ -97,28 +89,24 @@ void present(const Target& target, GLuint framebuffer, int x, int y) {
 }
 
 void ReadBack::push(const Target& target) {
-  const std::size_t bytes = std::size_t(target.width) * std::size_t(target.height) * 4;
-  Slot slot;
-  if (!free_.empty()) slot = std::move(free_.back()), free_.pop_back();
-  if (slot.pixels.bytes() != bytes) slot.pixels = Buffer("frame read-back", bytes, nullptr, GL_STREAM_READ);
-  slot.width = target.width;
-  slot.height = target.height;
+  Buffer pixels("frame read-back", bytes_of(target.width, target.height), nullptr, GL_STREAM_READ);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, resolve(target));
-  glPixelStorei(GL_PACK_ALIGNMENT, 4);
-  glBindBuffer(GL_PIXEL_PACK_BUFFER, slot.pixels.id());
+  glBindBuffer(GL_PIXEL_PACK_BUFFER, pixels.id());
   glReadPixels(0, 0, target.width, target.height, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-  slot.fence = Fence::here();
+  pending_.push_back({target.width, target.height, std::move(pixels), Fence::here()});
   glFlush();  // else the fence may never be reached while nobody waits
-  pending_.push_back(std::move(slot));
 }
 
 std::optional<Image> ReadBack::poll(bool wait) {
   if (pending_.empty()) return std::nullopt;
-  Slot& slot = pending_.front();
-  if (!reached(slot.fence.sync(), wait, "reading a frame back")) return std::nullopt;
-  const Image image = flipped(slot.width, slot.height, slot.pixels.read_all<std::uint8_t>().data());
-  free_.push_back(std::move(slot));
+  auto& [width, height, pixels, fence] = pending_.front();
+  auto rows = take<std::uint8_t>(fence, pixels, "reading a frame back", wait);
+  if (!rows) return std::nullopt;
+  Image image{width, height, std::move(*rows)};
+  const auto row = [&](int y) { return image.rgba.begin() + std::ptrdiff_t(bytes_of(image.width, y)); };
+  for (int y = 0; y < image.height / 2; ++y)  // rows come bottom first
+    std::swap_ranges(row(y), row(y + 1), row(image.height - 1 - y));
   pending_.pop_front();
   return image;
 }

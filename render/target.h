@@ -25,8 +25,6 @@ struct Target {
 
 /// Samples 0, 2, 4, 8, lowered to what the driver can do. Throws Error for sizes it cannot do.
 Target make_target(int width, int height, int samples = 0);
-/// The framebuffer to read from, after resolving samples where there are any.
-GLuint resolve(const Target& target);
 /// Waits for the GPU.
 Image read_rgba(const Target& target);
 /// Copies the image to a corner of another framebuffer (0: the window) as it is. The window needs no sRGB
@@ -45,11 +43,10 @@ class ReadBack {
 
  private:
   struct Slot {
+    int width, height;
     Buffer pixels;
-    int width = 0, height = 0;
     Fence fence;
   };
-  std::vector<Slot> free_;
   std::deque<Slot> pending_;
 };
 

@@ -18,7 +18,6 @@ Picker make_picker(const TetMesh& mesh) {
   picker.triangles = Buffer("pick triangles", mesh.surface);
   picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
   picker.count = mesh.surface.size();
-  check_work_groups(picker.kernel.label(), work_groups(picker.count, 128));
   return picker;
 }
 

@@ -27,7 +27,6 @@ VertexGather gather(const TetMesh& mesh, const std::string& label, std::size_t v
     Index* item = items.data() + std::size_t(next[v]++) * arity;
     ((*item++ = others), ...);
   });
-  check_work_groups(label, work_groups(mesh.positions.size(), 128));
   return {Buffer(label + " offsets", offsets), Buffer(label + " items", items),
           Buffer(label, mesh.positions.size() * value_bytes)};
 }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/layout.h"
+#include "sim/sim.h"
 
 namespace tetpbd {
 
@@ -16,40 +16,29 @@ Error error_of(const NonFinite& found, const std::string& where) {
       "use a smaller dt, more substeps or a lower stiffness", 1);
 }
 
-std::optional<std::uint32_t> first_non_finite(const State& state) {
+namespace {
+
+// As floats, which is what the GPU and all files get.
+std::optional<NonFinite> non_finite(const State& state, long step) {
   const auto finite = [](const glm::dvec3& v) {
     return std::isfinite(float(v.x)) && std::isfinite(float(v.y)) && std::isfinite(float(v.z));
   };
   for (std::size_t i = 0; i < state.positions.size(); ++i)
-    if (!finite(state.positions[i]) || !finite(state.velocities[i])) return std::uint32_t(i);
+    if (!finite(state.positions[i]) || !finite(state.velocities[i])) return NonFinite{step, std::uint32_t(i)};
   return std::nullopt;
 }
 
-FiniteCheck make_finite_check(std::size_t position_bytes, std::size_t velocity_bytes) {
-  FiniteCheck check;
-  check.words = Buffer("check", 8);
-  check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
-  check.copy = Program::compute("checkpoint.comp");
-  if (position_bytes == 0) return check;
-  check.positions = Buffer("checkpoint positions", position_bytes);
-  check.velocities = Buffer("checkpoint velocities", velocity_bytes);
-  return check;
-}
-
-void restart(FiniteCheck& check, long step) {
-  check.asked = {};
-  check.found.reset();
-  check.has_checkpoint = false;
-  check.first = check.known = check.asked_step = step;
-  const std::uint32_t none[2] = {~0u, ~0u};
-  check.words.write(0, sizeof none, none);
-}
-
-void save_checkpoint(FiniteCheck& check, const Buffer& positions, const Buffer& velocities) {
+// On the GPU unless it has seen a vertex that was not finite.
+void keep_checkpoint(Sim& sim) {
+  FiniteCheck& check = sim.check;
+  if (on_cpu(sim)) {
+    check.host = sim.host;
+    return;
+  }
   check.copy.use();
   check.words.bind_storage(BIND_CHECK);
   for (const auto& [from, to] :
-       {std::pair(&positions, &check.positions), std::pair(&velocities, &check.velocities)}) {
+       {std::pair(&sim.positions, &check.positions), std::pair(&sim.velocities, &check.velocities)}) {
     const std::size_t words = from->bytes() / 4;
     check.copy.set("count", unsigned(words));
     from->bind_storage(BIND_CHECKPOINT_FROM);
@@ -58,33 +47,81 @@ void save_checkpoint(FiniteCheck& check, const Buffer& positions, const Buffer& 
   }
   // The next step overwrites what was read; restoring reads what was written.
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  check.has_checkpoint = true;
 }
 
-long checkpoint_step(const FiniteCheck& check) {
-  const long every = FiniteCheck::checkpoint_every;
-  return std::max(check.first, (check.found->step - 1) / every * every);
-}
-
-void ask(FiniteCheck& check, long step, bool wait) {
-  const auto take = [&](bool wait_for_it) {
-    if (!check.asked.sync() ||
-        !reached(check.asked.sync(), wait_for_it, "checking for numbers that are not finite"))
-      return;
-    check.asked = {};
-    const auto words = check.read_back.read_all<std::uint32_t>();  // its step, its vertex
-    if (words[0] != ~0u) check.found = {long(words[0]), words[1]};
-    check.known = check.asked_step;
-  };
-  take(wait);
-  if (check.found || check.asked.sync() || check.known >= step) return;
+// Asks the GPU about the steps so far, unless a question is under way.
+void ask(Sim& sim) {
+  FiniteCheck& check = sim.check;
+  if (check.found || check.asked.sync() || check.known >= sim.steps) return;
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);  // kernels wrote what is copied
   glBindBuffer(GL_COPY_READ_BUFFER, check.words.id());
   glBindBuffer(GL_COPY_WRITE_BUFFER, check.read_back.id());
   glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, GLsizeiptr(check.words.bytes()));
   check.asked = Fence::here();
-  check.asked_step = step;
-  if (wait) take(true);
+  check.asked_step = sim.steps;
+}
+
+void take_answer(FiniteCheck& check, bool wait) {
+  if (!check.asked.sync()) return;
+  if (!reached(check.asked.sync(), wait, "checking for numbers that are not finite")) return;
+  check.asked = {};
+  const auto words = check.read_back.read_all<std::uint32_t>();  // its step, its vertex
+  if (words[0] != ~0u) check.found = {long(words[0]), words[1]};
+  check.known = check.asked_step;
+}
+
+}  // namespace
+
+void start_check(Sim& sim, const State* given) {
+  FiniteCheck& check = sim.check;
+  check.asked = {};
+  check.first = check.known = sim.steps;
+  check.found = given ? non_finite(*given, sim.steps) : std::nullopt;
+  if (!on_cpu(sim)) check.words.write(0, 8, std::array{~0u, ~0u}.data());
+  if (!check.found) keep_checkpoint(sim);
+}
+
+void check_step(Sim& sim) {
+  FiniteCheck& check = sim.check;
+  if (check.found) return;
+  if (on_cpu(sim)) {
+    check.found = non_finite(sim.host, sim.steps);
+  } else if (sim.steps % FiniteCheck::ask_every == 0) {
+    check_context();
+    take_answer(check, true);  // the CPU is never further ahead than two questions
+    ask(sim);
+  }
+  if (!check.found && sim.steps % FiniteCheck::checkpoint_every == 0) keep_checkpoint(sim);
+}
+
+const std::optional<NonFinite>& check_finite(Sim& sim, bool wait) {
+  FiniteCheck& check = sim.check;
+  if (check.found || on_cpu(sim)) return check.found;
+  check_context();
+  take_answer(check, wait);
+  ask(sim);
+  if (wait) take_answer(check, true);
+  return check.found;
+}
+
+bool restore_checkpoint(Sim& sim) {
+  FiniteCheck& check = sim.check;
+  if (!check.found || check.found->step == check.first) return false;
+  constexpr long every = FiniteCheck::checkpoint_every;
+  sim.steps = std::max(check.first, (check.found->step - 1) / every * every);
+  if (on_cpu(sim)) {
+    write_state(sim, State(check.host));
+    return true;
+  }
+  // Not through State: a double holds fewer bits than a pair of floats can. Pins may have changed since.
+  auto positions = check.positions.read_all<Position>();
+  for (std::size_t i = 0; i < positions.size(); ++i) positions[i].inverse_mass = float(sim.inverse_masses[i]);
+  const auto velocities = check.velocities.read_all<Velocity>();
+  sim.positions.write(0, sim.positions.bytes(), positions.data());
+  sim.velocities.write(0, sim.velocities.bytes(), velocities.data());
+  sim.needs_predict = true;
+  start_check(sim, nullptr);
+  return true;
 }
 
 }  // namespace tetpbd

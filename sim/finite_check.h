@@ -20,8 +20,6 @@ struct NonFinite {
 };
 /// What users are told; `where` names the run if there are several.
 Error error_of(const NonFinite& found, const std::string& where = "");
-/// The first vertex of a state that is not finite as floats, which is what the GPU and all files get.
-std::optional<std::uint32_t> first_non_finite(const State& state);
 
 /// Part of a Sim (sim.h), whose steps keep it up to date.
 struct FiniteCheck {
@@ -31,23 +29,10 @@ struct FiniteCheck {
   Program copy;                  ///< checkpoint.comp
   Buffer positions, velocities;  ///< the checkpoint of a GPU mode,
   State host;                    ///< and of a CPU mode
-  long first = 0;                ///< step of the state that was last given
-  long known = 0;                ///< steps up to this one are finite, or `found` says which is not
-  long asked_step = 0;           ///< the step that the answer under way is of
-  bool has_checkpoint = false;
+  long first = 0;       ///< step of the state that was last given, the first checkpoint if it is finite
+  long known = 0;       ///< GPU: steps up to this one are finite, or `found` says which is not
+  long asked_step = 0;  ///< the step that the answer under way is of
   std::optional<NonFinite> found;
 };
-
-/// Room for the check, and for a checkpoint of buffers of these sizes (0: a CPU mode).
-FiniteCheck make_finite_check(std::size_t position_bytes, std::size_t velocity_bytes);
-/// Starts anew from the state of step `step`, of which nothing is known.
-void restart(FiniteCheck& check, long step);
-/// Copies the buffers to the checkpoint, unless the GPU has seen a vertex that was not finite.
-void save_checkpoint(FiniteCheck& check, const Buffer& positions, const Buffer& velocities);
-/// The step whose state the checkpoint is, once one is found that was not finite.
-long checkpoint_step(const FiniteCheck& check);
-/// Asks the GPU about the steps up to `step`, and takes its answer to the last question; with `wait`, to this
-/// one.
-void ask(FiniteCheck& check, long step, bool wait);
 
 }  // namespace tetpbd

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <ranges>
 
 #include "shaders/metrics/layout.glsl"
@@ -12,7 +14,7 @@ namespace tetpbd {
 
 namespace {
 
-constexpr std::size_t ring_size = 16;
+constexpr std::size_t ring_size = 16, measured_kinds = std::tuple_size_v<decltype(Metrics::counts)>;
 
 // Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
 glm::uvec2 range_of(const ConstraintList& list, glm::uvec2 vertices) {
@@ -25,34 +27,26 @@ glm::uvec2 range_of(const ConstraintList& list, glm::uvec2 vertices) {
 }  // namespace
 
 Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
-  // Those that are measured, as the bindings; further kinds have no measure.
+  // Those that are measured, in the order of their bindings; further kinds have no measure.
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
-  constexpr int measured = 3;
+  const bool all_made = made.present.size() >= measured_kinds &&
+                        std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
+  const ConstraintSystem own =
+      all_made ? ConstraintSystem{} : build_constraints(model.rest, "stretch,bend,volume");
+  const std::vector<ConstraintList>& lists = (all_made ? made : own).lists;
   Metrics m;
-  std::string missing;
-  const auto is_made = [&](int k) {
-    return std::size_t(k) < made.present.size() && made.present[std::size_t(k)];
-  };
-  for_each_kind([&](auto kind, int k) {
-    if (k < measured && !is_made(k)) missing += std::string(kind.row.name) + ",";
-  });
-  ConstraintSystem others;
-  if (!missing.empty()) others = build_constraints(model.rest, missing.substr(0, missing.size() - 1));
-  std::vector<const ConstraintList*> lists;
-  for_each_kind([&](auto kind, int k) {
-    if (k >= measured) return;
-    lists.push_back(&(is_made(k) ? made : others).lists[std::size_t(k)]);
-    // A mesh can lack hinges (no two surface triangles share an edge): an empty buffer then.
-    m.records.push_back(record_buffer(*lists.back(), kind.row.name));
-  });
+  for (std::size_t k = 0; k < measured_kinds; ++k) {
+    m.records.push_back(record_buffer(lists[k], constraint_kinds[k].name));
+    m.counts[k] = lists[k].count();
+  }
   std::vector<glm::vec4> rest(model.rest.positions.size());
   const std::vector<double> volumes = tet_volumes(model.rest);
   for (const Body& body : model.bodies) {
     Metrics::BodyRanges ranges;
     const std::size_t first = body.first_vertex, end = first + body.vertices;
     ranges.vertices = {first, end};
-    ranges.edges = range_of(*lists[0], ranges.vertices);
-    ranges.hinges = range_of(*lists[1], ranges.vertices);
+    ranges.edges = range_of(lists[0], ranges.vertices);
+    ranges.hinges = range_of(lists[1], ranges.vertices);
     ranges.tets = {body.first_tet, body.first_tet + body.tets};
     glm::dvec3 centre{0};
     for (std::size_t i = first; i < end; ++i) {
@@ -62,9 +56,11 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     centre /= ranges.mass;
     for (std::size_t i = first; i < end; ++i)
       rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
-    for (std::size_t t = ranges.tets.x; t < ranges.tets.y; ++t) ranges.volume += volumes[t];
+    for (std::size_t t = ranges.tets.x; t < ranges.tets.y; ++t) m.volume += volumes[t];
     const auto shape = model.rest.positions.begin();
     ranges.size = bounds({shape + std::ptrdiff_t(first), shape + std::ptrdiff_t(end)}).size();
+    m.mass += ranges.mass;
+    m.mass_sizes += ranges.mass * ranges.size;
     m.bodies.push_back(ranges);
   }
   m.rest = Buffer("metrics rest", rest);
@@ -79,67 +75,50 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
 
 namespace {
 
-Measurement read_row(const Metrics& m, const Metrics::Pending& pending) {
-  std::vector<float> floats(m.bodies.size() * M_STRIDE);
-  m.rows[pending.slot].read(0, floats.size() * sizeof(float), floats.data());
-  Measurement result = pending.known;
-  double rest_volume = 0, mass = 0, tet_squares = 0, stretch_squares = 0, bend_squares = 0, rigid = 0,
-         size = 0;
-  std::size_t tets = 0, edges = 0, hinges = 0;
+// Whether the result is there.
+bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
+  if (!pending.fence.sync()) return true;
+  if (!reached(pending.fence.sync(), wait, "measuring")) return false;
+  pending.fence = {};
+  Measurement& result = pending.result;
+  const std::vector<float> rows = m.rows[pending.slot].read_all<float>();
+  std::array<double, M_ROW> sums{};
   const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
-    const Metrics::BodyRanges& body = m.bodies[b];
-    const float* row = floats.data() + b * M_STRIDE;
-    const auto vector = [&](int at) { return glm::dvec3(row[at], row[at + 1], row[at + 2]); };
-    tets += body.tets.y - body.tets.x;
-    edges += body.edges.y - body.edges.x;
-    hinges += body.hinges.y - body.hinges.x;
-    rest_volume += body.volume;
-    mass += body.mass;
-    result.volume += body.volume + double(row[M_VOLUME_CHANGE]);
-    tet_squares += double(row[M_TET_SQUARES]);
-    stretch_squares += double(row[M_STRETCH_SQUARES]);
-    bend_squares += double(row[M_BEND_SQUARES]);
+    const float* row = rows.data() + b * M_STRIDE;
+    for (std::size_t at = 0; at < M_ROW; ++at) sums[at] += double(row[at]);
     result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
     result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
-    result.inverted_tets += double(row[M_INVERTED]);
-    result.momentum += vector(M_MOMENTUM);
-    result.angular_momentum += vector(M_ANGULAR);
-    result.speed += double(row[M_SPEED]);
-    result.centre += body.mass * (vector(M_ORIGIN) + vector(M_CENTRE));
-    result.kinetic += double(row[M_KINETIC]);
-    result.potential += pending.gravity * (double(row[M_HEIGHT]) - body.mass * pending.ground);
-    result.contacts += double(row[M_CONTACTS]);
-    result.non_finite += double(row[M_NON_FINITE]);
-    rigid += double(row[M_RIGID_SQUARES]);
-    size += body.mass * body.size;
+    for (int a = 0; a < 3; ++a)
+      result.centre[a] += m.bodies[b].mass * (double(row[M_ORIGIN + a]) + double(row[M_CENTRE + a]));
   }
   const auto rms = [](double squares, std::size_t count) {
     return count ? std::sqrt(squares / double(count)) : 0.0;
   };
-  result.centre /= mass;
-  result.volume_error_percent = 100 * (result.volume - rest_volume) / rest_volume;
-  result.tet_volume_rms = rms(tet_squares, tets);
-  result.stretch_rms = rms(stretch_squares, edges);
-  result.bend_rms_rad = rms(bend_squares, hinges);
-  result.rigid_distance = std::sqrt(rigid / mass) / (size / mass);
-  return result;
-}
-
-std::optional<Measurement> read_oldest(Metrics& m, bool wait) {
-  if (m.pending.empty()) return std::nullopt;
-  if (!reached(m.pending.front().fence.sync(), wait, "measuring")) return std::nullopt;
-  const Metrics::Pending pending = std::move(m.pending.front());
-  m.pending.pop_front();
-  return read_row(m, pending);
+  const auto vector = [&](std::size_t at) { return glm::dvec3(sums[at], sums[at + 1], sums[at + 2]); };
+  result.volume = m.volume + sums[M_VOLUME_CHANGE];
+  result.volume_error_percent = 100 * (result.volume - m.volume) / m.volume;
+  result.tet_volume_rms = rms(sums[M_TET_SQUARES], m.counts[2]);
+  result.inverted_tets = sums[M_INVERTED];
+  result.stretch_rms = rms(sums[M_STRETCH_SQUARES], m.counts[0]);
+  result.bend_rms_rad = rms(sums[M_BEND_SQUARES], m.counts[1]);
+  result.rigid_distance = std::sqrt(sums[M_RIGID_SQUARES] / m.mass) / (m.mass_sizes / m.mass);
+  result.momentum = vector(M_MOMENTUM);
+  result.angular_momentum = vector(M_ANGULAR);
+  result.speed = sums[M_SPEED];
+  result.centre /= m.mass;
+  result.kinetic = sums[M_KINETIC];
+  result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
+  result.contacts = sums[M_CONTACTS];
+  result.non_finite = sums[M_NON_FINITE];
+  return true;
 }
 
 }  // namespace
 
 void measure(Metrics& m, const Sim& sim) {
-  if (m.pending.size() == m.rows.size()) m.ready.push_back(*read_oldest(m, true));
-  const std::size_t slot = m.next;
-  m.next = (m.next + 1) % m.rows.size();
+  if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
+  const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
   sim.current_positions().bind_storage(BIND_M_POSITIONS);
   sim.velocities.bind_storage(BIND_M_VELOCITIES);
@@ -168,16 +147,17 @@ void measure(Metrics& m, const Sim& sim) {
       glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
   }
-  Measurement known;
-  known.step = sim.steps, known.time = double(sim.steps) * sim.settings.dt;
-  m.pending.push_back({Fence::here(), slot, known, sim.settings.ground ? sim.settings.ground_height : 0.0,
+  m.pending.push_back({Fence::here(),
+                       slot,
+                       {.step = sim.steps, .time = double(sim.steps) * sim.settings.dt},
+                       sim.settings.ground ? sim.settings.ground_height : 0.0,
                        sim.settings.gravity});
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {
-  if (m.ready.empty()) return read_oldest(m, wait);
-  const Measurement result = m.ready.front();
-  m.ready.pop_front();
+  if (m.pending.empty() || !read(m, m.pending.front(), wait)) return std::nullopt;
+  const Measurement result = m.pending.front().result;
+  m.pending.pop_front();
   return result;
 }
 

@@ -2,6 +2,7 @@
 // late.
 #pragma once
 
+#include <array>
 #include <deque>
 #include <limits>
 #include <optional>
@@ -23,10 +24,9 @@ struct Measurement {
   double inverted_tets = 0;
   double stretch_rms = 0;  ///< of (l - d) / d over edges
   double stretch_max = 0;
-  double bend_rms_rad = 0;  ///< of the angle error over hinges
-  double rigid_distance =
-      0;                   ///< RMS (by mass) distance to the rigidly aligned rest shape, over the body's size
-  glm::dvec3 momentum{0};  ///< kg m/s
+  double bend_rms_rad = 0;    ///< of the angle error over hinges
+  double rigid_distance = 0;  ///< RMS (by mass) distance to the rigidly aligned rest shape, over the size
+  glm::dvec3 momentum{0};     ///< kg m/s
   glm::dvec3 angular_momentum{0};     ///< kg m^2/s about each body's centre, summed
   double speed = 0;                   ///< sum m |v|, kg m/s: what drift is relative to
   glm::dvec3 centre{0};               ///< m, of mass
@@ -41,26 +41,27 @@ struct Metrics {
   /// Where a body's part of each list is: first and end.
   struct BodyRanges {
     glm::uvec2 vertices, edges, hinges, tets;
-    double mass = 0, volume = 0, size = 0;
+    double mass = 0, size = 0;
   };
   struct Pending {
-    Fence fence;
+    Fence fence;  ///< none once the result is read
     std::size_t slot;
-    Measurement known;  ///< step and time
+    Measurement result;  ///< step and time before
     double ground, gravity;
   };
 
   std::vector<BodyRanges> bodies;
-  std::vector<Buffer> records;  ///< by kind
+  double mass = 0, volume = 0, mass_sizes = 0;  ///< of all bodies; the last sums mass times size
+  std::vector<Buffer> records;                  ///< by kind
+  std::array<std::size_t, 3> counts{};          ///< constraints, by kind
   Buffer rest, partials;
   std::vector<Program> kernels;  ///< in order of dispatch
   std::vector<Buffer> rows;      ///< a ring: a row per body in each
-  std::deque<Pending> pending;
-  std::deque<Measurement> ready;  ///< read because the ring was full
-  std::size_t next = 0;
+  std::deque<Pending> pending;   ///< in order
+  std::size_t measured = 0;
 };
 
-/// Constraints of kinds that are present in `made`, of the same model, are not made again.
+/// Takes the constraints from `made`, of the same model, if all kinds that are measured are there.
 Metrics create_metrics(const Model& model, const ConstraintSystem& made = {});
 /// Queues a measurement of the current state. Waits only if the ring of results is full.
 void measure(Metrics& metrics, const Sim& sim);

@@ -248,6 +248,10 @@ void check_settings(const Settings& settings, const std::string& where) {
       } else if (!in_range(row, double(value)))
         refuse(row, parameter_text(settings, row), where, range_text(row));
     });
+  const SolverMode& mode = *find_solver_mode(settings.mode);
+  if (compliant(settings) && !mode.compliance)
+    throw Error(fmt::format("mode {} has no compliance", mode.name), where,
+                "set compliance and constraint_damping to 0 or use another mode");
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");
@@ -256,8 +260,7 @@ void check_settings(const Settings& settings, const std::string& where) {
   const auto no_handles = [&](const std::string& why) {
     throw Error("'clusters' are for hard bodies: " + why, where, "set clusters to 0");
   };
-  const SolverMode* mode = find_solver_mode(settings.mode);
-  if (!mode || !mode->clusters) no_handles("mode " + settings.mode + " has none");
+  if (!mode.clusters) no_handles("mode " + settings.mode + " has none");
   if (compliant(settings)) no_handles("compliance or constraint_damping is above 0");
   if (!uses(settings, Stretch::row)) no_handles("stretch is left out");
   for (std::size_t k = 0; k < kind_count; ++k)

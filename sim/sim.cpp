@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <tuple>
 
 #include "sim/error.h"
 #include "sim/parallel.h"
@@ -59,12 +60,13 @@ void start_clusters(Sim& sim, const State& state) {
 void write_step_block(Sim& sim) {
   const Settings& s = sim.settings;
   const double h = s.dt / s.substeps, strength = has_clusters(sim) ? s.clusters : 0;
+  const bool soft = compliant(s);
   Step block{};
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
   block.h = float(h);
   block.inverse_h = float(1 / h);
   block.cluster_strength = float(strength);
-  block.omega = sim.compliant ? 1.0f : float(relaxation(s.omega, strength));
+  block.omega = soft ? 1.0f : float(relaxation(s.omega, strength));
   block.soft_omega = float(s.omega);
   block.friction = float(s.friction);
   block.velocity_scale = float(std::exp(-s.damping * h));
@@ -72,7 +74,7 @@ void write_step_block(Sim& sim) {
   block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
   // With compliance always: with averages, a constraint's multiplier would not be what its vertices were
   // moved by.
-  block.mass_splitting = s.mass_splitting || sim.compliant;
+  block.mass_splitting = s.mass_splitting || soft;
   block.quantum = float(sim.quantum);
   block.inverse_quantum = float(1 / sim.quantum);
   block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
@@ -117,109 +119,80 @@ Tuning within_limits(Tuning tuning) {
   return tuning;
 }
 
-// Made first, then put in place: a shader that does not compile leaves the old solver running.
-void build_solver(Sim& sim) {
-  const SolverMode* mode = find_solver_mode(sim.settings.mode);
-  if (!mode) throw Error("no such mode", sim.settings.mode, "see tetpbd run --help");
-  const std::size_t vertices = sim.model->positions.size();
-  const bool soft = compliant(sim.settings), clusters = sim.settings.clusters > 0;
-  if (soft && !mode->compliance)
-    throw Error(fmt::format("mode {} has no compliance", mode->name),
-                "compliance or constraint_damping above 0", "set them to 0 or use another mode");
-  check_limits(sim.system, capabilities(), clusters);
-  Pass predict{Program::compute("predict.comp", {}, {soft ? "COMPLIANT 1" : "COMPLIANT 0"}),
-               work_groups(vertices, group_size), vertices * (sizeof(Position) + sizeof(Velocity) + 16)};
-  sim.solver = mode->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft, clusters});
-  sim.predict = std::move(predict);
-  sim.compliant = soft;
-  sim.needs_predict = true;
-  sim.shader_version = shader_folder_version();
-}
-
 void schedule(Sim& sim) {
   if (!on_cpu(sim)) sim.substep = substep_dispatches(sim.solver, sim.settings.iterations);
-}
-
-void allocate(Sim& sim) {
-  const std::size_t count = sim.model->positions.size();
-  const auto buffer = [&](const char* label, std::size_t bytes) {
-    check_storage(sim.tuning, label, bytes);
-    return Buffer(label, bytes);
-  };
-  sim.step_block = Buffer("step", sizeof(Step));
-  if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
-  sim.positions = buffer("positions", count * sizeof(Position));
-  sim.velocities = buffer("velocities", count * sizeof(Velocity));
-  const bool gpu = !on_cpu(sim);
-  sim.check = make_finite_check(gpu ? sim.positions.bytes() : 0, gpu ? sim.velocities.bytes() : 0);
-  if (!gpu) return;
-  sim.predicted = buffer("predicted", count * sizeof(Velocity));
-  for (std::size_t side = 0; side < (sim.solver.double_buffered ? 2u : 1u); ++side)
-    sim.quantized[side] = buffer(side == 0 ? "quantized positions" : "quantized positions, other side",
-                                 count * 16 * (sim.compliant ? 2 : 1));
-}
-
-State start_state(const Sim& sim) {
-  State state{sim.model->positions, sim.model->velocities};
-  // Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
-  // constant acceleration is integrated exactly (method.md eq. 3).
-  const double half = 0.5 * sim.settings.dt / sim.settings.substeps;
-  for (std::size_t i = 0; i < state.velocities.size(); ++i)
-    if (sim.model->inverse_masses[i] > 0) state.velocities[i].y += half * sim.settings.gravity;
-  return state;
 }
 
 // Everything but the state.
 Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning,
              ConstraintSystem system) {
   Sim sim;
+  sim.shader_version = shader_folder_version();
   sim.model = std::move(model);
   sim.settings = settings;
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  build_solver(sim);
-  allocate(sim);
+  const bool soft = compliant(settings), clusters = settings.clusters > 0;
+  const std::size_t count = sim.model->positions.size();
+  sim.predict = {Program::compute("predict.comp", {}, {soft ? "COMPLIANT 1" : "COMPLIANT 0"}),
+                 work_groups(count, group_size), count * (sizeof(Position) + sizeof(Velocity) + 16)};
+  sim.solver = find_solver_mode(settings.mode)
+                   ->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft, clusters});
+  const auto buffer = [&](const char* label, std::size_t bytes) {
+    check_storage(sim.tuning, label, bytes);
+    return Buffer(label, bytes);
+  };
+  sim.step_block = Buffer("step", sizeof(Step));
+  sim.positions = buffer("positions", count * sizeof(Position));
+  sim.velocities = buffer("velocities", count * sizeof(Velocity));
+  if (on_cpu(sim)) return sim;
+  sim.predicted = buffer("predicted", count * sizeof(Velocity));
+  sim.quantized[0] = buffer("quantized positions", count * 16 * (soft ? 2 : 1));
+  if (sim.solver.double_buffered)
+    sim.quantized[1] = buffer("quantized positions, other side", sim.quantized[0].bytes());
+  if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
+  sim.check.words = Buffer("check", 8);
+  sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
+  sim.check.copy = Program::compute("checkpoint.comp");
+  sim.check.positions = buffer("checkpoint positions", sim.positions.bytes());
+  sim.check.velocities = buffer("checkpoint velocities", sim.velocities.bytes());
   schedule(sim);
   return sim;
 }
 
+// Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
+void remake(Sim& sim, const Settings& settings) {
+  if (check_finite(sim, true)) restore_checkpoint(sim);  // it has nothing better to start from
+  const State state = read_state(sim);
+  const bool same_kinds = settings.constraints == sim.settings.constraints;
+  Sim fresh = make_sim(sim.model, settings, sim.tuning,
+                       same_kinds ? sim.system : build_constraints(sim.model->rest, settings.constraints));
+  fresh.inverse_masses = sim.inverse_masses;
+  fresh.steps = sim.steps;
+  fresh.timed = sim.timed;
+  write_state(fresh, state);
+  sim = std::move(fresh);
+}
+
+// Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
+// constant acceleration is integrated exactly (method.md eq. 3).
 double half_substep_fall(const Settings& s) { return 0.5 * s.dt / s.substeps * s.gravity; }
 
-// Stored velocities are half a substep old (start_state): with another substep or gravity they are those of
-// another time.
-void shift_velocities(Sim& sim, double upwards) {
-  if (upwards == 0) return;
-  const auto moved = [&](std::size_t i) { return sim.inverse_masses[i] > 0; };
-  if (on_cpu(sim)) {
-    for (std::size_t i = 0; i < sim.host.velocities.size(); ++i)
-      if (moved(i)) sim.host.velocities[i].y += upwards;
-  }
-  auto velocities = sim.velocities.read_all<Velocity>();
-  for (std::size_t i = 0; i < velocities.size(); ++i) {
-    Velocity& v = velocities[i];
-    if (moved(i))
-      split_pair(glm::dvec3(v.high) + glm::dvec3(v.low) + glm::dvec3(0, upwards, 0), v.high, v.low);
-  }
+void add_upwards(const Sim& sim, State& state, double speed) {
+  for (std::size_t i = 0; i < state.velocities.size(); ++i)
+    if (sim.inverse_masses[i] > 0) state.velocities[i].y += speed;
+}
+
+void write_velocities(const Sim& sim, const State& state) {
+  std::vector<Velocity> velocities(state.velocities.size());
+  parallel_for(velocities.size(), [&](std::size_t i) {
+    split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
+  });
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
 }  // namespace
-
-void check_limits(const ConstraintSystem& system, const Capabilities& limits, bool clusters) {
-  const int needed = clusters ? 11 : 8;
-  if (needed > limits.storage_blocks)
-    throw Error("too few shader storage blocks",
-                fmt::format("{} needed, the driver offers {}", needed, limits.storage_blocks),
-                clusters ? "set clusters to 0 or use a newer driver" : "use a newer driver", 1);
-  std::size_t largest = system.at_vertex.size() * sizeof(Position);
-  for (const ConstraintList& list : system.lists)
-    largest = std::max(largest, list.count() * std::size_t(list.arity + 1) * 4);
-  if (largest > std::size_t(limits.storage_bytes))
-    throw Error("a storage buffer is too large",
-                fmt::format("{} bytes, the driver allows {}", largest, limits.storage_bytes),
-                "use a smaller mesh", 1);
-}
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
   check_settings(settings, "settings");
@@ -235,21 +208,20 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
 void reset(Sim& sim) {
   sim.steps = 0;
   if (sim.guard_counts) sim.guard_counts.clear();
-  sim.guards_read = on_cpu(sim) ? guards_so_far(sim) : GuardCounts{};
+  sim.guards_read = guards_so_far(sim);
   sim.inverse_masses = sim.model->inverse_masses;
-  write_state(sim, start_state(sim));
+  State state{sim.model->positions, sim.model->velocities};
+  add_upwards(sim, state, half_substep_fall(sim.settings));
+  write_state(sim, state);
 }
 
 void upload(Sim& sim, const State& state) {
-  const std::size_t count = state.positions.size();
-  std::vector<Position> positions(count);
-  std::vector<Velocity> velocities(count);
-  parallel_for(count, [&](std::size_t i) {
+  std::vector<Position> positions(state.positions.size());
+  parallel_for(positions.size(), [&](std::size_t i) {
     positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
-    split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
   });
-  sim.positions.write(0, count * sizeof(Position), positions.data());
-  sim.velocities.write(0, count * sizeof(Velocity), velocities.data());
+  sim.positions.write(0, positions.size() * sizeof(Position), positions.data());
+  write_velocities(sim, state);
   sim.needs_predict = true;
 }
 
@@ -259,48 +231,28 @@ void write_state(Sim& sim, const State& state) {
   sim.quantum = quantum_of(sim, state);
   start_clusters(sim, state);
   write_step_block(sim);
-  restart(sim.check, sim.steps);
-  if (const auto vertex = first_non_finite(state)) {
-    sim.check.found = {sim.steps, *vertex};
-  } else if (on_cpu(sim)) {
-    sim.check.host = state;
-    sim.check.has_checkpoint = true;
-  } else {
-    save_checkpoint(sim.check, sim.positions, sim.velocities);
-  }
+  start_check(sim, &state);
 }
 
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
-  const bool kinds = settings.constraints != sim.settings.constraints;
+  const auto made_for = [](const Settings& s) {
+    return std::tuple(s.mode, s.constraints, s.clusters > 0, compliant(s));
+  };
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
-  const bool softness = !on_cpu(sim) && compliant(settings) != sim.compliant;
-  const bool clusters = (settings.clusters > 0) != (sim.settings.clusters > 0);
-  if (kinds || softness || clusters || settings.mode != sim.settings.mode) {
-    if (check_finite(sim, true))
-      restore_checkpoint(sim);  // a solver made anew has nothing better to start from
-    const State state = read_state(sim);
-    // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
-    Sim fresh = make_sim(sim.model, settings, sim.tuning,
-                         kinds ? build_constraints(sim.model->rest, settings.constraints) : sim.system);
-    fresh.inverse_masses = sim.inverse_masses;
-    fresh.steps = sim.steps;
-    fresh.timed = sim.timed;
-    write_state(fresh, state);
-    sim = std::move(fresh);
-  }
+  if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
   sim.settings = settings;
   schedule(sim);
   write_step_block(sim);
-  shift_velocities(sim, upwards);
+  if (upwards == 0) return;
+  // Velocities are half a substep old: with another substep or gravity they are those of another time.
+  State state = read_state(sim);
+  add_upwards(sim, state, upwards);
+  write_velocities(sim, state);
+  if (on_cpu(sim)) sim.host = std::move(state);
 }
 
-void rebuild_shaders(Sim& sim) {
-  sim.shader_version = shader_folder_version();
-  build_solver(sim);
-  schedule(sim);
-  start_clusters(sim, read_state(sim));
-}
+void rebuild_shaders(Sim& sim) { remake(sim, sim.settings); }
 
 GuardCounts guard_counts(Sim& sim) {
   GuardCounts counts{};
@@ -338,34 +290,6 @@ std::uint64_t state_hash(const Sim& sim) {
   return hash;
 }
 
-const std::optional<NonFinite>& check_finite(Sim& sim, bool wait) {
-  if (!sim.check.found && !on_cpu(sim)) {
-    check_context();
-    ask(sim.check, sim.steps, wait);
-  }
-  return sim.check.found;
-}
-
-bool restore_checkpoint(Sim& sim) {
-  FiniteCheck& check = sim.check;
-  if (!check.found || !check.has_checkpoint) return false;
-  sim.steps = checkpoint_step(check);
-  if (on_cpu(sim)) {
-    write_state(sim, State(check.host));
-    return true;
-  }
-  // Not through State: a double holds fewer bits than a pair of floats can. Pins may have changed since.
-  auto positions = check.positions.read_all<Position>();
-  for (std::size_t i = 0; i < positions.size(); ++i) positions[i].inverse_mass = float(sim.inverse_masses[i]);
-  const auto velocities = check.velocities.read_all<Velocity>();
-  sim.positions.write(0, sim.positions.bytes(), positions.data());
-  sim.velocities.write(0, sim.velocities.bytes(), velocities.data());
-  sim.needs_predict = true;
-  restart(check, sim.steps);
-  check.has_checkpoint = true;
-  return true;
-}
-
 // ---------------------------------------------------------------------------------------------------------
 // pinning
 
@@ -379,18 +303,13 @@ void write_inverse_mass(Sim& sim, std::uint32_t vertex, double value) {
   sim.needs_predict = true;
 }
 
-void write_velocity(Sim& sim, std::uint32_t vertex, const glm::dvec3& velocity) {
-  Velocity v{};
-  split_pair(velocity, v.high, v.low);
-  sim.velocities.write(vertex * sizeof(Velocity), sizeof v, &v);
-  if (on_cpu(sim)) sim.host.velocities[vertex] = velocity;
-}
-
 }  // namespace
 
 void pin(Sim& sim, std::uint32_t vertex) {
   write_inverse_mass(sim, vertex, 0);
-  write_velocity(sim, vertex, glm::dvec3(0));
+  const Velocity still{};
+  sim.velocities.write(vertex * sizeof still, sizeof still, &still);
+  if (on_cpu(sim)) sim.host.velocities[vertex] = glm::dvec3(0);
 }
 
 void unpin(Sim& sim, std::uint32_t vertex) {

@@ -1,6 +1,7 @@
 // A simulation: a model, settings, GPU buffers and the passes of a step. Any number can live side by side.
-// step.cpp takes steps, sim.cpp makes, sets and reads simulations, explain.cpp says what one costs. Whoever
-// uses it calls these functions and reads its members; only they write them.
+// step.cpp takes steps, sim.cpp makes, sets and reads simulations, finite_check.cpp goes back to good states,
+// explain.cpp says what one costs. Whoever uses it calls these functions and reads its members; only they
+// write them.
 #pragma once
 
 #include <memory>
@@ -33,7 +34,6 @@ struct Sim {
   Pass predict;  ///< makes the quantized positions of the next step, after a change from outside
   std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;
-  bool compliant = false;           ///< what the solver was made for
   double quantum = 1;               ///< m, of quantized positions
   bool needs_predict = true;        ///< the quantized positions are not those of the next step
   unsigned read_index = 0;          ///< which of `quantized` is read next
@@ -53,11 +53,9 @@ struct Sim {
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
-/// Throws Error naming what the driver's limits do not allow.
-void check_limits(const ConstraintSystem& system, const Capabilities& limits, bool clusters = false);
 /// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
-/// solver again if the mode, the constraint kinds or whether there is compliance changed; where that fails,
-/// throws and leaves the simulation as it was.
+/// solver again if the mode, the constraint kinds or whether there are clusters or compliance changed; where
+/// that fails, throws and leaves the simulation as it was.
 void apply_settings(Sim& sim, const Settings& settings);
 /// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
 /// not compile.
@@ -84,6 +82,10 @@ std::uint64_t state_hash(const Sim& sim);
 /// Waits.
 GuardCounts guard_counts(Sim& sim);
 
+/// Starts anew from the state of now, of which nothing is known but that it was `given`, if it was.
+void start_check(Sim& sim, const State* given);
+/// After a step.
+void check_step(Sim& sim);
 /// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
 /// ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);

@@ -82,24 +82,6 @@ void step_on_gpu(Sim& sim) {
   if (sim.timed) sim.timer.end();
 }
 
-void check_step(Sim& sim) {
-  FiniteCheck& check = sim.check;
-  if (check.found) return;
-  if (on_cpu(sim)) {
-    if (const auto vertex = first_non_finite(sim.host)) check.found = {sim.steps, *vertex};
-    check.known = sim.steps;
-  } else if (sim.steps % FiniteCheck::ask_every == 0) {
-    check_context();
-    ask(check, check.asked_step, true);  // the CPU is never further ahead than two questions
-    if (!check.found) ask(check, sim.steps, false);
-  }
-  if (check.found || sim.steps % FiniteCheck::checkpoint_every != 0) return;
-  if (on_cpu(sim))
-    check.host = sim.host;
-  else
-    save_checkpoint(check, sim.positions, sim.velocities);
-}
-
 }  // namespace
 
 void step(Sim& sim) {

@@ -310,21 +310,9 @@ TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode chan
 
 TEST_CASE("limits of a driver are named with what is needed and what there is") {
   GlTest gl;
-  const Capabilities real = capabilities();
-  CHECK(real.storage_blocks >= 10);
-  CHECK(real.work_groups >= 65535);
-  const ConstraintSystem system = build_constraints(block()->rest, "stretch,bend,volume");
-  check_limits(system, real);
-  Capabilities few = real;
-  few.storage_blocks = 7;
-  CHECK(has(what_of([&] { check_limits(system, few); }),
-            "too few shader storage blocks: 8 needed, the driver offers 7"));
-  few = real;
-  few.storage_bytes = 100;
-  CHECK(has(what_of([&] { check_limits(system, few); }), "a storage buffer is too large"));
-  CHECK(has(what_of([&] { check_work_groups("predict", 70000, 65535); }),
-            "too many work-groups: predict needs 70000, the driver allows 65535"));
-  check_work_groups("predict", 65535, 65535);
+  CHECK(capabilities().storage_blocks >= 11);  // what clusters take
+  CHECK(has(what_of([&] { create_sim(block(), quick("node"), {.storage = 100}); }),
+            "a storage buffer is too large: "));
   CHECK(has(what_of([&] { make_target(100000, 10); }), "bad image size: 100000x10"));
 }
 
@@ -343,10 +331,12 @@ TEST_CASE("a GPU that was reset ends the program, whatever it was doing") {
   Sim sim = create_sim(block(), quick("node"));
   step(sim);
   check_finite(sim, true);
+  REQUIRE((GLEW_KHR_robustness || GLEW_VERSION_4_5));
+  const auto of_driver = __glewGetGraphicsResetStatus;  // GLEW's pointer: no software renderer is ever reset
   for (const GLenum reason : {GL_GUILTY_CONTEXT_RESET, GL_INNOCENT_CONTEXT_RESET, GL_UNKNOWN_CONTEXT_RESET}) {
     static GLenum answer;
     answer = reason;
-    set_reset_status([] { return answer; });
+    __glewGetGraphicsResetStatus = []() -> GLenum { return answer; };
     CHECK_THROWS_AS(check_finite(sim), ContextLost);
     CHECK_THROWS_AS(([&] {
                       for (int s = 0; s < FiniteCheck::checkpoint_every; ++s) step(sim);
@@ -356,7 +346,7 @@ TEST_CASE("a GPU that was reset ends the program, whatever it was doing") {
     Session session;
     CHECK_THROWS_AS(attempt(session, [] { check_context(); }),
                     ContextLost);  // no message: there is no window left
-    set_reset_status(nullptr);
+    __glewGetGraphicsResetStatus = of_driver;
   }
   CHECK(!attempt(*std::make_unique<Session>(), [] { throw Error("a", "b", "c"); }));
   check_context();

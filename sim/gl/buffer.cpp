@@ -14,11 +14,6 @@ namespace {
 std::atomic<long> live_objects = 0;
 std::atomic<std::int64_t> live_buffer_bytes = 0;
 
-[[noreturn]] void throw_out_of_memory(const std::string& what, std::size_t bytes) {
-  throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
-              "use a smaller mesh, a smaller image or fewer samples", 1);
-}
-
 }  // namespace
 
 GlLive gl_live() { return {live_objects, live_buffer_bytes}; }
@@ -28,9 +23,11 @@ void count_gl_objects(long change, std::int64_t buffer_bytes) {
   live_buffer_bytes += buffer_bytes;
 }
 
-void check_memory(const std::string& what, std::size_t bytes) {
+void check_memory(const std::string& what, std::size_t bytes, bool fits) {
   // Drivers call an absurd size by other names than GL_OUT_OF_MEMORY.
-  if (glGetError() != GL_NO_ERROR) throw_out_of_memory(what, bytes);
+  if (glGetError() != GL_NO_ERROR || !fits)
+    throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
+                "use a smaller mesh, a smaller image or fewer samples", 1);
 }
 
 void clear_errors() {
@@ -47,11 +44,9 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
   object_ = Owned<GLuint, delete_buffer>(id, std::int64_t(bytes));
   glBindBuffer(GL_COPY_WRITE_BUFFER, id);
   glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
-  const std::string what = fmt::format("buffer '{}'", label_);
-  check_memory(what, bytes);
-  GLint64 made = 0;  // some drivers say nothing
+  GLint64 made = 0;  // some drivers say nothing of what does not fit
   glGetBufferParameteri64v(GL_COPY_WRITE_BUFFER, GL_BUFFER_SIZE, &made);
-  if (std::size_t(made) < bytes) throw_out_of_memory(what, bytes);
+  check_memory(fmt::format("buffer '{}'", label_), bytes, std::size_t(made) >= bytes);
   label_object(GL_BUFFER, id, label_);
 }
 

@@ -7,8 +7,8 @@
 
 namespace tetpbd {
 
-/// Throws Error naming what did not fit if the last GL call was out of memory.
-void check_memory(const std::string& what, std::size_t bytes);
+/// Throws Error naming what did not fit if it does not, or the last GL call failed.
+void check_memory(const std::string& what, std::size_t bytes, bool fits = true);
 /// Forgets GL errors of earlier calls, so that check_memory judges the next alone.
 void clear_errors();
 
@@ -43,8 +43,8 @@ class Buffer {
  private:
   Owned<GLuint, delete_buffer> object_;
   std::string label_;
-  bool whole_at_once_ =
-      false;  ///< GL_STREAM_DRAW: a write of all of it gets new memory, which nothing waits for
+  /// GL_STREAM_DRAW: a write of all of it gets new memory, which nothing waits for.
+  bool whole_at_once_ = false;
 };
 
 }  // namespace tetpbd

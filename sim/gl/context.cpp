@@ -16,7 +16,6 @@ namespace tetpbd {
 namespace {
 
 std::atomic<int> error_count = 0;
-GLenum (*given_reset_status)() = nullptr;
 
 void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text,
                            const void*) {
@@ -39,30 +38,20 @@ int gl_integer(GLenum name) {
 
 }  // namespace
 
-bool is_software_renderer() {
-  const std::string renderer = gl_string(GL_RENDERER);
-  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR"})
-    if (renderer.find(name) != std::string::npos) return true;
-  return false;
-}
+int gl_error_count() { return error_count; }
 
 Capabilities capabilities() {
-  Capabilities caps;
-  caps.vendor = gl_string(GL_VENDOR);
-  caps.renderer = gl_string(GL_RENDERER);
-  caps.version = gl_string(GL_VERSION);
-  caps.shading_language = gl_string(GL_SHADING_LANGUAGE_VERSION);
-  caps.storage_blocks = gl_integer(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS);
+  Capabilities caps{.vendor = gl_string(GL_VENDOR),
+                    .renderer = gl_string(GL_RENDERER),
+                    .version = gl_string(GL_VERSION),
+                    .shading_language = gl_string(GL_SHADING_LANGUAGE_VERSION),
+                    .storage_blocks = gl_integer(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS),
+                    .work_group_invocations = gl_integer(GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS),
+                    .shared_bytes = gl_integer(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE),
+                    .samples = gl_integer(GL_MAX_SAMPLES)};
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &caps.storage_bytes);
-  GLint groups = 0;
-  glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
-  caps.work_groups = unsigned(groups);
-  caps.work_group_invocations = gl_integer(GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS);
-  caps.shared_bytes = gl_integer(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE);
-  caps.samples = gl_integer(GL_MAX_SAMPLES);
-  caps.software = is_software_renderer();
-  caps.debug = gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT;
-  caps.reset_status = GLEW_KHR_robustness || GLEW_VERSION_4_5 || GLEW_ARB_robustness;
+  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR"})
+    caps.software = caps.software || caps.renderer.find(name) != std::string::npos;
   return caps;
 }
 
@@ -76,43 +65,25 @@ Capabilities load_gl() {
   if (gl_integer(GL_MAJOR_VERSION) * 10 + gl_integer(GL_MINOR_VERSION) < 43)
     throw Error("OpenGL 4.3 is needed", "the driver offers " + gl_string(GL_VERSION),
                 "use a newer driver or another GPU (tetpbd info lists them)", 1);
-  const Capabilities caps = capabilities();
-  if (caps.debug) {
+  if (gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT) {
     glEnable(GL_DEBUG_OUTPUT);
     glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
     glDebugMessageCallback(on_message, nullptr);
   }
-  return caps;
+  return capabilities();
 }
-
-int gl_error_count() { return error_count; }
-
-void check_work_groups(const std::string& kernel, std::size_t groups, unsigned allowed) {
-  if (groups > allowed)
-    throw Error("too many work-groups",
-                fmt::format("{} needs {}, the driver allows {}", kernel, groups, allowed),
-                "use a smaller mesh or another GPU (tetpbd info lists them)", 1);
-}
-
-void set_reset_status(GLenum (*answer)()) { given_reset_status = answer; }
 
 void check_context() {
-  GLenum status = GL_NO_ERROR;
-  if (given_reset_status)
-    status = given_reset_status();
-  else if (GLEW_KHR_robustness || GLEW_VERSION_4_5)
-    status = glGetGraphicsResetStatus();
-  else if (GLEW_ARB_robustness)
-    status = glGetGraphicsResetStatusARB();
+  if (!GLEW_KHR_robustness && !GLEW_VERSION_4_5) return;
+  const GLenum status = glGetGraphicsResetStatus();
   if (status == GL_NO_ERROR) return;
   const char* whose = status == GL_GUILTY_CONTEXT_RESET ? "by what this program did (a step too long for it?)"
                       : status == GL_INNOCENT_CONTEXT_RESET ? "by another program"
                                                             : "for an unknown reason";
-  throw ContextLost(
-      "the GPU was reset", whose,
-      "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look "
-      "into the system's log",
-      1);
+  throw ContextLost("the GPU was reset", whose,
+                    "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and "
+                    "look into the system's log",
+                    1);
 }
 
 // -----------------------------------------------------------------------------------------------------------
@@ -179,14 +150,9 @@ EGLContext make_context(EGLDisplay display, bool debug, int version, bool reset 
 
 std::vector<std::string> list_devices() {
   std::vector<std::string> names;
-  for (EGLDeviceEXT device : query_devices()) {
-    const std::string file = device_string(device, EGL_DRM_DEVICE_FILE_EXT);
-    const bool nvidia = device_string(device, EGL_EXTENSIONS).find("NV_device_cuda") != std::string::npos;
-    names.push_back(nvidia                ? "NVIDIA GPU"
-                    : is_software(device) ? "software renderer (Mesa)"
-                    : file.empty()        ? "GPU"
-                                          : "GPU " + file);
-  }
+  for (EGLDeviceEXT device : query_devices())
+    names.push_back(is_software(device) ? "software renderer (Mesa)"
+                                        : "GPU " + device_string(device, EGL_DRM_DEVICE_FILE_EXT));
   return names;
 }
 

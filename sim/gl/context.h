@@ -14,16 +14,13 @@ struct Capabilities {
   std::string vendor, renderer, version, shading_language;
   int storage_blocks = 0;          ///< shader storage blocks a compute stage may use (8 guaranteed)
   std::int64_t storage_bytes = 0;  ///< largest storage block
-  unsigned work_groups = 0;        ///< of one dispatch in one dimension (65535 guaranteed)
   int work_group_invocations = 0;  ///< 1024 guaranteed
   int shared_bytes = 0;            ///< shared memory of a work-group
   int samples = 0;                 ///< largest MSAA sample count
   bool software = false;           ///< a CPU pretends to be a GPU (llvmpipe, softpipe, swrast)
-  bool debug = false;              ///< a debug context: every GL error is reported
-  bool reset_status = false;       ///< the driver tells when the GPU was reset
 };
 Capabilities capabilities();
-bool is_software_renderer();
+inline bool is_software_renderer() { return capabilities().software; }
 
 /// Loads GL functions for the current context and checks for GL 4.3. Throws Error with the version found.
 Capabilities load_gl();
@@ -32,15 +29,9 @@ int gl_error_count();
 
 /// Number of work-groups of `size` invocations that cover `count`.
 inline std::size_t work_groups(std::size_t count, unsigned size) { return (count + size - 1) / size; }
-/// Throws Error if a kernel needs more work-groups than one dispatch may have.
-void check_work_groups(const std::string& kernel, std::size_t groups,
-                       unsigned allowed = capabilities().work_groups);
 
 /// Throws ContextLost if the GPU was reset. Cheap, but not free: once a frame, not once a dispatch.
 void check_context();
-/// Answers check_context() in place of the driver: provokes in tests what no software renderer does. Null:
-/// the driver.
-void set_reset_status(unsigned (*answer)());
 
 /// Names of the EGL devices, in the order of `--gpu N`.
 std::vector<std::string> list_devices();

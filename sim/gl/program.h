@@ -55,15 +55,9 @@ class Program {
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }
-  void set(const char* name, const glm::uvec2& value) const { set(location(name), value); }
-  void set(const char* name, const glm::vec2& value) const { glUniform2fv(location(name), 1, &value.x); }
+  void set(const char* name, const glm::uvec2& value) const { glUniform2uiv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec4& value) const { glUniform4fv(location(name), 1, &value.x); }
-  void set(const char* name, const glm::mat4& value) const {
-    glUniformMatrix4fv(location(name), 1, GL_FALSE, &value[0].x);
-  }
-  /// The same by a location that the shader states.
-  void set(int location, const glm::uvec2& value) const { glUniform2ui(location, value.x, value.y); }
 
  private:
   GLint location(const char* name) const;

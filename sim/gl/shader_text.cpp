@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <ranges>
 #include <regex>
 #include <sstream>
 
@@ -18,11 +19,10 @@ const std::vector<std::pair<std::string, std::string>>& embedded_shaders();
 
 namespace {
 
-std::string& folder_setting() {
+std::string chosen_folder = [] {
   const char* variable = std::getenv("TETPBD_SHADERS");
-  static std::string folder = variable ? variable : "";
-  return folder;
-}
+  return variable ? variable : "";
+}();
 
 std::string read_shader_file(const std::string& name) {
   if (const std::string& folder = shader_folder(); !folder.empty()) {
@@ -37,17 +37,11 @@ std::string read_shader_file(const std::string& name) {
   throw Error("no such shader", name, "it is not one of the files of shaders/", 1);
 }
 
-std::string substitute(const std::string& text, const Substitutions& words) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size();) {
-    std::size_t end = i + 1;
-    if (text[i] == '$') end = text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789", end);
-    const std::string word = text.substr(i, end - i);
-    const auto found = word[0] == '$' ? words.find(word.substr(1)) : words.end();
-    result += found == words.end() ? word : found->second;
-    i += word.size();
-  }
-  return result;
+std::string substitute(std::string text, const Substitutions& words) {
+  for (const auto& [key, value] : words | std::views::reverse)  // KIND_ROW before KIND
+    for (std::size_t at; (at = text.find("$" + key)) != std::string::npos;)
+      text.replace(at, key.size() + 1, value);
+  return text;
 }
 
 }  // namespace
@@ -55,10 +49,10 @@ std::string substitute(const std::string& text, const Substitutions& words) {
 void set_shader_folder(const std::string& folder) {
   if (!folder.empty() && !fs::is_directory(folder))
     throw Error("no such shader folder", folder, "point --shaders at a copy of shaders/");
-  folder_setting() = folder;
+  chosen_folder = folder;
 }
 
-const std::string& shader_folder() { return folder_setting(); }
+const std::string& shader_folder() { return chosen_folder; }
 
 std::int64_t shader_folder_version() {
   if (shader_folder().empty()) return 0;
@@ -87,15 +81,15 @@ std::string shader_text(const std::string& name, const ShaderWords& words, std::
   };
   for (int number = 1; std::getline(lines, line); ++number) {
     constexpr std::string_view foreach = "#foreach ";
-    const std::size_t start = line.find_first_not_of(' ');
-    if (start == std::string::npos || line.compare(start, foreach.size(), foreach) != 0) {
+    const std::size_t at = line.find(foreach);
+    if (at == std::string::npos) {
       expand_line(line, words, number);
       continue;
     }
     for (const Substitutions& item : words.each) {
       ShaderWords local = words;
       for (const auto& [key, value] : item) local.words[key] = value;
-      expand_line(line.substr(start + foreach.size()), local, number);
+      expand_line(line.substr(at + foreach.size()), local, number);
     }
     result += fmt::format("#line {} {}\n", number + 1, index);
   }

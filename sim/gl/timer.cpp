@@ -6,8 +6,7 @@
 namespace tetpbd {
 
 bool reached(GLsync fence, bool wait, const char* what) {
-  constexpr GLuint64 slice =
-      1'000'000'000u;  // ns; a step may take as long as it likes, a lost GPU is noticed
+  constexpr GLuint64 slice = 1'000'000'000u;  // ns; a step takes what it takes, a lost GPU is noticed
   for (;;) {
     const GLenum state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? slice : 0u);
     if (state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED) return true;
@@ -18,34 +17,23 @@ bool reached(GLsync fence, bool wait, const char* what) {
   throw Error("the GPU does not answer", what, "use fewer iterations or substeps, or a smaller mesh", 1);
 }
 
-void Timer::begin() {
-  if (free_.empty()) {
-    GLuint ids[2];
-    glGenQueries(2, ids);
-    free_.push_back({Query(ids[0]), Query(ids[1])});
-  }
-  pending_.push_back(std::move(free_.back()));
-  free_.pop_back();
-  pending_.back().ended = false;
-  glQueryCounter(pending_.back().begin.name(), GL_TIMESTAMP);
-}
-
-void Timer::end() {
-  glQueryCounter(pending_.back().end.name(), GL_TIMESTAMP);
-  pending_.back().ended = true;
+Timer::Query Timer::now() {
+  GLuint id = 0;
+  glGenQueries(1, &id);
+  glQueryCounter(id, GL_TIMESTAMP);
+  return Query(id);
 }
 
 std::optional<double> Timer::poll(bool wait) {
-  if (pending_.empty() || !pending_.front().ended) return std::nullopt;
-  Span& span = pending_.front();
-  GLint available = 0;
-  if (!wait) glGetQueryObjectiv(span.end.name(), GL_QUERY_RESULT_AVAILABLE, &available);
-  if (!wait && !available) return std::nullopt;
+  if (spans_.empty()) return std::nullopt;
+  const auto& [first, last] = spans_.front();
+  GLint available = wait;
+  if (!wait) glGetQueryObjectiv(last.name(), GL_QUERY_RESULT_AVAILABLE, &available);
+  if (!available) return std::nullopt;
   GLuint64 begin = 0, end = 0;
-  glGetQueryObjectui64v(span.begin.name(), GL_QUERY_RESULT, &begin);
-  glGetQueryObjectui64v(span.end.name(), GL_QUERY_RESULT, &end);
-  free_.push_back(std::move(span));
-  pending_.pop_front();
+  glGetQueryObjectui64v(first.name(), GL_QUERY_RESULT, &begin);
+  glGetQueryObjectui64v(last.name(), GL_QUERY_RESULT, &end);
+  spans_.pop_front();
   return double(end - begin) * 1e-6;
 }
 

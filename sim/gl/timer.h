@@ -3,7 +3,6 @@
 
 #include <deque>
 #include <optional>
-#include <vector>
 
 #include "sim/gl/object.h"
 
@@ -26,19 +25,16 @@ struct Fence : Owned<GLsync, delete_fence> {
 /// GPU time between begin and end by pairs of timestamps, read back when ready (never waits unless asked).
 class Timer {
  public:
-  void begin();
-  void end();
-  /// Milliseconds of the oldest finished span, if any; with `wait`, of the oldest span begun and ended.
+  void begin() { begun_ = now(); }
+  void end() { spans_.emplace_back(std::move(begun_), now()); }
+  /// Milliseconds of the oldest span that is ready, if any; with `wait`, of the oldest there is.
   std::optional<double> poll(bool wait = false);
 
  private:
   using Query = Owned<GLuint, delete_query>;
-  struct Span {
-    Query begin, end;
-    bool ended = false;
-  };
-  std::vector<Span> free_;
-  std::deque<Span> pending_;
+  static Query now();
+  Query begun_;
+  std::deque<std::pair<Query, Query>> spans_;
 };
 
 }  // namespace tetpbd

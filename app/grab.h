@@ -13,22 +13,19 @@ namespace tetpbd {
 
 struct Grab {
   std::uint32_t vertex = 0;
-  bool was_pinned = false;           ///< by the user: it stays so when let go
-  glm::dvec3 hit{0};                 ///< m, where the ray met the surface: the drag keeps this depth
-  bool placed = false;               ///< position, start and offset are known (a frame or two after the pick)
-  glm::dvec3 start{0}, position{0};  ///< m, of the vertex: when caught, and now
-  glm::dvec3 offset{0};              ///< m, from the hit to the vertex, so that catching it moves nothing
-  glm::dvec3 target{0};              ///< m, where the cursor wants it
-  double edge = 1;                   ///< m, mean rest length of the vertex's edges
-  double resting = 0;                ///< m, distance of the vertex from the mean of its neighbours, at rest
-  double pace = 1;                   ///< part of the full speed that the body can follow now, -1..1
-  glm::dvec3 neighbours{0};          ///< m, their mean a frame or so ago
-  std::vector<std::uint32_t> watched;  ///< the vertex, then its neighbours
+  bool was_pinned = false;             ///< by the user: it stays so when let go
+  glm::dvec3 hit{0};                   ///< m, where the ray met the surface: the drag keeps this depth
+  glm::dvec3 start{0}, position{0};    ///< m, of the vertex: when caught, and now
+  glm::dvec3 target{0};                ///< m, where the cursor wants it
+  double edge = 0;                     ///< m, mean rest length of the vertex's edges
+  double resting = 0;                  ///< m, distance of the vertex from its neighbours' mean when caught
+  glm::dvec3 seen{0}, neighbours{0};   ///< m, vertex and mean of its neighbours a frame or so ago
+  std::vector<std::uint32_t> watched;  ///< the neighbours, then the vertex
   Buffer copy;                         ///< of their positions, on its way back
   Fence copied;
 };
 
-/// Pins the vertex that was picked.
+/// Pins the vertex that was picked. Waits for the GPU, to know where it is.
 Grab begin_grab(Sim& sim, const Pick& pick);
 /// Takes in what has been read back, and aims at the point under the cursor at the depth of the hit.
 void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,

@@ -4,6 +4,7 @@
 #include <imgui_stdlib.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <optional>
@@ -72,15 +73,17 @@ void enum_combo(Session& s, Ui& ui, const char* label, const Names& names, Enum&
   const auto chosen =
       combo(s, ui, label, names[std::size_t(value)], Words(std::begin(names), std::end(names)));
   if (!chosen) return;
-  value = Enum(std::find(std::begin(names), std::end(names), *chosen) - std::begin(names));
+  value = Enum(std::ranges::find(names, *chosen) - std::begin(names));
   s.log("{} {}", label, *chosen);
 }
 
-void fraction(Session& s, Ui& ui, const char* label, double& value, double high, const char* help) {
-  const double low = 0;
-  ImGui::SliderScalar(begin_row(label).c_str(), ImGuiDataType_Double, &value, &low, &high, "%.2f",
-                      ImGuiSliderFlags_AlwaysClamp);
+bool slider(Session& s, Ui& ui, const char* label, double& value, double low, double high, const char* format,
+            const char* help, bool logarithmic = false) {
+  const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+  const bool changed =
+      ImGui::SliderScalar(begin_row(label).c_str(), ImGuiDataType_Double, &value, &low, &high, format, flags);
   describe_item(s, ui, label, help);
+  return changed;
 }
 
 template <class T>
@@ -122,7 +125,7 @@ bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) 
   int place = 0;
   for (const std::string& word : choices(row)) {
     if (place++ % 3) ImGui::SameLine();
-    bool on = std::find(chosen.begin(), chosen.end(), word) != chosen.end();
+    bool on = std::ranges::count(chosen, word) > 0;
     if (!check_box(s, ui, word.c_str(), on, help_text(row))) continue;
     changed = true;
     on ? chosen.push_back(word) : void(std::erase(chosen, word));
@@ -135,12 +138,8 @@ bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) 
 bool is_idle(const Settings& settings, const Parameter& row) {
   const std::string_view name = row.name;
   if (name == "mass_splitting") return compliant(settings);  // brings it with it
-  for (const std::string_view of_kind : {"k_", "compliance_"})
-    if (name.starts_with(of_kind)) {
-      const auto kinds = split(settings.constraints, ',');
-      return std::find(kinds.begin(), kinds.end(), name.substr(of_kind.size())) == kinds.end();
-    }
-  return false;
+  if (!name.starts_with("k_") && !name.starts_with("compliance_")) return false;
+  return std::ranges::count(split(settings.constraints, ','), name.substr(name.find('_') + 1)) == 0;
 }
 
 bool parameter_widget(Session& s, Ui& ui, const Parameter& row, Settings& settings) {
@@ -191,19 +190,16 @@ void draw_solver(Session& s, Ui& ui) {
   }
   words.push_back("auto");
   if (const auto chosen = combo(s, ui, "solver", current, words, help)) {
-    s.choosing = *chosen == "auto";
+    if (*chosen == "auto") choose_soon(s);
     Settings wanted = now;
     for (const SolverPreset& preset : solver_presets())
       if (*chosen == preset.name) apply_preset(wanted, preset);
     change_settings(s, wanted);
   }
   if (!automatic) return;
-  const double low = 0.01, high = 100;
-  ImGui::SliderScalar(begin_row("budget").c_str(), ImGuiDataType_Double, &s.budget_ms, &low, &high,
-                      "%.3g ms per step", ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
-  if (ImGui::IsItemDeactivatedAfterEdit()) s.choosing = true;
-  describe_item(s, ui, "budget",
-                "GPU time that a step may take; choosing again takes a second or so\n--budget-ms");
+  slider(s, ui, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
+         "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);
+  if (ImGui::IsItemDeactivatedAfterEdit()) choose_soon(s);
   ImGui::TextWrapped("%s", describe(*choice).c_str());
 }
 
@@ -221,7 +217,7 @@ void draw_run(Session& s, Ui& ui) {
 
 void draw_scene(Session& s, Ui& ui) {
   if (const auto name = combo(s, ui, "scene", s.loaded.scene.name, scene_names(), s.loaded.scene.description))
-    s.loading = LoadRequest{*name, {}, false, false};
+    load_soon(s, *name, {}, false, false);
   begin_row("mesh file");
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
   bool load_it =
@@ -232,26 +228,22 @@ void draw_scene(Session& s, Ui& ui) {
   ImGui::SameLine();
   load_it |= button(s, ui, "Load", "load", "");
   if (!load_it || ui.mesh.empty()) return;
-  s.loading = LoadRequest{s.loaded.name, s.loaded.overrides, true, false};
-  s.loading->overrides.mesh = ui.mesh;
+  SceneOverrides overrides = s.loaded.overrides;
+  overrides.mesh = ui.mesh;
+  load_soon(s, s.loaded.name, overrides, true, false);
 }
 
 void draw_colour_range(Session& s, Ui& ui) {
-  ViewOptions& view = s.view;
-  const std::string id = begin_row(view.colour == Colour::plain ? "body colour" : "colour range");
-  const int flags = ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp;
-  if (view.colour == Colour::plain) {
-    ImGui::ColorEdit3(id.c_str(), &view.body_colour.x, ImGuiColorEditFlags_NoInputs);
-  } else if (view.colour == Colour::velocity) {
-    const double low = 0.1, high = 50;
-    ImGui::SliderScalar(id.c_str(), ImGuiDataType_Double, &view.range().high, &low, &high, "0 .. %.2f m/s",
-                        flags);
-  } else {
-    float percent = float(view.range().high * 100);
-    if (ImGui::SliderFloat(id.c_str(), &percent, 0.1f, 100, "+/- %.1f %%", flags))
-      view.range() = {-double(percent) / 100, double(percent) / 100};
+  ColourRange& range = s.view.range();
+  if (s.view.colour == Colour::plain) {
+    ImGui::ColorEdit3(begin_row("body colour").c_str(), &s.view.body_colour.x, ImGuiColorEditFlags_NoInputs);
+    mark(s, ui, "body colour");
+  } else if (s.view.colour == Colour::velocity) {
+    slider(s, ui, "colour range", range.high, 0.1, 50, "0 .. %.2f m/s", "", true);
+  } else if (double percent = range.high * 100;
+             slider(s, ui, "colour range", percent, 0.1, 100, "+/- %.1f %%", "", true)) {
+    range = {-percent / 100, percent / 100};
   }
-  mark(s, ui, "colour range");
 }
 
 void draw_view(Session& s, Ui& ui) {
@@ -260,9 +252,9 @@ void draw_view(Session& s, Ui& ui) {
   enum_combo(s, ui, "colour", colour_names, view.colour);
   draw_colour_range(s, ui);
   if (view.look == Look::tets) {
-    fraction(s, ui, "shrink", view.shrink, 1, "each tetrahedron, towards its centre");
-    fraction(s, ui, "explode", view.explode, 3, "tetrahedra away from the bodies' centre");
-    fraction(s, ui, "cut", view.cut, 1, "show tetrahedra below this part of the body; 1 shows all");
+    slider(s, ui, "shrink", view.shrink, 0, 1, "%.2f", "each tetrahedron, towards its centre");
+    slider(s, ui, "explode", view.explode, 0, 3, "%.2f", "tetrahedra away from the bodies' centre");
+    slider(s, ui, "cut", view.cut, 0, 1, "%.2f", "show tetrahedra below this part of the body; 1 shows all");
     enum_combo(s, ui, "cut along", std::array{"x", "y", "z"}, view.cut_axis);
   }
   struct Switch {
@@ -279,10 +271,9 @@ void draw_view(Session& s, Ui& ui) {
     if (i % 2) ImGui::SameLine(label_width());
     check_box(s, ui, switches[i].name, switches[i].value, switches[i].help);
   }
-  constexpr std::array sample_names{"none", "2x", "4x", "8x"};
-  int index = s.samples >= 8 ? 3 : s.samples >= 4 ? 2 : s.samples >= 2 ? 1 : 0;
-  enum_combo(s, ui, "MSAA", sample_names, index);
-  s.samples = index ? 1 << index : 0;
+  int doublings = std::bit_width(unsigned(s.samples) / 2);
+  enum_combo(s, ui, "MSAA", std::array{"none", "2x", "4x", "8x"}, doublings);
+  s.samples = doublings ? 1 << doublings : 0;
 }
 
 bool section(Session& s, Ui& ui, const char* name) {

@@ -24,8 +24,11 @@ void forget_measurements(Session& s) {
   s.volume_error.values.clear();
 }
 
-void forget_non_finite(Session& s) {
-  std::erase_if(s.messages, [](const Message& m) { return m.offer_reset; });
+// After the state was put back.
+void start_afresh(Session& s) {
+  s.clock.owed = 0;
+  s.messages.clear();
+  forget_measurements(s);
 }
 
 bool differs(const Settings& a, const Settings& b, const Parameter& row) {
@@ -47,26 +50,15 @@ void log_state(Session& s) {
   if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
 }
 
-// Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a step
-// takes minutes. A scene or the command line can.
-void bound_passes(Session& s, Settings& wanted, const Settings& old) {
-  constexpr int most = 10000;
-  if (wanted.iterations <= old.iterations && wanted.substeps <= old.substeps) return;
-  if (long(wanted.iterations) * wanted.substeps <= most) return;
-  int& grown = wanted.iterations > old.iterations ? wanted.iterations : wanted.substeps;
-  grown = std::max(1, most / (wanted.iterations > old.iterations ? wanted.substeps : wanted.iterations));
-  say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
-}
-
 void say_choice(Session& s) {
   s.budget_ms = s.loaded.choice->budget_ms;
   say(s, "solver: " + describe(*s.loaded.choice));
 }
 
 bool is_fixed(Session& s, std::uint32_t vertex) {
-  if (s.loaded.sim.model->inverse_masses[vertex] > 0) return false;
-  say(s, fmt::format("vertex {} is fixed by the scene", vertex));
-  return true;
+  const bool fixed = !(s.loaded.sim.model->inverse_masses[vertex] > 0);
+  if (fixed) say(s, fmt::format("vertex {} is fixed by the scene", vertex));
+  return fixed;
 }
 
 }  // namespace
@@ -80,12 +72,12 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
   return loaded;
 }
 
-void say(Session& s, const std::string& text, bool error, bool offer_reset) {
+void say(Session& s, const std::string& text, bool error, bool non_finite) {
   s.log("{} {}", error ? "error" : "message", text);
   std::erase_if(s.messages, [&](const Message& m) { return m.text == text; });
   constexpr std::size_t most = 5;  // what a small window has room for
   if (s.messages.size() >= most) s.messages.erase(s.messages.begin());
-  s.messages.push_back({text, error, offer_reset, s.now});
+  s.messages.push_back({text, error, non_finite, s.now});
 }
 
 bool attempt(Session& s, const std::function<void()>& action) {
@@ -125,14 +117,10 @@ void restart(Session& s) {
   const auto made_with_another = [&](const Parameter& row) {
     return row.effect == Effect::restart && differs(s.loaded.scene.settings, s.loaded.sim.settings, row);
   };
-  if (std::any_of(parameters().begin(), parameters().end(), made_with_another)) {
-    s.loading = LoadRequest{s.loaded.name, s.loaded.overrides, true, true};
-    return;
-  }
+  if (std::ranges::any_of(parameters(), made_with_another))
+    return load_soon(s, s.loaded.name, s.loaded.overrides, true, true);
   attempt(s, [&] { reset(s.loaded.sim); });
-  s.clock.owed = 0;
-  forget_non_finite(s);
-  forget_measurements(s);
+  start_afresh(s);
   s.log("reset");
 }
 
@@ -141,30 +129,28 @@ void go_back(Session& s) {
   attempt(s, [&] {
     if (!check_finite(s.loaded.sim, true)) return;
     if (!restore_checkpoint(s.loaded.sim)) return say(s, "no good state is kept: reset (R)");
-    s.clock.owed = 0;
-    forget_non_finite(s);
-    forget_measurements(s);
+    start_afresh(s);
     s.log("back {}", s.loaded.sim.steps);
   });
 }
 
 void watch_state(Session& s) {
   const auto& found = check_finite(s.loaded.sim);
-  if (!found && s.told_non_finite) {  // mended by a reset, another scene or a new solver
-    s.told_non_finite = false;
-    forget_non_finite(s);
-  }
-  if (!found || (s.told_non_finite && !s.playing)) return;
-  s.told_non_finite = true;
+  if (!found || (!s.playing && std::ranges::any_of(s.messages, &Message::non_finite))) return;
   let_go(s);
   play(s, false);
   say(s, error_of(*found).what(), true, true);
 }
 
-void change_settings(Session& s, const Settings& asked) {
+void change_settings(Session& s, const Settings& wanted) {
   const Settings old = s.loaded.sim.settings;
-  Settings wanted = asked;
-  bound_passes(s, wanted, old);
+  // Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a
+  // step takes minutes.
+  constexpr long most = 10000;
+  const auto passes = [](const Settings& settings) { return long(settings.iterations) * settings.substeps; };
+  if (passes(wanted) > std::max(most, passes(old)))
+    return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more",
+                              most));
   attempt(s, [&] {
     apply_settings(s.loaded.sim, wanted);
     for (const Parameter& row : parameters()) {
@@ -177,16 +163,15 @@ void change_settings(Session& s, const Settings& asked) {
   });
 }
 
-void finish_choosing(Session& s) {
-  s.choosing = false;
-  attempt(s, [&] {
-    Scene scene = s.loaded.scene;
-    scene.settings = s.loaded.sim.settings;
-    scene.budget_ms = s.budget_ms;
-    s.loaded.choice = choose_for(scene, s.loaded.sim.model);
-    change_settings(s, scene.settings);
-    say_choice(s);
-  });
+void choose_soon(Session& s) {
+  s.task = Task{"trying ways to solve", [&s] {
+                  Scene scene = s.loaded.scene;
+                  scene.settings = s.loaded.sim.settings;
+                  scene.budget_ms = s.budget_ms;
+                  s.loaded.choice = choose_for(scene, s.loaded.sim.model);
+                  change_settings(s, scene.settings);
+                  say_choice(s);
+                }};
 }
 
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
@@ -197,23 +182,21 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
     s.beside = glm::vec3(0);
   }
   s.centre.reset();
-  s.clock.owed = 0;
   s.step_ms.values.clear();
-  forget_non_finite(s);
-  forget_measurements(s);
+  start_afresh(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim.model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }
 
-void finish_loading(Session& s) {
-  const LoadRequest request = *s.loading;
-  s.loading.reset();
-  attempt(s, [&] {
-    Scene scene = load_scene(request.name, request.overrides);
-    if (request.keep_settings) scene.settings = s.loaded.sim.settings, scene.budget_ms.reset();
-    take_over(s, load(request.name, request.overrides, scene), request.keep_camera);
-    s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);  // what was there before is gone
-  });
+void load_soon(Session& s, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
+               bool keep_camera) {
+  s.task = Task{"loading " + (overrides.mesh.empty() ? name : overrides.mesh.string()), [=, &s] {
+                  Scene scene = load_scene(name, overrides);
+                  if (keep_settings) scene.settings = s.loaded.sim.settings, scene.budget_ms.reset();
+                  take_over(s, load(name, overrides, scene), keep_camera);
+                  // What was there before is gone.
+                  s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);
+                }};
 }
 
 // Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
@@ -238,13 +221,9 @@ bool follow_bodies(Session& s, double elapsed) {
 
 void toggle_pin(Session& s, std::uint32_t vertex) {
   if (is_fixed(s, vertex)) return;
-  if (is_pinned(s.loaded.sim, vertex)) {
-    unpin(s.loaded.sim, vertex);
-    s.log("unpin {}", vertex);
-  } else {
-    pin(s.loaded.sim, vertex);
-    s.log("pin {}", vertex);
-  }
+  const bool pinned = is_pinned(s.loaded.sim, vertex);
+  (pinned ? unpin : pin)(s.loaded.sim, vertex);
+  s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
 
 void catch_vertex(Session& s, const Pick& pick) {
@@ -294,10 +273,7 @@ void advance(Session& s, double elapsed) {
 void measure_frame(Session& s, bool stepped) {
   Sim& sim = s.loaded.sim;
   sim.timed = s.measuring;
-  double total = 0;
-  int count = 0;
-  for (; const auto ms = sim.timer.poll(); ++count) total += *ms;
-  if (count && s.measuring) s.step_ms.add(total / count);
+  while (const auto ms = sim.timer.poll()) s.step_ms.add(*ms);
   if (!s.measuring) return;
   if (!s.loaded.metrics) s.loaded.metrics = create_metrics(*sim.model, sim.system);
   Metrics& metrics = *s.loaded.metrics;

@@ -37,8 +37,9 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
 
 struct Message {
   std::string text;
-  bool error = false, offer_reset = false;  ///< the latter where the state is not finite: also the way back
-  double since = 0;                         ///< s
+  bool error = false;
+  bool non_finite = false;  ///< stays until a reset, a way back or another scene mends the state
+  double since = 0;         ///< s
 };
 
 /// A line for each event, in the file that TETPBD_WINDOW_LOG names, for tests and demonstrations.
@@ -68,11 +69,10 @@ struct History {
   }
 };
 
-struct LoadRequest {
+/// Something that stops the window for a while: done once its name has been on the screen.
+struct Task {
   std::string name;
-  SceneOverrides overrides;
-  bool keep_settings = false;  ///< those of now instead of the scene's
-  bool keep_camera = false;
+  std::function<void()> act;
 };
 
 struct Session {
@@ -88,18 +88,16 @@ struct Session {
   Clock clock;
   std::optional<Grab> grab;
   std::vector<Message> messages;
-  std::optional<LoadRequest> loading;
-  double budget_ms = 0.5;  ///< for the solver auto
-  bool choosing = false;   ///< that is asked for
-  bool measuring = true;   ///< somebody looks at the measurements
-  bool told_non_finite = false;
+  std::optional<Task> task;
+  double budget_ms = 0.5;           ///< for the solver auto
+  bool measuring = true;            ///< somebody looks at the measurements
   std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago
   glm::vec3 beside{0};              ///< from there to what a following camera looks at, by moving the view
   History frames_per_second, step_ms, volume_error;
   double now = 0;  ///< s since the start
 };
 
-void say(Session& session, const std::string& text, bool error = false, bool offer_reset = false);
+void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);
 /// Does it; what it throws becomes a message, but for ContextLost. Whether it went well.
 bool attempt(Session& session, const std::function<void()>& action);
 
@@ -107,12 +105,14 @@ void play(Session& session, bool playing);
 void single_step(Session& session);
 /// To the start; with a parameter changed that needs it, the bodies are made again.
 void restart(Session& session);
-/// As asked for, but without steps that would stop the window for minutes.
-void change_settings(Session& session, const Settings& asked);
-/// Loads what was asked for, in place of what there is if it succeeds.
-void finish_loading(Session& session);
-/// Chooses a solver within the budget and takes its settings; the bodies stay where they are.
-void finish_choosing(Session& session);
+/// Refuses those whose steps would stop the window for minutes.
+void change_settings(Session& session, const Settings& wanted);
+/// Makes it the task to load a scene; what there is stays where that fails. `keep_settings`: those of now in
+/// place of the scene's.
+void load_soon(Session& session, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
+               bool keep_camera);
+/// Makes it the task to choose a solver within the budget; the bodies stay where they are.
+void choose_soon(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
 /// Leads the camera after the bodies; whether it is still on its way.

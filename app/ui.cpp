@@ -81,10 +81,13 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
   std::erase_if(s.messages, [&](const Message& m) { return !m.error && s.now - m.since > lasting; });
   const float margin = 14 * ui.scale, width = std::min(view.width - 2 * margin, 560 * ui.scale);
   float top = view.y + margin;
-  std::string dismissed;
-  const auto messages = s.messages;  // buttons change them
-  for (std::size_t i = 0; i < messages.size(); ++i) {
-    const Message& message = messages[i];
+  std::function<void()> pressed;  // changes the messages, so after the loop
+  const auto offer = [&](const char* label, const char* name, auto act) {
+    if (ImGui::SmallButton(label)) pressed = act;
+    mark(s, ui, name);
+  };
+  for (std::size_t i = 0; i < s.messages.size(); ++i) {
+    const Message& message = s.messages[i];
     ImGui::SetNextWindowPos(ImVec2(view.x + margin, top));
     ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(width, view.height));
     ImGui::PushStyleColor(ImGuiCol_Text, message.error ? ImVec4(0.65f, 0.1f, 0.05f, 1)
@@ -96,30 +99,20 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
     ImGui::TextUnformatted(message.text.c_str());
     ImGui::PopTextWrapPos();
     ImGui::PopStyleColor();
-    if (message.error) {
-      if (ImGui::SmallButton("Dismiss")) dismissed = message.text;
-      mark(s, ui, "dismiss");
-    }
-    if (message.offer_reset) {
+    if (message.non_finite) {
+      offer("Reset", "reset after error", [&s] { restart(s); });
       ImGui::SameLine();
-      if (ImGui::SmallButton("Reset")) restart(s);
-      mark(s, ui, "reset after error");
-      ImGui::SameLine();
-      if (ImGui::SmallButton("Back to the last good state")) go_back(s);
-      mark(s, ui, "back");
+      offer("Back to the last good state", "back", [&s] { go_back(s); });
+    } else if (message.error) {
+      offer("Dismiss", "dismiss", [&s, i] {
+        s.messages.erase(s.messages.begin() + std::ptrdiff_t(i));
+        s.log("dismissed");
+      });
     }
     top += ImGui::GetWindowHeight() + 6 * ui.scale;
     ImGui::End();
   }
-  if (dismissed.empty()) return;
-  std::erase_if(s.messages, [&](const Message& m) { return m.text == dismissed; });
-  s.log("dismissed");
-}
-
-void help_rows(const char* title, const std::vector<std::pair<const char*, const char*>>& rows) {
-  ImGui::TableNextColumn();
-  ImGui::TextDisabled("%s", title);
-  for (const auto& [keys, help] : rows) ImGui::BulletText("%s: %s", keys, help);
+  if (pressed) pressed();
 }
 
 void draw_help(const Ui& ui) {
@@ -128,17 +121,21 @@ void draw_help(const Ui& ui) {
   ImGui::SetNextWindowSize(ImVec2(std::min(760 * ui.scale, whole.x), 0));
   ImGui::SetNextWindowFocus();
   ImGui::Begin("help", nullptr, plain_window);
-  std::vector<std::pair<const char*, const char*>> keys;
-  for (const Shortcut& shortcut : shortcuts()) keys.emplace_back(shortcut.shown, shortcut.help);
+  constexpr std::pair<const char*, const char*> mouse[] = {
+      {"Left drag", "pull the body, or turn the view beside it"},
+      {"Right drag", "turn the view"},
+      {"Middle drag", "move the view (or Shift + drag)"},
+      {"Wheel", "closer, farther"},
+      {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
+      {"Ctrl + click on a slider", "type a value"},
+      {"Hover", "what a setting means"}};
   if (ImGui::BeginTable("help", 2)) {
-    help_rows("Keys", keys);
-    help_rows("Mouse", {{"Left drag", "pull the body, or turn the view beside it"},
-                        {"Right drag", "turn the view"},
-                        {"Middle drag", "move the view (or Shift + drag)"},
-                        {"Wheel", "closer, farther"},
-                        {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
-                        {"Ctrl + click on a slider", "type a value"},
-                        {"Hover", "what a setting means"}});
+    ImGui::TableNextColumn();
+    ImGui::TextDisabled("Keys");
+    for (const Shortcut& shortcut : shortcuts()) ImGui::BulletText("%s: %s", shortcut.shown, shortcut.help);
+    ImGui::TableNextColumn();
+    ImGui::TextDisabled("Mouse");
+    for (const auto& [action, help] : mouse) ImGui::BulletText("%s: %s", action, help);
     ImGui::EndTable();
   }
   ImGui::End();

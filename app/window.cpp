@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <utility>
 
 #include "app/files.h"
 #include "app/input.h"
@@ -21,11 +22,6 @@
 namespace tetpbd {
 
 namespace {
-
-const char* variable(const char* name) {
-  const char* value = std::getenv(name);
-  return value && *value ? value : nullptr;
-}
 
 std::string last_glfw_error() {
   const char* text = nullptr;
@@ -48,10 +44,8 @@ struct Desktop {
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);  // where the driver can
-    glfwWindowHint(GLFW_SAMPLES, 0);                                      // the view has its own target
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-    const char* debug = variable("TETPBD_GL_DEBUG");
-    glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, debug && std::string(debug) != "0");
+    glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, std::getenv("TETPBD_GL_DEBUG") != nullptr);
     window = glfwCreateWindow(wanted_width, wanted_height, title.c_str(), nullptr, nullptr);
     if (!window) {
       const std::string reason = last_glfw_error();
@@ -74,35 +68,7 @@ struct Desktop {
   Desktop& operator=(const Desktop&) = delete;
 };
 
-Mouse& mouse_of(GLFWwindow* window) { return *static_cast<Mouse*>(glfwGetWindowUserPointer(window)); }
-
-// Installed before Dear ImGui's, which call them and then do their own. A queue of our own, since Dear ImGui
-// forgets what came and went within a frame, and frames of a software renderer are long.
-void listen(GLFWwindow* window, Mouse& mouse) {
-  glfwSetWindowUserPointer(window, &mouse);
-  glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
-    // Held down, only the key that steps goes on.
-    const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT);
-    if (action == GLFW_PRESS || again)
-      mouse_of(w).events.push_back({Event::Kind::key, code, modifiers, 0, 0});
-  });
-  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int code, int action, int modifiers) {
-    double x = 0, y = 0;
-    glfwGetCursorPos(w, &x, &y);
-    const auto kind = action == GLFW_PRESS ? Event::Kind::press : Event::Kind::release;
-    mouse_of(w).events.push_back({Event::Kind::move, 0, 0, x, y});
-    mouse_of(w).events.push_back({kind, code, modifiers, x, y});
-  });
-  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
-    mouse_of(w).events.push_back({Event::Kind::move, 0, 0, x, y});
-  });
-  glfwSetScrollCallback(window, [](GLFWwindow* w, double x, double y) {
-    mouse_of(w).events.push_back({Event::Kind::wheel, 0, 0, x, y});
-  });
-}
-
 void start_imgui(GLFWwindow* window) {
-  IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // no file is left behind
   ImGui_ImplGlfw_InitForOpenGL(window, true);
@@ -154,24 +120,17 @@ void draw_view(Session& s, View& view, int width, int height) {
   }
 }
 
-std::string next_screenshot() {
-  std::error_code ignored;
-  for (int i = 0;; ++i) {
-    const std::string name = fmt::format("screenshot_{:03}.png", i);
-    if (!std::filesystem::exists(name, ignored)) return name;
-  }
-}
-
 void take_screenshots(Session& s, View& view) {
-  if (s.take_screenshot && view.target.framebuffer) view.read_back.push(view.target);
-  s.take_screenshot = false;
+  if (std::exchange(s.take_screenshot, false) && view.target.framebuffer) view.read_back.push(view.target);
   attempt(s, [&] {
-    if (const auto image = view.read_back.poll()) {
-      const std::string name = next_screenshot();
-      write_png(name, *image);
-      s.log("screenshot {}", name);
-      say(s, "saved " + name);
-    }
+    const auto image = view.read_back.poll();
+    if (!image) return;
+    std::string name;
+    for (int i = 0; name.empty() || std::filesystem::exists(name); ++i)
+      name = fmt::format("screenshot_{:03}.png", i);
+    write_png(name, *image);
+    s.log("screenshot {}", name);
+    say(s, "saved " + name);
   });
 }
 
@@ -196,61 +155,51 @@ void end_imgui_frame(const Desktop& d, const Target& target) {
 }
 
 // The first scene loads before there is anything to show, so this says what is going on.
-void show_start(Desktop& d, Ui& ui, const std::string& what) {
+void show_start(Session& s, Ui& ui, Desktop& d, const std::string& scene) {
   for (int frame = 0; frame < 2; ++frame) {  // the first has no size for what it places
     glfwPollEvents();
     measure_window(d, ui);
+    const Layout layout = make_layout(ui, float(std::max(d.width, 1)), float(std::max(d.height, 1)));
+    s.aspect = layout.view.width / layout.view.height;
     if (!d.visible) return;
     begin_imgui_frame();
-    draw_busy(make_layout(ui, float(d.width), float(d.height)), what);
+    draw_busy(layout, scene);
     end_imgui_frame(d, {});
   }
 }
 
-void draw_frame(Session& s, Ui& ui, View& view, Mouse& mouse, const Desktop& d) {
+void draw_frame(Session& s, Ui& ui, View& view, Input& input, const Desktop& d) {
   begin_imgui_frame();
-  handle_input(s, ui, mouse, make_layout(ui, float(d.width), float(d.height)).view);
+  handle_input(input, make_layout(ui, float(d.width), float(d.height)).view);
   const Layout layout = make_layout(ui, float(d.width), float(d.height));  // a key can hide the panels
   const auto pixels = [&](float length) { return std::max(int(std::lround(length * d.density)), 1); };
   const int width = pixels(layout.view.width), height = pixels(layout.view.height);
   s.aspect = float(width) / float(height);
   draw_view(s, view, width, height);
   take_screenshots(s, view);
-  const bool load_now = s.loading.has_value(), choose_now = s.choosing;
+  const bool named = s.task.has_value();
   draw_ui(s, ui, layout);
-  if (s.loading) {
-    const std::string mesh = s.loading->overrides.mesh.string();
-    draw_busy(layout, "loading " + (mesh.empty() ? s.loading->name : mesh));
-  } else if (s.choosing) {
-    draw_busy(layout, "trying ways to solve");
-  }
+  if (s.task) draw_busy(layout, s.task->name);
   end_imgui_frame(d, view.target);
-  // Their messages have been on the screen for a frame.
-  if (load_now)
-    finish_loading(s);
-  else if (choose_now)
-    finish_choosing(s);
+  if (named) attempt(s, std::exchange(s.task, std::nullopt)->act);  // its name has been on the screen
 }
 
 }  // namespace
 
 int run_window(const Scene& scene, const WindowOptions& options) {
   Desktop desktop(options.width, options.height, "tetpbd");
-  Mouse mouse;
-  listen(desktop.window, mouse);
   Session s;  // after the desktop: its GL objects go before the context does
   s.gl = load_gl();
-  if (const char* file = variable("TETPBD_WINDOW_LOG")) s.log.file.open(file);
+  if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);
   s.samples = options.samples;
   s.view = options.view;
   s.view.follow = true;
   Ui ui;
   ui.mesh = options.overrides.mesh.string();
+  Input input{s, ui};
+  listen(desktop.window, input);
   start_imgui(desktop.window);
-  show_start(desktop, ui, scene.name);
-  const Rect first =
-      make_layout(ui, float(std::max(desktop.width, 1)), float(std::max(desktop.height, 1))).view;
-  s.aspect = first.width / first.height;
+  show_start(s, ui, desktop, "loading " + scene.name);
   take_over(s, load(options.scene_name, options.overrides, scene), false);
 
   View view;
@@ -263,17 +212,16 @@ int run_window(const Scene& scene, const WindowOptions& options) {
   s.log("ready");
   while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !moving && !is_busy(mouse) && !s.loading && !s.choosing &&
-                      view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
+    const bool idle = !s.playing && !moving && !input.busy() && !s.task && view.read_back.pending() == 0 &&
+                      glfwGetTime() - last_event > 0.5;
     if (!desktop.visible || idle)
       glfwWaitEventsTimeout(0.1);
     else
       glfwPollEvents();
     measure_window(desktop, ui);
     s.now = glfwGetTime();
-    if (!mouse.events.empty()) last_event = s.now;
-    const double elapsed = s.now - before;
-    before = s.now;
+    if (!input.events.empty()) last_event = s.now;
+    const double elapsed = s.now - std::exchange(before, s.now);
     if (!desktop.visible) continue;
     if (!idle && ++frames > 2)
       s.frames_per_second.add(1 / std::max(elapsed, 1e-6));  // the first compile shaders
@@ -295,7 +243,7 @@ int run_window(const Scene& scene, const WindowOptions& options) {
       last_check = s.now;
       follow_shaders(s);
     }
-    draw_frame(s, ui, view, mouse, desktop);
+    draw_frame(s, ui, view, input, desktop);
   }
   s.log("closed");
   return 0;

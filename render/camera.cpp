@@ -6,17 +6,6 @@
 
 namespace tetpbd {
 
-namespace {
-
-// From the target to the eye.
-glm::vec3 backward(const Camera& camera) {
-  const float azimuth = glm::radians(camera.azimuth), elevation = glm::radians(camera.elevation);
-  return {std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
-          std::cos(elevation) * std::cos(azimuth)};
-}
-
-}  // namespace
-
 void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees) {
   camera.azimuth = std::remainder(camera.azimuth + azimuth_degrees, 360.0f);
   // Straight up or down, "up" on the screen has no direction.
@@ -54,7 +43,12 @@ void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, floa
   camera.distance = distance;
 }
 
-glm::vec3 eye(const Camera& camera) { return camera.target + camera.distance * backward(camera); }
+glm::vec3 eye(const Camera& camera) {
+  const float azimuth = glm::radians(camera.azimuth), elevation = glm::radians(camera.elevation);
+  const glm::vec3 backward{std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
+                           std::cos(elevation) * std::cos(azimuth)};
+  return camera.target + camera.distance * backward;
+}
 
 glm::mat4 view_matrix(const Camera& camera) {
   return glm::lookAt(eye(camera), camera.target, glm::vec3(0.0f, 1.0f, 0.0f));

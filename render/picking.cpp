@@ -17,7 +17,6 @@ Picker make_picker(const TetMesh& mesh) {
   picker.kernel = Program::compute("render/pick.comp");
   picker.triangles = Buffer("pick triangles", mesh.surface);
   picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
-  picker.count = mesh.surface.size();
   return picker;
 }
 
@@ -25,8 +24,9 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
   picker.ray = ray;
   const std::array<std::uint32_t, 3> start{none, none, none};
   picker.result.write(0, sizeof start, start.data());
+  const std::size_t count = picker.triangles.bytes() / sizeof(Triangle);
   picker.kernel.use();
-  picker.kernel.set("count", unsigned(picker.count));
+  picker.kernel.set("count", unsigned(count));
   picker.kernel.set("origin", ray.origin);
   picker.kernel.set("direction", ray.direction);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
@@ -35,7 +35,7 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
   for (int stage = 0; stage < 3; ++stage) {
     picker.kernel.set("stage", stage);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the stage before
-    glDispatchCompute(stage < 2 ? unsigned(work_groups(picker.count, 128)) : 1, 1, 1);
+    glDispatchCompute(stage < 2 ? unsigned(work_groups(count, 128)) : 1, 1, 1);
   }
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   picker.answered = Fence::here();

@@ -23,7 +23,6 @@ struct Pick {
 struct Picker {
   Program kernel;
   Buffer triangles, result;
-  std::size_t count = 0;
   Ray ray;
   Fence answered;
 };

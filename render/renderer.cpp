@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 
 #include "render/layout.h"
@@ -60,6 +61,69 @@ Buffer rest_buffer(const Renderer& renderer) {
   return Buffer("render rest", rest);
 }
 
+// -----------------------------------------------------------------------------------------------------------
+// Values of the surface's vertices from the current positions
+
+// `each(add)` calls add(vertex, item...) for every incidence, the same way both times: first counted, then
+// stored.
+template <int arity, class Each>
+VertexGather gather(const TetMesh& mesh, const std::string& label, std::size_t value_bytes, Each each) {
+  std::vector<bool> on_surface(mesh.positions.size());
+  for (const Triangle& triangle : mesh.surface)
+    for (std::uint32_t v : triangle) on_surface[v] = true;
+  std::vector<std::uint32_t> offsets(mesh.positions.size() + 1, 0);
+  each([&](std::uint32_t v, auto...) { offsets[v + 1] += on_surface[v]; });
+  std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+  std::vector<std::uint32_t> items(std::size_t(offsets.back()) * arity), next(offsets);
+  each([&](std::uint32_t v, auto... others) {
+    if (!on_surface[v]) return;
+    std::uint32_t* item = items.data() + std::size_t(next[v]++) * arity;
+    ((*item++ = others), ...);
+  });
+  return {Buffer(label + " offsets", offsets), Buffer(label + " items", items),
+          Buffer(label, mesh.positions.size() * value_bytes)};
+}
+
+VertexGather make_normals(const TetMesh& mesh) {
+  return gather<2>(mesh, "vertex normals", sizeof(glm::vec4), [&](auto add) {
+    for (const auto& [a, b, c] : mesh.surface) add(a, b, c), add(b, c, a), add(c, a, b);
+  });
+}
+
+VertexGather make_volume_errors(const TetMesh& mesh) {
+  // Even permutations, which keep the sign of the volume.
+  return gather<3>(mesh, "vertex volume errors", sizeof(float), [&](auto add) {
+    for (const auto& [a, b, c, d] : mesh.tets)
+      add(a, b, c, d), add(b, a, d, c), add(c, a, b, d), add(d, a, c, b);
+  });
+}
+
+VertexGather make_stretch_errors(const TetMesh& mesh) {
+  const auto edges = tet_edges(mesh);
+  return gather<1>(mesh, "vertex stretch errors", sizeof(float), [&](auto add) {
+    for (const auto& [a, b] : edges) add(a, b), add(b, a);
+  });
+}
+
+// The name of the buffer of values, made when first asked for and filled by their program.
+GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values,
+                VertexGather make(const TetMesh&), const char* program) {
+  if (!values) values = make(renderer.mesh);
+  const std::size_t count = renderer.mesh.positions.size();
+  use(renderer, program).set("count", unsigned(count));
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
+  if (renderer.rest) renderer.rest.bind_storage(BIND_RENDER_REST);  // normals do without
+  values.offsets.bind_storage(BIND_RENDER_OFFSETS);
+  values.items.bind_storage(BIND_RENDER_ITEMS);
+  values.values.bind_storage(BIND_RENDER_VALUES);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
+  glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
+  return values.values.id();
+}
+
+// -----------------------------------------------------------------------------------------------------------
+// What a picture is made of
+
 float linear(float srgb) {
   return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f);
 }
@@ -110,12 +174,6 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
     glVertexAttribPointer(index, count, GL_FLOAT, GL_FALSE, GLsizei(stride),
                           reinterpret_cast<const void*>(offset));
   };
-  // Values of vertices from their kernel, in a buffer of which this is the name.
-  const auto gathered = [&](VertexGather& values, VertexGather make(const TetMesh&), const char* program) {
-    if (!values) values = make(renderer.mesh);
-    update(values, use(renderer, program), frame.positions, renderer.rest);
-    return values.values.id();
-  };
   const ViewOptions& options = frame.options;
   const bool tets = options.look == Look::tets, volume = options.colour == Colour::volume,
              stretch = options.colour == Colour::stretch;
@@ -123,9 +181,11 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
     renderer.rest = rest_buffer(renderer);
   GLuint normal = 0, value = 0;
   if (!tets) {  // the geometry shader of these has the whole tetrahedron
-    if (options.smooth_normals) normal = gathered(renderer.normals, make_normals, "normals");
-    if (volume) value = gathered(renderer.volume_errors, make_volume_errors, "volume errors");
-    if (stretch) value = gathered(renderer.stretch_errors, make_stretch_errors, "stretch errors");
+    if (options.smooth_normals) normal = gathered(renderer, frame, renderer.normals, make_normals, "normals");
+    if (volume)
+      value = gathered(renderer, frame, renderer.volume_errors, make_volume_errors, "volume errors");
+    if (stretch)
+      value = gathered(renderer, frame, renderer.stretch_errors, make_stretch_errors, "stretch errors");
   }
   glBindVertexArray(renderer.vertex_array.id());
   attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
@@ -150,6 +210,69 @@ void draw_bodies(Renderer& renderer, const Frame& frame, bool shadow) {
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.id());
   glDrawElements(tets ? GL_LINES_ADJACENCY : GL_TRIANGLES, GLsizei(indices.bytes() / sizeof(std::uint32_t)),
                  GL_UNSIGNED_INT, nullptr);
+}
+
+// The projection of the light, as far as something of this frame needs it, fitted by the GPU itself.
+void fit_light(Renderer& renderer, const Frame& frame) {
+  const ViewOptions& options = frame.options;
+  if (!options.shadow && !options.follow && !(options.look == Look::tets && options.explode > 0)) return;
+  Shadow& shadow = renderer.shadow;
+  if (!shadow.light) {
+    shadow.bounds = Buffer("bounds", std::vector<std::uint32_t>{~0u, ~0u, ~0u, 0, 0, 0});
+    shadow.light = Buffer("light", sizeof(Light));
+    shadow.centre = Buffer("centre", sizeof(glm::vec4), nullptr, GL_STREAM_READ);
+  }
+  const std::size_t count = renderer.mesh.positions.size();
+  const float rest_size = glm::length(renderer.rest_high - renderer.rest_low);
+  const Program& kernel = use(renderer, "shadow fit");
+  kernel.set("count", unsigned(count));
+  kernel.set("map_size", float(Shadow::size));
+  // Centre and radius of what is worth a shadow: a blown-up vertex must not take the whole map.
+  kernel.set("limit", glm::vec4(frame.camera.target, 4.0f * std::max(frame.camera.distance, rest_size)));
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
+  shadow.bounds.bind_storage(BIND_RENDER_BOUNDS);
+  shadow.light.bind_storage(BIND_RENDER_FIT);
+  for (int stage = 0; stage < 2; ++stage) {
+    kernel.set("stage", stage);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the bounds
+    glDispatchCompute(stage == 0 ? unsigned(work_groups(count, 128)) : 1, 1, 1);
+  }
+  glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+  if (!options.follow || shadow.centre_copied.sync()) return;
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glBindBuffer(GL_COPY_READ_BUFFER, shadow.light.id());
+  glBindBuffer(GL_COPY_WRITE_BUFFER, shadow.centre.id());
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, offsetof(Light, centre), 0,
+                      sizeof(glm::vec4));
+  shadow.centre_copied = Fence::here();
+  glFlush();
+}
+
+void make_map(Shadow& shadow) {
+  Texture depth("shadow depth");
+  clear_errors();
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, Shadow::size, Shadow::size, 0, GL_DEPTH_COMPONENT,
+               GL_FLOAT, nullptr);
+  check_memory("the shadow map", std::size_t(Shadow::size) * Shadow::size * 4);
+  shadow.depth = std::move(depth);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+  shadow.framebuffer = Framebuffer("shadow");
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, shadow.depth.id(), 0);
+  glDrawBuffer(GL_NONE);
+  glReadBuffer(GL_NONE);
+  const std::array<float, 4> lit{1.0f, 1.0f, 1.0f, 1.0f};
+  shadow.compared = Sampler("shadow compared");
+  shadow.plain = Sampler("shadow plain");
+  for (const auto& [sampler, filter] :
+       {std::pair{shadow.compared.id(), GL_LINEAR}, {shadow.plain.id(), GL_NEAREST}}) {
+    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+      glSamplerParameteri(sampler, wrap, GL_CLAMP_TO_BORDER);
+    for (GLenum size : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+      glSamplerParameteri(sampler, size, filter);
+    glSamplerParameterfv(sampler, GL_TEXTURE_BORDER_COLOR, lit.data());
+  }
+  glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
 }
 
 void draw_shadow_map(Renderer& renderer, const Frame& frame) {
@@ -201,17 +324,6 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
   batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_PROGRAM_POINT_SIZE);
-}
-
-// The light, as far as something of this frame needs it.
-void fit_light(Renderer& renderer, const Frame& frame) {
-  const ViewOptions& options = frame.options;
-  if (!options.shadow && !options.follow && !(options.look == Look::tets && options.explode > 0)) return;
-  const float radius =
-      std::max(4.0f * frame.camera.distance, 4.0f * glm::length(renderer.rest_high - renderer.rest_low));
-  fit(renderer.shadow, use(renderer, "shadow fit"), frame.positions, renderer.mesh.positions.size(),
-      glm::vec4(frame.camera.target, radius));
-  if (options.follow) request_centre(renderer.shadow);
 }
 
 // However drawing ends, by a shader that does not compile, too.

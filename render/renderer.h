@@ -11,11 +11,28 @@
 
 #include "render/frame.h"
 #include "render/legend.h"
-#include "render/shadow.h"
-#include "render/vertex_data.h"
 #include "sim/model.h"
 
 namespace tetpbd {
+
+/// What each vertex of the surface gathers, in fixed order: items[offsets[v] .. offsets[v + 1]). Others have
+/// none.
+struct VertexGather {
+  Buffer offsets, items;
+  Buffer values;  ///< by vertex: vec4 of a normal, float of others
+  explicit operator bool() const { return bool(values); }
+};
+
+/// The key light's depth image of the bodies, fitted to where they are by the GPU (no read-back).
+struct Shadow {
+  static constexpr int size = 1024;  ///< texels a side
+  Buffer bounds, light;              ///< light: the uniform block
+  Buffer centre;                     ///< a copy of its `centre`, on its way back
+  Fence centre_copied;
+  Texture depth;
+  Framebuffer framebuffer;
+  Sampler compared, plain;
+};
 
 /// Only what was once asked for exists: buffers, programs, the shadow map.
 struct Renderer {

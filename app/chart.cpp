@@ -13,7 +13,6 @@
 
 #include "app/files.h"
 #include "sim/error.h"
-#include "sim/files.h"
 #include "sim/solvers/solver.h"
 
 extern char** environ;
@@ -204,22 +203,20 @@ std::string to_svg(const Chart& chart) {
 void write_chart(const std::filesystem::path& name, const std::string& svg) {
   // Absolute: a folder whose name begins with a dash is no option of rsvg-convert.
   const std::string whole = std::filesystem::absolute(name).string();
-  const std::string svg_file = whole + ".svg", png_file = whole + ".png",
-                    part = temporary_name(png_file).string();
+  const std::string svg_file = whole + ".svg";
+  const PartFile png(whole + ".png");
   write_file(svg_file, svg);
-  const char* arguments[] = {"rsvg-convert", "-z", "1.5", "-o", part.c_str(), svg_file.c_str(), nullptr};
+  const char* arguments[] = {"rsvg-convert", "-z", "1.5", "-o", png.part.c_str(), svg_file.c_str(), nullptr};
   pid_t child = 0;
   int status = -1;
   if (posix_spawnp(&child, arguments[0], nullptr, nullptr, const_cast<char* const*>(arguments), environ) == 0)
     while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
-  if (status == 0) return rename_whole(part, png_file);
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
-  std::fputs(
-      fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n", printable(png_file))
-          .c_str(),
-      stderr);
+  if (status == 0) return png.finish();
+  std::fputs(fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n",
+                         printable(png.file.string()))
+                 .c_str(),
+             stderr);
 }
 
 }  // namespace tetpbd

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "sim/error.h"
-#include "sim/files.h"
 
 namespace tetpbd {
 
@@ -28,7 +27,7 @@ void write_npy(const fs::path& file, const char* type, std::size_t rows, std::si
   header += '\n';
   const std::string length{char(header.size() & 255), char(header.size() >> 8)};
   const std::string content(static_cast<const char*>(data), rows * columns * 4);
-  write_whole(file, std::string("\x93NUMPY\x01\0", 8) + length + header + content);
+  write_file(file, std::string("\x93NUMPY\x01\0", 8) + length + header + content);
 }
 
 // One word of a shell's command line.
@@ -50,28 +49,6 @@ void make_output_folder(const fs::path& folder) {
     throw Error("cannot write to the output folder", folder.string(), std::strerror(errno));
 }
 
-GrowingFile::GrowingFile(const fs::path& file)
-    : file_(file), temporary_(temporary_name(file)), stream_(temporary_, std::ios::binary) {
-  add("");
-}
-
-GrowingFile::~GrowingFile() {
-  std::error_code ignored;
-  fs::remove(temporary_, ignored);  // nothing is there after close()
-}
-
-void GrowingFile::add(const std::string& text) {
-  if (!(stream_ << text)) throw Error("cannot be written", file_.string(), std::strerror(errno), 1);
-}
-
-void GrowingFile::close() {
-  stream_.close();
-  add("");
-  rename_whole(temporary_, file_);
-}
-
-void write_file(const fs::path& file, const std::string& content) { write_whole(file, content); }
-
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string field = "\"";
@@ -86,10 +63,10 @@ void write_png(const fs::path& file, const Image& image) {
   png.height = png_uint_32(image.height);
   png.format = PNG_FORMAT_RGBA;
   png.flags = PNG_IMAGE_FLAG_FAST;
-  const fs::path temporary = temporary_name(file);
-  if (!png_image_write_to_file(&png, temporary.c_str(), 0, image.rgba.data(), 0, nullptr))
+  const PartFile whole(file);
+  if (!png_image_write_to_file(&png, whole.part.c_str(), 0, image.rgba.data(), 0, nullptr))
     throw Error("cannot be written", file.string(), png.message, 1);
-  rename_whole(temporary, file);
+  whole.finish();
 }
 
 void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
@@ -104,7 +81,7 @@ void write_npy(const fs::path& file, const std::vector<Tet>& rows) {
 }
 
 Video::Video(const fs::path& file, int width, int height, int frames_per_second)
-    : file_(file), temporary_(temporary_name(file)), log_(temporary_.string() + ".log") {
+    : video_(file), log_(file.string() + ".log") {
   const std::string extension = file.extension().string();
   if (extension != ".mp4" && extension != ".mkv" && extension != ".webm" && extension != ".gif")
     throw Error("unknown video format", file.string(), "name it .mp4, .mkv, .webm or .gif");
@@ -115,8 +92,8 @@ Video::Video(const fs::path& file, int width, int height, int frames_per_second)
   const std::string command = fmt::format(
       "exec setsid ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgba -s {}x{} -r {} -i - {} {} {} >{} 2>&1",
       width, height, frames_per_second, extension == ".gif" ? "" : "-pix_fmt yuv420p",
-      extension == ".mp4" ? "-movflags +faststart" : "", quoted("file:" + temporary_.string()),
-      quoted(log_.string()));
+      extension == ".mp4" ? "-movflags +faststart" : "", quoted("file:" + video_.part.string()),
+      quoted(log_.part.string()));
   pipe_ = ::popen(command.c_str(), "we");
   if (!pipe_) throw Error("cannot start ffmpeg", file.string(), std::strerror(errno), 1);
 }
@@ -129,19 +106,16 @@ void Video::close() {
   const bool sent = std::fflush(pipe_) == 0 && !std::ferror(pipe_);
   const int status = ::pclose(std::exchange(pipe_, nullptr));
   std::string said;
-  std::getline(std::ifstream(log_), said);
+  std::getline(std::ifstream(log_.part), said);
   // On a full disk ffmpeg 5.1 says so and still ends with 0.
-  if (sent && status == 0 && said.empty()) return rename_whole(temporary_, file_);
+  if (sent && status == 0 && said.empty()) return video_.finish();
   const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
-  throw Error("cannot write the video", file_.string(),
+  throw Error("cannot write the video", video_.file.string(),
               missing ? "install ffmpeg" : "ffmpeg ended early" + (said.empty() ? "" : " (" + said + ")"), 1);
 }
 
 Video::~Video() {
   if (pipe_) ::pclose(pipe_);
-  std::error_code ignored;
-  fs::remove(log_, ignored);
-  fs::remove(temporary_, ignored);
 }
 
 }  // namespace tetpbd

@@ -1,21 +1,20 @@
-// Files that are whole or not there: written under a temporary name, then renamed.
+// Files of the app: text (sim/files.h), images, arrays, videos; whole or not there.
 #pragma once
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <glm/glm.hpp>
 #include <string>
 #include <vector>
 
 #include "render/target.h"
+#include "sim/files.h"
 #include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 
 /// Makes the folder and checks that it can be written to.
 void make_output_folder(const std::filesystem::path& folder);
-void write_file(const std::filesystem::path& file, const std::string& content);
 /// A field of a CSV line: quoted where a comma, quote or line break stands in it.
 std::string csv_field(const std::string& text);
 /// JSON text; bytes that are no UTF-8 (file names may hold any) are replaced.
@@ -24,36 +23,20 @@ std::string json_text(const Json& document, int indent) {
   return document.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 void write_png(const std::filesystem::path& file, const Image& image);
-/// Text that is written as it comes; the file appears under its name when close() has succeeded.
-class GrowingFile {
- public:
-  explicit GrowingFile(const std::filesystem::path& file);
-  ~GrowingFile();
-  GrowingFile(const GrowingFile&) = delete;
-  GrowingFile& operator=(const GrowingFile&) = delete;
-  void add(const std::string& text);
-  void close();
-
- private:
-  std::filesystem::path file_, temporary_;
-  std::ofstream stream_;
-};
 /// numpy arrays: float32 N x 3 (throws Error for numbers that are not finite), uint32 T x 4.
 void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);
 void write_npy(const std::filesystem::path& file, const std::vector<Tet>& rows);
 
-/// Frames piped into ffmpeg; the file appears under its name when close() has succeeded.
+/// Frames piped into ffmpeg; the file appears when close() has succeeded.
 class Video {
  public:
   Video(const std::filesystem::path& file, int width, int height, int frames_per_second);
   ~Video();
-  Video(const Video&) = delete;
-  Video& operator=(const Video&) = delete;
   void add(const Image& frame);
   void close();
 
  private:
-  std::filesystem::path file_, temporary_, log_;
+  PartFile video_, log_;
   std::FILE* pipe_ = nullptr;
 };
 

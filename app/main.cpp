@@ -29,24 +29,17 @@ using Task = std::function<int()>;
 constexpr long most_steps = 1000000000;
 
 /// "1280x720", "2/8": two whole numbers in a range.
-template <char between, int low, int high>
-struct Pair {
-  int first = low, second = low;
-  Pair() = default;
-  Pair(int a, int b) : first(a), second(b) {}  // or CLI11 would make one of a single number
-  friend std::ostream& operator<<(std::ostream& out, const Pair& pair) {
-    return out << pair.first << between << pair.second;
-  }
-  friend std::istream& operator>>(std::istream& in, Pair& pair) {
-    char found = 0;
-    in >> pair.first >> found >> pair.second;
-    if (found != between || std::min(pair.first, pair.second) < low ||
-        std::max(pair.first, pair.second) > high)
-      in.setstate(std::ios::failbit);
-    return in;
-  }
-};
-using Size = Pair<'x', 16, 16384>;
+std::array<int, 2> two_numbers(const std::string& flag, const std::string& text, char between, int low,
+                               int high) {
+  std::istringstream in(text);
+  int first = 0, second = 0;
+  char found = 0;
+  in >> first >> found >> second;
+  if (!in || !in.eof() || found != between || std::min(first, second) < low || std::max(first, second) > high)
+    throw Error(fmt::format("bad {} '{}'", flag, text), "command line",
+                fmt::format("give two whole numbers from {} to {} with {} between", low, high, between));
+  return {first, second};
+}
 
 /// What words can set, with its defaults.
 struct Arguments {
@@ -54,8 +47,8 @@ struct Arguments {
   SceneOverrides overrides;
   std::vector<std::optional<std::string>> values{parameters().size()};  ///< text by row of parameters()
   bool explain = false, no_render = false;
-  std::vector<Size> sizes{{1280, 720}};
-  Pair<'/', 1, 99999> shard{1, 1};
+  std::vector<std::string> sizes{"1280x720"};
+  std::string shard = "1/1";
   RunOptions run;  ///< its device and picture are those of every command that opens a scene
   SoakOptions soak;
   BenchOptions bench;
@@ -208,7 +201,8 @@ void add_scene(CLI::App& command, Arguments& a) {
 }
 
 Scene open_scene(Arguments& a) {
-  a.run.width = a.sizes[0].first, a.run.height = a.sizes[0].second;
+  const auto [width, height] = two_numbers("--size", a.sizes[0], 'x', 16, 16384);
+  a.run.width = width, a.run.height = height;
   a.soak.gpu = a.run.gpu;
   for (std::size_t i = 0; i < a.values.size(); ++i)
     if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
@@ -280,8 +274,7 @@ void add_compare(CLI::App& command, Arguments& a) {
       "print the best setting within so many ms per step");
   add(command, "--error", compare.error_percent, 1e-9, 1e9,
       "print the cheapest setting that loses at most this volume, %");
-  command.add_option("--shard", a.shard,
-                     "i/n: only every n-th combination, from the i-th; merge them afterwards");
+  add(command, "--shard", a.shard, "i/n: only every n-th combination, from the i-th; merge them afterwards");
   add(command, "--cases", a.hard.cases, "hard cases to run (default: all)")->needs(hard);
   add(command, "--meshes", a.hard.meshes, "hard cases: bunny, block, tet")->needs(hard);
   command.add_option("--merge", compare.merge, "folders of finished shards, instead of running");
@@ -325,12 +318,13 @@ Task start(Arguments& a) {
 
 Task start_bench(Arguments& a) {
   if (a.no_render) a.sizes.clear();
-  for (const Size& size : a.sizes) a.bench.sizes.push_back({size.first, size.second});
+  for (const std::string& size : a.sizes)
+    a.bench.sizes.push_back(two_numbers("--sizes", size, 'x', 16, 16384));
   return start<&Arguments::bench, run_bench>(a);
 }
 
 Task start_compare(Arguments& a) {
-  const auto [i, n] = a.shard;
+  const auto [i, n] = two_numbers("--shard", a.shard, '/', 1, 99999);
   if (i > n) throw Error("bad share", fmt::format("--shard {}/{}", i, n), "count i from 1 to n, as in 2/8");
   a.compare.shard = i, a.compare.shards = n;
   if (!a.hard_cases) return start<&Arguments::compare, run_compare>(a);

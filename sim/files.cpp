@@ -5,47 +5,47 @@
 
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 
 #include "sim/error.h"
 
 namespace tetpbd {
 namespace fs = std::filesystem;
 
-fs::path temporary_name(const fs::path& file) {
-  return file.parent_path() /
-         fmt::format(".{}.{}.part{}", file.stem().string(), ::getpid(), file.extension().string());
-}
+// The extension stays: programs choose formats by it.
+PartFile::PartFile(const fs::path& name)
+    : file(name),
+      part(name.parent_path() /
+           fmt::format(".{}.{}.part{}", name.stem().string(), ::getpid(), name.extension().string())) {}
 
-void rename_whole(const fs::path& temporary, const fs::path& file) {
-  std::error_code failed, ignored;
-  fs::rename(temporary, file, failed);
-  if (!failed) return;
-  fs::remove(temporary, ignored);
-  throw Error("cannot be written", file.string(), failed.message(), 1);
-}
-
-void write_whole(const fs::path& file, const std::string& content) {
-  write_whole(std::vector{std::pair{file, content}});
-}
-
-void write_whole(const std::vector<std::pair<fs::path, std::string>>& files) {
+PartFile::~PartFile() {
   std::error_code ignored;
-  try {
-    for (const auto& [file, content] : files) {
-      fs::remove(temporary_name(file), ignored);  // a link left there is not followed
-      std::ofstream stream(temporary_name(file), std::ios::binary);
-      stream.write(content.data(), std::streamsize(content.size()));
-      stream.close();
-      if (!stream) throw Error("cannot be written", file.string(), std::strerror(errno), 1);
-      if (fs::is_directory(file))
-        throw Error("cannot be written", file.string(), "a folder has that name", 1);
-    }
-    for (const auto& [file, content] : files) rename_whole(temporary_name(file), file);
-  } catch (...) {
-    for (const auto& [file, content] : files) fs::remove(temporary_name(file), ignored);
-    throw;
-  }
+  fs::remove(part, ignored);
+}
+
+void PartFile::finish() const {
+  std::error_code failed;
+  fs::rename(part, file, failed);
+  if (failed) throw Error("cannot be written", file.string(), failed.message(), 1);
+}
+
+GrowingFile::GrowingFile(const fs::path& file) : part_(file), stream_(part_.part, std::ios::binary) {
+  add("");
+}
+
+void GrowingFile::add(const std::string& text) {
+  if (!(stream_ << text)) throw Error("cannot be written", part_.file.string(), std::strerror(errno), 1);
+}
+
+void GrowingFile::close() {
+  stream_.close();
+  add("");
+  part_.finish();
+}
+
+void write_file(const fs::path& file, const std::string& content) {
+  GrowingFile whole(file);
+  whole.add(content);
+  whole.close();
 }
 
 }  // namespace tetpbd

@@ -1,22 +1,35 @@
-// Files that appear whole or not at all: written under a temporary name, then renamed.
+// Files that are whole or not there: written under a temporary name, then renamed.
 #pragma once
 
 #include <filesystem>
+#include <fstream>
 #include <string>
-#include <utility>
-#include <vector>
 
 namespace tetpbd {
 
-/// ".NAME.PID.part.EXTENSION" in the same folder: programs choose formats by the extension, so it stays.
-std::filesystem::path temporary_name(const std::filesystem::path& file);
+/// What is written as `part` becomes `file` by finish(); without it, it is removed.
+struct PartFile {
+  std::filesystem::path file, part;
+  explicit PartFile(const std::filesystem::path& name);
+  ~PartFile();
+  PartFile(const PartFile&) = delete;
+  PartFile& operator=(const PartFile&) = delete;
+  void finish() const;  ///< throws Error (status 1)
+};
 
-/// Gives a finished file its name. Throws Error (status 1) and removes it when that fails.
-void rename_whole(const std::filesystem::path& temporary, const std::filesystem::path& file);
+/// Text that is written as it comes; the file appears when close() has succeeded. Both throw Error (status
+/// 1).
+class GrowingFile {
+ public:
+  explicit GrowingFile(const std::filesystem::path& file);
+  void add(const std::string& text);
+  void close();
 
-/// Throws Error (status 1) and leaves nothing behind when it cannot.
-void write_whole(const std::filesystem::path& file, const std::string& content);
-/// All are written before the first gets its name.
-void write_whole(const std::vector<std::pair<std::filesystem::path, std::string>>& files);
+ private:
+  PartFile part_;
+  std::ofstream stream_;
+};
+
+void write_file(const std::filesystem::path& file, const std::string& content);
 
 }  // namespace tetpbd

@@ -21,26 +21,24 @@ TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
     throw Error(fmt::format("{:.0f} tets are too many", count), source, "give at most 1e8 / 6 cells");
 
   TetMesh mesh;
-  const glm::ivec3 nodes = cells + 1;
-  for (int z = 0; z < nodes.z; ++z)
-    for (int y = 0; y < nodes.y; ++y)
-      for (int x = 0; x < nodes.x; ++x)
-        mesh.positions.push_back(size * (glm::dvec3(x, y, z) / glm::dvec3(cells) - 0.5));
-  const std::array<std::uint32_t, 3> step{1, std::uint32_t(nodes.x),
-                                          std::uint32_t(nodes.x) * std::uint32_t(nodes.y)};
-  constexpr std::array<std::array<std::uint8_t, 3>, 6> orders{
+  const glm::uvec3 nodes(cells + 1);
+  const auto each_of = [](const glm::uvec3& counts, const auto& visit) {
+    for (std::uint32_t z = 0; z < counts.z; ++z)
+      for (std::uint32_t y = 0; y < counts.y; ++y)
+        for (std::uint32_t x = 0; x < counts.x; ++x) visit(glm::uvec3(x, y, z));
+  };
+  each_of(nodes, [&](const glm::uvec3& at) {
+    mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5));
+  });
+  const glm::uvec3 step(1, nodes.x, nodes.x * nodes.y);
+  constexpr std::array<std::array<int, 3>, 6> orders{
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
-  mesh.tets.reserve(std::size_t(count));
-  for (int z = 0; z < cells.z; ++z)
-    for (int y = 0; y < cells.y; ++y)
-      for (int x = 0; x < cells.x; ++x) {
-        const std::uint32_t corner =
-            std::uint32_t(x) + std::uint32_t(y) * step[1] + std::uint32_t(z) * step[2];
-        for (const auto& order : orders) {
-          const std::uint32_t first = corner + step[order[0]], second = first + step[order[1]];
-          mesh.tets.push_back({corner, first, second, second + step[order[2]]});
-        }
-      }
+  each_of(glm::uvec3(cells), [&](const glm::uvec3& at) {
+    const std::uint32_t corner = at.x + at.y * step.y + at.z * step.z;
+    for (const auto& [i, j, k] : orders)
+      mesh.tets.push_back(
+          {corner, corner + step[i], corner + step[i] + step[j], corner + step[0] + step[1] + step[2]});
+  });
   finish_tets(mesh, source);
   return mesh;
 }

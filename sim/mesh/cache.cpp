@@ -15,15 +15,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Change it whenever the file's layout, the mesher or what is done with its result changes.
-constexpr std::string_view maker = "tetpbd cache 1, TetGen 1.5.0";
-constexpr std::array<char, 8> magic{'t', 'e', 't', 'p', 'b', 'd', 'M', '1'};
-
-struct Head {
-  std::array<char, 8> magic;
-  CacheKey key;
-  std::uint64_t checksum, size;  // of what follows
-};
+// Change it whenever the file's layout or what is done with TetGen's result changes.
+constexpr std::string_view version = "tetpbd cache 2";
 
 template <class T>
 void put_array(std::string& bytes, const std::vector<T>& values) {
@@ -57,9 +50,17 @@ bool is_sound(const TetMesh& mesh) {
          std::ranges::all_of(mesh.tets, [&](const Tet& t) { return tet_volume(mesh, t) > 0; });
 }
 
-fs::path mesh_file(const CacheKey& key) {
-  const fs::path folder = cache_folder();
-  return folder.empty() ? folder : folder / fmt::format("{:016x}{:016x}.tets", key[0], key[1]);
+// In $TETPBD_CACHE, else $XDG_CACHE_HOME/tetpbd, else ~/.cache/tetpbd; empty where there is none of these.
+fs::path mesh_file(std::uint64_t key) {
+  const auto folder = [](const char* variable, const char* below) {
+    const char* value = std::getenv(variable);
+    return value && *value ? fs::path(value) / below : fs::path();
+  };
+  const std::string name = fmt::format("{:016x}.tets", key);
+  for (const fs::path& place :
+       {folder("TETPBD_CACHE", ""), folder("XDG_CACHE_HOME", "tetpbd"), folder("HOME", ".cache/tetpbd")})
+    if (!place.empty()) return place / name;
+  return {};
 }
 
 }  // namespace
@@ -81,62 +82,53 @@ std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed) {
   return hash;
 }
 
-fs::path cache_folder() {
-  const auto variable = [](const char* name) {
-    const char* value = std::getenv(name);
-    return fs::path(value ? value : "");
-  };
-  if (const fs::path own = variable("TETPBD_CACHE"); !own.empty()) return own;
-  if (const fs::path shared = variable("XDG_CACHE_HOME"); shared.is_absolute()) return shared / "tetpbd";
-  if (const fs::path home = variable("HOME"); !home.empty()) return home / ".cache" / "tetpbd";
-  return {};
-}
-
-CacheKey mesh_key(const SurfaceMesh& surface, const std::string& switches) {
-  std::string bytes = fmt::format("{}\n{}\n", maker, switches);
+std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, const fs::path& program) {
+  std::error_code failed;  // of a program that is not there the mark is one that no file has
+  const auto size = fs::file_size(program, failed);
+  const auto written = fs::last_write_time(program, failed).time_since_epoch().count();
+  std::string bytes = fmt::format("{}\n{}\n{} {}\n", version, switches, size, written);
   put_array(bytes, surface.positions);
   put_array(bytes, surface.triangles);
-  return {hash_bytes(bytes, 1), hash_bytes(bytes, 2)};
+  return hash_bytes(bytes, 1);
 }
 
-std::optional<TetMesh> parse_mesh(std::string_view bytes, const CacheKey& key) {
-  Head head;
-  if (bytes.size() < sizeof head) return {};
-  std::memcpy(&head, bytes.data(), sizeof head);
-  bytes.remove_prefix(sizeof head);
+std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) {
+  std::uint64_t checksum = 0;
+  if (bytes.size() < sizeof checksum) return {};
+  std::memcpy(&checksum, bytes.data(), sizeof checksum);
+  bytes.remove_prefix(sizeof checksum);
   TetMesh mesh;
-  const bool whole = head.magic == magic && head.key == key && head.size == bytes.size() &&
-                     head.checksum == hash_bytes(bytes, 3) && take_array(bytes, mesh.positions) &&
+  const bool whole = checksum == hash_bytes(bytes, key) && take_array(bytes, mesh.positions) &&
                      take_array(bytes, mesh.tets) && take_array(bytes, mesh.surface) && bytes.empty() &&
                      is_sound(mesh);
-  if (!whole) return {};
-  return mesh;
+  return whole ? std::optional(std::move(mesh)) : std::nullopt;
 }
 
-std::string mesh_bytes(const CacheKey& key, const TetMesh& mesh) {
-  std::string content;
-  put_array(content, mesh.positions);
-  put_array(content, mesh.tets);
-  put_array(content, mesh.surface);
-  const Head head{magic, key, hash_bytes(content, 3), content.size()};
-  return std::string(reinterpret_cast<const char*>(&head), sizeof head) + content;
+std::string mesh_bytes(std::uint64_t key, const TetMesh& mesh) {
+  std::string bytes(sizeof key, '\0');
+  put_array(bytes, mesh.positions);
+  put_array(bytes, mesh.tets);
+  put_array(bytes, mesh.surface);
+  const std::uint64_t checksum = hash_bytes(std::string_view(bytes).substr(sizeof key), key);
+  std::memcpy(bytes.data(), &checksum, sizeof checksum);
+  return bytes;
 }
 
-std::optional<TetMesh> read_mesh(const CacheKey& key) {
+std::optional<TetMesh> read_mesh(std::uint64_t key) {
   const fs::path file = mesh_file(key);
   std::error_code failed;
   const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
-  if (failed || size > std::uintmax_t{16} << 30) return {};
+  if (failed) return {};
   std::string bytes(size, '\0');
   if (!std::ifstream(file, std::ios::binary).read(bytes.data(), std::streamsize(size))) return {};
   return parse_mesh(bytes, key);
 }
 
-void keep_mesh(const CacheKey& key, const TetMesh& mesh) try {
+void keep_mesh(std::uint64_t key, const TetMesh& mesh) try {
   const fs::path file = mesh_file(key);
   if (file.empty()) return;
   fs::create_directories(file.parent_path());
-  write_whole(file, mesh_bytes(key, mesh));
+  write_file(file, mesh_bytes(key, mesh));
 } catch (const std::exception&) {  // read-only or full
 }
 

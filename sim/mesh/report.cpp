@@ -18,12 +18,10 @@ std::array<double, 6> dihedral_angles(const TetMesh& mesh, const Tet& tet) {
   std::array<double, 6> angles{};
   std::size_t n = 0;
   for (std::size_t i = 0; i < 4; ++i)
-    for (std::size_t j = i + 1; j < 4; ++j) {
-      // atan2, not acos: exact to the last digits for slivers too
-      const double sine = glm::length(glm::cross(normals[i], normals[j])),
-                   cosine = -glm::dot(normals[i], normals[j]);
-      angles[n++] = std::atan2(sine, cosine) * 180 / std::numbers::pi;
-    }
+    for (std::size_t j = i + 1; j < 4; ++j)  // atan2, not acos: exact to the last digits for slivers too
+      angles[n++] =
+          std::atan2(glm::length(glm::cross(normals[i], normals[j])), -glm::dot(normals[i], normals[j])) *
+          180 / std::numbers::pi;
   return angles;
 }
 
@@ -36,27 +34,26 @@ MeshReport report(const TetMesh& mesh) {
   r.surface_triangles = mesh.surface.size();
   r.edges = tet_edges(mesh).size();
   r.faces = (4 * r.tets + r.surface_triangles) / 2;
-  r.euler_characteristic = int(static_cast<long long>(r.vertices) - static_cast<long long>(r.edges) +
-                               static_cast<long long>(r.faces) - static_cast<long long>(r.tets));
+  r.euler_characteristic = int(r.vertices) - int(r.edges) + int(r.faces) - int(r.tets);
 
   const SurfaceTopology surface = surface_topology(mesh.surface, mesh.positions.size());
   r.surface_vertices = surface.vertices;
-  for (std::size_t e = 0; e < surface.edge_count(); ++e) r.bends += surface.uses_of(e) == 2;
   // Where parts of the boundary touch in a vertex or an edge they are taken as separate sheets: one vertex
   // for each fan of triangles, one edge for each pair.
-  long long fans = 0, joined_edges = 0;
-  for (const std::uint32_t n : surface.fans) fans += n;
-  for (std::size_t e = 0; e < surface.edge_count(); ++e)
-    joined_edges += static_cast<long long>(surface.uses_of(e) / 2);
-  const long long euler = fans - joined_edges + static_cast<long long>(mesh.surface.size());
-  r.genus = int(static_cast<long long>(surface.patches) - euler / 2);
+  int euler = int(mesh.surface.size());
+  for (const std::uint32_t fans : surface.fans) euler += int(fans);
+  for (std::size_t e = 0; e < surface.edge_count(); ++e) {
+    r.bends += surface.uses_of(e) == 2;
+    euler -= int(surface.uses_of(e) / 2);
+  }
+  r.genus = int(surface.patches) - euler / 2;
 
-  DisjointSets parts(mesh.positions.size());
+  DisjointSets parts(r.vertices);
   for (const Tet& tet : mesh.tets)
-    for (std::size_t k = 1; k < 4; ++k) parts.join(tet[0], tet[k]);
-  r.components = int(parts.count());
+    for (const std::uint32_t v : tet) parts.join(tet[0], v);
+  for (std::uint32_t v = 0; v < r.vertices; ++v) r.components += parts.root(v) == v;
 
-  r.smallest_tet_volume = mesh.tets.empty() ? 0 : INFINITY;
+  r.smallest_tet_volume = INFINITY;
   r.min_dihedral_deg = 180;
   struct Shape {
     double volume, low, high;  // m^3, degrees
@@ -76,10 +73,8 @@ MeshReport report(const TetMesh& mesh) {
     r.mean_min_dihedral_deg += low;
     r.slivers += low < 5 || high > 175;
   }
-  if (r.tets > 0) {
-    r.mean_tet_volume = r.volume / double(r.tets);
-    r.mean_min_dihedral_deg /= double(r.tets);
-  }
+  r.mean_tet_volume = r.volume / double(r.tets);
+  r.mean_min_dihedral_deg /= double(r.tets);
   return r;
 }
 

@@ -5,13 +5,12 @@
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 
@@ -24,28 +23,21 @@ namespace {
 constexpr int not_started = 127;
 
 // Between fork and exec only system calls are safe: other threads may have held any lock.
-[[noreturn]] void become(char* const* arguments, int output, pid_t parent, const SubprocessLimits& limits) {
+[[noreturn]] void become(char* const* words, int output, std::size_t bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(1);
-  for (const int number : {SIGALRM, SIGPIPE, SIGXFSZ, SIGINT, SIGTERM}) std::signal(number, SIG_DFL);
-  sigset_t none;
-  sigemptyset(&none);
-  ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  const rlimit no_core{0, 0};
-  ::setrlimit(RLIMIT_CORE, &no_core);
-  rlimit memory{};
-  ::getrlimit(RLIMIT_AS, &memory);
-  memory.rlim_cur = std::min<rlim_t>(limits.bytes, memory.rlim_max);
-  ::setrlimit(RLIMIT_AS, &memory);
+  const auto limit = [](__rlimit_resource what, rlim_t most) {
+    rlimit now{};
+    ::getrlimit(what, &now);
+    now.rlim_cur = std::min(most, now.rlim_max);
+    ::setrlimit(what, &now);
+  };
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_AS, bytes);
   const int null = ::open("/dev/null", O_RDWR);
   ::dup2(null, STDIN_FILENO);
   ::dup2(output, STDOUT_FILENO);
   ::dup2(null, STDERR_FILENO);
-  // The timer outlives exec: at its end the system kills the program.
-  const double seconds = std::clamp(limits.seconds, 1e-6, 1e7), whole = std::floor(seconds);
-  const itimerval timer{{}, {static_cast<time_t>(whole), static_cast<suseconds_t>((seconds - whole) * 1e6)}};
-  ::setitimer(ITIMER_REAL, &timer, nullptr);
-  ::execvp(arguments[0], arguments);
+  ::execvp(words[0], words);
   ::_exit(not_started);
 }
 
@@ -57,21 +49,23 @@ SubprocessEnd run_subprocess(const std::vector<std::string>& arguments, const Su
   words.push_back(nullptr);
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return {SubprocessEnd::failed, {}, std::strerror(errno)};
-  const pid_t parent = ::getpid(), child = ::fork();
-  if (child == 0) become(words.data(), ends[1], parent, limits);
-  const int why = errno;
+  const pid_t child = ::fork();
+  if (child == 0) become(words.data(), ends[1], limits.bytes);
+  SubprocessEnd end{SubprocessEnd::failed, {}, child < 0 ? std::strerror(errno) : ""};
   ::close(ends[1]);
-  std::string output;
+  const auto start = std::chrono::steady_clock::now();
   for (char chunk[65536]; child > 0;) {
-    if (interrupted()) ::kill(child, SIGKILL);
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > limits.seconds)
+      end.kind = SubprocessEnd::timed_out;
+    if (end.kind == SubprocessEnd::timed_out || interrupted()) ::kill(child, SIGKILL);
     pollfd wanted{ends[0], POLLIN, 0};
     if (::poll(&wanted, 1, 100) <= 0) continue;
     const ssize_t n = ::read(ends[0], chunk, sizeof chunk);
     if (n <= 0) break;
-    if (output.size() < limits.output) output.append(chunk, std::size_t(n));
+    if (end.output.size() < limits.output) end.output.append(chunk, std::size_t(n));
   }
   ::close(ends[0]);
-  if (child < 0) return {SubprocessEnd::failed, {}, std::strerror(why)};
+  if (child < 0) return end;
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
@@ -79,13 +73,14 @@ SubprocessEnd run_subprocess(const std::vector<std::string>& arguments, const Su
     throw Error("interrupted", "while a mesh was filled", "start again; nothing was written", 1);
   if (WIFSIGNALED(status)) {
     const int number = WTERMSIG(status);
-    return {number == SIGALRM ? SubprocessEnd::timed_out : SubprocessEnd::failed, output,
-            fmt::format("it was ended by signal {} ({})", number, ::strsignal(number))};
+    end.reason = fmt::format("it was ended by signal {} ({})", number, ::strsignal(number));
+  } else if (WEXITSTATUS(status) != 0) {
+    end.reason = fmt::format("it ended with status {}", WEXITSTATUS(status));
+    if (WEXITSTATUS(status) == not_started) end.kind = SubprocessEnd::not_started;
+  } else if (end.kind != SubprocessEnd::timed_out) {
+    end.kind = SubprocessEnd::done;
   }
-  if (WEXITSTATUS(status) == not_started) return {SubprocessEnd::not_started, output, "it did not start"};
-  if (WEXITSTATUS(status) != 0)
-    return {SubprocessEnd::failed, output, fmt::format("it ended with status {}", WEXITSTATUS(status))};
-  return {SubprocessEnd::done, output, {}};
+  return end;
 }
 
 }  // namespace tetpbd

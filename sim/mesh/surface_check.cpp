@@ -16,26 +16,27 @@ namespace {
 constexpr double degenerate_area = 1e-14;
 constexpr double flat_thickness = 1e-7;
 
-struct Found {
+struct Defect {
+  const char *name, *one, *many, *hint;
   std::size_t count = 0;
-  std::string first;
-  void add(const glm::dvec3& p) {
-    if (count++ == 0) first = fmt::format("near ({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
+  std::string first{};
+  void add(const std::string& place) {
+    if (count++ == 0) first = place;
   }
-  void add(const char* what, std::size_t number) {
-    if (count++ == 0) first = fmt::format("{} {}", what, number);
-  }
+  void add(const glm::dvec3& p) { add("near " + point_text(p)); }
 };
 
-// True, and noted, when there is one.
-bool note(SurfaceCheck& check, const Found& found, const char* defect, const char* one, const char* many,
-          const char* hint) {
-  if (found.count == 0) return false;
-  check.count = found.count;
-  check.defect = defect;
-  check.place = fmt::format("{} {}, first {}", found.count, found.count == 1 ? one : many, found.first);
-  check.hint = hint;
-  return true;
+// The first defect that there is becomes the result; false when there is none.
+bool note(SurfaceCheck& check, std::initializer_list<Defect> defects) {
+  for (const Defect& d : defects) {
+    if (d.count == 0) continue;
+    check.count = d.count;
+    check.defect = d.name;
+    check.place = fmt::format("{} {}, first {}", d.count, d.count == 1 ? d.one : d.many, d.first);
+    check.hint = d.hint;
+    return true;
+  }
+  return false;
 }
 
 glm::dvec3 centroid(const SurfaceMesh& s, const Triangle& t) {
@@ -47,43 +48,47 @@ glm::dvec3 area_vector(const SurfaceMesh& s, const Triangle& t) {
 }
 
 bool bad_numbers(const SurfaceMesh& surface, SurfaceCheck& check) {
-  Found indices, not_finite, far;
+  Defect indices{"triangles name vertices that are not there", "index", "indices", "export the mesh again"};
+  Defect infinite{"positions are not finite numbers", "vertex", "vertices", "export the mesh again"};
+  Defect far{"positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh"};
   for (std::size_t t = 0; t < surface.triangles.size(); ++t)
     for (const std::uint32_t v : surface.triangles[t])
-      if (v >= surface.positions.size()) indices.add("in triangle", t);
+      if (v >= surface.positions.size()) indices.add(fmt::format("in triangle {}", t));
   for (std::size_t v = 0; v < surface.positions.size(); ++v) {
     const glm::dvec3 size = glm::abs(surface.positions[v]);
     const double largest = size.x + size.y + size.z;  // NaN where one of them is
-    if (!std::isfinite(largest)) not_finite.add("vertex", v);
-    if (largest > largest_coordinate) far.add("vertex", v);
+    if (!std::isfinite(largest)) infinite.add(fmt::format("vertex {}", v));
+    if (largest > largest_coordinate) far.add(fmt::format("vertex {}", v));
   }
-  return note(check, indices, "triangles name vertices that are not there", "index", "indices",
-              "export the mesh again") ||
-         note(check, not_finite, "positions are not finite numbers", "vertex", "vertices",
-              "export the mesh again") ||
-         note(check, far, "positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30",
-              "scale the mesh");
+  return note(check, {indices, infinite, far});
 }
 
 bool bad_triangles(const SurfaceMesh& surface, double size, SurfaceCheck& check) {
-  Found degenerate, repeated;
+  Defect degenerate{"triangles have no area", "triangle", "triangles",
+                    "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)"};
+  Defect repeated{"triangles appear more than once", "too many", "too many",
+                  "remove the duplicates (a sheet with two sides is no solid)"};
   for (const Triangle& t : surface.triangles)
     if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0] ||
         glm::length(area_vector(surface, t)) <= degenerate_area * size * size)
       degenerate.add(centroid(surface, t));
   std::vector<Triangle> sorted = surface.triangles;
-  for (Triangle& t : sorted) std::sort(t.begin(), t.end());
-  std::sort(sorted.begin(), sorted.end());
+  for (Triangle& t : sorted) std::ranges::sort(t);
+  std::ranges::sort(sorted);
   for (std::size_t i = 1; i < sorted.size(); ++i)
     if (sorted[i] == sorted[i - 1]) repeated.add(centroid(surface, sorted[i]));
-  return note(check, degenerate, "triangles have no area", "triangle", "triangles",
-              "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)") ||
-         note(check, repeated, "triangles appear more than once", "too many", "too many",
-              "remove the duplicates (a sheet with two sides is no solid)");
+  return note(check, {degenerate, repeated});
 }
 
 bool bad_topology(const SurfaceMesh& surface, const SurfaceTopology& topology, SurfaceCheck& check) {
-  Found open, crowded, pinched, one_sided;
+  Defect crowded{"edges have more than two triangles", "edge", "edges",
+                 "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)"};
+  Defect open{"surface is open", "edge with one triangle only", "edges with one triangle only",
+              "close its holes (in MeshLab: Close Holes)"};
+  Defect pinched{"parts of the surface touch in single vertices", "vertex", "vertices",
+                 "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)"};
+  Defect one_sided{"surface has only one side", "edge where it cannot be oriented",
+                   "edges where it cannot be oriented", "cut it open and close it as a solid"};
   const auto middle = [&](std::size_t edge) {
     const EdgeUse& use = topology.uses[topology.edges[edge]];
     return (surface.positions[use.low] + surface.positions[use.high]) * 0.5;
@@ -95,14 +100,7 @@ bool bad_topology(const SurfaceMesh& surface, const SurfaceTopology& topology, S
   for (std::size_t v = 0; v < topology.fans.size(); ++v)
     if (topology.fans[v] > 1) pinched.add(surface.positions[v]);
   for (const std::uint32_t e : topology.one_sided) one_sided.add(middle(e));
-  return note(check, crowded, "edges have more than two triangles", "edge", "edges",
-              "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)") ||
-         note(check, open, "surface is open", "edge with one triangle only", "edges with one triangle only",
-              "close its holes (in MeshLab: Close Holes)") ||
-         note(check, pinched, "parts of the surface touch in single vertices", "vertex", "vertices",
-              "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)") ||
-         note(check, one_sided, "surface has only one side", "edge where it cannot be oriented",
-              "edges where it cannot be oriented", "cut it open and close it as a solid");
+  return note(check, {crowded, open, pinched, one_sided});
 }
 
 // Turns triangles so that every patch faces outward, and finds the patches without volume.
@@ -118,16 +116,16 @@ void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, 
     area[patch] += glm::length(normal);
     place[patch] = centroid(surface, t);
   }
-  Found flat;
+  Defect flat{"surface is flat", "part without volume", "parts without volume",
+              "give it thickness or remove it"};
   for (std::size_t p = 0; p < topology.patches; ++p) {
     if (std::abs(volume[p]) <= flat_thickness * area[p] * size) flat.add(place[p]);
     check.volume += std::abs(volume[p]);
   }
-  note(check, flat, "surface is flat", "part without volume", "parts without volume",
-       "give it thickness or remove it");
+  note(check, {flat});
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
     const bool inward = volume[topology.patch[i]] < 0;
-    if ((topology.turned[i] != 0) == inward) continue;
+    if (bool(topology.turned[i]) == inward) continue;
     std::swap(surface.triangles[i][1], surface.triangles[i][2]);
     ++check.flipped_triangles;
   }

@@ -19,14 +19,11 @@ constexpr double no_volume = 1e-10;
 // Faces opposite to corners 0..3, counter-clockwise seen from outside a tet of positive volume.
 constexpr std::array<Triangle, 4> outward_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
-std::string point(const glm::dvec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z); }
-
 double longest_edge(const TetMesh& mesh, const Tet& tet) {
   double longest = 0;
-  for (int a = 0; a < 4; ++a)
-    for (int b = a + 1; b < 4; ++b)
-      longest = std::max(
-          longest, glm::distance(mesh.positions[tet[std::size_t(a)]], mesh.positions[tet[std::size_t(b)]]));
+  for (const std::uint32_t a : tet)
+    for (const std::uint32_t b : tet)
+      longest = std::max(longest, glm::distance(mesh.positions[a], mesh.positions[b]));
   return longest;
 }
 
@@ -36,7 +33,7 @@ void check_indices(const TetMesh& mesh, const std::string& source) {
     throw Error("mesh is too large for 32-bit indices", source, "use a coarser one");
   for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
     Tet t = mesh.tets[i];
-    std::sort(t.begin(), t.end());
+    std::ranges::sort(t);
     if (t[3] >= mesh.positions.size())
       throw Error(fmt::format("tet {} names vertex {} of {}", i, t[3], mesh.positions.size()), source,
                   "export the mesh again");
@@ -49,35 +46,27 @@ void check_indices(const TetMesh& mesh, const std::string& source) {
     if (!std::isfinite(largest))
       throw Error(fmt::format("position of vertex {} is not finite", v), source, "export the mesh again");
     if (largest > largest_coordinate)
-      throw Error(fmt::format("vertex {} is at {}, further out than {:g}", v, point(mesh.positions[v]),
+      throw Error(fmt::format("vertex {} is at {}, further out than {:g}", v, point_text(mesh.positions[v]),
                               largest_coordinate),
                   source, "scale the mesh");
   }
 }
 
 void orient_tets(TetMesh& mesh, const std::string& source) {
-  std::size_t flat = 0, first = 0;
-  for (std::size_t i = mesh.tets.size(); i-- > 0;) {
-    Tet& tet = mesh.tets[i];
-    const double volume = tet_volume(mesh, tet);
-    if (6 * std::abs(volume) <= no_volume * std::pow(longest_edge(mesh, tet), 3)) ++flat, first = i;
-    if (volume < 0) std::swap(tet[2], tet[3]);
+  std::size_t flat = 0;
+  std::string first;
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    Tet& t = mesh.tets[i];
+    const double volume = tet_volume(mesh, t);
+    const bool is_flat = 6 * std::abs(volume) <= no_volume * std::pow(longest_edge(mesh, t), 3);
+    if (is_flat && flat++ == 0)
+      first = fmt::format("first tet {} near {}", i, point_text(mesh.positions[t[0]]));
+    if (volume < 0) std::swap(t[2], t[3]);
   }
-  if (flat > 0) {
-    const Tet& t = mesh.tets[first];
-    const glm::dvec3 middle =
-        (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]] + mesh.positions[t[3]]) / 4.0;
-    throw Error("tets have no volume",
-                fmt::format("{} of them, first tet {} near {} in {}", flat, first, point(middle), source),
+  if (flat > 0)
+    throw Error("tets have no volume", fmt::format("{} of them, {} in {}", flat, first, source),
                 "mesh again with quality switches (such as pYq1.85o/140) or remove them");
-  }
 }
-
-struct Face {
-  std::uint32_t middle, high;  // its vertices beside the smallest, sorted
-  std::uint32_t tet_and_side;  // tet * 4 + side
-  bool even;                   // outward order is an even permutation of the sorted one
-};
 
 // Faces are grouped by their smallest vertex (about 24 in each) and sorted there: one sort of all faces takes
 // four times as long.
@@ -92,6 +81,11 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
       emit(std::ranges::min(outward(tet, side)), std::uint32_t(tet * 4 + side));
   };
   const Grouped grouped = group_by_key(mesh.tets.size(), mesh.positions.size(), each);
+  struct Face {
+    std::pair<std::uint32_t, std::uint32_t> others;  // its vertices beside the smallest, sorted
+    std::uint32_t id;                                // tet * 4 + side
+    bool even;                                       // outward order is an even permutation of the sorted one
+  };
   std::vector<std::uint32_t> boundary;
   std::vector<Face> faces;
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
@@ -100,20 +94,19 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
       const std::uint32_t id = grouped.values[i];
       Triangle f = outward(id / 4, id % 4);
       std::ranges::rotate(f, std::ranges::min_element(f));
-      faces.push_back({std::min(f[1], f[2]), std::max(f[1], f[2]), id, f[1] < f[2]});
+      faces.push_back({std::minmax(f[1], f[2]), id, f[1] < f[2]});
     }
-    std::ranges::sort(faces, {}, [](const Face& f) { return std::pair(f.middle, f.high); });
+    std::ranges::sort(faces, {}, &Face::others);
     for (auto f = faces.begin(); f != faces.end();) {
       auto next = f + 1;
-      while (next != faces.end() && next->middle == f->middle && next->high == f->high) ++next;
-      const bool overlap = next - f > 2 || (next - f == 2 && f->even == (f + 1)->even);
-      if (overlap)
-        throw Error(
-            fmt::format("tets {} and {} overlap", std::min(f->tet_and_side, (f + 1)->tet_and_side) / 4,
-                        std::max(f->tet_and_side, (f + 1)->tet_and_side) / 4),
-            fmt::format("near {} in {}", point(mesh.positions[v]), source),
-            "remove duplicate or folded elements");
-      if (next - f == 1) boundary.push_back(f->tet_and_side);
+      while (next != faces.end() && next->others == f->others) ++next;
+      if (next - f > 2 || (next - f == 2 && f->even == f[1].even)) {
+        const auto [one, other] = std::minmax({f->id / 4, f[1].id / 4});
+        throw Error(fmt::format("tets {} and {} overlap", one, other),
+                    fmt::format("near {} in {}", point_text(mesh.positions[v]), source),
+                    "remove duplicate or folded elements");
+      }
+      if (next - f == 1) boundary.push_back(f->id);
       f = next;
     }
   }
@@ -187,5 +180,7 @@ Bounds bounds(const std::vector<glm::dvec3>& positions) {
   }
   return box.low.x <= box.high.x ? box : Bounds{};
 }
+
+std::string point_text(const glm::dvec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z); }
 
 }  // namespace tetpbd

@@ -1,6 +1,6 @@
 // Head of sim/mesh: surface and tetrahedral meshes in double precision (metres), from files, checked, filled
-// by TetGen, kept in the cache, reported, written. Other rooms need this header alone, beside cache.h. A new
-// format is a reader in surface_files.cpp or tet_files.cpp; nothing here knows of solvers.
+// by TetGen, kept in the cache, reported, written. Other rooms need this header alone. A new format is a
+// reader in surface_files.cpp or tet_files.cpp; nothing here knows of solvers.
 #pragma once
 
 #include <array>
@@ -63,15 +63,17 @@ TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, 
 
 /// TetGen .node/.ele (either name given) or Gmsh .msh (ASCII 2.2 and 4.1).
 TetMesh load_tets(const std::filesystem::path& file);
-/// Any supported file: surfaces are checked and tetrahedralised with `switches`, tetrahedra loaded as they
-/// are.
+/// TetGen's pair, not yet finished.
+TetMesh read_node_ele(const std::filesystem::path& file);
+/// Any supported file: surfaces are checked and tetrahedralised with `switches`, tetrahedra are as they are.
 TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches);
 bool is_surface_file(const std::filesystem::path& file);
 /// Throws Error when write_mesh() does not know the extension.
 void require_mesh_format(const std::filesystem::path& file);
-/// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Whole
-/// or not at all.
+/// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Each
+/// file is whole or not there.
 void write_mesh(const std::filesystem::path& file, const TetMesh& mesh);
+void write_surface(const std::filesystem::path& file, const SurfaceMesh& surface);
 
 /// Orients every tet, drops vertices without one and finds the boundary. Throws Error naming `source` for
 /// positions that are not finite, indices out of range, repeated vertices, no volume, overlapping tets, no
@@ -95,6 +97,8 @@ struct Bounds {
 };
 /// Of the finite positions.
 Bounds bounds(const std::vector<glm::dvec3>& positions);
+/// "(x, y, z)", for errors.
+std::string point_text(const glm::dvec3& p);
 
 /// What `tetpbd mesh` prints and stats.json quotes.
 struct MeshReport {

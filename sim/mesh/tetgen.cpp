@@ -4,14 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <regex>
+#include <sstream>
 
 #include "sim/error.h"
-#include "sim/files.h"
 #include "sim/mesh/cache.h"
-#include "sim/mesh/formats.h"
 #include "sim/mesh/subprocess.h"
 #include "sim/mesh/tet_mesh.h"
-#include "sim/mesh/text_file.h"
 
 namespace tetpbd {
 namespace fs = std::filesystem;
@@ -36,8 +34,12 @@ struct TemporaryFolder {
 std::string tetgen_program() {
   if (const char* named = std::getenv("TETPBD_TETGEN_PROGRAM")) return named;
   std::error_code failed;
-  const fs::path beside = fs::read_symlink("/proc/self/exe", failed).parent_path() / "tetgen";
-  return fs::exists(beside, failed) ? beside.string() : "tetgen";
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(fs::read_symlink("/proc/self/exe", failed).parent_path().string() + ":" +
+                             (path ? path : ""));
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (fs::exists(fs::path(folder) / "tetgen", failed)) return fs::path(folder) / "tetgen";
+  return "tetgen";
 }
 
 SubprocessEnd run_tetgen(const std::string& switches, const fs::path& input, double seconds) {
@@ -49,14 +51,6 @@ SubprocessEnd run_tetgen(const std::string& switches, const fs::path& input, dou
   return end;
 }
 
-std::string smesh_text(const SurfaceMesh& surface) {
-  std::string text = fmt::format("{} 3 0 0\n", surface.positions.size());
-  put_rows(text, surface.positions, "", 0, 0);
-  text += fmt::format("{} 0\n", surface.triangles.size());
-  put_rows(text, surface.triangles, "3 ");
-  return text + "0\n0\n";  // holes, regions
-}
-
 // TetGen's switch d prints the pairs: "Facet #4 intersects facet #5 at triangles: ...", counted from 1.
 void throw_intersections(const SurfaceMesh& surface, const fs::path& input, const std::string& source) {
   const std::string printed = run_tetgen("pd", input, 60).output;
@@ -65,23 +59,20 @@ void throw_intersections(const SurfaceMesh& surface, const fs::path& input, cons
   for (std::size_t at = 0; (at = printed.find(mark, at)) != printed.npos; ++at) ++pairs;
   if (pairs == 0) return;
   const std::size_t facet = std::strtoul(printed.c_str() + printed.find(mark) + mark.size(), nullptr, 10);
-  glm::dvec3 first(NAN);
-  if (facet >= 1 && facet <= surface.triangles.size()) {
-    const Triangle& t = surface.triangles[facet - 1];
-    first = (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
-  }
-  throw Error(
-      "surface intersects itself",
-      fmt::format("{} of triangles, first near ({:.6g}, {:.6g}, {:.6g}) in {}",
-                  pairs == 1 ? "1 pair" : fmt::format("{} pairs", pairs), first.x, first.y, first.z, source),
-      "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
+  const Triangle& t = surface.triangles.at(std::max<std::size_t>(facet, 1) - 1);
+  const glm::dvec3 first =
+      (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
+  throw Error("surface intersects itself",
+              fmt::format("{} pair{} of triangles, first near {} in {}", pairs, pairs == 1 ? "" : "s",
+                          point_text(first), source),
+              "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
 }
 
 TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seconds,
             const std::string& source) {
   const TemporaryFolder folder;
-  const fs::path input = folder.path / "surface.smesh", output = folder.path / "surface.1.node";
-  write_whole(input, smesh_text(surface));
+  const fs::path input = folder.path / "surface.off", output = folder.path / "surface.1.node";
+  write_surface(input, surface);
   const SubprocessEnd end = run_tetgen(switches + "F", input, seconds);  // F: no files of faces
   if (end.kind == SubprocessEnd::timed_out)
     throw Error(fmt::format("tetrahedralising with {} took longer than {:g} s", switches, seconds), source,
@@ -113,7 +104,7 @@ std::string checked_switches(const std::string& switches) {
 TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switches, double time_limit,
                        const std::string& source) {
   const std::string switches = checked_switches(wanted_switches);
-  const CacheKey key = mesh_key(given, switches);
+  const std::uint64_t key = mesh_key(given, switches, tetgen_program());
   if (std::optional<TetMesh> kept = read_mesh(key)) return std::move(*kept);
 
   SurfaceMesh surface = given;

@@ -2,18 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <fstream>
+
+#include "sim/error.h"
 
 namespace tetpbd {
 namespace fs = std::filesystem;
 
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
+  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
   return extension;
 }
 
@@ -30,10 +30,9 @@ void require_readable(const fs::path& file) {
 
 TextFile::TextFile(const fs::path& file, char comment) : file_(file), comment_(comment) {
   require_readable(file);
-  std::ifstream in(file, std::ios::binary);
   text_.resize(fs::file_size(file));
-  in.read(text_.data(), std::streamsize(text_.size()));
-  if (!in) throw Error("cannot be read to its end", file.string(), "check the disk");
+  if (!std::ifstream(file, std::ios::binary).read(text_.data(), std::streamsize(text_.size())))
+    throw Error("cannot be read to its end", file.string(), "check the disk");
 }
 
 bool TextFile::next_line() {
@@ -45,19 +44,18 @@ bool TextFile::next_line() {
     if (comment_ != '\0') line_ = line_.substr(0, line_.find(comment_));
     const std::size_t first = line_.find_first_not_of(blank);
     if (first == std::string_view::npos) continue;
-    line_ = line_.substr(first, line_.find_last_not_of(blank) - first + 1);
-    rest_ = line_;
+    rest_ = line_ = line_.substr(first, line_.find_last_not_of(blank) - first + 1);
     return true;
   }
   line_ = rest_ = {};
   return false;
 }
 
-void TextFile::require_line(const std::string& wanted) {
-  if (!next_line()) fail("file ends before " + wanted);
+void TextFile::require_line(std::string_view wanted) {
+  if (!next_line()) fail(fmt::format("file ends before {}", wanted));
 }
 
-std::string_view TextFile::word(const char* wanted) {
+std::string_view TextFile::word(std::string_view wanted) {
   if (!more()) fail(fmt::format("line has no {}", wanted));
   rest_.remove_prefix(rest_.find_first_not_of(blank));
   const std::string_view found = rest_.substr(0, rest_.find_first_of(blank));
@@ -65,34 +63,29 @@ std::string_view TextFile::word(const char* wanted) {
   return found;
 }
 
-double TextFile::number(const char* wanted) {
+template <class T>
+T TextFile::value(std::string_view wanted) {
   const std::string_view found = word(wanted);
-  const char* first = found.data() + (found.front() == '+' ? 1 : 0);
-  double value = 0;
-  const auto [end, code] = std::from_chars(first, found.data() + found.size(), value);
-  if (code != std::errc{} || end != found.data() + found.size())
-    fail(fmt::format("'{}' is not a number ({})", found.substr(0, 40), wanted));
+  const char *first = found.data() + found.starts_with('+'), *last = found.data() + found.size();
+  T value{};
+  const auto [end, code] = std::from_chars(first, last, value);
+  if (code != std::errc{} || end != last)
+    fail(fmt::format("'{}' is not a {}number ({})", found.substr(0, 40),
+                     std::is_integral_v<T> ? "whole " : "", wanted));
   return value;
 }
+template double TextFile::value(std::string_view);
+template long long TextFile::value(std::string_view);
 
 glm::dvec3 TextFile::position() {
   const double x = number("x"), y = number("y"), z = number("z");
   return {x, y, z};
 }
 
-long long TextFile::integer(const char* wanted) {
-  const std::string_view found = word(wanted);
-  long long value = 0;
-  const auto [end, code] = std::from_chars(found.data(), found.data() + found.size(), value);
-  if (code != std::errc{} || end != found.data() + found.size())
-    fail(fmt::format("'{}' is not a whole number ({})", found.substr(0, 40), wanted));
-  return value;
-}
-
-std::size_t TextFile::count(const char* wanted, std::size_t bytes_each) {
+std::size_t TextFile::count(std::string_view wanted) {
   const long long value = integer(wanted);
   if (value < 0) fail(fmt::format("{} is {}", wanted, value));
-  if (static_cast<unsigned long long>(value) > text_.size() / bytes_each + 1)
+  if (std::size_t(value) > text_.size())
     fail(fmt::format("{} is {}, more than {} bytes can hold", wanted, value, text_.size()));
   return std::size_t(value);
 }

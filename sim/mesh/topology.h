@@ -3,52 +3,27 @@
 
 #include <cstdint>
 #include <numeric>
-#include <utility>
 #include <vector>
 
 #include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 
-/// Union-find with path halving, which also tells which members are turned against each other.
+/// Union-find with path halving.
 struct DisjointSets {
   std::vector<std::uint32_t> parent;
-  std::vector<char> turned;  ///< against the parent
-  explicit DisjointSets(std::size_t count) : parent(count), turned(count, 0) {
-    std::iota(parent.begin(), parent.end(), 0u);
+  explicit DisjointSets(std::size_t count) : parent(count) { std::iota(parent.begin(), parent.end(), 0u); }
+  std::uint32_t root(std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
   }
-  /// The root of i's set, and whether i is turned against it.
-  std::pair<std::uint32_t, bool> root(std::uint32_t i) {
-    bool against = false;
-    for (; parent[i] != i; i = parent[i]) {
-      turned[i] = char(turned[i] ^ turned[parent[i]]);
-      parent[i] = parent[parent[i]];
-      against ^= turned[i] != 0;
-    }
-    return {i, against};
-  }
-  /// False when they are joined already, the other way round.
-  bool join(std::uint32_t a, std::uint32_t b, bool against = false) {
-    const auto [root_a, turned_a] = root(a);
-    const auto [root_b, turned_b] = root(b);
-    const bool turn = turned_a ^ turned_b ^ against;
-    if (root_a == root_b) return !turn;
-    parent[root_a] = root_b;
-    turned[root_a] = turn;
-    return true;
-  }
-  std::size_t count() const {
-    std::size_t roots = 0;
-    for (std::uint32_t i = 0; i < parent.size(); ++i) roots += parent[i] == i;
-    return roots;
-  }
+  void join(std::uint32_t a, std::uint32_t b) { parent[root(a)] = root(b); }
 };
 
-/// One side of a triangle: corner `side` to the next.
+/// One side of a triangle: from corner `side` to the next.
 struct EdgeUse {
   std::uint32_t low, high;  ///< vertices, low < high
-  std::uint32_t triangle;
-  std::uint32_t side;
+  std::uint32_t triangle, side;
   bool forward;  ///< the triangle runs from low to high
 };
 

@@ -1,8 +1,10 @@
 #include "sim/mesh/weld.h"
 
+#define GLM_ENABLE_EXPERIMENTAL  // hash
+
 #include <algorithm>
 #include <cmath>
-#include <string_view>
+#include <glm/gtx/hash.hpp>
 #include <unordered_map>
 
 namespace tetpbd {
@@ -15,13 +17,8 @@ void weld(SurfaceMesh& surface, double tolerance) {
   // A mesh far from the origin has no finer steps than its own numbers, nor would cells be whole numbers.
   const double largest = glm::length(glm::max(glm::abs(box.low), glm::abs(box.high)));
   tolerance = std::max({tolerance, largest * 1e-15, 1e-300});
-  const auto cell = [&](const glm::dvec3& p) {
-    return glm::floor((p - box.low) / (8 * tolerance)) + 0.0;
-  };  // no -0
-  const auto key = [](const glm::dvec3& at) {
-    return std::hash<std::string_view>()({reinterpret_cast<const char*>(&at), sizeof at});
-  };
-  std::unordered_multimap<std::size_t, std::uint32_t> cells;  // the vertices kept
+  const auto cell = [&](const glm::dvec3& p) { return glm::floor((p - box.low) / (8 * tolerance)); };
+  std::unordered_multimap<glm::dvec3, std::uint32_t> cells;  // the vertices kept
   cells.reserve(positions.size());
   std::vector<std::uint32_t> kept(positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
@@ -32,11 +29,11 @@ void weld(SurfaceMesh& surface, double tolerance) {
     for (double x = low.x; x <= high.x; ++x)
       for (double y = low.y; y <= high.y; ++y)
         for (double z = low.z; z <= high.z; ++z) {
-          const auto [first, last] = cells.equal_range(key({x, y, z}));
+          const auto [first, last] = cells.equal_range({x, y, z});
           for (auto at = first; at != last; ++at)
             if (glm::distance(positions[at->second], p) <= tolerance) kept[v] = std::min(kept[v], at->second);
         }
-    if (kept[v] == v) cells.emplace(key(cell(p)), v);
+    if (kept[v] == v) cells.emplace(cell(p), v);
   }
   for (Triangle& t : surface.triangles)
     for (std::uint32_t& v : t) v = kept[v];

@@ -192,18 +192,13 @@ void fill_surface(std::string_view bytes) {
   });
 }
 
-// As they are, and once more behind a header that fits them.
+// As they are, and once more behind a checksum that fits them.
 void read_cache_file(std::string_view bytes) {
-  const CacheKey key{1, 2};
+  constexpr std::uint64_t key = 1;
   if (const auto mesh = parse_mesh(bytes, key)) require_sound(*mesh);
-  std::string whole = mesh_bytes(key, {});
-  const std::size_t header = whole.size() - 24;  // three counts of 0
-  whole.resize(header);
-  whole += bytes;
-  const std::uint64_t checksum = hash_bytes(bytes, 3), size = bytes.size();
-  std::memcpy(whole.data() + header - 16, &checksum, 8);
-  std::memcpy(whole.data() + header - 8, &size, 8);
-  if (const auto mesh = parse_mesh(whole, key)) require_sound(*mesh);
+  const std::uint64_t checksum = hash_bytes(bytes, key);
+  const std::string head(reinterpret_cast<const char*>(&checksum), sizeof checksum);
+  if (const auto mesh = parse_mesh(head + std::string(bytes), key)) require_sound(*mesh);
 }
 
 // Scenes of blocks are built too, where they are small.

@@ -34,7 +34,7 @@ bool take_array(std::string_view& bytes, std::vector<T>& values) {
   bytes.remove_prefix(sizeof count);
   if (count > bytes.size() / sizeof(T)) return false;
   values.resize(count);
-  if (count > 0) std::memcpy(static_cast<void*>(values.data()), bytes.data(), count * sizeof(T));
+  std::ranges::copy(bytes.substr(0, count * sizeof(T)), reinterpret_cast<char*>(values.data()));
   bytes.remove_prefix(count * sizeof(T));
   return true;
 }
@@ -65,20 +65,10 @@ fs::path mesh_file(std::uint64_t key) {
 
 }  // namespace
 
+// FNV-1a
 std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed) {
-  std::uint64_t hash = seed ^ (bytes.size() * 0x9e3779b97f4a7c15);
-  const auto mix = [&hash](std::uint64_t word) {
-    hash = (hash ^ word) * 0xff51afd7ed558ccd;
-    hash ^= hash >> 32;
-  };
-  while (!bytes.empty()) {
-    std::uint64_t word = 0;
-    const std::size_t n = std::min(bytes.size(), sizeof word);
-    std::memcpy(&word, bytes.data(), n);
-    mix(word);
-    bytes.remove_prefix(n);
-  }
-  mix(0xc4ceb9fe1a85ec53);
+  std::uint64_t hash = 14695981039346656037ull ^ seed;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
   return hash;
 }
 

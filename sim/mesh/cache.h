@@ -12,8 +12,7 @@
 
 namespace tetpbd {
 
-/// 64 bits, eight bytes at a time (a gigabyte takes about half a second). Not cryptographic: it finds
-/// accidents.
+/// Not cryptographic: it finds accidents.
 std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed);
 
 /// Of the surface's bits, the switches and the program that fills it.

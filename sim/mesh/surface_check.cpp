@@ -23,7 +23,9 @@ struct Defect {
   void add(const std::string& place) {
     if (count++ == 0) first = place;
   }
-  void add(const glm::dvec3& p) { add("near " + point_text(p)); }
+  void add(const glm::dvec3& p) {
+    if (count++ == 0) first = "near " + point_text(p);
+  }
 };
 
 // The first defect that there is becomes the result; false when there is none.

@@ -95,9 +95,9 @@ TetMesh read_msh(const fs::path& file) {
   return mesh;
 }
 
-bool is_tet_file(const fs::path& file) {
+bool has_mesh_format(const fs::path& file) {
   const std::string extension = lower_extension(file);
-  return extension == ".node" || extension == ".ele" || extension == ".msh";
+  return extension == ".node" || extension == ".ele" || extension == ".msh" || is_surface_file(file);
 }
 
 }  // namespace
@@ -140,25 +140,22 @@ TetMesh read_node_ele(const fs::path& file) {
 }
 
 TetMesh load_tets(const fs::path& file) {
-  if (!is_tet_file(file))
-    throw Error("not a tetrahedral mesh format", file.string(), "use .node with .ele, or .msh");
   TetMesh mesh = lower_extension(file) == ".msh" ? read_msh(file) : read_node_ele(file);
   finish_tets(mesh, file.string());
   return mesh;
 }
 
 TetMesh load_mesh(const fs::path& file, const std::string& switches) {
-  if (is_surface_file(file)) return tetrahedralise(load_surface(file), switches, 600, file.string());
-  if (is_tet_file(file)) return load_tets(file);
-  require_readable(file);  // a missing file or a folder is the better news
-  throw Error(fmt::format("unknown mesh format '{}'", lower_extension(file)), file.string(),
-              "use a surface (.ply .obj .stl .off) or tetrahedra (.node/.ele .msh)");
+  if (!has_mesh_format(file)) require_readable(file);  // a missing file or a folder is the better news
+  require_mesh_format(file);
+  if (!is_surface_file(file)) return load_tets(file);
+  return tetrahedralise(load_surface(file), switches, 600, file.string());
 }
 
 void require_mesh_format(const fs::path& file) {
-  if (!is_surface_file(file) && !is_tet_file(file))
+  if (!has_mesh_format(file))
     throw Error(fmt::format("unknown mesh format '{}'", lower_extension(file)), file.string(),
-                "use .node, .ele or .msh for tetrahedra, .ply, .obj, .off or .stl for the boundary surface");
+                "use .ply, .obj, .stl or .off for surfaces, .node with .ele or .msh for tetrahedra");
 }
 
 }  // namespace tetpbd

@@ -26,8 +26,6 @@ struct TemporaryFolder {
     std::error_code ignored;
     fs::remove_all(path, ignored);
   }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 };
 
 // $TETPBD_TETGEN_PROGRAM, else the one beside ours (a bundle brings its own), else PATH's.
@@ -87,7 +85,7 @@ TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seco
 }  // namespace
 
 std::string checked_switches(const std::string& switches) {
-  const std::string clean = switches.starts_with('-') ? switches.substr(1) : switches;
+  const std::string clean = switches.substr(switches.starts_with('-'));
   const std::string where = fmt::format("TetGen switches '{}'", switches);
   const char* hint = "use p with Y, q, a and others, for example pYq1.85o/140 (docs: Meshes)";
   if (clean.size() > 200) throw Error("too long", where, hint);

@@ -1,13 +1,36 @@
 // SIGINT and SIGTERM as a flag that long work looks at between its parts, so that files stay whole.
 #pragma once
 
+#include <chrono>
+#include <csignal>
+
 #include "sim/error.h"
 
 namespace tetpbd {
 
+namespace signals {
+inline volatile std::sig_atomic_t caught = 0;
+inline std::chrono::steady_clock::time_point first;
+
+// `timeout` signals its child, then its child's group: that is one wish in two signals, a moment apart.
+inline void catch_one(int signal) {
+  const auto now = std::chrono::steady_clock::now();
+  if (!caught) {
+    first = now;
+    caught = 1;
+  } else if (now - first > std::chrono::milliseconds(200)) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
+}
+}  // namespace signals
+
 /// From here on the first signal only sets the flag; a second one ends the program at once.
-void catch_interrupts();
-bool interrupted();
+inline void catch_interrupts() {
+  signals::caught = 0;
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, signals::catch_one);
+}
+inline bool interrupted() { return signals::caught != 0; }
 
 /// Thrown out of a measurement, which is nothing when it is not whole.
 struct Interrupted : Error {

@@ -110,15 +110,11 @@ double factor_of(const std::string& how) {
   return value;
 }
 
-// Of the tet nearest the middle.
-const Tet* middle_tet(const std::vector<glm::dvec3>& x, const TetMesh& rest, const glm::dvec3& centre) {
-  const Tet* nearest = nullptr;
-  double best = 0;
-  for (const Tet& t : rest.tets) {
-    const double d = glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
-    if (!nearest || d < best) nearest = &t, best = d;
-  }
-  return nearest;
+// The one nearest the middle.
+Tet middle_tet(const std::vector<glm::dvec3>& x, const TetMesh& rest, const glm::dvec3& centre) {
+  return std::ranges::min(rest.tets, {}, [&](const Tet& t) {
+    return glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
+  });
 }
 
 }  // namespace
@@ -145,14 +141,13 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
     const double factor = factor_of(how);
     for (auto& p : x) p.y = centre.y + (p.y - centre.y) * factor;
   } else if (how == "invert-one") {
-    // The tet nearest the middle: its first vertex goes through the opposite face.
-    const Tet* nearest = middle_tet(x, rest, centre);
-    if (!nearest) return;
-    const Tet& t = *nearest;
+    // Its first vertex goes through the opposite face.
+    const Tet t = middle_tet(x, rest, centre);
     const glm::dvec3 n = glm::normalize(glm::cross(x[t[2]] - x[t[1]], x[t[3]] - x[t[1]]));
     x[t[0]] -= 2 * glm::dot(x[t[0]] - x[t[1]], n) * n;
   } else if (how == "coincident") {
-    if (const Tet* t = middle_tet(x, rest, centre)) x[(*t)[0]] = x[(*t)[1]];
+    const Tet t = middle_tet(x, rest, centre);
+    x[t[0]] = x[t[1]];
   } else if (how.starts_with("twist:")) {
     const double turn = glm::radians(factor_of(how));
     for (auto& p : x) {

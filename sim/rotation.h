@@ -1,6 +1,7 @@
 // The rotation that fits best (Kabsch, Acta Cryst. A32, 1976; Horn 1987).
 #pragma once
 
+#include <Eigen/Dense>
 #include <glm/glm.hpp>
 
 namespace tetpbd {
@@ -11,6 +12,17 @@ struct BestRotation {
 };
 /// The R with the largest trace(R^T A), for A = sum w x X^T about both centres: it turns the X nearest to the
 /// x.
-BestRotation best_rotation(const glm::dmat3& A);
+inline BestRotation best_rotation(const glm::dmat3& A) {
+  const Eigen::Map<const Eigen::Matrix3d> a(&A[0].x);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  BestRotation best;
+  Eigen::Map<Eigen::Matrix3d>(&best.R[0].x) =
+      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  // A turn about the axes of the two smallest values costs their (signed) sum: 0 leaves it undecided.
+  const Eigen::Vector3d values = svd.singularValues();
+  best.unique = values(1) + sign * values(2) > 1e-12 * values(0);
+  return best;
+}
 
 }  // namespace tetpbd

@@ -15,53 +15,46 @@ namespace tetpbd {
 
 const std::vector<Parameter>& parameters() {
   using S = Settings;
-  using enum Effect;
   static const std::vector<Parameter> rows = [] {
     std::vector<Parameter> all = {
-        {"mode", "solver", &S::mode, 0, 0, false, "", "solver mode", rebuild},
-        {"constraints", "solver", &S::constraints, 0, 0, false, "", "constraint kinds, separated by commas",
-         rebuild},
+        {"mode", "solver", &S::mode, "solver mode", 0, 0, "", false, Effect::rebuild},
+        {"constraints", "solver", &S::constraints, "constraint kinds, separated by commas", 0, 0, "", false,
+         Effect::rebuild},
     };
     for (std::size_t k = 0; k < kind_count; ++k)
-      all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k}, 0,
-                     1, false, "", fmt::format("stiffness of {}", constraint_kinds[k].noun), live});
+      all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
+                     fmt::format("stiffness of {}", constraint_kinds[k].noun)});
     for (std::size_t k = 0; k < kind_count; ++k)
       all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
-                     KindMember{&S::compliance, k}, 0, constraint_kinds[k].most_compliance, true,
-                     constraint_kinds[k].compliance_unit,
+                     KindMember{&S::compliance, k},
                      fmt::format("softness of {}; 0: as hard as iterations make it. Any compliance or "
                                  "constraint_damping above 0 brings mass_splitting with it",
                                  constraint_kinds[k].noun),
-                     live});
+                     0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
     const std::vector<Parameter> others = {
-        {"constraint_damping", "solver", &S::constraint_damping, 0, 10, true, "s",
-         "time over which constraints resist their rate: a spring's damping is this times its stiffness",
-         live},
-        {"omega", "solver", &S::omega, 0, 4, false, "",
+        {"constraint_damping", "solver", &S::constraint_damping,
+         "time over which constraints resist their rate: a spring's damping is this times its stiffness", 0,
+         10, "s", true},
+        {"omega", "solver", &S::omega,
          "over-relaxation of averaged corrections, 1 to 2 recommended, with compliance at most 2 (Jacobi "
          "modes)",
-         live},
-        {"mass_splitting", "solver", &S::mass_splitting, 0, 1, false, "",
+         0, 4},
+        {"mass_splitting", "solver", &S::mass_splitting,
          "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
-         "with compliance always",
-         live},
-        {"clusters", "solver", &S::clusters, 0, 1, false, "",
+         "with compliance always"},
+        {"clusters", "solver", &S::clusters,
          "how far shape-matching clusters pull towards the rest shape per iteration, 0.4 to 0.8: for hard "
-         "bodies alone "
-         "(mode node, stretch in use, every k 1, no compliance)",
-         live},
-        {"iterations", "solver", &S::iterations, 0, 100000, true, "", "iterations per substep", live},
-        {"substeps", "solver", &S::substeps, 1, 100000, true, "", "substeps per step", live},
-        {"dt", "solver", &S::dt, 1e-6, 1, true, "s", "time of one step", live},
-        {"damping", "solver", &S::damping, 0, 1000, false, "1/s",
-         "rate at which velocity decays, exp(-damping t)", live},
-        {"gravity", "world", &S::gravity, -1000, 1000, false, "m/s^2", "gravity, downwards", live},
-        {"ground", "world", &S::ground, 0, 1, false, "", "whether there is a ground plane", live},
-        {"ground_height", "world", &S::ground_height, -1e6, 1e6, false, "m", "height of the ground plane",
-         live},
-        {"friction", "world", &S::friction, 0, 10, false, "", "Coulomb friction of ground and obstacles",
-         live},
-        {"seed", "solver", &S::seed, 0, 2147483647, false, "", "seed of random start positions", restart},
+         "bodies alone (mode node, stretch in use, every k 1, no compliance)"},
+        {"iterations", "solver", &S::iterations, "iterations per substep", 0, 100000, "", true},
+        {"substeps", "solver", &S::substeps, "substeps per step", 1, 100000, "", true},
+        {"dt", "solver", &S::dt, "time of one step", 1e-6, 1, "s", true},
+        {"damping", "solver", &S::damping, "rate at which velocity decays, exp(-damping t)", 0, 1000, "1/s"},
+        {"gravity", "world", &S::gravity, "gravity, downwards", -1000, 1000, "m/s^2"},
+        {"ground", "world", &S::ground, "whether there is a ground plane"},
+        {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
+        {"friction", "world", &S::friction, "Coulomb friction of ground and obstacles", 0, 10},
+        {"seed", "solver", &S::seed, "seed of random start positions", 0, 2147483647, "", false,
+         Effect::restart},
     };
     all.insert(all.end(), others.begin(), others.end());
     return all;
@@ -169,26 +162,14 @@ constexpr double usual_clusters = 0.4;
 
 void set_mode(Settings& settings, const std::string& word, const std::string& where) {
   const std::string with = "node+clusters";
-  bool known = true;
-  if (!word.starts_with(with)) {
-    settings.mode = word;
-    settings.clusters = 0;
-    known = find_solver_mode(word);
-  } else {
-    settings.mode = "node";
-    settings.clusters = usual_clusters;
-    if (word != with) {
-      const char *begin = word.data() + with.size(), *end = word.data() + word.size();
-      const auto [stop, error] = std::from_chars(begin + 1, end, settings.clusters);
-      known = *begin == '-' && error == std::errc() && stop == end && settings.clusters > 0 &&
-              settings.clusters <= 1;
-    }
-  }
-  if (known) return;
-  std::vector<std::string> words = choices(*find_parameter("mode"));
-  words.push_back(with);
-  throw Error(fmt::format("'mode' cannot be '{}'", word), where,
-              fmt::format("choose from {}", fmt::join(words, ", ")));
+  const bool clusters = word.starts_with(with);
+  settings.mode = clusters ? "node" : word;
+  settings.clusters = clusters ? usual_clusters : 0;
+  if (clusters && word.starts_with(with + "-"))
+    set_parameter(settings, *find_parameter("clusters"), word.substr(with.size() + 1), where);
+  else if (!find_solver_mode(settings.mode) || (clusters && word != with))
+    refuse(*find_parameter("mode"), "'" + word + "'", where,
+           fmt::format("choose from {}, {}", fmt::join(choices(*find_parameter("mode")), ", "), with));
 }
 
 std::string mode_word(const Settings& settings) {
@@ -199,31 +180,21 @@ std::string mode_word(const Settings& settings) {
 
 const std::vector<SolverPreset>& solver_presets() {
   static const std::vector<SolverPreset> rows = {
-      {"paper",
-       "25 iterations a step, averaged",
-       {{"mode", "node"},
-        {"iterations", "25"},
-        {"substeps", "1"},
-        {"omega", "1.5"},
-        {"clusters", "0"},
-        {"mass_splitting", "false"}}},
-      {"substeps",
-       "20 substeps of 1 iteration",
-       {{"mode", "node"}, {"iterations", "1"}, {"substeps", "20"}, {"omega", "1.5"}, {"clusters", "0"}}},
+      {"paper", "25 iterations a step, averaged",
+       "mode=node,iterations=25,substeps=1,omega=1.5,clusters=0,mass_splitting=false"},
+      {"substeps", "20 substeps of 1 iteration", "mode=node,iterations=1,substeps=20,omega=1.5,clusters=0"},
       {"hard",
        "10 substeps of 1 iteration with shape-matching clusters: the least net volume loss for hard bodies",
-       {{"mode", "node"},
-        {"iterations", "1"},
-        {"substeps", "10"},
-        {"omega", "1.5"},
-        {"clusters", fmt::format("{}", usual_clusters)}}},
+       "mode=node,iterations=1,substeps=10,omega=1.5,clusters=0.4"},
   };
   return rows;
 }
 
 void apply_preset(Settings& settings, const SolverPreset& preset) {
-  for (const auto& [name, text] : preset.values)
-    set_parameter(settings, *find_parameter(name), text, preset.name);
+  for (const std::string& value : split(preset.values, ',')) {
+    const std::size_t equals = value.find('=');
+    set_parameter(settings, *find_parameter(value.substr(0, equals)), value.substr(equals + 1), preset.name);
+  }
 }
 
 bool uses(const Settings& settings, const ConstraintKind& kind) {

@@ -52,11 +52,11 @@ struct Parameter {
   const char* section;  ///< scene section: "solver" or "world"
   std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*, KindMember>
       member;
-  double low, high;  ///< allowed range; numbers only
-  bool logarithmic;  ///< slider scale
-  const char* unit;
   std::string help;
-  Effect effect;
+  double low = 0, high = 1;  ///< allowed range; numbers only
+  const char* unit = "";
+  bool logarithmic = false;  ///< slider scale
+  Effect effect = Effect::live;
 };
 /// Calls f with a reference to the parameter's value in `settings`: double, int, bool or std::string.
 template <class S, class F>
@@ -90,9 +90,8 @@ std::string mode_word(const Settings& settings);
 
 /// A way to solve, by name: what --solver puts in place of the scene's settings.
 struct SolverPreset {
-  const char* name;
-  const char* help;
-  std::vector<std::pair<std::string, std::string>> values;  ///< parameter, text
+  const char *name, *help;
+  const char* values;  ///< PARAMETER=TEXT, separated by commas
 };
 const std::vector<SolverPreset>& solver_presets();
 void apply_preset(Settings& settings, const SolverPreset& preset);

@@ -80,8 +80,8 @@ void write_step_block(Sim& sim) {
   block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
   block.vertex_count = unsigned(sim.model->positions.size());
   block.damping = float(s.constraint_damping / h);
-  if (s.ground) block.planes[block.plane_count++] = {0, 1, 0, float(s.ground_height)};
-  for (const glm::dvec4& plane : sim.model->obstacles) block.planes[block.plane_count++] = glm::vec4(plane);
+  for (const glm::dvec4& plane : planes_of(*sim.model, s))
+    block.planes[block.plane_count++] = glm::vec4(plane);
   for (std::size_t k = 0; k < kind_count; ++k) {
     block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.stiffness[k]);
     block.compliance[k / 4][glm::length_t(k % 4)] = float(s.compliance[k] / (h * h));

@@ -101,8 +101,6 @@ TEST_CASE("the rigid step never mirrors, and refuses what it cannot answer") {
   CHECK_THROWS_AS(rigid_step(scene.input(), state), Error);
   scene.settings.ground = false;
   CHECK_NOTHROW(rigid_step(scene.input(), state));
-  state.positions.pop_back();
-  CHECK_THROWS_AS(rigid_step(scene.input(), state), Error);
   scene.model.inverse_masses[3] = 0;
   CHECK_THROWS_AS(rigid_step(scene.input(), scene.start()), Error);
 }
@@ -303,6 +301,4 @@ TEST_CASE("the error to a reference is the RMS distance by mass over the body's 
         doctest::Approx(2 * std::sqrt(scene.model.masses[5] / mass) / scene.model.size));
   b.positions[5].y = std::nan("");
   CHECK(std::isnan(error_to(scene.model, a, b)));
-  b.positions.pop_back();
-  CHECK_THROWS_AS(error_to(scene.model, a, b), Error);
 }

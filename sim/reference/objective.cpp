@@ -9,8 +9,6 @@ namespace tetpbd {
 
 namespace {
 
-using Points = std::vector<glm::dvec3>;
-
 // C, without the clamp to +-1 that bend.glsl has, and its gradient. C = f(x) - rest, so a clamped one is
 // found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long gets
 // the same C as before.
@@ -97,8 +95,9 @@ using Factor = Eigen::SimplicialLDLT<Sparse>;
 template <class Kind, std::size_t arity>
 auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double alpha, bool project) {
   constexpr int n = 3 * int(arity);
-  Eigen::Matrix<double, n, n> hessian;
+  using Matrix = Eigen::Matrix<double, n, n>;
   using Vector = Eigen::Matrix<double, n, 1>;
+  Matrix hessian = Matrix::Zero();
   const auto flat = [](const auto& c) { return Vector(Eigen::Map<const Vector>(&c.gradient[0].x)); };
   const auto here = unclamped<Kind>(x, rest);
   const auto g = flat(here);
@@ -106,7 +105,6 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double al
   for (std::size_t i = 0; i < arity; ++i)
     for (std::size_t j = 0; j < i; ++j) side = std::min(side, glm::length(x[i] - x[j]));
   const double step = 1e-5 * side;
-  hessian.setZero();
   if (here.C != 0 && step > 0)
     for (int column = 0; column < n; ++column) {
       double& coordinate = x[std::size_t(column / 3)][column % 3];
@@ -121,7 +119,7 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double al
     }
   hessian = ((0.5 * (hessian + hessian.transpose()) + g * g.transpose()) / alpha).eval();
   if (project) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>> modes(hessian);
+    const Eigen::SelfAdjointEigenSolver<Matrix> modes(hessian);
     hessian = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).asDiagonal() *
               modes.eigenvectors().transpose();
   }
@@ -131,8 +129,9 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double al
 // Lower triangle. A fixed vertex has rows of its own, which are the identity's. The pattern is the same at
 // all positions.
 Sparse assemble(const Objective& o, const Points& positions, bool project) {
+  const int rows = 3 * int(positions.size());
   std::vector<Eigen::Triplet<double>> entries;
-  for (int row = 0; row < 3 * int(positions.size()); ++row) {
+  for (int row = 0; row < rows; ++row) {
     const double mass = o.masses[std::size_t(row / 3)];
     entries.emplace_back(row, row, mass > 0 ? mass * o.inertia : 1.0);
   }
@@ -146,7 +145,6 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
           entries.emplace_back(row, column, local(r, c));
       }
   });
-  const int rows = 3 * int(positions.size());
   Sparse hessian(rows, rows);
   hessian.setFromTriplets(entries.begin(), entries.end());
   return hessian;
@@ -224,8 +222,7 @@ Minimum newton(const Objective& o, Points start) {
 }  // namespace
 
 // Around the first vertex: far from the origin, positions have no digits left for small strains.
-Minimum minimise(const Objective& objective, Points start) {
-  Objective o = objective;
+Minimum minimise(Objective o, Points start) {
   const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
   for (Points* list : {&o.predicted, &start})
     for (glm::dvec3& p : *list) p -= origin;

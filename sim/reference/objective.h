@@ -9,10 +9,12 @@
 
 namespace tetpbd {
 
+using Points = std::vector<glm::dvec3>;  ///< m, by vertex
+
 /// alpha of each kind, in the order of Kinds: a constraint's energy is C^2 / (2 alpha), so alpha is in
 /// unit(C)^2 / J. Stretch: m^2/J = m/N, one over a spring's stiffness; bend: rad^2/J; volume: m^6/J = m^3/Pa.
 /// Above 0 (rigid_step is the limit); infinity leaves the kind out.
-using Compliances = std::array<double, std::size_t(kind_count)>;
+using Compliances = std::array<double, kind_count>;
 
 /// What is minimised, in joules, over the positions x of vertices with mass:
 ///   E(x) = sum m_i (inertia/2 |x_i - y_i|^2 - gravity . (x_i - y_i)) + sum_c C_c(x)^2 / (2 alpha_c).
@@ -21,19 +23,19 @@ using Compliances = std::array<double, std::size_t(kind_count)>;
 struct Objective {
   const ConstraintSystem& system;
   Compliances compliances;
-  std::vector<double> masses;         ///< kg; 0: fixed
-  std::vector<glm::dvec3> predicted;  ///< m, y; of fixed vertices, where they are
-  double inertia = 0;                 ///< 1/s^2, 1 / h^2; 0: static
-  glm::dvec3 gravity{0};              ///< m/s^2; 0 for a step, whose y has it already
-  double unit = 1;                    ///< J, what tolerances are relative to (`Minimum::residual`)
+  std::vector<double> masses;  ///< kg; 0: fixed
+  Points predicted;            ///< y; of fixed vertices, where they are
+  double inertia = 0;          ///< 1/s^2, 1 / h^2; 0: static
+  glm::dvec3 gravity{0};       ///< m/s^2; 0 for a step, whose y has it already
+  double unit = 1;             ///< J, what tolerances are relative to (`Minimum::residual`)
 };
-double energy(const Objective& objective, const std::vector<glm::dvec3>& positions);
+double energy(const Objective& objective, const Points& positions);
 /// dE/dx, newtons; of fixed vertices too, where it is the force they are held with.
-std::vector<glm::dvec3> gradient(const Objective& objective, const std::vector<glm::dvec3>& positions);
+Points gradient(const Objective& objective, const Points& positions);
 
 struct Minimum {
-  std::vector<glm::dvec3> positions;  ///< m
-  int iterations = 0;                 ///< Newton steps taken
+  Points positions;
+  int iterations = 0;  ///< Newton steps taken
   /// Norm of the gradient g in the inverse Hessian, sqrt(g . H^-1 g / unit): a number without unit. In a step
   /// it bounds the RMS (by mass) distance to the minimiser over the body's size, as H >= M/h^2 but for
   /// springs in compression. |g| over a typical force would not do: with stiff constraints rounding alone
@@ -44,6 +46,6 @@ struct Minimum {
 };
 constexpr double minimum_tolerance = 1e-10;
 /// A minimum of E, by Newton with an Armijo line search; of several, the one that `start` leads to.
-Minimum minimise(const Objective& objective, std::vector<glm::dvec3> start);
+Minimum minimise(Objective objective, Points start);
 
 }  // namespace tetpbd

@@ -8,24 +8,14 @@
 
 #include "sim/error.h"
 #include "sim/rotation.h"
+#include "sim/solvers/cpu_pbd.h"
 
 namespace tetpbd {
 
 namespace {
 
-using Points = std::vector<glm::dvec3>;
-
-void check_sizes(const ReferenceInput& input, const Points& positions) {
-  const std::size_t count = input.model.rest.positions.size();
-  if (positions.size() != count || input.inverse_masses.size() != count ||
-      input.system.at_vertex.size() != count)
-    throw Error("state and model differ", fmt::format("{} positions, {} vertices", positions.size(), count),
-                "step the state of this model");
-}
-
 void refuse_contact(const ReferenceInput& input, const Points& positions) {
-  std::vector<glm::dvec4> planes = input.model.obstacles;
-  if (input.settings.ground) planes.emplace_back(0, 1, 0, input.settings.ground_height);
+  const std::vector<glm::dvec4> planes = planes_of(input.model, input.settings);
   for (std::size_t i = 0; i < positions.size(); ++i)
     for (const glm::dvec4& plane : planes)
       if (input.inverse_masses[i] > 0 && glm::dot(glm::dvec3(plane), positions[i]) < plane.w)
@@ -76,7 +66,6 @@ void align(const ReferenceInput& input, const Body& body, const Points& to, Poin
 }  // namespace
 
 State rigid_step(const ReferenceInput& input, State state) {
-  check_sizes(input, state.positions);
   for (std::size_t i = 0; i < state.positions.size(); ++i)
     if (!(input.inverse_masses[i] > 0))
       throw Error("the rigid step needs free bodies", fmt::format("vertex {} is fixed", i), "unpin it");
@@ -100,7 +89,7 @@ Objective objective_of(const ReferenceInput& input, const Compliances& complianc
       throw Error("compliance must be above 0",
                   fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
                   "rigid_step is the limit of 0, infinity leaves a kind out");
-  Objective o{input.system, compliances, {}, {}, 0, glm::dvec3(0), 1};
+  Objective o{.system = input.system, .compliances = compliances, .masses = {}, .predicted = {}};
   for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);
   return o;
 }
@@ -115,12 +104,10 @@ Error no_convergence(const Minimum& result, const char* hint) {
 
 }  // namespace
 
-Objective step_objective(const ReferenceInput& input, const State& state, const Compliances& compliances,
-                         double h) {
+Objective step_objective(const ReferenceInput& input, State state, const Compliances& compliances, double h) {
   Objective o = objective_of(input, compliances);
-  State predicted = state;
-  predict(input, predicted, h);
-  o.predicted = std::move(predicted.positions);
+  predict(input, state, h);
+  o.predicted = std::move(state.positions);
   o.inertia = 1 / (h * h);
   o.unit = total_mass(o) * o.inertia * input.model.size * input.model.size;
   return o;
@@ -137,15 +124,13 @@ Objective static_objective(const ReferenceInput& input, const Points& positions,
 
 ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, const Compliances& compliances,
                                   const Points* guess) {
-  check_sizes(input, state.positions);
-  if (guess != nullptr) check_sizes(input, *guess);
   const double h = input.settings.dt / input.settings.substeps;
   ReferenceStep step;
   for (int s = 0; s < input.settings.substeps; ++s) {
     const Objective objective = step_objective(input, state, compliances, h);
     predict(input, state, h);
     refuse_contact(input, state.positions);
-    Minimum result = minimise(objective, guess != nullptr && s == 0 ? *guess : state.positions);
+    Minimum result = minimise(objective, guess && s == 0 ? *guess : state.positions);
     if (!result.converged) throw no_convergence(result, "use a smaller step or a larger compliance");
     refuse_contact(input, result.positions);
     for (std::size_t i = 0; i < state.positions.size(); ++i)
@@ -160,7 +145,6 @@ ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, cons
 
 ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions,
                                  const Compliances& compliances) {
-  check_sizes(input, positions);
   const bool held =
       std::any_of(input.inverse_masses.begin(), input.inverse_masses.end(), [](double w) { return w == 0; });
   if (!held || !(input.settings.gravity > 0))
@@ -191,14 +175,9 @@ ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& posi
 }
 
 double error_to(const Model& model, const State& reference, const State& state) {
-  const std::size_t count = model.masses.size();
-  if (reference.positions.size() != count || state.positions.size() != count)
-    throw Error("states of different models",
-                fmt::format("{} and {} vertices", reference.positions.size(), state.positions.size()),
-                fmt::format("compare states of {} vertices", count));
   // The size metrics.cpp takes for rigid_distance: the mean of the bodies' by mass.
   double mass = 0, size = 0, squares = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < model.masses.size(); ++i) {
     const glm::dvec3 apart = state.positions[i] - reference.positions[i];
     mass += model.masses[i];
     squares += model.masses[i] * glm::dot(apart, apart);

@@ -32,10 +32,9 @@ State rigid_step(const ReferenceInput& input, State state);
 
 /// The implicit-Euler step of length h (s) from `state`: inertia 1/h^2, unit M size^2 / h^2 with M the moving
 /// mass.
-Objective step_objective(const ReferenceInput& input, const State& state, const Compliances& compliances,
-                         double h);
+Objective step_objective(const ReferenceInput& input, State state, const Compliances& compliances, double h);
 /// Rest under gravity: no inertia, unit M g size. `positions`: where fixed vertices are held.
-Objective static_objective(const ReferenceInput& input, const std::vector<glm::dvec3>& positions,
+Objective static_objective(const ReferenceInput& input, const Points& positions,
                            const Compliances& compliances);
 
 struct ReferenceStep {
@@ -51,18 +50,17 @@ struct ReferenceStep {
 /// residual; `guess` is for the first. Throws Error for compliances not above 0 and when Newton does not
 /// converge.
 ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, const Compliances& compliances,
-                                  const std::vector<glm::dvec3>* guess = nullptr);
+                                  const Points* guess = nullptr);
 
 /// Where the body hangs at rest, velocities 0: the minimiser of sum C^2 / (2 alpha) - sum m g . x from the
 /// given positions, in up to 64 steps of load where one does not converge. Throws Error without fixed
 /// vertices or gravity, for compliances not above 0, and where no isolated stable equilibrium is found (a
 /// body free to turn has none).
-ReferenceStep static_equilibrium(const ReferenceInput& input, const std::vector<glm::dvec3>& positions,
+ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions,
                                  const Compliances& compliances);
 
 /// RMS (by mass) distance of two states over the size of the body (mean by mass of several):
-/// `reference_distance`. No alignment: a displaced state is wrong. Throws Error if the states do not have the
-/// model's vertices.
+/// `reference_distance`. No alignment: a displaced state is wrong.
 double error_to(const Model& model, const State& reference, const State& state);
 
 }  // namespace tetpbd

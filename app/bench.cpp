@@ -18,42 +18,26 @@ namespace tetpbd {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
+using std::chrono::steady_clock;
 
-const std::vector<std::string> columns = split(
-    "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,wall_ms_per_"
-    "step,"
-    "draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent",
-    ',');
-constexpr const char* table =
+const char* columns =
+    "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
+    "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent";
+const char* table =
     "scene -16, mode -18, constraints -20, iterations:iter 5, substeps:sub 5, size 10, picture 8, fps 10, "
-    "gpu_ms_per_step:GPU-ms 10, gpu_us_per_iteration:us/iter 10, draw_ms 10, max_volume_loss_percent:loss-% "
-    "11";
+    "gpu_ms_per_step:GPU-ms 10, gpu_us_per_iteration:us/iter 10, draw_ms 10, "
+    "max_volume_loss_percent:loss-% 11";
 
 ordered_json spread(std::vector<double> values) {
   if (values.empty()) values = {0};
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   return {{"median", values[values.size() / 2]}, {"min", values.front()}, {"max", values.back()}};
 }
 
 struct Subject {
-  Scene scene;
+  Scene scene;  ///< with the settings to measure
   std::shared_ptr<const Model> model;
-  std::vector<Settings> settings;
 };
-
-// A run that is not finite says nothing else.
-void judge(ordered_json& row, const MeasuredRun& run) {
-  row["finite"] = run.errors.finite;
-  row["non_finite"] = non_finite_json(run.errors.non_finite);
-  if (!run.errors.finite) row["max_volume_loss_percent"] = nullptr;
-  say_non_finite(run, fmt::format("{}, mode {}, {}, {} iterations, {} substeps", text_of(row["scene"]),
-                                  text_of(row["mode"]), text_of(row["constraints"]),
-                                  text_of(row["iterations"]), text_of(row["substeps"])));
-}
 
 /// What a dispatch and a byte cost on this GPU at least, what speeds are held against: a dispatch of as many
 /// invocations as a small mesh has, and its barrier; bytes read and written by a kernel that copies from
@@ -76,7 +60,7 @@ ordered_json launch_and_bandwidth_limits(bool software) {
       glFinish();
     };
     run();
-    const auto begin = Clock::now();
+    const auto begin = steady_clock::now();
     run();
     return seconds_since(begin) / times;
   };
@@ -91,7 +75,7 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
   const auto time_picture = [&] {
     if (!picture) return;
     const long count = std::min(options.frames, 100L);
-    const auto begin = Clock::now();
+    const auto begin = steady_clock::now();
     for (long f = 0; f < count; ++f) picture();
     glFinish();
     still.push_back(1e3 * seconds_since(begin) / double(count));
@@ -108,9 +92,12 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
     fps.push_back(double(run.steps) / run.seconds);
     wall.push_back(run.seconds * 1e3 / double(run.steps));
     if (!run.gpu_ms.values.empty()) gpu.push_back(percentiles(run.gpu_ms.values).median);
-    judge(row, run);
+    put_finite(row, run);
   }
-  if (row["finite"] == false) fps = gpu = wall = {std::nan("")};  // they say nothing
+  if (row["finite"] == false) {  // the others say nothing
+    fps = gpu = wall = {std::nan("")};
+    row["max_volume_loss_percent"] = nullptr;
+  }
   row["fps"] = spread(fps);
   row["gpu_ms_per_step"] = spread(gpu);
   row["wall_ms_per_step"] = spread(wall);
@@ -119,33 +106,22 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
       1e3 * number(row, "gpu_ms_per_step") / (number(row, "iterations") * number(row, "substeps"));
 }
 
-std::vector<ordered_json> rows_of(const Subject& subject, const Settings& settings,
-                                  const BenchOptions& options) {
+std::vector<ordered_json> rows_of(const Subject& subject, const BenchOptions& options) {
   const Model& model = *subject.model;
-  std::string kinds = settings.constraints;
-  std::replace(kinds.begin(), kinds.end(), ',', '+');
-  Sim sim = create_sim(subject.model, settings);
+  Sim sim = create_sim(subject.model, subject.scene.settings);
   const Explanation cost = explain(sim);
   Metrics metrics = create_metrics(model, sim.system);
   const MeasuredRun run =
       run_loop(sim, &metrics, options.frames, {.most_seconds = 12 * options.most_seconds});
-  // NaN where time ran out: an error over part of the run would be another quantity.
-  const bool whole = run.steps == options.frames;
-  ordered_json row = {{"scene", subject.scene.name},
-                      {"mode", mode_word(settings)},
-                      {"omega", settings.omega},
-                      {"constraints", kinds},
-                      {"iterations", settings.iterations},
-                      {"substeps", settings.substeps},
-                      {"size", ""},
-                      {"picture", ""},
-                      {"vertices", model.positions.size()},
-                      {"tets", model.rest.tets.size()},
-                      {"dispatches_per_step", cost.dispatches_per_step},
-                      {"bytes_per_step", cost.bytes_per_step},
-                      {"gpu_bytes", cost.bytes},
-                      {"max_volume_loss_percent", whole ? run.errors.max_volume_loss_percent : std::nan("")}};
-  judge(row, run);
+  ordered_json row = setting_json(subject.scene, model, sim.settings);
+  row.update({{"size", ""},
+              {"picture", ""},
+              {"dispatches_per_step", cost.dispatches_per_step},
+              {"bytes_per_step", cost.bytes_per_step},
+              {"gpu_bytes", cost.bytes}});
+  put_errors(row, run);
+  // Where time ran out: an error over part of the run would be another quantity.
+  if (run.steps < options.frames) row["max_volume_loss_percent"] = nullptr;
   std::vector<ordered_json> rows{row};
   time_frames(rows[0], sim, options, {});
   if (options.sizes.empty()) return rows;
@@ -169,21 +145,16 @@ std::vector<ordered_json> rows_of(const Subject& subject, const Settings& settin
 Sweep bench_sweep(const BenchOptions& options) {
   std::vector<Subject> subjects;
   for (const std::string& name : options.scenes) {
-    const Scene scene = load_scene(name, options.overrides);
-    const auto all = combinations(
-        scene.settings, {options.modes, options.constraint_sets, {}, options.iterations, options.substeps});
-    subjects.push_back({scene, nullptr, all});
+    Scene scene = load_scene(name, options.overrides);
+    const auto all = combinations(scene.settings, options.axes);
+    const auto model = build_model(scene);
+    for (const Settings& settings : all) {
+      scene.settings = settings;
+      subjects.push_back({scene, model});
+    }
   }
-  Sweep sweep{"bench", "bench", columns, 0, table, {}};
-  for (Subject& subject : subjects) {
-    subject.model = build_model(subject.scene);
-    sweep.combinations += subject.settings.size();
-  }
-  sweep.make = [subjects, options](std::size_t i) {
-    auto subject = subjects.begin();
-    for (; i >= subject->settings.size(); ++subject) i -= subject->settings.size();
-    return rows_of(*subject, subject->settings[i], options);
-  };
+  Sweep sweep{"bench", "bench", split(columns, ','), 0, table, {}, subjects.size()};
+  sweep.make = [subjects, options](std::size_t i) { return rows_of(subjects[i], options); };
   return sweep;
 }
 
@@ -207,10 +178,7 @@ int run_bench(const BenchOptions& options) {
       options.frames, options.warm_up, options.repeats, number(limits, "dispatch_us"),
       number(limits, "copy_gb_s"));
   print_table(table);
-  const ordered_json document = run_sweep(sweep);
-  write_sweep(sweep, options.out, document);
-  const auto& rows = document["rows"];
-  return std::all_of(rows.begin(), rows.end(), [](const auto& row) { return row["finite"] == true; }) ? 0 : 1;
+  return write_sweep(sweep, options.out, run_sweep(sweep));
 }
 
 }  // namespace tetpbd

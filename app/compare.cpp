@@ -16,17 +16,14 @@ namespace tetpbd {
 
 namespace {
 
-const std::vector<std::string> columns = split(
-    "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,max_volume_loss_"
-    "percent,"
-    "tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,angular_drift,inverted_tets,"
-    "finite,"
-    "pareto",
-    ',');
-constexpr const char* table =
+const char* columns =
+    "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
+    "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
+    "angular_drift,inverted_tets,finite,pareto";
+const char* table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
-    "wall_ms_per_step:wall-ms 11, "
-    "max_volume_loss_percent:loss-% 11, rigid_distance 16, reference_distance:one-step 11, pareto 8";
+    "wall_ms_per_step:wall-ms 11, max_volume_loss_percent:loss-% 11, rigid_distance 16, "
+    "reference_distance:one-step 11, pareto 8";
 
 /// What a step costs: GPU time, or wall time where the CPU does the work.
 double cost_ms(const ordered_json& row) {
@@ -43,8 +40,7 @@ double loss(const ordered_json& row) {
 /// One step from the rest shape stretched by 5 % without gravity or ground: the exact answer is the rest
 /// shape again, in place. What is left of the distance to it, as a part of what there was.
 double remaining_after_one_step(const std::shared_ptr<const Model>& model, Settings settings) {
-  for (double w : model->inverse_masses)
-    if (!(w > 0)) return std::nan("");  // a clamped body has another answer
+  if (std::ranges::count(model->inverse_masses, 0.0)) return std::nan("");  // clamped: another answer
   auto stretched = std::make_shared<Model>(*model);
   for (const Body& body : stretched->bodies) {
     const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
@@ -55,42 +51,24 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
       stretched->positions[v].y = middle + 1.05 * (rest[v].y - middle);
     }
   }
-  std::fill(stretched->velocities.begin(), stretched->velocities.end(), glm::dvec3(0));
+  std::ranges::fill(stretched->velocities, glm::dvec3(0));
   stretched->obstacles.clear();
   settings.gravity = 0;
   settings.ground = false;
-  Sim sim = create_sim(stretched, settings);
-  Metrics metrics = create_metrics(*stretched, sim.system);
-  const MeasuredRun run = run_loop(sim, &metrics, 1);
+  const MeasuredRun run = run_model(stretched, settings, 1);
   if (!run.errors.finite || interrupted()) return std::nan("");
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }
 
 ordered_json row_of(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings,
                     long steps) {
-  Sim sim = create_sim(model, settings);
-  Metrics metrics = create_metrics(*model, sim.system);
-  const MeasuredRun run = run_loop(sim, &metrics, steps);
-  say_non_finite(run, fmt::format("mode {}, omega {:g}, {} iterations, {} substeps", mode_word(settings),
-                                  settings.omega, settings.iterations, settings.substeps));
-  const auto median = [](const Samples& samples) {
-    return samples.values.empty() ? std::nan("") : percentiles(samples.values).median;
-  };
-  ordered_json row = {{"scene", scene.name},
-                      {"mode", mode_word(settings)},
-                      {"omega", settings.omega},
-                      {"iterations", settings.iterations},
-                      {"substeps", settings.substeps},
-                      {"vertices", model->positions.size()},
-                      {"tets", model->rest.tets.size()},
-                      {"gpu_ms_per_step", median(run.gpu_ms)},
-                      {"wall_ms_per_step", median(run.wall_ms)},
-                      {"reference_distance", remaining_after_one_step(model, settings)},
-                      {"finite", run.errors.finite},
-                      {"non_finite", non_finite_json(run.errors.non_finite)},
-                      {"pareto", false}};
-  row.update(error_json(run.errors));
-  row.update(drift_json(run.errors));
+  const MeasuredRun run = run_model(model, settings, steps);
+  ordered_json row = setting_json(scene, *model, settings);
+  row["gpu_ms_per_step"] = percentiles(run.gpu_ms.values).median;
+  row["wall_ms_per_step"] = percentiles(run.wall_ms.values).median;
+  row["reference_distance"] = remaining_after_one_step(model, settings);
+  row["pareto"] = false;
+  put_errors(row, run);
   return row;
 }
 
@@ -110,16 +88,16 @@ void mark_front(ordered_json& rows) {
 
 Chart chart_of(const ordered_json& document) {
   const auto& rows = document["rows"];
-  Chart chart;
-  chart.title = "Speed against error: " + text_of(rows[0]["scene"]);
-  chart.subtitle = fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
-                               text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
-                               text_of(document["device"]["gl_renderer"]));
-  chart.x_label = "time of a step, ms (GPU time; cpu modes: wall time)";
-  chart.y_label = "largest volume loss, %";
-  chart.log_x = chart.log_y = true;
+  Chart chart{"Speed against error: " + text_of(rows[0]["scene"]),
+              fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
+                          text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
+                          text_of(document["device"]["gl_renderer"])),
+              "time of a step, ms (GPU time; cpu modes: wall time)",
+              "largest volume loss, %",
+              true,
+              true};
   std::vector<ordered_json> sorted(rows.begin(), rows.end());
-  std::sort(sorted.begin(), sorted.end(), [](auto& a, auto& b) { return cost_ms(a) < cost_ms(b); });
+  std::ranges::sort(sorted, {}, cost_ms);
   Series front{"Pareto front", "#999999", {}, {}, true, false, true};
   for (const auto& row : sorted) {
     const double x = cost_ms(row), y = loss(row);
@@ -129,8 +107,7 @@ Chart chart_of(const ordered_json& document) {
       chart.notes.push_back({x, y, text_of(row["iterations"]) + " x " + text_of(row["substeps"])});
     }
     const std::string mode = text_of(row["mode"]);
-    auto series = std::find_if(chart.series.begin(), chart.series.end(),
-                               [&](const Series& other) { return other.name == mode; });
+    auto series = std::ranges::find(chart.series, mode, &Series::name);
     if (series == chart.series.end())
       series = chart.series.insert(series, {mode, mode_colour(mode), {}, {}, false, true, false});
     series->x.push_back(x), series->y.push_back(y);
@@ -139,19 +116,20 @@ Chart chart_of(const ordered_json& document) {
   return chart;
 }
 
+using Quantity = double (*)(const ordered_json& row);
+
 /// The row within a limit that is best by something else.
-template <class Limited, class Judged>
-void print_best(const ordered_json& rows, const std::string& what, double limit, const Limited& limited,
-                const Judged& judged) {
-  const ordered_json* best = nullptr;
+void print_best(const ordered_json& rows, const std::string& what, double limit, Quantity limited,
+                Quantity judged) {
+  std::vector<ordered_json> within;
   for (const auto& row : rows)
-    if (std::isfinite(loss(row)) && limited(row) <= limit &&
-        (!best || std::pair(judged(row), limited(row)) < std::pair(judged(*best), limited(*best))))
-      best = &row;
-  if (!best) return fmt::print("{}: nothing measured is\n", what);
-  fmt::print("{}: {}, {} it x {} sub, omega {} ({:.3g} ms, loss {:.3g} %)\n", what, text_of((*best)["mode"]),
-             text_of((*best)["iterations"]), text_of((*best)["substeps"]), text_of((*best)["omega"]),
-             cost_ms(*best), loss(*best));
+    if (std::isfinite(loss(row)) && limited(row) <= limit) within.push_back(row);
+  if (within.empty()) return fmt::print("{}: nothing measured is\n", what);
+  const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
+  const auto& best = *std::ranges::min_element(within, {}, order);
+  fmt::print("{}: {}, {} it x {} sub, omega {} ({:.3g} ms, loss {:.3g} %)\n", what, text_of(best["mode"]),
+             text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best),
+             loss(best));
 }
 
 }  // namespace
@@ -159,15 +137,15 @@ void print_best(const ordered_json& rows, const std::string& what, double limit,
 int run_compare(const CompareOptions& options) {
   catch_interrupts();
   make_output_folder(options.out);
-  Sweep sweep{"compare", "comparison", columns, 5, table, {{"steps", options.steps}, {"dt", 0.005}}};
+  Sweep sweep{"compare", "comparison", split(columns, ','), 5, table, {}};
+  sweep.facts = {{"steps", options.steps}, {"dt", 0.005}};
   std::optional<HeadlessContext> context;
   Scene scene;
   std::shared_ptr<const Model> model;
   std::vector<Settings> all;
-  if (options.merge.empty()) {
+  if (options.shards.merge.empty()) {
     scene = load_scene(options.scene, options.overrides);
-    all = combinations(scene.settings,
-                       {options.modes, {}, options.omegas, options.iterations, options.substeps});
+    all = combinations(scene.settings, options.axes);
     model = build_model(scene);
     context.emplace(options.gpu);
     sweep.facts["dt"] = scene.settings.dt;
@@ -175,12 +153,12 @@ int run_compare(const CompareOptions& options) {
     sweep.combinations = all.size();
     sweep.make = [&](std::size_t i) { return std::vector{row_of(scene, model, all[i], options.steps)}; };
   }
-  ordered_json document = run_sweep(sweep, {options.shard, options.shards, options.merge});
+  ordered_json document = run_sweep(sweep, options.shards);
   ordered_json& rows = document["rows"];
   mark_front(rows);
   print_device(document["device"]);
   print_table(table, rows);
-  if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return loss(row) == 0; }))
+  if (std::ranges::all_of(rows, [](const auto& row) { return loss(row) == 0; }))
     fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
                text_of(document["steps"]));
   if (options.budget_ms)

@@ -40,10 +40,11 @@ int print_info(int gpu);
 
 struct BenchOptions {
   std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
-  std::vector<std::string> modes = {"cpu", "constraint", "node"};
-  std::vector<std::string> constraint_sets = {"stretch+bend", "stretch+bend+volume"};
-  std::vector<int> iterations = {1, 150};
-  std::vector<int> substeps = {1};
+  SceneOverrides overrides;  ///< for every scene
+  Axes axes = {.modes = {"cpu", "constraint", "node"},
+               .constraint_sets = {"stretch+bend", "stretch+bend+volume"},
+               .iterations = {1, 150},
+               .substeps = {1}};
   long frames = 400, warm_up = 50;
   int repeats = 3;
   double most_seconds = 5;                ///< a repetition stops there, with fewer frames (slow CPU modes)
@@ -52,7 +53,6 @@ struct BenchOptions {
   int samples = 0;
   int gpu = -1;
   std::filesystem::path out = "bench";
-  SceneOverrides overrides;  ///< for every scene
 };
 /// `tetpbd bench`: frames a second and milliseconds a step, by the paper's protocol, beside the error of the
 /// same setting. Prints a table, writes bench.csv and bench.json. Exit status 1 if any state became
@@ -64,37 +64,26 @@ Sweep bench_sweep(const BenchOptions& options);
 struct CompareOptions {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  std::vector<std::string> modes = {"node", "constraint", "cpu"};
-  std::vector<int> iterations = {1, 5, 10, 25};
-  std::vector<int> substeps = {1};
-  std::vector<double> omegas;  ///< empty: the scene's
+  Axes axes = {.modes = {"node", "constraint", "cpu"}, .iterations = {1, 5, 10, 25}, .substeps = {1}};
   long steps = 400;
   int gpu = -1;
   std::filesystem::path out = "compare";
-  int shard = 1, shards = 1;
-  std::vector<std::filesystem::path> merge;
+  Shards shards;
   std::optional<double> budget_ms, error_percent;
+  std::vector<std::string> cases;  ///< of hard cases; empty: all of models/scenes/hard
+  std::vector<std::string> meshes = {"bunny", "block", "tet"};
 };
 /// `tetpbd compare`: speed against error over modes x iterations x substeps. Writes compare.csv,
 /// compare.json, compare.svg, compare.png; prints a table and what was asked for.
 int run_compare(const CompareOptions& options);
 
-struct HardCaseOptions {
-  std::vector<std::string> cases;  ///< empty: all of models/scenes/hard
-  std::vector<std::string> meshes = {"bunny", "block", "tet"};
-  /// Solver modes; NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the scene
-  /// has iterations; node+clusters as in settings.h.
-  std::vector<std::string> modes = {"node", "constraint", "node-substeps", "node+clusters-substeps",
-                                    "cpu",  "cpu-double"};
-  long steps = 0;  ///< 0: the scene's duration
-  int gpu = -1;
-  std::filesystem::path out = "stability";
-  int shard = 1, shards = 1;
-  std::vector<std::filesystem::path> merge;
-};
 /// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double
-/// precision. Writes stability.csv and stability.json. Exit status 1 if any state became non-finite.
-int run_hard_cases(const HardCaseOptions& options);
+/// precision. Writes stability.csv and stability.json. Exit status 1 if any state became non-finite. Of the
+/// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
+/// scene has iterations. Steps 0: the scene's duration.
+int run_hard_cases(const CompareOptions& options);
+inline const std::vector<std::string> hard_case_modes{
+    "node", "constraint", "node-substeps", "node+clusters-substeps", "cpu", "cpu-double"};
 /// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
 /// 5 % of the run's `steps` at least: what is good for less long may be passing through.
 std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);

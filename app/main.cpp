@@ -53,7 +53,6 @@ struct Arguments {
   SoakOptions soak;
   BenchOptions bench;
   CompareOptions compare;
-  HardCaseOptions hard;
   bool hard_cases = false;
   ReproduceOptions reproduce;
   std::filesystem::path mesh_file, mesh_out;
@@ -140,11 +139,10 @@ void add_overrides(CLI::App& command, SceneOverrides& overrides) {
 }
 
 /// Lists of modes, iterations and substeps, every combination of which is run.
-template <class Options>
-void add_sweep(CLI::App& command, Options& options) {
-  add(command, "--modes,--mode", options.modes, "solver modes; node+clusters; paper: as published");
-  add(command, "--iterations", options.iterations, 1, 100000, "iterations a substep");
-  add(command, "--substeps", options.substeps, 1, 100000, "substeps a step");
+void add_axes(CLI::App& command, Axes& axes) {
+  add(command, "--modes,--mode", axes.modes, "solver modes; node+clusters; paper: as published");
+  add(command, "--iterations", axes.iterations, 1, 100000, "iterations a substep");
+  add(command, "--substeps", axes.substeps, 1, 100000, "substeps a step");
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -236,8 +234,8 @@ void add_soak(CLI::App& command, Arguments& a) {
 void add_bench(CLI::App& command, Arguments& a) {
   BenchOptions& bench = a.bench;
   add(command, "--scenes,--scene", bench.scenes, "scenes, separated by commas");
-  add_sweep(command, bench);
-  add(command, "--constraint-sets", bench.constraint_sets, "sets of kinds joined by +");
+  add_axes(command, bench.axes);
+  add(command, "--constraint-sets", bench.axes.constraint_sets, "sets of kinds joined by +");
   add(command, "--frames", bench.frames, 1L, 1000000L, "timed frames");
   add(command, "--warm-up", bench.warm_up, 0L, 1000000L, "frames before them");
   add(command, "--repeats", bench.repeats, 1, 100, "repetitions; the median counts");
@@ -260,24 +258,24 @@ void add_compare(CLI::App& command, Arguments& a) {
       "--hard-cases",
       [&] {
         a.hard_cases = true;
-        compare.modes = a.hard.modes, compare.steps = a.hard.steps, compare.out = a.hard.out;
+        compare.axes.modes = hard_case_modes, compare.steps = 0, compare.out = "stability";
       },
       "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
       "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 % and no tet "
       "inverted; scenes in which no constraint acts are left out");
   add(command, "--scene", compare.scene, "a scene");
   add_overrides(command, compare.overrides);
-  add_sweep(command, compare);
-  add(command, "--omegas", compare.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
+  add_axes(command, compare.axes);
+  add(command, "--omegas", compare.axes.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
   add(command, "--steps", compare.steps, 1L, most_steps, "steps of each run");
   add(command, "--budget-ms", compare.budget_ms, 1e-9, 1e9,
       "print the best setting within so many ms per step");
   add(command, "--error", compare.error_percent, 1e-9, 1e9,
       "print the cheapest setting that loses at most this volume, %");
   add(command, "--shard", a.shard, "i/n: only every n-th combination, from the i-th; merge them afterwards");
-  add(command, "--cases", a.hard.cases, "hard cases to run (default: all)")->needs(hard);
-  add(command, "--meshes", a.hard.meshes, "hard cases: bunny, block, tet")->needs(hard);
-  command.add_option("--merge", compare.merge, "folders of finished shards, instead of running");
+  add(command, "--cases", compare.cases, "hard cases to run (default: all)")->needs(hard);
+  add(command, "--meshes", compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
+  command.add_option("--merge", compare.shards.merge, "folders of finished shards, instead of running");
   add_gpu(command, compare.gpu);
   add(command, "--out", compare.out, "folder for compare.csv, .json, .svg, .png");
 }
@@ -326,11 +324,9 @@ Task start_bench(Arguments& a) {
 Task start_compare(Arguments& a) {
   const auto [i, n] = two_numbers("--shard", a.shard, '/', 1, 99999);
   if (i > n) throw Error("bad share", fmt::format("--shard {}/{}", i, n), "count i from 1 to n, as in 2/8");
-  a.compare.shard = i, a.compare.shards = n;
-  if (!a.hard_cases) return start<&Arguments::compare, run_compare>(a);
-  const CompareOptions& c = a.compare;
-  a.hard = {a.hard.cases, a.hard.meshes, c.modes, c.steps, c.gpu, c.out, c.shard, c.shards, c.merge};
-  return start<&Arguments::hard, run_hard_cases>(a);
+  a.compare.shards.shard = i, a.compare.shards.shards = n;
+  return a.hard_cases ? start<&Arguments::compare, run_hard_cases>(a)
+                      : start<&Arguments::compare, run_compare>(a);
 }
 
 struct Command {

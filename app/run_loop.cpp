@@ -12,14 +12,7 @@
 
 namespace tetpbd {
 
-namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-}  // namespace
+using std::chrono::steady_clock;
 
 void Samples::add(double value) {
   ++count;
@@ -31,33 +24,34 @@ void Samples::add(double value) {
 }
 
 Percentiles percentiles(std::vector<double> values) {
-  if (values.empty()) return {};
-  std::sort(values.begin(), values.end());
+  if (values.empty()) values = {std::nan("")};
+  std::ranges::sort(values);
   const auto at = [&](double part) {
     return values[std::size_t(std::lround(part * double(values.size() - 1)))];
   };
   return {at(0.5), at(0.05), at(0.95)};
 }
 
+void print_error(const std::string& line) {
+  std::fputs(line.c_str(), stderr);  // fmt::print() throws
+  std::fflush(stderr);
+}
+
 Progress::Progress(std::string label, long total, bool force)
-    : label_(std::move(label)), total_(total), shown_(force || isatty(2)), start_(Clock::now()) {}
+    : label_(std::move(label)), total_(total), shown_(force || isatty(2)), start_(steady_clock::now()) {}
 
 Progress::~Progress() {
-  if (drawn_) std::fputs("\r\033[K", stderr);
+  if (drawn_) print_error("\r\033[K");
 }
 
 void Progress::update(long done) {
   if (!shown_ || (drawn_ && seconds_since(last_) < 0.1 && done != total_)) return;
-  last_ = Clock::now();
+  last_ = steady_clock::now();
   drawn_ = true;
   const double part = total_ > 0 ? double(done) / double(total_) : 1.0;
   const double left = part > 0 ? seconds_since(start_) * (1 - part) / part : 0.0;
-  // fmt::print() throws where nothing can be written.
-  std::fputs(fmt::format("\r\033[K{} [{:.<30}] {}/{}  {:.0f} s left", label_,
-                         std::string(std::size_t(part * 30), '#'), done, total_, left)
-                 .c_str(),
-             stderr);
-  std::fflush(stderr);
+  print_error(fmt::format("\r\033[K{} [{:.<30}] {}/{}  {:.0f} s left", label_,
+                          std::string(std::size_t(part * 30), '#'), done, total_, left));
 }
 
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
@@ -74,9 +68,9 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.add(*ms);
   };
   if (metrics) measure(*metrics, sim);
-  const auto begin = Clock::now();
+  const auto begin = steady_clock::now();
   while (run.steps < steps && !interrupted() && !check_finite(sim)) {
-    const auto step_begin = Clock::now();
+    const auto step_begin = steady_clock::now();
     step(sim);
     if (plan.wait) glFinish();
     const double seconds = seconds_since(step_begin);
@@ -101,9 +95,10 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   return run;
 }
 
-void say_non_finite(const MeasuredRun& run, const std::string& where) {
-  if (!run.errors.non_finite) return;
-  std::fputs(fmt::format("tetpbd: {}\n", error_of(*run.errors.non_finite, where).what()).c_str(), stderr);
+MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps) {
+  Sim sim = create_sim(model, settings);
+  Metrics metrics = create_metrics(*model, sim.system);
+  return run_loop(sim, &metrics, steps);
 }
 
 void warm_up(Sim& sim) {

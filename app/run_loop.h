@@ -24,9 +24,17 @@ struct Samples {
 };
 
 struct Percentiles {
-  double median = 0, p05 = 0, p95 = 0;
+  double median, p05, p95;
 };
+/// NaN where there are none.
 Percentiles percentiles(std::vector<double> values);
+
+inline double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// On standard error, even where nothing can be written there.
+void print_error(const std::string& line);
 
 /// A bar on standard error, on a terminal only unless forced.
 class Progress {
@@ -65,8 +73,8 @@ struct MeasuredRun {
 /// so, or when interrupted() does: ask it before making anything of the result. No metrics: nothing is
 /// measured.
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});
-/// On standard error, if it is so.
-void say_non_finite(const MeasuredRun& run, const std::string& where);
+/// The same with a simulation of its own, every step measured.
+MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps);
 /// Steps until a GPU that has rested while the CPU prepared the scene runs at its full clock, which takes a
 /// few hundred milliseconds. Nothing on a software renderer.
 void warm_up(Sim& sim);

@@ -1,7 +1,9 @@
 // Scenes: JSON with strict checking (docs/guide.md), and how a scene becomes a model.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -66,6 +68,10 @@ struct SceneOverrides {
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides = {});
 std::vector<std::string> scene_names();
 
+/// One at least.
+inline long duration_in_steps(const Scene& scene) {
+  return std::max(1L, std::lround(scene.duration / scene.settings.dt));
+}
 /// As a scene file says it.
 nlohmann::json body_json(const BodyDescription& body);
 /// Meshes loaded and tetrahedralised, placed, deformed.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/files.h"
@@ -34,8 +35,6 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
   return result;
 }
 
-}  // namespace
-
 ordered_json error_json(const RunErrors& errors) {
   const Measurement last = errors.last.value_or(nothing_measured());
   return {{"max_volume_loss_percent", errors.last ? errors.max_volume_loss_percent : std::nan("")},
@@ -48,62 +47,6 @@ ordered_json error_json(const RunErrors& errors) {
           {"bend_rms_rad", last.bend_rms_rad},
           {"rigid_distance", last.rigid_distance}};
 }
-
-ordered_json drift_json(const RunErrors& errors) {
-  return {{"linear_drift", errors.linear_drift}, {"angular_drift", errors.angular_drift}};
-}
-
-ordered_json guards_json(const GuardCounts& guards) {
-  ordered_json counts;
-  for (std::size_t g = 0; g < GUARDS; ++g) counts[guard_names[g]] = guards[g];
-  return counts;
-}
-
-ordered_json non_finite_json(const std::optional<NonFinite>& found) {
-  if (!found) return nullptr;
-  return {{"step", found->step}, {"vertex", found->vertex}};
-}
-
-std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
-                            const MeasuredRun& run, const GuardCounts& guards,
-                            std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice) {
-  ordered_json j;
-  j["scene"] = scene.name;
-  j["settings"] = settings_json(scene, sim.settings);
-  if (choice) j["solver_choice"] = solver_choice_json(*choice);
-  j["solver"] = {{"omega", effective_omega(sim.settings)}};
-  const MeshReport mesh = report(sim.model->rest);
-  j["mesh"] = {{"vertices", mesh.vertices},
-               {"surface_triangles", mesh.surface_triangles},
-               {"edges", mesh.edges},
-               {"bends", mesh.bends},
-               {"tets", mesh.tets},
-               {"volume", mesh.volume},
-               {"euler_characteristic", mesh.euler_characteristic}};
-  j["device"] = device_json(device);
-  j["timing"] = {{"steps", sim.steps},
-                 {"gpu_ms_per_step", times(run.gpu_ms)},
-                 {"wall_ms_per_step", times(run.wall_ms)},
-                 {"fps", double(sim.steps) / run.seconds}};
-  const RunErrors& errors = run.errors;
-  const Measurement last = errors.last.value_or(nothing_measured());
-  j["error"] = error_json(errors);
-  j["momentum"] = drift_json(errors);
-  j["momentum"]["linear"] = vector(last.momentum);
-  j["momentum"]["angular"] = vector(last.angular_momentum);
-  j["energy"] = {{"start", errors.last ? errors.start_energy : std::nan("")},
-                 {"final", last.energy()},
-                 {"max", errors.last ? errors.max_energy : std::nan("")},
-                 {"final_kinetic", last.kinetic},
-                 {"final_potential", last.potential}};
-  j["guards"] = guards_json(guards);
-  j["finite"] = errors.finite;
-  j["non_finite"] = non_finite_json(errors.non_finite);
-  j["state_hash"] = hash ? ordered_json(fmt::format("{:016x}", *hash)) : ordered_json();
-  return json_text(j, 2) + "\n";
-}
-
-namespace {
 
 std::vector<std::pair<const char*, double>> quantities(const Measurement& now, const RunErrors& so_far) {
   const Measurement m = now.finite() ? now : nothing_measured();
@@ -131,6 +74,83 @@ std::vector<std::pair<const char*, double>> quantities(const Measurement& now, c
 }
 
 }  // namespace
+
+ordered_json non_finite_json(const std::optional<NonFinite>& found) {
+  if (!found) return nullptr;
+  return {{"step", found->step}, {"vertex", found->vertex}};
+}
+
+ordered_json setting_json(const Scene& scene, const Model& model, const Settings& settings) {
+  std::string kinds = settings.constraints;
+  std::ranges::replace(kinds, ',', '+');
+  return {{"scene", scene.name},
+          {"mode", mode_word(settings)},
+          {"omega", settings.omega},
+          {"constraints", kinds},
+          {"iterations", settings.iterations},
+          {"substeps", settings.substeps},
+          {"vertices", model.positions.size()},
+          {"tets", model.rest.tets.size()}};
+}
+
+void put_finite(ordered_json& row, const MeasuredRun& run) {
+  const auto& found = run.errors.non_finite;
+  row["finite"] = run.errors.finite;
+  row["non_finite"] = non_finite_json(found);
+  if (!found) return;
+  const auto text = [&](const char* key) { return text_of(row[key]); };
+  const std::string where =
+      fmt::format("{}, mode {}, {}, omega {}, {} iterations, {} substeps", text("scene"), text("mode"),
+                  text("constraints"), text("omega"), text("iterations"), text("substeps"));
+  print_error(fmt::format("tetpbd: {}\n", error_of(*found, where).what()));
+}
+
+void put_errors(ordered_json& row, const MeasuredRun& run) {
+  row.update(error_json(run.errors));
+  row["linear_drift"] = run.errors.linear_drift;
+  row["angular_drift"] = run.errors.angular_drift;
+  put_finite(row, run);
+}
+
+std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
+                            const MeasuredRun& run, const GuardCounts& guards,
+                            std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice) {
+  ordered_json j;
+  j["scene"] = scene.name;
+  j["settings"] = settings_json(scene, sim.settings);
+  if (choice) j["solver_choice"] = solver_choice_json(*choice);
+  j["solver"] = {{"omega", effective_omega(sim.settings)}};
+  const MeshReport mesh = report(sim.model->rest);
+  j["mesh"] = {{"vertices", mesh.vertices},
+               {"surface_triangles", mesh.surface_triangles},
+               {"edges", mesh.edges},
+               {"bends", mesh.bends},
+               {"tets", mesh.tets},
+               {"volume", mesh.volume},
+               {"euler_characteristic", mesh.euler_characteristic}};
+  j["device"] = device_json(device);
+  j["timing"] = {{"steps", sim.steps},
+                 {"gpu_ms_per_step", times(run.gpu_ms)},
+                 {"wall_ms_per_step", times(run.wall_ms)},
+                 {"fps", double(sim.steps) / run.seconds}};
+  const RunErrors& errors = run.errors;
+  const Measurement last = errors.last.value_or(nothing_measured());
+  j["error"] = error_json(errors);
+  j["momentum"] = {{"linear_drift", errors.linear_drift},
+                   {"angular_drift", errors.angular_drift},
+                   {"linear", vector(last.momentum)},
+                   {"angular", vector(last.angular_momentum)}};
+  j["energy"] = {{"start", errors.last ? errors.start_energy : std::nan("")},
+                 {"final", last.energy()},
+                 {"max", errors.last ? errors.max_energy : std::nan("")},
+                 {"final_kinetic", last.kinetic},
+                 {"final_potential", last.potential}};
+  for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
+  j["finite"] = errors.finite;
+  j["non_finite"] = non_finite_json(errors.non_finite);
+  j["state_hash"] = hash ? ordered_json(fmt::format("{:016x}", *hash)) : ordered_json();
+  return json_text(j, 2) + "\n";
+}
 
 std::string csv_header() {
   std::vector<std::string> names;

@@ -1,4 +1,5 @@
-// stats.json and stats.csv: names that scripts rely on (docs/guide.md).
+// What a run amounts to: stats.json and stats.csv, rows of sweeps; names that scripts rely on
+// (docs/guide.md).
 #pragma once
 
 #include <optional>
@@ -14,13 +15,16 @@ namespace tetpbd {
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeasuredRun& run, const GuardCounts& guards,
                             std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice);
-/// What a run amounts to, as stats.json, compare.json and stability.json name it.
-ordered_json error_json(const RunErrors& errors);
-ordered_json drift_json(const RunErrors& errors);
-ordered_json guards_json(const GuardCounts& guards);
-/// {"step", "vertex"}, or null.
-ordered_json non_finite_json(const std::optional<NonFinite>& found);
 std::string csv_header();
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
+
+/// {"step", "vertex"}, or null.
+ordered_json non_finite_json(const std::optional<NonFinite>& found);
+/// What tells a setting of a scene apart from others: a row begins with it.
+ordered_json setting_json(const Scene& scene, const Model& model, const Settings& settings);
+/// Puts into the row whether the run stayed finite, and says on standard error where not.
+void put_finite(ordered_json& row, const MeasuredRun& run);
+/// That, the errors and the drifts.
+void put_errors(ordered_json& row, const MeasuredRun& run);
 
 }  // namespace tetpbd

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <limits>
 #include <set>
 #include <sstream>
 
@@ -23,29 +22,18 @@ namespace {
 
 const ordered_json nothing;
 
-// Of several measurements, the median, where a time of 0 is none; null for what is not finite.
-const ordered_json& cell(const ordered_json& row, const std::string& key) {
-  const ordered_json& value = row.at(key);
-  if (value.is_object()) return value.at("median") == 0 ? nothing : cell(value, "median");
-  return value.is_number() && !std::isfinite(value.get<double>()) ? nothing : value;
-}
-
-// Of text for each column's key or title.
-template <class Text>
-void print_line(const std::string& columns, const Text& text) {
+// A line of a table; no row: the titles.
+void print_row(const std::string& columns, const ordered_json& row) {
   std::istringstream words(columns);
   std::string line, name;
   for (int width = 0; words >> name >> width; words.ignore(1)) {
     const std::size_t colon = name.find(':');
-    const std::string field = text(name.substr(0, colon), name.substr(colon == name.npos ? 0 : colon + 1));
+    const std::string field = row.is_null() ? name.substr(colon == name.npos ? 0 : colon + 1)
+                                            : text_of(cell(row, name.substr(0, colon)));
     line += width < 0 ? fmt::format("{:<{}}", field, -width) : fmt::format("{:>{}}", field, width);
   }
   fmt::print("{}\n", line);
   std::fflush(stdout);
-}
-
-void print_row(const std::string& columns, const ordered_json& row) {
-  print_line(columns, [&](const std::string& key, const std::string&) { return text_of(cell(row, key)); });
 }
 
 std::string name_of(const Sweep& sweep, const ordered_json& row) {
@@ -55,29 +43,20 @@ std::string name_of(const Sweep& sweep, const ordered_json& row) {
   return name;
 }
 
-bool has_shape(const ordered_json& part, const ordered_json& shape) {
-  if (!shape.is_object()) return part.type() == shape.type() || (part.is_number() && shape.is_number());
-  for (const auto& [key, value] : shape.items())
-    if (!part.is_object() || !part.contains(key) || !has_shape(part[key], value)) return false;
-  return true;
-}
-
 // Whatever stands in the file, what follows finds the keys and types it looks for.
 ordered_json read_part(const Sweep& sweep, const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  ordered_json part = ordered_json::parse(stream, nullptr, false);
-  ordered_json shape = {{"device", {{"gl_renderer", ""}, {"gl_version", ""}, {"software", true}}},
-                        {"combinations", 1},
-                        {"shard", ordered_json::array()},
-                        {"shards", 1},
-                        {"rows", ordered_json::array()}};
-  shape.update(sweep.facts);
-  bool good = has_shape(part, shape);
-  for (std::size_t r = 0; good && r < part["rows"].size(); ++r)
-    for (const std::string& column : sweep.columns)
-      good = good && part["rows"][r].contains(column) && part["rows"][r][column].is_primitive();
-  if (!good) throw Error("not a finished " + sweep.title, file.string(), "run that shard again");
-  return part;
+  try {
+    std::ifstream stream(file);
+    const ordered_json part = ordered_json::parse(stream);
+    for (const char* key : {"gl_renderer", "gl_version", "software"}) part.at("device").at(key);
+    for (const auto& [key, fact] : sweep.facts.items()) part.at(key).get<double>();
+    for (const char* key : {"combinations", "shards"}) part.at(key).get<double>();
+    part.at("shard").get<std::vector<int>>();
+    csv_text(sweep.columns, part.at("rows"));
+    return part;
+  } catch (const ordered_json::exception&) {
+    throw Error("not a finished " + sweep.title, file.string(), "run that shard again");
+  }
 }
 
 ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>& folders) {
@@ -108,10 +87,8 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
   }
   const auto rows = all["rows"].size();
   if (const auto wanted = all["combinations"].get<std::size_t>(); rows < wanted)
-    std::fputs(fmt::format("tetpbd: only {} rows of {}: shards {} of {}\n", rows, wanted, all["shard"].dump(),
-                           all["shards"].dump())
-                   .c_str(),
-               stderr);
+    print_error(fmt::format("tetpbd: only {} rows of {}: shards {} of {}\n", rows, wanted,
+                            all["shard"].dump(), all["shards"].dump()));
   return all;
 }
 
@@ -160,7 +137,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   std::vector<Settings> distinct;  // two omegas beyond what clusters allow are one
   for (Settings& settings : all) {
     settings.omega = effective_omega(settings);
-    if (std::find(distinct.begin(), distinct.end(), settings) == distinct.end()) distinct.push_back(settings);
+    if (std::ranges::find(distinct, settings) == distinct.end()) distinct.push_back(settings);
   }
   all = distinct;
   vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
@@ -177,7 +154,7 @@ ordered_json run_sweep(const Sweep& sweep, const Shards& shards) {
 }
 
 void print_table(const std::string& columns, const ordered_json& rows) {
-  print_line(columns, [](const std::string&, const std::string& title) { return title; });
+  print_row(columns, nothing);
   for (const auto& row : rows) print_row(columns, row);
 }
 
@@ -197,7 +174,7 @@ std::string csv_text(const std::vector<std::string>& columns, const ordered_json
   return csv;
 }
 
-void write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document) {
+int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document) {
   const std::filesystem::path csv = folder / (sweep.name + ".csv");
   write_file(folder / (sweep.name + ".json"), json_text(document, 1) + "\n");
   write_file(csv, csv_text(sweep.columns, document["rows"]));
@@ -205,11 +182,19 @@ void write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const 
   if (interrupted())
     throw Error("interrupted", fmt::format("after {} rows", document["rows"].size()),
                 "what was finished is written", 1);
+  const auto finite = [](const ordered_json& row) { return row["finite"] == true; };
+  return std::ranges::all_of(document["rows"], finite) ? 0 : 1;
+}
+
+const ordered_json& cell(const ordered_json& row, const std::string& key) {
+  const ordered_json& value = row.at(key);
+  if (value.is_structured()) return value.at("median") == 0 ? nothing : cell(value, "median");
+  return value.is_number() && !std::isfinite(value.get<double>()) ? nothing : value;
 }
 
 double number(const ordered_json& row, const char* key) {
   const ordered_json& value = cell(row, key);
-  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+  return value.is_number() ? value.get<double>() : std::nan("");
 }
 
 std::string text_of(const ordered_json& value) {

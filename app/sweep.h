@@ -33,7 +33,7 @@ struct Sweep {
   std::vector<std::string> columns;  ///< of NAME.csv, of which the first so many ...
   std::size_t identity;              ///< ... tell rows apart
   std::string table;   ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
-  ordered_json facts;  ///< what all shards have in common: "device", the number of steps
+  ordered_json facts;  ///< what all shards have in common: "device", numbers
   std::size_t combinations = 0;
   std::function<std::vector<ordered_json>(std::size_t)> make{};  ///< the rows of a combination
   bool print_each = false;                                       ///< when they are there
@@ -48,15 +48,19 @@ struct Shards {
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards = {});
 /// Their head, then the rows.
 void print_table(const std::string& columns, const ordered_json& rows = ordered_json::array());
-/// Writes NAME.json and NAME.csv and says where. Throws Error if interrupted.
-void write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document);
+/// Writes NAME.json and NAME.csv and says where. The exit status: 1 if a row is not finite, else 0. Throws
+/// Error if interrupted.
+int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document);
 
-/// Column names, then a line a row; a field is empty where there is nothing.
-std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows);
+/// What a row has under a key: of several measurements the median, where a time of 0 is none; null for what
+/// is not finite.
+const ordered_json& cell(const ordered_json& row, const std::string& key);
 /// As people read it: four digits, "-" for null.
 std::string text_of(const ordered_json& value);
 /// NaN where it is no number.
 double number(const ordered_json& row, const char* key);
+/// Column names, then a line a row; a field is empty where there is nothing.
+std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows);
 /// The device as all files name it.
 ordered_json device_json(const Capabilities& device);
 void print_device(const ordered_json& device);

@@ -251,7 +251,7 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
       "c",
       folder);
   CHECK(compared.status == 0);
-  CHECK(compared.err.find("the state is not finite: mode node, ") != std::string::npos);
+  CHECK(compared.err.find("the state is not finite: beam, mode node, ") != std::string::npos);
   const json rows = json::parse(read(folder.path / "c/compare.json"))["rows"];
   CHECK(rows[0]["finite"] == false);
   CHECK(rows[0]["non_finite"]["step"] == step);

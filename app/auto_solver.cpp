@@ -103,15 +103,15 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   }
   // Where nothing was lost the trials say nothing: a body that has not fallen yet, a machine too slow to wait
   // for it. Clusters, which come last, were best wherever something was.
-  choice.lost_nothing = std::all_of(choice.trials.begin(), choice.trials.end(),
-                                    [](const SolverTrial& trial) { return trial.loss_percent < 0.01; });
+  choice.lost_nothing = std::ranges::all_of(
+      choice.trials, [](double loss) { return loss < 0.01; }, &SolverTrial::loss_percent);
   if (choice.lost_nothing && choice.trials.back().settings.clusters > 0) choice.best = runs.size() - 1;
   return choice;
 }
 
 std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model) {
   if (!scene.budget_ms) return std::nullopt;
-  const long steps = std::clamp(std::lround(scene.duration / scene.settings.dt), 1L, 400L);
+  const long steps = std::min(duration_in_steps(scene), 400L);
   SolverChoice choice = choose_solver(model, scene.settings, *scene.budget_ms, steps);
   scene.settings = choice.settings();
   scene.budget_ms.reset();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <memory>
 
 #include "app/files.h"
@@ -18,7 +17,7 @@ namespace tetpbd {
 
 namespace {
 
-/// Draws what a run asked for and writes it as it arrives, up to two frames late.
+/// Draws what a run asked for and writes it.
 struct FrameWriter {
   const RunOptions& options;
   Frame frame;
@@ -27,13 +26,7 @@ struct FrameWriter {
   long video_every;  ///< steps
   double dt;         ///< s
   long drawn = 0;    ///< step of the last frame
-  std::optional<Video> video;
-  ReadBack read_back;
-  struct Use {
-    long png_step;  ///< below 0: none
-    bool video;
-  };
-  std::deque<Use> uses{};
+  std::optional<Video> video{};
 
   void draw_frame(long s) {
     const bool png = options.png_every > 0 && s % options.png_every == 0;
@@ -43,22 +36,9 @@ struct FrameWriter {
     if (const auto centre = poll_centre(renderer, true))  // for the next frame
       follow(frame.camera, *centre, float(double(s - drawn) * dt));
     drawn = s;
-    read_back.push(target);
-    uses.push_back({png ? s : -1, film});
-    if (uses.size() > 2) write_one();
-  }
-
-  void write_one() {
-    const Image image = *read_back.poll(true);
-    const Use use = uses.front();
-    uses.pop_front();
-    if (use.png_step >= 0) write_png(options.out / fmt::format("frame_{:05}.png", use.png_step), image);
-    if (use.video) video->add(image);
-  }
-
-  void finish() {
-    while (!uses.empty()) write_one();
-    if (video) video->close();
+    const Image image = read_rgba(target);
+    if (png) write_png(options.out / fmt::format("frame_{:05}.png", s), image);
+    if (film) video->add(image);
   }
 };
 
@@ -70,8 +50,8 @@ std::unique_ptr<FrameWriter> frame_writer(const Scene& scene, const Sim& sim, co
   const Camera camera = scene_camera(scene, *sim.model, float(options.width) / float(options.height));
   Target target = make_target(options.width, options.height, options.samples);
   const Frame frame = frame_of(sim, camera, options.view, target);
-  std::unique_ptr<FrameWriter> frames(new FrameWriter{
-      options, frame, make_renderer(*sim.model), std::move(target), video_every, dt, 0, {}, {}});
+  std::unique_ptr<FrameWriter> frames(
+      new FrameWriter{options, frame, make_renderer(*sim.model), std::move(target), video_every, dt});
   if (!options.video.empty()) {
     const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
     frames->video.emplace(options.video, options.width, options.height, rate);
@@ -100,8 +80,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
   Metrics metrics = create_metrics(*model, sim.system);
-  const long steps =
-      options.steps > 0 ? options.steps : std::max(1L, std::lround(scene.duration / scene.settings.dt));
+  const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   auto frames = frame_writer(scene, sim, options);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
@@ -120,7 +99,7 @@ int run_headless(Scene scene, const RunOptions& options) {
     if (!check_finite(sim)) plan.stepped(0);
     run = run_loop(sim, &metrics, steps, plan);
   }
-  if (frames) frames->finish();
+  if (frames && frames->video) frames->video->close();
   const auto& found = run.errors.non_finite;
   const bool good = !found || restore_checkpoint(sim);
   // To the last good step: the same steps again, the same bits.

@@ -21,19 +21,20 @@ void project_$KIND(uint number, uint owned) {
     c.C += gamma * (c.C - $KIND(start, uintBitsToFloat(record.y), record.x).C);
   }
   c.C += a * before;
-  float lambda = multiplier(c, w, k, params.max_correction, a, share);
-  if ((phases & PHASE_FINISH) == 0u) multipliers[number] = before + lambda;
 #else
   const float a = 0.0, share = 1.0;
-  float lambda = multiplier(c, w, k, params.max_correction, a, share);
+#endif
+  Multiplier m = multiplier(c, w, k, params.max_correction, a, share);
+#if COMPLIANT
+  if ((phases & PHASE_FINISH) == 0u) multipliers[number] = before + m.lambda;
 #endif
 #if COUNT_GUARDS
-  if (local_id(record.x, 0) < owned) count_guards(guards_of(c, w, k, params.max_correction, a, share));  // in one patch of those that have it
+  if (local_id(record.x, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
 #endif
   for (int j = 0; j < $ARITY; ++j) {
     uint local = local_id(record.x, j);
-    if (local < owned && lambda != 0.0) {
-      ivec3 quanta = ivec3(round(lambda * w[j] * c.gradient[j] * quanta_per_metre[local]));
+    if (local < owned && m.lambda != 0.0) {
+      ivec3 quanta = ivec3(round(m.lambda * w[j] * c.gradient[j] * quanta_per_metre[local]));
       atomicAdd(sums[3u * local], quanta.x);
       atomicAdd(sums[3u * local + 1u], quanta.y);
       atomicAdd(sums[3u * local + 2u], quanta.z);

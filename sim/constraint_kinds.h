@@ -72,6 +72,12 @@ constexpr void for_each_kind(F&& f) {
   (std::make_index_sequence<kind_count>{});
 }
 
+template <template <class> class Of, class... Kind>
+std::tuple<Of<Kind>...> of_each(std::tuple<Kind...>);
+/// The tuple of Of<Kind> for every kind.
+template <template <class> class Of>
+using OfEachKind = decltype(of_each<Of>(Kinds()));
+
 /// Where a kind stands in the table, and in the settings' arrays by kind.
 template <class Kind>
 constexpr std::size_t index_of = [] {

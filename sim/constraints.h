@@ -18,6 +18,9 @@ struct ConstraintList {
   std::vector<std::uint32_t> vertices;  ///< arity * count
   std::vector<double> rest;
   std::size_t count() const { return rest.size(); }
+  std::span<const std::uint32_t> ends(std::size_t c) const {  ///< of constraint c
+    return std::span(vertices).subspan(c * std::size_t(arity), std::size_t(arity));
+  }
   void add(std::span<const std::uint32_t> vertex, double value) {
     vertices.insert(vertices.end(), vertex.begin(), vertex.end());
     rest.push_back(value);

@@ -35,10 +35,6 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
   return p;
 }
 
-GuardCounts guards_so_far(const Sim& sim) {
-  return sim.solver.guards_on_cpu ? sim.solver.guards_on_cpu() : GuardCounts{};
-}
-
 // Poses near to the state's, and sums of 0; from there on the GPU keeps them.
 void start_clusters(Sim& sim, const State& state) {
   if (!has_clusters(sim)) return;
@@ -208,7 +204,7 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
 void reset(Sim& sim) {
   sim.steps = 0;
   if (sim.guard_counts) sim.guard_counts.clear();
-  sim.guards_read = guards_so_far(sim);
+  sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
   State state{sim.model->positions, sim.model->velocities};
   add_upwards(sim, state, half_substep_fall(sim.settings));
@@ -255,17 +251,13 @@ void apply_settings(Sim& sim, const Settings& settings) {
 void rebuild_shaders(Sim& sim) { remake(sim, sim.settings); }
 
 GuardCounts guard_counts(Sim& sim) {
-  GuardCounts counts{};
-  if (on_cpu(sim)) {
-    counts = guards_so_far(sim);
-    for (std::size_t g = 0; g < GUARDS; ++g) counts[g] -= sim.guards_read[g];
-  } else if (sim.guard_counts) {
+  if (sim.guard_counts) {
     glMemoryBarrier(GL_ATOMIC_COUNTER_BARRIER_BIT);
     const auto now = sim.guard_counts.read_all<GLuint>();
-    for (std::size_t g = 0; g < GUARDS; ++g) counts[g] = sim.guards_read[g] += now[g];
+    for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += now[g];
     sim.guard_counts.clear();
   }
-  return counts;
+  return sim.guards;
 }
 
 State read_state(const Sim& sim) {

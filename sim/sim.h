@@ -44,8 +44,8 @@ struct Sim {
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
-  GuardCounts guards_read{};  ///< GPU: counted as of the last reading; CPU modes: the count at the start
-  FiniteCheck check;          ///< ask check_finite()
+  GuardCounts guards{};  ///< since the last reset; ask guard_counts()
+  FiniteCheck check;     ///< ask check_finite()
 
   const Buffer& current_positions() const { return positions; }
 };

@@ -86,7 +86,8 @@ void step_on_gpu(Sim& sim) {
 
 void step(Sim& sim) {
   if (on_cpu(sim)) {
-    sim.solver.step_on_cpu(sim.host, sim.settings, sim.inverse_masses);
+    const GuardCounts counts = sim.solver.step_on_cpu(sim.host, sim.settings, sim.inverse_masses);
+    for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += counts[g];
     upload(sim, sim.host);
   } else {
     step_on_gpu(sim);

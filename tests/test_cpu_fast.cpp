@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/sim.h"
 #include "sim/solvers/colours.h"
 #include "sim/solvers/cpu_pbd.h"
 #include "sim/solvers/lane_math.h"
-#include "sim/sim.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;
@@ -38,8 +38,7 @@ State reference(const Sim& sim, GuardCounts& guards) {
   for (ConstraintList& list : system.lists) list = coloured(list, sim.model->positions.size()).list;
   CpuPbd<double> pbd(*sim.model, system);
   State state = read_state(sim);
-  pbd.step(state, sim.settings, sim.inverse_masses, Sweep::gauss_seidel);
-  guards = pbd.guards;
+  guards = pbd.step(state, sim.settings, sim.inverse_masses, Sweep::gauss_seidel);
   return state;
 }
 

@@ -99,7 +99,7 @@ TEST_CASE("one projection of one constraint meets it") {
   const double rest = 0.15;
   for (int k = 0; k < 4; ++k) {
     const auto c = Volume::evaluate<double>(tet.data(), rest);
-    const double lambda = Formulas<double>{}.multiplier(c, w, 1, 1e9, 0, 1);
+    const double lambda = Formulas<double>{}.multiplier(c, w, 1, 1e9, 0, 1).lambda;
     for (std::size_t j = 0; j < 4; ++j) tet[j] += lambda * w[j] * c.gradient[j];
   }
   CHECK(Volume::evaluate<double>(tet.data(), rest).C == doctest::Approx(0).epsilon(1e-9));
@@ -113,11 +113,11 @@ TEST_CASE("degenerate shapes give finite corrections") {
       x[j] = shape == 0 ? glm::vec3(0) : glm::vec3(float(j), 0, 0) * (shape == 1 ? 1.0f : 1e-20f);
     const auto tet = Volume::evaluate<float>(x.data(), 0.1f);
     const auto hinge = Bend::evaluate<float>(x.data(), 0.3f);
-    CHECK(std::isfinite(Formulas<float>{}.multiplier(tet, w, 1, 1, 0, 1)));
-    CHECK(std::isfinite(Formulas<float>{}.multiplier(hinge, w, 1, 1, 0, 1)));
+    CHECK(std::isfinite(Formulas<float>{}.multiplier(tet, w, 1, 1, 0, 1).lambda));
+    CHECK(std::isfinite(Formulas<float>{}.multiplier(hinge, w, 1, 1, 0, 1).lambda));
     const auto edge = Stretch::evaluate<float>(x.data(), 0.1f);
     float two[2] = {1, 1};
-    CHECK(std::isfinite(Formulas<float>{}.multiplier(edge, two, 1, 1, 0, 1)));
+    CHECK(std::isfinite(Formulas<float>{}.multiplier(edge, two, 1, 1, 0, 1).lambda));
   }
   // Of an edge that is 5 too short only the lighter end's correction is over the limit: both are shortened
   // alike.
@@ -126,14 +126,14 @@ TEST_CASE("degenerate shapes give finite corrections") {
   auto moved = ends;
   const auto edge = Stretch::evaluate<double>(moved.data(), 6);
   Formulas<double> formulas;
-  CHECK(formulas.multiplier(edge, two, 1, 10, 0, 1) == doctest::Approx(1));
-  CHECK(formulas.multiplier(edge, two, 1, 2.5, 0, 1) * two[0] == doctest::Approx(2.5));
-  CHECK(formulas.guards_of(edge, two, 1, 2.5, 0, 1) == GUARD_LIMIT);
-  CHECK(formulas.guards_of(edge, two, 1, 10, 0, 1) == 0);
+  CHECK(formulas.multiplier(edge, two, 1, 10, 0, 1).lambda == doctest::Approx(1));
+  CHECK(formulas.multiplier(edge, two, 1, 2.5, 0, 1).lambda * two[0] == doctest::Approx(2.5));
+  CHECK(formulas.multiplier(edge, two, 1, 2.5, 0, 1).guards == GUARD_LIMIT);
+  CHECK(formulas.multiplier(edge, two, 1, 10, 0, 1).guards == 0);
   auto none = edge;
   none.C = std::nan("");
-  CHECK(formulas.multiplier(none, two, 1, 10, 0, 1) == 0);
-  CHECK(formulas.guards_of(none, two, 1, 10, 0, 1) == GUARD_NOT_FINITE);
+  CHECK(formulas.multiplier(none, two, 1, 10, 0, 1).lambda == 0);
+  CHECK(formulas.multiplier(none, two, 1, 10, 0, 1).guards == GUARD_NOT_FINITE);
 }
 
 TEST_CASE("guards: what triggers them, and where vertices without a direction go") {
@@ -158,12 +158,12 @@ TEST_CASE("guards: what triggers them, and where vertices without a direction go
   glm::dvec3 sum(0);
   for (const auto& g : tet.gradient) sum += g;
   CHECK(glm::length(sum) < 1e-12);
-  const double lambda = formulas.multiplier(tet, w, 1, 1, 0, 1);
+  const double lambda = formulas.multiplier(tet, w, 1, 1, 0, 1).lambda;
   for (int j = 0; j < 4; ++j) CHECK(glm::length(lambda * w[j] * tet.gradient[j]) < 3 * std::cbrt(rest));
   line[2].y = 0.01;  // a sliver of a triangle: a gradient again, under the floor
   const auto open = Volume::evaluate<double>(line.data(), rest, id);
   CHECK(open.guards == 0);
-  CHECK(formulas.guards_of(open, w, 1, 1e9, 0, 1) == GUARD_FLOOR);
+  CHECK(formulas.multiplier(open, w, 1, 1e9, 0, 1).guards == GUARD_FLOOR);
   std::array<glm::dvec3, 4> point{};
   CHECK(Bend::evaluate<double>(point.data(), 0.0, id).guards == GUARD_HINGE);
   std::array<glm::dvec3, 4> hinge = {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 0),

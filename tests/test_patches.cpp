@@ -77,7 +77,7 @@ TEST_CASE("patches: each constraint in one, on at most 256 vertices") {
   const ConstraintSystem system = build_constraints(model->rest, "stretch,bend,volume");
   for (std::size_t most : {1, 50, 5000}) {
     CAPTURE(most);
-    const Patches patches = constraint_patches(*model, system, most);
+    const Patches patches = constraint_patches(system, most);
     CHECK(patches.chunks.size() == patches.count * patches.chunk_words);
     std::vector<Constraint> found;
     for (std::size_t p = 0; p < patches.count; ++p) {

@@ -55,40 +55,26 @@ Weighted weighted(Constraint4 c, real w[4]) {
   return Weighted(sum, longest, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));
 }
 
-// -C / sum, less where the longest correction, sqrt(longest) times that, exceeds `max_correction`; 0 where that is no number.
-real bounded(real C, real sum, real longest, real max_correction) {
-  real lambda = sum > real(0) ? -C / sum : real(0);
-  real squared = lambda * lambda * longest;
-  if (squared > max_correction * max_correction) lambda *= max_correction / sqrt(squared);
-  return squared * real(0) == real(0) ? lambda : real(0);
-}
-// The guards that bounded() took.
-uint bounded_guards(real C, real sum, real longest, real max_correction) {
-  real lambda = sum > real(0) ? -C / sum : real(0);
-  real squared = lambda * lambda * longest;
-  return squared <= max_correction * max_correction ? 0u : squared * real(0) == real(0) ? GUARD_LIMIT : GUARD_NOT_FINITE;
-}
-
-// The multiplier (method.md eqs. 4, 25-26): lambda w_j grad_j C moves vertex j, by `max_correction` (one body size) at most. XPBD's (Macklin,
-// Mueller and Chentanez 2016), of which PBD's is the one with a = 0 and share = 1: `c.C` is the whole residual,
+// The multiplier (method.md eqs. 4, 25-26): lambda w_j grad_j C moves vertex j, by `max_correction` (one body size) at most. XPBD's
+// (Macklin, Mueller and Chentanez 2016), of which PBD's is the one with a = 0 and share = 1: `c.C` is the whole residual,
 // C + a lambda + gamma (C - C at the substep's start), with a = alpha / h^2 and gamma = tau / h; `share` is (1 + gamma) / omega: the
 // relaxation leaves a alone, so that one iteration of a short substep is right too.
-real multiplier(Constraint2 c, real w[2], real k, real max_correction, real a, real share) {
-  Weighted s = weighted(c, w);
-  return bounded(k * c.C, share * s.sum + a, s.longest, max_correction);
+struct Multiplier {
+  real lambda;  // 0 where it is no number
+  uint guards;  // that it took
+};
+Multiplier bounded(real C, uint guards, Weighted s, real k, real max_correction, real a, real share) {
+  real sum = share * max(s.sum, s.least) + a;
+  real lambda = sum > real(0) ? -(k * C) / sum : real(0);
+  real squared = lambda * lambda * s.longest;
+  bool beyond = squared > max_correction * max_correction, number = squared * real(0) == real(0);
+  if (beyond) lambda *= max_correction / sqrt(squared);
+  if (C != real(0) && s.sum < s.least) guards |= GUARD_FLOOR;
+  return Multiplier(number ? lambda : real(0), guards | (!number ? GUARD_NOT_FINITE : beyond ? GUARD_LIMIT : 0u));
 }
-real multiplier(Constraint4 c, real w[4], real k, real max_correction, real a, real share) {
-  Weighted s = weighted(c, w);
-  return bounded(k * c.C, share * max(s.sum, s.least) + a, s.longest, max_correction);
+Multiplier multiplier(Constraint2 c, real w[2], real k, real max_correction, real a, real share) {
+  return bounded(c.C, c.guards, weighted(c, w), k, max_correction, a, share);
 }
-
-// The guards that such a multiplier took.
-uint guards_of(Constraint2 c, real w[2], real k, real max_correction, real a, real share) {
-  Weighted s = weighted(c, w);
-  return c.guards | bounded_guards(k * c.C, share * s.sum + a, s.longest, max_correction);
-}
-uint guards_of(Constraint4 c, real w[4], real k, real max_correction, real a, real share) {
-  Weighted s = weighted(c, w);
-  uint floored = c.C != real(0) && s.sum < s.least ? GUARD_FLOOR : 0u;
-  return c.guards | floored | bounded_guards(k * c.C, share * max(s.sum, s.least) + a, s.longest, max_correction);
+Multiplier multiplier(Constraint4 c, real w[4], real k, real max_correction, real a, real share) {
+  return bounded(c.C, c.guards, weighted(c, w), k, max_correction, a, share);
 }

@@ -8,7 +8,7 @@ Solver create_constraint_solver(const SolverInput& input) {
   Solver solver;
   // A small mesh needs patches for every part of the GPU.
   const Cut cut = tuned({input.system.count() <= 150000 ? 128u : 256u, 128}, input.tuning);
-  const Patches patches = constraint_patches(input.model, input.system, cut.patch);
+  const Patches patches = constraint_patches(input.system, cut.patch);
   if (patches.count > 0) {
     add_patches(solver, input, patches, "solve_constraint.comp", cut.group);
     solver.iteration.back().bytes += patches.vertices.size() * 2 * 12;  // an atomic reads and writes

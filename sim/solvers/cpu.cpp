@@ -14,9 +14,8 @@ Solver create(const SolverInput& input) {
   const auto pbd = std::make_shared<CpuPbd<real>>(input.model, input.system);
   solver.step_on_cpu = [pbd](State& state, const Settings& settings,
                              const std::vector<double>& inverse_masses) {
-    pbd->step(state, settings, inverse_masses, Sweep::gauss_seidel);
+    return pbd->step(state, settings, inverse_masses, Sweep::gauss_seidel);
   };
-  solver.guards_on_cpu = [pbd] { return pbd->guards; };
   return solver;
 }
 

@@ -14,34 +14,72 @@
 
 namespace tetpbd {
 
-/// The half spaces of a step, n.x >= d as (n, d).
-inline std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings) {
-  std::vector<glm::dvec4> planes = model.obstacles;
-  if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
-  return planes;
-}
+/// What moves a vertex in a substep besides its constraints.
+struct Substep {
+  double h, velocity_scale, friction;
+  glm::dvec3 gravity;
+  std::vector<glm::dvec4> planes;  ///< half spaces n.x >= d as (n, d)
 
-/// A vertex out of all half spaces (eqs. 11-12); `fall`: what prediction moved it by.
-inline glm::dvec3 out_of(const std::vector<glm::dvec4>& planes, glm::dvec3 x, const glm::dvec3& predicted,
-                         const glm::dvec3& fall, double friction) {
-  for (const glm::dvec4& plane : planes) {
-    const glm::dvec3 n(plane);
-    const double depth = glm::dot(n, x) - plane.w;
-    if (depth < 0) x += Formulas<double>{}.plane_correction(n, depth, fall + (x - predicted), friction);
+  Substep(const Model& model, const Settings& settings)
+      : h(settings.dt / settings.substeps),
+        velocity_scale(std::exp(-settings.damping * h)),
+        friction(settings.friction),
+        gravity(0, -settings.gravity, 0),
+        planes(model.obstacles) {
+    if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
   }
-  return x;
-}
-
-/// Constraints of one kind, contiguous, in the order they are projected.
-template <class Kind, class real>
-struct Batch {
-  struct Item {
-    std::array<std::uint32_t, std::size_t(Kind::row.arity)> vertices;
-    real rest;
-  };
-  std::vector<Item> items;
-  std::vector<real> multipliers;  // of compliant constraints, in this substep
+  /// Where prediction moves x (eqs. 1-2); changes v.
+  glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
+    v = (v + h * gravity) * velocity_scale;
+    return x + h * v;
+  }
+  /// x out of all half spaces (eqs. 11-12).
+  glm::dvec3 out_of_planes(glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v) const {
+    for (const glm::dvec4& plane : planes) {
+      const glm::dvec3 n(plane);
+      const double depth = glm::dot(n, x) - plane.w;
+      if (depth < 0) x += Formulas<double>{}.plane_correction(n, depth, h * v + (x - predicted), friction);
+    }
+    return x;
+  }
 };
+
+/// What constraints of a kind share (shaders/constraints/types.glsl, multiplier).
+template <class real>
+struct Rule {
+  real k, limit, a, gamma, share;
+  Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1)
+      : k(real(settings.stiffness[kind])), limit(real(longest)) {
+    const double h = settings.dt / settings.substeps;
+    a = real(settings.compliance[kind] / (h * h));
+    gamma = real(settings.constraint_damping / h);
+    share = (1 + gamma) / real(omega);
+  }
+};
+
+/// Projects one constraint (eqs. 4, 25-26). `vertices` tells of a vertex where it is (at), where it was at
+/// the substep's start (start), its inverse mass (weight), and takes its correction (move).
+template <class Kind, class real, class Vertices>
+void project(const std::uint32_t* ids, real rest, const Rule<real>& rule, real& multiplier,
+             Vertices&& vertices, GuardCounts& guards) {
+  constexpr std::size_t arity = std::size_t(Kind::row.arity);
+  const auto evaluate = [&](auto&& position) {
+    glm::vec<3, real> local[arity];
+    for (std::size_t j = 0; j < arity; ++j) local[j] = glm::vec<3, real>(position(ids[j]) - position(ids[0]));
+    return Kind::template evaluate<real>(local, rest, ids);
+  };
+  auto c = evaluate([&](std::uint32_t v) { return vertices.at(v); });
+  if (rule.gamma > 0)
+    c.C += rule.gamma * (c.C - evaluate([&](std::uint32_t v) { return vertices.start(v); }).C);
+  c.C += rule.a * multiplier;
+  real w[arity];
+  for (std::size_t j = 0; j < arity; ++j) w[j] = vertices.weight(ids[j]);
+  const auto [lambda, triggered] = Formulas<real>{}.multiplier(c, w, rule.k, rule.limit, rule.a, rule.share);
+  multiplier += lambda;
+  for (std::size_t j = 0; lambda != 0 && j < arity; ++j)
+    vertices.move(ids[j], glm::dvec3(lambda * w[j] * c.gradient[j]));
+  for (std::size_t g = 0; triggered && g < GUARDS; ++g) guards[g] += triggered >> g & 1;
+}
 
 /// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
 /// finer: their rounding is what moves the centre of a free body then.
@@ -58,119 +96,85 @@ class CpuPbd {
  public:
   CpuPbd(const Model& model, const ConstraintSystem& system) : model_(model), at_vertex_(system.at_vertex) {
     for_each_kind([&](auto kind, int k) {
-      using Kind = decltype(kind);
-      auto& items = std::get<Batch<Kind, real>>(batches_).items;
+      constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
       const ConstraintList& list = system.lists[std::size_t(k)];
+      auto& items = std::get<Items<decltype(kind)>>(items_);
       items.resize(list.count());
       for (std::size_t c = 0; c < items.size(); ++c) {
-        std::copy_n(list.vertices.begin() + std::ptrdiff_t(c * Kind::row.arity), Kind::row.arity,
-                    items[c].vertices.begin());
+        std::copy_n(list.vertices.data() + c * arity, arity, items[c].vertices.data());
         items[c].rest = real(list.rest[c]);
       }
     });
   }
 
-  /// How often each guard triggered so far.
-  GuardCounts guards{};
-
-  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26), `settings.substeps` substeps.
-  void step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep) {
-    const double h = settings.dt / settings.substeps;
-    const glm::dvec3 gravity(0, -settings.gravity, 0);
-    const std::vector<glm::dvec4> planes = planes_of(model_, settings);
-    const double keep = std::exp(-settings.damping * h);
-    auto& x = state.positions;
-    auto& v = state.velocities;
-    const bool soft = compliant(settings);
-    const bool held = sweep == Sweep::jacobi && settings.clusters > 0 && !soft;
+  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26), `settings.substeps` substeps. Returns
+  /// how often each guard triggered.
+  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
+                   Sweep sweep) {
+    const bool jacobi = sweep == Sweep::jacobi, soft = compliant(settings);
+    const bool held = jacobi && settings.clusters > 0 && !soft;
     const double omega = soft ? 1 : relaxation(settings.omega, held ? settings.clusters : 0);
     if (held && clusters_.rest.empty()) clusters_ = build_clusters(model_);
-    inverse_masses_.assign(inverse_masses.begin(), inverse_masses.end());
+    const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
+    const Substep substep(model_, settings);
+    auto& x = state.positions;
+    auto& v = state.velocities;
+    std::vector<glm::dvec3> start, predicted, sums;
+    std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
+    if (jacobi && (soft || settings.mass_splitting))
+      for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
+    GuardCounts guards{};
+    const Vertices vertices{x, start, weights, jacobi ? sums : x};
     for (int s = 0; s < settings.substeps; ++s) {
-      if (damped(settings)) start_ = x;
-      if (soft)
-        for_each_kind([&](auto kind, int) {
-          auto& batch = std::get<Batch<decltype(kind), real>>(batches_);
-          batch.multipliers.assign(batch.items.size(), 0);
-        });
+      if (damped(settings)) start = x;
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) {
-          v[i] = (v[i] + h * gravity) * keep;
-          x[i] += h * v[i];
-        }
-      predicted_ = x;
+        if (inverse_masses[i] > 0) x[i] = substep.predict(x[i], v[i]);
+      predicted = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
         std::vector<glm::dvec3> pulls;
         if (held) pulls = cluster_pulls(clusters_, x);
-        if (sweep == Sweep::jacobi) deltas_.assign(x.size(), glm::dvec3(0));
-        for_each_kind(
-            [&](auto kind, int k) { project<decltype(kind)>(std::size_t(k), soft, x, settings, sweep); });
+        if (jacobi) sums.assign(x.size(), glm::dvec3(0));
+        for_each_kind([&](auto kind, int k) {
+          const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1);
+          for (auto& item : std::get<Items<decltype(kind)>>(items_)) {
+            if (iteration == 0) item.multiplier = 0;
+            project<decltype(kind)>(item.vertices.data(), item.rest, rule, item.multiplier, vertices, guards);
+          }
+        });
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
-          if (sweep == Sweep::jacobi && at_vertex_[i] > 0) x[i] += deltas_[i] * (omega / at_vertex_[i]);
+          if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
           if (held) x[i] += settings.clusters * pulls[i];
-          x[i] = out_of(planes, x[i], predicted_[i], h * v[i], settings.friction);
+          x[i] = substep.out_of_planes(x[i], predicted[i], v[i]);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) v[i] += (x[i] - predicted_[i]) / h;
+        if (inverse_masses[i] > 0) v[i] += (x[i] - predicted[i]) / substep.h;
     }
+    return guards;
   }
 
  private:
   template <class Kind>
-  void project(std::size_t kind, bool soft, std::vector<glm::dvec3>& x, const Settings& settings,
-               Sweep sweep) {
-    constexpr std::size_t arity = std::size_t(Kind::row.arity);
-    using vec = glm::vec<3, real>;
-    const real k = real(settings.stiffness[kind]);
-    const real limit = real(sweep == Sweep::jacobi ? longest_correction(model_, settings) : model_.size);
-    const bool split = (soft || settings.mass_splitting) && sweep == Sweep::jacobi;
-    const double h = settings.dt / settings.substeps;
-    const real a = soft ? real(settings.compliance[kind] / (h * h)) : 0,
-               gamma = soft ? real(settings.constraint_damping / h) : 0,
-               share = soft ? (1 + gamma) / real(sweep == Sweep::jacobi ? settings.omega : 1) : 1;
-    Formulas<real> formulas;
-    auto& batch = std::get<Batch<Kind, real>>(batches_);
-    for (std::size_t number = 0; number < batch.items.size(); ++number) {
-      const auto& item = batch.items[number];
-      vec local[arity];
-      real w[arity];
-      for (std::size_t j = 0; j < arity; ++j) {
-        local[j] = vec(x[item.vertices[j]] - x[item.vertices[0]]);
-        w[j] = inverse_masses_[item.vertices[j]];
-        if (split) w[j] *= real(at_vertex_[item.vertices[j]]);
-      }
-      auto c = Kind::template evaluate<real>(local, item.rest, item.vertices.data());
-      if (gamma > 0) {
-        vec start[arity];
-        for (std::size_t j = 0; j < arity; ++j)
-          start[j] = vec(start_[item.vertices[j]] - start_[item.vertices[0]]);
-        c.C += gamma * (c.C - Kind::template evaluate<real>(start, item.rest, item.vertices.data()).C);
-      }
-      if (soft) c.C += a * batch.multipliers[number];
-      const real lambda = formulas.multiplier(c, w, k, limit, a, share);
-      const std::uint32_t triggered = formulas.guards_of(c, w, k, limit, a, share);
-      if (soft) batch.multipliers[number] += lambda;
-      for (std::size_t j = 0; lambda != real(0) && j < arity; ++j)
-        (sweep == Sweep::jacobi ? deltas_ : x)[item.vertices[j]] += glm::dvec3(lambda * w[j] * c.gradient[j]);
-      if (triggered)
-        for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
-    }
-  }
-
-  template <class>
-  struct Batches;
-  template <class... Kind>
-  struct Batches<std::tuple<Kind...>> {
-    using type = std::tuple<Batch<Kind, real>...>;
+  struct Item {
+    std::array<std::uint32_t, std::size_t(Kind::row.arity)> vertices;
+    real rest, multiplier;  // the latter in this substep
+  };
+  template <class Kind>
+  using Items = std::vector<Item<Kind>>;  // contiguous, in the order they are projected
+  struct Vertices {
+    const std::vector<glm::dvec3>&x, &starts;
+    const std::vector<real>& weights;
+    std::vector<glm::dvec3>& moved;
+    const glm::dvec3& at(std::uint32_t v) const { return x[v]; }
+    const glm::dvec3& start(std::uint32_t v) const { return starts[v]; }
+    real weight(std::uint32_t v) const { return weights[v]; }
+    void move(std::uint32_t v, const glm::dvec3& by) const { moved[v] += by; }
   };
 
   const Model& model_;
   std::vector<std::uint32_t> at_vertex_;
-  typename Batches<Kinds>::type batches_;
-  std::vector<glm::dvec3> start_, predicted_, deltas_;
-  std::vector<real> inverse_masses_;
+  OfEachKind<Items> items_;
   Clusters clusters_;  // made when they are first asked for
 };
 

@@ -2,53 +2,16 @@
 
 #include <algorithm>
 #include <bit>
-#include <optional>
-#include <span>
+#include <tuple>
 #include <utility>
 
-#include "sim/hilbert.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
 
 namespace {
 
-struct Item {
-  std::uint64_t key;
-  std::uint32_t kind, constraint;
-  auto operator<=>(const Item&) const = default;
-};
-
-// Along a Hilbert curve through the rest shape, by the middle of each constraint.
-std::vector<Item> ordered(const Model& model, const ConstraintSystem& system) {
-  const Bounds box = bounds(model.rest.positions);
-  std::vector<Item> items;
-  for (std::uint32_t k = 0; k < system.lists.size(); ++k) {
-    const ConstraintList& list = system.lists[k];
-    if (!system.present[k]) continue;
-    const std::size_t start = items.size(), arity = std::size_t(list.arity);
-    items.resize(start + list.count());
-    parallel_for(list.count(), [&](std::size_t c) {
-      glm::dvec3 middle(0);
-      for (std::size_t j = 0; j < arity; ++j) middle += model.rest.positions[list.vertices[c * arity + j]];
-      items[start + c] = {hilbert_key(middle / double(arity), box), k, std::uint32_t(c)};
-    });
-  }
-  parallel_sort(std::span(items));
-  return items;
-}
-
 using Record = std::array<std::uint32_t, 2>;
-
-// Consecutive threads take constraints far apart, which seldom meet at a vertex: their additions to its sum
-// would wait for each other.
-void spread(std::vector<Record>& records) {
-  const std::vector<Record> near = std::move(records);
-  records.clear();
-  const std::size_t stride = (near.size() + 31) / 32;
-  for (std::size_t start = 0; start < stride; ++start)
-    for (std::size_t r = start; r < near.size(); r += stride) records.push_back(near[r]);
-}
 
 // A chunk as it is written.
 struct Chunk {
@@ -73,21 +36,18 @@ class ChunkWriter {
   /// False, and nothing done, if it has more vertices than fit.
   bool add(std::size_t kind, std::uint32_t constraint) {
     const ConstraintList& list = system_.lists[kind];
-    const std::size_t arity = std::size_t(list.arity);
-    const std::span of(list.vertices.data() + std::size_t(constraint) * arity, arity);
-    const auto added =
-        std::count_if(of.begin(), of.end(), [&](std::uint32_t v) { return local_[v] == none; });
+    const auto ends = list.ends(constraint);
+    const auto added = std::ranges::count_if(ends, [&](std::uint32_t v) { return local_[v] == none; });
     if (chunk_.vertices.size() + std::size_t(added) > Patches::most_vertices) return false;
     Record record = {0, std::bit_cast<std::uint32_t>(float(list.rest[constraint]))};
-    for (std::size_t j = 0; j < arity; ++j) record[0] |= vertex(of[j]) << (8 * j);
+    for (std::size_t j = 0; j < ends.size(); ++j) record[0] |= vertex(ends[j]) << (8 * j);
     chunk_.records[kind].push_back(record);
     return true;
   }
-  /// The chunk, of whose vertices the first `owned` are owned (all: none given); the next one begins.
-  Chunk close(std::optional<std::size_t> owned = std::nullopt) {
+  /// The chunk; the next one begins. It owns its first vertices, as many as `owned` if it has more.
+  Chunk close(std::size_t owned = Patches::most_vertices) {
     for (std::uint32_t v : chunk_.vertices) local_[v] = none;
-    for (auto& records : chunk_.records) spread(records);
-    chunk_.owned = owned.value_or(chunk_.vertices.size());
+    chunk_.owned = std::min(owned, chunk_.vertices.size());
     return std::exchange(chunk_, {});
   }
 
@@ -125,8 +85,13 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
     for (std::size_t k = 0; k < kind_count; ++k) {
       if (!system.present[k]) continue;
       *words++ = std::uint32_t(result.records.size());
-      *words++ = std::uint32_t(chunk.records[k].size());
-      result.records.insert(result.records.end(), chunk.records[k].begin(), chunk.records[k].end());
+      const std::vector<Record>& records = chunk.records[k];
+      *words++ = std::uint32_t(records.size());
+      // Consecutive threads take constraints far apart, which seldom meet at a vertex: their additions to its
+      // sum would wait for each other.
+      const std::size_t stride = (records.size() + 31) / 32;
+      for (std::size_t start = 0; start < stride; ++start)
+        for (std::size_t r = start; r < records.size(); r += stride) result.records.push_back(records[r]);
     }
     for (std::size_t v = 0; v < result.largest; ++v) {
       const std::uint32_t vertex = chunk.vertices[v < chunk.vertices.size() ? v : 0];
@@ -142,67 +107,22 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
   return result;
 }
 
-// The constraints of one kind on each vertex, in order.
-Grouped constraints_at(const ConstraintList& list, std::size_t vertices) {
-  const std::size_t arity = std::size_t(list.arity);
-  return group_by_key(list.count(), vertices, [&](std::size_t c, const auto& emit) {
-    for (std::size_t j = 0; j < arity; ++j) emit(list.vertices[c * arity + j], std::uint32_t(c));
-  });
-}
-
-// Where patches of at most `own` consecutive vertices begin, and the end: fewer vertices where these and the
-// ones that share a constraint with them would not fit a chunk, and at every `stretch` vertices, between
-// which nothing depends on the rest.
-std::vector<std::size_t> starts_of_patches(const ConstraintSystem& system, const std::vector<Grouped>& at,
-                                           std::size_t own) {
-  constexpr std::size_t stretch = 4096;
-  const std::size_t vertices = system.at_vertex.size();
-  std::vector<std::vector<std::size_t>> of_stretch((vertices + stretch - 1) / stretch);
-  parallel_parts(of_stretch.size(), 1, [&](std::size_t first_stretch, std::size_t end_stretch) {
-    std::vector<std::uint32_t> last(vertices);  // patch that had the vertex last, from 1 on
-    std::uint32_t patch = 0;
-    std::size_t held = 0;
-    const auto add = [&](std::size_t v) {
-      const auto hold = [&](std::size_t u) {
-        if (last[u] != patch) last[u] = patch, ++held;
-      };
-      hold(v);
-      for (std::size_t k = 0; k < system.lists.size(); ++k) {
-        const ConstraintList& list = system.lists[k];
-        const std::size_t arity = std::size_t(list.arity);
-        for (std::size_t i = at[k].first[v]; i < at[k].first[v + 1]; ++i)
-          for (std::size_t j = 0; j < arity; ++j) hold(list.vertices[at[k].values[i] * arity + j]);
-      }
-    };
-    for (std::size_t s = first_stretch; s < end_stretch; ++s) {
-      auto& starts = of_stretch[s];
-      for (std::size_t v = s * stretch; v < std::min(vertices, (s + 1) * stretch); ++v) {
-        if (!starts.empty() && v - starts.back() < own) add(v);
-        if (starts.empty() || v - starts.back() == own || held > Patches::most_vertices) {
-          starts.push_back(v);
-          ++patch;
-          held = 0;
-          add(v);
-        }
-      }
-    }
-  });
-  std::vector<std::size_t> starts;
-  for (const auto& some : of_stretch) starts.insert(starts.end(), some.begin(), some.end());
-  starts.push_back(vertices);
-  return starts;
-}
-
 }  // namespace
 
-Patches constraint_patches(const Model& model, const ConstraintSystem& system, std::size_t most) {
+Patches constraint_patches(const ConstraintSystem& system, std::size_t most) {
+  // In the order of their vertices, which neighbours in space are near to each other in.
+  std::vector<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>> order;  // vertex, kind, constraint
+  for (std::uint32_t k = 0; k < kind_count; ++k)
+    for (std::uint32_t c = 0; c < system.lists[k].count(); ++c)
+      order.emplace_back(std::ranges::min(system.lists[k].ends(c)), k, c);
+  parallel_sort(std::span(order));
   std::vector<std::vector<Chunk>> patches;
   ChunkWriter writer(system);
   std::size_t filled = 0;
-  for (const Item& item : ordered(model, system)) {
-    if (filled == most || !writer.add(item.kind, item.constraint)) {
+  for (const auto& [vertex, kind, constraint] : order) {
+    if (filled == most || !writer.add(kind, constraint)) {
       patches.push_back({writer.close()});
-      writer.add(item.kind, item.constraint);
+      writer.add(kind, constraint);
       filled = 0;
     }
     ++filled;
@@ -213,43 +133,51 @@ Patches constraint_patches(const Model& model, const ConstraintSystem& system, s
 
 Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
   const std::size_t vertices = system.at_vertex.size();
-  std::vector<Grouped> at;
-  for (const ConstraintList& list : system.lists) at.push_back(constraints_at(list, vertices));
-  const std::vector<std::size_t> starts = starts_of_patches(system, at, own);
-  std::vector<std::vector<Chunk>> patches(starts.size() - 1);
-  const auto write_patch = [&](ChunkWriter& writer, std::size_t p, std::vector<std::uint32_t>& found) {
-    const std::size_t first = starts[p], end = starts[p + 1];
-    const auto begin_chunk = [&] {
+  std::array<Grouped, kind_count> at;  // the constraints on each vertex
+  for (std::size_t k = 0; k < kind_count; ++k)
+    at[k] = group_by_key(system.lists[k].count(), vertices, [&](std::size_t c, const auto& emit) {
+      for (std::uint32_t v : system.lists[k].ends(c)) emit(v, std::uint32_t(c));
+    });
+  // A patch of vertices [first, end).
+  const auto patch_of = [&](ChunkWriter& writer, std::size_t first, std::size_t end) {
+    std::vector<Chunk> chunks;
+    const auto own_vertices = [&] {
       for (std::size_t v = first; v < end; ++v) writer.vertex(std::uint32_t(v));
     };
-    begin_chunk();
+    own_vertices();
     for (std::size_t k = 0; k < kind_count; ++k) {
-      const ConstraintList& list = system.lists[k];
-      const std::size_t arity = std::size_t(list.arity);
-      found.clear();
-      for (std::size_t v = first; v < end; ++v)
-        for (std::uint32_t i = at[k].first[v]; i < at[k].first[v + 1]; ++i) {
-          const std::uint32_t c = at[k].values[i];
-          // Taken at the first of the patch's vertices that it has.
-          const auto earlier = [&](std::uint32_t u) { return u >= first && u < v; };
-          const std::uint32_t* of = list.vertices.data() + std::size_t(c) * arity;
-          if (std::none_of(of, of + arity, earlier)) found.push_back(c);
-        }
-      std::sort(found.begin(), found.end());
+      std::vector<std::uint32_t> found(at[k].values.begin() + at[k].first[first],
+                                       at[k].values.begin() + at[k].first[end]);
+      std::ranges::sort(found);
+      found.erase(std::unique(found.begin(), found.end()), found.end());
       for (std::uint32_t c : found) {
         if (writer.add(k, c)) continue;
-        patches[p].push_back(writer.close(end - first));
-        begin_chunk();
+        chunks.push_back(writer.close(end - first));
+        own_vertices();
         writer.add(k, c);
       }
     }
-    patches[p].push_back(writer.close(end - first));
+    chunks.push_back(writer.close(end - first));
+    return chunks;
   };
-  parallel_parts(patches.size(), 64, [&](std::size_t begin, std::size_t end) {
+  // Parts of so many vertices are cut for themselves, whoever cuts them. A patch has fewer than `own`
+  // vertices where these and the ones that share a constraint with them would not fit a chunk.
+  constexpr std::size_t part = 4096;
+  std::vector<std::vector<std::vector<Chunk>>> of_part((vertices + part - 1) / part);
+  const auto cut = [&](std::size_t first_part, std::size_t end_part) {
     ChunkWriter writer(system);
-    std::vector<std::uint32_t> found;
-    for (std::size_t p = begin; p < end; ++p) write_patch(writer, p, found);
-  });
+    for (std::size_t p = first_part; p < end_part; ++p)
+      for (std::size_t v = p * part, end = std::min(v + part, vertices), taken = 0; v < end; v += taken) {
+        taken = std::min(own, end - v);
+        auto chunks = patch_of(writer, v, v + taken);
+        for (; chunks.size() > 1 && taken > 1; chunks = patch_of(writer, v, v + taken))
+          taken -= (taken + 15) / 16;
+        of_part[p].push_back(std::move(chunks));
+      }
+  };
+  parallel_parts(of_part.size(), 1, cut);
+  std::vector<std::vector<Chunk>> patches;
+  for (auto& some : of_part) std::ranges::move(some, std::back_inserter(patches));
   return assemble(system, patches);
 }
 

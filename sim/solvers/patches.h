@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "sim/constraints.h"
-#include "sim/model.h"
 
 namespace tetpbd {
 
@@ -28,7 +27,7 @@ struct Patches {
 };
 
 /// Each constraint in one patch of at most `most`; all its vertices are owned.
-Patches constraint_patches(const Model& model, const ConstraintSystem& system, std::size_t most);
+Patches constraint_patches(const ConstraintSystem& system, std::size_t most);
 
 /// Patches of at most `own` consecutive vertices, which are owned, and of all constraints on these: a
 /// constraint is in each patch that has a vertex of it. `own` is at most most_vertices - 4.

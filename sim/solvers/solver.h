@@ -46,8 +46,7 @@ struct Solver {
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
   Clusters clusters;     ///< none but where passes keep sums for them
   Buffer cluster_sums;   ///< three sets: read, added to, cleared, by turns
-  std::function<void(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
-  std::function<GuardCounts()> guards_on_cpu;  ///< counted so far; none where the mode does not count
+  std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };
 
 /// A pass in a substep, and the phases (layout.glsl PHASE_) it goes through.

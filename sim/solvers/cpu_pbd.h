@@ -60,8 +60,8 @@ struct Rule {
 /// Projects one constraint (eqs. 4, 25-26). `vertices` tells of a vertex where it is (at), where it was at
 /// the substep's start (start), its inverse mass (weight), and takes its correction (move).
 template <class Kind, class real, class Vertices>
-void project(const std::uint32_t* ids, real rest, const Rule<real>& rule, real& multiplier,
-             Vertices&& vertices, GuardCounts& guards) {
+[[gnu::always_inline]] inline void project(const std::uint32_t* ids, real rest, const Rule<real>& rule,
+                                           real& multiplier, Vertices&& vertices, GuardCounts& guards) {
   constexpr std::size_t arity = std::size_t(Kind::row.arity);
   const auto evaluate = [&](auto&& position) {
     glm::vec<3, real> local[arity];
@@ -78,7 +78,8 @@ void project(const std::uint32_t* ids, real rest, const Rule<real>& rule, real& 
   multiplier += lambda;
   for (std::size_t j = 0; lambda != 0 && j < arity; ++j)
     vertices.move(ids[j], glm::dvec3(lambda * w[j] * c.gradient[j]));
-  for (std::size_t g = 0; triggered && g < GUARDS; ++g) guards[g] += triggered >> g & 1;
+  if (triggered)
+    for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
 }
 
 /// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "sim/hilbert.h"
+#include "sim/model.h"
 #include "sim/parallel.h"
 #include "sim/solvers/patches.h"
 

@@ -15,7 +15,7 @@ namespace tetpbd {
 namespace {
 
 void refuse_contact(const ReferenceInput& input, const Points& positions) {
-  const std::vector<glm::dvec4> planes = Substep(input.model, input.settings).planes;
+  const std::vector<glm::dvec4> planes = planes_of(input.model, input.settings);
   for (std::size_t i = 0; i < positions.size(); ++i)
     for (const glm::dvec4& plane : planes)
       if (input.inverse_masses[i] > 0 && glm::dot(glm::dvec3(plane), positions[i]) < plane.w)

@@ -14,6 +14,13 @@
 
 namespace tetpbd {
 
+/// The half spaces of a step, n.x >= d as (n, d).
+inline std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings) {
+  std::vector<glm::dvec4> planes = model.obstacles;
+  if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
+  return planes;
+}
+
 /// What moves a vertex in a substep besides its constraints.
 struct Substep {
   double h, velocity_scale, friction;
@@ -25,9 +32,7 @@ struct Substep {
         velocity_scale(std::exp(-settings.damping * h)),
         friction(settings.friction),
         gravity(0, -settings.gravity, 0),
-        planes(model.obstacles) {
-    if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
-  }
+        planes(planes_of(model, settings)) {}
   /// Where prediction moves x (eqs. 1-2); changes v.
   glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
     v = (v + h * gravity) * velocity_scale;

@@ -45,12 +45,9 @@ TEST_CASE("a guard that does not trigger changes no bit") {
     replace("constraints/bend.glsl", "clamp(apply_dead_zone(turn, noise), real(-1), real(1))",
             "apply_dead_zone(turn, noise)");
     replace("constraints/volume.glsl", "if (sum <= real(1e-10) * c.floor) {", "if (false) {");
-    replace("constraints/types.glsl", "share * max(s.sum, s.least) + a, s.longest, max_correction);",
-            "share * s.sum + a, s.longest, max_correction);");
-    replace("constraints/types.glsl",
-            "if (squared > max_correction * max_correction) lambda *= max_correction / sqrt(squared);", "");
-    replace("constraints/types.glsl", "return squared * real(0) == real(0) ? lambda : real(0);",
-            "return lambda;");
+    replace("constraints/types.glsl", "share * max(s.sum, s.least) + a", "share * s.sum + a");
+    replace("constraints/types.glsl", "if (beyond) lambda *= max_correction / sqrt(squared);", "");
+    replace("constraints/types.glsl", "Multiplier(number ? lambda : real(0), ", "Multiplier(lambda, ");
     set_shader_folder(folder.string());
     const std::uint64_t without = run(false);
     set_shader_folder("");

@@ -11,7 +11,6 @@
 #include "app/sweep.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/solvers/clusters.h"
 
 namespace tetpbd {
 
@@ -25,7 +24,7 @@ std::vector<Settings> candidates(const Settings& settings) {
   Settings base = settings;
   set_mode(base, "node", "auto");
   base.iterations = 1;
-  if (compliant(settings)) return {base};  // neither over-relaxation nor clusters apply
+  if (compliant(settings)) return {base};  // over-relaxation does not apply
   std::vector<Settings> all;
   for (double omega : {1.5, 2.5}) {
     base.omega = omega;
@@ -34,15 +33,6 @@ std::vector<Settings> candidates(const Settings& settings) {
   if (!base.mass_splitting) {
     all.push_back(base);
     all.back().mass_splitting = true;
-  }
-  // Clusters pull to the rest shape: right only where that is what the constraints ask for.
-  bool keeps_shape = uses(settings, Stretch::row);
-  for (std::size_t k = 0; k < kind_count; ++k)
-    keeps_shape = keeps_shape && (!uses(settings, constraint_kinds[k]) || settings.stiffness[k] == 1);
-  if (keeps_shape) {
-    base.omega = 1.5;
-    set_mode(base, "node+clusters", "auto");
-    all.push_back(base);
   }
   return all;
 }
@@ -102,10 +92,10 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     if (choice.trials[t].loss_percent < 0.99 * choice.trials[choice.best].loss_percent) choice.best = t;
   }
   // Where nothing was lost the trials say nothing: a body that has not fallen yet, a machine too slow to wait
-  // for it. Clusters, which come last, were best wherever something was.
+  // for it. Then the first of them is taken.
   choice.lost_nothing = std::ranges::all_of(
       choice.trials, [](double loss) { return loss < 0.01; }, &SolverTrial::loss_percent);
-  if (choice.lost_nothing && choice.trials.back().settings.clusters > 0) choice.best = runs.size() - 1;
+  if (choice.lost_nothing) choice.best = 0;
   return choice;
 }
 
@@ -124,16 +114,16 @@ std::string describe(const SolverChoice& choice) {
   const std::string loss = choice.lost_nothing
                                ? fmt::format("none lost volume in {} steps", choice.steps)
                                : fmt::format("loss {:.3g} % over {} steps", best.loss_percent, choice.steps);
-  return fmt::format("{}, {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {}", mode_word(s),
-                     s.substeps, s.substeps == 1 ? "" : "s", effective_omega(s),
-                     s.mass_splitting ? ", masses split" : "", best.ms, choice.budget_ms, loss);
+  return fmt::format("{}, {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {}", s.mode, s.substeps,
+                     s.substeps == 1 ? "" : "s", s.omega, s.mass_splitting ? ", masses split" : "", best.ms,
+                     choice.budget_ms, loss);
 }
 
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {
   ordered_json trials = ordered_json::array();
   for (const SolverTrial& trial : choice.trials)
-    trials.push_back({{"mode", mode_word(trial.settings)},
-                      {"omega", effective_omega(trial.settings)},
+    trials.push_back({{"mode", trial.settings.mode},
+                      {"omega", trial.settings.omega},
                       {"mass_splitting", trial.settings.mass_splitting},
                       {"iterations", trial.settings.iterations},
                       {"substeps", trial.settings.substeps},

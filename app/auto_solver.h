@@ -30,14 +30,13 @@ struct Scene;
 
 /// The budget without --budget-ms: a tenth of the time that a step simulates.
 double default_budget_ms(const Settings& settings);
-/// Tries mode node, one iteration a substep: averaged with two over-relaxations, with masses split and, where
-/// all constraints are hard and edges are among them, with shape-matching clusters. Everything else stays as
-/// in `settings`. Takes a second or so on a GPU; needs a GL context.
+/// Tries mode node, one iteration a substep: averaged with two over-relaxations, with masses split.
+/// Everything else stays as in `settings`. Takes a second or so on a GPU; needs a GL context.
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
                            double budget_ms, long steps);
 /// For a scene that asks for it: over its first 400 steps at most. The scene then has the settings chosen.
 std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model);
-/// "node+clusters, 12 substeps, omega 1.5: 0.143 ms of 0.15 ms a step, loss 1.1 % over 400 steps"
+/// "node, 17 substeps, omega 2.5: 0.143 ms of 0.15 ms a step, loss 2.4 % over 400 steps"
 std::string describe(const SolverChoice& choice);
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice);
 

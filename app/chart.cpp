@@ -133,8 +133,7 @@ std::string palette_colour(std::size_t index) {
 std::string mode_colour(const std::string& mode) {
   for (std::size_t i = 0; i < solver_modes().size(); ++i)
     if (mode == solver_modes()[i].name) return palette_colour(i);
-  if (mode == "node+clusters") return palette_colour(solver_modes().size());
-  return mode.starts_with("node+clusters") ? "#7a3e9d" : "#222222";
+  return "#222222";
 }
 
 std::string to_svg(const Chart& chart) {

@@ -128,8 +128,8 @@ int print_explanation(Scene scene, int gpu) {
   if (const auto choice = choose_for(scene, model)) fmt::print("solver: {}\n", describe(*choice));
   const Sim sim = create_sim(model, scene.settings);
   const Explanation e = explain(sim);
-  fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, mode_word(sim.settings),
-             model->positions.size(), model->rest.tets.size());
+  fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),
+             model->rest.tets.size());
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
     if (sim.system.present[k]) fmt::print(", {} {}", sim.system.lists[k].count(), constraint_kinds[k].name);
   fmt::print("\n\n{:<52}{:>14}\n", "buffer", "bytes");

@@ -83,7 +83,7 @@ int run_compare(const CompareOptions& options);
 /// scene has iterations. Steps 0: the scene's duration.
 int run_hard_cases(const CompareOptions& options);
 inline const std::vector<std::string> hard_case_modes{
-    "node", "constraint", "node-substeps", "node+clusters-substeps", "cpu", "cpu-double"};
+    "node", "constraint", "node-substeps", "cpu", "cpu-double"};
 /// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
 /// 5 % of the run's `steps` at least: what is good for less long may be passing through.
 std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);

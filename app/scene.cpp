@@ -248,7 +248,7 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   const std::string name = overrides.solver.empty() && overrides.budget_ms ? "auto" : overrides.solver;
   if (name == "auto") {
     for (const auto& [parameter, text] : overrides.parameters)
-      for (const char* chosen : {"mode", "iterations", "substeps", "omega", "clusters"})
+      for (const char* chosen : {"mode", "iterations", "substeps", "omega"})
         if (parameter == chosen)
           throw Error(fmt::format("--solver auto chooses {} itself", chosen),
                       flag_name(*find_parameter(parameter)), "leave out one of the two");

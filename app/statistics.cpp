@@ -84,7 +84,7 @@ ordered_json setting_json(const Scene& scene, const Model& model, const Settings
   std::string kinds = settings.constraints;
   std::ranges::replace(kinds, ',', '+');
   return {{"scene", scene.name},
-          {"mode", mode_word(settings)},
+          {"mode", settings.mode},
           {"omega", settings.omega},
           {"constraints", kinds},
           {"iterations", settings.iterations},
@@ -119,7 +119,6 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
   if (choice) j["solver_choice"] = solver_choice_json(*choice);
-  j["solver"] = {{"omega", effective_omega(sim.settings)}};
   const MeshReport mesh = report(sim.model->rest);
   j["mesh"] = {{"vertices", mesh.vertices},
                {"surface_triangles", mesh.surface_triangles},

@@ -14,7 +14,6 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/solvers/clusters.h"
 
 namespace tetpbd {
 
@@ -114,8 +113,6 @@ ordered_json measured(const Sweep& sweep, const Shards& part) {
 
 }  // namespace
 
-double effective_omega(const Settings& settings) { return relaxation(settings.omega, settings.clusters); }
-
 std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   std::vector<Settings> all{base};
   const auto vary = [&](const auto& values, const auto& set) {
@@ -134,12 +131,6 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   });
   vary(axes.modes, [](Settings& s, const std::string& mode) { set_mode(s, mode, "--modes"); });
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
-  std::vector<Settings> distinct;  // two omegas beyond what clusters allow are one
-  for (Settings& settings : all) {
-    settings.omega = effective_omega(settings);
-    if (std::ranges::find(distinct, settings) == distinct.end()) distinct.push_back(settings);
-  }
-  all = distinct;
   vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
   vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });
   return all;

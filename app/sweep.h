@@ -21,10 +21,8 @@ struct Axes {
   std::vector<double> omegas{};
   std::vector<int> iterations{}, substeps{};
 };
-/// Every combination, the last of the lists varying fastest, with the omega that acts. Throws Error.
+/// Every combination, the last of the lists varying fastest. Throws Error.
 std::vector<Settings> combinations(const Settings& base, const Axes& axes);
-/// The over-relaxation that acts: shape-matching clusters bound it.
-double effective_omega(const Settings& settings);
 
 /// A row is an object with the columns' keys: text, true or false, numbers (written as null where not
 /// finite), or {"median": number, ...}.

@@ -5,7 +5,7 @@ docs/make_tables.py fronts R DATE: speed against error, and the paper's experime
 
   for s in bunny-drop armadillo-drop dragon-drop bunny-100k.json; do
     c() { tetpbd compare --scene $s --steps 200 --out R/c/${s%-drop}_$n "$@"; n=$((n + 1)); }; n=1
-    c --modes node,node+clusters,node+clusters-0.8 --iterations 1 --substeps 1,2,3,5,7,10,12,15,20,30,50,100
+    c --modes node --iterations 1 --substeps 1,2,3,5,7,10,12,15,20,30,50,100
     c --modes node --iterations 1 --substeps 5,10,20,50 --omegas 2.5
     c --modes node,constraint --iterations 5,25 --substeps 1,5,20
     c --modes constraint --iterations 1 --substeps 1,5,10,20
@@ -23,13 +23,9 @@ docs/make_tables.py performance B/bench.json S/bench.json ...: what a step costs
     --sizes 640x480,1280x720 --most-seconds 0.5 --out B
   tetpbd bench --scenes bunny-100k.json,... --modes node,constraint,paper --iterations 25 --no-render \\
     --constraint-sets stretch+bend+volume --frames 20 --warm-up 5 --most-seconds 1 --out S
-  tetpbd bench --scenes bunny-drop,armadillo-drop,dragon-drop,bunny-100k.json --modes node,node+clusters-0.8,paper \\
-    --iterations 1 --substeps 10 --constraint-sets stretch+bend+volume --frames 200 --repeats 3 --most-seconds 0.5 \\
-    --no-render --out H
-
   block-N is beam.json with N x N x N cells; bunny-N is bunny-drop with bunny_50k.ply, tetgen pYq1.414o/140aV
   (V = 9e-6, 1.5e-6, 3.53e-7, 1.175e-7 for 100k, 300k, 1M, 3M; 100k has 161k tets) and "deform": "stretch:1.1"
-  (not in H), so that constraints have something to do from the first step on.
+  so that constraints have something to do from the first step on.
 
 docs/make_tables.py stability NOTE FOLDER ...: the hard cases; a later folder's row replaces an earlier one's
 
@@ -85,7 +81,7 @@ def fronts(source, date):
             good = min((o["ms"] for o in ours if o["lost"] <= r["lost"]), default=None)
             less = "–" if within is None else f"{'over ' * (within < 0.01)}{r['lost'] / max(within, 0.01):.0f}"
             lines.append(common(r) + [less, "–" if good is None else f"{r['ms'] / good:.0f}"])
-        out.append("Against each setting of `paper` and `cpu-fast`, the best of mode `node` (with clusters or without): how many times less "
+        out.append("Against each setting of `paper` and `cpu-fast`, the best of mode `node`: how many times less "
                    "net volume loss in no more time (below 0.01 % counts as 0.01), how many times faster at no more loss:\n")
         out.append(table(["against", *head, "times less error", "times faster"], lines))
     heading = "## The paper's experiments"
@@ -150,7 +146,7 @@ def performance(*files):
 
 
 def stability(note, *folders):
-    modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps", "node+clusters-substeps", "node+clusters-0.8-substeps"]
+    modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps"]
     rows = {}
     for folder in folders:
         for r in json.load(open(pathlib.Path(folder) / "stability.json"))["rows"]:

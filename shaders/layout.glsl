@@ -23,26 +23,6 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
-// A shape-matching cluster (sim/solvers/clusters.h). S: sum of weight times steps times steps about their mean; matrices as diagonal and (yz, xz, xy).
-struct Cluster {
-  vec3 node;              // cells of its body's lattice
-  float weight;           // all its vertices', at most 2^22
-  vec3 centre;            // of these, cells
-  float steps_per_metre;  // of arms from the centre, at most 2^14 steps
-  vec3 cell;              // m, sides of a cell
-  uint owner;             // the patch that writes its pose
-  vec3 steps;             // sum of weight times steps
-  uint number;            // of the cluster; ~0: none
-  vec3 squares;           // S
-  float _3;
-  vec3 products;
-  float _4;
-  vec3 inverse_squares;   // (tr S - S)^-1
-  float _5;
-  vec3 inverse_products;
-  float _6;
-};
-
 #define MAX_PLANES 8
 // Everything of a step that does not change within it (a uniform block, std140).
 struct Step {
@@ -60,10 +40,10 @@ struct Step {
   float inverse_quantum;    // 1/m
   float quantized_size;     // m, the size whose rounding is one quantum (constraints/types.glsl)
   float mass_splitting;     // 1: neighbours see n_i w_i, not w_i
-  float cluster_strength;   // share of the way that clusters pull in an iteration
   float damping;            // of constraints over h, gamma (with compliance)
   float soft_omega;         // over-relaxation with compliance (`omega` is 1 then)
   float _0;
+  float _1;
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind
@@ -84,9 +64,8 @@ struct Step {
 #define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v
 #define PHASE_SOLVE 2u    // corrections, then contacts
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
-#define PHASE_SUMS 8u     // nothing but the clusters' sums, of positions as they are
 
-// Storage bindings of the simulation; a kernel has 8 at most, but for those with clusters.
+// Storage bindings of the simulation; a kernel has 8 at most.
 #define BIND_POSITIONS 0
 #define BIND_VELOCITIES 1
 #define BIND_PREDICTED 2
@@ -97,12 +76,8 @@ struct Step {
 #define BIND_MULTIPLIERS 7    // with compliance, of each of the patches' records
 #define BIND_SUMS 8           // constraint modes: sums of corrections
 #define BIND_RECORDS 9        // mode paper: of one constraint kind
-#define BIND_CLUSTERS 10      // sim/solvers/clusters.h
-#define BIND_CLUSTER_REST 11
-#define BIND_CLUSTER_SUMS 12
-#define BIND_CHECKPOINT_FROM 13
-#define BIND_CHECKPOINT_TO 14
-#define CLUSTER_ROW 48        // words of a cluster in each set of sums (clusters.glsl)
+#define BIND_CHECKPOINT_FROM 10
+#define BIND_CHECKPOINT_TO 11
 // Uniform blocks.
 #define BIND_STEP 0
 // Atomic counters.

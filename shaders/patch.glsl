@@ -9,7 +9,7 @@ layout(std430, binding = BIND_PATCHES) restrict readonly buffer Patches { uvec2 
 layout(std430, binding = BIND_MULTIPLIERS) restrict buffer Multipliers { float multipliers[]; };  // of records, in this substep
 shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
 #endif
-shared ivec4 local_positions[LOCAL_ROOM];  // quantized
+shared ivec4 local_positions[MAX_VERTICES];  // quantized
 shared uint global_ids[MAX_VERTICES];
 shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];

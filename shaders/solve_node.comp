@@ -7,9 +7,6 @@
 layout(local_size_x = GROUP_SIZE) in;
 #include "vertex.glsl"
 #include "patch.glsl"
-#if CLUSTERS
-#include "clusters.glsl"
-#endif
 
 void main() {
   uint lane = gl_LocalInvocationIndex;
@@ -19,18 +16,11 @@ void main() {
   bool mine = lane < owned;
 
   // Gather: the sum of all corrections on a vertex, over their number, times omega (method.md eqs. 4, 13).
-#if CLUSTERS
-  load_clusters(group_index(), chunk.first, owned);
-#endif
   if (solves) {
     clear_sums();
     load_chunk(chunk.number);
   }
   barrier();
-#if CLUSTERS
-  find_poses();  // while others evaluate constraints
-  if (!solves) barrier();
-#endif
   vec3 correction = vec3(0.0);
   if (solves) {
     project_chunk(chunk, exists);
@@ -44,30 +34,16 @@ void main() {
     }
 #endif
     if (mine) correction = vec3(sums[3u * lane], sums[3u * lane + 1u], sums[3u * lane + 2u]) * (params.correction_quantum * params.omega);
-#if CLUSTERS
-    correction += params.cluster_strength * cluster_pull(chunk.first, owned);
-#endif
   }
 
   // Move: prediction before the first iteration of a substep, contacts in each, velocity after the last (eqs. 1-2, 5, 11-13).
   if (mine) {  // read here only: fewer registers while constraints are evaluated
-    ivec4 seen = quantized[i];
-    if ((phases & PHASE_SUMS) != 0u) {
-      quantized_out[i] = seen;
-    } else {
-      Velocity speed;
-      if ((phases & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
-      seen = advance(i, positions[i], speed, correction);
-    }
+    Velocity speed;
+    if ((phases & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
+    advance(i, positions[i], speed, correction);
 #if COMPLIANT
     if (params.damping > 0.0 && (phases & PHASE_FINISH) == 0u)
       quantized_out[params.vertex_count + i] = quantized[params.vertex_count + i];
 #endif
-#if CLUSTERS
-    local_positions[lane] = seen;
-#endif
   }
-#if CLUSTERS
-  add_to_clusters(group_index(), owned);
-#endif
 }

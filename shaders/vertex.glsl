@@ -84,9 +84,9 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   if (finishes) x = predict_position(x, predict_velocity(v));
   return x;
 }
-// Reads and writes vertex i alone; returns what its neighbours see of it. `own`: its position; `speed`: its velocity, read if the phases
+// Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases
 // predict or finish.
-ivec4 advance(uint i, Position own, Velocity speed, vec3 correction) {
+void advance(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) {
     x = moved(i, own, speed, correction);
@@ -96,7 +96,5 @@ ivec4 advance(uint i, Position own, Velocity speed, vec3 correction) {
     if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
   }
-  ivec4 seen = quantize(x, weight_of(own));
-  quantized_out[i] = seen;
-  return seen;
+  quantized_out[i] = quantize(x, weight_of(own));
 }

@@ -120,7 +120,7 @@ void measure(Metrics& m, const Sim& sim) {
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
-  sim.current_positions().bind_storage(BIND_M_POSITIONS);
+  sim.positions.bind_storage(BIND_M_POSITIONS);
   sim.velocities.bind_storage(BIND_M_VELOCITIES);
   m.rest.bind_storage(BIND_M_REST);
   for (std::size_t k = 0; k < m.records.size(); ++k) m.records[k].bind_storage(BIND_M_STRETCH + int(k));

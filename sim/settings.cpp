@@ -42,9 +42,6 @@ const std::vector<Parameter>& parameters() {
         {"mass_splitting", "solver", &S::mass_splitting,
          "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
          "with compliance always"},
-        {"clusters", "solver", &S::clusters,
-         "how far shape-matching clusters pull towards the rest shape per iteration, 0.4 to 0.8: for hard "
-         "bodies alone (mode node, stretch in use, every k 1, no compliance)"},
         {"iterations", "solver", &S::iterations, "iterations per substep", 0, 100000, "", true},
         {"substeps", "solver", &S::substeps, "substeps per step", 1, 100000, "", true},
         {"dt", "solver", &S::dt, "time of one step", 1e-6, 1, "s", true},
@@ -158,34 +155,18 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
   });
 }
 
-constexpr double usual_clusters = 0.4;
-
 void set_mode(Settings& settings, const std::string& word, const std::string& where) {
-  const std::string with = "node+clusters";
-  const bool clusters = word.starts_with(with);
-  settings.mode = clusters ? "node" : word;
-  settings.clusters = clusters ? usual_clusters : 0;
-  if (clusters && word.starts_with(with + "-"))
-    set_parameter(settings, *find_parameter("clusters"), word.substr(with.size() + 1), where);
-  else if (!find_solver_mode(settings.mode) || (clusters && word != with))
-    refuse(*find_parameter("mode"), "'" + word + "'", where,
-           fmt::format("choose from {}, {}", fmt::join(choices(*find_parameter("mode")), ", "), with));
-}
-
-std::string mode_word(const Settings& settings) {
-  if (settings.clusters == 0) return settings.mode;
-  return settings.mode + "+clusters" +
-         (settings.clusters == usual_clusters ? "" : fmt::format("-{:g}", settings.clusters));
+  const Parameter& row = *find_parameter("mode");
+  if (!find_solver_mode(word))
+    refuse(row, "'" + word + "'", where, fmt::format("choose from {}", fmt::join(choices(row), ", ")));
+  settings.mode = word;
 }
 
 const std::vector<SolverPreset>& solver_presets() {
   static const std::vector<SolverPreset> rows = {
       {"paper", "25 iterations a step, averaged",
-       "mode=node,iterations=25,substeps=1,omega=1.5,clusters=0,mass_splitting=false"},
-      {"substeps", "20 substeps of 1 iteration", "mode=node,iterations=1,substeps=20,omega=1.5,clusters=0"},
-      {"hard",
-       "10 substeps of 1 iteration with shape-matching clusters: the least net volume loss for hard bodies",
-       "mode=node,iterations=1,substeps=10,omega=1.5,clusters=0.4"},
+       "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false"},
+      {"substeps", "20 substeps of 1 iteration", "mode=node,iterations=1,substeps=20,omega=1.5"},
   };
   return rows;
 }
@@ -226,17 +207,6 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");
-  if (settings.clusters == 0) return;
-  // Clusters pull to the rest shape, which is the answer only where every constraint is to be met.
-  const auto no_handles = [&](const std::string& why) {
-    throw Error("'clusters' are for hard bodies: " + why, where, "set clusters to 0");
-  };
-  if (!mode.clusters) no_handles("mode " + settings.mode + " has none");
-  if (compliant(settings)) no_handles("compliance or constraint_damping is above 0");
-  if (!uses(settings, Stretch::row)) no_handles("stretch is left out");
-  for (std::size_t k = 0; k < kind_count; ++k)
-    if (uses(settings, constraint_kinds[k]) && settings.stiffness[k] < 1)
-      no_handles(fmt::format("k_{} is below 1", constraint_kinds[k].name));
 }
 
 }  // namespace tetpbd

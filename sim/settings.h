@@ -24,7 +24,6 @@ struct Settings {
   double constraint_damping = 0;
   double omega = 1.5;
   bool mass_splitting = false;
-  double clusters = 0;
   int iterations = 1;
   int substeps = 20;
   double dt = 0.005;
@@ -83,10 +82,8 @@ std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
 /// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of
 /// them.
 std::vector<std::string> choices(const Parameter& parameter);
-/// A mode as sweeps name it: "node+clusters" is mode node with clusters of strength 0.4, "node+clusters-0.8"
-/// of another. Also the modes that are not offered elsewhere. Throws Error naming `where` if there is none.
+/// Also the modes that are not offered elsewhere. Throws Error naming `where` if there is none.
 void set_mode(Settings& settings, const std::string& word, const std::string& where);
-std::string mode_word(const Settings& settings);
 
 /// A way to solve, by name: what --solver puts in place of the scene's settings.
 struct SolverPreset {

@@ -35,34 +35,15 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
   return p;
 }
 
-// Poses near to the state's, and sums of 0; from there on the GPU keeps them.
-void start_clusters(Sim& sim, const State& state) {
-  if (!has_clusters(sim)) return;
-  const std::vector<ClusterPose> poses = cluster_poses(sim.solver.clusters, state.positions);
-  std::vector<std::uint32_t> words(3 * CLUSTER_ROW * poses.size());
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    std::uint32_t* row = words.data() + (sim.cluster_set * poses.size() + k) * CLUSTER_ROW;
-    const glm::mat3 R(poses[k].R);
-    std::memcpy(row + 36, &R, sizeof R);
-    for (int a = 0; a < 3; ++a) {
-      const double quanta = std::round(poses[k].place[a] / sim.quantum);
-      const double rest = std::isfinite(quanta) ? std::fmod(quanta, 4294967296.0) : 0;
-      row[45 + a] = std::uint32_t(std::int64_t(rest));
-    }
-  }
-  sim.solver.cluster_sums.write(0, sim.solver.cluster_sums.bytes(), words.data());
-}
-
 void write_step_block(Sim& sim) {
   const Settings& s = sim.settings;
-  const double h = s.dt / s.substeps, strength = has_clusters(sim) ? s.clusters : 0;
+  const double h = s.dt / s.substeps;
   const bool soft = compliant(s);
   Step block{};
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
   block.h = float(h);
   block.inverse_h = float(1 / h);
-  block.cluster_strength = float(strength);
-  block.omega = soft ? 1.0f : float(relaxation(s.omega, strength));
+  block.omega = soft ? 1.0f : float(s.omega);
   block.soft_omega = float(s.omega);
   block.friction = float(s.friction);
   block.velocity_scale = float(std::exp(-s.damping * h));
@@ -129,12 +110,12 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  const bool soft = compliant(settings), clusters = settings.clusters > 0;
+  const bool soft = compliant(settings);
   const std::size_t count = sim.model->positions.size();
   sim.predict = {Program::compute("predict.comp", {}, {soft ? "COMPLIANT 1" : "COMPLIANT 0"}),
                  work_groups(count, group_size), count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.solver = find_solver_mode(settings.mode)
-                   ->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft, clusters});
+                   ->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft});
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
     return Buffer(label, bytes);
@@ -225,16 +206,13 @@ void write_state(Sim& sim, const State& state) {
   if (on_cpu(sim)) sim.host = state;
   upload(sim, state);
   sim.quantum = quantum_of(sim, state);
-  start_clusters(sim, state);
   write_step_block(sim);
   start_check(sim, &state);
 }
 
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
-  const auto made_for = [](const Settings& s) {
-    return std::tuple(s.mode, s.constraints, s.clusters > 0, compliant(s));
-  };
+  const auto made_for = [](const Settings& s) { return std::tuple(s.mode, s.constraints, compliant(s)); };
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
   sim.settings = settings;

@@ -37,7 +37,6 @@ struct Sim {
   double quantum = 1;               ///< m, of quantized positions
   bool needs_predict = true;        ///< the quantized positions are not those of the next step
   unsigned read_index = 0;          ///< which of `quantized` is read next
-  unsigned cluster_set = 0;         ///< which of the three sets of the clusters' sums is
   long steps = 0;                   ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
@@ -47,14 +46,13 @@ struct Sim {
   GuardCounts guards{};  ///< since the last reset; ask guard_counts()
   FiniteCheck check;     ///< ask check_finite()
 
-  const Buffer& current_positions() const { return positions; }
 };
 
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
 /// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
-/// solver again if the mode, the constraint kinds or whether there are clusters or compliance changed; where
+/// solver again if the mode, the constraint kinds or whether there is compliance changed; where
 /// that fails, throws and leaves the simulation as it was.
 void apply_settings(Sim& sim, const Settings& settings);
 /// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
@@ -67,7 +65,6 @@ void reset(Sim& sim);
 
 /// Whether the mode steps on the CPU: then `host` is the state.
 inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
-inline bool has_clusters(const Sim& sim) { return !sim.solver.clusters.clusters.empty(); }
 
 /// Waits for the GPU.
 State read_state(const Sim& sim);

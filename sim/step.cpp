@@ -19,8 +19,8 @@ struct Dispatcher {
   }
   void run(Pass& pass, unsigned phases) {
     if (pass.program.id() != program) pass.program.use(), program = pass.program.id();
-    constexpr std::array names = {"phases", "step_number", "cluster_set"};
-    const std::array<unsigned, 3> parameters = {phases, unsigned(sim.steps + 1), sim.cluster_set};
+    constexpr std::array names = {"phases", "step_number"};
+    const std::array<unsigned, 2> parameters = {phases, unsigned(sim.steps + 1)};
     if (pass.parameters[0] == ~0u)
       for (std::size_t p = 0; p < names.size(); ++p)
         pass.locations[p] = glGetUniformLocation(program, names[p]);
@@ -32,14 +32,13 @@ struct Dispatcher {
     const std::size_t row = std::min<std::size_t>(pass.work_groups, sim.tuning.row);
     glDispatchCompute(GLuint(row), GLuint((pass.work_groups + row - 1) / row), 1);
     // The next dispatch reads what this one wrote, and overwrites what it read (the other quantized
-    // positions, the sums of corrections that average.comp clears, the clusters' set of sums before last).
+    // positions, the sums of corrections that average.comp clears).
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
   }
   // The pass that moves the vertices: what it wrote is read from then on.
   void move(unsigned phases) {
     run(sim.solver.iteration.back(), phases);
     if (sim.solver.double_buffered) sim.read_index = 1 - sim.read_index, bind_quantized();
-    sim.cluster_set = (sim.cluster_set + 1) % 3;
   }
 };
 
@@ -69,7 +68,6 @@ void step_on_gpu(Sim& sim) {
     dispatcher.run(sim.predict, 0);
   }
   dispatcher.bind_quantized();
-  if (sim.needs_predict && has_clusters(sim)) dispatcher.move(PHASE_SUMS);
   sim.needs_predict = false;
   for (int substep = 0; substep < sim.settings.substeps; ++substep)
     for (const Dispatch& dispatch : sim.substep)

@@ -28,12 +28,11 @@ TEST_CASE("a solver by name puts its settings in place of the scene's; flags go 
   CHECK(paper.iterations == 25);
   CHECK(paper.substeps == 1);
   CHECK(paper.omega == 1.5);
-  const Settings hard =
-      load_scene("bunny-drop", {.solver = "hard", .parameters = {{"substeps", "7"}}}).settings;
-  CHECK(hard.clusters > 0);
-  CHECK(hard.iterations == 1);
-  CHECK(hard.substeps == 7);
-  CHECK_THROWS(load_scene("bunny-drop", {.solver = "hardest"}));
+  const Settings substeps =
+      load_scene("bunny-drop", {.solver = "substeps", .parameters = {{"substeps", "7"}}}).settings;
+  CHECK(substeps.iterations == 1);
+  CHECK(substeps.substeps == 7);
+  CHECK_THROWS(load_scene("bunny-drop", {.solver = "hard"}));
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "paper", .budget_ms = 1.0}));
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "auto", .parameters = {{"substeps", "7"}}}));
   CHECK(load_scene("bunny-drop", {.budget_ms = 2.0}).budget_ms == 2.0);
@@ -51,9 +50,8 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
   REQUIRE(choice);
   CHECK_FALSE(scene.budget_ms);
   CHECK(scene.settings == choice->settings());
-  CHECK(choice->trials.size() == 4);  // averaged, with more over-relaxation, with masses split, with clusters
+  CHECK(choice->trials.size() == 3);  // averaged, with more over-relaxation, with masses split
   CHECK(choice->trials[2].settings.mass_splitting);
-  CHECK(choice->trials[3].settings.clusters > 0);
   for (const SolverTrial& trial : choice->trials) {
     CHECK(trial.settings.iterations == 1);
     CHECK(trial.settings.substeps >= 1);
@@ -62,25 +60,17 @@ TEST_CASE("auto takes what loses least volume, and as many substeps as the budge
           trial.loss_percent + 1e-4);  // nothing lost: any
   }
   CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
-  CHECK(solver_choice_json(*choice)["trials"].size() == 4);
+  CHECK(solver_choice_json(*choice)["trials"].size() == 3);
 
-  // What clusters or over-relaxation would change is not tried with them.
+  // What over-relaxation would change is not tried with it.
   Settings soft = scene.settings;
-  soft.mass_splitting = false;  // which of the trials was taken depends on the machine
-  soft.stiffness[index_of<Stretch>] = 0.5;
-  CHECK(choose_solver(model, soft, 1, 3).trials.size() == 3);
-  Settings liquid = scene.settings;  // keeps its volume and no shape: clusters would freeze it
-  liquid.clusters = 0;
-  liquid.constraints = "volume";
-  for (const SolverTrial& trial : choose_solver(model, liquid, 1, 3).trials)
-    CHECK(trial.settings.clusters == 0);
   soft.compliance[index_of<Volume>] = 1e-6, soft.omega = 1.5;
   CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
   // No budget is too small for one substep, and a hundred times the budget holds more.
   CHECK(choose_solver(model, scene.settings, 1e-6, 2).settings().substeps == 1);
   const SolverChoice early = choose_solver(model, scene.settings, 100, 2);
   CHECK(early.settings().substeps > 4);
-  CHECK(early.lost_nothing);  // it has not hit the ground: what is best elsewhere
-  CHECK(early.settings().clusters > 0);
+  CHECK(early.lost_nothing);  // it has not hit the ground: the first is taken
+  CHECK(early.best == 0);
   CHECK(describe(early).find("none lost volume in 2 steps") != std::string::npos);
 }

@@ -61,7 +61,7 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 
 // Writes into what the GPU reads, as a faulty kernel would.
 void spoil(const Sim& sim, std::uint32_t vertex, bool velocity, float value) {
-  const Buffer& buffer = velocity ? sim.velocities : sim.current_positions();
+  const Buffer& buffer = velocity ? sim.velocities : sim.positions;
   buffer.write(vertex * (velocity ? sizeof(Velocity) : sizeof(Position)) + 4, sizeof value, &value);
 }
 
@@ -229,7 +229,7 @@ TEST_CASE("nothing that is not finite is drawn, in any look or colour, and none 
   const std::vector<std::uint32_t> dots{0, 5};
   frame.pinned = dots;
   const auto picture = [&] {
-    frame.positions = sim.current_positions().id();
+    frame.positions = sim.positions.id();
     frame.velocities = sim.velocities.id();
     draw(renderer, frame);
     return read_rgba(target).rgba;
@@ -250,7 +250,7 @@ TEST_CASE("nothing that is not finite is drawn, in any look or colour, and none 
         for (auto& p : bad.positions) p.y = value;
         write_state(sim, bad);
         CHECK(picture() == empty);
-        request(picker, sim.current_positions().id(),
+        request(picker, sim.positions.id(),
                 {eye(frame.camera), glm::normalize(frame.camera.target - eye(frame.camera))});
         CHECK(!poll(picker, true)->hit);
       }
@@ -310,7 +310,7 @@ TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode chan
 
 TEST_CASE("limits of a driver are named with what is needed and what there is") {
   GlTest gl;
-  CHECK(capabilities().storage_blocks >= 11);  // what clusters take
+  CHECK(capabilities().storage_blocks >= 8);
   CHECK(has(what_of([&] { create_sim(block(), quick("node"), {.storage = 100}); }),
             "a storage buffer is too large: "));
   CHECK(has(what_of([&] { make_target(100000, 10); }), "bad image size: 100000x10"));
@@ -372,7 +372,7 @@ TEST_CASE("shader faults name file and line, or the uniform") {
       Renderer renderer = make_renderer(sim.model->rest);
       const Target target = make_target(32, 32);
       Frame frame;
-      frame.positions = sim.current_positions().id();
+      frame.positions = sim.positions.id();
       frame.target = target.framebuffer.id();
       frame.viewport = {0, 0, 32, 32};
       frame.ground = 0.0f;

@@ -119,9 +119,8 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
   CHECK(program("compare --shard 4/3", folder).status == 2);
   CHECK(program("compare --merge nowhere --out x", folder).status == 2);
   CHECK(program("compare --merge part1 part1 --out x", folder).status == 2);
-  // Whole comparisons of the same scene go together as well; node+clusters and the paper's pipeline are modes
-  // here.
-  REQUIRE(program("compare --scene beam --modes node+clusters,paper --iterations 1 --substeps 2 --steps 12 "
+  // Whole comparisons of the same scene go together as well; the paper's pipeline is a mode here.
+  REQUIRE(program("compare --scene beam --modes cpu-double,paper --iterations 1 --substeps 2 --steps 12 "
                   "--out more",
                   folder)
               .status == 0);
@@ -129,10 +128,9 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
   const json both = json::parse(read(folder.path / "both/compare.json"));
   CHECK(both["rows"].size() == 10);
   CHECK(both["combinations"] == 10);
-  CHECK(both["rows"][8]["mode"] == "node+clusters");
+  CHECK(both["rows"][9]["mode"] == "paper");
   CHECK(program("compare --merge whole whole --out x", folder).err.find("two of these") != std::string::npos);
-  CHECK(program("compare --modes node+cluster --out x", folder).err.find("node+clusters") !=
-        std::string::npos);
+  CHECK(program("compare --modes nodes --out x", folder).err.find("choose from node") != std::string::npos);
 }
 
 TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contained report") {
@@ -187,33 +185,6 @@ TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the 
             .err.find("choose from bunny, block, tet") != std::string::npos);
 }
 
-TEST_CASE("compare: with clusters, rows name the over-relaxation that acts, and each once") {
-  const Folder folder;
-  REQUIRE(
-      program("compare --scene beam --modes node+clusters-0.8,node --omegas 1,1.5,2 --iterations 1 --steps 2 "
-              "--out c",
-              folder)
-          .status == 0);
-  std::vector<double> clusters, plain;
-  const json compared = json::parse(read(folder.path / "c/compare.json"));
-  for (const json& row : compared["rows"]) (row["mode"] == "node" ? plain : clusters).push_back(row["omega"]);
-  CHECK(plain == std::vector<double>{1, 1.5, 2});
-  REQUIRE(clusters.size() == 2);
-  CHECK(clusters[0] == 1);
-  CHECK(clusters[1] == doctest::Approx(1.2));  // of 1.5 and of 2
-  REQUIRE(
-      program(
-          "bench --scenes beam --modes node+clusters-0.8 --constraint-sets stretch --iterations 1 --frames "
-          "1 --warm-up 0 --repeats 1 --no-render --out b",
-          folder)
-          .status == 0);
-  CHECK(json::parse(read(folder.path / "b/bench.json"))["rows"][0]["omega"] == doctest::Approx(1.2));
-  REQUIRE(program("run --scene beam --clusters 0.8 --omega 2 --steps 1 --out r", folder).status == 0);
-  const json stats = json::parse(read(folder.path / "r/stats.json"));
-  CHECK(stats["settings"]["omega"] == 2);
-  CHECK(stats["solver"]["omega"] == doctest::Approx(1.2));
-}
-
 TEST_CASE("hard cases: recovered is what stays good for the last 5 % of the steps") {
   const auto series = [](int bad) {  // 100 steps, of which so many at the start have an inverted tet
     std::vector<Measurement> measurements(101);
@@ -230,8 +201,7 @@ TEST_CASE("hard cases: recovered is what stays good for the last 5 % of the step
 TEST_CASE("hard cases: where no constraint acts there is nothing to recover by") {
   const Folder folder;
   const Outcome run =
-      program("compare --hard-cases --cases stiffness-0 --meshes tet --modes node+clusters --steps 2 --out h",
-              folder);
+      program("compare --hard-cases --cases stiffness-0 --meshes tet --modes node --steps 2 --out h", folder);
   CHECK(run.status == 2);
   CHECK(run.err.find("nothing to run") != std::string::npos);
 }

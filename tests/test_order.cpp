@@ -188,7 +188,7 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
     camera.target = {1, 0.4f, 0};
     int hits = 0;
     for (float x = 20; x < 160; x += 20) {
-      request(picker, sim.current_positions().id(), pixel_ray(camera, x, 60, 160, 120));
+      request(picker, sim.positions.id(), pixel_ray(camera, x, 60, 160, 120));
       const auto pick = poll(picker, true);
       hits += pick->hit;
       answers.numbers.insert(answers.numbers.end(), {double(pick->hit), double(pick->triangle),
@@ -199,7 +199,7 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
     const Target target = make_target(160, 120, 0);
     for (const Colour colour : {Colour::plain, Colour::volume, Colour::stretch}) {
       Frame frame;
-      frame.positions = sim.current_positions().id();
+      frame.positions = sim.positions.id();
       frame.velocities = sim.velocities.id();
       frame.camera = camera;
       frame.viewport = {0, 0, 160, 120};
@@ -265,7 +265,7 @@ TEST_CASE("other work on the GPU at the same time changes no bit") {
     while (!stop) {
       for (int s = 0; s < 3; ++s) step(sim), ++steps;
       Frame frame;
-      frame.positions = sim.current_positions().id();
+      frame.positions = sim.positions.id();
       frame.velocities = sim.velocities.id();
       frame.viewport = {0, 0, 320, 240};
       frame.target = target.framebuffer.id();

@@ -138,7 +138,6 @@ await '^set omega 1\.2'
 choose mode cpu; await '^set mode cpu'
 key s; await '^step'
 choose mode node; await '^set mode node'
-choose solver hard; await '^set clusters 0\.4'
 choose solver auto; await '^message solver: node'; shot auto.png
 choose solver paper; await '^set iterations 25'
 choose solver substeps; await '^set substeps 20'

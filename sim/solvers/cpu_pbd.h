@@ -9,7 +9,6 @@
 #include "sim/constraints.h"
 #include "sim/model.h"
 #include "sim/settings.h"
-#include "sim/solvers/clusters.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -93,8 +92,8 @@ inline double longest_correction(const Model& model, const Settings& settings) {
   return settings.mass_splitting ? model.size / 64 : model.size;
 }
 
-/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, and shape-matching clusters;
-/// with compliance masses are split, and there are no clusters. `gauss_seidel`: one after the other.
+/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, or with
+/// compliance masses split. `gauss_seidel`: one after the other.
 enum class Sweep { jacobi, gauss_seidel };
 
 template <class real>
@@ -118,9 +117,7 @@ class CpuPbd {
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    Sweep sweep) {
     const bool jacobi = sweep == Sweep::jacobi, soft = compliant(settings);
-    const bool held = jacobi && settings.clusters > 0 && !soft;
-    const double omega = soft ? 1 : relaxation(settings.omega, held ? settings.clusters : 0);
-    if (held && clusters_.rest.empty()) clusters_ = build_clusters(model_);
+    const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
     const Substep substep(model_, settings);
     auto& x = state.positions;
@@ -137,8 +134,6 @@ class CpuPbd {
         if (inverse_masses[i] > 0) x[i] = substep.predict(x[i], v[i]);
       predicted = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-        std::vector<glm::dvec3> pulls;
-        if (held) pulls = cluster_pulls(clusters_, x);
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
         for_each_kind([&](auto kind, int k) {
           const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1);
@@ -150,7 +145,6 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
-          if (held) x[i] += settings.clusters * pulls[i];
           x[i] = substep.out_of_planes(x[i], predicted[i], v[i]);
         }
       }
@@ -181,7 +175,6 @@ class CpuPbd {
   const Model& model_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;
-  Clusters clusters_;  // made when they are first asked for
 };
 
 }  // namespace tetpbd

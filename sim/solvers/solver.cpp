@@ -26,8 +26,7 @@ namespace {
 const std::vector<SolverMode> rows = {
     {.name = "node",
      .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch",
-     .create = create_node_solver,
-     .clusters = true},
+     .create = create_node_solver},
     {.name = "constraint",
      .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics",
      .create = create_constraint_solver},
@@ -145,45 +144,6 @@ namespace {
 
 std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
 
-constexpr std::size_t few_clusters = 8;  // up to here each patch has all, in their order
-
-// The buffers of clusters.glsl, among them each patch's list of clusters; returns the length of the longest.
-std::size_t add_clusters(Solver& solver, const SolverInput& input, const Patches& patches) {
-  std::vector<layout::Cluster>& clusters = solver.clusters.clusters;
-  const std::vector<glm::vec4>& rest = solver.clusters.rest;
-  if (patches.count > 65536)  // as many numbers of 16 bits fit 32
-    throw Error("the body is too large for clusters", fmt::format("{} patches", patches.count),
-                "set clusters to 0, or take a mesh of at most 20 million tets");
-  for (layout::Cluster& cluster : clusters) cluster.owner = ~0u;
-  std::vector<std::vector<std::uint32_t>> lists(patches.count);
-  std::size_t most = 1;
-  for (std::size_t p = 0; p < patches.count; ++p) {
-    const std::uint32_t* header = patches.chunks.data() + p * patches.chunk_words;
-    for (std::uint32_t k = 0; k < clusters.size(); ++k) {
-      bool any = clusters.size() <= few_clusters;
-      for (std::uint32_t v = header[2]; v < header[2] + header[1] && !any; ++v)
-        any = glsl::ShapeMatching{}.cluster_weight(rest[v], clusters[k].node) > 0;
-      if (!any) continue;
-      lists[p].push_back(k);
-      if (clusters[k].owner == ~0u) clusters[k].owner = std::uint32_t(p);
-    }
-    most = std::max(most, lists[p].size());
-  }
-  layout::Cluster none{};
-  none.number = ~0u;
-  std::vector<layout::Cluster> copies(patches.count * most, none);  // beside each other, for each patch
-  for (std::size_t p = 0; p < patches.count; ++p)
-    for (std::size_t k = 0; k < lists[p].size(); ++k) {
-      layout::Cluster& copy = copies[p * most + k] = clusters[lists[p][k]];
-      copy.number = lists[p][k];
-    }
-  add_buffer(solver, input.tuning, BIND_CLUSTERS, Buffer("clusters", copies));
-  add_buffer(solver, input.tuning, BIND_CLUSTER_REST, Buffer("cluster rest", rest));
-  solver.cluster_sums = Buffer("cluster sums", std::vector<std::uint32_t>(3 * CLUSTER_ROW * clusters.size()));
-  solver.bindings.push_back({BIND_CLUSTER_SUMS, solver.cluster_sums.id()});
-  return most;
-}
-
 }  // namespace
 
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
@@ -197,12 +157,6 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
   words.write(chunk_bytes + vertex_bytes, record_bytes, patches.records.data());
   std::size_t bytes = words.bytes() + 16 * patches.vertices.size();  // and quantized positions
   add_buffer(solver, input.tuning, BIND_PATCHES, std::move(words));
-  std::size_t most_clusters = 0;
-  if (input.clusters) {
-    solver.clusters = build_clusters(input.model);
-    most_clusters = add_clusters(solver, input, patches);
-    bytes += 32 * patches.count * patches.most_owned + 2 * solver.cluster_sums.bytes();
-  }
   if (input.compliant) {
     add_buffer(solver, input.tuning, BIND_MULTIPLIERS,
                Buffer("multipliers", std::vector<float>(patches.records.size())));
@@ -210,22 +164,14 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
   }
   const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
                     vertices = std::max<std::size_t>(patches.largest, 1);
-  // Clusters work on so many at a time, with an invocation for each pair of one and a vertex.
-  const std::size_t pair_clusters =
-      std::clamp<std::size_t>(group / owned, 1, std::clamp<std::size_t>(most_clusters, 1, 8));
-  const std::size_t room = input.clusters ? (1 + pair_clusters) * owned : 0;
-  const std::size_t cluster_count = solver.clusters.clusters.size();
   solver.iteration.push_back(
       {Program::compute(
            shader, {{}, kind_words(input.system)},
            {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
             define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
             define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8), define("MAX_VERTICES", vertices),
-            define("MAX_OWNED", owned), define("LOCAL_ROOM", std::max(vertices, room)),
-            define("CHUNKED", patches.chunked), define("COMPLIANT", input.compliant),
-            define("COUNT_GUARDS", input.tuning.count_guards), define("CLUSTERS", most_clusters),
-            define("CLUSTER_COUNT", cluster_count), define("ALL_CLUSTERS", cluster_count <= few_clusters),
-            define("PAIR_CLUSTERS", pair_clusters)}),
+            define("MAX_OWNED", owned), define("CHUNKED", patches.chunked),
+            define("COMPLIANT", input.compliant), define("COUNT_GUARDS", input.tuning.count_guards)}),
        patches.count, bytes});
 }
 

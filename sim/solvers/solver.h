@@ -13,7 +13,6 @@
 #include "sim/layout.h"
 #include "sim/model.h"
 #include "sim/settings.h"
-#include "sim/solvers/clusters.h"
 #include "sim/solvers/patches.h"
 
 namespace tetpbd {
@@ -26,8 +25,8 @@ struct Pass {
   GLuint records = 0;     ///< buffer to bind to BIND_RECORDS before it (mode paper)
   /// Where the program has its dispatch parameters (-1: nowhere), and their values; asked for and set in
   /// step.cpp.
-  std::array<GLint, 3> locations{};
-  std::array<unsigned, 3> parameters{~0u, ~0u, ~0u};
+  std::array<GLint, 2> locations{};
+  std::array<unsigned, 2> parameters{~0u, ~0u};
 };
 
 /// How often each guard of layout.glsl triggered, in its order. A projection counts once where each
@@ -44,8 +43,6 @@ struct Solver {
   bool double_buffered =
       false;             ///< an iteration reads one buffer of quantized positions and writes the other
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
-  Clusters clusters;     ///< none but where passes keep sums for them
-  Buffer cluster_sums;   ///< three sets: read, added to, cleared, by turns
   std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };
 
@@ -77,7 +74,6 @@ struct SolverInput {
   Tuning tuning;           ///< `row` and `storage` filled in
   bool software = false;   ///< the "GPU" is a CPU
   bool compliant = false;  ///< settings.h
-  bool clusters = false;   ///< shape-matching clusters are asked for
 };
 
 /// A row of the table: what the mode is called, what makes it, and what it can do.
@@ -85,7 +81,6 @@ struct SolverMode {
   const char* name;
   const char* help;
   Solver (*create)(const SolverInput&);
-  bool clusters = false;   ///< takes shape-matching clusters
   bool compliance = true;  ///< and compliance
   bool offered = true;     ///< in --mode and the window; else in bench and compare alone
 };
@@ -110,8 +105,7 @@ struct Cut {
 };
 /// With what `tuning` overrides; throws Error if a work-group cannot have that size.
 Cut tuned(Cut cut, const Tuning& tuning);
-/// Gives a solver a pass of `shader`, a work-group per patch, and the patches' buffers (patch.glsl), and with
-/// `input.clusters` those of its clusters (clusters.glsl).
+/// Gives a solver a pass of `shader`, a work-group per patch, and the patches' buffers (patch.glsl).
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
                  unsigned group);
 /// Gives a solver its sums of corrections, at zero, and its last pass, which averages them and moves the

@@ -6,6 +6,7 @@
 
 #include "app/files.h"
 #include "app/lab.h"
+#include "app/reference_command.h"
 #include "app/statistics.h"
 #include "render/renderer.h"
 #include "render/target.h"
@@ -81,6 +82,9 @@ int run_headless(Scene scene, const RunOptions& options) {
   Sim sim = create_sim(model, scene.settings, tuning);
   Metrics metrics = create_metrics(*model, sim.system);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
+  const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
+  std::optional<MotionError> motion_error;
+  if (right) motion_error.emplace();
   auto frames = frame_writer(scene, sim, options);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
@@ -94,6 +98,7 @@ int run_headless(Scene scene, const RunOptions& options) {
     };
     plan.stepped = [&](long s) {
       if (frames) frames->draw_frame(s);
+      if (right && is_kept(*right, s)) add_state(*motion_error, *right, *model, s, read_state(sim));
       return true;
     };
     if (!check_finite(sim)) plan.stepped(0);
@@ -105,8 +110,8 @@ int run_headless(Scene scene, const RunOptions& options) {
   // To the last good step: the same steps again, the same bits.
   while (good && found && sim.steps < found->step - 1) step(sim);
   const auto hash = good ? std::optional(state_hash(sim)) : std::nullopt;
-  write_file(options.out / "stats.json",
-             statistics_json(scene, sim, context.capabilities(), run, guard_counts(sim), hash, choice));
+  write_file(options.out / "stats.json", statistics_json(scene, sim, context.capabilities(), run,
+                                                         guard_counts(sim), hash, choice, motion_error));
   if (csv) csv->close();
   if (options.positions && good) write_positions(sim, options.out);
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,

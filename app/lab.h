@@ -20,12 +20,13 @@ namespace tetpbd {
 struct RunOptions {
   long steps = 0;  ///< 0: the scene's duration
   std::filesystem::path out = "out";
-  long png_every = 0;           ///< steps; 0: no frames
-  std::filesystem::path video;  ///< empty: none
-  long video_every = 0;         ///< steps a video frame; 0: real time at 30 frames a second
-  long csv_every = 1;           ///< steps; 0: no stats.csv
-  long measure_every = 1;       ///< steps between measurements; the last step is measured in any case
-  bool positions = false;       ///< positions.npy and tets.npy
+  long png_every = 0;               ///< steps; 0: no frames
+  std::filesystem::path video;      ///< empty: none
+  long video_every = 0;             ///< steps a video frame; 0: real time at 30 frames a second
+  long csv_every = 1;               ///< steps; 0: no stats.csv
+  std::filesystem::path reference;  ///< the right motion (reference_command.h); empty: the cache's, if any
+  long measure_every = 1;           ///< steps between measurements; the last step is measured in any case
+  bool positions = false;           ///< positions.npy and tets.npy
   int gpu = -1;
   int width = 1280, height = 720, samples = 4;
   ViewOptions view;
@@ -82,8 +83,8 @@ int run_compare(const CompareOptions& options);
 /// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
 /// scene has iterations. Steps 0: the scene's duration.
 int run_hard_cases(const CompareOptions& options);
-inline const std::vector<std::string> hard_case_modes{
-    "node", "constraint", "node-substeps", "cpu", "cpu-double"};
+inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu",
+                                                      "cpu-double"};
 /// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
 /// 5 % of the run's `steps` at least: what is good for less long may be passing through.
 std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);

@@ -16,6 +16,7 @@
 #include "app/command_line.h"
 #include "app/lab.h"
 #include "app/mesh_command.h"
+#include "app/reference_command.h"
 #include "app/scene.h"
 #include "app/window.h"
 #include "sim/error.h"
@@ -51,6 +52,7 @@ struct Arguments {
   std::string shard = "1/1";
   RunOptions run;  ///< its device and picture are those of every command that opens a scene
   SoakOptions soak;
+  ReferenceOptions reference;
   BenchOptions bench;
   CompareOptions compare;
   bool hard_cases = false;
@@ -217,10 +219,20 @@ void add_run(CLI::App& command, Arguments& a) {
   add(command, "--video-every", run.video_every, 1L, most_steps,
       "steps per video frame (default: those of 1/30 s)");
   add(command, "--csv-every", run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
+  add(command, "--reference", run.reference,
+      "the right motion, made by tetpbd reference (default: the cache's of this scene)");
   add(command, "--measure-every", run.measure_every, 1L, most_steps,
       "measure errors every K steps and at the end");
   command.add_flag("--positions", run.positions, "write positions.npy and tets.npy");
   add_progress(command, run.progress);
+}
+
+void add_reference(CLI::App& command, Arguments& a) {
+  add_scene(command, a);
+  add(command, "--steps", a.reference.steps, 1L, most_steps, "steps of the scene (default: its duration)");
+  add(command, "--out", a.reference.out,
+      "file to write (default: in the cache, where runs of the scene find it)");
+  add_progress(command, a.reference.progress);
 }
 
 void add_soak(CLI::App& command, Arguments& a) {
@@ -339,6 +351,8 @@ const Command commands[] = {
     {"view", "a window (the default where there is a display)", add_scene, start_view},
     {"run", "headless: steps a scene, writes frames, video, statistics", add_run,
      start_scene<&Arguments::run, run_headless>},
+    {"reference", "finds the right motion of a scene and keeps it: what runs are held against", add_reference,
+     start_scene<&Arguments::reference, run_reference>},
     {"soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down", add_soak,
      start_scene<&Arguments::soak, run_soak>},
     {"bench", "fps and ms per step, the paper's protocol and ours", add_bench, start_bench},

@@ -114,7 +114,8 @@ void put_errors(ordered_json& row, const MeasuredRun& run) {
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeasuredRun& run, const GuardCounts& guards,
-                            std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice) {
+                            std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice,
+                            const std::optional<MotionError>& motion) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -135,6 +136,10 @@ std::string statistics_json(const Scene& scene, const Sim& sim, const Capabiliti
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);
+  for (const auto& [key, member] :
+       {std::pair("motion_final", &MotionError::final), std::pair("motion_rms", &MotionError::rms),
+        std::pair("motion_peak", &MotionError::peak), std::pair("motion_relative", &MotionError::relative)})
+    j["error"][key] = motion ? *motion.*member : std::nan("");  // written as null
   j["momentum"] = {{"linear_drift", errors.linear_drift},
                    {"angular_drift", errors.angular_drift},
                    {"linear", vector(last.momentum)},

@@ -9,12 +9,14 @@
 #include "app/run_loop.h"
 #include "app/scene.h"
 #include "app/sweep.h"
+#include "sim/reference/motion.h"
 
 namespace tetpbd {
 
 std::string statistics_json(const Scene& scene, const Sim& sim, const Capabilities& device,
                             const MeasuredRun& run, const GuardCounts& guards,
-                            std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice);
+                            std::optional<std::uint64_t> hash, const std::optional<SolverChoice>& choice,
+                            const std::optional<MotionError>& motion = std::nullopt);
 std::string csv_header();
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 

@@ -18,27 +18,6 @@ namespace {
 // Change it whenever the file's layout or what is done with TetGen's result changes.
 constexpr std::string_view version = "tetpbd cache 2";
 
-template <class T>
-void put_array(std::string& bytes, const std::vector<T>& values) {
-  const std::uint64_t count = values.size();
-  bytes.append(reinterpret_cast<const char*>(&count), sizeof count);
-  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
-}
-
-// Takes an array off the front; false when `bytes` is too short for the count it declares.
-template <class T>
-bool take_array(std::string_view& bytes, std::vector<T>& values) {
-  std::uint64_t count = 0;
-  if (bytes.size() < sizeof count) return false;
-  std::memcpy(&count, bytes.data(), sizeof count);
-  bytes.remove_prefix(sizeof count);
-  if (count > bytes.size() / sizeof(T)) return false;
-  values.resize(count);
-  std::ranges::copy(bytes.substr(0, count * sizeof(T)), reinterpret_cast<char*>(values.data()));
-  bytes.remove_prefix(count * sizeof(T));
-  return true;
-}
-
 // Damage passes the checksum only by malice, but a cache folder may be shared: what is taken is a mesh.
 bool is_sound(const TetMesh& mesh) {
   const auto in_range = [&](const auto& element) {
@@ -50,20 +29,20 @@ bool is_sound(const TetMesh& mesh) {
          std::ranges::all_of(mesh.tets, [&](const Tet& t) { return tet_volume(mesh, t) > 0; });
 }
 
-// In $TETPBD_CACHE, else $XDG_CACHE_HOME/tetpbd, else ~/.cache/tetpbd; empty where there is none of these.
-fs::path mesh_file(std::uint64_t key) {
+std::string mesh_file(std::uint64_t key) { return fmt::format("{:016x}.tets", key); }
+
+}  // namespace
+
+fs::path cache_file(const std::string& name) {
   const auto folder = [](const char* variable, const char* below) {
     const char* value = std::getenv(variable);
     return value && *value ? fs::path(value) / below : fs::path();
   };
-  const std::string name = fmt::format("{:016x}.tets", key);
   for (const fs::path& place :
        {folder("TETPBD_CACHE", ""), folder("XDG_CACHE_HOME", "tetpbd"), folder("HOME", ".cache/tetpbd")})
     if (!place.empty()) return place / name;
   return {};
 }
-
-}  // namespace
 
 // FNV-1a
 std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed) {
@@ -105,7 +84,7 @@ std::string mesh_bytes(std::uint64_t key, const TetMesh& mesh) {
 }
 
 std::optional<TetMesh> read_mesh(std::uint64_t key) {
-  const fs::path file = mesh_file(key);
+  const fs::path file = cache_file(cache_file(mesh_file(key)));
   std::error_code failed;
   const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
   if (failed) return {};
@@ -115,7 +94,7 @@ std::optional<TetMesh> read_mesh(std::uint64_t key) {
 }
 
 void keep_mesh(std::uint64_t key, const TetMesh& mesh) try {
-  const fs::path file = mesh_file(key);
+  const fs::path file = cache_file(cache_file(mesh_file(key)));
   if (file.empty()) return;
   fs::create_directories(file.parent_path());
   write_file(file, mesh_bytes(key, mesh));

@@ -1,19 +1,47 @@
-// Meshes that TetGen made, in the user's cache folder: a checksum with the key in it, then the arrays. A
-// cache that cannot be read or written costs time, never an error.
+// The user's cache folder, and in it meshes that TetGen made: a checksum with the key in it, then the arrays.
+// A cache that cannot be read or written costs time, never an error.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
 
+/// In $TETPBD_CACHE, else $XDG_CACHE_HOME/tetpbd, else ~/.cache/tetpbd; empty where there is none of these.
+std::filesystem::path cache_file(const std::string& name);
+
 /// Not cryptographic: it finds accidents.
 std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed);
+
+/// Its count, then its bits.
+template <class T>
+void put_array(std::string& bytes, const std::vector<T>& values) {
+  const std::uint64_t count = values.size();
+  bytes.append(reinterpret_cast<const char*>(&count), sizeof count);
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+}
+
+/// Takes an array off the front; false when `bytes` is too short for the count it declares.
+template <class T>
+bool take_array(std::string_view& bytes, std::vector<T>& values) {
+  std::uint64_t count = 0;
+  if (bytes.size() < sizeof count) return false;
+  std::memcpy(&count, bytes.data(), sizeof count);
+  bytes.remove_prefix(sizeof count);
+  if (count > bytes.size() / sizeof(T)) return false;
+  values.resize(count);
+  std::ranges::copy(bytes.substr(0, count * sizeof(T)), reinterpret_cast<char*>(values.data()));
+  bytes.remove_prefix(count * sizeof(T));
+  return true;
+}
 
 /// Of the surface's bits, the switches and the program that fills it.
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches,

@@ -9,23 +9,6 @@ namespace tetpbd {
 
 namespace {
 
-// C, without the clamp to +-1 that bend.glsl has, and its gradient. C = f(x) - rest, so a clamped one is
-// found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long gets
-// the same C as before.
-template <class Kind, class Positions>
-auto unclamped(Positions& x, double rest) {
-  auto c = Kind::template evaluate<double>(x.data(), rest);
-  const double unit = c.C;
-  if (unit == 1 || unit == -1) {
-    double further = unit;
-    for (int turns = 1; turns <= 3 && further == unit; ++turns) {
-      further = Kind::template evaluate<double>(x.data(), rest + turns * unit).C;
-      c.C = turns * unit + further;
-    }
-  }
-  return c;
-}
-
 // Calls visit(Kind{}, vertex indices, positions relative to the first, rest, alpha) for every constraint with
 // an energy.
 template <class F>

@@ -33,6 +33,23 @@ double energy(const Objective& objective, const Points& positions);
 /// dE/dx, newtons; of fixed vertices too, where it is the force they are held with.
 Points gradient(const Objective& objective, const Points& positions);
 
+/// C, without the clamp to +-1 that bend.glsl has, and its gradient. C = f(x) - rest, so a clamped one is
+/// found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long
+/// gets the same C.
+template <class Kind, class Positions>
+auto unclamped(Positions& x, double rest) {
+  auto c = Kind::template evaluate<double>(x.data(), rest);
+  const double unit = c.C;
+  if (unit == 1 || unit == -1) {
+    double further = unit;
+    for (int turns = 1; turns <= 3 && further == unit; ++turns) {
+      further = Kind::template evaluate<double>(x.data(), rest + turns * unit).C;
+      c.C = turns * unit + further;
+    }
+  }
+  return c;
+}
+
 struct Minimum {
   Points positions;
   int iterations = 0;  ///< Newton steps taken

@@ -1,0 +1,130 @@
+#include "app/reference_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "app/files.h"
+#include "app/run_loop.h"
+#include "sim/error.h"
+#include "sim/interrupt.h"
+#include "sim/mesh/cache.h"
+
+namespace tetpbd {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* format_name = "tetpbd motion 1";
+
+std::string hex(std::uint64_t key) { return fmt::format("{:016x}", key); }
+
+void print_motion(const Scene& scene, const Motion& motion) {
+  double error = 0, before = 0, after = 0, apex = 0;
+  bool risen = false;
+  for (const Motion::Row& row : motion.rows) {
+    error = std::max(error, row.error);
+    if (!risen) before = std::max(before, -row.velocity.y);
+    risen = risen || row.velocity.y > 0;
+    if (risen) after = std::max(after, row.velocity.y), apex = std::max(apex, row.centre.y);
+  }
+  const Motion::Row& last = motion.rows.back();
+  fmt::print("{}: {} in steps of {:.3g} s, {:.3g} s of motion, {} instants kept\n", scene.name, motion.method,
+             motion.step, last.time, motion.kept.size());
+  fmt::print("  own error {:.2g} of the size: the most that steps twice as long are away\n", error);
+  if (risen && before > 0)
+    fmt::print("  centre of mass: {:.4g} m/s down, then {:.4g} m/s up to {:.4g} m\n", before, after, apex);
+  fmt::print("  at the end: centre {:.5g} m high, energy {:.6g} J ({:.6g} kinetic)\n", last.centre.y,
+             last.kinetic + last.potential, last.kinetic);
+}
+
+// The cache's file of this scene's motion; empty without a cache folder.
+std::filesystem::path cached_motion(const ReferenceInput& input) {
+  return cache_file("motion_" + hex(scene_key(input)));
+}
+
+}  // namespace
+
+void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion) {
+  ordered_json head = {
+      {"format", format_name},
+      {"scene", hex(motion.scene)},
+      {"method", motion.method},
+      {"dt", motion.dt},
+      {"step", motion.step},
+      {"vertices", model.masses.size()},
+      {"kept", motion.kept},
+      {"columns", {"time", "x", "y", "z", "vx", "vy", "vz", "kinetic", "potential", "error"}}};
+  for (const Motion::Row& r : motion.rows)
+    head["rows"].push_back({r.time, r.centre.x, r.centre.y, r.centre.z, r.velocity.x, r.velocity.y,
+                            r.velocity.z, r.kinetic, r.potential, r.error});
+  std::string text = head.dump() + "\n";
+  for (const auto& positions : motion.positions) {
+    const auto rows = in_original_order(model, positions);
+    text.append(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof rows[0]);
+  }
+  write_file(file, text);
+}
+
+Motion read_motion(const std::filesystem::path& file, const ReferenceInput& input) {
+  std::ifstream in(file, std::ios::binary);
+  std::string line;
+  std::getline(in, line);
+  const ordered_json head = ordered_json::parse(line, nullptr, false);
+  Motion motion;
+  const std::size_t count = input.model.masses.size();
+  try {
+    if (head.at("format") != format_name) throw std::exception();
+    motion.scene = std::stoull(head.at("scene").get<std::string>(), nullptr, 16);
+    motion.method = head.at("method"), motion.dt = head.at("dt"), motion.step = head.at("step");
+    motion.kept = head.at("kept").get<std::vector<long>>();
+    for (const auto& r : head.at("rows").get<std::vector<std::array<double, 10>>>())
+      motion.rows.push_back({r[0], {r[1], r[2], r[3]}, {r[4], r[5], r[6]}, r[7], r[8], r[9]});
+    if (motion.scene == scene_key(input))
+      for (std::size_t k = 0; k < motion.kept.size(); ++k) {
+        std::vector<glm::dvec3> rows(count), positions(count);
+        in.read(reinterpret_cast<char*>(rows.data()), std::streamsize(count * sizeof rows[0]));
+        if (!in) throw std::exception();
+        for (std::size_t i = 0; i < count; ++i) positions[i] = rows[input.model.original[i]];
+        motion.positions.push_back(positions);
+      }
+    if (motion.rows.empty() || motion.kept.empty()) throw std::exception();
+  } catch (const std::exception&) {
+    throw Error("not the motion of a scene", file.string(), "make it again: tetpbd reference");
+  }
+  if (motion.positions.empty())
+    throw Error("the motion of another scene", file.string(),
+                "its mesh, start, material, world or dt differ: tetpbd reference makes this one's");
+  return motion;
+}
+
+std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file) {
+  const std::filesystem::path from = file.empty() ? cached_motion(input) : file;
+  std::error_code ignored;
+  if (file.empty() && !std::filesystem::exists(from, ignored)) return std::nullopt;
+  return read_motion(from, input);
+}
+
+int run_reference(const Scene& scene, const ReferenceOptions& options) {
+  catch_interrupts();
+  const auto model = build_model(scene);
+  const ConstraintSystem system = build_constraints(model->rest, scene.settings.constraints);
+  const ReferenceInput input{*model, system, scene.settings, model->inverse_masses};
+  const std::filesystem::path file = options.out.empty() ? cached_motion(input) : options.out;
+  if (file.empty()) throw Error("nowhere to keep it", "there is no cache folder", "give --out FILE");
+  const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
+  Progress progress("the right motion", steps, options.progress);
+  const Motion motion =
+      find_motion(input, steps, file.string() + ".unfinished", [&](long done) { progress.update(done); });
+  write_motion(file, *model, motion);
+  print_motion(scene, motion);
+  fmt::print("{}\n", file.string());
+  return 0;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,171 @@
+#include "sim/reference/leapfrog.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <random>
+
+#include "sim/error.h"
+#include "sim/solvers/cpu_pbd.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Calls visit(Kind{}, list, alpha, offset of its first part) for every kind that has constraints and a finite
+// compliance.
+template <class F>
+void for_each_spring(const Leapfrog& run, F&& visit) {
+  std::size_t offset = 0;
+  for_each_kind([&](auto kind, int k) {
+    const ConstraintList& list = run.input.system.lists[std::size_t(k)];
+    const double alpha = run.compliances[std::size_t(k)];
+    if (list.count() == 0 || std::isinf(alpha)) return;
+    visit(kind, list, alpha, offset);
+    offset += list.vertices.size();
+  });
+}
+
+// Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha.
+Points accelerations(Leapfrog& run) {
+  const double tau = run.input.settings.constraint_damping;
+  for_each_spring(run, [&](auto kind, const ConstraintList& list, double alpha, std::size_t offset) {
+    constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
+    parallel_for(
+        list.count(),
+        [&](std::size_t c) {
+          const std::uint32_t* vertices = list.vertices.data() + c * arity;
+          std::array<glm::dvec3, arity> x;
+          for (std::size_t j = 0; j < arity; ++j) x[j] = run.x[vertices[j]] - run.x[vertices[0]];
+          const auto value = unclamped<decltype(kind)>(x, list.rest[c]);
+          double size = value.C;
+          for (std::size_t j = 0; j < arity; ++j)
+            size += tau * glm::dot(value.gradient[j], run.v[vertices[j]]);
+          for (std::size_t j = 0; j < arity; ++j)
+            run.parts[offset + c * arity + j] = -size / alpha * value.gradient[j];
+        },
+        1024);
+  });
+  const glm::dvec3 gravity(0, -run.input.settings.gravity, 0);
+  Points a(run.x.size(), glm::dvec3(0));
+  parallel_for(
+      a.size(),
+      [&](std::size_t i) {
+        if (run.input.inverse_masses[i] == 0) return;
+        glm::dvec3 force(0);
+        for (std::uint32_t k = run.at_vertex.first[i]; k < run.at_vertex.first[i + 1]; ++k)
+          force += run.parts[run.at_vertex.values[k]];
+        a[i] = gravity + force * run.input.inverse_masses[i];
+      },
+      1024);
+  return a;
+}
+
+// Out of the half space, as inelastically as a vertex can: what it sank by is taken back, and of its slip
+// what friction holds.
+void touch(const glm::dvec4& plane, double friction, const glm::dvec3& before, double h, glm::dvec3& x,
+           glm::dvec3& v) {
+  const glm::dvec3 n(plane);
+  const double depth = plane.w - glm::dot(n, x);
+  if (depth <= 0) return;
+  const glm::dvec3 moved = x - before, slip = moved - n * glm::dot(n, moved);
+  const double length = glm::length(slip), held = std::min(length, friction * depth);
+  const glm::dvec3 correction = depth * n - (length > 0 ? slip * (held / length) : glm::dvec3(0));
+  x += correction;
+  v += correction / h;
+}
+
+Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
+  for (std::size_t k = 0; k < compliances.size(); ++k)
+    if (!(compliances[k] > 0))
+      throw Error("compliance must be above 0",
+                  fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
+                  "without compliance the right motion is a rigid body's");
+  Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}};
+  std::vector<std::uint32_t> vertices;
+  for_each_spring(run, [&](auto, const ConstraintList& list, double, std::size_t) {
+    vertices.insert(vertices.end(), list.vertices.begin(), list.vertices.end());
+  });
+  run.parts.resize(vertices.size());
+  run.at_vertex = group_by_key(vertices.size(), positions.size(), [&](std::size_t part, auto&& emit) {
+    emit(vertices[part], std::uint32_t(part));
+  });
+  return run;
+}
+
+}  // namespace
+
+Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h) {
+  Leapfrog run = prepared(input, compliances, start.positions);
+  run.h = h;
+  run.v = start.velocities;
+  const Points a = accelerations(run);
+  for (std::size_t i = 0; i < a.size(); ++i) run.v[i] -= h / 2 * a[i];
+  return run;
+}
+
+void advance(Leapfrog& run, long steps) {
+  const Settings& settings = run.input.settings;
+  const std::vector<glm::dvec4> planes = planes_of(run.input.model, settings);
+  const double keep = std::exp(-settings.damping * run.h);
+  for (long s = 0; s < steps; ++s) {
+    const Points a = accelerations(run);
+    parallel_for(
+        a.size(),
+        [&](std::size_t i) {
+          if (run.input.inverse_masses[i] == 0) return;
+          const glm::dvec3 before = run.x[i];
+          run.v[i] = (run.v[i] + run.h * a[i]) * keep;
+          run.x[i] += run.h * run.v[i];
+          for (const glm::dvec4& plane : planes)
+            touch(plane, settings.friction, before, run.h, run.x[i], run.v[i]);
+        },
+        4096);
+  }
+  for (std::size_t i = 0; i < run.x.size(); ++i)
+    if (!std::isfinite(glm::dot(run.x[i], run.x[i]) + glm::dot(run.v[i], run.v[i])))
+      throw Error("the reference motion is not finite", fmt::format("vertex {}, steps of {:.3g} s", i, run.h),
+                  "take shorter ones", 1);
+}
+
+State state_of(Leapfrog& run) {
+  State state{run.x, run.v};
+  const Points a = accelerations(run);
+  for (std::size_t i = 0; i < a.size(); ++i) state.velocities[i] += run.h / 2 * a[i];
+  return state;
+}
+
+double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
+  Settings settings = input.settings;
+  settings.constraint_damping = 0;
+  const ReferenceInput still{input.model, input.system, settings, input.inverse_masses};
+  Leapfrog run = prepared(still, compliances, positions);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Points p(positions.size());
+  for (glm::dvec3& q : p) q = {unit(random), unit(random), unit(random)};
+  const double reach = 1e-7 * input.model.size;
+  double largest = 0;  // 1/s^2
+  for (int iteration = 0; iteration < 100; ++iteration) {
+    double squares = 0;
+    for (std::size_t i = 0; i < p.size(); ++i) squares += glm::dot(p[i], p[i]);
+    const double scale = std::sqrt(double(p.size()) / squares);
+    const auto at = [&](double sign) {
+      for (std::size_t i = 0; i < p.size(); ++i)
+        run.x[i] = positions[i] + (input.inverse_masses[i] > 0 ? sign * reach * scale : 0) * p[i];
+      return accelerations(run);
+    };
+    const Points ahead = at(1), behind = at(-1);
+    double sum = 0;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      const glm::dvec3 next = (behind[i] - ahead[i]) / (2 * reach);
+      sum += glm::dot(next, next);
+      p[i] = next;
+    }
+    largest = std::sqrt(sum / double(p.size()));
+  }
+  const double omega = std::sqrt(1.02 * largest), damped = input.settings.constraint_damping * omega;
+  return (std::sqrt(damped * damped + 4) - damped) / omega;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,223 @@
+#include "sim/reference/motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+
+#include "sim/error.h"
+#include "sim/files.h"
+#include "sim/interrupt.h"
+#include "sim/mesh/cache.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/reference/rigid.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Far below what changes a motion to four digits; of the leapfrog's, the part of its stable step.
+constexpr double rigid_step_length = 4e-5;  // s
+constexpr double part_of_stable = 0.5;
+constexpr double most_bytes = 9e6;  // of positions kept, as long as they are 20 instants or more
+constexpr std::size_t least_instants = 21;
+constexpr double seconds_between_saves = 20;
+
+/// The same motion in longer and in shorter steps, advanced side by side.
+struct Pair {
+  double step = 0;                      ///< s, the shorter
+  std::function<void()> advance;        ///< both, by a step of the scene
+  std::function<State()> coarse, fine;  ///< where they are
+  std::function<void(std::string&)> save;
+  std::function<bool(std::string_view&)> load;
+};
+
+void require_answer(const ReferenceInput& input) {
+  const Settings& settings = input.settings;
+  const char* hint =
+      "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
+  const auto refuse = [&](const std::string& what) {
+    throw Error("the scene has no right motion", what, hint);
+  };
+  if (!uses(settings, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");
+  for (std::size_t k = 0; k < kind_count; ++k) {
+    if (!uses(settings, constraint_kinds[k])) continue;
+    if (settings.stiffness[k] != 1)
+      refuse(fmt::format("k_{} is {}", constraint_kinds[k].name, settings.stiffness[k]));
+    if (compliant(settings) && settings.compliance[k] == 0)
+      refuse(fmt::format("compliance_{} is 0 and another is not", constraint_kinds[k].name));
+  }
+}
+
+Pair rigid_pair(const ReferenceInput& input) {
+  struct Run {
+    std::vector<RigidBody> bodies;
+    long steps;
+  };
+  const long steps = std::max(1L, std::lround(input.settings.dt / rigid_step_length));
+  auto runs = std::make_shared<std::array<Run, 2>>();
+  *runs = {Run{rigid_bodies(input.model), steps}, Run{rigid_bodies(input.model), 2 * steps}};
+  Pair pair;
+  pair.step = input.settings.dt / double(2 * steps);
+  pair.advance = [runs, input] {
+    for (Run& run : *runs)
+      for (RigidBody& body : run.bodies)
+        for (long s = 0; s < run.steps; ++s)
+          advance(body, input.model, input.settings, input.settings.dt / double(run.steps));
+  };
+  pair.coarse = [runs, input] { return state_of(input.model, (*runs)[0].bodies); };
+  pair.fine = [runs, input] { return state_of(input.model, (*runs)[1].bodies); };
+  return pair;
+}
+
+Pair leapfrog_pair(const ReferenceInput& input) {
+  Compliances compliances;
+  for (std::size_t k = 0; k < kind_count; ++k)
+    compliances[k] =
+        input.system.present[k] ? input.settings.compliance[k] : std::numeric_limits<double>::infinity();
+  const double dt = input.settings.dt, stable = stable_step(input, compliances, input.model.rest.positions);
+  const long steps = long(std::ceil(dt / (part_of_stable * stable)));
+  const State start{input.model.positions, input.model.velocities};
+  auto runs = std::make_shared<std::array<Leapfrog, 2>>(
+      std::array{leapfrog(input, compliances, start, dt / double(steps)),
+                 leapfrog(input, compliances, start, dt / double(2 * steps))});
+  Pair pair;
+  pair.step = (*runs)[1].h;
+  pair.advance = [runs, steps] { advance((*runs)[0], steps), advance((*runs)[1], 2 * steps); };
+  pair.coarse = [runs] { return state_of((*runs)[0]); };
+  pair.fine = [runs] { return state_of((*runs)[1]); };
+  pair.save = [runs](std::string& bytes) {
+    for (const Leapfrog& run : *runs) put_array(bytes, run.x), put_array(bytes, run.v);
+  };
+  pair.load = [runs](std::string_view& bytes) {
+    bool whole = true;
+    for (Leapfrog& run : *runs) whole = whole && take_array(bytes, run.x) && take_array(bytes, run.v);
+    return whole;
+  };
+  return pair;
+}
+
+Motion::Row measured(const ReferenceInput& input, const State& state, double time, double error) {
+  Motion::Row row;
+  row.time = time, row.error = error;
+  const double ground = input.settings.ground ? input.settings.ground_height : 0;
+  double mass = 0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i) {
+    const double m = input.model.masses[i];
+    mass += m;
+    row.centre += m * state.positions[i];
+    row.velocity += m * state.velocities[i];
+    row.kinetic += 0.5 * m * glm::dot(state.velocities[i], state.velocities[i]);
+    row.potential += m * input.settings.gravity * (state.positions[i].y - ground);
+  }
+  row.centre /= mass, row.velocity /= mass;
+  return row;
+}
+
+// What is done so far, for a later run to take up, with a checksum with the scene in it.
+void save_unfinished(const std::filesystem::path& file, const Motion& motion, const Pair& pair) {
+  std::string bytes;
+  put_array(bytes, motion.rows), put_array(bytes, motion.kept);
+  for (const Points& positions : motion.positions) put_array(bytes, positions);
+  pair.save(bytes);
+  put_array(bytes, std::vector{hash_bytes(bytes, motion.scene)});
+  write_file(file, bytes);
+}
+
+bool load_unfinished(const std::filesystem::path& file, Motion& motion, const Pair& pair) {
+  std::ifstream in(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::string_view bytes = text;
+  std::vector<std::uint64_t> sum;
+  constexpr std::size_t tail = 16;  // that array
+  if (bytes.size() < tail) return false;
+  std::string_view end = bytes.substr(bytes.size() - tail);
+  bytes.remove_suffix(tail);
+  if (!take_array(end, sum) || sum != std::vector{hash_bytes(bytes, motion.scene)}) return false;
+  Motion held = motion;
+  bool whole = take_array(bytes, held.rows) && take_array(bytes, held.kept);
+  held.positions.resize(held.kept.size());
+  for (Points& positions : held.positions) whole = whole && take_array(bytes, positions);
+  if (whole && pair.load(bytes)) motion = held;
+  return whole;
+}
+
+}  // namespace
+
+std::uint64_t scene_key(const ReferenceInput& input) {
+  std::uint64_t key = 0;
+  const auto add_all = [&](const auto& values) {
+    key = hash_bytes(
+        {reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof *std::data(values)},
+        key);
+  };
+  const Model& model = input.model;
+  add_all(model.rest.positions), add_all(model.rest.tets), add_all(model.positions),
+      add_all(model.velocities);
+  add_all(model.masses), add_all(model.obstacles), add_all(input.inverse_masses);
+  const Settings& s = input.settings;
+  add_all(s.constraints), add_all(s.stiffness), add_all(s.compliance);
+  const double numbers[] = {s.constraint_damping, s.dt,      s.damping, s.gravity, double(s.ground),
+                            s.ground_height,      s.friction};
+  add_all(numbers);
+  return key;
+}
+
+Motion find_motion(const ReferenceInput& input, long steps, const std::filesystem::path& unfinished,
+                   const std::function<void(long)>& progress) {
+  require_answer(input);
+  const bool soft = compliant(input.settings);
+  const Pair pair = soft ? leapfrog_pair(input) : rigid_pair(input);
+  Motion motion;
+  motion.method = soft ? "leapfrog" : "rigid body";
+  motion.scene = scene_key(input);
+  motion.dt = input.settings.dt, motion.step = pair.step;
+  const double instant_bytes = double(input.model.masses.size() * sizeof(glm::dvec3));
+  const auto instants = std::max(least_instants, std::size_t(most_bytes / instant_bytes));
+  const long keep_every = long(std::ceil(double(steps) / double(instants - 1)));
+  const auto add = [&](long step) {
+    const State fine = pair.fine();
+    motion.rows.push_back(
+        measured(input, fine, double(step) * motion.dt, error_to(input.model, fine, pair.coarse())));
+    if (step % keep_every != 0 && step != steps) return;
+    motion.kept.push_back(step);
+    motion.positions.push_back(fine.positions);
+  };
+  const bool resumable = pair.save && !unfinished.empty();
+  if (!resumable || !load_unfinished(unfinished, motion, pair)) add(0);
+  auto saved = std::chrono::steady_clock::now();
+  for (long step = long(motion.rows.size()); step <= steps; ++step) {
+    pair.advance();
+    add(step);
+    if (progress) progress(step);
+    const auto now = std::chrono::steady_clock::now();
+    const bool stop = interrupted();
+    if (resumable && (stop || std::chrono::duration<double>(now - saved).count() > seconds_between_saves)) {
+      save_unfinished(unfinished, motion, pair);
+      saved = now;
+    }
+    if (stop) throw Interrupted();
+  }
+  std::error_code ignored;
+  if (resumable) std::filesystem::remove(unfinished, ignored);
+  return motion;
+}
+
+bool is_kept(const Motion& motion, long step) { return std::ranges::binary_search(motion.kept, step); }
+
+void add_state(MotionError& error, const Motion& motion, const Model& model, long step, const State& state) {
+  const auto found = std::ranges::find(motion.kept, step);
+  if (found == motion.kept.end()) return;
+  const State right{motion.positions[std::size_t(found - motion.kept.begin())], {}},
+      start{motion.positions[0], {}};
+  error.final = error_to(model, right, state);
+  const double moved = error_to(model, start, right);
+  error.relative = moved > 0 ? error.final / moved : 0;
+  error.peak = std::max(error.peak, error.final);
+  const double squares = error.rms * error.rms * double(error.instants) + error.final * error.final;
+  error.rms = std::sqrt(squares / double(++error.instants));
+}
+
+}  // namespace tetpbd

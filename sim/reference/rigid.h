@@ -1,0 +1,35 @@
+// The right motion of k = 1: rigid bodies on half spaces, with Coulomb friction and restitution, in double.
+// Moreau's time stepping (Moreau 1988; Jean 1999): all contacts of a step at once, by nonsmooth Gauss-Seidel
+// to convergence. Bodies do not touch each other.
+#pragma once
+
+#include <vector>
+
+#include "sim/model.h"
+#include "sim/settings.h"
+
+namespace tetpbd {
+
+/// A body's placement and momentum. Its inertia is that of its vertices' masses, as the solvers have it.
+struct RigidBody {
+  std::size_t first = 0;         ///< of its vertices in the model
+  std::vector<glm::dvec3> rest;  ///< m, its vertices from the centre of mass
+  double mass = 0;               ///< kg
+  glm::dmat3 inertia{0};         ///< kg m^2, in the rest shape's axes
+  glm::dvec3 centre{0};          ///< m
+  glm::dmat3 rotation{1};
+  glm::dvec3 velocity{0};  ///< m/s
+  glm::dvec3 angular{0};   ///< kg m^2/s
+};
+
+/// The model's bodies at their start. Throws Error for fixed vertices, and for starts that are not the rest
+/// shape in rigid motion.
+std::vector<RigidBody> rigid_bodies(const Model& model);
+/// Moves a body on by `h` seconds under the settings' gravity, ground and friction and the model's obstacles:
+/// second order in h in flight, first in contact. `restitution`: of Newton, normal velocity after an impact
+/// over before.
+void advance(RigidBody& body, const Model& model, const Settings& settings, double h, double restitution = 0);
+/// The model's vertices, moved with the bodies.
+State state_of(const Model& model, const std::vector<RigidBody>& bodies);
+
+}  // namespace tetpbd

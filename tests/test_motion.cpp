@@ -1,6 +1,7 @@
 // The right motions of reference/: rigid bodies and leapfrog against closed forms, each other and implicit
 // Euler.
 #include <fstream>
+#include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
 #include "sim/reference/leapfrog.h"
@@ -130,6 +131,27 @@ TEST_CASE("motion: a tumbling block loses energy only, and comes to rest on the 
   CHECK(b.centre.y == doctest::Approx(0.15).epsilon(0.002));  // on its largest side
 }
 
+TEST_CASE("motion: a corner that hits turns the body by its arm times the impulse, and stops") {
+  const glm::dmat3 tilted(glm::rotate(glm::dmat4(1), 0.7, glm::normalize(glm::dvec3(1, 0.5, 2))));
+  for (const double friction : {0.0, 0.4}) {
+    CAPTURE(friction);
+    Scene scene = block_at({1, 0.6, 0.3}, {0, 1, 0}, {0.3, -2, 0}, {1, 2, 3}, tilted);
+    scene.settings.friction = friction;
+    RigidBody b = rigid_of(scene), before = b;
+    while (b.velocity.y < before.velocity.y || b.centre.y > 0.95)
+      before = b, advance(b, scene.model, scene.settings, 1e-5);
+    const auto lowest = std::ranges::min(b.rest, {}, [&](const glm::dvec3& r) { return (b.rotation * r).y; });
+    const glm::dvec3 arm = b.rotation * lowest;
+    const glm::dvec3 impulse = b.mass * (b.velocity - before.velocity + glm::dvec3(0, 1e-5 * 9.81, 0));
+    CHECK(glm::length(b.angular - before.angular - glm::cross(arm, impulse)) < 1e-4 * glm::length(impulse));
+    const glm::dvec3 spin = b.rotation * (glm::inverse(b.inertia) * (glm::transpose(b.rotation) * b.angular));
+    CHECK(std::abs((b.velocity + glm::cross(spin, arm)).y) < 1e-3);
+    const double slip = std::hypot(impulse.x, impulse.z);
+    CHECK(slip <= friction * impulse.y + 1e-9);
+    if (friction > 0) CHECK(slip > 0.1 * impulse.y);
+  }
+}
+
 TEST_CASE("motion: what is no rigid motion is refused") {
   Scene scene = block_at({1, 1, 1}, {0, 2, 0});
   scene.model.positions[0].x += 0.01;
@@ -195,6 +217,19 @@ TEST_CASE("motion: two masses on a spring fall, stick, and leave the ground when
   advance(run, std::lround(0.06 * lift / h));
   CHECK(run.x[0].y > 1e-6);
   CHECK(run.x[0].x == 0);
+}
+
+TEST_CASE("motion: leapfrog slides v^2 / (2 friction g) and stops") {
+  Scene scene = chain_scene({{0, 0, 0}, {1, 0, 0}}, {1, 1});
+  scene.settings.ground = true;
+  scene.settings.friction = 0.5;
+  const State start{scene.model.positions, {{1, 0, 0}, {1, 0, 0}}};
+  Leapfrog run = leapfrog(scene.input(), {1e-4, infinity, infinity}, start, 1e-4);
+  advance(run, 3000);
+  CHECK(run.x[0].x == doctest::Approx(1 / (2 * 0.5 * 9.81)).epsilon(0.005));
+  const double stopped = run.x[0].x;
+  advance(run, 1000);
+  CHECK(run.x[0].x == doctest::Approx(stopped).epsilon(1e-9));
 }
 
 TEST_CASE(

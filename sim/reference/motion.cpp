@@ -41,7 +41,8 @@ void require_answer(const ReferenceInput& input) {
   const auto refuse = [&](const std::string& what) {
     throw Error("the scene has no right motion", what, hint);
   };
-  if (!uses(settings, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");
+  if (!compliant(settings) && !uses(settings, Stretch::row))
+    refuse("without stretch constraints bodies have no shape to keep");
   for (std::size_t k = 0; k < kind_count; ++k) {
     if (!uses(settings, constraint_kinds[k])) continue;
     if (settings.stiffness[k] != 1)

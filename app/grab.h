@@ -1,7 +1,6 @@
 // A vertex held by the mouse: pinned, and led towards the cursor no faster than the body can follow.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 

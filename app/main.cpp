@@ -13,12 +13,8 @@
 #include <sstream>
 #include <tuple>
 
-#include "app/command_line.h"
-#include "app/lab.h"
-#include "app/mesh_command.h"
+#include "app/commands.h"
 #include "app/reference_command.h"
-#include "app/scene.h"
-#include "app/window.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
 
@@ -65,10 +61,6 @@ struct Arguments {
 // ------------------------------------------------------------------------------------------------------------
 // kinds of options
 
-// An unset shell variable must not run another experiment than was meant.
-const CLI::Validator not_empty(
-    [](std::string& text) { return text.empty() ? std::string("must not be empty") : std::string(); }, "");
-
 template <class T>
 CLI::Validator in_range(T low, T high) {
   return CLI::Validator(
@@ -95,16 +87,16 @@ CLI::Validator one_of(const Words& words) {
       "");
 }
 
-/// Text, a path, or a list separated by commas.
+/// Text, a path, or a list. An empty one is refused: an unset shell variable would run another experiment.
 template <class T>
 CLI::Option* add(CLI::App& command, const char* flag, T& target, const std::string& help) {
-  CLI::Option* option = command.add_option(flag, target, help)->check(not_empty);
+  CLI::Option* option = command.add_option(flag, target, help);
+  option->check([](const std::string& text) { return std::string(text.empty() ? "must not be empty" : ""); });
   if constexpr (!std::is_constructible_v<std::filesystem::path, T>) option->delimiter(',');
   return target.empty() ? option : option->capture_default_str();
 }
 
-/// A number in a range, or a list of them. A default outside the range is not shown: the help says what it
-/// is.
+/// A number in a range, or a list of them. A default outside the range is for the help to say.
 template <class T, class N>
 void add(CLI::App& command, const char* flag, T& target, N low, N high, const std::string& help) {
   CLI::Option* option = command.add_option(flag, target, help)->check(in_range(low, high));
@@ -311,9 +303,7 @@ Task start_view(Arguments& a) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
     throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
                 "start it in a desktop session, or use tetpbd run");
-  return [scene = open_scene(a), a, r = a.run] {
-    return run_window(scene, {a.scene, a.overrides, r.width, r.height, r.samples, r.view});
-  };
+  return [scene = open_scene(a), a] { return run_window(scene, a.scene, a.overrides, a.run); };
 }
 
 template <auto options, auto run>

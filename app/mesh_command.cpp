@@ -1,10 +1,9 @@
-#include "app/mesh_command.h"
-
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "app/commands.h"
 #include "app/files.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
@@ -19,15 +18,6 @@ struct Row {
   const char *key, *label, *remark;
   Json value;
 };
-
-std::vector<Row> rows_of(const SurfaceMesh& surface, const SurfaceCheck& check) {
-  return {{"vertices", "vertices", "", surface.positions.size()},
-          {"triangles", "triangles", "", surface.triangles.size()},
-          {"components", "components", "", check.components},
-          {"euler_characteristic", "Euler characteristic", "V - E + F", check.euler_characteristic},
-          {"volume", "volume", "m^3", check.volume},
-          {"triangles_turned", "triangles turned", "to face outward", check.flipped_triangles}};
-}
 
 std::vector<Row> rows_of(const MeshReport& r) {
   return {{"vertices", "vertices", "V", r.vertices},
@@ -75,7 +65,14 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
     const SurfaceCheck check = check_surface(oriented);
     if (!check.defect.empty()) throw Error(check.defect, check.place + " in " + file.string(), check.hint);
     document["tetgen"] = switches;
-    put_table(document["surface"], "surface", rows_of(surface, check), json);
+    put_table(document["surface"], "surface",
+              {{"vertices", "vertices", "", surface.positions.size()},
+               {"triangles", "triangles", "", surface.triangles.size()},
+               {"components", "components", "", check.components},
+               {"euler_characteristic", "Euler characteristic", "V - E + F", check.euler_characteristic},
+               {"volume", "volume", "m^3", check.volume},
+               {"triangles_turned", "triangles turned", "to face outward", check.flipped_triangles}},
+              json);
     mesh = tetrahedralise(surface, switches, 600, file.string());
   } else {
     mesh = load_mesh(file, switches);

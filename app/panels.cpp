@@ -91,8 +91,7 @@ bool number_widget(const Parameter& row, const std::string& id, T& value) {
   constexpr bool real = std::is_same_v<T, double>;
   constexpr ImGuiDataType type = real ? ImGuiDataType_Double : ImGuiDataType_S32;
   const T low = T(row.low), high = T(row.high), before = value;
-  // On a logarithmic slider ImGui takes what its format does not show for 0: all decades down to 1e-12 have
-  // to be in it.
+  // A logarithmic slider takes what its format does not show for 0: it has to hold decades down to 1e-12.
   const std::string number = !real ? "%d" : row.logarithmic ? "%.12g" : "%.4g";
   const std::string format = number + (*row.unit ? " " : "") + row.unit;
   bool changed = false;
@@ -181,21 +180,16 @@ void draw_solver(Session& s, Ui& ui) {
                   "--solver\nauto: tries ways to solve this scene and takes what loses least volume within "
                   "the budget";
   Words words;
+  std::map<std::string, Settings> ways;
   for (const SolverPreset& preset : solver_presets()) {
-    Settings same = now;
-    apply_preset(same, preset);
-    if (same == now && !automatic) current = preset.name;
+    apply_preset(ways[preset.name] = now, preset);
+    if (ways[preset.name] == now && !automatic) current = preset.name;
     words.push_back(preset.name);
     help += fmt::format("\n{}: {}", preset.name, preset.help);
   }
   words.push_back("auto");
-  if (const auto chosen = combo(s, ui, "solver", current, words, help)) {
-    if (*chosen == "auto") choose_soon(s);
-    Settings wanted = now;
-    for (const SolverPreset& preset : solver_presets())
-      if (*chosen == preset.name) apply_preset(wanted, preset);
-    change_settings(s, wanted);
-  }
+  if (const auto chosen = combo(s, ui, "solver", current, words, help))
+    ways.contains(*chosen) ? change_settings(s, ways[*chosen]) : choose_soon(s);
   if (!automatic) return;
   slider(s, ui, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
          "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);

@@ -266,6 +266,14 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   throw Error("no such solver", "--solver " + name, fmt::format("choose from {}", fmt::join(names, ", ")));
 }
 
+TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
+  if (body.block) return make_block(body.block->size, body.block->cells);
+  if (!body.tet) return load_mesh(body.mesh, body.tetgen);
+  TetMesh mesh{{body.tet->begin(), body.tet->end()}, {{0, 1, 2, 3}}, {}};
+  finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene));
+  return mesh;
+}
+
 }  // namespace
 
 std::vector<std::string> scene_names() {
@@ -282,12 +290,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   std::error_code error;
   if (!fs::is_regular_file(file, error) && file.extension() != ".json")
     file = models_folder() / "scenes" / (name_or_file + ".json");
-  const std::vector<std::string> names = scene_names();
   if (!fs::is_regular_file(file, error))
     throw Error("no such scene", name_or_file,
-                names.empty()
-                    ? fmt::format("there are none in {}: set TETPBD_MODELS", models_folder().string())
-                    : fmt::format("give a .json file or one of {}", fmt::join(names, ", ")));
+                fmt::format("give a .json file or one of {} in {}", fmt::join(scene_names(), ", "),
+                            (models_folder() / "scenes").string()));
   if (fs::file_size(file, error) > most_bytes)
     throw Error("scene file is too large", file.string(), "a scene is a few kilobytes of JSON");
   json document;
@@ -328,20 +334,6 @@ json body_json(const BodyDescription& body) {
   if (body.tet) result["tet"] = *body.tet;
   return result;
 }
-
-namespace {
-
-TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
-  if (body.block) return make_block(body.block->size, body.block->cells);
-  if (!body.tet) return load_mesh(body.mesh, body.tetgen);
-  TetMesh mesh;
-  mesh.positions.assign(body.tet->begin(), body.tet->end());
-  mesh.tets = {{0, 1, 2, 3}};
-  finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene));
-  return mesh;
-}
-
-}  // namespace
 
 std::shared_ptr<const Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();

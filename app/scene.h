@@ -79,8 +79,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.
 Camera scene_camera(const Scene& scene, const Model& model, float aspect);
 
-/// Folder of the shipped meshes and scenes: $TETPBD_MODELS, beside the installed program, or the source
-/// folder.
+/// Of shipped meshes and scenes: $TETPBD_MODELS, beside the installed program, or the source folder.
 std::filesystem::path models_folder();
 
 }  // namespace tetpbd

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <new>
 
+#include "app/run_loop.h"
 #include "sim/error.h"
 
 namespace tetpbd {
@@ -13,22 +13,13 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-double seconds_since(Steady::time_point begin) {
-  return std::chrono::duration<double>(Steady::now() - begin).count();
-}
-
-// Measurements under way belong to what was before.
-void forget_measurements(Session& s) {
-  while (s.loaded.metrics && collect(*s.loaded.metrics, true)) {
-  }
-  s.volume_error.values.clear();
-}
-
-// After the state was put back.
+// After the state was put back: measurements under way belong to what was before.
 void start_afresh(Session& s) {
   s.clock.owed = 0;
   s.messages.clear();
-  forget_measurements(s);
+  while (s.loaded.metrics && collect(*s.loaded.metrics, true)) {
+  }
+  s.volume_error.values.clear();
 }
 
 bool differs(const Settings& a, const Settings& b, const Parameter& row) {
@@ -44,8 +35,7 @@ void one_step(Session& s) {
   s.clock.simulated += sim.settings.dt;
 }
 
-// What a run without a window of as many steps must give, too. Waits for the GPU, so only where somebody
-// reads it.
+// For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& s) {
   if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
 }
@@ -144,8 +134,7 @@ void watch_state(Session& s) {
 
 void change_settings(Session& s, const Settings& wanted) {
   const Settings old = s.loaded.sim.settings;
-  // Nothing ends a step early and the window stands still while it lasts, so a slider does not go where a
-  // step takes minutes.
+  // Nothing ends a step early, so a slider does not go where one takes minutes.
   constexpr long most = 10000;
   const auto passes = [](const Settings& settings) { return long(settings.iterations) * settings.substeps; };
   if (passes(wanted) > std::max(most, passes(old)))
@@ -291,7 +280,6 @@ void follow_shaders(Session& s) {
     reload_shaders(s.loaded.renderer);
     s.loaded.picker = make_picker(s.loaded.sim.model->rest);
     s.loaded.metrics.reset();
-    forget_measurements(s);
   });
   s.loaded.sim.shader_version = version;  // also after an error: said once an edit
   if (!done) return;

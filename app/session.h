@@ -1,5 +1,4 @@
-// What the window shows and what can be done to it, without any widget: a loaded scene, its clock, its
-// messages.
+// What the window shows and what can be done to it, without any widget.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,7 +12,6 @@
 #include "app/auto_solver.h"
 #include "app/grab.h"
 #include "app/scene.h"
-#include "app/window.h"
 #include "render/picking.h"
 #include "render/renderer.h"
 #include "sim/metrics.h"
@@ -21,8 +19,7 @@
 
 namespace tetpbd {
 
-/// A scene with all that is made from it; replaced as a whole, so that one that fails to load changes
-/// nothing.
+/// A scene with all that is made from it; replaced as a whole: one that fails to load changes nothing.
 struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
@@ -107,8 +104,7 @@ void single_step(Session& session);
 void restart(Session& session);
 /// Refuses those whose steps would stop the window for minutes.
 void change_settings(Session& session, const Settings& wanted);
-/// Makes it the task to load a scene; what there is stays where that fails. `keep_settings`: those of now in
-/// place of the scene's.
+/// Makes it the task to load a scene; where that fails all stays. `keep_settings`: those of now.
 void load_soon(Session& session, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
                bool keep_camera);
 /// Makes it the task to choose a solver within the budget; the bodies stay where they are.

@@ -144,6 +144,7 @@ void draw_help(const Ui& ui) {
 }  // namespace
 
 void set_style(float scale, float density) {
+  ImGui::GetIO().IniFilename = nullptr;  // no file is left behind
   ImGuiStyle& style = ImGui::GetStyle() = ImGuiStyle();
   ImGui::StyleColorsLight(&style);
   style.FrameRounding = style.GrabRounding = 3;

@@ -20,8 +20,7 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
-/// The window, cut up without overlap: the panel at the right, plots and status line below, the view in what
-/// is left.
+/// The window, cut up: the panel at the right, plots and status line below, the view in what is left.
 struct Layout {
   Rect view, panel, plots, status;
 };

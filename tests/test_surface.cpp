@@ -6,7 +6,6 @@
 
 #include "mesh_samples.h"
 #include "sim/mesh/subprocess.h"
-#include "sim/mesh/weld.h"
 
 using namespace tetpbd;
 using namespace samples;

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "app/mesh_command.h"
+#include "app/commands.h"
 #include "mesh_samples.h"
 #include "sim/mesh/cache.h"
 

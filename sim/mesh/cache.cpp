@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "sim/error.h"
 #include "sim/files.h"
 
 namespace tetpbd {
@@ -16,31 +17,17 @@ namespace fs = std::filesystem;
 namespace {
 
 // Change it whenever the file's layout or what is done with TetGen's result changes.
-constexpr std::string_view version = "tetpbd cache 2";
-
-// Damage passes the checksum only by malice, but a cache folder may be shared: what is taken is a mesh.
-bool is_sound(const TetMesh& mesh) {
-  const auto in_range = [&](const auto& element) {
-    return std::ranges::all_of(element, [&](std::uint32_t v) { return v < mesh.positions.size(); });
-  };
-  return !mesh.tets.empty() && std::ranges::all_of(mesh.tets, in_range) &&
-         std::ranges::all_of(mesh.surface, in_range) &&
-         std::ranges::all_of(mesh.positions, [](auto& p) { return glm::length(p) < largest_coordinate; }) &&
-         std::ranges::all_of(mesh.tets, [&](const Tet& t) { return tet_volume(mesh, t) > 0; });
-}
+constexpr std::string_view version = "tetpbd cache 3";
 
 std::string mesh_file(std::uint64_t key) { return fmt::format("{:016x}.tets", key); }
 
 }  // namespace
 
 fs::path cache_file(const std::string& name) {
-  const auto folder = [](const char* variable, const char* below) {
-    const char* value = std::getenv(variable);
-    return value && *value ? fs::path(value) / below : fs::path();
-  };
-  for (const fs::path& place :
-       {folder("TETPBD_CACHE", ""), folder("XDG_CACHE_HOME", "tetpbd"), folder("HOME", ".cache/tetpbd")})
-    if (!place.empty()) return place / name;
+  constexpr std::pair<const char*, const char*> folders[] = {
+      {"TETPBD_CACHE", ""}, {"XDG_CACHE_HOME", "tetpbd"}, {"HOME", ".cache/tetpbd"}};
+  for (const auto& [variable, below] : folders)
+    if (const char* folder = std::getenv(variable); folder && *folder) return fs::path(folder) / below / name;
   return {};
 }
 
@@ -61,23 +48,25 @@ std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, 
   return hash_bytes(bytes, 1);
 }
 
-std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) {
+std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try {
   std::uint64_t checksum = 0;
   if (bytes.size() < sizeof checksum) return {};
   std::memcpy(&checksum, bytes.data(), sizeof checksum);
   bytes.remove_prefix(sizeof checksum);
   TetMesh mesh;
-  const bool whole = checksum == hash_bytes(bytes, key) && take_array(bytes, mesh.positions) &&
-                     take_array(bytes, mesh.tets) && take_array(bytes, mesh.surface) && bytes.empty() &&
-                     is_sound(mesh);
-  return whole ? std::optional(std::move(mesh)) : std::nullopt;
+  if (checksum != hash_bytes(bytes, key) || !take_array(bytes, mesh.positions) ||
+      !take_array(bytes, mesh.tets) || !bytes.empty())
+    return {};
+  finish_tets(mesh, "cache");
+  return mesh;
+} catch (const Error&) {  // damage passes the checksum only by malice, but a cache folder may be shared
+  return {};
 }
 
 std::string mesh_bytes(std::uint64_t key, const TetMesh& mesh) {
   std::string bytes(sizeof key, '\0');
   put_array(bytes, mesh.positions);
   put_array(bytes, mesh.tets);
-  put_array(bytes, mesh.surface);
   const std::uint64_t checksum = hash_bytes(std::string_view(bytes).substr(sizeof key), key);
   std::memcpy(bytes.data(), &checksum, sizeof checksum);
   return bytes;

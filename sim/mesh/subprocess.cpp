@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -25,14 +24,9 @@ constexpr int not_started = 127;
 // Between fork and exec only system calls are safe: other threads may have held any lock.
 [[noreturn]] void become(char* const* words, int output, std::size_t bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  const auto limit = [](__rlimit_resource what, rlim_t most) {
-    rlimit now{};
-    ::getrlimit(what, &now);
-    now.rlim_cur = std::min(most, now.rlim_max);
-    ::setrlimit(what, &now);
-  };
-  limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_AS, bytes);
+  const rlimit no_core{0, 0}, memory{bytes, bytes};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  ::setrlimit(RLIMIT_AS, &memory);  // fails where the limit in force is lower
   const int null = ::open("/dev/null", O_RDWR);
   ::dup2(null, STDIN_FILENO);
   ::dup2(output, STDOUT_FILENO);

@@ -48,8 +48,7 @@ TetMesh read_msh(const fs::path& file) {
     if (mesh.positions.size() != total)
       text.fail(fmt::format("{} nodes declared, {} found", total, mesh.positions.size()));
   };
-  // What follows an element's number and, in version 2, its type; 11: of second order, its corners come
-  // first.
+  // What follows an element's number and type; 11: of second order, its corners come first.
   const auto read_element = [&](long long type) {
     if (type != 4 && type != 11) return;
     for (std::size_t tags = blocks ? 0 : text.count("number of tags"); tags > 0; --tags) text.integer("tag");
@@ -78,26 +77,12 @@ TetMesh read_msh(const fs::path& file) {
     });
   };
 
-  bool has_nodes = false, has_elements = false;
-  while (text.next_line()) {
-    if (text.line() == "$Nodes") {
-      if (has_nodes) text.fail("file has $Nodes twice");
-      has_nodes = true;
+  while (text.next_line())
+    if (text.line() == "$Nodes")
       read_nodes();
-    } else if (text.line() == "$Elements") {
-      has_elements = true;
+    else if (text.line() == "$Elements")
       read_elements();
-    }
-  }
-  if (!has_nodes || !has_elements)
-    throw Error(has_nodes ? "file has no $Elements" : "file has no $Nodes", file.string(),
-                "it is incomplete: export it again");
   return mesh;
-}
-
-bool has_mesh_format(const fs::path& file) {
-  const std::string extension = lower_extension(file);
-  return extension == ".node" || extension == ".ele" || extension == ".msh" || is_surface_file(file);
 }
 
 }  // namespace
@@ -146,15 +131,16 @@ TetMesh load_tets(const fs::path& file) {
 }
 
 TetMesh load_mesh(const fs::path& file, const std::string& switches) {
-  if (!has_mesh_format(file)) require_readable(file);  // a missing file or a folder is the better news
+  require_readable(file);
   require_mesh_format(file);
   if (!is_surface_file(file)) return load_tets(file);
   return tetrahedralise(load_surface(file), switches, 600, file.string());
 }
 
 void require_mesh_format(const fs::path& file) {
-  if (!has_mesh_format(file))
-    throw Error(fmt::format("unknown mesh format '{}'", lower_extension(file)), file.string(),
+  const std::string extension = lower_extension(file);
+  if (extension != ".node" && extension != ".ele" && extension != ".msh" && !is_surface_file(file))
+    throw Error(fmt::format("unknown mesh format '{}'", extension), file.string(),
                 "use .ply, .obj, .stl or .off for surfaces, .node with .ele or .msh for tetrahedra");
 }
 

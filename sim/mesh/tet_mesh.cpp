@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "sim/error.h"
-#include "sim/mesh/weld.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -68,8 +67,7 @@ void orient_tets(TetMesh& mesh, const std::string& source) {
                 "mesh again with quality switches (such as pYq1.85o/140) or remove them");
 }
 
-// Faces are grouped by their smallest vertex (about 24 in each) and sorted there: one sort of all faces takes
-// four times as long.
+// Faces are grouped by their smallest vertex and sorted there: four times as fast as one sort of all.
 void find_boundary(TetMesh& mesh, const std::string& source) {
   const auto outward = [&](std::size_t tet, std::size_t side) -> Triangle {
     const Tet& t = mesh.tets[tet];
@@ -122,6 +120,32 @@ void finish_tets(TetMesh& mesh, const std::string& source) {
   orient_tets(mesh, source);
   drop_unused_vertices(mesh.positions, mesh.tets);
   find_boundary(mesh, source);
+}
+
+// Kuhn's subdivision: a tet for each order of walking from the cell's low corner to its high one along the
+// three axes. All cells share the diagonal's direction, so the faces of neighbours match.
+TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
+  TetMesh mesh;
+  const glm::uvec3 nodes(cells + 1);
+  const auto each_of = [](const glm::uvec3& counts, const auto& visit) {
+    for (std::uint32_t z = 0; z < counts.z; ++z)
+      for (std::uint32_t y = 0; y < counts.y; ++y)
+        for (std::uint32_t x = 0; x < counts.x; ++x) visit(glm::uvec3(x, y, z));
+  };
+  each_of(nodes, [&](const glm::uvec3& at) {
+    mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5));
+  });
+  const glm::uvec3 step(1, nodes.x, nodes.x * nodes.y);
+  constexpr std::array<std::array<int, 3>, 6> orders{
+      {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
+  each_of(glm::uvec3(cells), [&](const glm::uvec3& at) {
+    const std::uint32_t corner = at.x + at.y * step.y + at.z * step.z;
+    for (const auto& [i, j, k] : orders)
+      mesh.tets.push_back(
+          {corner, corner + step[i], corner + step[i] + step[j], corner + step[0] + step[1] + step[2]});
+  });
+  finish_tets(mesh, "block");
+  return mesh;
 }
 
 double tet_volume(const TetMesh& mesh, const Tet& tet) {

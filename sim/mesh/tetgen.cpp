@@ -110,8 +110,7 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
   if (!check.defect.empty()) throw Error(check.defect, check.place + " in " + source, check.hint);
   TetMesh mesh = run(surface, switches, time_limit, source);
   finish_tets(mesh, source);
-  // TetGen fills everything inside the outermost surface. Where parts lie inside one another their volumes
-  // count twice.
+  // TetGen fills everything inside the outermost surface: volumes of parts inside one another count twice.
   if (check.components > 1 && std::abs(mesh_volume(mesh) - check.volume) > 1e-6 * check.volume)
     throw Error("parts of the surface lie inside one another",
                 fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume,

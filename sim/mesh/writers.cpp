@@ -5,8 +5,8 @@
 
 #include "sim/error.h"
 #include "sim/files.h"
+#include "sim/mesh/tet_mesh.h"
 #include "sim/mesh/text_file.h"
-#include "sim/mesh/weld.h"
 
 namespace tetpbd {
 namespace {

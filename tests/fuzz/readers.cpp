@@ -10,12 +10,11 @@
 #include <cstring>
 #include <filesystem>
 
-#include "app/command_line.h"
+#include "app/commands.h"
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/mesh/cache.h"
 #include "sim/mesh/tet_mesh.h"
-#include "sim/mesh/weld.h"
 
 namespace fuzz {
 namespace {

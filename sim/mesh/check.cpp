@@ -1,0 +1,300 @@
+// What is wrong with a surface, and what a mesh of tets is like: both from which triangles meet where.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <tuple>
+
+#include "sim/mesh/tet_mesh.h"
+#include "sim/parallel.h"
+
+namespace tetpbd {
+namespace {
+
+/// Union-find with path halving.
+struct DisjointSets {
+  std::vector<std::uint32_t> parent;
+  explicit DisjointSets(std::size_t count) : parent(count) { std::iota(parent.begin(), parent.end(), 0u); }
+  std::uint32_t root(std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  }
+  void join(std::uint32_t a, std::uint32_t b) { parent[root(a)] = root(b); }
+};
+
+/// One side of a triangle: from corner `side` to the next.
+struct EdgeUse {
+  std::uint32_t low, high;  ///< vertices, low < high
+  std::uint32_t triangle, side;
+  bool forward;  ///< the triangle runs from low to high
+};
+
+struct SurfaceTopology {
+  std::vector<EdgeUse> uses;              ///< sorted by (low, high, triangle)
+  std::vector<std::uint32_t> edges;       ///< where each edge begins in `uses`, and the end
+  std::vector<std::uint32_t> patch;       ///< triangle -> patch: joined across edges that two triangles share
+  std::vector<char> turned;               ///< triangle -> whether it is turned against others of its patch
+  std::vector<std::uint32_t> one_sided;   ///< edges across which no choice of turns makes neighbours agree
+  std::vector<std::uint32_t> fans;        ///< vertex -> number of fans of triangles around it
+  std::size_t patches = 0, vertices = 0;  ///< vertices: those with a triangle
+  std::size_t edge_count() const { return edges.size() - 1; }
+  std::size_t uses_of(std::size_t edge) const { return edges[edge + 1] - edges[edge]; }
+};
+
+// Indices must be in range and no triangle may name a vertex twice.
+SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+  SurfaceTopology topology;
+  auto& uses = topology.uses;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = triangles[t][k], b = triangles[t][(k + 1) % 3];
+      uses.push_back({std::min(a, b), std::max(a, b), t, k, a < b});
+    }
+  std::ranges::sort(uses, {}, [](const EdgeUse& use) { return std::tuple(use.low, use.high, use.triangle); });
+  for (std::uint32_t i = 0; i < uses.size(); ++i)
+    if (i == 0 || uses[i].low != uses[i - 1].low || uses[i].high != uses[i - 1].high)
+      topology.edges.push_back(i);
+  topology.edges.push_back(std::uint32_t(uses.size()));
+
+  // Each triangle is in two sets, as it is (2 t) and turned (2 t + 1): what is in one agrees.
+  DisjointSets ways(triangles.size() * 2), corners(triangles.size() * 3);
+  const auto corner = [&](const EdgeUse& use, std::uint32_t vertex) {
+    const bool first = triangles[use.triangle][use.side] == vertex;
+    return use.triangle * 3 + (first ? use.side : (use.side + 1) % 3);
+  };
+  for (std::uint32_t e = 0; e < topology.edge_count(); ++e) {
+    if (topology.uses_of(e) != 2) continue;
+    const EdgeUse &a = uses[topology.edges[e]], &b = uses[topology.edges[e] + 1];
+    const std::uint32_t i = 2 * a.triangle, agreeing = 2 * b.triangle + (a.forward == b.forward);
+    if (ways.root(i) == ways.root(agreeing ^ 1)) {
+      topology.one_sided.push_back(e);
+    } else {
+      ways.join(i, agreeing);
+      ways.join(i ^ 1, agreeing ^ 1);
+    }
+    corners.join(corner(a, a.low), corner(b, a.low));
+    corners.join(corner(a, a.high), corner(b, a.high));
+  }
+  std::vector<std::uint32_t> number(triangles.size() * 2, ~0u);  // of a set's patch, by its root
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const std::uint32_t as_is = ways.root(2 * t), turned = ways.root(2 * t + 1);
+    if (number[as_is] == ~0u) number[as_is] = number[turned] = std::uint32_t(topology.patches++);
+    topology.patch.push_back(number[as_is]);
+    topology.turned.push_back(as_is > turned);
+  }
+  topology.fans.assign(vertex_count, 0);
+  for (std::uint32_t c = 0; c < triangles.size() * 3; ++c)
+    if (corners.root(c) == c) ++topology.fans[triangles[c / 3][c % 3]];
+  for (const std::uint32_t fans : topology.fans) topology.vertices += fans > 0;
+  return topology;
+}
+
+// Both relative to the bounding box's diagonal d. A triangle under 1e-14 d^2 has a height in the range of
+// float rounding (an equilateral one: sides of 1.5e-7 d). Volume per area and d is a thickness: a sheet of
+// thickness h has about h / (3 d), a wire of thickness h about h / (4 d); rounding alone gives a double-sided
+// sheet up to 1e-8.
+constexpr double degenerate_area = 1e-14;
+constexpr double flat_thickness = 1e-7;
+
+struct Defect {
+  const char *name, *one, *many, *hint;
+};
+
+// Which of 0 .. count are bad, unless a defect is known already; place() says where the first is.
+void look_for(const Defect& defect, SurfaceCheck& check, std::size_t count, const auto& is_bad,
+              const auto& place) {
+  if (!check.defect.empty()) return;
+  std::string first;
+  for (std::size_t i = 0; i < count; ++i)
+    if (is_bad(i) && check.count++ == 0) first = place(i);
+  if (check.count == 0) return;
+  check.defect = defect.name;
+  check.place =
+      fmt::format("{} {}, first {}", check.count, check.count == 1 ? defect.one : defect.many, first);
+  check.hint = defect.hint;
+}
+
+std::string near(const glm::dvec3& point) { return "near " + point_text(point); }
+
+glm::dvec3 centroid(const SurfaceMesh& s, const Triangle& t) {
+  return (s.positions[t[0]] + s.positions[t[1]] + s.positions[t[2]]) / 3.0;
+}
+
+glm::dvec3 area_vector(const SurfaceMesh& s, const Triangle& t) {
+  return glm::cross(s.positions[t[1]] - s.positions[t[0]], s.positions[t[2]] - s.positions[t[0]]) * 0.5;
+}
+
+// Turns triangles so that every patch faces outward, and finds the patches without volume.
+void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, SurfaceCheck& check) {
+  const glm::dvec3 centre = bounds(surface.positions).centre();  // small numbers: less rounding
+  std::vector<double> volume(topology.patches, 0), area(topology.patches, 0);
+  std::vector<glm::dvec3> place(topology.patches);
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const Triangle& t = surface.triangles[i];
+    const std::uint32_t patch = topology.patch[i];
+    const glm::dvec3 normal = area_vector(surface, t);
+    volume[patch] += glm::dot(surface.positions[t[0]] - centre, normal) / 3 * (topology.turned[i] ? -1 : 1);
+    area[patch] += glm::length(normal);
+    place[patch] = centroid(surface, t);
+  }
+  for (const double v : volume) check.volume += std::abs(v);
+  look_for(
+      {"surface is flat", "part without volume", "parts without volume", "give it thickness or remove it"},
+      check, topology.patches,
+      [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
+      [&](std::size_t p) { return near(place[p]); });
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const bool inward = volume[topology.patch[i]] < 0;
+    if (bool(topology.turned[i]) == inward) continue;
+    std::swap(surface.triangles[i][1], surface.triangles[i][2]);
+    ++check.flipped_triangles;
+  }
+}
+
+// Dihedral angles between the faces opposite to corners a and b, degrees.
+std::array<double, 6> dihedral_angles(const TetMesh& mesh, const Tet& tet) {
+  const glm::dvec3 &a = mesh.positions[tet[0]], &b = mesh.positions[tet[1]], &c = mesh.positions[tet[2]],
+                   &d = mesh.positions[tet[3]];
+  const std::array<glm::dvec3, 4> normals{glm::cross(c - b, d - b), glm::cross(d - a, c - a),
+                                          glm::cross(b - a, d - a), glm::cross(c - a, b - a)};
+  std::array<double, 6> angles{};
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = i + 1; j < 4; ++j)  // atan2, not acos: exact to the last digits for slivers too
+      angles[n++] =
+          std::atan2(glm::length(glm::cross(normals[i], normals[j])), -glm::dot(normals[i], normals[j])) *
+          180 / std::numbers::pi;
+  return angles;
+}
+
+}  // namespace
+
+SurfaceCheck check_surface(SurfaceMesh& surface) {
+  SurfaceCheck check;
+  const std::vector<glm::dvec3>& positions = surface.positions;
+  const std::vector<Triangle>& triangles = surface.triangles;
+  const auto at_vertex = [](std::size_t v) { return fmt::format("vertex {}", v); };
+  // NaN where a coordinate is.
+  const auto reach = [&](std::size_t v) { return glm::dot(glm::abs(positions[v]), glm::dvec3(1)); };
+  look_for(
+      {"triangles name vertices that are not there", "index", "indices", "export the mesh again"}, check,
+      3 * triangles.size(), [&](std::size_t i) { return triangles[i / 3][i % 3] >= positions.size(); },
+      [](std::size_t i) { return fmt::format("in triangle {}", i / 3); });
+  look_for(
+      {"positions are not finite numbers", "vertex", "vertices", "export the mesh again"}, check,
+      positions.size(), [&](std::size_t v) { return !std::isfinite(reach(v)); }, at_vertex);
+  look_for(
+      {"positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh"}, check,
+      positions.size(), [&](std::size_t v) { return reach(v) > largest_coordinate; }, at_vertex);
+  if (!check.defect.empty()) return check;
+  if (triangles.size() < 4) {
+    check.defect = "too few triangles to enclose a volume";
+    check.place = fmt::format("{} of them", triangles.size());
+    check.hint = "a closed surface has at least 4";
+    return check;
+  }
+
+  const double size = bounds(positions).size();
+  std::vector<Triangle> sorted = triangles;
+  for (Triangle& t : sorted) std::ranges::sort(t);
+  std::ranges::sort(sorted);
+  look_for(
+      {"triangles have no area", "triangle", "triangles",
+       "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)"},
+      check, triangles.size(),
+      [&](std::size_t i) {
+        const Triangle& t = triangles[i];
+        return t[0] == t[1] || t[1] == t[2] || t[2] == t[0] ||
+               glm::length(area_vector(surface, t)) <= degenerate_area * size * size;
+      },
+      [&](std::size_t i) { return near(centroid(surface, triangles[i])); });
+  look_for(
+      {"triangles appear more than once", "too many", "too many",
+       "remove the duplicates (a sheet with two sides is no solid)"},
+      check, sorted.size() - 1, [&](std::size_t i) { return sorted[i] == sorted[i + 1]; },
+      [&](std::size_t i) { return near(centroid(surface, sorted[i])); });
+  if (!check.defect.empty()) return check;
+
+  const SurfaceTopology topology = surface_topology(triangles, positions.size());
+  check.components = int(topology.patches);
+  check.euler_characteristic = int(topology.vertices) - int(topology.edge_count()) + int(triangles.size());
+  const auto at_edge = [&](std::size_t edge) {
+    const EdgeUse& use = topology.uses[topology.edges[edge]];
+    return near((positions[use.low] + positions[use.high]) * 0.5);
+  };
+  look_for(
+      {"edges have more than two triangles", "edge", "edges",
+       "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)"},
+      check, topology.edge_count(), [&](std::size_t e) { return topology.uses_of(e) > 2; }, at_edge);
+  look_for(
+      {"surface is open", "edge with one triangle only", "edges with one triangle only",
+       "close its holes (in MeshLab: Close Holes)"},
+      check, topology.edge_count(), [&](std::size_t e) { return topology.uses_of(e) == 1; }, at_edge);
+  look_for(
+      {"parts of the surface touch in single vertices", "vertex", "vertices",
+       "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)"},
+      check, topology.fans.size(), [&](std::size_t v) { return topology.fans[v] > 1; },
+      [&](std::size_t v) { return near(positions[v]); });
+  look_for(
+      {"surface has only one side", "edge where it cannot be oriented", "edges where it cannot be oriented",
+       "cut it open and close it as a solid"},
+      check, topology.one_sided.size(), [](std::size_t) { return true; },
+      [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
+  if (check.defect.empty()) orient(surface, topology, size, check);
+  return check;
+}
+
+MeshReport report(const TetMesh& mesh) {
+  MeshReport r{};
+  r.vertices = mesh.positions.size();
+  r.tets = mesh.tets.size();
+  r.surface_triangles = mesh.surface.size();
+  r.edges = tet_edges(mesh).size();
+  r.faces = (4 * r.tets + r.surface_triangles) / 2;
+  r.euler_characteristic = int(r.vertices) - int(r.edges) + int(r.faces) - int(r.tets);
+
+  const SurfaceTopology surface = surface_topology(mesh.surface, mesh.positions.size());
+  r.surface_vertices = surface.vertices;
+  // Where parts of the boundary touch in a vertex or an edge they are taken as separate sheets: one vertex
+  // for each fan of triangles, one edge for each pair.
+  int euler = int(mesh.surface.size());
+  for (const std::uint32_t fans : surface.fans) euler += int(fans);
+  for (std::size_t e = 0; e < surface.edge_count(); ++e) {
+    r.bends += surface.uses_of(e) == 2;
+    euler -= int(surface.uses_of(e) / 2);
+  }
+  r.genus = int(surface.patches) - euler / 2;
+
+  DisjointSets parts(r.vertices);
+  for (const Tet& tet : mesh.tets)
+    for (const std::uint32_t v : tet) parts.join(tet[0], v);
+  for (std::uint32_t v = 0; v < r.vertices; ++v) r.components += parts.root(v) == v;
+
+  r.smallest_tet_volume = INFINITY;
+  r.min_dihedral_deg = 180;
+  struct Shape {
+    double volume, low, high;  // m^3, degrees
+  };
+  std::vector<Shape> shapes(mesh.tets.size());
+  parallel_for(shapes.size(), [&](std::size_t i) {
+    const auto angles = dihedral_angles(mesh, mesh.tets[i]);
+    const auto [low, high] = std::minmax_element(angles.begin(), angles.end());
+    shapes[i] = {tet_volume(mesh, mesh.tets[i]), *low, *high};
+  });
+  for (const auto& [volume, low, high] : shapes) {
+    r.volume += volume;
+    r.smallest_tet_volume = std::min(r.smallest_tet_volume, volume);
+    r.inverted += volume <= 0;
+    r.min_dihedral_deg = std::min(r.min_dihedral_deg, low);
+    r.max_dihedral_deg = std::max(r.max_dihedral_deg, high);
+    r.mean_min_dihedral_deg += low;
+    r.slivers += low < 5 || high > 175;
+  }
+  r.mean_tet_volume = r.volume / double(r.tets);
+  r.mean_min_dihedral_deg /= double(r.tets);
+  return r;
+}
+
+}  // namespace tetpbd

@@ -95,8 +95,4 @@ void lead(Grab& grab, Sim& sim) {
   move_pinned(sim, grab.vertex, grab.position);
 }
 
-void end_grab(Grab& grab, Sim& sim) {
-  if (!grab.was_pinned) unpin(sim, grab.vertex);
-}
-
 }  // namespace tetpbd

@@ -31,7 +31,5 @@ void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
          std::span<const glm::dvec4> planes);
 /// Before each step: leads the vertex on.
 void lead(Grab& grab, Sim& sim);
-/// Lets go: the vertex is free again unless it had been pinned.
-void end_grab(Grab& grab, Sim& sim);
 
 }  // namespace tetpbd

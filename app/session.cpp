@@ -223,7 +223,7 @@ void catch_vertex(Session& s, const Pick& pick) {
 
 void let_go(Session& s) {
   if (!s.grab) return;
-  end_grab(*s.grab, s.loaded.sim);
+  if (!s.grab->was_pinned) unpin(s.loaded.sim, s.grab->vertex);
   s.log("release {} moved {:.4f}", s.grab->vertex, glm::length(s.grab->position - s.grab->start));
   s.grab.reset();
 }

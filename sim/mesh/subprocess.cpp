@@ -26,7 +26,7 @@ constexpr int not_started = 127;
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0}, memory{bytes, bytes};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  ::setrlimit(RLIMIT_AS, &memory);  // fails where the limit in force is lower
+  ::setrlimit(RLIMIT_AS, &memory);
   const int null = ::open("/dev/null", O_RDWR);
   ::dup2(null, STDIN_FILENO);
   ::dup2(output, STDOUT_FILENO);

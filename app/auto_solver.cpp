@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "app/run_loop.h"
@@ -16,49 +15,32 @@ namespace tetpbd {
 
 namespace {
 
-constexpr double most_seconds = 3;  // of a trial: a slow machine compares fewer steps
+constexpr double most_seconds = 3;  // of the first trial: a slow machine compares fewer steps
 constexpr double most_substeps = 1000;
 
 // On the front wherever it was measured (docs/results.md): one iteration a substep, never several.
-std::vector<Settings> candidates(const Settings& settings) {
-  Settings base = settings;
+std::vector<Settings> candidates(Settings base) {
   set_mode(base, "node", "auto");
-  base.iterations = 1;
-  if (compliant(settings)) return {base};  // over-relaxation does not apply
-  std::vector<Settings> all;
-  for (double omega : {1.5, 2.5}) {
-    base.omega = omega;
-    all.push_back(base);
-  }
-  if (!base.mass_splitting) {
-    all.push_back(base);
-    all.back().mass_splitting = true;
-  }
+  base.iterations = base.substeps = 1;
+  if (compliant(base)) return {base};  // over-relaxation does not apply
+  std::vector<Settings> all = combinations(base, {.omegas = {1.5, 2.5}});
+  all.push_back(all.back());
+  all.back().mass_splitting = true;
   return all;
 }
 
 /// As many substeps as fit the budget, from one substep's time, then from what so many took.
-void fit_substeps(Sim& sim, SolverTrial& trial, double budget_ms) {
+void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
   for (int round = 0; round < 2; ++round) {
     reset(sim);
     const double seconds = is_software_renderer() ? 0 : 0.03;
     const MeasuredRun run =
         run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
     if (interrupted()) throw Interrupted();
-    const double ms = percentiles(run.gpu_ms.values).median;
-    trial.settings.substeps =
-        int(std::clamp(std::floor(trial.settings.substeps * budget_ms / ms), 1.0, most_substeps));
-    apply_settings(sim, trial.settings);
+    const double fitting = settings.substeps * budget_ms / percentiles(run.gpu_ms.values).median;
+    settings.substeps = int(std::clamp(fitting, 1.0, most_substeps));
+    apply_settings(sim, settings);
   }
-}
-
-/// Largest volume loss; infinite if the state did not stay finite.
-double loss_until(const MeasuredRun& run, long steps) {
-  if (!run.errors.finite) return std::numeric_limits<double>::infinity();
-  double loss = 0;
-  for (const Measurement& m : run.measurements)
-    if (m.step <= steps) loss = std::max(loss, -m.volume_error_percent);
-  return loss;
 }
 
 }  // namespace
@@ -70,26 +52,26 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   SolverChoice choice;
   choice.budget_ms = budget_ms;
   choice.steps = steps;
-  std::vector<MeasuredRun> runs;
   for (const Settings& candidate : candidates(settings)) {
-    SolverTrial trial{candidate, 0, 0};
-    trial.settings.substeps = 1;
-    Sim sim = create_sim(model, trial.settings);
-    if (runs.empty()) warm_up(sim);
+    const bool first = choice.trials.empty();
+    SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
+    Sim sim = create_sim(model, candidate);
+    if (first) warm_up(sim);
     step(sim);  // the first of a new solver is not like the others
-    fit_substeps(sim, trial, budget_ms);
+    fit_substeps(sim, trial.settings, budget_ms);
     reset(sim);
     Metrics metrics = create_metrics(*model, sim.system);
-    runs.push_back(run_loop(sim, &metrics, choice.steps, {.most_seconds = most_seconds}));
+    RunPlan plan;
+    if (first) plan.most_seconds = most_seconds;
+    const MeasuredRun run = run_loop(sim, &metrics, choice.steps, plan);
     if (interrupted()) throw Interrupted();
-    if (runs.back().errors.finite) choice.steps = std::min(choice.steps, runs.back().steps);
-    trial.ms = percentiles(runs.back().gpu_ms.values).median;
-    choice.trials.push_back(trial);
-  }
-  for (std::size_t t = 0; t < runs.size(); ++t) {
-    choice.trials[t].loss_percent = loss_until(runs[t], choice.steps);
+    if (first && run.errors.finite) choice.steps = run.steps;
+    trial.ms = percentiles(run.gpu_ms.values).median;
+    trial.loss_percent =
+        run.errors.finite ? run.errors.max_volume_loss_percent : std::numeric_limits<double>::infinity();
     // Losses that agree to a hundredth are the same: then the plainer one.
-    if (choice.trials[t].loss_percent < 0.99 * choice.trials[choice.best].loss_percent) choice.best = t;
+    if (trial.loss_percent < 0.99 * choice.trials[choice.best].loss_percent)
+      choice.best = choice.trials.size() - 1;
   }
   // Where nothing was lost the trials say nothing: a body that has not fallen yet, a machine too slow to wait
   // for it. Then the first of them is taken.

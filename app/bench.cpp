@@ -34,11 +34,6 @@ ordered_json spread(std::vector<double> values) {
   return {{"median", values[values.size() / 2]}, {"min", values.front()}, {"max", values.back()}};
 }
 
-struct Subject {
-  Scene scene;  ///< with the settings to measure
-  std::shared_ptr<const Model> model;
-};
-
 /// What a dispatch and a byte cost on this GPU at least, what speeds are held against: a dispatch of as many
 /// invocations as a small mesh has, and its barrier; bytes read and written by a kernel that copies from
 /// memory, not from a cache. About a tenth of a second.
@@ -81,7 +76,7 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
     still.push_back(1e3 * seconds_since(begin) / double(count));
   };
   RunPlan plan{.most_seconds = options.most_seconds, .wait = false};
-  if (picture) plan.stepped = [&](long) { return picture(), true; };
+  if (picture) plan.stepped = [&](long) { picture(); };
   warm_up(sim);
   for (int repeat = 0; repeat < options.repeats && row["finite"] == true; ++repeat) {
     reset(sim);
@@ -106,29 +101,28 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
       1e3 * number(row, "gpu_ms_per_step") / (number(row, "iterations") * number(row, "substeps"));
 }
 
-std::vector<ordered_json> rows_of(const Subject& subject, const BenchOptions& options) {
-  const Model& model = *subject.model;
-  Sim sim = create_sim(subject.model, subject.scene.settings);
+std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<const Model>& model,
+                                  const Settings& settings, const BenchOptions& options) {
+  Sim sim = create_sim(model, settings);
   const Explanation cost = explain(sim);
-  Metrics metrics = create_metrics(model, sim.system);
+  Metrics metrics = create_metrics(*model, sim.system);
   const MeasuredRun run =
       run_loop(sim, &metrics, options.frames, {.most_seconds = 12 * options.most_seconds});
-  ordered_json row = setting_json(subject.scene, model, sim.settings);
+  ordered_json row = row_of(scene, *model, sim.settings, run);
   row.update({{"size", ""},
               {"picture", ""},
               {"dispatches_per_step", cost.dispatches_per_step},
               {"bytes_per_step", cost.bytes_per_step},
               {"gpu_bytes", cost.bytes}});
-  put_errors(row, run);
   // Where time ran out: an error over part of the run would be another quantity.
   if (run.steps < options.frames) row["max_volume_loss_percent"] = nullptr;
   std::vector<ordered_json> rows{row};
   time_frames(rows[0], sim, options, {});
   if (options.sizes.empty()) return rows;
-  Renderer renderer = make_renderer(model);
+  Renderer renderer = make_renderer(*model);
   for (const auto& [width, height] : options.sizes) {
     const Target target = make_target(width, height, options.samples);
-    const Camera camera = scene_camera(subject.scene, model, float(width) / float(height));
+    const Camera camera = scene_camera(scene, *model, float(width) / float(height));
     for (const std::string& picture : options.pictures) {
       const Frame frame = frame_of(sim, camera, picture == "plain" ? plain_view({}) : ViewOptions{}, target);
       row["size"] = fmt::format("{}x{}", width, height);
@@ -143,18 +137,14 @@ std::vector<ordered_json> rows_of(const Subject& subject, const BenchOptions& op
 }  // namespace
 
 Sweep bench_sweep(const BenchOptions& options) {
-  std::vector<Subject> subjects;
+  Sweep sweep{"bench", "bench", split(columns, ','), 0, table, {}};
   for (const std::string& name : options.scenes) {
-    Scene scene = load_scene(name, options.overrides);
+    const Scene scene = load_scene(name, options.overrides);
     const auto all = combinations(scene.settings, options.axes);
     const auto model = build_model(scene);
-    for (const Settings& settings : all) {
-      scene.settings = settings;
-      subjects.push_back({scene, model});
-    }
+    for (const Settings& settings : all)
+      sweep.work.push_back([=] { return rows_of(scene, model, settings, options); });
   }
-  Sweep sweep{"bench", "bench", split(columns, ','), 0, table, {}, subjects.size()};
-  sweep.make = [subjects, options](std::size_t i) { return rows_of(subjects[i], options); };
   return sweep;
 }
 
@@ -163,21 +153,19 @@ int run_bench(const BenchOptions& options) {
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
   Sweep sweep = bench_sweep(options);
-  const ordered_json device = device_json(context.capabilities());
   const ordered_json limits = launch_and_bandwidth_limits(context.capabilities().software);
-  sweep.facts = {{"device", device},
+  sweep.facts = {{"device", device_json(context.capabilities())},
                  {"frames", options.frames},
                  {"warm_up", options.warm_up},
                  {"repeats", options.repeats},
                  {"floors", limits}};
   sweep.print_each = true;
-  print_device(device);
   fmt::print(
       "{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing waits "
-      "between frames\nat least {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n\n",
+      "between frames\nat least {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n",
       options.frames, options.warm_up, options.repeats, number(limits, "dispatch_us"),
       number(limits, "copy_gb_s"));
-  print_table(table);
+  print_table(sweep, sweep.facts);
   return write_sweep(sweep, options.out, run_sweep(sweep));
 }
 

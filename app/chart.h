@@ -1,4 +1,4 @@
-// Charts as SVG text: axes with units, log scales, one colour a solver mode everywhere.
+// Charts as SVG text: points and lines over axes with units, linear from 0 or by decades.
 #pragma once
 
 #include <filesystem>
@@ -9,30 +9,28 @@ namespace tetpbd {
 
 struct Series {
   std::string name, colour;
-  std::vector<double> x, y;
-  bool line = true, markers = true, dashed = false;
+  enum Style { points, line, dashes } style = points;
+  std::vector<double> x{}, y{};
 };
 
 struct Chart {
   std::string title, subtitle, x_label, y_label;
-  bool log_x = false, log_y = false;
+  bool log = false;  ///< both axes
   std::vector<Series> series{};
   struct Note {
     double x, y;
     std::string text;
   };
   std::vector<Note> notes{};
-  /// Bars instead, in groups, one a series in each: y by group, NaN leaves a gap.
-  std::vector<std::string> groups{};
 };
 
 std::string to_svg(const Chart& chart);
 
-/// The colour of a solver mode; palette_colour(k): of anything else, in order.
-std::string mode_colour(const std::string& mode);
+/// Okabe and Ito's: told apart with any colour vision. A solver mode has the same everywhere.
 std::string palette_colour(std::size_t index);
+std::string mode_colour(const std::string& mode);
 
 /// Writes NAME.svg and, with rsvg-convert, NAME.png; says on standard error when that is missing.
-void write_chart(const std::filesystem::path& name, const std::string& svg);
+void write_chart(const std::filesystem::path& name, const Chart& chart);
 
 }  // namespace tetpbd

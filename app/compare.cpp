@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <tuple>
 
 #include "app/chart.h"
 #include "app/files.h"
@@ -16,11 +18,14 @@ namespace tetpbd {
 
 namespace {
 
-const char* columns =
+// ------------------------------------------------------------------------------------------------------------
+// speed against error
+
+const char* compare_columns =
     "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
     "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
     "angular_drift,inverted_tets,finite,pareto";
-const char* table =
+const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
     "wall_ms_per_step:wall-ms 11, max_volume_loss_percent:loss-% 11, rigid_distance 16, "
     "reference_distance:one-step 11, pareto 8";
@@ -42,15 +47,8 @@ double loss(const ordered_json& row) {
 double remaining_after_one_step(const std::shared_ptr<const Model>& model, Settings settings) {
   if (std::ranges::count(model->inverse_masses, 0.0)) return std::nan("");  // clamped: another answer
   auto stretched = std::make_shared<Model>(*model);
-  for (const Body& body : stretched->bodies) {
-    const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
-    const auto& rest = model->rest.positions;
-    const double middle = bounds({rest.begin() + first, rest.begin() + end}).centre().y;
-    for (auto v = std::size_t(first); v < std::size_t(end); ++v) {
-      stretched->positions[v] = rest[v];
-      stretched->positions[v].y = middle + 1.05 * (rest[v].y - middle);
-    }
-  }
+  stretched->positions = model->rest.positions;
+  for (glm::dvec3& p : stretched->positions) p.y *= 1.05;
   std::ranges::fill(stretched->velocities, glm::dvec3(0));
   stretched->obstacles.clear();
   settings.gravity = 0;
@@ -58,18 +56,6 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   const MeasuredRun run = run_model(stretched, settings, 1);
   if (!run.errors.finite || interrupted()) return std::nan("");
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
-}
-
-ordered_json row_of(const Scene& scene, const std::shared_ptr<const Model>& model, const Settings& settings,
-                    long steps) {
-  const MeasuredRun run = run_model(model, settings, steps);
-  ordered_json row = setting_json(scene, *model, settings);
-  row["gpu_ms_per_step"] = percentiles(run.gpu_ms.values).median;
-  row["wall_ms_per_step"] = percentiles(run.wall_ms.values).median;
-  row["reference_distance"] = remaining_after_one_step(model, settings);
-  row["pareto"] = false;
-  put_errors(row, run);
-  return row;
 }
 
 // Losses that agree to a thousandth are the same: two Jacobi modes differ by rounding. Times that agree to a
@@ -92,13 +78,10 @@ Chart chart_of(const ordered_json& document) {
               fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
                           text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
                           text_of(document["device"]["gl_renderer"])),
-              "time of a step, ms (GPU time; cpu modes: wall time)",
-              "largest volume loss, %",
-              true,
-              true};
+              "time of a step, ms (GPU time; cpu modes: wall time)", "largest volume loss, %", true};
   std::vector<ordered_json> sorted(rows.begin(), rows.end());
   std::ranges::sort(sorted, {}, cost_ms);
-  Series front{"Pareto front", "#999999", {}, {}, true, false, true};
+  Series front{"Pareto front", "#999999", Series::dashes};
   for (const auto& row : sorted) {
     const double x = cost_ms(row), y = loss(row);
     if (!std::isfinite(y)) continue;
@@ -108,8 +91,7 @@ Chart chart_of(const ordered_json& document) {
     }
     const std::string mode = text_of(row["mode"]);
     auto series = std::ranges::find(chart.series, mode, &Series::name);
-    if (series == chart.series.end())
-      series = chart.series.insert(series, {mode, mode_colour(mode), {}, {}, false, true, false});
+    if (series == chart.series.end()) series = chart.series.insert(series, {mode, mode_colour(mode)});
     series->x.push_back(x), series->y.push_back(y);
   }
   chart.series.push_back(front);
@@ -132,44 +114,171 @@ void print_best(const ordered_json& rows, const std::string& what, double limit,
              loss(best));
 }
 
+// ------------------------------------------------------------------------------------------------------------
+// hard cases
+
+const char* case_columns =
+    "case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,rigid_distance,"
+    "reference_recovered_at_step,linear_drift,angular_drift";
+const char* case_table =
+    "case -18, mesh -7, mode -26, steps 7, finite 8, recovered_at_step:recovered 11, "
+    "reference_recovered_at_step:reference 11, final_volume_error_percent:volume-err-% 14, "
+    "inverted_tets:inverted 10, rigid_distance 16";
+
+std::vector<std::string> case_names() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(models_folder() / "scenes/hard"))
+    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  return names;
+}
+
+/// The case's scene with `mesh` for its body; a scene whose body is no bunny is itself the only mesh.
+std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) {
+  Scene scene = load_scene("hard/" + name);
+  BodyDescription& body = scene.bodies.at(0);
+  const std::string own = body.block ? "block" : body.tet ? "tet" : "bunny";
+  if (mesh == own) return scene;
+  if (own != "bunny" || body.tetgen != BodyDescription{}.tetgen) return std::nullopt;  // about this very mesh
+  body.mesh.clear();
+  if (mesh == "block") body.block = {{0.8, 1, 0.6}, {8, 10, 6}};
+  const double low = -std::sqrt(3.0) / 6, high = std::sqrt(3.0) / 3;
+  if (mesh == "tet") body.tet = {{{-0.5, 0, low}, {0.5, 0, low}, {0, 0, high}, {0, std::sqrt(2.0 / 3), 0}}};
+  return scene;
+}
+
+bool is_constrained(const Settings& settings) {
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (settings.stiffness[k] > 0 && uses(settings, constraint_kinds[k])) return true;
+  return false;
+}
+
+Settings settings_of(const Scene& scene, std::string mode) {
+  Settings settings = scene.settings;
+  const std::string suffix = "-substeps", where = "--modes " + mode;
+  if (mode.ends_with(suffix)) {
+    mode.resize(mode.size() - suffix.size());
+    std::swap(settings.substeps, settings.iterations);
+  }
+  set_mode(settings, mode, where);
+  check_settings(settings, where);
+  return settings;
+}
+
+ordered_json case_row(const Scene& scene, const Settings& settings, long steps) {
+  const auto model = build_model(scene);
+  Tuning tuning;
+  tuning.count_guards = true;
+  Sim sim = create_sim(model, settings, tuning);
+  Metrics metrics = create_metrics(*model, sim.system);
+  if (steps == 0) steps = duration_in_steps(scene);
+  const MeasuredRun run = run_loop(sim, &metrics, steps);
+  const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps) : std::nullopt;
+  ordered_json row = row_of(scene, *model, settings, run);
+  row["steps"] = run.steps;
+  row["recovered_at_step"] = recovered ? ordered_json(*recovered) : ordered_json();
+  row["reference_recovered_at_step"] = nullptr;
+  const GuardCounts guards = guard_counts(sim);
+  for (std::size_t g = 0; g < GUARDS; ++g) row[fmt::format("guard_{}", guard_names[g])] = guards[g];
+  return row;
+}
+
+void add_cases(Sweep& sweep, const CompareOptions& options) {
+  std::vector<std::string> names = options.cases.empty() ? case_names() : options.cases;
+  std::ranges::sort(names);
+  for (const std::string& name : names)
+    for (const std::string& mesh : options.meshes) {
+      if (mesh != "bunny" && mesh != "block" && mesh != "tet")
+        throw Error("no such mesh", "--meshes " + mesh, "choose from bunny, block, tet");
+      const auto scene = scene_of(name, mesh);
+      if (!scene || !is_constrained(scene->settings)) continue;  // where nothing acts, nothing recovers
+      for (const std::string& mode : options.axes.modes)
+        sweep.work.push_back([=, settings = settings_of(*scene, mode), steps = options.steps] {
+          ordered_json row = {{"case", name}, {"mesh", mesh}};
+          row.update(case_row(*scene, settings, steps));
+          row["mode"] = mode;
+          return std::vector{row};
+        });
+    }
+}
+
+// Every row says when the reference recovered in its case: Gauss-Seidel in double precision.
+void add_reference(ordered_json& rows) {
+  for (const auto& reference : rows)
+    if (reference["mode"] == "cpu-double")
+      for (auto& row : rows)
+        if (row["case"] == reference["case"] && row["mesh"] == reference["mesh"])
+          row["reference_recovered_at_step"] = reference["recovered_at_step"];
+}
+
+/// Runs what `add` gives the sweep, or merges shards of it.
+template <class Add>
+ordered_json run_or_merge(Sweep& sweep, const CompareOptions& options, const Add& add) {
+  catch_interrupts();
+  make_output_folder(options.out);
+  std::optional<HeadlessContext> context;
+  if (options.shards.merge.empty()) {
+    add();
+    context.emplace(options.gpu);
+    sweep.facts["device"] = device_json(context->capabilities());
+  }
+  return run_sweep(sweep, options.shards);
+}
+
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
-  catch_interrupts();
-  make_output_folder(options.out);
-  Sweep sweep{"compare", "comparison", split(columns, ','), 5, table, {}};
+  Sweep sweep{"compare", "comparison", split(compare_columns, ','), 5, compare_table, {}};
   sweep.facts = {{"steps", options.steps}, {"dt", 0.005}};
-  std::optional<HeadlessContext> context;
-  Scene scene;
-  std::shared_ptr<const Model> model;
-  std::vector<Settings> all;
-  if (options.shards.merge.empty()) {
-    scene = load_scene(options.scene, options.overrides);
-    all = combinations(scene.settings, options.axes);
-    model = build_model(scene);
-    context.emplace(options.gpu);
+  ordered_json document = run_or_merge(sweep, options, [&] {
+    const Scene scene = load_scene(options.scene, options.overrides);
     sweep.facts["dt"] = scene.settings.dt;
-    sweep.facts["device"] = device_json(context->capabilities());
-    sweep.combinations = all.size();
-    sweep.make = [&](std::size_t i) { return std::vector{row_of(scene, model, all[i], options.steps)}; };
-  }
-  ordered_json document = run_sweep(sweep, options.shards);
+    const auto all = combinations(scene.settings, options.axes);
+    const auto model = build_model(scene);
+    for (const Settings& settings : all)
+      sweep.work.push_back([=, steps = options.steps] {
+        const MeasuredRun run = run_model(model, settings, steps);
+        ordered_json row = row_of(scene, *model, settings, run);
+        row["gpu_ms_per_step"] = percentiles(run.gpu_ms.values).median;
+        row["wall_ms_per_step"] = percentiles(run.wall_ms.values).median;
+        row["reference_distance"] = remaining_after_one_step(model, settings);
+        row["pareto"] = false;
+        return std::vector{row};
+      });
+  });
   ordered_json& rows = document["rows"];
   mark_front(rows);
-  print_device(document["device"]);
-  print_table(table, rows);
-  if (std::ranges::all_of(rows, [](const auto& row) { return loss(row) == 0; }))
-    fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
-               text_of(document["steps"]));
+  print_table(sweep, document);
   if (options.budget_ms)
     print_best(rows, fmt::format("best within {:g} ms a step", *options.budget_ms), *options.budget_ms,
                cost_ms, loss);
   if (options.error_percent)
     print_best(rows, fmt::format("cheapest with a loss of at most {:g} %", *options.error_percent),
                *options.error_percent, loss, cost_ms);
-  write_chart(options.out / "compare", to_svg(chart_of(document)));
   write_sweep(sweep, options.out, document);
+  write_chart(options.out / "compare", chart_of(document));
   return 0;
+}
+
+std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps) {
+  std::optional<long> step;
+  for (auto m = measurements.rbegin(); m != measurements.rend(); ++m) {
+    if (!(std::abs(m->volume_error_percent) < 1) || m->inverted_tets > 0 || !m->finite()) break;
+    step = m->step;
+  }
+  return step && double(*step) <= 0.95 * double(steps) ? step : std::nullopt;
+}
+
+int run_hard_cases(const CompareOptions& options) {
+  Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), 3, case_table, {}};
+  sweep.facts = ordered_json::object();
+  for (const char* guard : guard_names) sweep.columns.push_back(fmt::format("guard_{}", guard));
+  ordered_json document = run_or_merge(sweep, options, [&] { add_cases(sweep, options); });
+  ordered_json& rows = document["rows"];
+  const auto name = [](const ordered_json& row) { return std::tie(row["case"], row["mesh"], row["mode"]); };
+  std::sort(rows.begin(), rows.end(), [&](const auto& a, const auto& b) { return name(a) < name(b); });
+  add_reference(rows);
+  print_table(sweep, document);
+  return write_sweep(sweep, options.out, document);
 }
 
 }  // namespace tetpbd

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "app/auto_solver.h"
 #include "app/files.h"
 #include "app/lab.h"
 #include "app/reference_command.h"
@@ -27,7 +28,7 @@ struct FrameWriter {
   long video_every;  ///< steps
   double dt;         ///< s
   long drawn = 0;    ///< step of the last frame
-  std::optional<Video> video{};
+  std::unique_ptr<Video> video{};
 
   void draw_frame(long s) {
     const bool png = options.png_every > 0 && s % options.png_every == 0;
@@ -43,21 +44,87 @@ struct FrameWriter {
   }
 };
 
-std::unique_ptr<FrameWriter> frame_writer(const Scene& scene, const Sim& sim, const RunOptions& options) {
-  if (options.png_every == 0 && options.video.empty()) return nullptr;
+std::optional<FrameWriter> frame_writer(const Scene& scene, const Sim& sim, const RunOptions& options) {
+  if (options.png_every == 0 && options.video.empty()) return std::nullopt;
   const double dt = scene.settings.dt;
   const long video_every =
       options.video_every > 0 ? options.video_every : std::max(1L, std::lround(1.0 / 30 / dt));
   const Camera camera = scene_camera(scene, *sim.model, float(options.width) / float(options.height));
   Target target = make_target(options.width, options.height, options.samples);
   const Frame frame = frame_of(sim, camera, options.view, target);
-  std::unique_ptr<FrameWriter> frames(
-      new FrameWriter{options, frame, make_renderer(*sim.model), std::move(target), video_every, dt});
+  FrameWriter frames{options, frame, make_renderer(*sim.model), std::move(target), video_every, dt};
   if (!options.video.empty()) {
     const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
-    frames->video.emplace(options.video, options.width, options.height, rate);
+    frames.video = std::make_unique<Video>(options.video, options.width, options.height, rate);
   }
   return frames;
+}
+
+// What is not finite is written as null.
+ordered_json vector(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+ordered_json times(const Samples& ms) {
+  if (ms.values.empty()) return nullptr;
+  const Percentiles p = percentiles(ms.values);
+  return {{"median", p.median}, {"p05", p.p05}, {"p95", p.p95}};
+}
+
+ordered_json settings_json(const Scene& scene, const Settings& settings) {
+  ordered_json result;
+  for (const Parameter& row : parameters())
+    with_value(settings, row, [&](const auto& value) { result[row.name] = value; });
+  for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
+  result["obstacles"] = ordered_json::array();
+  for (const glm::dvec4& plane : scene.obstacles) {
+    const glm::dvec3 normal(plane);
+    result["obstacles"].push_back({{"point", vector(normal * plane.w)}, {"normal", vector(normal)}});
+  }
+  result["duration"] = scene.duration;
+  return result;
+}
+
+ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
+                             const ordered_json& hash, const std::optional<SolverChoice>& choice,
+                             const std::optional<MotionError>& motion) {
+  ordered_json j;
+  j["scene"] = scene.name;
+  j["settings"] = settings_json(scene, sim.settings);
+  if (choice) j["solver_choice"] = solver_choice_json(*choice);
+  const MeshReport mesh = report(sim.model->rest);
+  j["mesh"] = {{"vertices", mesh.vertices},
+               {"surface_triangles", mesh.surface_triangles},
+               {"edges", mesh.edges},
+               {"bends", mesh.bends},
+               {"tets", mesh.tets},
+               {"volume", mesh.volume},
+               {"euler_characteristic", mesh.euler_characteristic}};
+  j["device"] = device_json(device);
+  j["timing"] = {{"steps", sim.steps},
+                 {"gpu_ms_per_step", times(run.gpu_ms)},
+                 {"wall_ms_per_step", times(run.wall_ms)},
+                 {"fps", double(sim.steps) / run.seconds}};
+  const RunErrors& errors = run.errors;
+  const Measurement last = errors.last.value_or(nothing_measured());
+  j["error"] = error_json(errors);
+  for (const auto& [key, member] :
+       {std::pair("motion_final", &MotionError::final), std::pair("motion_rms", &MotionError::rms),
+        std::pair("motion_peak", &MotionError::peak), std::pair("motion_relative", &MotionError::relative)})
+    j["error"][key] = motion ? *motion.*member : std::nan("");  // written as null
+  j["momentum"] = {{"linear_drift", errors.linear_drift},
+                   {"angular_drift", errors.angular_drift},
+                   {"linear", vector(last.momentum)},
+                   {"angular", vector(last.angular_momentum)}};
+  j["energy"] = {{"start", errors.last ? errors.start_energy : std::nan("")},
+                 {"final", last.energy()},
+                 {"max", errors.last ? errors.max_energy : std::nan("")},
+                 {"final_kinetic", last.kinetic},
+                 {"final_potential", last.potential}};
+  const GuardCounts guards = guard_counts(sim);
+  for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
+  j["finite"] = errors.finite;
+  j["non_finite"] = non_finite_json(errors.non_finite);
+  j["state_hash"] = hash;
+  return j;
 }
 
 void write_positions(const Sim& sim, const std::filesystem::path& out) {
@@ -99,7 +166,6 @@ int run_headless(Scene scene, const RunOptions& options) {
     plan.stepped = [&](long s) {
       if (frames) frames->draw_frame(s);
       if (right && is_kept(*right, s)) add_state(*motion_error, *right, *model, s, read_state(sim));
-      return true;
     };
     if (!check_finite(sim)) plan.stepped(0);
     run = run_loop(sim, &metrics, steps, plan);
@@ -109,9 +175,11 @@ int run_headless(Scene scene, const RunOptions& options) {
   const bool good = !found || restore_checkpoint(sim);
   // To the last good step: the same steps again, the same bits.
   while (good && found && sim.steps < found->step - 1) step(sim);
-  const auto hash = good ? std::optional(state_hash(sim)) : std::nullopt;
-  write_file(options.out / "stats.json", statistics_json(scene, sim, context.capabilities(), run,
-                                                         guard_counts(sim), hash, choice, motion_error));
+  const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
+  write_file(
+      options.out / "stats.json",
+      json_text(statistics_json(scene, sim, context.capabilities(), run, hash, choice, motion_error), 2) +
+          "\n");
   if (csv) csv->close();
   if (options.positions && good) write_positions(sim, options.out);
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,

@@ -38,20 +38,17 @@ void print_error(const std::string& line) {
 }
 
 Progress::Progress(std::string label, long total, bool force)
-    : label_(std::move(label)), total_(total), shown_(force || isatty(2)), start_(steady_clock::now()) {}
+    : label_(std::move(label)), total_(total), shown_(force || isatty(2)) {}
 
 Progress::~Progress() {
-  if (drawn_) print_error("\r\033[K");
+  if (shown_) print_error("\r\033[K");
 }
 
 void Progress::update(long done) {
-  if (!shown_ || (drawn_ && seconds_since(last_) < 0.1 && done != total_)) return;
+  if (!shown_ || seconds_since(last_) < 0.1) return;
   last_ = steady_clock::now();
-  drawn_ = true;
-  const double part = total_ > 0 ? double(done) / double(total_) : 1.0;
-  const double left = part > 0 ? seconds_since(start_) * (1 - part) / part : 0.0;
-  print_error(fmt::format("\r\033[K{} [{:.<30}] {}/{}  {:.0f} s left", label_,
-                          std::string(std::size_t(part * 30), '#'), done, total_, left));
+  print_error(fmt::format("\r\033[K{} {} of {}, {:.0f} s left", label_, done, total_,
+                          seconds_since(start_) * double(total_ - done) / double(done)));
 }
 
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
@@ -82,7 +79,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     if (plan.wait) run.wall_ms.add(seconds * 1e3), run.seconds += seconds;
     take(false);
     if (plan.progress) plan.progress->update(s);
-    if (plan.stepped && !plan.stepped(s)) break;
+    if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }
   if (!plan.wait) {

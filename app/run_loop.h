@@ -36,7 +36,7 @@ inline double seconds_since(std::chrono::steady_clock::time_point begin) {
 /// On standard error, even where nothing can be written there.
 void print_error(const std::string& line);
 
-/// A bar on standard error, on a terminal only unless forced.
+/// A line on standard error, on a terminal only unless forced.
 class Progress {
  public:
   Progress(std::string label, long total, bool force = false);
@@ -46,8 +46,8 @@ class Progress {
  private:
   std::string label_;
   long total_;
-  bool shown_, drawn_ = false;
-  std::chrono::steady_clock::time_point start_, last_;
+  bool shown_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
 };
 
 struct RunPlan {
@@ -56,7 +56,7 @@ struct RunPlan {
   bool wait = true;   ///< for each step, to time it; without: steps are queued, and timed all together
   bool timed = true;  ///< GPU time of each step; its queries are GL objects that come and go
   Progress* progress = nullptr;
-  std::function<bool(long)> stepped{};  ///< after each step; false ends the run
+  std::function<void(long)> stepped{};  ///< after each step
   /// Takes each measurement as it arrives; without, the run keeps them.
   std::function<void(const Measurement&, const RunErrors&)> measured{};
 };
@@ -69,9 +69,8 @@ struct MeasuredRun {
   long steps = 0;                         ///< taken, and finite
 };
 
-/// Steps `steps` times. Ends early when the state is not finite (its errors then say so), when the plan says
-/// so, or when interrupted() does: ask it before making anything of the result. No metrics: nothing is
-/// measured.
+/// Steps `steps` times. Ends early when the state is not finite (its errors then say so) or when
+/// interrupted() says so: ask it before making anything of the result. No metrics: nothing is measured.
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});
 /// The same with a simulation of its own, every step measured.
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps);

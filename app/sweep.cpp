@@ -19,8 +19,6 @@ namespace tetpbd {
 
 namespace {
 
-const ordered_json nothing;
-
 // A line of a table; no row: the titles.
 void print_row(const std::string& columns, const ordered_json& row) {
   std::istringstream words(columns);
@@ -33,13 +31,6 @@ void print_row(const std::string& columns, const ordered_json& row) {
   }
   fmt::print("{}\n", line);
   std::fflush(stdout);
-}
-
-std::string name_of(const Sweep& sweep, const ordered_json& row) {
-  std::string name;
-  for (std::size_t c = 0; c < sweep.identity; ++c)
-    name += fmt::format("{}{} {}", c ? ", " : "", sweep.columns[c], text_of(row.at(sweep.columns[c])));
-  return name;
 }
 
 // Whatever stands in the file, what follows finds the keys and types it looks for.
@@ -58,55 +49,55 @@ ordered_json read_part(const Sweep& sweep, const std::filesystem::path& file) {
   }
 }
 
+// Shards of one command, or whole sweeps: of other settings, but otherwise the same.
 ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>& folders) {
   ordered_json all;
-  std::set<std::string> names;
+  std::set<ordered_json> names;
   for (const auto& folder : folders) {
     const ordered_json part = read_part(sweep, folder / (sweep.name + ".json"));
-    for (const auto& row : part["rows"])
-      if (!names.insert(name_of(sweep, row)).second)
-        throw Error("a setting is in two of these",
-                    fmt::format("{}: {}", folder.string(), name_of(sweep, row)), "name each folder once");
+    for (const auto& row : part["rows"]) {
+      ordered_json name;
+      for (std::size_t c = 0; c < sweep.identity; ++c) name.push_back(row[sweep.columns[c]]);
+      if (!names.insert(name).second)
+        throw Error("a setting is in two of these", folder.string() + ": " + name.dump(),
+                    "name each folder once");
+    }
     if (all.is_null()) {
       all = part;
       continue;
     }
-    // Shards of one command, or whole sweeps: other modes and other numbers of substeps.
-    const bool whole = part["shards"] == 1 && all["shards"] == 1;
+    ordered_json expected = part;
     for (const auto& [key, value] : all.items())
-      if (key != "rows" && key != "shard" && !(whole && key == "combinations") &&
-          (!part.contains(key) || part[key] != value))
-        throw Error("these shards differ", fmt::format("'{}' in {}", key, folder.string()),
-                    "merge runs of one command on one device");
-    if (whole)
+      if (key != "rows" && key != "shard" && (key != "combinations" || all["shards"] != 1))
+        expected[key] = value;
+    if (part != expected)
+      throw Error("these shards differ", folder.string(), "merge runs of one command on one device");
+    for (const char* key : {"rows", "shard"})
+      all[key].insert(all[key].end(), part[key].begin(), part[key].end());
+    if (all["shards"] == 1)
       all["combinations"] = all["combinations"].get<long>() + part["combinations"].get<long>();
-    else
-      all["shard"].insert(all["shard"].end(), part["shard"].begin(), part["shard"].end());
-    all["rows"].insert(all["rows"].end(), part["rows"].begin(), part["rows"].end());
   }
-  const auto rows = all["rows"].size();
-  if (const auto wanted = all["combinations"].get<std::size_t>(); rows < wanted)
-    print_error(fmt::format("tetpbd: only {} rows of {}: shards {} of {}\n", rows, wanted,
-                            all["shard"].dump(), all["shards"].dump()));
+  if (all["rows"].size() < all["combinations"])
+    print_error(fmt::format("tetpbd: only {} rows of {}: shards {} of {}\n", all["rows"].size(),
+                            all["combinations"].dump(), all["shard"].dump(), all["shards"].dump()));
   return all;
 }
 
 ordered_json measured(const Sweep& sweep, const Shards& part) {
   ordered_json document = sweep.facts;
-  document["combinations"] = sweep.combinations;
+  document["combinations"] = sweep.work.size();
   document["shard"] = {part.shard};
   document["shards"] = part.shards;
   ordered_json& rows = document["rows"] = ordered_json::array();
-  Progress progress(sweep.title, long(sweep.combinations) / part.shards);
-  const auto stride = std::size_t(part.shards);
-  for (std::size_t i = std::size_t(part.shard - 1); i < sweep.combinations; i += stride) {
-    const std::vector<ordered_json> made = sweep.make(i);
+  Progress progress(sweep.title, long(sweep.work.size()));
+  for (auto i = std::size_t(part.shard - 1); i < sweep.work.size(); i += std::size_t(part.shards)) {
+    const std::vector<ordered_json> made = sweep.work[i]();
     if (interrupted()) break;  // they are nothing: what they are of is not whole
     for (const ordered_json& row : made) {
       rows.push_back(row);
       if (sweep.print_each) print_row(sweep.table, row);
     }
-    progress.update(long(i / stride) + 1);
+    progress.update(long(i) + 1);
   }
   return document;
 }
@@ -144,22 +135,21 @@ ordered_json run_sweep(const Sweep& sweep, const Shards& shards) {
               "name combinations that there are, and no more shards than those");
 }
 
-void print_table(const std::string& columns, const ordered_json& rows) {
-  print_row(columns, nothing);
-  for (const auto& row : rows) print_row(columns, row);
+void print_table(const Sweep& sweep, const ordered_json& document) {
+  const ordered_json& device = document["device"];
+  fmt::print("{}{}\n", text_of(device["gl_renderer"]),
+             device["software"] == true ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
+                                        : ", OpenGL " + text_of(device["gl_version"]));
+  print_row(sweep.table, nullptr);
+  if (document.contains("rows"))
+    for (const auto& row : document["rows"]) print_row(sweep.table, row);
 }
 
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows) {
   std::string csv = fmt::format("{}\n", fmt::join(columns, ","));
   for (const auto& row : rows) {
     std::vector<std::string> fields;
-    for (const std::string& column : columns) {
-      const ordered_json& value = cell(row, column);
-      fields.push_back(value.is_string()         ? csv_field(value.get<std::string>())
-                       : value.is_null()         ? ""
-                       : value.is_number_float() ? fmt::format("{:.7g}", value.get<double>())
-                                                 : value.dump());
-    }
+    for (const std::string& column : columns) fields.push_back(csv_field(text_of(cell(row, column), 7)));
     csv += fmt::format("{}\n", fmt::join(fields, ","));
   }
   return csv;
@@ -178,9 +168,10 @@ int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const o
 }
 
 const ordered_json& cell(const ordered_json& row, const std::string& key) {
+  static const ordered_json nothing;
   const ordered_json& value = row.at(key);
-  if (value.is_structured()) return value.at("median") == 0 ? nothing : cell(value, "median");
-  return value.is_number() && !std::isfinite(value.get<double>()) ? nothing : value;
+  if (!value.is_structured()) return value;
+  return value.at("median") == 0 ? nothing : value.at("median");
 }
 
 double number(const ordered_json& row, const char* key) {
@@ -188,11 +179,10 @@ double number(const ordered_json& row, const char* key) {
   return value.is_number() ? value.get<double>() : std::nan("");
 }
 
-std::string text_of(const ordered_json& value) {
+std::string text_of(const ordered_json& value, int digits) {
   if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  if (value.is_number_float()) return fmt::format("{:.4g}", value.get<double>());
-  return value.is_null() ? "-" : value.dump();
+  if (!value.is_number_float()) return value.is_null() ? "" : value.dump();
+  return std::isfinite(value.get<double>()) ? fmt::format("{:.{}g}", value.get<double>(), digits) : "";
 }
 
 ordered_json device_json(const Capabilities& device) {
@@ -200,12 +190,6 @@ ordered_json device_json(const Capabilities& device) {
           {"gl_vendor", device.vendor},
           {"gl_version", device.version},
           {"software", device.software}};
-}
-
-void print_device(const ordered_json& device) {
-  fmt::print("{}{}\n", text_of(device["gl_renderer"]),
-             device["software"] == true ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
-                                        : ", OpenGL " + text_of(device["gl_version"]));
 }
 
 }  // namespace tetpbd

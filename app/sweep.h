@@ -32,9 +32,8 @@ struct Sweep {
   std::size_t identity;              ///< ... tell rows apart
   std::string table;   ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
   ordered_json facts;  ///< what all shards have in common: "device", numbers
-  std::size_t combinations = 0;
-  std::function<std::vector<ordered_json>(std::size_t)> make{};  ///< the rows of a combination
-  bool print_each = false;                                       ///< when they are there
+  std::vector<std::function<std::vector<ordered_json>()>> work{};  ///< makes a combination's rows
+  bool print_each = false;                                         ///< when they are there
 };
 struct Shards {
   int shard = 1, shards = 1;                   ///< this process makes shard, shard + shards, ...
@@ -44,23 +43,21 @@ struct Shards {
 /// The facts, "combinations", "shard", "shards" and "rows", those that were finished if interrupted. Throws
 /// Error if there are none.
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards = {});
-/// Their head, then the rows.
-void print_table(const std::string& columns, const ordered_json& rows = ordered_json::array());
+/// The device, the table's head, the rows so far.
+void print_table(const Sweep& sweep, const ordered_json& document);
 /// Writes NAME.json and NAME.csv and says where. The exit status: 1 if a row is not finite, else 0. Throws
 /// Error if interrupted.
 int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document);
 
-/// What a row has under a key: of several measurements the median, where a time of 0 is none; null for what
-/// is not finite.
+/// What a row has under a key: of several measurements the median, where a time of 0 is none.
 const ordered_json& cell(const ordered_json& row, const std::string& key);
-/// As people read it: four digits, "-" for null.
-std::string text_of(const ordered_json& value);
+/// Nothing for null and what is not finite.
+std::string text_of(const ordered_json& value, int digits = 4);
 /// NaN where it is no number.
 double number(const ordered_json& row, const char* key);
-/// Column names, then a line a row; a field is empty where there is nothing.
+/// Column names, then a line a row.
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows);
 /// The device as all files name it.
 ordered_json device_json(const Capabilities& device);
-void print_device(const ordered_json& device);
 
 }  // namespace tetpbd

@@ -116,6 +116,7 @@ std::string to_svg(const Chart& chart) {
     svg += path(fmt::format("M{} {:.1f}H{}", left, y.at(v), right), grid) +
            text(left - 8, y.at(v) + 4, number(v), "end");
   double legend = top + 10;
+  bool empty = true;
   for (std::size_t k = 0; k < chart.series.size(); ++k, legend += 20) {
     const Series& s = chart.series[k];
     const bool line = s.style != Series::points;
@@ -129,9 +130,12 @@ std::string to_svg(const Chart& chart) {
       if (x.shows(s.x[i]) && y.shows(s.y[i]))
         points += fmt::format("{}{:.1f} {:.1f}{}", line && !points.empty() ? "L" : "M", x.at(s.x[i]),
                               y.at(s.y[i]), marker);
+    empty = empty && points.empty();
     svg += path(points, style) + text(right + 44, legend + 4, s.name);
     svg += path(fmt::format("M{} {}{}", right + (line ? 14 : 26), legend, line ? "h24" : marker), style);
   }
+  if (empty)
+    svg += text((left + right) / 2, middle, "no value to draw: all are 0 or none is finite", "middle", 15);
   for (const Chart::Note& note : chart.notes)  // below and to the left, where a front leaves room
     if (x.shows(note.x) && y.shows(note.y))
       svg += text(x.at(note.x) - 7, y.at(note.y) + 14, note.text, "end", 10.5);

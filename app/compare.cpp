@@ -248,6 +248,9 @@ int run_compare(const CompareOptions& options) {
   ordered_json& rows = document["rows"];
   mark_front(rows);
   print_table(sweep, document);
+  if (std::ranges::all_of(rows, [](const auto& row) { return loss(row) == 0; }))
+    fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
+               text_of(document["steps"]));
   if (options.budget_ms)
     print_best(rows, fmt::format("best within {:g} ms a step", *options.budget_ms), *options.budget_ms,
                cost_ms, loss);

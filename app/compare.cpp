@@ -125,13 +125,6 @@ const char* case_table =
     "reference_recovered_at_step:reference 11, final_volume_error_percent:volume-err-% 14, "
     "inverted_tets:inverted 10, rigid_distance 16";
 
-std::vector<std::string> case_names() {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(models_folder() / "scenes/hard"))
-    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
-  return names;
-}
-
 /// The case's scene with `mesh` for its body; a scene whose body is no bunny is itself the only mesh.
 std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) {
   Scene scene = load_scene("hard/" + name);
@@ -183,7 +176,10 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
 }
 
 void add_cases(Sweep& sweep, const CompareOptions& options) {
-  std::vector<std::string> names = options.cases.empty() ? case_names() : options.cases;
+  std::vector<std::string> names = options.cases.empty() ? scene_names("scenes/hard") : options.cases;
+  if (names.empty())
+    throw Error("no hard cases", (models_folder() / "scenes/hard").string(),
+                "point TETPBD_MODELS at the folder models/");
   std::ranges::sort(names);
   for (const std::string& name : names)
     for (const std::string& mesh : options.meshes) {

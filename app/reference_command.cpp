@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -44,9 +42,7 @@ void print_motion(const Scene& scene, const Motion& motion) {
 }
 
 // The cache's file of this scene's motion; empty without a cache folder.
-std::filesystem::path cached_motion(const ReferenceInput& input) {
-  return cache_file("motion_" + hex(scene_key(input)));
-}
+std::filesystem::path cached_motion(std::uint64_t scene) { return cache_file("motion_" + hex(scene)); }
 
 }  // namespace
 
@@ -71,13 +67,13 @@ void write_motion(const std::filesystem::path& file, const Model& model, const M
   write_file(file, text);
 }
 
-Motion read_motion(const std::filesystem::path& file, const ReferenceInput& input) {
+Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene) {
   std::ifstream in(file, std::ios::binary);
   std::string line;
   std::getline(in, line);
   const ordered_json head = ordered_json::parse(line, nullptr, false);
   Motion motion;
-  const std::size_t count = input.model.masses.size();
+  const std::size_t count = model.masses.size();
   try {
     if (head.at("format") != format_name) throw std::exception();
     motion.scene = std::stoull(head.at("scene").get<std::string>(), nullptr, 16);
@@ -85,12 +81,12 @@ Motion read_motion(const std::filesystem::path& file, const ReferenceInput& inpu
     motion.kept = head.at("kept").get<std::vector<long>>();
     for (const auto& r : head.at("rows").get<std::vector<std::array<double, 10>>>())
       motion.rows.push_back({r[0], {r[1], r[2], r[3]}, {r[4], r[5], r[6]}, r[7], r[8], r[9]});
-    if (motion.scene == scene_key(input))
+    if (motion.scene == scene)
       for (std::size_t k = 0; k < motion.kept.size(); ++k) {
         std::vector<glm::dvec3> rows(count), positions(count);
         in.read(reinterpret_cast<char*>(rows.data()), std::streamsize(count * sizeof rows[0]));
         if (!in) throw std::exception();
-        for (std::size_t i = 0; i < count; ++i) positions[i] = rows[input.model.original[i]];
+        for (std::size_t i = 0; i < count; ++i) positions[i] = rows[model.original[i]];
         motion.positions.push_back(positions);
       }
     if (motion.rows.empty() || motion.kept.empty()) throw std::exception();
@@ -104,10 +100,11 @@ Motion read_motion(const std::filesystem::path& file, const ReferenceInput& inpu
 }
 
 std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file) {
-  const std::filesystem::path from = file.empty() ? cached_motion(input) : file;
+  const std::uint64_t scene = scene_key(input);
+  const std::filesystem::path from = file.empty() ? cached_motion(scene) : file;
   std::error_code ignored;
   if (file.empty() && !std::filesystem::exists(from, ignored)) return std::nullopt;
-  return read_motion(from, input);
+  return read_motion(from, input.model, scene);
 }
 
 int run_reference(const Scene& scene, const ReferenceOptions& options) {
@@ -115,8 +112,10 @@ int run_reference(const Scene& scene, const ReferenceOptions& options) {
   const auto model = build_model(scene);
   const ConstraintSystem system = build_constraints(model->rest, scene.settings.constraints);
   const ReferenceInput input{*model, system, scene.settings, model->inverse_masses};
-  const std::filesystem::path file = options.out.empty() ? cached_motion(input) : options.out;
+  const std::filesystem::path file = options.out.empty() ? cached_motion(scene_key(input)) : options.out;
   if (file.empty()) throw Error("nowhere to keep it", "there is no cache folder", "give --out FILE");
+  std::error_code ignored;  // a folder that cannot be made is named when the file is written
+  if (options.out.empty()) std::filesystem::create_directories(file.parent_path(), ignored);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   Progress progress("the right motion", steps, options.progress);
   const Motion motion =

@@ -20,8 +20,8 @@ int run_reference(const Scene& scene, const ReferenceOptions& options);
 
 /// A line of JSON, then the kept positions as float64, frames x N x 3, in the first order of vertices.
 void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion);
-/// Throws Error for what is no such file, or of another scene.
-Motion read_motion(const std::filesystem::path& file, const ReferenceInput& input);
+/// Throws Error for what is no such file, or of another scene than `scene` (scene_key).
+Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene);
 /// The motion in `file`, or without one the cache's of this scene, if it has any.
 std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
 

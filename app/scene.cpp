@@ -276,10 +276,10 @@ TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
 
 }  // namespace
 
-std::vector<std::string> scene_names() {
+std::vector<std::string> scene_names(const std::string& folder) {
   std::vector<std::string> names;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(models_folder() / "scenes", error))
+  for (const auto& entry : fs::directory_iterator(models_folder() / folder, error))
     if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
   std::sort(names.begin(), names.end());
   return names;

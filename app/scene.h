@@ -66,7 +66,7 @@ struct SceneOverrides {
 
 /// A name in models/scenes, or a file. Throws Error naming file, key and allowed range.
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides = {});
-std::vector<std::string> scene_names();
+std::vector<std::string> scene_names(const std::string& folder = "scenes");
 
 /// One at least.
 inline long duration_in_steps(const Scene& scene) {

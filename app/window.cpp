@@ -166,9 +166,8 @@ void handle_input(Input& in, const Rect& view) {
   attempt(s, [&] { take_answer(in); });
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
-  std::vector<glm::dvec4> planes = s.loaded.sim.model->obstacles;
-  if (s.loaded.sim.settings.ground) planes.emplace_back(0.0, 1.0, 0.0, s.loaded.sim.settings.ground_height);
-  aim(*s.grab, s.loaded.sim, s.camera, ray_at_cursor(in), planes);
+  const Sim& sim = s.loaded.sim;
+  aim(*s.grab, sim, s.camera, ray_at_cursor(in), planes_of(*sim.model, sim.settings));
 }
 
 // ------------------------------------------------------------------------------------------------------------

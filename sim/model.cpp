@@ -12,8 +12,15 @@
 #include "sim/error.h"
 #include "sim/hilbert.h"
 #include "sim/parallel.h"
+#include "sim/settings.h"
 
 namespace tetpbd {
+
+std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings) {
+  std::vector<glm::dvec4> planes = model.obstacles;
+  if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
+  return planes;
+}
 
 void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,

@@ -8,6 +8,8 @@
 
 namespace tetpbd {
 
+struct Settings;
+
 /// State on the CPU, in double: what CPU modes step and what tests compare.
 struct State {
   std::vector<glm::dvec3> positions;   ///< m
@@ -32,6 +34,9 @@ struct Model {
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
 };
+
+/// The half spaces of a step, n.x >= d as (n, d): the ground of the settings first, then obstacles.
+std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings);
 
 /// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices;
 /// `mass_factors`, if not empty, multiply the masses of its vertices.

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <limits>
+#include <span>
 #include <tuple>
 
 #include "sim/error.h"
+#include "sim/hash.h"
 #include "sim/parallel.h"
 #include "sim/solvers/cpu_pbd.h"
 
@@ -249,12 +250,8 @@ State read_state(const Sim& sim) {
 }
 
 std::uint64_t state_hash(const Sim& sim) {
-  std::uint64_t hash = 14695981039346656037ull;
-  const auto add = [&](const glm::vec3& value) {
-    unsigned char bytes[12];
-    std::memcpy(bytes, &value, sizeof bytes);
-    for (unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211ull;
-  };
+  std::uint64_t hash = fnv_basis;
+  const auto add = [&](const glm::vec3& value) { hash = hash_values(std::span(&value.x, 3), hash); };
   for (const Position& p : sim.positions.read_all<Position>()) add(p.high), add(p.low);
   for (const Velocity& v : sim.velocities.read_all<Velocity>()) add(v.high), add(v.low);
   return hash;

@@ -204,4 +204,6 @@ TEST_CASE("hard cases: where no constraint acts there is nothing to recover by")
       program("compare --hard-cases --cases stiffness-0 --meshes tet --modes node --steps 2 --out h", folder);
   CHECK(run.status == 2);
   CHECK(run.err.find("nothing to run") != std::string::npos);
+  CHECK(program("compare --hard-cases --out h", folder, "TETPBD_MODELS=/none")
+            .err.find("no hard cases: /none") != std::string::npos);
 }

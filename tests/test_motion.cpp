@@ -317,7 +317,7 @@ TEST_CASE(
       << R"({"bodies": [{"block": {"size": [0.4, 0.2, 0.2], "cells": [4, 2, 2]}, "position": [0, 0.02, 0]}],
              "solver": {"constraints": ["stretch", "volume"], "compliance_stretch": 1e-5,
                         "compliance_volume": 1e-10, "iterations": 1, "substeps": 5}, "duration": 0.1})";
-  const std::string cache = "TETPBD_CACHE=" + folder.path.string();
+  const std::string cache = "TETPBD_CACHE=" + (folder.path / "cache").string();  // not there yet
   const Outcome found = program("reference --scene soft.json", folder, cache);
   CHECK(found.err == "");
   REQUIRE(found.status == 0);
@@ -334,16 +334,19 @@ TEST_CASE(
   CHECK(motion_error("--friction 0.1")["motion_final"].is_null());  // another scene, of which there is none
 
   // By name; and the same bits whether it was interrupted or not.
-  const std::string stiff =
-      "reference --scene soft.json --set solver.compliance_stretch=1e-8 --steps 400 --out ";
-  const Outcome stopped = program(stiff + "a", folder, cache + " timeout -s INT 1");
+  const std::string stiff = "reference --scene soft.json --set solver.compliance_stretch=1e-8 --out ";
+  const Outcome stopped = program(stiff + "a --steps 400", folder, cache + " timeout -s INT 1");
   CHECK(stopped.status == 124);
   CHECK(stopped.err.find("interrupted") != std::string::npos);
   CHECK_FALSE(fs::exists(folder.path / "a"));
   REQUIRE(fs::exists(folder.path / "a.unfinished"));
-  REQUIRE(program(stiff + "a", folder, cache).status == 0);
+  fs::copy(folder.path / "a.unfinished", folder.path / "short.unfinished");
+  REQUIRE(program(stiff + "short --steps 3", folder, cache).status == 0);  // what is longer is not taken up
+  const std::string found_short = read(folder.path / "short");
+  CHECK(json::parse(found_short.substr(0, found_short.find('\n')))["rows"].size() == 4);
+  REQUIRE(program(stiff + "a --steps 400", folder, cache).status == 0);
   CHECK_FALSE(fs::exists(folder.path / "a.unfinished"));
-  REQUIRE(program(stiff + "b", folder, cache).status == 0);
+  REQUIRE(program(stiff + "b --steps 400", folder, cache).status == 0);
   CHECK(read(folder.path / "a") == read(folder.path / "b"));
   const Outcome other = program("run --scene soft.json --reference a --out r", folder, cache);
   CHECK(other.status == 2);

@@ -49,7 +49,8 @@ Blob body_of(const Picture& picture) {
 TEST_CASE("run writes what it says, twice the same") {
   const Folder folder;
   const std::string arguments =
-      "run --scene bunny-drop --steps 30 --iterations 3 --substeps 2 --set bodies.0.position=[0,0.02,0] --size 320x240 "
+      "run --scene bunny-drop --steps 30 --iterations 3 --substeps 2 --set bodies.0.position=[0,0.02,0] "
+      "--size 320x240 "
       "--samples 0 "
       "--png-every 15 --video fall.mp4 --positions --out ";
   const Outcome first = program(arguments + "a", folder), second = program(arguments + "b", folder);
@@ -303,4 +304,13 @@ TEST_CASE("a run that measures every tenth step has the same state, rows and end
   CHECK(few[1] == rows[1]);
   CHECK(few[2].substr(0, few[2].find(',')) == "10");
   CHECK(few[4].substr(0, few[4].find(',')) == "25");
+}
+
+TEST_CASE("a cache folder named from where one is holds meshes itself") {
+  const Folder folder;
+  const std::string mesh = std::string("mesh ") + TEST_MODELS + "/bunny.ply --tetgen pY";
+  REQUIRE(program(mesh, folder, "TETPBD_CACHE=meshes").status == 0);
+  int files = 0;
+  for (const auto& entry : fs::directory_iterator(folder.path / "meshes")) files += entry.is_regular_file();
+  CHECK(files == 1);
 }

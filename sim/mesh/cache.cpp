@@ -9,6 +9,7 @@
 
 #include "sim/error.h"
 #include "sim/files.h"
+#include "sim/hash.h"
 
 namespace tetpbd {
 
@@ -19,7 +20,7 @@ namespace {
 // Change it whenever the file's layout or what is done with TetGen's result changes.
 constexpr std::string_view version = "tetpbd cache 3";
 
-std::string mesh_file(std::uint64_t key) { return fmt::format("{:016x}.tets", key); }
+fs::path mesh_file(std::uint64_t key) { return cache_file(fmt::format("{:016x}.tets", key)); }
 
 }  // namespace
 
@@ -31,13 +32,6 @@ fs::path cache_file(const std::string& name) {
   return {};
 }
 
-// FNV-1a
-std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed) {
-  std::uint64_t hash = 14695981039346656037ull ^ seed;
-  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return hash;
-}
-
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, const fs::path& program) {
   std::error_code failed;  // of a program that is not there the mark is one that no file has
   const auto size = fs::file_size(program, failed);
@@ -45,7 +39,7 @@ std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, 
   std::string bytes = fmt::format("{}\n{}\n{} {}\n", version, switches, size, written);
   put_array(bytes, surface.positions);
   put_array(bytes, surface.triangles);
-  return hash_bytes(bytes, 1);
+  return hash_bytes(bytes);
 }
 
 std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try {
@@ -54,7 +48,7 @@ std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try
   std::memcpy(&checksum, bytes.data(), sizeof checksum);
   bytes.remove_prefix(sizeof checksum);
   TetMesh mesh;
-  if (checksum != hash_bytes(bytes, key) || !take_array(bytes, mesh.positions) ||
+  if (checksum != hash_bytes(bytes, fnv_basis ^ key) || !take_array(bytes, mesh.positions) ||
       !take_array(bytes, mesh.tets) || !bytes.empty())
     return {};
   finish_tets(mesh, "cache");
@@ -67,13 +61,13 @@ std::string mesh_bytes(std::uint64_t key, const TetMesh& mesh) {
   std::string bytes(sizeof key, '\0');
   put_array(bytes, mesh.positions);
   put_array(bytes, mesh.tets);
-  const std::uint64_t checksum = hash_bytes(std::string_view(bytes).substr(sizeof key), key);
+  const std::uint64_t checksum = hash_bytes(std::string_view(bytes).substr(sizeof key), fnv_basis ^ key);
   std::memcpy(bytes.data(), &checksum, sizeof checksum);
   return bytes;
 }
 
 std::optional<TetMesh> read_mesh(std::uint64_t key) {
-  const fs::path file = cache_file(cache_file(mesh_file(key)));
+  const fs::path file = mesh_file(key);
   std::error_code failed;
   const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
   if (failed) return {};
@@ -83,7 +77,7 @@ std::optional<TetMesh> read_mesh(std::uint64_t key) {
 }
 
 void keep_mesh(std::uint64_t key, const TetMesh& mesh) try {
-  const fs::path file = cache_file(cache_file(mesh_file(key)));
+  const fs::path file = mesh_file(key);
   if (file.empty()) return;
   fs::create_directories(file.parent_path());
   write_file(file, mesh_bytes(key, mesh));

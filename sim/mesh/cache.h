@@ -18,9 +18,6 @@ namespace tetpbd {
 /// In $TETPBD_CACHE, else $XDG_CACHE_HOME/tetpbd, else ~/.cache/tetpbd; empty where there is none of these.
 std::filesystem::path cache_file(const std::string& name);
 
-/// Not cryptographic: it finds accidents.
-std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t seed);
-
 /// Its count, then its bits.
 template <class T>
 void put_array(std::string& bytes, const std::vector<T>& values) {

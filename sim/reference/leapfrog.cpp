@@ -6,7 +6,6 @@
 #include <random>
 
 #include "sim/error.h"
-#include "sim/solvers/cpu_pbd.h"
 
 namespace tetpbd {
 
@@ -62,7 +61,7 @@ Points accelerations(Leapfrog& run) {
 }
 
 // Out of the half space, as inelastically as a vertex can: what it sank by is taken back, and of its slip
-// what friction holds.
+// what friction holds. Written anew: with the solvers' formula it would share their mistakes.
 void touch(const glm::dvec4& plane, double friction, const glm::dvec3& before, double h, glm::dvec3& x,
            glm::dvec3& v) {
   const glm::dvec3 n(plane);
@@ -76,11 +75,7 @@ void touch(const glm::dvec4& plane, double friction, const glm::dvec3& before, d
 }
 
 Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
-  for (std::size_t k = 0; k < compliances.size(); ++k)
-    if (!(compliances[k] > 0))
-      throw Error("compliance must be above 0",
-                  fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
-                  "without compliance the right motion is a rigid body's");
+  require_compliances(compliances);
   Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}};
   std::vector<std::uint32_t> vertices;
   for_each_spring(run, [&](auto, const ConstraintList& list, double, std::size_t) {

@@ -9,6 +9,7 @@
 
 #include "sim/error.h"
 #include "sim/files.h"
+#include "sim/hash.h"
 #include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
 #include "sim/reference/leapfrog.h"
@@ -117,17 +118,19 @@ Motion::Row measured(const ReferenceInput& input, const State& state, double tim
   return row;
 }
 
-// What is done so far, for a later run to take up, with a checksum with the scene in it.
-void save_unfinished(const std::filesystem::path& file, const Motion& motion, const Pair& pair) {
+// What is done so far, for a later run to take up; its checksum has `key` in it, the scene and the number of
+// steps.
+void save_unfinished(const std::filesystem::path& file, std::uint64_t key, const Motion& motion,
+                     const Pair& pair) {
   std::string bytes;
   put_array(bytes, motion.rows), put_array(bytes, motion.kept);
   for (const Points& positions : motion.positions) put_array(bytes, positions);
   pair.save(bytes);
-  put_array(bytes, std::vector{hash_bytes(bytes, motion.scene)});
+  put_array(bytes, std::vector{hash_bytes(bytes, key)});
   write_file(file, bytes);
 }
 
-bool load_unfinished(const std::filesystem::path& file, Motion& motion, const Pair& pair) {
+bool load_unfinished(const std::filesystem::path& file, std::uint64_t key, Motion& motion, const Pair& pair) {
   std::ifstream in(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   std::string_view bytes = text;
@@ -136,7 +139,7 @@ bool load_unfinished(const std::filesystem::path& file, Motion& motion, const Pa
   if (bytes.size() < tail) return false;
   std::string_view end = bytes.substr(bytes.size() - tail);
   bytes.remove_suffix(tail);
-  if (!take_array(end, sum) || sum != std::vector{hash_bytes(bytes, motion.scene)}) return false;
+  if (!take_array(end, sum) || sum != std::vector{hash_bytes(bytes, key)}) return false;
   Motion held = motion;
   bool whole = take_array(bytes, held.rows) && take_array(bytes, held.kept);
   held.positions.resize(held.kept.size());
@@ -148,21 +151,16 @@ bool load_unfinished(const std::filesystem::path& file, Motion& motion, const Pa
 }  // namespace
 
 std::uint64_t scene_key(const ReferenceInput& input) {
-  std::uint64_t key = 0;
-  const auto add_all = [&](const auto& values) {
-    key = hash_bytes(
-        {reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof *std::data(values)},
-        key);
-  };
+  std::uint64_t key = fnv_basis;
+  const auto add = [&](const auto& values) { key = hash_values(values, key); };
   const Model& model = input.model;
-  add_all(model.rest.positions), add_all(model.rest.tets), add_all(model.positions),
-      add_all(model.velocities);
-  add_all(model.masses), add_all(model.obstacles), add_all(input.inverse_masses);
+  add(model.rest.positions), add(model.rest.tets), add(model.positions), add(model.velocities);
+  add(model.masses), add(model.obstacles), add(input.inverse_masses);
   const Settings& s = input.settings;
-  add_all(s.constraints), add_all(s.stiffness), add_all(s.compliance);
+  add(s.constraints), add(s.stiffness), add(s.compliance);
   const double numbers[] = {s.constraint_damping, s.dt,      s.damping, s.gravity, double(s.ground),
                             s.ground_height,      s.friction};
-  add_all(numbers);
+  add(numbers);
   return key;
 }
 
@@ -187,7 +185,8 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::filesyste
     motion.positions.push_back(fine.positions);
   };
   const bool resumable = pair.save && !unfinished.empty();
-  if (!resumable || !load_unfinished(unfinished, motion, pair)) add(0);
+  const std::uint64_t key = hash_values(std::array{steps}, motion.scene);
+  if (!resumable || !load_unfinished(unfinished, key, motion, pair)) add(0);
   auto saved = std::chrono::steady_clock::now();
   for (long step = long(motion.rows.size()); step <= steps; ++step) {
     pair.advance();
@@ -196,7 +195,7 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::filesyste
     const auto now = std::chrono::steady_clock::now();
     const bool stop = interrupted();
     if (resumable && (stop || std::chrono::duration<double>(now - saved).count() > seconds_between_saves)) {
-      save_unfinished(unfinished, motion, pair);
+      save_unfinished(unfinished, key, motion, pair);
       saved = now;
     }
     if (stop) throw Interrupted();

@@ -8,7 +8,6 @@
 
 #include "sim/error.h"
 #include "sim/rotation.h"
-#include "sim/solvers/cpu_pbd.h"
 
 namespace tetpbd {
 
@@ -81,14 +80,18 @@ State rigid_step(const ReferenceInput& input, State state) {
   return state;
 }
 
-namespace {
-
-Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
+void require_compliances(const Compliances& compliances) {
   for (std::size_t k = 0; k < compliances.size(); ++k)
     if (!(compliances[k] > 0))
       throw Error("compliance must be above 0",
                   fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
                   "rigid_step is the limit of 0, infinity leaves a kind out");
+}
+
+namespace {
+
+Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
+  require_compliances(compliances);
   Objective o{.system = input.system, .compliances = compliances, .masses = {}, .predicted = {}};
   for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);
   return o;

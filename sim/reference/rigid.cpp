@@ -7,7 +7,6 @@
 
 #include "sim/error.h"
 #include "sim/rotation.h"
-#include "sim/solvers/cpu_pbd.h"
 
 namespace tetpbd {
 

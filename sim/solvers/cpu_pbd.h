@@ -13,13 +13,6 @@
 
 namespace tetpbd {
 
-/// The half spaces of a step, n.x >= d as (n, d).
-inline std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings) {
-  std::vector<glm::dvec4> planes = model.obstacles;
-  if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
-  return planes;
-}
-
 /// What moves a vertex in a substep besides its constraints.
 struct Substep {
   double h, velocity_scale, friction;

@@ -13,6 +13,7 @@
 #include "app/commands.h"
 #include "app/scene.h"
 #include "sim/error.h"
+#include "sim/hash.h"
 #include "sim/mesh/cache.h"
 #include "sim/mesh/tet_mesh.h"
 
@@ -195,7 +196,7 @@ void fill_surface(std::string_view bytes) {
 void read_cache_file(std::string_view bytes) {
   constexpr std::uint64_t key = 1;
   if (const auto mesh = parse_mesh(bytes, key)) require_sound(*mesh);
-  const std::uint64_t checksum = hash_bytes(bytes, key);
+  const std::uint64_t checksum = hash_bytes(bytes, fnv_basis ^ key);
   const std::string head(reinterpret_cast<const char*>(&checksum), sizeof checksum);
   if (const auto mesh = parse_mesh(head + std::string(bytes), key)) require_sound(*mesh);
 }

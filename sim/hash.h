@@ -1,0 +1,25 @@
+// FNV-1a: tells states, scenes and damaged files apart. Not cryptographic: it finds accidents.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace tetpbd {
+
+constexpr std::uint64_t fnv_basis = 14695981039346656037ull;
+
+/// Goes on from `hash`, that of what came before.
+inline std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t hash = fnv_basis) {
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return hash;
+}
+
+/// Of the bits of a list of values without padding.
+template <class List>
+std::uint64_t hash_values(const List& values, std::uint64_t hash = fnv_basis) {
+  return hash_bytes(
+      {reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof *std::data(values)},
+      hash);
+}
+
+}  // namespace tetpbd

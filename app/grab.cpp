@@ -30,16 +30,11 @@ void watch(Grab& grab, const Sim& sim, bool wait = false) {
     // The vertex is the last.
     grab.neighbours = (grab.neighbours - grab.seen) / double(copy->size() - 1);
   }
-  if (grab.copied.sync()) return;
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glBindBuffer(GL_COPY_READ_BUFFER, sim.positions.id());
-  glBindBuffer(GL_COPY_WRITE_BUFFER, grab.copy.id());
+  if (grab.copied) return;
   for (std::size_t i = 0; i < grab.watched.size(); ++i)
-    glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER,
-                        GLintptr(grab.watched[i] * sizeof(Position)), GLintptr(i * sizeof(Position)),
-                        sizeof(Position));
+    sim.positions.copy_to(grab.copy, i * sizeof(Position), grab.watched[i] * sizeof(Position),
+                          sizeof(Position));
   grab.copied = Fence::here();
-  glFlush();
 }
 
 double apart(const Grab& grab) { return glm::distance(grab.seen, grab.neighbours); }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/color_space.hpp>
 
 extern "C" const unsigned char _binary_font_ttf_start[], _binary_font_ttf_end[];
 
@@ -29,12 +30,9 @@ struct Current {
 
 ImU32 scale_colour(const ViewOptions& options, double value) {
   const ColourRange& range = options.range();
-  const glm::vec3 c =
-      colour_maps::scale_colour(int(options.colour), float(value), float(range.low), float(range.high));
-  const auto code = [](float linear) {
-    return linear <= 0.0031308f ? linear * 12.92f : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
-  };
-  return ImGui::ColorConvertFloat4ToU32({code(c.x), code(c.y), code(c.z), 1});
+  const glm::vec3 c = glm::convertLinearToSRGB(
+      colour_maps::scale_colour(int(options.colour), float(value), float(range.low), float(range.high)));
+  return ImGui::ColorConvertFloat4ToU32({c.x, c.y, c.z, 1});
 }
 
 void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, float height, float line) {

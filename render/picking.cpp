@@ -9,7 +9,7 @@
 namespace tetpbd {
 
 namespace {
-constexpr std::uint32_t none = 0xffffffffu;
+constexpr std::uint32_t none = ~0u;
 }
 
 Picker make_picker(const TetMesh& mesh) {
@@ -37,22 +37,14 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the stage before
     glDispatchCompute(stage < 2 ? unsigned(work_groups(count, 128)) : 1, 1, 1);
   }
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   picker.answered = Fence::here();
-  glFlush();
 }
 
 std::optional<Pick> poll(Picker& picker, bool wait) {
   const auto answer = take<std::uint32_t>(picker.answered, picker.result, "picking", wait);
   if (!answer) return std::nullopt;
-  Pick pick;
-  pick.ray = picker.ray;
-  pick.hit = (*answer)[1] != none;
-  if (!pick.hit) return pick;
-  pick.distance = std::bit_cast<float>((*answer)[0]);
-  pick.triangle = (*answer)[1];
-  pick.vertex = (*answer)[2];
-  return pick;
+  const std::uint32_t triangle = answer->at(1), vertex = answer->at(2);
+  return Pick{triangle != none, triangle, vertex, std::bit_cast<float>(answer->at(0)), picker.ray};
 }
 
 }  // namespace tetpbd

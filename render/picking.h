@@ -1,12 +1,12 @@
-// Which vertex of the surface a ray meets, found on the GPU from the current positions and read back without
-// waiting.
+// Which vertex of the surface a ray meets, found on the GPU from the current positions, read back without
+// wait.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 
 #include "render/camera.h"
-#include "render/gl_objects.h"
+#include "sim/gl/gpu.h"
 #include "sim/mesh/tet_mesh.h"
 
 namespace tetpbd {
@@ -29,8 +29,7 @@ struct Picker {
 
 Picker make_picker(const TetMesh& mesh);
 void request(Picker& picker, GLuint positions, const Ray& ray);
-/// The answer, once, when it has arrived (with `wait`: when it has been waited for). None when nothing was
-/// asked.
+/// The answer, once, when it has arrived (with `wait`: now); none when nothing was asked.
 std::optional<Pick> poll(Picker& picker, bool wait = false);
 
 }  // namespace tetpbd

@@ -1,13 +1,14 @@
 #include "render/renderer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <numeric>
+#include <glm/gtc/color_space.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <utility>
 
 #include "render/layout.h"
 #include "sim/layout.h"
+#include "sim/parallel.h"
 
 namespace tetpbd {
 
@@ -64,50 +65,29 @@ Buffer rest_buffer(const Renderer& renderer) {
 // -----------------------------------------------------------------------------------------------------------
 // Values of the surface's vertices from the current positions
 
-// `each(add)` calls add(vertex, item...) for every incidence, the same way both times: first counted, then
-// stored.
-template <int arity, class Each>
-VertexGather gather(const TetMesh& mesh, const std::string& label, std::size_t value_bytes, Each each) {
-  std::vector<bool> on_surface(mesh.positions.size());
+// What the corners of elements gather: the other corners of each, in the order of `others`.
+template <std::size_t N>
+VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint32_t, N>>& elements,
+                    const std::array<std::array<std::size_t, N - 1>, N>& others, const std::string& label,
+                    std::size_t value_bytes) {
+  std::vector<char> on_surface(mesh.positions.size());
   for (const Triangle& triangle : mesh.surface)
-    for (std::uint32_t v : triangle) on_surface[v] = true;
-  std::vector<std::uint32_t> offsets(mesh.positions.size() + 1, 0);
-  each([&](std::uint32_t v, auto...) { offsets[v + 1] += on_surface[v]; });
-  std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
-  std::vector<std::uint32_t> items(std::size_t(offsets.back()) * arity), next(offsets);
-  each([&](std::uint32_t v, auto... others) {
-    if (!on_surface[v]) return;
-    std::uint32_t* item = items.data() + std::size_t(next[v]++) * arity;
-    ((*item++ = others), ...);
-  });
-  return {Buffer(label + " offsets", offsets), Buffer(label + " items", items),
+    for (const std::uint32_t v : triangle) on_surface[v] = true;
+  const auto corners = [&](std::size_t e, const auto& emit) {
+    for (std::size_t k = 0; k < N; ++k)
+      if (on_surface[elements[e][k]]) emit(elements[e][k], std::uint32_t(e * N + k));
+  };
+  const Grouped grouped = group_by_key(elements.size(), mesh.positions.size(), corners);
+  std::vector<std::uint32_t> items;
+  for (const std::uint32_t corner : grouped.values)
+    for (const std::size_t other : others[corner % N]) items.push_back(elements[corner / N][other]);
+  return {Buffer(label + " offsets", grouped.first), Buffer(label + " items", items),
           Buffer(label, mesh.positions.size() * value_bytes)};
 }
 
-VertexGather make_normals(const TetMesh& mesh) {
-  return gather<2>(mesh, "vertex normals", sizeof(glm::vec4), [&](auto add) {
-    for (const auto& [a, b, c] : mesh.surface) add(a, b, c), add(b, c, a), add(c, a, b);
-  });
-}
-
-VertexGather make_volume_errors(const TetMesh& mesh) {
-  // Even permutations, which keep the sign of the volume.
-  return gather<3>(mesh, "vertex volume errors", sizeof(float), [&](auto add) {
-    for (const auto& [a, b, c, d] : mesh.tets)
-      add(a, b, c, d), add(b, a, d, c), add(c, a, b, d), add(d, a, c, b);
-  });
-}
-
-VertexGather make_stretch_errors(const TetMesh& mesh) {
-  const auto edges = tet_edges(mesh);
-  return gather<1>(mesh, "vertex stretch errors", sizeof(float), [&](auto add) {
-    for (const auto& [a, b] : edges) add(a, b), add(b, a);
-  });
-}
-
 // The name of the buffer of values, made when first asked for and filled by their program.
-GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values,
-                VertexGather make(const TetMesh&), const char* program) {
+GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, const char* program,
+                const auto& make) {
   if (!values) values = make(renderer.mesh);
   const std::size_t count = renderer.mesh.positions.size();
   use(renderer, program).set("count", unsigned(count));
@@ -124,17 +104,10 @@ GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values,
 // -----------------------------------------------------------------------------------------------------------
 // What a picture is made of
 
-float linear(float srgb) {
-  return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f);
-}
-
-// Turns the hue about the grey axis (Rodrigues): clay, then teal, ochre, plum and so on, of like lightness.
+// Turns the hue about the grey axis: clay, then teal, ochre, plum and so on, of like lightness.
 glm::vec3 turned(const glm::vec3& colour, float degrees) {
-  const float c = std::cos(glm::radians(degrees)), s = std::sin(glm::radians(degrees));
-  const glm::vec3 grey{0.57735027f};
-  const glm::vec3 result =
-      colour * c + glm::cross(grey, colour) * s + grey * glm::dot(grey, colour) * (1.0f - c);
-  return glm::clamp(result, glm::vec3(0.02f), glm::vec3(1.0f));
+  const glm::mat3 turn(glm::rotate(glm::mat4(1.0f), glm::radians(degrees), glm::vec3(1.0f)));
+  return glm::clamp(turn * colour, 0.02f, 1.0f);
 }
 
 View view_block(const Renderer& renderer, const Frame& frame) {
@@ -153,9 +126,8 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   view.rest_high = glm::vec4(renderer.rest_high, 0.0f);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {
-    const glm::vec3 c = turned(options.body_colour, turns[i % turns.size()]);
-    view.palette[i] =
-        glm::vec4(linear(c.x), linear(c.y), linear(c.z), 1.0f) * (i < turns.size() ? 1.0f : 0.8f);
+    const glm::vec3 colour = glm::convertSRGBToLinear(turned(options.body_colour, turns[i % turns.size()]));
+    view.palette[i] = glm::vec4(colour, 1.0f) * (i < turns.size() ? 1.0f : 0.8f);
   }
   return view;
 }
@@ -181,11 +153,19 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
     renderer.rest = rest_buffer(renderer);
   GLuint normal = 0, value = 0;
   if (!tets) {  // the geometry shader of these has the whole tetrahedron
-    if (options.smooth_normals) normal = gathered(renderer, frame, renderer.normals, make_normals, "normals");
-    if (volume)
-      value = gathered(renderer, frame, renderer.volume_errors, make_volume_errors, "volume errors");
+    if (options.smooth_normals)
+      normal = gathered(renderer, frame, renderer.normals, "normals", [](const TetMesh& mesh) {
+        return gather<3>(mesh, mesh.surface, {{{1, 2}, {2, 0}, {0, 1}}}, "vertex normals", sizeof(glm::vec4));
+      });
+    if (volume)  // even permutations, which keep the sign of the volume
+      value = gathered(renderer, frame, renderer.volume_errors, "volume errors", [](const TetMesh& mesh) {
+        return gather<4>(mesh, mesh.tets, {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}},
+                         "vertex volume errors", sizeof(float));
+      });
     if (stretch)
-      value = gathered(renderer, frame, renderer.stretch_errors, make_stretch_errors, "stretch errors");
+      value = gathered(renderer, frame, renderer.stretch_errors, "stretch errors", [](const TetMesh& mesh) {
+        return gather<2>(mesh, tet_edges(mesh), {{{1}, {0}}}, "vertex stretch errors", sizeof(float));
+      });
   }
   glBindVertexArray(renderer.vertex_array.id());
   attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
@@ -238,14 +218,9 @@ void fit_light(Renderer& renderer, const Frame& frame) {
     glDispatchCompute(stage == 0 ? unsigned(work_groups(count, 128)) : 1, 1, 1);
   }
   glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
-  if (!options.follow || shadow.centre_copied.sync()) return;
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glBindBuffer(GL_COPY_READ_BUFFER, shadow.light.id());
-  glBindBuffer(GL_COPY_WRITE_BUFFER, shadow.centre.id());
-  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, offsetof(Light, centre), 0,
-                      sizeof(glm::vec4));
+  if (!options.follow || shadow.centre_copied) return;
+  shadow.light.copy_to(shadow.centre, 0, offsetof(Light, centre), sizeof(glm::vec4));
   shadow.centre_copied = Fence::here();
-  glFlush();
 }
 
 void make_map(Shadow& shadow) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "sim/error.h"
 
@@ -59,8 +60,8 @@ Target make_target(int width, int height, int samples) {
   Target target;
   target.width = width;
   target.height = height;
-  samples = std::min(samples, int(most));
-  target.samples = samples < 2 ? 0 : samples < 4 ? 2 : samples < 8 ? 4 : 8;
+  samples = std::min({samples, int(most), 8});
+  target.samples = samples < 2 ? 0 : int(std::bit_floor(unsigned(samples)));
   target.colour = storage("target colour", target, target.samples, GL_SRGB8_ALPHA8);
   target.depth = storage("target depth", target, target.samples, GL_DEPTH_COMPONENT32F);
   target.framebuffer = framebuffer_of("target", target, target.colour, target.depth);
@@ -95,7 +96,6 @@ void ReadBack::push(const Target& target) {
   glReadPixels(0, 0, target.width, target.height, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   pending_.push_back({target.width, target.height, std::move(pixels), Fence::here()});
-  glFlush();  // else the fence may never be reached while nobody waits
 }
 
 std::optional<Image> ReadBack::poll(bool wait) {

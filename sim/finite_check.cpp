@@ -49,25 +49,22 @@ void keep_checkpoint(Sim& sim) {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
+void take_answer(FiniteCheck& check, bool wait) {
+  const auto answer =
+      take<std::uint32_t>(check.asked, check.read_back, "checking for numbers that are not finite", wait);
+  if (!answer) return;
+  const std::uint32_t step = answer->front(), vertex = answer->back();
+  if (step != ~0u) check.found = {long(step), vertex};
+  check.known = check.asked_step;
+}
+
 // Asks the GPU about the steps so far, unless a question is under way.
 void ask(Sim& sim) {
   FiniteCheck& check = sim.check;
-  if (check.found || check.asked.sync() || check.known >= sim.steps) return;
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);  // kernels wrote what is copied
-  glBindBuffer(GL_COPY_READ_BUFFER, check.words.id());
-  glBindBuffer(GL_COPY_WRITE_BUFFER, check.read_back.id());
-  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, GLsizeiptr(check.words.bytes()));
+  if (check.found || check.asked || check.known >= sim.steps) return;
+  check.words.copy_to(check.read_back, 0, 0, check.words.bytes());
   check.asked = Fence::here();
   check.asked_step = sim.steps;
-}
-
-void take_answer(FiniteCheck& check, bool wait) {
-  if (!check.asked.sync()) return;
-  if (!reached(check.asked.sync(), wait, "checking for numbers that are not finite")) return;
-  check.asked = {};
-  const auto words = check.read_back.read_all<std::uint32_t>();  // its step, its vertex
-  if (words[0] != ~0u) check.found = {long(words[0]), words[1]};
-  check.known = check.asked_step;
 }
 
 }  // namespace

@@ -62,9 +62,6 @@ Capabilities load_gl() {
   if (result != GLEW_OK && result != GLEW_ERROR_NO_GLX_DISPLAY)
     throw Error("OpenGL functions did not load", reinterpret_cast<const char*>(glewGetErrorString(result)),
                 "check the OpenGL driver", 1);
-  if (gl_integer(GL_MAJOR_VERSION) * 10 + gl_integer(GL_MINOR_VERSION) < 43)
-    throw Error("OpenGL 4.3 is needed", "the driver offers " + gl_string(GL_VERSION),
-                "use a newer driver or another GPU (tetpbd info lists them)", 1);
   if (gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT) {
     glEnable(GL_DEBUG_OUTPUT);
     glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
@@ -77,13 +74,13 @@ void check_context() {
   if (!GLEW_KHR_robustness && !GLEW_VERSION_4_5) return;
   const GLenum status = glGetGraphicsResetStatus();
   if (status == GL_NO_ERROR) return;
-  const char* whose = status == GL_GUILTY_CONTEXT_RESET ? "by what this program did (a step too long for it?)"
-                      : status == GL_INNOCENT_CONTEXT_RESET ? "by another program"
-                                                            : "for an unknown reason";
-  throw ContextLost("the GPU was reset", whose,
-                    "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and "
-                    "look into the system's log",
-                    1);
+  const bool guilty = status == GL_GUILTY_CONTEXT_RESET;
+  throw ContextLost(
+      "the GPU was reset",
+      guilty ? "by what this program did (a step too long for it?)" : "by another program",
+      "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look into "
+      "the system's log",
+      1);
 }
 
 // -----------------------------------------------------------------------------------------------------------
@@ -111,35 +108,19 @@ bool is_software(EGLDeviceEXT device) {
   return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
 }
 
-std::vector<EGLDisplay> displays_of(const std::vector<EGLDeviceEXT>& devices, int device) {
-  const auto of = [](EGLDeviceEXT one) {
-    return eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr);
-  };
-  if (device >= 0) return {of(devices[std::size_t(device)])};
-  std::vector<EGLDisplay> displays;
-  for (EGLDeviceEXT one : devices)
-    if (!is_software(one)) displays.push_back(of(one));
-  displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
-  for (EGLDeviceEXT one : devices) displays.push_back(of(one));
-  return displays;
-}
-
-/// Current, or none. `version`: major and minor; 0: whatever the driver makes. With `reset`, the driver tells
-/// of a GPU that was reset (and of nothing else: bounds checks in shaders would cost time).
-EGLContext make_context(EGLDisplay display, bool debug, int version, bool reset = true) {
+/// Current, or none. With `reset`, the driver tells of a GPU that was reset (and of nothing else: bounds
+/// checks in shaders would cost time).
+EGLContext make_context(EGLDisplay display, bool debug, bool reset) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
-  std::vector<EGLint> attributes = {EGL_CONTEXT_OPENGL_DEBUG, debug ? EGL_TRUE : EGL_FALSE};
-  if (version > 0)
-    attributes.insert(attributes.end(),
-                      {EGL_CONTEXT_MAJOR_VERSION, version / 10, EGL_CONTEXT_MINOR_VERSION, version % 10,
-                       EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT});
-  if (reset)
-    attributes.insert(attributes.end(),
-                      {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
-  attributes.push_back(EGL_NONE);
-  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes.data());
-  if (context == EGL_NO_CONTEXT && reset) return make_context(display, debug, version, false);
+  const EGLint attributes[][2] = {
+      {EGL_CONTEXT_MAJOR_VERSION, 4},
+      {EGL_CONTEXT_MINOR_VERSION, 3},
+      {EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT},
+      {EGL_CONTEXT_OPENGL_DEBUG, debug},
+      {reset ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY : EGL_NONE, EGL_LOSE_CONTEXT_ON_RESET},
+      {EGL_NONE, EGL_NONE}};
+  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes[0]);
   if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
     return context;
   eglDestroyContext(display, context);
@@ -159,19 +140,26 @@ std::vector<std::string> list_devices() {
 HeadlessContext::HeadlessContext(int device, bool debug) {
   const std::vector<EGLDeviceEXT> devices = query_devices();
   if (device >= int(devices.size()))
-    throw Error("no such GPU", fmt::format("--gpu {}", device),
-                fmt::format("this machine has {}: see tetpbd info", devices.size()));
-  for (const int version : {43, 0})  // another one so that load_gl() can say which
-    for (EGLDisplay display : displays_of(devices, device)) {
-      context_ = make_context(display, debug, version);
+    throw Error("no such GPU", fmt::format("--gpu {}", device), "tetpbd info lists them");
+  const auto display_of = [](EGLDeviceEXT one) {
+    return eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr);
+  };
+  std::vector<EGLDisplay> displays;
+  for (EGLDeviceEXT one : devices)
+    if (device < 0 ? !is_software(one) : one == devices[std::size_t(device)])
+      displays.push_back(display_of(one));
+  if (device < 0)
+    displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
+  for (EGLDisplay display : displays)
+    for (const bool reset : {true, false}) {
+      context_ = make_context(display, debug, reset);
       if (context_ == EGL_NO_CONTEXT) continue;
       display_ = display;
       capabilities_ = load_gl();
       return;
     }
-  const std::string which = device >= 0 ? fmt::format("--gpu {}", device) : "EGL, any device";
-  throw Error("no OpenGL 4.3 context", devices.empty() ? "EGL finds no device and no driver" : which,
-              "install a driver, or libegl-mesa0 and libgl1-mesa-dri for software rendering", 1);
+  throw Error("no OpenGL 4.3 context", device < 0 ? "any device of EGL" : fmt::format("--gpu {}", device),
+              "install a newer driver, or libegl-mesa0 and libgl1-mesa-dri for software rendering", 1);
 }
 
 // The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that driver.

@@ -1,9 +1,187 @@
-// The little OpenGL 4.3 core that this program needs: a context, buffers, programs with includes, fences and
-// timers, all labelled and counted. No direct state access, no buffer storage, no vendor extension: what more
-// is asked of a driver is a row of Capabilities. Nothing here knows of meshes or solvers.
+// The little OpenGL 4.3 core that this program needs: a context (context.h), buffers, programs with includes,
+// fences and timers, all labelled and counted. No direct state access, no buffer storage, no vendor
+// extension: what more is asked of a driver is a row of Capabilities. Nothing here knows of meshes or
+// solvers.
 #pragma once
 
-#include "sim/gl/buffer.h"
+#include <GL/glew.h>
+
+#include <cstdint>
+#include <deque>
+#include <glm/glm.hpp>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "sim/gl/context.h"
-#include "sim/gl/program.h"
-#include "sim/gl/timer.h"
+
+namespace tetpbd {
+
+/// What the program holds of GL right now, over all contexts; bytes of textures and renderbuffers not
+/// counted.
+struct GlLive {
+  long objects = 0;
+  std::int64_t buffer_bytes = 0;
+};
+inline GlLive& gl_live() {
+  static GlLive live;
+  return live;
+}
+
+inline void label_object(GLenum kind, GLuint id, const std::string& label) {
+  glObjectLabel(kind, id, GLsizei(label.size()), label.data());
+}
+
+/// A GL object that is deleted with its owner. `Name`: GLuint or GLsync; 0 is none.
+template <class Name, void (*destroy)(Name)>
+class Owned {
+ public:
+  Owned() = default;
+  explicit Owned(Name name, std::int64_t bytes = 0) : name_(name), bytes_(bytes) { count(1); }
+  Owned(Owned&& other) noexcept { swap(other); }
+  Owned& operator=(Owned&& other) noexcept { return swap(other), *this; }
+  ~Owned() {
+    if (name_) destroy(name_), count(-1);
+  }
+  Name id() const { return name_; }
+  std::size_t bytes() const { return std::size_t(bytes_); }
+  explicit operator bool() const { return name_ != Name{}; }
+
+ private:
+  void count(int change) const {
+    gl_live().objects += change;
+    gl_live().buffer_bytes += change * bytes_;
+  }
+  void swap(Owned& other) { std::swap(name_, other.name_), std::swap(bytes_, other.bytes_); }
+  Name name_{};
+  std::int64_t bytes_ = 0;
+};
+
+inline void delete_buffer(GLuint id) { glDeleteBuffers(1, &id); }
+inline void delete_program(GLuint id) { glDeleteProgram(id); }
+inline void delete_query(GLuint id) { glDeleteQueries(1, &id); }
+inline void delete_fence(GLsync sync) { glDeleteSync(sync); }
+
+/// Throws Error naming what did not fit if it does not, or the last GL call failed.
+void check_memory(const std::string& what, std::size_t bytes, bool fits = true);
+/// Forgets GL errors of earlier calls, so that check_memory judges the next alone.
+void clear_errors();
+
+/// A buffer of fixed size.
+class Buffer : public Owned<GLuint, delete_buffer> {
+ public:
+  Buffer() = default;
+  Buffer(std::string label, std::size_t bytes, const void* data = nullptr, GLenum usage = GL_DYNAMIC_COPY);
+  template <class T>
+  Buffer(std::string label, const std::vector<T>& data, GLenum usage = GL_STATIC_DRAW)
+      : Buffer(std::move(label), data.size() * sizeof(T), data.data(), usage) {}
+
+  const std::string& label() const { return label_; }
+  void write(std::size_t offset, std::size_t bytes, const void* data) const;
+  void read(std::size_t offset, std::size_t bytes, void* data) const;  ///< waits for the GPU
+  /// Of what kernels wrote, queued: done when the GPU comes to the next fence.
+  void copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const;
+  void clear() const;  ///< to zero bytes
+  void bind_storage(int binding) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), id()); }
+  void bind_uniform(int binding) const { glBindBufferBase(GL_UNIFORM_BUFFER, GLuint(binding), id()); }
+
+  template <class T>
+  std::vector<T> read_all() const {
+    std::vector<T> data(bytes() / sizeof(T));
+    read(0, data.size() * sizeof(T), data.data());
+    return data;
+  }
+
+ private:
+  std::string label_;
+  bool whole_at_once_ = false;  ///< GL_STREAM_DRAW: a write of all gets new memory, which nothing waits for
+};
+
+/// A place in the GPU's queue.
+struct Fence : Owned<GLsync, delete_fence> {
+  using Owned::Owned;
+  static Fence here() { return Fence(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)); }
+  GLsync sync() const { return id(); }
+};
+/// Whether the GPU has come to the fence; with `wait`, once it has. Where waiting fails: ContextLost, or an
+/// Error that names what was waited for.
+bool reached(GLsync fence, bool wait, const char* what);
+/// What a buffer held when the GPU came to `fence`, once: nothing before that (with `wait`, after waiting for
+/// it) or without a fence.
+template <class T>
+std::optional<std::vector<T>> take(Fence& fence, const Buffer& buffer, const char* what, bool wait = false) {
+  if (!fence || !reached(fence.id(), wait, what)) return std::nullopt;
+  fence = Fence();
+  return buffer.read_all<T>();
+}
+
+/// GPU time between begin and end by pairs of timestamps, read back when ready (never waits unless asked).
+class Timer {
+ public:
+  void begin() { begun_ = now(); }
+  void end() { spans_.emplace_back(std::move(begun_), now()); }
+  /// Milliseconds of the oldest span that is ready, if any; with `wait`, of the oldest there is.
+  std::optional<double> poll(bool wait = false);
+
+ private:
+  using Query = Owned<GLuint, delete_query>;
+  static Query now();
+  Query begun_;
+  std::deque<std::pair<Query, Query>> spans_;
+};
+
+/// Values of `$NAME` in a shader's text, put in before it is compiled: {"KIND", "stretch"} makes gather_$KIND
+/// gather_stretch.
+using Substitutions = std::map<std::string, std::string>;
+/// `words` for the whole text; `each`: a line that starts with #foreach is repeated once for every entry,
+/// with its words.
+struct ShaderWords {
+  Substitutions words;
+  std::vector<Substitutions> each;
+};
+
+/// Reads shaders from this folder instead of the ones inside the program (empty: inside). The variable
+/// TETPBD_SHADERS sets it at start.
+void set_shader_folder(const std::string& folder);
+const std::string& shader_folder();
+/// Changes when a file of the folder changes; 0 without a folder.
+std::int64_t shader_folder_version();
+
+/// The text of shaders/`name`, #include, #foreach and `$NAME` expanded. `files`: the files it is made of, in
+/// order; line N of files[I] stands under #line N I (GLSL has numbers where C has names).
+std::string shader_text(const std::string& name, const ShaderWords& words, std::vector<std::string>& files);
+
+/// A linked program. Errors name the shader file and line.
+class Program : public Owned<GLuint, delete_program> {
+ public:
+  struct Stage {
+    GLenum type;
+    std::string file;
+  };
+  Program() = default;
+  /// `#define`s and `#version 430 core` are put before each stage.
+  Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words = {},
+          const std::vector<std::string>& defines = {});
+  static Program compute(const std::string& file, const ShaderWords& words = {},
+                         const std::vector<std::string>& defines = {});
+
+  const std::string& label() const { return label_; }
+  void use() const { glUseProgram(id()); }
+  /// Sets a uniform of the program in use. One that the linker dropped is ignored; one that its text does not
+  /// declare throws Error.
+  void set(const char* name, int value) const { glUniform1i(location(name), value); }
+  void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
+  void set(const char* name, float value) const { glUniform1f(location(name), value); }
+  void set(const char* name, const glm::uvec2& value) const { glUniform2uiv(location(name), 1, &value.x); }
+  void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }
+  void set(const char* name, const glm::vec4& value) const { glUniform4fv(location(name), 1, &value.x); }
+
+ private:
+  GLint location(const char* name) const;
+  std::string label_, text_;
+  mutable std::map<std::string, GLint, std::less<>> locations_;
+};
+
+}  // namespace tetpbd

@@ -1,5 +1,3 @@
-#include "sim/gl/program.h"
-
 #include <fmt/format.h>
 
 #include <optional>
@@ -7,6 +5,7 @@
 #include <sstream>
 
 #include "sim/error.h"
+#include "sim/gl/gpu.h"
 
 namespace tetpbd {
 
@@ -45,9 +44,9 @@ std::optional<std::string> fault(GLuint id, GLenum status) {
 Shader compile(const Program::Stage& stage, const std::string& text, const std::vector<std::string>& files) {
   Shader shader(glCreateShader(stage.type));
   const char* pointer = text.c_str();
-  glShaderSource(shader.name(), 1, &pointer, nullptr);
-  glCompileShader(shader.name());
-  if (const auto log = fault(shader.name(), GL_COMPILE_STATUS))
+  glShaderSource(shader.id(), 1, &pointer, nullptr);
+  glCompileShader(shader.id());
+  if (const auto log = fault(shader.id(), GL_COMPILE_STATUS))
     throw Error("shader does not compile", stage.file, name_files(*log, files), 1);
   return shader;
 }
@@ -56,23 +55,19 @@ Shader compile(const Program::Stage& stage, const std::string& text, const std::
 
 Program::Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words,
                  const std::vector<std::string>& defines)
-    : label_(std::move(label)) {
+    : Owned(glCreateProgram()), label_(std::move(label)) {
   std::string head = "#version 430 core\n";
   for (const std::string& define : defines) head += "#define " + define + "\n";
   std::vector<Shader> shaders;
-  object_ = Owned<GLuint, delete_program>(glCreateProgram());
   for (const Stage& stage : stages) {
     std::vector<std::string> files;
     const std::string text = head + shader_text(stage.file, words, files);
-    // Where `set` looks for names: a uniform that nothing uses has no location and yet is no mistake.
-    std::istringstream lines(text);
-    for (std::string line; std::getline(lines, line);)
-      if (line.find("uniform ") != std::string::npos) declarations_ += line + "\n";
+    text_ += text;
     shaders.push_back(compile(stage, text, files));
-    glAttachShader(id(), shaders.back().name());
+    glAttachShader(id(), shaders.back().id());
   }
   glLinkProgram(id());
-  for (const Shader& shader : shaders) glDetachShader(id(), shader.name());
+  for (const Shader& shader : shaders) glDetachShader(id(), shader.id());
   if (const auto log = fault(id(), GL_LINK_STATUS))
     throw Error("shader program does not link", label_, name_files(*log, {}), 1);
   label_object(GL_PROGRAM, id(), label_);
@@ -91,7 +86,8 @@ GLint Program::location(const char* name) const {
   if (const auto found = locations_.find(std::string_view(name)); found != locations_.end())
     return found->second;
   const GLint location = glGetUniformLocation(id(), name);
-  if (location < 0 && !std::regex_search(declarations_, std::regex(fmt::format("\\b{}\\b", name))))
+  // One that nothing uses has no location either and yet is no mistake.
+  if (location < 0 && !std::regex_search(text_, std::regex(fmt::format("\nuniform [^;]*\\b{}\\b", name))))
     throw Error("no such uniform", fmt::format("'{}' in {}", name, label_),
                 shader_folder().empty() ? "declare it in the shader" : "declare it in " + shader_folder(), 1);
   return locations_.emplace(name, location).first->second;

@@ -5,11 +5,10 @@
 #include <fstream>
 #include <limits>
 #include <ranges>
-#include <regex>
 #include <sstream>
 
 #include "sim/error.h"
-#include "sim/gl/program.h"
+#include "sim/gl/gpu.h"
 
 namespace tetpbd {
 
@@ -70,28 +69,24 @@ std::string shader_text(const std::string& name, const ShaderWords& words, std::
   files.push_back(name);
   std::istringstream lines(read_shader_file(name));
   std::string line, result = fmt::format("#line 1 {}\n", index);
-  const auto expand_line = [&](const std::string& text, const ShaderWords& local, int number) {
-    static const std::regex include(R"re(^\s*#include\s+"([^"]+)"\s*$)re");
-    std::smatch match;
-    const std::string filled = substitute(text, local.words);
-    if (filled.find("#include") == std::string::npos || !std::regex_match(filled, match, include))
-      result += filled + "\n";
-    else
-      result += shader_text(match[1], local, files) + fmt::format("#line {} {}\n", number + 1, index);
-  };
   for (int number = 1; std::getline(lines, line); ++number) {
-    constexpr std::string_view foreach = "#foreach ";
+    constexpr std::string_view foreach = "#foreach ", include = "#include \"";
     const std::size_t at = line.find(foreach);
-    if (at == std::string::npos) {
-      expand_line(line, words, number);
-      continue;
+    const bool repeated = at != std::string::npos;
+    if (repeated) line.erase(0, at + foreach.size());
+    const std::string resume = fmt::format("#line {} {}\n", number + 1, index);
+    for (const Substitutions& item : repeated ? words.each : std::vector<Substitutions>(1)) {
+      ShaderWords local{item, words.each};
+      local.words.insert(words.words.begin(), words.words.end());
+      const std::string filled = substitute(line, local.words);
+      if (filled.starts_with(include)) {
+        const std::string inner = filled.substr(include.size(), filled.rfind('"') - include.size());
+        result += shader_text(inner, local, files) + resume;
+      } else {
+        result += filled + "\n";
+      }
     }
-    for (const Substitutions& item : words.each) {
-      ShaderWords local = words;
-      for (const auto& [key, value] : item) local.words[key] = value;
-      expand_line(line.substr(at + foreach.size()), local, number);
-    }
-    result += fmt::format("#line {} {}\n", number + 1, index);
+    if (repeated) result += resume;
   }
   return result;
 }

@@ -1,27 +1,12 @@
-#include "sim/gl/buffer.h"
+#include "sim/gl/gpu.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 
 #include "sim/error.h"
 
 namespace tetpbd {
-
-namespace {
-
-std::atomic<long> live_objects = 0;
-std::atomic<std::int64_t> live_buffer_bytes = 0;
-
-}  // namespace
-
-GlLive gl_live() { return {live_objects, live_buffer_bytes}; }
-
-void count_gl_objects(long change, std::int64_t buffer_bytes) {
-  live_objects += change;
-  live_buffer_bytes += buffer_bytes;
-}
 
 void check_memory(const std::string& what, std::size_t bytes, bool fits) {
   // Drivers call an absurd size by other names than GL_OUT_OF_MEMORY.
@@ -31,23 +16,28 @@ void check_memory(const std::string& what, std::size_t bytes, bool fits) {
 }
 
 void clear_errors() {
-  // A lost context answers an error for ever.
-  for (int i = 0; i < 100 && glGetError() != GL_NO_ERROR; ++i) {
-  }
+  for (int i = 0; i < 100 && glGetError() != GL_NO_ERROR;) ++i;  // a lost context answers an error for ever
 }
 
-Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
-    : label_(std::move(label)), whole_at_once_(usage == GL_STREAM_DRAW) {
-  clear_errors();
+namespace {
+GLuint new_buffer() {
   GLuint id = 0;
   glGenBuffers(1, &id);
-  object_ = Owned<GLuint, delete_buffer>(id, std::int64_t(bytes));
-  glBindBuffer(GL_COPY_WRITE_BUFFER, id);
+  return id;
+}
+}  // namespace
+
+Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
+    : Owned(new_buffer(), std::int64_t(bytes)),
+      label_(std::move(label)),
+      whole_at_once_(usage == GL_STREAM_DRAW) {
+  clear_errors();
+  glBindBuffer(GL_COPY_WRITE_BUFFER, id());
   glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
   GLint64 made = 0;  // some drivers say nothing of what does not fit
   glGetBufferParameteri64v(GL_COPY_WRITE_BUFFER, GL_BUFFER_SIZE, &made);
   check_memory(fmt::format("buffer '{}'", label_), bytes, std::size_t(made) >= bytes);
-  label_object(GL_BUFFER, id, label_);
+  label_object(GL_BUFFER, id(), label_);
 }
 
 // Kernels queued before may still read or write the buffer: the barrier here is why pins, uploads, resets and
@@ -61,13 +51,12 @@ void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) cons
   }
   // Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old
   // bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
-  GLuint staging = 0;
-  glGenBuffers(1, &staging);
+  const GLuint staging = new_buffer();
   glBindBuffer(GL_COPY_READ_BUFFER, staging);
   glBufferData(GL_COPY_READ_BUFFER, GLsizeiptr(bytes), data, GL_STREAM_DRAW);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id());
   glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, GLintptr(offset), GLsizeiptr(bytes));
-  glDeleteBuffers(1, &staging);
+  delete_buffer(staging);
 }
 
 void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
@@ -76,10 +65,50 @@ void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
   glGetBufferSubData(GL_COPY_READ_BUFFER, GLintptr(offset), GLsizeiptr(bytes), data);
 }
 
+void Buffer::copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glBindBuffer(GL_COPY_READ_BUFFER, id());
+  glBindBuffer(GL_COPY_WRITE_BUFFER, to.id());
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GLintptr(offset), GLintptr(at),
+                      GLsizeiptr(bytes));
+}
+
 void Buffer::clear() const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id());
   glClearBufferData(GL_COPY_WRITE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+}
+
+bool reached(GLsync fence, bool wait, const char* what) {
+  constexpr GLuint64 slice = 1'000'000'000u;  // ns; a step takes what it takes, a lost GPU is noticed
+  for (;;) {
+    const GLenum state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? slice : 0u);
+    if (state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED) return true;
+    if (state == GL_TIMEOUT_EXPIRED && !wait) return false;
+    check_context();
+    if (state == GL_WAIT_FAILED) break;
+  }
+  throw Error("the GPU does not answer", what, "use fewer iterations or substeps, or a smaller mesh", 1);
+}
+
+Timer::Query Timer::now() {
+  GLuint id = 0;
+  glGenQueries(1, &id);
+  glQueryCounter(id, GL_TIMESTAMP);
+  return Query(id);
+}
+
+std::optional<double> Timer::poll(bool wait) {
+  if (spans_.empty()) return std::nullopt;
+  const auto& [first, last] = spans_.front();
+  GLint available = wait;
+  if (!wait) glGetQueryObjectiv(last.id(), GL_QUERY_RESULT_AVAILABLE, &available);
+  if (!available) return std::nullopt;
+  GLuint64 begin = 0, end = 0;
+  glGetQueryObjectui64v(first.id(), GL_QUERY_RESULT, &begin);
+  glGetQueryObjectui64v(last.id(), GL_QUERY_RESULT, &end);
+  spans_.pop_front();
+  return double(end - begin) * 1e-6;
 }
 
 }  // namespace tetpbd

@@ -63,8 +63,7 @@ struct Multiplier {
   real lambda;  // 0 where it is no number
   uint guards;  // that it took
 };
-Multiplier bounded(real C, uint guards, Weighted s, real k, real max_correction, real a, real share) {
-  real sum = share * max(s.sum, s.least) + a;
+Multiplier bounded(real C, uint guards, Weighted s, real sum, real k, real max_correction) {
   real lambda = sum > real(0) ? -(k * C) / sum : real(0);
   real squared = lambda * lambda * s.longest;
   bool beyond = squared > max_correction * max_correction, number = squared * real(0) == real(0);
@@ -73,8 +72,10 @@ Multiplier bounded(real C, uint guards, Weighted s, real k, real max_correction,
   return Multiplier(number ? lambda : real(0), guards | (!number ? GUARD_NOT_FINITE : beyond ? GUARD_LIMIT : 0u));
 }
 Multiplier multiplier(Constraint2 c, real w[2], real k, real max_correction, real a, real share) {
-  return bounded(c.C, c.guards, weighted(c, w), k, max_correction, a, share);
+  Weighted s = weighted(c, w);
+  return bounded(c.C, c.guards, s, share * s.sum + a, k, max_correction);
 }
 Multiplier multiplier(Constraint4 c, real w[4], real k, real max_correction, real a, real share) {
-  return bounded(c.C, c.guards, weighted(c, w), k, max_correction, a, share);
+  Weighted s = weighted(c, w);
+  return bounded(c.C, c.guards, s, share * max(s.sum, s.least) + a, k, max_correction);
 }

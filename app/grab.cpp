@@ -11,8 +11,7 @@ constexpr std::size_t most_neighbours = 32;
 
 // The vertex may go this part of an edge in one step. A tet turns inside out when a vertex passes its
 // opposite face, about 0.8 of an edge away; a quarter leaves the solver several steps to answer, also while
-// the read-back that sets the pace is a few steps old. In metres a second it is edge / (4 dt): 1.5 m/s for a
-// 1 m bunny.
+// the read-back that sets the pace is a few steps old.
 constexpr double edges_a_step = 0.25;
 
 // So many edges from the mean of its neighbours the vertex stops, and beyond turns back: what does not follow

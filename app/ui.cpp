@@ -17,7 +17,21 @@ void set_look(Session& s, Look look) {
   s.log("look {}", look_names[std::size_t(look)]);
 }
 
+void next_colour(Session& s) {
+  s.view.colour = Colour((std::size_t(s.view.colour) + 1) % colour_names.size());
+  s.log("colour {}", colour_names[std::size_t(s.view.colour)]);
+}
+
 void flip(Session& s, const char* name, bool& value) { s.log("{} {}", name, value = !value); }
+
+void escape(Session& s, Ui& ui) {
+  if (ui.help)
+    flip(s, "help", ui.help);
+  else if (s.grab)
+    let_go(s);
+  else
+    s.messages.clear();
+}
 
 constexpr ImGuiWindowFlags plain_window =
     ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
@@ -57,9 +71,6 @@ void draw_plots(const Session& s, const Rect& place) {
 // What is cut off first in a narrow window stands last.
 void draw_status(const Session& s, const Rect& place) {
   const Sim& sim = s.loaded.sim;
-  std::size_t constraints = 0;
-  for (std::size_t k = 0; k < sim.system.lists.size(); ++k)
-    if (sim.system.present[k]) constraints += sim.system.lists[k].count();
   begin_part("status", place);
   const bool slow = s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95;
   const std::string speed = s.playing ? fmt::format("{:.2g}x real time", s.clock.factor) : "paused";
@@ -71,7 +82,7 @@ void draw_status(const Session& s, const Rect& place) {
       "{0}  step {1}  {0}  {2:.3f} s  {0}  mode {3}  {0}  {4} tets  {0}  {5} vertices  {0}  {6} constraints  "
       "{0}  {7}",
       dot, sim.steps, double(sim.steps) * sim.settings.dt, sim.settings.mode, sim.model->rest.tets.size(),
-      sim.model->positions.size(), constraints, s.gl.renderer);
+      sim.model->positions.size(), sim.system.count(), s.gl.renderer);
   ImGui::TextUnformatted(rest.c_str());
   ImGui::End();
 }
@@ -155,38 +166,23 @@ void set_style(float scale, float density) {
 
 const std::vector<Shortcut>& shortcuts() {
   static const std::vector<Shortcut> rows = {
-      {GLFW_KEY_SPACE, 0, 0, "Space", "play, pause", [](Session& s, Ui&) { play(s, !s.playing); }},
-      {GLFW_KEY_S, GLFW_KEY_RIGHT, 0, "S, Right", "one step", [](Session& s, Ui&) { single_step(s); }},
-      {GLFW_KEY_R, 0, 0, "R", "reset", [](Session& s, Ui&) { restart(s); }},
-      {GLFW_KEY_F, 0, 0, "F", "show all of the body", [](Session& s, Ui&) { frame_body(s); }},
-      {GLFW_KEY_1, GLFW_KEY_KP_1, 0, "1", "surface", [](Session& s, Ui&) { set_look(s, Look::surface); }},
-      {GLFW_KEY_2, GLFW_KEY_KP_2, 0, "2", "surface with edges",
-       [](Session& s, Ui&) { set_look(s, Look::wire); }},
-      {GLFW_KEY_3, GLFW_KEY_KP_3, 0, "3", "tetrahedra", [](Session& s, Ui&) { set_look(s, Look::tets); }},
-      {GLFW_KEY_C, 0, 0, "C", "next colour",
-       [](Session& s, Ui&) {
-         s.view.colour = Colour((std::size_t(s.view.colour) + 1) % colour_names.size());
-         s.log("colour {}", colour_names[std::size_t(s.view.colour)]);
-       }},
-      {GLFW_KEY_N, 0, 0, "N", "smooth or flat normals",
-       [](Session& s, Ui&) { flip(s, "normals", s.view.smooth_normals); }},
-      {GLFW_KEY_G, 0, 0, "G", "grid", [](Session& s, Ui&) { flip(s, "grid", s.view.grid); }},
-      {GLFW_KEY_L, 0, 0, "L", "follow the bodies", [](Session& s, Ui&) { flip(s, "follow", s.view.follow); }},
-      {GLFW_KEY_M, 0, 0, "M", "plots", [](Session& s, Ui& ui) { flip(s, "plots", ui.plots); }},
-      {GLFW_KEY_TAB, 0, 0, "Tab", "panels", [](Session& s, Ui& ui) { flip(s, "panels", ui.panels); }},
-      {GLFW_KEY_P, 0, 0, "P", "screenshot without panels", [](Session& s, Ui&) { s.take_screenshot = true; }},
-      {GLFW_KEY_H, GLFW_KEY_F1, 0, "H, F1", "this help",
-       [](Session& s, Ui& ui) { flip(s, "help", ui.help); }},
-      {GLFW_KEY_ESCAPE, 0, 0, "Esc", "close help, messages; let go",
-       [](Session& s, Ui& ui) {
-         if (ui.help)
-           flip(s, "help", ui.help);
-         else if (s.grab)
-           let_go(s);
-         else
-           s.messages.clear();
-       }},
-      {GLFW_KEY_Q, 0, GLFW_MOD_CONTROL, "Ctrl + Q", "quit", [](Session& s, Ui&) { s.quit = true; }},
+      {GLFW_KEY_SPACE, "Space", "play, pause", [](Session& s, Ui&) { play(s, !s.playing); }},
+      {GLFW_KEY_S, "S, Right", "one step", [](Session& s, Ui&) { single_step(s); }, GLFW_KEY_RIGHT},
+      {GLFW_KEY_R, "R", "reset", [](Session& s, Ui&) { restart(s); }},
+      {GLFW_KEY_F, "F", "show all of the body", [](Session& s, Ui&) { frame_body(s); }},
+      {GLFW_KEY_1, "1", "surface", [](Session& s, Ui&) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
+      {GLFW_KEY_2, "2", "with edges", [](Session& s, Ui&) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
+      {GLFW_KEY_3, "3", "tetrahedra", [](Session& s, Ui&) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
+      {GLFW_KEY_C, "C", "next colour", [](Session& s, Ui&) { next_colour(s); }},
+      {GLFW_KEY_N, "N", "flat normals", [](Session& s, Ui&) { flip(s, "normals", s.view.smooth_normals); }},
+      {GLFW_KEY_G, "G", "grid", [](Session& s, Ui&) { flip(s, "grid", s.view.grid); }},
+      {GLFW_KEY_L, "L", "follow the bodies", [](Session& s, Ui&) { flip(s, "follow", s.view.follow); }},
+      {GLFW_KEY_M, "M", "plots", [](Session& s, Ui& ui) { flip(s, "plots", ui.plots); }},
+      {GLFW_KEY_TAB, "Tab", "panels", [](Session& s, Ui& ui) { flip(s, "panels", ui.panels); }},
+      {GLFW_KEY_P, "P", "screenshot without panels", [](Session& s, Ui&) { s.take_screenshot = true; }},
+      {GLFW_KEY_H, "H, F1", "this help", [](Session& s, Ui& ui) { flip(s, "help", ui.help); }, GLFW_KEY_F1},
+      {GLFW_KEY_ESCAPE, "Esc", "close help; let go; close messages", escape},
+      {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s, Ui&) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
   };
   return rows;
 }

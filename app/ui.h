@@ -34,11 +34,10 @@ struct Ui {
 
 /// A key and what it does: the help overlay and the keyboard read the same table.
 struct Shortcut {
-  int key, alternative;  ///< GLFW key codes; 0: none
-  int modifiers;
-  const char* shown;
-  const char* help;
+  int key;  ///< GLFW's code
+  const char *shown, *help;
   void (*act)(Session&, Ui&);
+  int alternative = 0, modifiers = 0;
 };
 const std::vector<Shortcut>& shortcuts();
 
@@ -51,7 +50,7 @@ void draw_busy(const Layout& layout, const std::string& what);
 /// Sizes and font for a display of this scale. `density`: framebuffer pixels a window coordinate.
 void set_style(float scale, float density);
 
-/// The panel at the right (panels.cpp), and the part of its width that a widget's label takes.
+/// The panel at the right, and the part of its width that a widget's label takes.
 void draw_panel(Session& session, Ui& ui);
 float label_width();
 std::string label_of(const char* parameter);

@@ -25,8 +25,7 @@ namespace tetpbd {
 
 namespace {
 
-// ------------------------------------------------------------------------------------------------------------
-// mouse and keyboard on the view: what a drag does is decided once the GPU has said what is under the cursor
+// Mouse and keyboard on the view: what a drag does is decided once the GPU has said what is under the cursor.
 
 struct Input {
   Session& session;
@@ -169,9 +168,6 @@ void handle_input(Input& in, const Rect& view) {
   const Sim& sim = s.loaded.sim;
   aim(*s.grab, sim, s.camera, ray_at_cursor(in), planes_of(*sim.model, sim.settings));
 }
-
-// ------------------------------------------------------------------------------------------------------------
-// the window and its frames
 
 std::string last_glfw_error() {
   const char* text = nullptr;

@@ -71,8 +71,7 @@ struct Frame {
   GLuint target = 0;  ///< framebuffer with an sRGB colour format (Target has it) and depth
 };
 
-/// A picture of a simulation: its ground, walls and pinned vertices (those of infinite mass), all of the
-/// target.
+/// A picture of a simulation with its ground, walls and pinned vertices (infinite mass), all of the target.
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target);
 
 }  // namespace tetpbd

@@ -1,5 +1,4 @@
-// Which vertex of the surface a ray meets, found on the GPU from the current positions, read back without
-// wait.
+// Which vertex of the surface a ray meets, found on the GPU, read back without waiting.
 #pragma once
 
 #include <cstdint>

@@ -14,35 +14,27 @@ namespace tetpbd {
 
 namespace {
 
-/// Shader files in render/, by whose endings their stages are known, and what they define.
+/// Shader files, and what they define.
 struct Recipe {
   std::vector<std::string> files, defines;
 };
 
 const std::map<std::string, Recipe> recipes = {
-    {"surface", {{"body.vert", "surface.geom", "body.frag"}, {}}},
-    {"surface shadow", {{"body.vert", "surface.geom", "depth.frag"}, {"SHADOW"}}},
-    {"tets", {{"body.vert", "tets.geom", "body.frag"}, {}}},
-    {"tets shadow", {{"body.vert", "tets.geom", "depth.frag"}, {"SHADOW"}}},
-    {"background", {{"background.vert", "background.frag"}, {}}},
-    {"plane", {{"plane.vert", "plane.frag"}, {}}},
-    {"dots", {{"dots.vert", "dots.frag"}, {}}},
-    {"normals", {{"gather.comp"}, {"NORMAL"}}},
-    {"volume errors", {{"gather.comp"}, {"VOLUME"}}},
-    {"stretch errors", {{"gather.comp"}, {}}},
-    {"shadow fit", {{"shadow_fit.comp"}, {}}}};
+    {"surface", {{"render/body.vert", "render/surface.geom", "render/body.frag"}, {}}},
+    {"surface shadow", {{"render/body.vert", "render/surface.geom", "render/depth.frag"}, {"SHADOW"}}},
+    {"tets", {{"render/body.vert", "render/tets.geom", "render/body.frag"}, {}}},
+    {"tets shadow", {{"render/body.vert", "render/tets.geom", "render/depth.frag"}, {"SHADOW"}}},
+    {"background", {{"render/background.vert", "render/background.frag"}, {}}},
+    {"plane", {{"render/plane.vert", "render/plane.frag"}, {}}},
+    {"dots", {{"render/dots.vert", "render/dots.frag"}, {}}},
+    {"normals", {{"render/gather.comp"}, {"NORMAL"}}},
+    {"volume errors", {{"render/gather.comp"}, {"VOLUME"}}},
+    {"stretch errors", {{"render/gather.comp"}, {}}},
+    {"shadow fit", {{"render/shadow_fit.comp"}, {}}}};
 
 Program compile(const std::string& name) {
   const auto& [files, defines] = recipes.at(name);
-  std::vector<Program::Stage> stages;
-  for (const std::string& file : files) {
-    const GLenum type = file.ends_with(".vert")   ? GL_VERTEX_SHADER
-                        : file.ends_with(".geom") ? GL_GEOMETRY_SHADER
-                        : file.ends_with(".frag") ? GL_FRAGMENT_SHADER
-                                                  : GL_COMPUTE_SHADER;
-    stages.push_back({type, "render/" + file});
-  }
-  return Program(name, stages, {}, defines);
+  return Program(name, files, {}, defines);
 }
 
 const Program& use(Renderer& renderer, const std::string& name) {
@@ -61,9 +53,6 @@ Buffer rest_buffer(const Renderer& renderer) {
   }
   return Buffer("render rest", rest);
 }
-
-// -----------------------------------------------------------------------------------------------------------
-// Values of the surface's vertices from the current positions
 
 // What the corners of elements gather: the other corners of each, in the order of `others`.
 template <std::size_t N>
@@ -100,9 +89,6 @@ GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, co
   glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
   return values.values.id();
 }
-
-// -----------------------------------------------------------------------------------------------------------
-// What a picture is made of
 
 // Turns the hue about the grey axis: clay, then teal, ochre, plum and so on, of like lightness.
 glm::vec3 turned(const glm::vec3& colour, float degrees) {

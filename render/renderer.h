@@ -1,5 +1,4 @@
-// Draws bodies straight from the simulation's position buffer: surface, wire, or tetrahedra; in plain or by
-// error.
+// Draws bodies straight from the simulation's position buffer, plain or coloured by error.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +14,7 @@
 
 namespace tetpbd {
 
-/// What each vertex of the surface gathers, in fixed order: items[offsets[v] .. offsets[v + 1]). Others have
-/// none.
+/// What each vertex of the surface gathers, in fixed order: items[offsets[v] .. offsets[v + 1]).
 struct VertexGather {
   Buffer offsets, items;
   Buffer values;  ///< by vertex: vec4 of a normal, float of others
@@ -51,14 +49,11 @@ struct Renderer {
 
 Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies = {});
 Renderer make_renderer(const Model& model);
-/// Leaves framebuffer, viewport and scissor at the frame's, depth test, blending and sRGB encoding off.
-/// Storage bindings change.
+/// Leaves framebuffer, viewport and scissor at the frame's; depth test, blending and sRGB encoding off.
 void draw(Renderer& renderer, const Frame& frame);
-/// Where the middle of the bodies' bounds was in a frame drawn with ViewOptions::follow, once, a frame or
-/// more later (with `wait`: now).
+/// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
-/// Compiles what is in use again, after shaders changed. Throws Error and keeps the old ones if one does not
-/// compile.
+/// Compiles what is in use again. Throws Error and keeps the old ones if one does not compile.
 void reload_shaders(Renderer& renderer);
 
 }  // namespace tetpbd

@@ -17,8 +17,7 @@ struct PartFile {
   void finish() const;  ///< throws Error (status 1)
 };
 
-/// Text that is written as it comes; the file appears when close() has succeeded. Both throw Error (status
-/// 1).
+/// Text that is written as it comes; the file appears when close() has succeeded. Both throw Error.
 class GrowingFile {
  public:
   explicit GrowingFile(const std::filesystem::path& file);

@@ -1,6 +1,5 @@
 // Whether a simulation is still made of numbers. The last kernel of a step notes the first vertex that is not
-// finite (shaders/vertex.glsl); the answer comes back through a fence, late, so that nothing stalls. The last
-// good state is kept as a checkpoint, on the GPU for GPU modes.
+// finite (shaders/vertex.glsl); the answer comes back late. The last good state is kept as a checkpoint.
 #pragma once
 
 #include <cstdint>

@@ -47,13 +47,11 @@ void parallel_sort(std::span<T> items) {
   __gnu_parallel::sort(items.begin(), items.end());
 }
 
-/// Values grouped by key: those of key k are values[first[k]] .. values[first[k + 1]], in the order of their
-/// items.
+/// Values by key: those of k are values[first[k]] .. values[first[k + 1]], in the order of their items.
 struct Grouped {
   std::vector<std::uint32_t> first, values;
 };
-/// Counting sort. each(item, emit) calls emit(key, value) as often as it likes, the same each time it is
-/// asked; fewer than 2^32 values in all.
+/// Counting sort. each(item, emit) calls emit(key, value), the same each time; fewer than 2^32 values in all.
 template <class Each>
 Grouped group_by_key(std::size_t items, std::size_t keys, Each&& each) {
   const std::size_t parts = std::clamp<std::size_t>(items / 65536, 1, thread_count());

@@ -83,9 +83,6 @@ void check_context() {
       1);
 }
 
-// -----------------------------------------------------------------------------------------------------------
-// EGL
-
 namespace {
 
 std::vector<EGLDeviceEXT> query_devices() {
@@ -108,8 +105,7 @@ bool is_software(EGLDeviceEXT device) {
   return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
 }
 
-/// Current, or none. With `reset`, the driver tells of a GPU that was reset (and of nothing else: bounds
-/// checks in shaders would cost time).
+/// Current, or none. With `reset`, the driver tells of a GPU that was reset, and checks no bounds in shaders.
 EGLContext make_context(EGLDisplay display, bool debug, bool reset) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;

@@ -1,5 +1,4 @@
-// An OpenGL 4.3 core context without a window or a display server, through EGL; what a context offers;
-// whether it is lost.
+// An OpenGL 4.3 core context without a display, through EGL; what a context offers; whether it is lost.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +7,7 @@
 
 namespace tetpbd {
 
-/// What the current context offers; everything the program asks a driver beyond GL 4.3's guarantees is listed
-/// here.
+/// What the current context offers: all that the program asks a driver beyond GL 4.3's guarantees.
 struct Capabilities {
   std::string vendor, renderer, version, shading_language;
   int storage_blocks = 0;          ///< shader storage blocks a compute stage may use (8 guaranteed)
@@ -39,8 +37,7 @@ std::vector<std::string> list_devices();
 /// Makes a context current for the calling thread until destroyed. It draws to framebuffer objects only.
 class HeadlessContext {
  public:
-  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3 (a GPU before a software
-  /// renderer).
+  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3, GPUs before software.
   explicit HeadlessContext(int device = -1, bool debug = false);
   ~HeadlessContext();
   HeadlessContext(const HeadlessContext&) = delete;

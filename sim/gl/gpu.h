@@ -1,7 +1,6 @@
 // The little OpenGL 4.3 core that this program needs: a context (context.h), buffers, programs with includes,
 // fences and timers, all labelled and counted. No direct state access, no buffer storage, no vendor
-// extension: what more is asked of a driver is a row of Capabilities. Nothing here knows of meshes or
-// solvers.
+// extension. Nothing here knows of meshes or solvers.
 #pragma once
 
 #include <GL/glew.h>
@@ -19,8 +18,7 @@
 
 namespace tetpbd {
 
-/// What the program holds of GL right now, over all contexts; bytes of textures and renderbuffers not
-/// counted.
+/// What the program holds of GL right now, over all contexts; images' bytes are not counted.
 struct GlLive {
   long objects = 0;
   std::int64_t buffer_bytes = 0;
@@ -105,11 +103,9 @@ struct Fence : Owned<GLsync, delete_fence> {
   static Fence here() { return Fence(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)); }
   GLsync sync() const { return id(); }
 };
-/// Whether the GPU has come to the fence; with `wait`, once it has. Where waiting fails: ContextLost, or an
-/// Error that names what was waited for.
+/// Whether the GPU has come to the fence; with `wait`, once it has. Throws ContextLost, or Error with `what`.
 bool reached(GLsync fence, bool wait, const char* what);
-/// What a buffer held when the GPU came to `fence`, once: nothing before that (with `wait`, after waiting for
-/// it) or without a fence.
+/// What a buffer held when the GPU came to `fence`, once; nothing before (with `wait`: waits) or without one.
 template <class T>
 std::optional<std::vector<T>> take(Fence& fence, const Buffer& buffer, const char* what, bool wait = false) {
   if (!fence || !reached(fence.id(), wait, what)) return std::nullopt;
@@ -132,18 +128,15 @@ class Timer {
   std::deque<std::pair<Query, Query>> spans_;
 };
 
-/// Values of `$NAME` in a shader's text, put in before it is compiled: {"KIND", "stretch"} makes gather_$KIND
-/// gather_stretch.
+/// Values of `$NAME` in a shader's text: {"KIND", "stretch"} makes gather_$KIND gather_stretch.
 using Substitutions = std::map<std::string, std::string>;
-/// `words` for the whole text; `each`: a line that starts with #foreach is repeated once for every entry,
-/// with its words.
+/// `words` for the whole text; `each`: a line with #foreach is repeated for every entry, with its words.
 struct ShaderWords {
   Substitutions words;
   std::vector<Substitutions> each;
 };
 
-/// Reads shaders from this folder instead of the ones inside the program (empty: inside). The variable
-/// TETPBD_SHADERS sets it at start.
+/// Reads shaders from this folder; empty: those inside the program. TETPBD_SHADERS sets it at start.
 void set_shader_folder(const std::string& folder);
 const std::string& shader_folder();
 /// Changes when a file of the folder changes; 0 without a folder.
@@ -156,21 +149,16 @@ std::string shader_text(const std::string& name, const ShaderWords& words, std::
 /// A linked program. Errors name the shader file and line.
 class Program : public Owned<GLuint, delete_program> {
  public:
-  struct Stage {
-    GLenum type;
-    std::string file;
-  };
   Program() = default;
-  /// `#define`s and `#version 430 core` are put before each stage.
-  Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words = {},
+  /// A stage of each file by its ending, after `#version 430 core` and `#define`s.
+  Program(std::string label, const std::vector<std::string>& stages, const ShaderWords& words = {},
           const std::vector<std::string>& defines = {});
   static Program compute(const std::string& file, const ShaderWords& words = {},
                          const std::vector<std::string>& defines = {});
 
   const std::string& label() const { return label_; }
   void use() const { glUseProgram(id()); }
-  /// Sets a uniform of the program in use. One that the linker dropped is ignored; one that its text does not
-  /// declare throws Error.
+  /// Of the program in use. A uniform that the linker dropped is ignored; one not declared throws Error.
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }

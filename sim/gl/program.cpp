@@ -41,27 +41,30 @@ std::optional<std::string> fault(GLuint id, GLenum status) {
   return log.substr(0, std::size_t(length));
 }
 
-Shader compile(const Program::Stage& stage, const std::string& text, const std::vector<std::string>& files) {
-  Shader shader(glCreateShader(stage.type));
+Shader compile(const std::string& stage, const std::string& text, const std::vector<std::string>& files) {
+  Shader shader(glCreateShader(stage.ends_with(".vert")   ? GL_VERTEX_SHADER
+                               : stage.ends_with(".geom") ? GL_GEOMETRY_SHADER
+                               : stage.ends_with(".frag") ? GL_FRAGMENT_SHADER
+                                                          : GL_COMPUTE_SHADER));
   const char* pointer = text.c_str();
   glShaderSource(shader.id(), 1, &pointer, nullptr);
   glCompileShader(shader.id());
   if (const auto log = fault(shader.id(), GL_COMPILE_STATUS))
-    throw Error("shader does not compile", stage.file, name_files(*log, files), 1);
+    throw Error("shader does not compile", stage, name_files(*log, files), 1);
   return shader;
 }
 
 }  // namespace
 
-Program::Program(std::string label, const std::vector<Stage>& stages, const ShaderWords& words,
+Program::Program(std::string label, const std::vector<std::string>& stages, const ShaderWords& words,
                  const std::vector<std::string>& defines)
     : Owned(glCreateProgram()), label_(std::move(label)) {
   std::string head = "#version 430 core\n";
   for (const std::string& define : defines) head += "#define " + define + "\n";
   std::vector<Shader> shaders;
-  for (const Stage& stage : stages) {
+  for (const std::string& stage : stages) {
     std::vector<std::string> files;
-    const std::string text = head + shader_text(stage.file, words, files);
+    const std::string text = head + shader_text(stage, words, files);
     text_ += text;
     shaders.push_back(compile(stage, text, files));
     glAttachShader(id(), shaders.back().id());
@@ -79,7 +82,7 @@ Program Program::compute(const std::string& file, const ShaderWords& words,
   if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
   for (const Substitutions& item : words.each)
     if (const auto kind = item.find("KIND"); kind != item.end()) label += " " + kind->second;
-  return Program(label, {{GL_COMPUTE_SHADER, file}}, words, defines);
+  return Program(label, {file}, words, defines);
 }
 
 GLint Program::location(const char* name) const {

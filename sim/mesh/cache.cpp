@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 
 #include "sim/error.h"
@@ -18,7 +16,7 @@ namespace fs = std::filesystem;
 namespace {
 
 // Change it whenever the file's layout or what is done with TetGen's result changes.
-constexpr std::string_view version = "tetpbd cache 3";
+constexpr std::string_view version = "tetpbd cache 4";
 
 fs::path mesh_file(std::uint64_t key) { return cache_file(fmt::format("{:016x}.tets", key)); }
 
@@ -43,36 +41,23 @@ std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, 
 }
 
 std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try {
-  std::uint64_t checksum = 0;
-  if (bytes.size() < sizeof checksum) return {};
-  std::memcpy(&checksum, bytes.data(), sizeof checksum);
-  bytes.remove_prefix(sizeof checksum);
   TetMesh mesh;
-  if (checksum != hash_bytes(bytes, fnv_basis ^ key) || !take_array(bytes, mesh.positions) ||
-      !take_array(bytes, mesh.tets) || !bytes.empty())
-    return {};
+  std::vector<std::uint64_t> sum;
+  std::string_view rest = bytes;
+  if (!take_array(rest, mesh.positions) || !take_array(rest, mesh.tets)) return {};
+  const std::uint64_t found = hash_bytes(bytes.substr(0, bytes.size() - rest.size()), key);
+  if (!take_array(rest, sum) || !rest.empty() || sum != std::vector{found}) return {};
   finish_tets(mesh, "cache");
   return mesh;
 } catch (const Error&) {  // damage passes the checksum only by malice, but a cache folder may be shared
   return {};
 }
 
-std::string mesh_bytes(std::uint64_t key, const TetMesh& mesh) {
-  std::string bytes(sizeof key, '\0');
-  put_array(bytes, mesh.positions);
-  put_array(bytes, mesh.tets);
-  const std::uint64_t checksum = hash_bytes(std::string_view(bytes).substr(sizeof key), fnv_basis ^ key);
-  std::memcpy(bytes.data(), &checksum, sizeof checksum);
-  return bytes;
-}
-
 std::optional<TetMesh> read_mesh(std::uint64_t key) {
   const fs::path file = mesh_file(key);
   std::error_code failed;
-  const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
-  if (failed) return {};
-  std::string bytes(size, '\0');
-  if (!std::ifstream(file, std::ios::binary).read(bytes.data(), std::streamsize(size))) return {};
+  std::string bytes(fs::is_regular_file(file, failed) ? fs::file_size(file, failed) : 0, '\0');
+  std::ifstream(file, std::ios::binary).read(bytes.data(), std::streamsize(bytes.size()));
   return parse_mesh(bytes, key);
 }
 
@@ -80,7 +65,10 @@ void keep_mesh(std::uint64_t key, const TetMesh& mesh) try {
   const fs::path file = mesh_file(key);
   if (file.empty()) return;
   fs::create_directories(file.parent_path());
-  write_file(file, mesh_bytes(key, mesh));
+  std::string bytes;
+  put_array(bytes, mesh.positions), put_array(bytes, mesh.tets);
+  put_array(bytes, std::vector{hash_bytes(bytes, key)});
+  write_file(file, bytes);
 } catch (const std::exception&) {  // read-only or full
 }
 

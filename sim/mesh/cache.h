@@ -1,5 +1,4 @@
-// The user's cache folder, and in it meshes that TetGen made: a checksum with the key in it, then the arrays.
-// A cache that cannot be read or written costs time, never an error.
+// The user's cache folder, and in it what TetGen made. What cannot be read or written costs time, no error.
 #pragma once
 
 #include <algorithm>
@@ -46,8 +45,7 @@ std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches,
 /// Nothing when it is not there, damaged, cut short, or of another key.
 std::optional<TetMesh> read_mesh(std::uint64_t key);
 void keep_mesh(std::uint64_t key, const TetMesh& mesh);
-/// The same as a file's bytes.
+/// Of a file's bytes.
 std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key);
-std::string mesh_bytes(std::uint64_t key, const TetMesh& mesh);
 
 }  // namespace tetpbd

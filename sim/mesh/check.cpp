@@ -98,22 +98,17 @@ SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::si
 constexpr double degenerate_area = 1e-14;
 constexpr double flat_thickness = 1e-7;
 
-struct Defect {
-  const char *name, *one, *many, *hint;
-};
-
 // Which of 0 .. count are bad, unless a defect is known already; place() says where the first is.
-void look_for(const Defect& defect, SurfaceCheck& check, std::size_t count, const auto& is_bad,
-              const auto& place) {
+void look_for(SurfaceCheck& check, const char* defect, const char* one, const char* many, const char* hint,
+              std::size_t count, const auto& is_bad, const auto& place) {
   if (!check.defect.empty()) return;
   std::string first;
   for (std::size_t i = 0; i < count; ++i)
     if (is_bad(i) && check.count++ == 0) first = place(i);
   if (check.count == 0) return;
-  check.defect = defect.name;
-  check.place =
-      fmt::format("{} {}, first {}", check.count, check.count == 1 ? defect.one : defect.many, first);
-  check.hint = defect.hint;
+  check.defect = defect;
+  check.place = fmt::format("{} {}, first {}", check.count, check.count == 1 ? one : many, first);
+  check.hint = hint;
 }
 
 std::string near(const glm::dvec3& point) { return "near " + point_text(point); }
@@ -141,8 +136,8 @@ void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, 
   }
   for (const double v : volume) check.volume += std::abs(v);
   look_for(
-      {"surface is flat", "part without volume", "parts without volume", "give it thickness or remove it"},
-      check, topology.patches,
+      check, "surface is flat", "part without volume", "parts without volume",
+      "give it thickness or remove it", topology.patches,
       [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
       [&](std::size_t p) { return near(place[p]); });
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
@@ -179,14 +174,14 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
   // NaN where a coordinate is.
   const auto reach = [&](std::size_t v) { return glm::dot(glm::abs(positions[v]), glm::dvec3(1)); };
   look_for(
-      {"triangles name vertices that are not there", "index", "indices", "export the mesh again"}, check,
+      check, "triangles name vertices that are not there", "index", "indices", "export the mesh again",
       3 * triangles.size(), [&](std::size_t i) { return triangles[i / 3][i % 3] >= positions.size(); },
       [](std::size_t i) { return fmt::format("in triangle {}", i / 3); });
   look_for(
-      {"positions are not finite numbers", "vertex", "vertices", "export the mesh again"}, check,
+      check, "positions are not finite numbers", "vertex", "vertices", "export the mesh again",
       positions.size(), [&](std::size_t v) { return !std::isfinite(reach(v)); }, at_vertex);
   look_for(
-      {"positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh"}, check,
+      check, "positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh",
       positions.size(), [&](std::size_t v) { return reach(v) > largest_coordinate; }, at_vertex);
   if (!check.defect.empty()) return check;
   if (triangles.size() < 4) {
@@ -201,9 +196,8 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
   for (Triangle& t : sorted) std::ranges::sort(t);
   std::ranges::sort(sorted);
   look_for(
-      {"triangles have no area", "triangle", "triangles",
-       "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)"},
-      check, triangles.size(),
+      check, "triangles have no area", "triangle", "triangles",
+      "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)", triangles.size(),
       [&](std::size_t i) {
         const Triangle& t = triangles[i];
         return t[0] == t[1] || t[1] == t[2] || t[2] == t[0] ||
@@ -211,9 +205,9 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
       },
       [&](std::size_t i) { return near(centroid(surface, triangles[i])); });
   look_for(
-      {"triangles appear more than once", "too many", "too many",
-       "remove the duplicates (a sheet with two sides is no solid)"},
-      check, sorted.size() - 1, [&](std::size_t i) { return sorted[i] == sorted[i + 1]; },
+      check, "triangles appear more than once", "too many", "too many",
+      "remove the duplicates (a sheet with two sides is no solid)", sorted.size() - 1,
+      [&](std::size_t i) { return sorted[i] == sorted[i + 1]; },
       [&](std::size_t i) { return near(centroid(surface, sorted[i])); });
   if (!check.defect.empty()) return check;
 
@@ -225,23 +219,22 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
     return near((positions[use.low] + positions[use.high]) * 0.5);
   };
   look_for(
-      {"edges have more than two triangles", "edge", "edges",
-       "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)"},
-      check, topology.edge_count(), [&](std::size_t e) { return topology.uses_of(e) > 2; }, at_edge);
+      check, "edges have more than two triangles", "edge", "edges",
+      "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)", topology.edge_count(),
+      [&](std::size_t e) { return topology.uses_of(e) > 2; }, at_edge);
   look_for(
-      {"surface is open", "edge with one triangle only", "edges with one triangle only",
-       "close its holes (in MeshLab: Close Holes)"},
-      check, topology.edge_count(), [&](std::size_t e) { return topology.uses_of(e) == 1; }, at_edge);
+      check, "surface is open", "edge with one triangle only", "edges with one triangle only",
+      "close its holes (in MeshLab: Close Holes)", topology.edge_count(),
+      [&](std::size_t e) { return topology.uses_of(e) == 1; }, at_edge);
   look_for(
-      {"parts of the surface touch in single vertices", "vertex", "vertices",
-       "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)"},
-      check, topology.fans.size(), [&](std::size_t v) { return topology.fans[v] > 1; },
+      check, "parts of the surface touch in single vertices", "vertex", "vertices",
+      "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)",
+      topology.fans.size(), [&](std::size_t v) { return topology.fans[v] > 1; },
       [&](std::size_t v) { return near(positions[v]); });
   look_for(
-      {"surface has only one side", "edge where it cannot be oriented", "edges where it cannot be oriented",
-       "cut it open and close it as a solid"},
-      check, topology.one_sided.size(), [](std::size_t) { return true; },
-      [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
+      check, "surface has only one side", "edge where it cannot be oriented",
+      "edges where it cannot be oriented", "cut it open and close it as a solid", topology.one_sided.size(),
+      [](std::size_t) { return true; }, [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
   if (check.defect.empty()) orient(surface, topology, size, check);
   return check;
 }

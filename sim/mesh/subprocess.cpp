@@ -42,13 +42,13 @@ SubprocessEnd run_subprocess(const std::vector<std::string>& arguments, const Su
   for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
   int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) return {SubprocessEnd::failed, {}, std::strerror(errno)};
-  const pid_t child = ::fork();
+  const pid_t child = ::pipe2(ends, O_CLOEXEC) == 0 ? ::fork() : -1;
+  if (child < 0) throw Error("cannot be started", arguments[0], std::strerror(errno), 1);
   if (child == 0) become(words.data(), ends[1], limits.bytes);
-  SubprocessEnd end{SubprocessEnd::failed, {}, child < 0 ? std::strerror(errno) : ""};
   ::close(ends[1]);
+  SubprocessEnd end{SubprocessEnd::failed, {}, {}};
   const auto start = std::chrono::steady_clock::now();
-  for (char chunk[65536]; child > 0;) {
+  for (char chunk[65536];;) {
     if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > limits.seconds)
       end.kind = SubprocessEnd::timed_out;
     if (end.kind == SubprocessEnd::timed_out || interrupted()) ::kill(child, SIGKILL);
@@ -59,7 +59,6 @@ SubprocessEnd run_subprocess(const std::vector<std::string>& arguments, const Su
     if (end.output.size() < limits.output) end.output.append(chunk, std::size_t(n));
   }
   ::close(ends[0]);
-  if (child < 0) return end;
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim/error.h"
 #include "sim/parallel.h"
@@ -11,8 +12,7 @@
 namespace tetpbd {
 namespace {
 
-// |6 V| under this times the longest edge cubed is no volume: a height of 1e-10 edges, where rounding decides
-// the sign.
+// |6 V| under this times the longest edge cubed is no volume: at such a height rounding decides the sign.
 constexpr double no_volume = 1e-10;
 
 // Faces opposite to corners 0..3, counter-clockwise seen from outside a tet of positive volume.
@@ -69,20 +69,19 @@ void orient_tets(TetMesh& mesh, const std::string& source) {
 
 // Faces are grouped by their smallest vertex and sorted there: four times as fast as one sort of all.
 void find_boundary(TetMesh& mesh, const std::string& source) {
-  const auto outward = [&](std::size_t tet, std::size_t side) -> Triangle {
-    const Tet& t = mesh.tets[tet];
-    const Triangle& f = outward_faces[side];
-    return {t[f[0]], t[f[1]], t[f[2]]};
+  const auto outward = [&](std::size_t face) -> Triangle {  // tet * 4 + side
+    const Tet& t = mesh.tets[face / 4];
+    const auto& [a, b, c] = outward_faces[face % 4];
+    return {t[a], t[b], t[c]};
   };
-  const auto each = [&](std::size_t tet, const auto& emit) {
-    for (std::size_t side = 0; side < 4; ++side)
-      emit(std::ranges::min(outward(tet, side)), std::uint32_t(tet * 4 + side));
+  const auto each = [&](std::size_t face, const auto& emit) {
+    emit(std::ranges::min(outward(face)), std::uint32_t(face));
   };
-  const Grouped grouped = group_by_key(mesh.tets.size(), mesh.positions.size(), each);
+  const Grouped grouped = group_by_key(4 * mesh.tets.size(), mesh.positions.size(), each);
   struct Face {
     std::pair<std::uint32_t, std::uint32_t> others;  // its vertices beside the smallest, sorted
-    std::uint32_t id;                                // tet * 4 + side
-    bool even;                                       // outward order is an even permutation of the sorted one
+    std::uint32_t id;
+    bool even;  // outward order is an even permutation of the sorted one
   };
   std::vector<std::uint32_t> boundary;
   std::vector<Face> faces;
@@ -90,7 +89,7 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
     faces.clear();
     for (std::uint32_t i = grouped.first[v]; i < grouped.first[v + 1]; ++i) {
       const std::uint32_t id = grouped.values[i];
-      Triangle f = outward(id / 4, id % 4);
+      Triangle f = outward(id);
       std::ranges::rotate(f, std::ranges::min_element(f));
       faces.push_back({std::minmax(f[1], f[2]), id, f[1] < f[2]});
     }
@@ -110,7 +109,7 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
   }
   std::ranges::sort(boundary);  // the order of the tets
   mesh.surface.clear();
-  for (const std::uint32_t face : boundary) mesh.surface.push_back(outward(face / 4, face % 4));
+  for (const std::uint32_t face : boundary) mesh.surface.push_back(outward(face));
 }
 
 }  // namespace
@@ -156,9 +155,8 @@ double tet_volume(const TetMesh& mesh, const Tet& tet) {
 }
 
 double mesh_volume(const TetMesh& mesh) {
-  double volume = 0;
-  for (const double v : tet_volumes(mesh)) volume += v;
-  return volume;
+  const std::vector<double> volumes = tet_volumes(mesh);
+  return std::accumulate(volumes.begin(), volumes.end(), 0.0);
 }
 
 std::vector<double> tet_volumes(const TetMesh& mesh) {

@@ -33,12 +33,11 @@ struct TetMesh {
 constexpr double largest_coordinate = 1e30;
 
 /// PLY, OBJ, STL, OFF: polygons cut into triangles, vertices welded, those without a triangle dropped. Throws
-/// Error (status 2) for files that cannot be read or hold no triangle.
+/// Error for files that cannot be read or hold no triangle.
 SurfaceMesh load_surface(const std::filesystem::path& file);
 
 /// Merges vertices nearer than `tolerance` (metres) to one kept before them, drops triangles that collapse by
-/// it, then vertices without a triangle. Vertices that are not finite are never merged, so that
-/// check_surface() still finds them. Indices must be in range.
+/// it, then vertices without one. Those not finite stay, for check_surface(). Indices must be in range.
 void weld(SurfaceMesh& surface, double tolerance);
 /// Drops positions that no element names; the others stay in their order. Indices must be in range.
 template <std::size_t N>
@@ -69,10 +68,8 @@ struct SurfaceCheck {
   std::string place;      ///< the same in words, and where the first is
   std::string hint;       ///< what to do about it
 };
-/// Orients triangles consistently and outward where possible (that is no defect), then checks: indices,
-/// finite, enough triangles, not degenerate, no duplicates, 2-manifold, closed, orientable, not flat. Ends at
-/// the first defect. Self-intersections are not looked for here: TetGen finds them, and tetrahedralise()
-/// names them.
+/// Orients triangles consistently and outward where possible (that is no defect), and stops at the first
+/// defect. Self-intersections are not looked for: TetGen finds them, and tetrahedralise() names them.
 SurfaceCheck check_surface(SurfaceMesh& surface);
 
 /// TetGen's switches without a leading '-' and with Q. Throws Error for those that need files, do something
@@ -92,14 +89,11 @@ TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches
 bool is_surface_file(const std::filesystem::path& file);
 /// Throws Error when write_mesh() does not know the extension.
 void require_mesh_format(const std::filesystem::path& file);
-/// By extension: .node/.ele or .msh (tetrahedra), .ply or .obj or .off or .stl (the boundary surface). Each
-/// file is whole or not there.
+/// By extension: .node/.ele or .msh (tetrahedra), .ply, .obj, .off or .stl (the boundary surface).
 void write_mesh(const std::filesystem::path& file, const TetMesh& mesh);
 void write_surface(const std::filesystem::path& file, const SurfaceMesh& surface);
 
-/// Orients every tet, drops vertices without one and finds the boundary. Throws Error naming `source` for
-/// positions that are not finite, indices out of range, repeated vertices, no volume, overlapping tets, no
-/// tet at all.
+/// Orients every tet, drops vertices without one, finds the boundary. Throws Error naming `source`.
 void finish_tets(TetMesh& mesh, const std::string& source);
 /// A block of cells nx * ny * nz, each cut into six tets (Kuhn), size in metres, centred on the origin.
 TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);

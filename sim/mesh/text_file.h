@@ -27,9 +27,8 @@ inline void require_readable(const std::filesystem::path& file) {
   std::error_code failed;
   const auto status = std::filesystem::status(file, failed);
   if (!exists(status)) throw Error("no such file", file.string(), "check the path");
-  if (is_directory(status)) throw Error("is a folder, not a mesh", file.string(), "name a file in it");
-  if (!is_regular_file(status)) throw Error("is not a plain file", file.string(), "name a mesh file");
-  if (!std::ifstream(file)) throw Error("cannot be read", file.string(), "check its permissions");
+  if (!is_regular_file(status))
+    throw Error(is_directory(status) ? "is a folder" : "is no plain file", file.string(), "name a mesh file");
   if (file_size(file, failed) == 0 || failed)
     throw Error("file is empty", file.string(), "fetch or export it again");
 }
@@ -42,7 +41,7 @@ class TextFile {
     require_readable(file);
     text_.resize(file_size(file));
     if (!std::ifstream(file, std::ios::binary).read(text_.data(), std::streamsize(text_.size())))
-      throw Error("cannot be read to its end", file.string(), "check the disk");
+      throw Error("cannot be read", file.string(), "check its permissions and the disk");
   }
 
   /// Goes to the next line that is not blank; false at the end.

@@ -196,9 +196,9 @@ void fill_surface(std::string_view bytes) {
 void read_cache_file(std::string_view bytes) {
   constexpr std::uint64_t key = 1;
   if (const auto mesh = parse_mesh(bytes, key)) require_sound(*mesh);
-  const std::uint64_t checksum = hash_bytes(bytes, fnv_basis ^ key);
-  const std::string head(reinterpret_cast<const char*>(&checksum), sizeof checksum);
-  if (const auto mesh = parse_mesh(head + std::string(bytes), key)) require_sound(*mesh);
+  std::string sealed(bytes);
+  put_array(sealed, std::vector{hash_bytes(bytes, key)});
+  if (const auto mesh = parse_mesh(sealed, key)) require_sound(*mesh);
 }
 
 // Scenes of blocks are built too, where they are small.

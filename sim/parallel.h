@@ -7,21 +7,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <numeric>
 #include <parallel/algorithm>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace tetpbd {
-
-/// Threads of a loop: the cores this process may use, at most 16 (loading is then bound by memory).
-inline std::size_t thread_count() { return std::size_t(std::clamp(omp_get_max_threads(), 1, 16)); }
 
 /// Calls f(first, end) for parts of 0 .. count that follow each other, one a thread and `least` items or more
 /// each; what f writes must depend on the item alone. Rethrows what the first part that failed threw.
 template <class F>
 void parallel_parts(std::size_t count, std::size_t least, F&& f) {
-  const std::size_t parts = std::clamp<std::size_t>(count / least, 1, thread_count());
+  const int threads = std::clamp(omp_get_max_threads(), 1, 16);  // more are bound by memory
+  const std::size_t parts = std::clamp<std::size_t>(count / least, 1, std::size_t(threads));
   std::vector<std::exception_ptr> failed(parts);
 #pragma omp parallel for num_threads(int(parts)) schedule(static, 1)
   for (std::size_t part = 0; part < parts; ++part) try {
@@ -54,25 +52,14 @@ struct Grouped {
 /// Counting sort. each(item, emit) calls emit(key, value), the same each time; fewer than 2^32 values in all.
 template <class Each>
 Grouped group_by_key(std::size_t items, std::size_t keys, Each&& each) {
-  const std::size_t parts = std::clamp<std::size_t>(items / 65536, 1, thread_count());
-  std::vector<std::vector<std::uint32_t>> at(parts);  // by part and key: how many, then where the next goes
-  const auto each_part = [&](const auto& visit) {
-    parallel_parts(parts, 1, [&](std::size_t part, std::size_t) {
-      at[part].resize(keys);
-      for (std::size_t i = items * part / parts; i < items * (part + 1) / parts; ++i)
-        each(i, [&](std::uint32_t key, std::uint32_t value) { visit(at[part][key], value); });
-    });
-  };
-  each_part([](std::uint32_t& count, std::uint32_t) { ++count; });
-  Grouped result;
-  std::uint32_t total = 0;
-  for (std::size_t key = 0; key < keys; ++key) {
-    result.first.push_back(total);
-    for (auto& counts : at) total += std::exchange(counts[key], total);
-  }
-  result.first.push_back(total);
-  result.values.resize(total);
-  each_part([&](std::uint32_t& next, std::uint32_t value) { result.values[next++] = value; });
+  Grouped result{std::vector<std::uint32_t>(keys + 1, 0), {}};
+  for (std::size_t i = 0; i < items; ++i)
+    each(i, [&](std::uint32_t key, std::uint32_t) { ++result.first[key + 1]; });
+  std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
+  result.values.resize(result.first.back());
+  std::vector<std::uint32_t> next = result.first;
+  for (std::size_t i = 0; i < items; ++i)
+    each(i, [&](std::uint32_t key, std::uint32_t value) { result.values[next[key]++] = value; });
   return result;
 }
 

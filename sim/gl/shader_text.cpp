@@ -18,10 +18,7 @@ const std::vector<std::pair<std::string, std::string>>& embedded_shaders();
 
 namespace {
 
-std::string chosen_folder = [] {
-  const char* variable = std::getenv("TETPBD_SHADERS");
-  return variable ? variable : "";
-}();
+std::string chosen_folder = std::getenv("TETPBD_SHADERS") ? std::getenv("TETPBD_SHADERS") : "";
 
 std::string read_shader_file(const std::string& name) {
   if (const std::string& folder = shader_folder(); !folder.empty()) {

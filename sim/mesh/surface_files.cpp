@@ -190,9 +190,8 @@ Polygons read_ply(const fs::path& file) {
         for (double k = 0; k < length; ++k) {
           const double number = value(*property.type);
           if (is_face) mesh.faces.back().push_back(corner(number));
-          for (int axis = 0; axis < 3; ++axis)
-            if (property.name == std::string_view("xyz").substr(std::size_t(axis), 1))
-              position[axis] = number;
+          const std::size_t axis = std::string_view("x y z").find(property.name) / 2;  // names have no blank
+          if (axis < 3) position[int(axis)] = number;
         }
       }
       if (element.name == "vertex") mesh.positions.push_back(position);

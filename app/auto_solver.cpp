@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "app/run_loop.h"
-#include "app/scene.h"
 #include "app/sweep.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
@@ -37,7 +36,7 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
     const MeasuredRun run =
         run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
     if (interrupted()) throw Interrupted();
-    const double fitting = settings.substeps * budget_ms / percentiles(run.gpu_ms.values).median;
+    const double fitting = settings.substeps * budget_ms / median(run.gpu_ms);
     settings.substeps = int(std::clamp(fitting, 1.0, most_substeps));
     apply_settings(sim, settings);
   }
@@ -45,13 +44,9 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
 
 }  // namespace
 
-double default_budget_ms(const Settings& settings) { return 1e3 * settings.dt / 10; }
-
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
                            double budget_ms, long steps) {
-  SolverChoice choice;
-  choice.budget_ms = budget_ms;
-  choice.steps = steps;
+  SolverChoice choice{budget_ms, steps};
   for (const Settings& candidate : candidates(settings)) {
     const bool first = choice.trials.empty();
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
@@ -66,7 +61,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     const MeasuredRun run = run_loop(sim, &metrics, choice.steps, plan);
     if (interrupted()) throw Interrupted();
     if (first && run.errors.finite) choice.steps = run.steps;
-    trial.ms = percentiles(run.gpu_ms.values).median;
+    trial.ms = median(run.gpu_ms);
     trial.loss_percent =
         run.errors.finite ? run.errors.max_volume_loss_percent : std::numeric_limits<double>::infinity();
     // Losses that agree to a hundredth are the same: then the plainer one.

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "app/scene.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -20,16 +21,12 @@ struct SolverTrial {
 struct SolverChoice {
   double budget_ms = 0;
   long steps = 0;  ///< of each trial
-  std::vector<SolverTrial> trials;
+  std::vector<SolverTrial> trials{};
   std::size_t best = 0;
   bool lost_nothing = false;  ///< none of them in so few steps: chosen by what is best elsewhere
   const Settings& settings() const { return trials[best].settings; }
 };
 
-struct Scene;
-
-/// The budget without --budget-ms: a tenth of the time that a step simulates.
-double default_budget_ms(const Settings& settings);
 /// Tries mode node, one iteration a substep: averaged with two over-relaxations, with masses split.
 /// Everything else stays as in `settings`. Takes a second or so on a GPU; needs a GL context.
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,

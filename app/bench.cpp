@@ -3,22 +3,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 
+#include "app/commands.h"
 #include "app/files.h"
-#include "app/lab.h"
-#include "app/statistics.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
-#include "sim/interrupt.h"
 
 namespace tetpbd {
 
 namespace {
-
-using std::chrono::steady_clock;
 
 const char* columns =
     "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
@@ -30,63 +25,56 @@ const char* table =
 
 ordered_json spread(std::vector<double> values) {
   if (values.empty()) values = {0};
-  std::ranges::sort(values);
-  return {{"median", values[values.size() / 2]}, {"min", values.front()}, {"max", values.back()}};
+  return {{"median", median(values)}, {"min", percentile(values, 0)}, {"max", percentile(values, 1)}};
 }
 
 /// What a dispatch and a byte cost on this GPU at least, what speeds are held against: a dispatch of as many
 /// invocations as a small mesh has, and its barrier; bytes read and written by a kernel that copies from
 /// memory, not from a cache. About a tenth of a second.
 ordered_json launch_and_bandwidth_limits(bool software) {
-  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, invocations = bytes / 16 / 8;
+  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, work_groups = bytes / 16 / 8 / 256;
   const Buffer from("probe, from", bytes), to("probe, to", bytes);
   from.clear();
   from.bind_storage(0);
   to.bind_storage(1);
-  const auto seconds_each = [&](const char* copy, std::size_t work_groups, int times) {
+  const auto seconds_each = [&](const char* copy, std::size_t groups, int times) {
     const Program program = Program::compute("probe.comp", {{{"COPY", copy}}, {}});
     program.use();
-    const auto run = [&] {
-      for (int k = 0; k < times; ++k) {
-        const std::size_t row = std::min<std::size_t>(work_groups, 32768);
-        glDispatchCompute(unsigned(row), unsigned(work_groups / row), 1);
-        glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    std::chrono::steady_clock::time_point begin;
+    for (int k = -times; k < times; ++k) {  // the first half to warm up
+      if (k == 0) {
+        glFinish();
+        begin = std::chrono::steady_clock::now();
       }
-      glFinish();
-    };
-    run();
-    const auto begin = steady_clock::now();
-    run();
+      glDispatchCompute(unsigned(groups), 1, 1);
+      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    }
+    glFinish();
     return seconds_since(begin) / times;
   };
   return {{"dispatch_us", seconds_each("0", 256, software ? 20 : 5000) * 1e6},
-          {"copy_gb_s", 2 * double(bytes) / seconds_each("1", invocations / 256, software ? 2 : 50) * 1e-9}};
+          {"copy_gb_s", 2 * double(bytes) / seconds_each("1", work_groups, software ? 2 : 50) * 1e-9}};
 }
 
 /// Frames as fast as they come: a step, and a picture of it if there is one. One wait, at the end.
 void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
                  const std::function<void()>& picture) {
-  std::vector<double> fps, gpu, wall, still;
-  const auto time_picture = [&] {
-    if (!picture) return;
-    const long count = std::min(options.frames, 100L);
-    const auto begin = steady_clock::now();
-    for (long f = 0; f < count; ++f) picture();
-    glFinish();
-    still.push_back(1e3 * seconds_since(begin) / double(count));
-  };
+  std::vector<double> fps, gpu, wall;
+  double drawing = 0, pictures = 0;
   RunPlan plan{.most_seconds = options.most_seconds, .wait = false};
   if (picture) plan.stepped = [&](long) { picture(); };
   warm_up(sim);
   for (int repeat = 0; repeat < options.repeats && row["finite"] == true; ++repeat) {
     reset(sim);
     run_loop(sim, nullptr, options.warm_up, plan);
-    time_picture();
+    const auto begin = std::chrono::steady_clock::now();
+    for (long f = 0; picture && f < std::min(options.frames, 200L); ++f, ++pictures) picture();
+    glFinish();
+    drawing += seconds_since(begin);
     const MeasuredRun run = run_loop(sim, nullptr, options.frames, plan);
-    time_picture();
     fps.push_back(double(run.steps) / run.seconds);
     wall.push_back(run.seconds * 1e3 / double(run.steps));
-    if (!run.gpu_ms.values.empty()) gpu.push_back(percentiles(run.gpu_ms.values).median);
+    if (!run.gpu_ms.empty()) gpu.push_back(median(run.gpu_ms));
     put_finite(row, run);
   }
   if (row["finite"] == false) {  // the others say nothing
@@ -96,7 +84,7 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
   row["fps"] = spread(fps);
   row["gpu_ms_per_step"] = spread(gpu);
   row["wall_ms_per_step"] = spread(wall);
-  row["draw_ms"] = std::accumulate(still.begin(), still.end(), 0.0) / double(still.size());
+  row["draw_ms"] = picture ? 1e3 * drawing / pictures : std::nan("");
   row["gpu_us_per_iteration"] =
       1e3 * number(row, "gpu_ms_per_step") / (number(row, "iterations") * number(row, "substeps"));
 }
@@ -149,7 +137,6 @@ Sweep bench_sweep(const BenchOptions& options) {
 }
 
 int run_bench(const BenchOptions& options) {
-  catch_interrupts();
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
   Sweep sweep = bench_sweep(options);

@@ -29,7 +29,7 @@ std::string text(double x, double y, const std::string& what, const char* anchor
       x, y, size, anchor, more, escaped);
 }
 
-std::string path(const std::string& points, const std::string& style) {
+std::string path(const std::string& points, const std::string& style = "stroke=\"#dddddd\"") {
   return fmt::format("<path d=\"{}\" {}/>\n", points, style);
 }
 
@@ -44,12 +44,12 @@ struct Axis {
   }
 };
 
-Axis fit(const Chart& chart, std::vector<double> Series::*values, double from, double to) {
+Axis fit(const Chart& chart, int component, double from, double to) {
   Axis axis{chart.log, from, to};
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Series& series : chart.series)
-    for (double v : series.*values)
-      if (axis.shows(v)) low = std::min(low, v), high = std::max(high, v);
+    for (const glm::dvec2& point : series.points)
+      if (const double v = point[component]; axis.shows(v)) low = std::min(low, v), high = std::max(high, v);
   if (!(low <= high)) return axis;
   if (axis.log) {
     axis.low = std::pow(10, std::floor(std::log10(low) + 1e-9));
@@ -64,10 +64,9 @@ Axis fit(const Chart& chart, std::vector<double> Series::*values, double from, d
 std::vector<double> ticks(const Axis& axis) {
   std::vector<double> result;
   if (axis.log) {
-    const bool finer = axis.high / axis.low < 1000;
     for (double decade = axis.low; decade <= axis.high * 1.0001; decade *= 10)
       for (double m : {1.0, 2.0, 5.0})
-        if (m == 1 || (finer && decade * m <= axis.high)) result.push_back(decade * m);
+        if (m == 1 || (axis.high < 1000 * axis.low && decade * m < axis.high)) result.push_back(decade * m);
     return result;
   }
   const double raw = (axis.high - axis.low) / 6, power = std::pow(10, std::floor(std::log10(raw)));
@@ -94,7 +93,7 @@ std::string mode_colour(const std::string& mode) {
 }
 
 std::string to_svg(const Chart& chart) {
-  const Axis x = fit(chart, &Series::x, left, right), y = fit(chart, &Series::y, bottom, top);
+  const Axis x = fit(chart, 0, left, right), y = fit(chart, 1, bottom, top);
   const double middle = (top + bottom) / 2;
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
@@ -108,28 +107,27 @@ std::string to_svg(const Chart& chart) {
   const auto number = [](double v) {
     return std::abs(v) >= 10000 ? fmt::format("{:g}k", v / 1000) : fmt::format("{:g}", v);
   };
-  const char* grid = "stroke=\"#dddddd\"";
   for (double v : ticks(x))
-    svg += path(fmt::format("M{:.1f} {}V{}", x.at(v), top, bottom), grid) +
+    svg += path(fmt::format("M{:.1f} {}V{}", x.at(v), top, bottom)) +
            text(x.at(v), bottom + 18, number(v), "middle");
   for (double v : ticks(y))
-    svg += path(fmt::format("M{} {:.1f}H{}", left, y.at(v), right), grid) +
+    svg += path(fmt::format("M{} {:.1f}H{}", left, y.at(v), right)) +
            text(left - 8, y.at(v) + 4, number(v), "end");
   double legend = top + 10;
   bool empty = true;
   for (std::size_t k = 0; k < chart.series.size(); ++k, legend += 20) {
     const Series& s = chart.series[k];
-    const bool line = s.style != Series::points;
+    const bool line = s.style != Series::markers;
     const std::string marker = line ? "" : markers[k % markers.size()];
     const std::string style =
         line ? fmt::format("stroke=\"{}\" stroke-width=\"1.8\" fill=\"none\"{}", s.colour,
                            s.style == Series::dashes ? " stroke-dasharray=\"6 4\"" : "")
              : fmt::format("fill=\"{}\"", s.colour);
     std::string points;
-    for (std::size_t i = 0; i < s.x.size(); ++i)
-      if (x.shows(s.x[i]) && y.shows(s.y[i]))
-        points += fmt::format("{}{:.1f} {:.1f}{}", line && !points.empty() ? "L" : "M", x.at(s.x[i]),
-                              y.at(s.y[i]), marker);
+    for (const glm::dvec2& p : s.points)
+      if (x.shows(p.x) && y.shows(p.y))
+        points += fmt::format("{}{:.1f} {:.1f}{}", line && !points.empty() ? "L" : "M", x.at(p.x), y.at(p.y),
+                              marker);
     empty = empty && points.empty();
     svg += path(points, style) + text(right + 44, legend + 4, s.name);
     svg += path(fmt::format("M{} {}{}", right + (line ? 14 : 26), legend, line ? "h24" : marker), style);
@@ -137,8 +135,8 @@ std::string to_svg(const Chart& chart) {
   if (empty)
     svg += text((left + right) / 2, middle, "no value to draw: all are 0 or none is finite", "middle", 15);
   for (const Chart::Note& note : chart.notes)  // below and to the left, where a front leaves room
-    if (x.shows(note.x) && y.shows(note.y))
-      svg += text(x.at(note.x) - 7, y.at(note.y) + 14, note.text, "end", 10.5);
+    if (x.shows(note.at.x) && y.shows(note.at.y))
+      svg += text(x.at(note.at.x) - 7, y.at(note.at.y) + 14, note.text, "end", 10.5);
   return svg + "</svg>\n";
 }
 

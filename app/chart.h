@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <string>
 #include <vector>
 
@@ -9,8 +10,8 @@ namespace tetpbd {
 
 struct Series {
   std::string name, colour;
-  enum Style { points, line, dashes } style = points;
-  std::vector<double> x{}, y{};
+  enum Style { markers, line, dashes } style = markers;
+  std::vector<glm::dvec2> points{};
 };
 
 struct Chart {
@@ -18,7 +19,7 @@ struct Chart {
   bool log = false;  ///< both axes
   std::vector<Series> series{};
   struct Note {
-    double x, y;
+    glm::dvec2 at;
     std::string text;
   };
   std::vector<Note> notes{};

@@ -1,18 +1,49 @@
-// What main starts, beside the laboratory (lab.h).
+// The commands: what each is asked for, and what starts it. run_loop steps and measures, sweep combines
+// settings and merges shards, chart draws; a command is its columns and its judgement. Names in files are
+// relied upon by scripts (docs/guide.md): they may be added to, not changed.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "app/lab.h"
+#include "app/run_loop.h"
+#include "app/scene.h"
+#include "app/sweep.h"
+#include "render/frame.h"
+#include "sim/reference/motion.h"
 
 namespace tetpbd {
 
 /// The words after the program's name. Loads and checks the scene they name, and returns what is left to do;
 /// calling that gives the exit status. Throws Error for words that make no command.
 std::function<int()> parse_command_line(std::vector<std::string> words);
+
+struct RunOptions {
+  long steps = 0;  ///< 0: the scene's duration
+  std::filesystem::path out = "out";
+  long png_every = 0;               ///< steps; 0: no frames
+  std::filesystem::path video;      ///< empty: none
+  long video_every = 0;             ///< steps a video frame; 0: real time at 30 frames a second
+  long csv_every = 1;               ///< steps; 0: no stats.csv
+  std::filesystem::path reference;  ///< the right motion; empty: the cache's, if any
+  long measure_every = 1;           ///< steps between measurements; the last step is measured in any case
+  bool positions = false;           ///< positions.npy and tets.npy
+  int gpu = -1;
+  std::array<int, 2> size{1280, 720};  ///< pixels
+  int samples = 4;
+  ViewOptions view;
+  bool progress = false;  ///< show it even if standard error is no terminal
+};
+/// `tetpbd run`: steps a scene without a window and writes frames, video and statistics. Exit status: 0, or 1
+/// if the state became non-finite.
+int run_headless(Scene scene, const RunOptions& options);
+/// Prints buffers, bytes, kernels and dispatches a step.
+int print_explanation(Scene scene, int gpu);
+int print_info(int gpu);
 
 /// `tetpbd view`: until the window is closed. `name` as it was given, a name or a file; `overrides` stay in
 /// force when the same scene is reset. Of the options: size, samples, view.
@@ -23,5 +54,99 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
 /// `out` says. Exit status: 0, or 1 when tets are inverted.
 int run_mesh_command(const std::filesystem::path& file, const std::string& switches,
                      const std::filesystem::path& out, bool json);
+
+struct ReferenceOptions {
+  long steps = 0;             ///< 0: the scene's duration
+  std::filesystem::path out;  ///< empty: in the cache, where runs of the scene find it
+  bool progress = false;
+};
+/// `tetpbd reference`: finds a scene's right motion and keeps it in a file. Prints what the motion is and how
+/// wrong it may be. An interrupted search goes on where it was.
+int run_reference(const Scene& scene, const ReferenceOptions& options);
+/// The motion in `file`, or without one the cache's of this scene, if it has any.
+std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
+
+struct BenchOptions {
+  std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
+  SceneOverrides overrides;  ///< for every scene
+  Axes axes = {.modes = {"cpu", "constraint", "node"},
+               .constraint_sets = {"stretch+bend", "stretch+bend+volume"},
+               .iterations = {1, 150},
+               .substeps = {1}};
+  long frames = 400, warm_up = 50;
+  int repeats = 3;
+  double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)
+  std::vector<std::array<int, 2>> sizes{{1280, 720}};     ///< of rendered frames, pixels; none: no rendering
+  std::vector<std::string> pictures = {"plain", "full"};  ///< rendered at each size
+  int samples = 0;
+  int gpu = -1;
+  std::filesystem::path out = "bench";
+};
+/// `tetpbd bench`: frames a second and milliseconds a step, by the paper's protocol, beside the error of the
+/// same setting. Exit status 1 if any state became non-finite.
+int run_bench(const BenchOptions& options);
+/// Its rows, to be made in the current context.
+Sweep bench_sweep(const BenchOptions& options);
+
+struct CompareOptions {
+  std::string scene = "bunny-drop";
+  SceneOverrides overrides;
+  Axes axes = {.modes = {"node", "constraint", "cpu"}, .iterations = {1, 5, 10, 25}, .substeps = {1}};
+  long steps = 400;
+  int gpu = -1;
+  std::filesystem::path out = "compare";
+  Shards shards;
+  std::optional<double> budget_ms, error_percent;
+  std::vector<std::string> cases;  ///< of hard cases; empty: all of models/scenes/hard
+  std::vector<std::string> meshes = {"bunny", "block", "tet"};
+};
+/// `tetpbd compare`: speed against error over modes x iterations x substeps.
+int run_compare(const CompareOptions& options);
+
+/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double
+/// precision. Exit status 1 if any state became non-finite. Of the axes only modes count: NAME-substeps runs
+/// mode NAME with one iteration a substep, as many substeps as the scene has iterations. Steps 0: the scene's
+/// duration.
+int run_hard_cases(const CompareOptions& options);
+inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu",
+                                                      "cpu-double"};
+/// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
+/// 5 % of the run's `steps` at least: what is good for less long may be passing through.
+std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);
+
+struct ReproduceOptions {
+  std::filesystem::path out = "reproduce";
+  bool quick = false;  ///< bunny alone, few frames: checks the trends on a software renderer
+  int gpu = -1;
+};
+/// `tetpbd reproduce`: the paper's table and figures (Va, Choi, Hong 2023), measured here. Throws Error
+/// (status 1) if a trend of the paper does not show.
+int run_reproduce(const ReproduceOptions& options);
+
+struct SoakOptions {
+  long settle = 2000;   ///< steps before the watch begins
+  long steps = 100000;  ///< steps watched
+  std::filesystem::path out = "soak";
+  int gpu = -1;
+  bool progress = false;
+};
+/// `tetpbd soak`: a long run of a body at rest that must not drift, leak or slow down. Exit status: 0, or 1
+/// if a check failed.
+int run_soak(Scene scene, const SoakOptions& options);
+
+// ------------------------------------------------------------------------------------------------------------
+// what a run amounts to (statistics.cpp): stats.json and stats.csv, rows of sweeps
+
+std::string csv_header();
+std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
+
+ordered_json mesh_json(const MeshReport& report);
+ordered_json error_json(const RunErrors& errors);
+/// {"step", "vertex"}, or null.
+ordered_json non_finite_json(const std::optional<NonFinite>& found);
+/// Puts into the row whether the run stayed finite, and says on standard error where not.
+void put_finite(ordered_json& row, const MeasuredRun& run);
+/// A run in a sweep: what tells its setting apart from others, errors, drifts, that.
+ordered_json row_of(const Scene& scene, const Model& model, const Settings& settings, const MeasuredRun& run);
 
 }  // namespace tetpbd

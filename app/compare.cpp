@@ -7,9 +7,8 @@
 #include <tuple>
 
 #include "app/chart.h"
+#include "app/commands.h"
 #include "app/files.h"
-#include "app/lab.h"
-#include "app/statistics.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
@@ -83,16 +82,16 @@ Chart chart_of(const ordered_json& document) {
   std::ranges::sort(sorted, {}, cost_ms);
   Series front{"Pareto front", "#999999", Series::dashes};
   for (const auto& row : sorted) {
-    const double x = cost_ms(row), y = loss(row);
-    if (!std::isfinite(y)) continue;
+    const glm::dvec2 point(cost_ms(row), loss(row));
+    if (!std::isfinite(point.y)) continue;
     if (row["pareto"] == true) {
-      front.x.push_back(x), front.y.push_back(y);
-      chart.notes.push_back({x, y, text_of(row["iterations"]) + " x " + text_of(row["substeps"])});
+      front.points.push_back(point);
+      chart.notes.push_back({point, text_of(row["iterations"]) + " x " + text_of(row["substeps"])});
     }
     const std::string mode = text_of(row["mode"]);
     auto series = std::ranges::find(chart.series, mode, &Series::name);
     if (series == chart.series.end()) series = chart.series.insert(series, {mode, mode_colour(mode)});
-    series->x.push_back(x), series->y.push_back(y);
+    series->points.push_back(point);
   }
   chart.series.push_back(front);
   return chart;
@@ -100,16 +99,17 @@ Chart chart_of(const ordered_json& document) {
 
 using Quantity = double (*)(const ordered_json& row);
 
-/// The row within a limit that is best by something else.
-void print_best(const ordered_json& rows, const std::string& what, double limit, Quantity limited,
+/// The row within a limit, where one is asked for, that is best by something else.
+void print_best(ordered_json rows, const char* what, std::optional<double> limit, Quantity limited,
                 Quantity judged) {
-  std::vector<ordered_json> within;
-  for (const auto& row : rows)
-    if (std::isfinite(loss(row)) && limited(row) <= limit) within.push_back(row);
-  if (within.empty()) return fmt::print("{}: nothing measured is\n", what);
+  if (!limit) return;
+  fmt::print(fmt::runtime(what), *limit);
+  std::erase_if(rows.get_ref<ordered_json::array_t&>(),
+                [&](const auto& row) { return !std::isfinite(loss(row)) || !(limited(row) <= *limit); });
+  if (rows.empty()) return fmt::print(": nothing measured is\n");
   const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
-  const auto& best = *std::ranges::min_element(within, {}, order);
-  fmt::print("{}: {}, {} it x {} sub, omega {} ({:.3g} ms, loss {:.3g} %)\n", what, text_of(best["mode"]),
+  const auto& best = *std::ranges::min_element(rows, {}, order);
+  fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, loss {:.3g} %)\n", text_of(best["mode"]),
              text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best),
              loss(best));
 }
@@ -159,11 +159,8 @@ Settings settings_of(const Scene& scene, std::string mode) {
 
 ordered_json case_row(const Scene& scene, const Settings& settings, long steps) {
   const auto model = build_model(scene);
-  Tuning tuning;
-  tuning.count_guards = true;
-  Sim sim = create_sim(model, settings, tuning);
+  Sim sim = create_sim(model, settings, {.count_guards = true});
   Metrics metrics = create_metrics(*model, sim.system);
-  if (steps == 0) steps = duration_in_steps(scene);
   const MeasuredRun run = run_loop(sim, &metrics, steps);
   const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
@@ -188,10 +185,10 @@ void add_cases(Sweep& sweep, const CompareOptions& options) {
       const auto scene = scene_of(name, mesh);
       if (!scene || !is_constrained(scene->settings)) continue;  // where nothing acts, nothing recovers
       for (const std::string& mode : options.axes.modes)
-        sweep.work.push_back([=, settings = settings_of(*scene, mode), steps = options.steps] {
-          ordered_json row = {{"case", name}, {"mesh", mesh}};
-          row.update(case_row(*scene, settings, steps));
-          row["mode"] = mode;
+        sweep.work.push_back([=, settings = settings_of(*scene, mode),
+                              steps = options.steps ? options.steps : duration_in_steps(*scene)] {
+          ordered_json row = case_row(*scene, settings, steps);
+          row.update({{"case", name}, {"mesh", mesh}, {"mode", mode}});
           return std::vector{row};
         });
     }
@@ -209,7 +206,6 @@ void add_reference(ordered_json& rows) {
 /// Runs what `add` gives the sweep, or merges shards of it.
 template <class Add>
 ordered_json run_or_merge(Sweep& sweep, const CompareOptions& options, const Add& add) {
-  catch_interrupts();
   make_output_folder(options.out);
   std::optional<HeadlessContext> context;
   if (options.shards.merge.empty()) {
@@ -234,8 +230,8 @@ int run_compare(const CompareOptions& options) {
       sweep.work.push_back([=, steps = options.steps] {
         const MeasuredRun run = run_model(model, settings, steps);
         ordered_json row = row_of(scene, *model, settings, run);
-        row["gpu_ms_per_step"] = percentiles(run.gpu_ms.values).median;
-        row["wall_ms_per_step"] = percentiles(run.wall_ms.values).median;
+        row["gpu_ms_per_step"] = median(run.gpu_ms);
+        row["wall_ms_per_step"] = median(run.wall_ms);
         row["reference_distance"] = remaining_after_one_step(model, settings);
         row["pareto"] = false;
         return std::vector{row};
@@ -247,12 +243,8 @@ int run_compare(const CompareOptions& options) {
   if (std::ranges::all_of(rows, [](const auto& row) { return loss(row) == 0; }))
     fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
                text_of(document["steps"]));
-  if (options.budget_ms)
-    print_best(rows, fmt::format("best within {:g} ms a step", *options.budget_ms), *options.budget_ms,
-               cost_ms, loss);
-  if (options.error_percent)
-    print_best(rows, fmt::format("cheapest with a loss of at most {:g} %", *options.error_percent),
-               *options.error_percent, loss, cost_ms);
+  print_best(rows, "best within {:g} ms a step", options.budget_ms, cost_ms, loss);
+  print_best(rows, "cheapest with a loss of at most {:g} %", options.error_percent, loss, cost_ms);
   write_sweep(sweep, options.out, document);
   write_chart(options.out / "compare", chart_of(document));
   return 0;

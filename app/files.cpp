@@ -42,18 +42,8 @@ std::string quoted(const std::string& text) {
 void make_output_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder))
-    throw Error("cannot make the output folder", folder.string(),
-                error ? error.message() : "a file is in the way");
-  if (access(folder.c_str(), W_OK) != 0)
-    throw Error("cannot write to the output folder", folder.string(), std::strerror(errno));
-}
-
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string field = "\"";
-  for (const char c : text) field += c == '"' ? "\"\"" : std::string(1, c);
-  return field + "\"";
+  if (!error && access(folder.c_str(), W_OK) != 0) error.assign(errno, std::generic_category());
+  if (error) throw Error("cannot write to the output folder", folder.string(), error.message());
 }
 
 void write_png(const fs::path& file, const Image& image) {

@@ -15,8 +15,6 @@ namespace tetpbd {
 
 /// Makes the folder and checks that it can be written to.
 void make_output_folder(const std::filesystem::path& folder);
-/// A field of a CSV line: quoted where a comma, quote or line break stands in it.
-std::string csv_field(const std::string& text);
 /// JSON text; bytes that are no UTF-8 (file names may hold any) are replaced.
 template <class Json>
 std::string json_text(const Json& document, int indent) {

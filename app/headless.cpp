@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 
 #include "app/auto_solver.h"
+#include "app/commands.h"
 #include "app/files.h"
-#include "app/lab.h"
-#include "app/reference_command.h"
-#include "app/statistics.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -22,13 +19,25 @@ namespace {
 /// Draws what a run asked for and writes it.
 struct FrameWriter {
   const RunOptions& options;
-  Frame frame;
-  Renderer renderer;
-  Target target;
-  long video_every;  ///< steps
   double dt;         ///< s
-  long drawn = 0;    ///< step of the last frame
-  std::unique_ptr<Video> video{};
+  long video_every;  ///< steps
+  Target target;
+  Renderer renderer;
+  Frame frame;
+  std::optional<Video> video{};
+  long drawn = 0;  ///< step of the last frame
+
+  FrameWriter(const Scene& scene, const Sim& sim, const RunOptions& run)
+      : options(run),
+        dt(scene.settings.dt),
+        video_every(run.video_every > 0 ? run.video_every : std::max(1L, std::lround(1.0 / 30 / dt))),
+        target(make_target(run.size[0], run.size[1], run.samples)),
+        renderer(make_renderer(*sim.model)),
+        frame(frame_of(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
+                       run.view, target)) {
+    const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
+    if (!run.video.empty()) video.emplace(run.video, run.size[0], run.size[1], rate);
+  }
 
   void draw_frame(long s) {
     const bool png = options.png_every > 0 && s % options.png_every == 0;
@@ -44,29 +53,12 @@ struct FrameWriter {
   }
 };
 
-std::optional<FrameWriter> frame_writer(const Scene& scene, const Sim& sim, const RunOptions& options) {
-  if (options.png_every == 0 && options.video.empty()) return std::nullopt;
-  const double dt = scene.settings.dt;
-  const long video_every =
-      options.video_every > 0 ? options.video_every : std::max(1L, std::lround(1.0 / 30 / dt));
-  const Camera camera = scene_camera(scene, *sim.model, float(options.width) / float(options.height));
-  Target target = make_target(options.width, options.height, options.samples);
-  const Frame frame = frame_of(sim, camera, options.view, target);
-  FrameWriter frames{options, frame, make_renderer(*sim.model), std::move(target), video_every, dt};
-  if (!options.video.empty()) {
-    const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
-    frames.video = std::make_unique<Video>(options.video, options.width, options.height, rate);
-  }
-  return frames;
-}
-
 // What is not finite is written as null.
 ordered_json vector(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
-ordered_json times(const Samples& ms) {
-  if (ms.values.empty()) return nullptr;
-  const Percentiles p = percentiles(ms.values);
-  return {{"median", p.median}, {"p05", p.p05}, {"p95", p.p95}};
+ordered_json times(const std::vector<double>& ms) {
+  if (ms.empty()) return nullptr;
+  return {{"median", median(ms)}, {"p05", percentile(ms, 0.05)}, {"p95", percentile(ms, 0.95)}};
 }
 
 ordered_json settings_json(const Scene& scene, const Settings& settings) {
@@ -90,14 +82,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
   if (choice) j["solver_choice"] = solver_choice_json(*choice);
-  const MeshReport mesh = report(sim.model->rest);
-  j["mesh"] = {{"vertices", mesh.vertices},
-               {"surface_triangles", mesh.surface_triangles},
-               {"edges", mesh.edges},
-               {"bends", mesh.bends},
-               {"tets", mesh.tets},
-               {"volume", mesh.volume},
-               {"euler_characteristic", mesh.euler_characteristic}};
+  j["mesh"] = mesh_json(report(sim.model->rest));
   j["device"] = device_json(device);
   j["timing"] = {{"steps", sim.steps},
                  {"gpu_ms_per_step", times(run.gpu_ms)},
@@ -138,7 +123,6 @@ void write_positions(const Sim& sim, const std::filesystem::path& out) {
 }  // namespace
 
 int run_headless(Scene scene, const RunOptions& options) {
-  catch_interrupts();
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
@@ -150,20 +134,21 @@ int run_headless(Scene scene, const RunOptions& options) {
   Metrics metrics = create_metrics(*model, sim.system);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
-  std::optional<MotionError> motion_error;
-  if (right) motion_error.emplace();
-  auto frames = frame_writer(scene, sim, options);
+  auto motion_error = right ? std::optional(MotionError{}) : std::nullopt;
+  std::optional<FrameWriter> frames;
+  if (options.png_every > 0 || !options.video.empty()) frames.emplace(scene, sim, options);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
 
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
-    RunPlan plan{.measure_every = options.measure_every, .progress = &progress};
+    RunPlan plan{.measure_every = options.measure_every};
     plan.measured = [&](const Measurement& measurement, const RunErrors& errors) {
       if (csv && measurement.step % options.csv_every == 0) csv->add(csv_row(measurement, errors));
     };
     plan.stepped = [&](long s) {
+      progress.update(s);
       if (frames) frames->draw_frame(s);
       if (right && is_kept(*right, s)) add_state(*motion_error, *right, *model, s, read_state(sim));
     };
@@ -176,15 +161,14 @@ int run_headless(Scene scene, const RunOptions& options) {
   // To the last good step: the same steps again, the same bits.
   while (good && found && sim.steps < found->step - 1) step(sim);
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
-  write_file(
-      options.out / "stats.json",
-      json_text(statistics_json(scene, sim, context.capabilities(), run, hash, choice, motion_error), 2) +
-          "\n");
+  const auto statistics =
+      statistics_json(scene, sim, context.capabilities(), run, hash, choice, motion_error);
+  write_file(options.out / "stats.json", json_text(statistics, 2) + "\n");
   if (csv) csv->close();
   if (options.positions && good) write_positions(sim, options.out);
   fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
              sim.steps, context.capabilities().renderer, run.errors.max_volume_loss_percent,
-             percentiles(run.wall_ms.values).median, (options.out / "stats.json").string());
+             median(run.wall_ms), (options.out / "stats.json").string());
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);

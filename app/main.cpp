@@ -4,48 +4,31 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
-#include <optional>
 #include <sstream>
 #include <tuple>
 
 #include "app/commands.h"
-#include "app/reference_command.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
+#include "sim/interrupt.h"
 
 using namespace tetpbd;
 
 namespace {
 
-using Task = std::function<int()>;
 constexpr long most_steps = 1000000000;
-
-/// "1280x720", "2/8": two whole numbers in a range.
-std::array<int, 2> two_numbers(const std::string& flag, const std::string& text, char between, int low,
-                               int high) {
-  std::istringstream in(text);
-  int first = 0, second = 0;
-  char found = 0;
-  in >> first >> found >> second;
-  if (!in || !in.eof() || found != between || std::min(first, second) < low || std::max(first, second) > high)
-    throw Error(fmt::format("bad {} '{}'", flag, text), "command line",
-                fmt::format("give two whole numbers from {} to {} with {} between", low, high, between));
-  return {first, second};
-}
 
 /// What words can set, with its defaults.
 struct Arguments {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
   std::vector<std::optional<std::string>> values{parameters().size()};  ///< text by row of parameters()
-  bool explain = false, no_render = false;
-  std::vector<std::string> sizes{"1280x720"};
-  std::string shard = "1/1";
+  std::optional<Scene> opened;  ///< from these, by commands that take a scene
+  std::vector<std::array<int, 2>> sizes{{1280, 720}};
+  bool explain = false;
   RunOptions run;  ///< its device and picture are those of every command that opens a scene
   SoakOptions soak;
   ReferenceOptions reference;
@@ -61,26 +44,27 @@ struct Arguments {
 // ------------------------------------------------------------------------------------------------------------
 // kinds of options
 
-template <class T>
-CLI::Validator in_range(T low, T high) {
-  return CLI::Validator(
-      [=](std::string& text) {
-        T value{};
-        if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
-        return fmt::format("must be a {} from {} to {}, not '{}'",
-                           std::is_integral_v<T> ? "whole number" : "number", low, high, text);
-      },
-      fmt::format("[{} .. {}]", low, high));
+/// "1280x720", "2/8": two whole numbers in a range.
+std::array<int, 2> two_numbers(const std::string& flag, const std::string& text, char between, int low,
+                               int high) {
+  std::istringstream in(text);
+  int first = 0, second = 0;
+  char found = 0;
+  in >> first >> found >> second;
+  if (!in || !in.eof() || found != between || std::min(first, second) < low || std::max(first, second) > high)
+    throw Error(fmt::format("bad {} '{}'", flag, text), "command line",
+                fmt::format("give two whole numbers from {} to {} with {} between", low, high, between));
+  return {first, second};
 }
 
 /// One of these words; as a transform() its number takes its place, which is an enum's value.
 template <class Words>
 CLI::Validator one_of(const Words& words) {
-  const std::string all = fmt::format("{}", fmt::join(words, ", "));
   return CLI::Validator(
       [=](std::string& text) {
-        const auto found = std::find(words.begin(), words.end(), text);
-        if (found == words.end()) return fmt::format("must be one of {}, not '{}'", all, text);
+        const auto found = std::ranges::find(words, text);
+        if (found == words.end())
+          return fmt::format("must be one of {}, not '{}'", fmt::join(words, ", "), text);
         text = std::to_string(found - words.begin());
         return std::string();
       },
@@ -99,7 +83,14 @@ CLI::Option* add(CLI::App& command, const char* flag, T& target, const std::stri
 /// A number in a range, or a list of them. A default outside the range is for the help to say.
 template <class T, class N>
 void add(CLI::App& command, const char* flag, T& target, N low, N high, const std::string& help) {
-  CLI::Option* option = command.add_option(flag, target, help)->check(in_range(low, high));
+  CLI::Option* option = command.add_option(flag, target, help);
+  const auto in_range = [=](const std::string& text) {
+    N value{};
+    if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+    return fmt::format("must be a {} from {} to {}, not '{}'",
+                       std::is_integral_v<N> ? "whole number" : "number", low, high, text);
+  };
+  option->check(in_range, fmt::format("[{} .. {}]", low, high));
   bool shown = false;
   if constexpr (std::is_same_v<T, N>) shown = target >= low && target <= high;
   if constexpr (std::is_same_v<T, std::vector<N>>) option->delimiter(','), shown = !target.empty();
@@ -112,6 +103,17 @@ void add_gpu(CLI::App& command, int& gpu) {
 
 void add_progress(CLI::App& command, bool& progress) {
   command.add_flag("--progress", progress, "show progress even if standard error is no terminal");
+}
+
+CLI::Option* add_sizes(CLI::App& command, const char* flag, std::vector<std::array<int, 2>>& sizes,
+                       const std::string& help) {
+  const auto take = [&sizes](const std::vector<std::string>& texts) {
+    sizes.clear();
+    for (const std::string& text : texts) sizes.push_back(two_numbers("--size", text, 'x', 16, 16384));
+  };
+  return command.add_option_function<std::vector<std::string>>(flag, take, help)
+      ->delimiter(',')
+      ->default_str("1280x720");
 }
 
 void add_samples(CLI::App& command, int& samples) {
@@ -142,6 +144,14 @@ void add_axes(CLI::App& command, Axes& axes) {
 // ------------------------------------------------------------------------------------------------------------
 // commands
 
+void open_scene(Arguments& a) {
+  a.run.size = a.sizes[0];
+  a.soak.gpu = a.run.gpu;
+  for (std::size_t i = 0; i < a.values.size(); ++i)
+    if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
+  a.opened = load_scene(a.scene, a.overrides);
+}
+
 // Options that mean the same in every command that opens a scene.
 void add_scene(CLI::App& command, Arguments& a) {
   add(command, "--scene", a.scene, fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")));
@@ -151,9 +161,7 @@ void add_scene(CLI::App& command, Arguments& a) {
                      "twist:DEGREES, invert-one, coincident, fold");
   for (std::size_t i = 0; i < parameters().size(); ++i) {
     const Parameter& row = parameters()[i];
-    const auto words = std::holds_alternative<bool Settings::*>(row.member)
-                           ? std::vector<std::string>{"true", "false"}
-                           : choices(row);
+    const auto words = choices(row);
     const std::string allowed =
         words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
                       : fmt::format(": {}", fmt::join(words, ", "));
@@ -172,7 +180,7 @@ void add_scene(CLI::App& command, Arguments& a) {
       "GPU ms per step, for --solver auto (default: a tenth of dt)");
   add_gpu(command, a.run.gpu);
   command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches, and stop");
-  add(command, "--size", a.sizes, "of images and window, WxH from 16x16 to 16384x16384")->expected(1);
+  add_sizes(command, "--size", a.sizes, "of images and window, WxH from 16x16 to 16384x16384")->expected(1);
   add_samples(command, a.run.samples);
   CLI::App& view = *command.add_option_group("View");
   ViewOptions& look = a.run.view;
@@ -190,15 +198,7 @@ void add_scene(CLI::App& command, Arguments& a) {
   view.add_flag("--follow", look.follow, "the camera goes where the bodies go (the window: from the start)");
   view.add_flag_callback(
       "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
-}
-
-Scene open_scene(Arguments& a) {
-  const auto [width, height] = two_numbers("--size", a.sizes[0], 'x', 16, 16384);
-  a.run.width = width, a.run.height = height;
-  a.soak.gpu = a.run.gpu;
-  for (std::size_t i = 0; i < a.values.size(); ++i)
-    if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
-  return load_scene(a.scene, a.overrides);
+  command.callback([&] { open_scene(a); });
 }
 
 void add_run(CLI::App& command, Arguments& a) {
@@ -245,11 +245,12 @@ void add_bench(CLI::App& command, Arguments& a) {
   add(command, "--repeats", bench.repeats, 1, 100, "repetitions; the median counts");
   add(command, "--most-seconds", bench.most_seconds, 0.01, 1e6,
       "a repetition ends there with fewer frames; 12 times that bounds the error run");
-  add(command, "--sizes,--size", a.sizes, "of the rendered frames, WxH, separated by commas");
+  add_sizes(command, "--sizes,--size", bench.sizes, "of the rendered frames, WxH, separated by commas");
   add(command, "--pictures", bench.pictures, "plain (flat faces on one colour), full (as run draws it)")
       ->check(one_of(std::array{"plain", "full"}));
   add_samples(command, bench.samples);
-  command.add_flag("--no-render", a.no_render, "simulation alone");
+  command.add_flag_callback(
+      "--no-render", [&] { bench.sizes.clear(); }, "simulation alone");
   add_tetgen(command, bench.overrides.tetgen);
   add_gpu(command, bench.gpu);
   add(command, "--out", bench.out, "folder for bench.csv and bench.json");
@@ -276,7 +277,14 @@ void add_compare(CLI::App& command, Arguments& a) {
       "print the best setting within so many ms per step");
   add(command, "--error", compare.error_percent, 1e-9, 1e9,
       "print the cheapest setting that loses at most this volume, %");
-  add(command, "--shard", a.shard, "i/n: only every n-th combination, from the i-th; merge them afterwards");
+  command.add_option_function<std::string>(
+      "--shard",
+      [&](const std::string& text) {
+        const auto [i, n] = two_numbers("--shard", text, '/', 1, 99999);
+        if (i > n) throw Error("bad share", "--shard " + text, "count i from 1 to n, as in 2/8");
+        compare.shards.shard = i, compare.shards.shards = n;
+      },
+      "i/n: only every n-th combination, from the i-th; merge them afterwards");
   add(command, "--cases", compare.cases, "hard cases to run (default: all)")->needs(hard);
   add(command, "--meshes", compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
   command.add_option("--merge", compare.shards.merge, "folders of finished shards, instead of running");
@@ -299,63 +307,38 @@ void add_mesh(CLI::App& command, Arguments& a) {
   command.add_flag("--json", a.json, "print the report as JSON");
 }
 
-Task start_view(Arguments& a) {
+int start_view(const Arguments& a) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
     throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
                 "start it in a desktop session, or use tetpbd run");
-  return [scene = open_scene(a), a] { return run_window(scene, a.scene, a.overrides, a.run); };
-}
-
-template <auto options, auto run>
-Task start_scene(Arguments& a) {
-  return [scene = open_scene(a), chosen = a.*options] { return run(scene, chosen); };
-}
-
-template <auto options, auto run>
-Task start(Arguments& a) {
-  return [chosen = a.*options] { return run(chosen); };
-}
-
-Task start_bench(Arguments& a) {
-  if (a.no_render) a.sizes.clear();
-  for (const std::string& size : a.sizes)
-    a.bench.sizes.push_back(two_numbers("--sizes", size, 'x', 16, 16384));
-  return start<&Arguments::bench, run_bench>(a);
-}
-
-Task start_compare(Arguments& a) {
-  const auto [i, n] = two_numbers("--shard", a.shard, '/', 1, 99999);
-  if (i > n) throw Error("bad share", fmt::format("--shard {}/{}", i, n), "count i from 1 to n, as in 2/8");
-  a.compare.shards.shard = i, a.compare.shards.shards = n;
-  return a.hard_cases ? start<&Arguments::compare, run_hard_cases>(a)
-                      : start<&Arguments::compare, run_compare>(a);
+  return run_window(*a.opened, a.scene, a.overrides, a.run);
 }
 
 struct Command {
   const char *name, *help;
   void (*add)(CLI::App&, Arguments&);  ///< its options
-  Task (*start)(Arguments&);           ///< what they ask for
+  int (*start)(const Arguments&);
 };
 
 const Command commands[] = {
     {"view", "a window (the default where there is a display)", add_scene, start_view},
     {"run", "headless: steps a scene, writes frames, video, statistics", add_run,
-     start_scene<&Arguments::run, run_headless>},
+     [](const Arguments& a) { return run_headless(*a.opened, a.run); }},
     {"reference", "finds the right motion of a scene and keeps it: what runs are held against", add_reference,
-     start_scene<&Arguments::reference, run_reference>},
+     [](const Arguments& a) { return run_reference(*a.opened, a.reference); }},
     {"soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down", add_soak,
-     start_scene<&Arguments::soak, run_soak>},
-    {"bench", "fps and ms per step, the paper's protocol and ours", add_bench, start_bench},
-    {"compare", "speed against error over modes x iterations x substeps", add_compare, start_compare},
+     [](const Arguments& a) { return run_soak(*a.opened, a.soak); }},
+    {"bench", "fps and ms per step, the paper's protocol and ours", add_bench,
+     [](const Arguments& a) { return run_bench(a.bench); }},
+    {"compare", "speed against error over modes x iterations x substeps", add_compare,
+     [](const Arguments& a) { return (a.hard_cases ? run_hard_cases : run_compare)(a.compare); }},
     {"reproduce", "the paper's table and figures, measured here, with plots and one report", add_reproduce,
-     start<&Arguments::reproduce, run_reproduce>},
+     [](const Arguments& a) { return run_reproduce(a.reproduce); }},
     {"mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", add_mesh,
-     [](Arguments& a) -> Task {
-       return [a] { return run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json); };
-     }},
+     [](const Arguments& a) { return run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json); }},
     {"info", "GL version, devices, limits, extensions used, build, licences",
      [](CLI::App& command, Arguments& a) { add_gpu(command, a.run.gpu); },
-     [](Arguments& a) -> Task { return [gpu = a.run.gpu] { return print_info(gpu); }; }},
+     [](const Arguments& a) { return print_info(a.run.gpu); }},
 };
 
 }  // namespace
@@ -390,18 +373,22 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
                 fmt::format("see tetpbd {}--help", parsed.empty() ? "" : parsed[0]->get_name() + " "));
   }
   if (!shaders.empty()) set_shader_folder(shaders);
-  if (arguments.explain)
-    return [scene = open_scene(arguments), gpu = arguments.run.gpu] { return print_explanation(scene, gpu); };
-  const Command* chosen = &commands[0];
+  const Command* chosen = nullptr;
   for (const Command& row : commands)
     if (app.got_subcommand(row.name)) chosen = &row;
-  return chosen->start(arguments);
+  if (!chosen) {
+    chosen = &commands[0];
+    open_scene(arguments);
+  }
+  return [chosen, a = std::move(arguments)] {
+    if (chosen->start != start_view) catch_interrupts();  // the window has no files to finish
+    return a.explain ? print_explanation(*a.opened, a.run.gpu) : chosen->start(a);
+  };
 }
 
-// Not fmt::print(), which throws where standard error cannot be written.
 static int fail(const std::string& line, int status) {
   std::fflush(stdout);
-  std::fputs(("tetpbd: " + printable(line) + "\n").c_str(), stderr);
+  print_error("tetpbd: " + printable(line) + "\n");
   return status;
 }
 

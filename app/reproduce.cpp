@@ -8,9 +8,8 @@
 #include <span>
 
 #include "app/chart.h"
+#include "app/commands.h"
 #include "app/files.h"
-#include "app/lab.h"
-#include "app/run_loop.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -53,24 +52,27 @@ less than one Gauss-Seidel iteration: compare the losses in the same row before 
 
 constexpr std::array iteration_counts = {5, 10, 15, 20, 25};
 
+/// The largest loss of volume, %, at iteration_counts, with stretch and bending, then with all constraints.
+using Losses = std::array<std::array<double, iteration_counts.size()>, 2>;
+
 // What the paper printed.
 struct Published {
   std::string name;
   std::array<int, 6> mesh;  ///< table 4: vertices, surface triangles, stretch, bend, tets; V - E + F - T
   int figure = 0;           ///< of losses; the next are snapshots
-  std::array<double, 5> stretch_bend{}, all{};  ///< the largest loss of volume, %, at iteration_counts
+  Losses losses{};
 };
-const std::vector<Published> published = {{"bunny",
-                                           {2990, 5976, 16701, 8964, 10724, 1},
-                                           8,
-                                           {64.66, 34.5, 20.79, 15.39, 12.31},
-                                           {60.93, 31.10, 17.79, 13.34, 11.47}},
-                                          {"armadillo",
-                                           {6362, 12720, 35442, 19080, 22721, 1},
-                                           10,
-                                           {86.95, 64.45, 51.11, 43.90, 42.47},
-                                           {79.12, 53.03, 37.83, 32.19, 28.07}},
-                                          {"dragon", {31800, 10582, 42072, 15419, 36690, 31709}}};
+const std::vector<Published> published = {
+    {"bunny",
+     {2990, 5976, 16701, 8964, 10724, 1},
+     8,
+     {{{64.66, 34.5, 20.79, 15.39, 12.31}, {60.93, 31.10, 17.79, 13.34, 11.47}}}},
+    {"armadillo",
+     {6362, 12720, 35442, 19080, 22721, 1},
+     10,
+     {{{86.95, 64.45, 51.11, 43.90, 42.47}, {79.12, 53.03, 37.83, 32.19, 28.07}}}},
+    {"dragon", {31800, 10582, 42072, 15419, 36690, 31709}},
+};
 
 /// Every part adds HTML and leaves a file beside it.
 struct Report {
@@ -139,7 +141,7 @@ void volume_error(Report& report, const Published& paper, Scene scene,
                   const std::shared_ptr<const Model>& model) {
   report.html += fmt::format("<h2>Figure {}: volume error over time, {}</h2>\n", paper.figure, paper.name);
   ordered_json rows;
-  std::array<std::array<double, iteration_counts.size()>, 2> losses;
+  Losses losses;
   for (const bool all : {false, true}) {
     Chart chart{fmt::format("{}: {}", paper.name, all ? "all constraints" : "stretch and bending"),
                 "volume error over time; dashed: the published maxima. Constraint-centric Jacobi", "time, s",
@@ -149,15 +151,16 @@ void volume_error(Report& report, const Published& paper, Scene scene,
       scene.settings.iterations = iteration_counts[k];
       const MeasuredRun run = run_model(model, scene.settings, report.quick ? 36 : 300);
       check(run, scene);
-      const double printed = (all ? paper.all : paper.stretch_bend)[k];
+      const double printed = paper.losses[all][k];
       const double lost = losses[all][k] = run.errors.max_volume_loss_percent;
       rows.push_back({all ? "all" : "stretch+bend", iteration_counts[k], printed, lost, lost / printed});
       Series series{fmt::format("{} iterations", iteration_counts[k]), palette_colour(k), Series::line};
       for (const Measurement& m : run.measurements)
-        series.x.push_back(m.time), series.y.push_back(-m.volume_error_percent);
+        series.points.emplace_back(m.time, -m.volume_error_percent);
       chart.series.push_back(series);
-      series.name = fmt::format("published {:.1f} %", printed), series.style = Series::dashes;
-      series.y.assign(series.x.size(), printed);
+      series.name = fmt::format("published {:.1f} %", printed);
+      series.style = Series::dashes;
+      for (glm::dvec2& point : series.points) point.y = printed;
       chart.series.push_back(series);
     }
     report.figure(fmt::format("volume_error_{}_{}", paper.name, all ? "all" : "stretch_bend"), chart);
@@ -217,8 +220,7 @@ void speed(Report& report, const BenchOptions& options, int figure, const std::s
       throw Error("a state is not finite", fmt::format("figure {}", figure), "the line above says where", 1);
     const std::size_t mode = r / 2 % modes.size();
     const double fps = number(row, "fps");
-    charts[r % 2].series[mode].x.push_back(number(row, "tets"));
-    charts[r % 2].series[mode].y.push_back(fps);
+    charts[r % 2].series[mode].points.emplace_back(number(row, "tets"), fps);
     table.push_back({row["scene"], row["mode"], r % 2 ? row["size"] : "none", fps,
                      fps / number(rows[r - 2 * mode], "fps"), cell(row, "gpu_ms_per_step"),
                      cell(row, "wall_ms_per_step"), cell(row, "max_volume_loss_percent")});
@@ -251,7 +253,6 @@ void speeds(Report& report) {
 }  // namespace
 
 int run_reproduce(const ReproduceOptions& options) {
-  catch_interrupts();
   for (const char* folder : {"", "figures", "tables"}) make_output_folder(options.out / folder);
   HeadlessContext context(options.gpu);
   const Capabilities& device = context.capabilities();

@@ -14,22 +14,11 @@ namespace tetpbd {
 
 using std::chrono::steady_clock;
 
-void Samples::add(double value) {
-  ++count;
-  if (values.size() < most) {
-    values.push_back(value);
-  } else if (const std::uint64_t chosen = random() % count; chosen < most) {
-    values[chosen] = value;
-  }
-}
-
-Percentiles percentiles(std::vector<double> values) {
-  if (values.empty()) values = {std::nan("")};
-  std::ranges::sort(values);
-  const auto at = [&](double part) {
-    return values[std::size_t(std::lround(part * double(values.size() - 1)))];
-  };
-  return {at(0.5), at(0.05), at(0.95)};
+double percentile(std::vector<double> values, double part) {
+  if (values.empty()) return std::nan("");
+  const auto chosen = values.begin() + std::lround(part * double(values.size() - 1));
+  std::ranges::nth_element(values, chosen);
+  return *chosen;
 }
 
 void print_error(const std::string& line) {
@@ -37,18 +26,18 @@ void print_error(const std::string& line) {
   std::fflush(stderr);
 }
 
-Progress::Progress(std::string label, long total, bool force)
-    : label_(std::move(label)), total_(total), shown_(force || isatty(2)) {}
+Progress::Progress(const std::string& of, long steps, bool force)
+    : label(of), total(steps), shown(force || isatty(2)) {}
 
 Progress::~Progress() {
-  if (shown_) print_error("\r\033[K");
+  if (shown) print_error("\r\033[K");
 }
 
 void Progress::update(long done) {
-  if (!shown_ || seconds_since(last_) < 0.1) return;
-  last_ = steady_clock::now();
-  print_error(fmt::format("\r\033[K{} {} of {}, {:.0f} s left", label_, done, total_,
-                          seconds_since(start_) * double(total_ - done) / double(done)));
+  if (!shown || done == 0 || seconds_since(last) < 0.1) return;
+  last = steady_clock::now();
+  print_error(fmt::format("\r\033[K{} {} of {}, {:.0f} s left", label, done, total,
+                          seconds_since(start) * double(total - done) / double(done)));
 }
 
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
@@ -62,7 +51,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
       else
         run.measurements.push_back(*measurement);
     }
-    while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.add(*ms);
+    while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.push_back(*ms);
   };
   if (metrics) measure(*metrics, sim);
   const auto begin = steady_clock::now();
@@ -76,9 +65,8 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     if (metrics && (bad || s % plan.measure_every == 0 || s == steps)) measure(*metrics, sim);
     if (bad) break;
     run.steps = s;
-    if (plan.wait) run.wall_ms.add(seconds * 1e3), run.seconds += seconds;
+    if (plan.wait) run.wall_ms.push_back(seconds * 1e3), run.seconds += seconds;
     take(false);
-    if (plan.progress) plan.progress->update(s);
     if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }

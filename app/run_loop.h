@@ -2,10 +2,8 @@
 #pragma once
 
 #include <chrono>
-#include <cstdint>
 #include <functional>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -13,21 +11,9 @@
 
 namespace tetpbd {
 
-/// Numbers in bounded memory: all of them up to `most`, then a random choice of `most` among all so far
-/// (reservoir sampling, always the same seed). Percentiles are exact up to there and estimates beyond.
-struct Samples {
-  static constexpr std::size_t most = 1 << 16;
-  std::vector<double> values;
-  std::uint64_t count = 0;  ///< added
-  std::mt19937_64 random;
-  void add(double value);
-};
-
-struct Percentiles {
-  double median, p05, p95;
-};
-/// NaN where there are none.
-Percentiles percentiles(std::vector<double> values);
+/// The value that this part of them does not exceed; NaN where there are none.
+double percentile(std::vector<double> values, double part);
+inline double median(const std::vector<double>& values) { return percentile(values, 0.5); }
 
 inline double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -37,17 +23,15 @@ inline double seconds_since(std::chrono::steady_clock::time_point begin) {
 void print_error(const std::string& line);
 
 /// A line on standard error, on a terminal only unless forced.
-class Progress {
- public:
-  Progress(std::string label, long total, bool force = false);
+struct Progress {
+  std::string label;
+  long total;
+  bool shown;
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now(), last{};
+
+  Progress(const std::string& of, long steps, bool force = false);
   ~Progress();
   void update(long done);
-
- private:
-  std::string label_;
-  long total_;
-  bool shown_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
 };
 
 struct RunPlan {
@@ -55,7 +39,6 @@ struct RunPlan {
   double most_seconds = std::numeric_limits<double>::infinity();  ///< ends then, after one step at least
   bool wait = true;   ///< for each step, to time it; without: steps are queued, and timed all together
   bool timed = true;  ///< GPU time of each step; its queries are GL objects that come and go
-  Progress* progress = nullptr;
   std::function<void(long)> stepped{};  ///< after each step
   /// Takes each measurement as it arrives; without, the run keeps them.
   std::function<void(const Measurement&, const RunErrors&)> measured{};
@@ -64,7 +47,7 @@ struct RunPlan {
 struct MeasuredRun {
   RunErrors errors;
   std::vector<Measurement> measurements;  ///< the start first
-  Samples gpu_ms, wall_ms;                ///< a step; GPU time is that of its passes alone
+  std::vector<double> gpu_ms, wall_ms;    ///< a step; GPU time is that of its passes alone
   double seconds = 0;                     ///< of all steps, without what came between those waited for
   long steps = 0;                         ///< taken, and finite
 };

@@ -1,12 +1,10 @@
-#include "app/statistics.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "app/files.h"
+#include "app/commands.h"
 
 namespace tetpbd {
 
@@ -42,6 +40,27 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
 }
 
 }  // namespace
+
+ordered_json mesh_json(const MeshReport& r) {
+  return {{"vertices", r.vertices},
+          {"surface_vertices", r.surface_vertices},
+          {"surface_triangles", r.surface_triangles},
+          {"edges", r.edges},
+          {"faces", r.faces},
+          {"bends", r.bends},
+          {"tets", r.tets},
+          {"euler_characteristic", r.euler_characteristic},
+          {"genus", r.genus},
+          {"components", r.components},
+          {"volume", r.volume},
+          {"smallest_tet_volume", r.smallest_tet_volume},
+          {"mean_tet_volume", r.mean_tet_volume},
+          {"min_dihedral_deg", r.min_dihedral_deg},
+          {"max_dihedral_deg", r.max_dihedral_deg},
+          {"mean_min_dihedral_deg", r.mean_min_dihedral_deg},
+          {"slivers", r.slivers},
+          {"inverted", r.inverted}};
+}
 
 ordered_json error_json(const RunErrors& errors) {
   const ordered_json all = quantities(errors.last.value_or(nothing_measured()), errors);
@@ -90,12 +109,7 @@ ordered_json row_of(const Scene& scene, const Model& model, const Settings& sett
   return row;
 }
 
-std::string csv_header() {
-  std::vector<std::string> names;
-  const ordered_json row = quantities({}, {});
-  for (const auto& [name, value] : row.items()) names.push_back(name);
-  return fmt::format("{}\n", fmt::join(names, ","));
-}
+std::string csv_header() { return fmt::format("{}\n", fmt::join(keys(quantities({}, {})), ",")); }
 
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far) {
   std::vector<std::string> fields;

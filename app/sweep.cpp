@@ -19,6 +19,14 @@ namespace tetpbd {
 
 namespace {
 
+// A field of a CSV line: quoted where a comma, quote or line break stands in it.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string field = "\"";
+  for (const char c : text) field += c == '"' ? "\"\"" : std::string(1, c);
+  return field + "\"";
+}
+
 // A line of a table; no row: the titles.
 void print_row(const std::string& columns, const ordered_json& row) {
   std::istringstream words(columns);
@@ -66,16 +74,13 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
       all = part;
       continue;
     }
-    ordered_json expected = part;
-    for (const auto& [key, value] : all.items())
-      if (key != "rows" && key != "shard" && (key != "combinations" || all["shards"] != 1))
-        expected[key] = value;
-    if (part != expected)
-      throw Error("these shards differ", folder.string(), "merge runs of one command on one device");
+    const bool whole = part["shards"] == 1;
+    for (const auto& [key, value] : part.items())
+      if (key != "rows" && key != "shard" && !(whole && key == "combinations") && value != all[key])
+        throw Error("these shards differ", folder.string(), "merge runs of one command on one device");
     for (const char* key : {"rows", "shard"})
       all[key].insert(all[key].end(), part[key].begin(), part[key].end());
-    if (all["shards"] == 1)
-      all["combinations"] = all["combinations"].get<long>() + part["combinations"].get<long>();
+    if (whole) all["combinations"] = all["combinations"].get<long>() + part["combinations"].get<long>();
   }
   if (all["rows"].size() < all["combinations"])
     print_error(fmt::format("tetpbd: only {} rows of {}: shards {} of {}\n", all["rows"].size(),
@@ -143,6 +148,12 @@ void print_table(const Sweep& sweep, const ordered_json& document) {
   print_row(sweep.table, nullptr);
   if (document.contains("rows"))
     for (const auto& row : document["rows"]) print_row(sweep.table, row);
+}
+
+std::vector<std::string> keys(const ordered_json& object) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : object.items()) names.push_back(name);
+  return names;
 }
 
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows) {

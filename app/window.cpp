@@ -328,7 +328,7 @@ void draw_frame(Session& s, Ui& ui, View& view, Input& input, const Desktop& d) 
 
 int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides,
                const RunOptions& options) {
-  Desktop desktop(options.width, options.height, "tetpbd");
+  Desktop desktop(options.size[0], options.size[1], "tetpbd");
   Session s;  // after the desktop: its GL objects go before the context does
   s.gl = load_gl();
   if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "app/lab.h"
+#include "app/commands.h"
 #include "tests/run_program.h"
 
 using nlohmann::json;

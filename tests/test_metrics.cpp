@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "app/statistics.h"
 #include "sim/metrics.h"
 #include "tests/gl_test.h"
 
@@ -221,16 +220,4 @@ TEST_CASE("measurements come back in order and none is lost when the ring is ful
   while (const auto m = collect(metrics, true)) seen.push_back(m->step);
   CHECK(seen.size() == 100);
   CHECK(std::is_sorted(seen.begin(), seen.end()));
-}
-
-TEST_CASE("times of a long run are sampled in bounded memory") {
-  Samples samples;
-  const int count = 1'000'000;
-  for (int i = 0; i < count; ++i) samples.add(double((i * 7919L) % count));
-  CHECK(samples.count == std::uint64_t(count));
-  CHECK(samples.values.size() == Samples::most);
-  const Percentiles p = percentiles(samples.values);
-  CHECK(p.median == doctest::Approx(0.5 * count).epsilon(0.02));
-  CHECK(p.p05 == doctest::Approx(0.05 * count).epsilon(0.05));
-  CHECK(p.p95 == doctest::Approx(0.95 * count).epsilon(0.02));
 }

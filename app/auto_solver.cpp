@@ -15,7 +15,7 @@ namespace tetpbd {
 namespace {
 
 constexpr double most_seconds = 3;  // of the first trial: a slow machine compares fewer steps
-constexpr double most_substeps = 1000;
+constexpr double most_substeps = 1000, infinity = std::numeric_limits<double>::infinity();
 
 // On the front wherever it was measured (docs/results.md): one iteration a substep, never several.
 std::vector<Settings> candidates(Settings base) {
@@ -56,14 +56,12 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     fit_substeps(sim, trial.settings, budget_ms);
     reset(sim);
     Metrics metrics = create_metrics(*model, sim.system);
-    RunPlan plan;
-    if (first) plan.most_seconds = most_seconds;
-    const MeasuredRun run = run_loop(sim, &metrics, choice.steps, plan);
+    const MeasuredRun run =
+        run_loop(sim, &metrics, choice.steps, {.most_seconds = first ? most_seconds : infinity});
     if (interrupted()) throw Interrupted();
     if (first && run.errors.finite) choice.steps = run.steps;
     trial.ms = median(run.gpu_ms);
-    trial.loss_percent =
-        run.errors.finite ? run.errors.max_volume_loss_percent : std::numeric_limits<double>::infinity();
+    trial.loss_percent = run.errors.finite ? run.errors.max_volume_loss_percent : infinity;
     // Losses that agree to a hundredth are the same: then the plainer one.
     if (trial.loss_percent < 0.99 * choice.trials[choice.best].loss_percent)
       choice.best = choice.trials.size() - 1;

@@ -61,13 +61,11 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
 // fiftieth are, too: then the smaller loss counts.
 void mark_front(ordered_json& rows) {
   for (auto& row : rows) {
-    bool beaten = !std::isfinite(loss(row));
-    for (const auto& other : rows) {
-      const bool as_good = loss(other) <= 1.001 * loss(row), better = 1.001 * loss(other) < loss(row);
-      beaten |=
-          (cost_ms(other) < cost_ms(row) && as_good) || (cost_ms(other) <= 1.02 * cost_ms(row) && better);
-    }
-    row["pareto"] = !beaten;
+    const auto beats = [cost = cost_ms(row), lost = loss(row)](const ordered_json& other) {
+      return (cost_ms(other) < cost && loss(other) <= 1.001 * lost) ||
+             (cost_ms(other) <= 1.02 * cost && 1.001 * loss(other) < lost);
+    };
+    row["pareto"] = std::isfinite(loss(row)) && std::ranges::none_of(rows, beats);
   }
 }
 
@@ -204,8 +202,7 @@ void add_reference(ordered_json& rows) {
 }
 
 /// Runs what `add` gives the sweep, or merges shards of it.
-template <class Add>
-ordered_json run_or_merge(Sweep& sweep, const CompareOptions& options, const Add& add) {
+ordered_json run_or_merge(Sweep& sweep, const CompareOptions& options, const std::function<void()>& add) {
   make_output_folder(options.out);
   std::optional<HeadlessContext> context;
   if (options.shards.merge.empty()) {

@@ -1,4 +1,4 @@
-// The command line: each command is a row of `commands`, with its options and what it starts.
+// The command line: the options of each command, and what it starts.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <sstream>
-#include <tuple>
 
 #include "app/commands.h"
 #include "sim/error.h"
@@ -23,9 +22,9 @@ constexpr long most_steps = 1000000000;
 
 /// What words can set, with its defaults.
 struct Arguments {
+  int (*start)(const Arguments&) = nullptr;  ///< the command; none: the window
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  std::vector<std::optional<std::string>> values{parameters().size()};  ///< text by row of parameters()
   std::optional<Scene> opened;  ///< from these, by commands that take a scene
   std::vector<std::array<int, 2>> sizes{{1280, 720}};
   bool explain = false;
@@ -147,8 +146,6 @@ void add_axes(CLI::App& command, Axes& axes) {
 void open_scene(Arguments& a) {
   a.run.size = a.sizes[0];
   a.soak.gpu = a.run.gpu;
-  for (std::size_t i = 0; i < a.values.size(); ++i)
-    if (a.values[i]) a.overrides.parameters.emplace_back(parameters()[i].name, *a.values[i]);
   a.opened = load_scene(a.scene, a.overrides);
 }
 
@@ -159,13 +156,13 @@ void add_scene(CLI::App& command, Arguments& a) {
   command.add_option("--deform", a.overrides.deform,
                      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
                      "twist:DEGREES, invert-one, coincident, fold");
-  for (std::size_t i = 0; i < parameters().size(); ++i) {
-    const Parameter& row = parameters()[i];
+  for (const Parameter& row : parameters()) {
     const auto words = choices(row);
     const std::string allowed =
         words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
                       : fmt::format(": {}", fmt::join(words, ", "));
-    command.add_option(flag_name(row), a.values[i], row.help + allowed)
+    const auto set = [&](const std::string& text) { a.overrides.parameters.emplace_back(row.name, text); };
+    command.add_option_function<std::string>(flag_name(row), set, row.help + allowed)
         ->group("Settings")
         ->type_name("VALUE");
   }
@@ -189,122 +186,14 @@ void add_scene(CLI::App& command, Arguments& a) {
       ->transform(one_of(colour_names));
   add(view, "--cut", look.cut, 0.0, 1.0, "tets: show those below this part of the body");
   add(view, "--cut-axis", look.cut_axis, 0, 2, "0: x, 1: y, 2: z");
-  for (const auto& [flag, member, help] : {std::tuple("--flat", &ViewOptions::smooth_normals, "flat normals"),
-                                           {"--no-shadow", &ViewOptions::shadow, "no shadow"},
-                                           {"--no-grid", &ViewOptions::grid, "no lines on the ground"},
-                                           {"--no-legend", &ViewOptions::legend, "no colour bar"}})
-    view.add_flag_callback(
-        flag, [&look, off = member] { look.*off = false; }, help);
+  view.add_flag("!--flat", look.smooth_normals, "flat normals");
+  view.add_flag("!--no-shadow", look.shadow, "no shadow");
+  view.add_flag("!--no-grid", look.grid, "no lines on the ground");
+  view.add_flag("!--no-legend", look.legend, "no colour bar");
   view.add_flag("--follow", look.follow, "the camera goes where the bodies go (the window: from the start)");
   view.add_flag_callback(
       "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
-  command.callback([&] { open_scene(a); });
-}
-
-void add_run(CLI::App& command, Arguments& a) {
-  add_scene(command, a);
-  RunOptions& run = a.run;
-  add(command, "--steps", run.steps, 1L, most_steps, "steps to take (default: the scene's duration)");
-  add(command, "--out", run.out, "folder for stats.json, stats.csv, frames");
-  add(command, "--png-every", run.png_every, 1L, most_steps, "write frame_NNNNN.png every K steps");
-  add(command, "--video", run.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
-  add(command, "--video-every", run.video_every, 1L, most_steps,
-      "steps per video frame (default: those of 1/30 s)");
-  add(command, "--csv-every", run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
-  add(command, "--reference", run.reference,
-      "the right motion, made by tetpbd reference (default: the cache's of this scene)");
-  add(command, "--measure-every", run.measure_every, 1L, most_steps,
-      "measure errors every K steps and at the end");
-  command.add_flag("--positions", run.positions, "write positions.npy and tets.npy");
-  add_progress(command, run.progress);
-}
-
-void add_reference(CLI::App& command, Arguments& a) {
-  add_scene(command, a);
-  add(command, "--steps", a.reference.steps, 1L, most_steps, "steps of the scene (default: its duration)");
-  add(command, "--out", a.reference.out,
-      "file to write (default: in the cache, where runs of the scene find it)");
-  add_progress(command, a.reference.progress);
-}
-
-void add_soak(CLI::App& command, Arguments& a) {
-  add_scene(command, a);
-  add(command, "--settle", a.soak.settle, 0L, most_steps, "steps before the watch begins");
-  add(command, "--steps", a.soak.steps, 10L, most_steps, "steps watched");
-  add(command, "--out", a.soak.out, "folder for soak.json and soak.csv");
-  add_progress(command, a.soak.progress);
-}
-
-void add_bench(CLI::App& command, Arguments& a) {
-  BenchOptions& bench = a.bench;
-  add(command, "--scenes,--scene", bench.scenes, "scenes, separated by commas");
-  add_axes(command, bench.axes);
-  add(command, "--constraint-sets", bench.axes.constraint_sets, "sets of kinds joined by +");
-  add(command, "--frames", bench.frames, 1L, 1000000L, "timed frames");
-  add(command, "--warm-up", bench.warm_up, 0L, 1000000L, "frames before them");
-  add(command, "--repeats", bench.repeats, 1, 100, "repetitions; the median counts");
-  add(command, "--most-seconds", bench.most_seconds, 0.01, 1e6,
-      "a repetition ends there with fewer frames; 12 times that bounds the error run");
-  add_sizes(command, "--sizes,--size", bench.sizes, "of the rendered frames, WxH, separated by commas");
-  add(command, "--pictures", bench.pictures, "plain (flat faces on one colour), full (as run draws it)")
-      ->check(one_of(std::array{"plain", "full"}));
-  add_samples(command, bench.samples);
-  command.add_flag_callback(
-      "--no-render", [&] { bench.sizes.clear(); }, "simulation alone");
-  add_tetgen(command, bench.overrides.tetgen);
-  add_gpu(command, bench.gpu);
-  add(command, "--out", bench.out, "folder for bench.csv and bench.json");
-}
-
-void add_compare(CLI::App& command, Arguments& a) {
-  CompareOptions& compare = a.compare;
-  // Options are taken in the order of these lines, so what follows stands above the defaults of hard cases.
-  auto* hard = command.add_flag_callback(
-      "--hard-cases",
-      [&] {
-        a.hard_cases = true;
-        compare.axes.modes = hard_case_modes, compare.steps = 0, compare.out = "stability";
-      },
-      "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
-      "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 % and no tet "
-      "inverted; scenes in which no constraint acts are left out");
-  add(command, "--scene", compare.scene, "a scene");
-  add_overrides(command, compare.overrides);
-  add_axes(command, compare.axes);
-  add(command, "--omegas", compare.axes.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
-  add(command, "--steps", compare.steps, 1L, most_steps, "steps of each run");
-  add(command, "--budget-ms", compare.budget_ms, 1e-9, 1e9,
-      "print the best setting within so many ms per step");
-  add(command, "--error", compare.error_percent, 1e-9, 1e9,
-      "print the cheapest setting that loses at most this volume, %");
-  command.add_option_function<std::string>(
-      "--shard",
-      [&](const std::string& text) {
-        const auto [i, n] = two_numbers("--shard", text, '/', 1, 99999);
-        if (i > n) throw Error("bad share", "--shard " + text, "count i from 1 to n, as in 2/8");
-        compare.shards.shard = i, compare.shards.shards = n;
-      },
-      "i/n: only every n-th combination, from the i-th; merge them afterwards");
-  add(command, "--cases", compare.cases, "hard cases to run (default: all)")->needs(hard);
-  add(command, "--meshes", compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
-  command.add_option("--merge", compare.shards.merge, "folders of finished shards, instead of running");
-  add_gpu(command, compare.gpu);
-  add(command, "--out", compare.out, "folder for compare.csv, .json, .svg, .png");
-}
-
-void add_reproduce(CLI::App& command, Arguments& a) {
-  add(command, "--out", a.reproduce.out, "folder for report.html, figures, tables");
-  command.add_flag("--quick", a.reproduce.quick, "bunny alone, few frames: checks the trends without a GPU");
-  add_gpu(command, a.reproduce.gpu);
-}
-
-void add_mesh(CLI::App& command, Arguments& a) {
-  add(command, "file", a.mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")
-      ->required();
-  add_tetgen(command, a.switches);
-  add(command, "--out", a.mesh_out,
-      "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
-  command.add_flag("--json", a.json, "print the report as JSON");
+  command.parse_complete_callback([&] { open_scene(a); });
 }
 
 int start_view(const Arguments& a) {
@@ -314,32 +203,128 @@ int start_view(const Arguments& a) {
   return run_window(*a.opened, a.scene, a.overrides, a.run);
 }
 
-struct Command {
-  const char *name, *help;
-  void (*add)(CLI::App&, Arguments&);  ///< its options
-  int (*start)(const Arguments&);
-};
+/// Each command is a paragraph: its help, what it starts, its options.
+void add_commands(CLI::App& app, Arguments& a) {
+  const auto command = [&](const char* name, const char* help, int (*start)(const Arguments&)) -> CLI::App& {
+    CLI::App& added = *app.add_subcommand(name, help);
+    added.final_callback([&a, start] { a.start = start; });
+    return added;
+  };
 
-const Command commands[] = {
-    {"view", "a window (the default where there is a display)", add_scene, start_view},
-    {"run", "headless: steps a scene, writes frames, video, statistics", add_run,
-     [](const Arguments& a) { return run_headless(*a.opened, a.run); }},
-    {"reference", "finds the right motion of a scene and keeps it: what runs are held against", add_reference,
-     [](const Arguments& a) { return run_reference(*a.opened, a.reference); }},
-    {"soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down", add_soak,
-     [](const Arguments& a) { return run_soak(*a.opened, a.soak); }},
-    {"bench", "fps and ms per step, the paper's protocol and ours", add_bench,
-     [](const Arguments& a) { return run_bench(a.bench); }},
-    {"compare", "speed against error over modes x iterations x substeps", add_compare,
-     [](const Arguments& a) { return (a.hard_cases ? run_hard_cases : run_compare)(a.compare); }},
-    {"reproduce", "the paper's table and figures, measured here, with plots and one report", add_reproduce,
-     [](const Arguments& a) { return run_reproduce(a.reproduce); }},
-    {"mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", add_mesh,
-     [](const Arguments& a) { return run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json); }},
-    {"info", "GL version, devices, limits, extensions used, build, licences",
-     [](CLI::App& command, Arguments& a) { add_gpu(command, a.run.gpu); },
-     [](const Arguments& a) { return print_info(a.run.gpu); }},
-};
+  add_scene(command("view", "a window (the default where there is a display)", start_view), a);
+
+  CLI::App& run = command("run", "headless: steps a scene, writes frames, video, statistics",
+                          [](const Arguments& a) { return run_headless(*a.opened, a.run); });
+  add_scene(run, a);
+  add(run, "--steps", a.run.steps, 1L, most_steps, "steps to take (default: the scene's duration)");
+  add(run, "--out", a.run.out, "folder for stats.json, stats.csv, frames");
+  add(run, "--png-every", a.run.png_every, 1L, most_steps, "write frame_NNNNN.png every K steps");
+  add(run, "--video", a.run.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
+  add(run, "--video-every", a.run.video_every, 1L, most_steps,
+      "steps per video frame (default: those of 1/30 s)");
+  add(run, "--csv-every", a.run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
+  add(run, "--reference", a.run.reference,
+      "the right motion, made by tetpbd reference (default: the cache's of this scene)");
+  add(run, "--measure-every", a.run.measure_every, 1L, most_steps,
+      "measure errors every K steps and at the end");
+  run.add_flag("--positions", a.run.positions, "write positions.npy and tets.npy");
+  add_progress(run, a.run.progress);
+
+  CLI::App& reference =
+      command("reference", "finds the right motion of a scene and keeps it: what runs are held against",
+              [](const Arguments& a) { return run_reference(*a.opened, a.reference); });
+  add_scene(reference, a);
+  add(reference, "--steps", a.reference.steps, 1L, most_steps, "steps of the scene (default: its duration)");
+  add(reference, "--out", a.reference.out,
+      "file to write (default: in the cache, where runs of the scene find it)");
+  add_progress(reference, a.reference.progress);
+
+  CLI::App& soak =
+      command("soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down",
+              [](const Arguments& a) { return run_soak(*a.opened, a.soak); });
+  add_scene(soak, a);
+  add(soak, "--settle", a.soak.settle, 0L, most_steps, "steps before the watch begins");
+  add(soak, "--steps", a.soak.steps, 10L, most_steps, "steps watched");
+  add(soak, "--out", a.soak.out, "folder for soak.json and soak.csv");
+  add_progress(soak, a.soak.progress);
+
+  CLI::App& bench = command("bench", "fps and ms per step, the paper's protocol and ours",
+                            [](const Arguments& a) { return run_bench(a.bench); });
+  add(bench, "--scenes,--scene", a.bench.scenes, "scenes, separated by commas");
+  add_axes(bench, a.bench.axes);
+  add(bench, "--constraint-sets", a.bench.axes.constraint_sets, "sets of kinds joined by +");
+  add(bench, "--frames", a.bench.frames, 1L, 1000000L, "timed frames");
+  add(bench, "--warm-up", a.bench.warm_up, 0L, 1000000L, "frames before them");
+  add(bench, "--repeats", a.bench.repeats, 1, 100, "repetitions; the median counts");
+  add(bench, "--most-seconds", a.bench.most_seconds, 0.01, 1e6,
+      "a repetition ends there with fewer frames; 12 times that bounds the error run");
+  add_sizes(bench, "--sizes,--size", a.bench.sizes, "of the rendered frames, WxH, separated by commas");
+  add(bench, "--pictures", a.bench.pictures, "plain (flat faces on one colour), full (as run draws it)")
+      ->check(one_of(std::array{"plain", "full"}));
+  add_samples(bench, a.bench.samples);
+  bench.add_flag_callback(
+      "--no-render", [&] { a.bench.sizes.clear(); }, "simulation alone");
+  add_tetgen(bench, a.bench.overrides.tetgen);
+  add_gpu(bench, a.bench.gpu);
+  add(bench, "--out", a.bench.out, "folder for bench.csv and bench.json");
+
+  CLI::App& compare =
+      command("compare", "speed against error over modes x iterations x substeps",
+              [](const Arguments& a) { return (a.hard_cases ? run_hard_cases : run_compare)(a.compare); });
+  // Options are taken in the order of these lines, so what follows stands above the defaults of hard cases.
+  auto* hard = compare.add_flag_callback(
+      "--hard-cases",
+      [&] {
+        a.hard_cases = true;
+        a.compare.axes.modes = hard_case_modes, a.compare.steps = 0, a.compare.out = "stability";
+      },
+      "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
+      "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 % and no tet "
+      "inverted; scenes in which no constraint acts are left out");
+  add(compare, "--scene", a.compare.scene, "a scene");
+  add_overrides(compare, a.compare.overrides);
+  add_axes(compare, a.compare.axes);
+  add(compare, "--omegas", a.compare.axes.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
+  add(compare, "--steps", a.compare.steps, 1L, most_steps, "steps of each run");
+  add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9,
+      "print the best setting within so many ms per step");
+  add(compare, "--error", a.compare.error_percent, 1e-9, 1e9,
+      "print the cheapest setting that loses at most this volume, %");
+  compare.add_option_function<std::string>(
+      "--shard",
+      [&](const std::string& text) {
+        const auto [i, n] = two_numbers("--shard", text, '/', 1, 99999);
+        if (i > n) throw Error("bad share", "--shard " + text, "count i from 1 to n, as in 2/8");
+        a.compare.shards.shard = i, a.compare.shards.shards = n;
+      },
+      "i/n: only every n-th combination, from the i-th; merge them afterwards");
+  add(compare, "--cases", a.compare.cases, "hard cases to run (default: all)")->needs(hard);
+  add(compare, "--meshes", a.compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
+  compare.add_option("--merge", a.compare.shards.merge, "folders of finished shards, instead of running");
+  add_gpu(compare, a.compare.gpu);
+  add(compare, "--out", a.compare.out, "folder for compare.csv, .json, .svg, .png");
+
+  CLI::App& reproduce =
+      command("reproduce", "the paper's table and figures, measured here, with plots and one report",
+              [](const Arguments& a) { return run_reproduce(a.reproduce); });
+  add(reproduce, "--out", a.reproduce.out, "folder for report.html, figures, tables");
+  reproduce.add_flag("--quick", a.reproduce.quick,
+                     "bunny alone, few frames: checks the trends without a GPU");
+  add_gpu(reproduce, a.reproduce.gpu);
+
+  CLI::App& mesh = command(
+      "mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it",
+      [](const Arguments& a) { return run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json); });
+  add(mesh, "file", a.mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")->required();
+  add_tetgen(mesh, a.switches);
+  add(mesh, "--out", a.mesh_out,
+      "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  mesh.add_flag("--json", a.json, "print the report as JSON");
+
+  add_gpu(command("info", "GL version, devices, limits, extensions used, build, licences",
+                  [](const Arguments& a) { return print_info(a.run.gpu); }),
+          a.run.gpu);
+}
 
 }  // namespace
 
@@ -353,7 +338,7 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
       "--shaders", shaders,
       "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
   Arguments arguments;
-  for (const Command& row : commands) row.add(*app.add_subcommand(row.name, row.help), arguments);
+  add_commands(app, arguments);
 
   // Options without a command belong to the window: tetpbd --scene beam.
   if (!words.empty() && words[0].starts_with("--") && words[0] != "--help" && words[0] != "--version" &&
@@ -373,16 +358,13 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
                 fmt::format("see tetpbd {}--help", parsed.empty() ? "" : parsed[0]->get_name() + " "));
   }
   if (!shaders.empty()) set_shader_folder(shaders);
-  const Command* chosen = nullptr;
-  for (const Command& row : commands)
-    if (app.got_subcommand(row.name)) chosen = &row;
-  if (!chosen) {
-    chosen = &commands[0];
+  if (!arguments.start) {
+    arguments.start = start_view;
     open_scene(arguments);
   }
-  return [chosen, a = std::move(arguments)] {
-    if (chosen->start != start_view) catch_interrupts();  // the window has no files to finish
-    return a.explain ? print_explanation(*a.opened, a.run.gpu) : chosen->start(a);
+  return [a = std::move(arguments)] {
+    if (a.start != start_view) catch_interrupts();  // the window has no files to finish
+    return a.explain ? print_explanation(*a.opened, a.run.gpu) : a.start(a);
   };
 }
 

@@ -16,16 +16,6 @@ constexpr const char* format_name = "tetpbd motion 1";
 
 std::string hex(std::uint64_t key) { return fmt::format("{:016x}", key); }
 
-void print_motion(const Scene& scene, const Motion& motion) {
-  const double error = std::ranges::max(motion.rows, {}, &Motion::Row::error).error;
-  const Motion::Row& last = motion.rows.back();
-  fmt::print("{}: {} in steps of {:.3g} s, {:.3g} s of motion, {} instants kept\n", scene.name, motion.method,
-             motion.step, last.time, motion.kept.size());
-  fmt::print("  own error {:.2g} of the size: the most that steps twice as long are away\n", error);
-  fmt::print("  at the end: centre {:.5g} m high, energy {:.6g} J ({:.6g} kinetic)\n", last.centre.y,
-             last.kinetic + last.potential, last.kinetic);
-}
-
 // The cache's file of this scene's motion; empty without a cache folder.
 std::filesystem::path cached_motion(std::uint64_t scene) { return cache_file("motion_" + hex(scene)); }
 
@@ -107,8 +97,10 @@ int run_reference(const Scene& scene, const ReferenceOptions& options) {
   const Motion motion =
       find_motion(input, steps, file.string() + ".unfinished", [&](long done) { progress.update(done); });
   write_motion(file, *model, motion);
-  print_motion(scene, motion);
-  fmt::print("{}\n", file.string());
+  fmt::print("{}: {} in steps of {:.3g} s, {} instants kept\n", scene.name, motion.method, motion.step,
+             motion.kept.size());
+  fmt::print("  own error {:.2g} of the size: the most that steps twice as long are away\n{}\n",
+             std::ranges::max(motion.rows, {}, &Motion::Row::error).error, file.string());
   return 0;
 }
 

@@ -49,20 +49,18 @@ int run_soak(Scene scene, const SoakOptions& options) {
   run_loop(sim, &metrics, options.settle, plan);
   const GlLive live = gl_live();  // no measurement under way, as at the end: their fences count
   ordered_json samples;           // a row of soak.csv each, counted from the end of settling
-  double drift = 0;
   Progress progress("stepping", options.steps, options.progress);
   plan.stepped = [&](long s) { progress.update(s); };
   const auto begin = std::chrono::steady_clock::now();
   plan.measured = [&](const Measurement& m, const RunErrors& errors) {
     if (!m.finite()) return;
-    const double moved = glm::length(m.centre - errors.first->centre) / model->size;
-    drift = std::max(drift, moved);
-    samples.push_back({{"step", m.step - errors.first->step},
+    const Measurement& start = *errors.first;
+    samples.push_back({{"step", m.step - start.step},
                        {"seconds", seconds_since(begin)},
                        {"centre_x", m.centre.x},
                        {"centre_y", m.centre.y},
                        {"centre_z", m.centre.z},
-                       {"drift", moved},
+                       {"drift", glm::length(m.centre - start.centre) / model->size},
                        {"kinetic_energy", m.kinetic},
                        {"resident_bytes", resident_bytes()},
                        {"gl_buffer_bytes", gl_live().buffer_bytes}});
@@ -77,6 +75,8 @@ int run_soak(Scene scene, const SoakOptions& options) {
   };
   const double first_speed = steps_per_second(at(0), at(0.1)), last_speed = steps_per_second(at(0.9), at(1));
   const double growth = number(at(1), "resident_bytes") - number(at(0.1), "resident_bytes");
+  double drift = 0;
+  for (const auto& sample : samples) drift = std::max(drift, number(sample, "drift"));
   ordered_json checks;
   std::string failed;
   const auto check = [&](const char* name, double value, double limit, bool passed) {

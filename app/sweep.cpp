@@ -41,28 +41,24 @@ void print_row(const std::string& columns, const ordered_json& row) {
   std::fflush(stdout);
 }
 
-// Whatever stands in the file, what follows finds the keys and types it looks for.
-ordered_json read_part(const Sweep& sweep, const std::filesystem::path& file) {
-  try {
-    std::ifstream stream(file);
-    const ordered_json part = ordered_json::parse(stream);
-    for (const char* key : {"gl_renderer", "gl_version", "software"}) part.at("device").at(key);
-    for (const auto& [key, fact] : sweep.facts.items()) part.at(key).get<double>();
-    for (const char* key : {"combinations", "shards"}) part.at(key).get<double>();
-    part.at("shard").get<std::vector<int>>();
-    csv_text(sweep.columns, part.at("rows"));
-    return part;
-  } catch (const ordered_json::exception&) {
-    throw Error("not a finished " + sweep.title, file.string(), "run that shard again");
-  }
-}
-
-// Shards of one command, or whole sweeps: of other settings, but otherwise the same.
+// Shards of one command, or whole sweeps: of other settings, but otherwise the same. Whatever stands in the
+// files, what follows finds the keys and types it looks for.
 ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>& folders) {
   ordered_json all;
   std::set<ordered_json> names;
   for (const auto& folder : folders) {
-    const ordered_json part = read_part(sweep, folder / (sweep.name + ".json"));
+    const std::filesystem::path file = folder / (sweep.name + ".json");
+    ordered_json part;
+    try {
+      part = ordered_json::parse(std::ifstream(file));
+      for (const char* key : {"gl_renderer", "gl_version", "software"}) part.at("device").at(key);
+      for (const auto& [key, fact] : sweep.facts.items()) part.at(key).get<double>();
+      for (const char* key : {"combinations", "shards"}) part.at(key).get<double>();
+      part.at("shard").get<std::vector<int>>();
+      csv_text(sweep.columns, part.at("rows"));
+    } catch (const ordered_json::exception&) {
+      throw Error("not a finished " + sweep.title, file.string(), "run that shard again");
+    }
     for (const auto& row : part["rows"]) {
       ordered_json name;
       for (std::size_t c = 0; c < sweep.identity; ++c) name.push_back(row[sweep.columns[c]]);

@@ -44,6 +44,8 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
 
 }  // namespace
 
+double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
+
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
                            double budget_ms, long steps) {
   SolverChoice choice{budget_ms, steps};

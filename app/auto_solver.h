@@ -27,6 +27,8 @@ struct SolverChoice {
   const Settings& settings() const { return trials[best].settings; }
 };
 
+/// The budget without --budget-ms: a tenth of the time that a step simulates.
+double default_budget_ms(const Settings& settings);
 /// Tries mode node, one iteration a substep: averaged with two over-relaxations, with masses split.
 /// Everything else stays as in `settings`. Takes a second or so on a GPU; needs a GL context.
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,

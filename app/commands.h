@@ -1,6 +1,6 @@
-// The commands: what each is asked for, and what starts it. run_loop steps and measures, sweep combines
-// settings and merges shards, chart draws; a command is its columns and its judgement. Names in files are
-// relied upon by scripts (docs/guide.md): they may be added to, not changed.
+// The commands: what each is asked for, and what starts it, which returns the exit status. run_loop steps and
+// measures, sweep combines settings and merges shards, chart draws; a command is its columns and its
+// judgement. Names in files are relied upon by scripts (docs/guide.md): they may be added to, not changed.
 #pragma once
 
 #include <array>
@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "app/reference_command.h"
 #include "app/run_loop.h"
 #include "app/scene.h"
 #include "app/sweep.h"
 #include "render/frame.h"
-#include "sim/reference/motion.h"
 
 namespace tetpbd {
 
@@ -38,8 +38,7 @@ struct RunOptions {
   ViewOptions view;
   bool progress = false;  ///< show it even if standard error is no terminal
 };
-/// `tetpbd run`: steps a scene without a window and writes frames, video and statistics. Exit status: 0, or 1
-/// if the state became non-finite.
+/// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
 int run_headless(Scene scene, const RunOptions& options);
 /// Prints buffers, bytes, kernels and dispatches a step.
 int print_explanation(Scene scene, int gpu);
@@ -50,21 +49,10 @@ int print_info(int gpu);
 int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides,
                const RunOptions& options);
 
-/// `tetpbd mesh`: checks a mesh, tetrahedralises surfaces with TetGen's `switches`, reports, writes it where
-/// `out` says. Exit status: 0, or 1 when tets are inverted.
+/// `tetpbd mesh`: checks a mesh, fills surfaces with TetGen's `switches`, reports, writes it where `out`
+/// says.
 int run_mesh_command(const std::filesystem::path& file, const std::string& switches,
                      const std::filesystem::path& out, bool json);
-
-struct ReferenceOptions {
-  long steps = 0;             ///< 0: the scene's duration
-  std::filesystem::path out;  ///< empty: in the cache, where runs of the scene find it
-  bool progress = false;
-};
-/// `tetpbd reference`: finds a scene's right motion and keeps it in a file. Prints what the motion is and how
-/// wrong it may be. An interrupted search goes on where it was.
-int run_reference(const Scene& scene, const ReferenceOptions& options);
-/// The motion in `file`, or without one the cache's of this scene, if it has any.
-std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
 
 struct BenchOptions {
   std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
@@ -82,8 +70,7 @@ struct BenchOptions {
   int gpu = -1;
   std::filesystem::path out = "bench";
 };
-/// `tetpbd bench`: frames a second and milliseconds a step, by the paper's protocol, beside the error of the
-/// same setting. Exit status 1 if any state became non-finite.
+/// `tetpbd bench`: frames a second and ms a step, by the paper's protocol, beside the error of the setting.
 int run_bench(const BenchOptions& options);
 /// Its rows, to be made in the current context.
 Sweep bench_sweep(const BenchOptions& options);
@@ -103,10 +90,9 @@ struct CompareOptions {
 /// `tetpbd compare`: speed against error over modes x iterations x substeps.
 int run_compare(const CompareOptions& options);
 
-/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double
-/// precision. Exit status 1 if any state became non-finite. Of the axes only modes count: NAME-substeps runs
-/// mode NAME with one iteration a substep, as many substeps as the scene has iterations. Steps 0: the scene's
-/// duration.
+/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double. Of the
+/// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
+/// scene has iterations. Steps 0: the scene's duration.
 int run_hard_cases(const CompareOptions& options);
 inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu",
                                                       "cpu-double"};
@@ -130,8 +116,7 @@ struct SoakOptions {
   int gpu = -1;
   bool progress = false;
 };
-/// `tetpbd soak`: a long run of a body at rest that must not drift, leak or slow down. Exit status: 0, or 1
-/// if a check failed.
+/// `tetpbd soak`: a long run of a body at rest that must not drift, leak or slow down.
 int run_soak(Scene scene, const SoakOptions& options);
 
 // ------------------------------------------------------------------------------------------------------------

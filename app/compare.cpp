@@ -76,10 +76,8 @@ Chart chart_of(const ordered_json& document) {
                           text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
                           text_of(document["device"]["gl_renderer"])),
               "time of a step, ms (GPU time; cpu modes: wall time)", "largest volume loss, %", true};
-  std::vector<ordered_json> sorted(rows.begin(), rows.end());
-  std::ranges::sort(sorted, {}, cost_ms);
   Series front{"Pareto front", "#999999", Series::dashes};
-  for (const auto& row : sorted) {
+  for (const auto& row : rows) {
     const glm::dvec2 point(cost_ms(row), loss(row));
     if (!std::isfinite(point.y)) continue;
     if (row["pareto"] == true) {
@@ -91,6 +89,7 @@ Chart chart_of(const ordered_json& document) {
     if (series == chart.series.end()) series = chart.series.insert(series, {mode, mode_colour(mode)});
     series->points.push_back(point);
   }
+  std::ranges::sort(front.points, {}, &glm::dvec2::x);
   chart.series.push_back(front);
   return chart;
 }
@@ -162,9 +161,9 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
   const MeasuredRun run = run_loop(sim, &metrics, steps);
   const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
-  row["steps"] = run.steps;
-  row["recovered_at_step"] = recovered ? ordered_json(*recovered) : ordered_json();
-  row["reference_recovered_at_step"] = nullptr;
+  row.update({{"steps", run.steps},
+              {"recovered_at_step", recovered ? ordered_json(*recovered) : nullptr},
+              {"reference_recovered_at_step", nullptr}});
   const GuardCounts guards = guard_counts(sim);
   for (std::size_t g = 0; g < GUARDS; ++g) row[fmt::format("guard_{}", guard_names[g])] = guards[g];
   return row;

@@ -1,25 +1,51 @@
+#include "app/reference_command.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
-#include "app/commands.h"
 #include "app/files.h"
+#include "app/run_loop.h"
 #include "sim/error.h"
+#include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
 
 namespace tetpbd {
 
 namespace {
 
+using nlohmann::ordered_json;
+
 constexpr const char* format_name = "tetpbd motion 1";
 
 std::string hex(std::uint64_t key) { return fmt::format("{:016x}", key); }
 
+void print_motion(const Scene& scene, const Motion& motion) {
+  double error = 0, before = 0, after = 0, apex = 0;
+  bool risen = false;
+  for (const Motion::Row& row : motion.rows) {
+    error = std::max(error, row.error);
+    if (!risen) before = std::max(before, -row.velocity.y);
+    risen = risen || row.velocity.y > 0;
+    if (risen) after = std::max(after, row.velocity.y), apex = std::max(apex, row.centre.y);
+  }
+  const Motion::Row& last = motion.rows.back();
+  fmt::print("{}: {} in steps of {:.3g} s, {:.3g} s of motion, {} instants kept\n", scene.name, motion.method,
+             motion.step, last.time, motion.kept.size());
+  fmt::print("  own error {:.2g} of the size: the most that steps twice as long are away\n", error);
+  if (risen && before > 0)
+    fmt::print("  centre of mass: {:.4g} m/s down, then {:.4g} m/s up to {:.4g} m\n", before, after, apex);
+  fmt::print("  at the end: centre {:.5g} m high, energy {:.6g} J ({:.6g} kinetic)\n", last.centre.y,
+             last.kinetic + last.potential, last.kinetic);
+}
+
 // The cache's file of this scene's motion; empty without a cache folder.
 std::filesystem::path cached_motion(std::uint64_t scene) { return cache_file("motion_" + hex(scene)); }
 
-/// A line of JSON, then the kept positions as float64, frames x N x 3, in the first order of vertices.
+}  // namespace
+
 void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion) {
   ordered_json head = {
       {"format", format_name},
@@ -41,7 +67,6 @@ void write_motion(const std::filesystem::path& file, const Model& model, const M
   write_file(file, text);
 }
 
-/// Throws Error for what is no such file, or of another scene than `scene` (scene_key).
 Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene) {
   std::ifstream in(file, std::ios::binary);
   std::string line;
@@ -74,8 +99,6 @@ Motion read_motion(const std::filesystem::path& file, const Model& model, std::u
   return motion;
 }
 
-}  // namespace
-
 std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file) {
   const std::uint64_t scene = scene_key(input);
   const std::filesystem::path from = file.empty() ? cached_motion(scene) : file;
@@ -85,6 +108,7 @@ std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesyst
 }
 
 int run_reference(const Scene& scene, const ReferenceOptions& options) {
+  catch_interrupts();
   const auto model = build_model(scene);
   const ConstraintSystem system = build_constraints(model->rest, scene.settings.constraints);
   const ReferenceInput input{*model, system, scene.settings, model->inverse_masses};
@@ -97,10 +121,8 @@ int run_reference(const Scene& scene, const ReferenceOptions& options) {
   const Motion motion =
       find_motion(input, steps, file.string() + ".unfinished", [&](long done) { progress.update(done); });
   write_motion(file, *model, motion);
-  fmt::print("{}: {} in steps of {:.3g} s, {} instants kept\n", scene.name, motion.method, motion.step,
-             motion.kept.size());
-  fmt::print("  own error {:.2g} of the size: the most that steps twice as long are away\n{}\n",
-             std::ranges::max(motion.rows, {}, &Motion::Row::error).error, file.string());
+  print_motion(scene, motion);
+  fmt::print("{}\n", file.string());
   return 0;
 }
 

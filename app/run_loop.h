@@ -57,8 +57,7 @@ struct MeasuredRun {
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});
 /// The same with a simulation of its own, every step measured.
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps);
-/// Steps until a GPU that has rested while the CPU prepared the scene runs at its full clock, which takes a
-/// few hundred milliseconds. Nothing on a software renderer.
+/// Steps until a GPU that has rested runs at its full clock: 0.3 s. Nothing on a software renderer.
 void warm_up(Sim& sim);
 
 }  // namespace tetpbd

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "app/auto_solver.h"
 #include "sim/error.h"
 #include "sim/layout.h"
 
@@ -310,7 +311,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     const Parameter& row = *find_parameter(name);
     set_parameter(scene.settings, row, text, flag_name(row));
   }
-  if (by_trying) scene.budget_ms = overrides.budget_ms.value_or(100 * scene.settings.dt);  // a tenth of it
+  if (by_trying) scene.budget_ms = overrides.budget_ms.value_or(default_budget_ms(scene.settings));
   if (!overrides.mesh.empty()) {
     BodyDescription& body = scene.bodies[0];
     body.name = overrides.mesh.stem().string();

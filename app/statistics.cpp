@@ -41,26 +41,11 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
 
 }  // namespace
 
-ordered_json mesh_json(const MeshReport& r) {
-  return {{"vertices", r.vertices},
-          {"surface_vertices", r.surface_vertices},
-          {"surface_triangles", r.surface_triangles},
-          {"edges", r.edges},
-          {"faces", r.faces},
-          {"bends", r.bends},
-          {"tets", r.tets},
-          {"euler_characteristic", r.euler_characteristic},
-          {"genus", r.genus},
-          {"components", r.components},
-          {"volume", r.volume},
-          {"smallest_tet_volume", r.smallest_tet_volume},
-          {"mean_tet_volume", r.mean_tet_volume},
-          {"min_dihedral_deg", r.min_dihedral_deg},
-          {"max_dihedral_deg", r.max_dihedral_deg},
-          {"mean_min_dihedral_deg", r.mean_min_dihedral_deg},
-          {"slivers", r.slivers},
-          {"inverted", r.inverted}};
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MeshReport, vertices, surface_vertices, surface_triangles, edges, bends,
+                                   tets, faces, euler_characteristic, genus, components, volume,
+                                   smallest_tet_volume, mean_tet_volume, min_dihedral_deg, max_dihedral_deg,
+                                   mean_min_dihedral_deg, slivers, inverted)
+ordered_json mesh_json(const MeshReport& counts) { return nlohmann::json(counts); }
 
 ordered_json error_json(const RunErrors& errors) {
   const ordered_json all = quantities(errors.last.value_or(nothing_measured()), errors);

@@ -1,0 +1,28 @@
+// `tetpbd reference`: finds a scene's right motion (sim/reference/motion.h) and keeps it in a file; and those
+// files.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "app/scene.h"
+#include "sim/reference/motion.h"
+
+namespace tetpbd {
+
+struct ReferenceOptions {
+  long steps = 0;             ///< 0: the scene's duration
+  std::filesystem::path out;  ///< empty: in the cache, where runs of the scene find it
+  bool progress = false;      ///< show it even if standard error is no terminal
+};
+/// Prints what the motion is and how wrong it may be. An interrupted search goes on where it was.
+int run_reference(const Scene& scene, const ReferenceOptions& options);
+
+/// A line of JSON, then the kept positions as float64, frames x N x 3, in the first order of vertices.
+void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion);
+/// Throws Error for what is no such file, or of another scene than `scene` (scene_key).
+Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene);
+/// The motion in `file`, or without one the cache's of this scene, if it has any.
+std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
+
+}  // namespace tetpbd

@@ -56,7 +56,9 @@ std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try
 std::optional<TetMesh> read_mesh(std::uint64_t key) {
   const fs::path file = mesh_file(key);
   std::error_code failed;
-  std::string bytes(fs::is_regular_file(file, failed) ? fs::file_size(file, failed) : 0, '\0');
+  const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
+  if (failed) return {};
+  std::string bytes(size, '\0');
   std::ifstream(file, std::ios::binary).read(bytes.data(), std::streamsize(bytes.size()));
   return parse_mesh(bytes, key);
 }

@@ -137,7 +137,10 @@ bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) 
 bool is_idle(const Settings& settings, const Parameter& row) {
   const std::string_view name = row.name;
   if (name == "mass_splitting") return compliant(settings);  // brings it with it
+  const bool material = settings.material != "none";
+  if (name == "young_modulus" || name == "poisson_ratio") return !material;
   if (!name.starts_with("k_") && !name.starts_with("compliance_")) return false;
+  if (material) return true;
   return std::ranges::count(split(settings.constraints, ','), name.substr(name.find('_') + 1)) == 0;
 }
 
@@ -182,7 +185,7 @@ void draw_solver(Session& s, Ui& ui) {
   Words words;
   std::map<std::string, Settings> ways;
   for (const SolverPreset& preset : solver_presets()) {
-    apply_preset(ways[preset.name] = now, preset);
+    apply_values(ways[preset.name] = now, preset.values, preset.name);
     if (ways[preset.name] == now && !automatic) current = preset.name;
     words.push_back(preset.name);
     help += fmt::format("\n{}: {}", preset.name, preset.help);

@@ -10,6 +10,7 @@
 #include "app/run_loop.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
+#include "sim/material.h"
 #include "sim/mesh/cache.h"
 
 namespace tetpbd {
@@ -110,7 +111,7 @@ std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesyst
 int run_reference(const Scene& scene, const ReferenceOptions& options) {
   catch_interrupts();
   const auto model = build_model(scene);
-  const ConstraintSystem system = build_constraints(model->rest, scene.settings.constraints);
+  const ConstraintSystem system = build_constraints(model->rest, scene.settings);
   const ReferenceInput input{*model, system, scene.settings, model->inverse_masses};
   const std::filesystem::path file = options.out.empty() ? cached_motion(scene_key(input)) : options.out;
   if (file.empty()) throw Error("nowhere to keep it", "there is no cache folder", "give --out FILE");

@@ -16,6 +16,7 @@
 #include "app/auto_solver.h"
 #include "sim/error.h"
 #include "sim/layout.h"
+#include "sim/material.h"
 
 namespace glm {
 template <class T>
@@ -87,6 +88,8 @@ json schema() {
       {"fixed", list(0, 100, boxes, box)},
       {"heavy", list(0, 100, boxes, heavy)},
       {"deform", "text"},
+      {"material",
+       {{"or", "text"}, {"model", nullptr}, {"young_modulus", nullptr}, {"poisson_ratio", nullptr}}},
   };
   const json plane = {{"point", vector(-far, far)}, {"normal", vector(-1e3, 1e3)}};
   json result = {
@@ -133,12 +136,13 @@ void check(const json& value, const json& allowed, const std::string& path, cons
             "a list of " + of);
     for (std::size_t i = 0; i < value.size(); ++i)
       check(value[i], allowed["each"], inner(std::to_string(i)), file);
-  } else if (allowed.is_object()) {
+  } else if (allowed.is_object() && !(allowed.contains("or") && value.is_string())) {
     require(value.is_object(), "an object in braces");
     for (const auto& [key, held] : value.items()) {
-      if (!allowed.contains(key)) {
+      if (!allowed.contains(key) || key == "or") {
         std::vector<std::string> known;
-        for (const auto& item : allowed.items()) known.push_back(item.key());
+        for (const auto& item : allowed.items())
+          if (item.key() != "or") known.push_back(item.key());
         refuse(fmt::format("'{}' is not known here; known are {}", inner(key), fmt::join(known, ", ")), file);
       }
       check(held, allowed[key], inner(key), file);
@@ -161,6 +165,25 @@ void read_settings(const json& section, Settings& settings, const std::string& f
     }
     set_parameter(settings, *row, text, file);
   }
+}
+
+// By name, or its model and moduli, which are settings; all bodies have the same.
+void read_material(const json& bodies, Settings& settings, const std::string& file) {
+  const json material = bodies[0].value("material", json());
+  for (const json& body : bodies)
+    if (body.value("material", json()) != material)
+      refuse("bodies of different materials cannot be in one scene", file);
+  if (material.is_null()) return;
+  if (material.is_string()) {
+    std::vector<std::string> names;
+    for (const MaterialPreset& preset : material_presets())
+      if (names.emplace_back(preset.name) == material) return apply_values(settings, preset.values, file);
+    refuse(fmt::format("'bodies.0.material' is no material; there are {}", fmt::join(names, ", ")), file);
+  }
+  settings.material = "neo-hookean";
+  json rows = material;
+  if (rows.contains("model")) rows["material"] = rows["model"], rows.erase("model");
+  read_settings(rows, settings, file);
 }
 
 BodyDescription read_body(const json& value, const std::string& where, const std::string& file,
@@ -193,6 +216,7 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
         read_body(body, fmt::format("bodies.{}", scene.bodies.size()), file, path.parent_path()));
   for (const char* section : {"world", "solver"})
     read_settings(document.value(section, json()), scene.settings, file);
+  read_material(document["bodies"], scene.settings, file);
   for (const json& plane : document.value("/world/obstacles"_json_pointer, json())) {
     const auto normal = plane.value("normal", glm::dvec3(0)), point = plane.value("point", glm::dvec3(0));
     if (!(glm::length(normal) > 1e-9))
@@ -261,7 +285,7 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   std::vector<std::string> names{"auto"};
   for (const SolverPreset& preset : solver_presets()) {
     names.emplace_back(preset.name);
-    if (name == preset.name) return apply_preset(settings, preset), false;
+    if (name == preset.name) return apply_values(settings, preset.values, preset.name), false;
   }
   throw Error("no such solver", "--solver " + name, fmt::format("choose from {}", fmt::join(names, ", ")));
 }

@@ -34,7 +34,7 @@ void count_guards(uint guards) {
   if ((guards & GUARD_NOT_FINITE) != 0u) atomicCounterIncrement(guard_counts[6]);
 }
 #endif
-#foreach #include "project.glsl"
+#foreach #include "$PROJECT.glsl"
 
 // A patch is one chunk, or more where its vertices are too many for one; those it owns come first in each.
 struct Chunk {
@@ -72,6 +72,6 @@ void project_chunk(Chunk chunk, bool exists) {
   uint end = 0u;
   #foreach uint begin_$KIND = end, count_$KIND = exists ? records_$KIND.y : 0u; end = (end + count_$KIND + 31u) & ~31u;
   for (uint t = gl_LocalInvocationIndex; t < end; t += GROUP_SIZE) {
-    #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records_$KIND.x + (t - begin_$KIND), chunk.owned);
+    #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records_$KIND.x + $PAIRS * (t - begin_$KIND), chunk.owned);
   }
 }

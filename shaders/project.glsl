@@ -12,7 +12,12 @@ void project_$KIND(uint number, uint owned) {
   Constraint$ARITY c = $KIND(x, uintBitsToFloat(record.y), record.x);
   float k = params.stiffness[$KIND_ROW][$KIND_COLUMN];
 #if COMPLIANT
-  float a = params.compliance[$KIND_ROW][$KIND_COLUMN], before = 0.0, gamma = params.damping, share = (1.0 + gamma) / params.soft_omega;
+#if $MATERIAL
+  float a = uintBitsToFloat(patch_words[RECORDS_AT + number + 1].x) * params.inverse_h * params.inverse_h;
+#else
+  float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
+#endif
+  float before = 0.0, gamma = params.damping, share = (1.0 + gamma) / params.soft_omega;
   if ((phases & PHASE_PREDICT) == 0u) before = multipliers[number];
   if (gamma > 0.0) {
     vec3 start[$ARITY];

@@ -1,6 +1,6 @@
 // The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and
-// a row here, named in the list at the end; its stiffness k_NAME and compliance compliance_NAME, its kernels
-// and its CPU loops follow. Order is the order of projection in Gauss-Seidel.
+// a row here, named in the list at the end; its stiffness k_NAME and compliance compliance_NAME (unless it is
+// a material's), its kernels and its CPU loops follow. Order is the order of projection in Gauss-Seidel.
 #pragma once
 
 #include <array>
@@ -26,7 +26,13 @@ struct ConstraintKind {
   int arity;                    ///< vertices, 2 or 4
   const char* noun;             ///< what has it, as help texts call them
   const char* compliance_unit;  ///< 1 over that of C^2 / J
-  double most_compliance;       ///< the largest that settings take
+  double most_compliance;       ///< the largest that settings take; 0: only a material has this kind
+  int values = 1;               ///< numbers that describe a constraint at rest
+  int components = 1;           ///< values of C, solved together, each with a compliance of its own
+  constexpr bool of_material() const { return most_compliance == 0; }
+  constexpr int multipliers() const {
+    return components + (of_material() ? 1 : 0);
+  }  ///< with its viscosity's
 };
 
 // A row: what it is called, its formula, the vertices of each, and what these measure at rest.
@@ -58,10 +64,40 @@ struct Volume {
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
+struct NeoHookean {
+  static constexpr ConstraintKind row{"neo_hookean", 4, "tets", "1/J", 0, 8, 2};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.neo_hookean(x, rest, id);
+  }
+  template <class real, class Math = glsl::LibraryMath>
+  static auto viscosity(glm::vec<3, real>* x, glm::vec<3, real>* start, const real* rest) {
+    return Formulas<real, Math>{}.neo_hookean_viscosity(x, start, rest);
+  }
+  static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
+  static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then
+};
 // The next row goes here.
 
-using Kinds = std::tuple<Stretch, Bend, Volume  // and its name here
+using Kinds = std::tuple<Stretch, Bend, Volume, NeoHookean  // and its name here
                          >;
+
+/// A constraint's rest values as its formula takes them: a number, or where there are several.
+template <class Kind, class real>
+auto rest_of(const real* values) {
+  if constexpr (Kind::row.values == 1)
+    return *values;
+  else
+    return values;
+}
+/// A component of what a formula returns: C, and its gradient by each vertex.
+template <class Constraint>
+auto component(const Constraint& c, int k) {
+  if constexpr (std::is_array_v<decltype(c.C)>)
+    return std::pair(c.C[k], &c.gradient[k][0]);
+  else
+    return std::pair(c.C, &c.gradient[0]);
+}
 
 constexpr std::size_t kind_count = std::tuple_size_v<Kinds>;
 

@@ -14,14 +14,16 @@ template <class Kind>
 ConstraintList list_of(const TetMesh& mesh) {
   constexpr std::size_t arity = std::size_t(Kind::row.arity);
   const auto& all = Kind::vertices(mesh);
+  constexpr std::size_t values = std::size_t(Kind::row.values);
   ConstraintList list{Kind::row.arity, std::vector<std::uint32_t>(all.size() * arity),
-                      std::vector<double>(all.size())};
+                      std::vector<double>(all.size() * values)};
   parallel_for(all.size(), [&](std::size_t c) {
     std::copy_n(all[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
     // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
     std::array<glm::dvec3, arity> x;
     for (std::size_t j = 0; j < arity; ++j) x[j] = mesh.positions[all[c][j]] - mesh.positions[all[c][0]];
-    list.rest[c] = Kind::rest(x.data());
+    const std::array<double, values> rest{Kind::rest(x.data())};
+    std::ranges::copy(rest, list.rest.begin() + std::ptrdiff_t(c * values));
   });
   return list;
 }
@@ -57,6 +59,12 @@ std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh) {
   return result;
 }
 
+std::array<double, 8> NeoHookean::rest(glm::dvec3* x) {
+  const glm::dmat3 sides(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+  const glm::dmat3 m = glm::inverse(glm::transpose(sides) * sides);
+  return {m[0][0], m[1][0], m[2][0], m[1][1], m[2][1], m[2][2], 1 / glm::determinant(sides), 1};
+}
+
 std::size_t ConstraintSystem::count() const {
   std::size_t sum = 0;
   for (const ConstraintList& list : lists) sum += list.count();
@@ -69,7 +77,7 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names
   const auto wanted = split(names, ',');
   for_each_kind([&]<class Kind>(Kind, int) {
     const bool present = std::find(wanted.begin(), wanted.end(), Kind::row.name) != wanted.end();
-    ConstraintList list = present ? list_of<Kind>(mesh) : ConstraintList{Kind::row.arity, {}, {}};
+    ConstraintList list = present ? list_of<Kind>(mesh) : ConstraintList{Kind::row.arity, {}, {}, {}};
     for (std::uint32_t v : list.vertices) ++system.at_vertex[v];
     system.present.push_back(list.count() > 0);
     system.lists.push_back(std::move(list));

@@ -1,6 +1,7 @@
 // The constraints of a mesh: one list per kind.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -11,19 +12,29 @@
 
 namespace tetpbd {
 
-/// Constraints of one kind: `arity` vertices and one rest value each (m, rad or m^3), from positions in
-/// double.
+/// Constraints of one kind: `arity` vertices and the kind's rest values each (m, rad or m^3 where there is
+/// one), from positions in double.
 struct ConstraintList {
   int arity = 0;
   std::vector<std::uint32_t> vertices;  ///< arity * count
   std::vector<double> rest;
-  std::size_t count() const { return rest.size(); }
+  std::vector<double> compliance{};  ///< of a material, the kind's components each; else empty: the settings'
+  std::size_t count() const { return vertices.size() / std::size_t(std::max(arity, 1)); }
   std::span<const std::uint32_t> ends(std::size_t c) const {  ///< of constraint c
     return std::span(vertices).subspan(c * std::size_t(arity), std::size_t(arity));
   }
   void add(std::span<const std::uint32_t> vertex, double value) {
     vertices.insert(vertices.end(), vertex.begin(), vertex.end());
     rest.push_back(value);
+  }
+  /// Constraint c of a list of the same kind.
+  void add(const ConstraintList& from, std::size_t c) {
+    const auto append = [&](auto& to, const auto& values) {
+      const std::size_t each = values.size() / from.count();
+      const auto first = values.begin() + std::ptrdiff_t(c * each);
+      to.insert(to.end(), first, first + std::ptrdiff_t(each));
+    };
+    append(vertices, from.vertices), append(rest, from.rest), append(compliance, from.compliance);
   }
 };
 

@@ -12,10 +12,9 @@ Explanation explain(const Sim& sim) {
     result.buffers.push_back({buffer.label(), buffer.bytes()});
     result.bytes += buffer.bytes();
   };
-  for (const Buffer* buffer :
-       {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0], &sim.quantized[1],
-        &sim.step_block, &sim.guard_counts, &sim.check.words, &sim.check.read_back, &sim.check.positions,
-        &sim.check.velocities})
+  for (const Buffer* buffer : {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0],
+                               &sim.quantized[1], &sim.step_block, &sim.guard_counts, &sim.check.words,
+                               &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;

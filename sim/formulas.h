@@ -21,16 +21,22 @@ struct LibraryMath {
   static real pow(real x, real y) {
     return std::pow(x, y);
   }
+  template <class real>
+  static real log(real x) {
+    return std::log(x);
+  }
 };
 
 template <class Real, class Math = LibraryMath>
 struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
+  using mat3 = glm::mat<3, 3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
   static constexpr real quantization_size = 0;  // positions are kept in full here
   static real atan(real y, real x) { return Math::atan(y, x); }
   static real pow(real x, real y) { return Math::pow(x, y); }
+  static real log(real x) { return Math::log(x); }
   using Ids = const uint*;
   static uint id_of(Ids ids, int j) { return ids[j]; }
   // in order of use

@@ -22,16 +22,26 @@ const std::vector<Parameter>& parameters() {
          Effect::rebuild},
     };
     for (std::size_t k = 0; k < kind_count; ++k)
-      all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
-                     fmt::format("stiffness of {}", constraint_kinds[k].noun)});
+      if (!constraint_kinds[k].of_material())
+        all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
+                       fmt::format("stiffness of {}", constraint_kinds[k].noun)});
     for (std::size_t k = 0; k < kind_count; ++k)
-      all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
-                     KindMember{&S::compliance, k},
-                     fmt::format("softness of {}; 0: as hard as iterations make it. Any compliance or "
-                                 "constraint_damping above 0 brings mass_splitting with it",
-                                 constraint_kinds[k].noun),
-                     0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
+      if (!constraint_kinds[k].of_material())
+        all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
+                       KindMember{&S::compliance, k},
+                       fmt::format("softness of {}; 0: as hard as iterations make it. Any compliance or "
+                                   "constraint_damping above 0 brings mass_splitting with it",
+                                   constraint_kinds[k].noun),
+                       0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
     const std::vector<Parameter> others = {
+        {"material", "solver", &S::material,
+         "of all bodies, in place of constraints, k and compliance: none, springs along edges and volumes, "
+         "neo-hookean tets",
+         0, 0, "", false, Effect::rebuild},
+        {"young_modulus", "solver", &S::young_modulus, "Young's modulus of the material", 1, 1e12, "Pa", true,
+         Effect::rebuild},
+        {"poisson_ratio", "solver", &S::poisson_ratio, "Poisson's ratio of the material, springs: from 0.25",
+         0, 0.499, "", false, Effect::rebuild},
         {"constraint_damping", "solver", &S::constraint_damping,
          "time over which constraints resist their rate: a spring's damping is this times its stiffness", 0,
          10, "s", true},
@@ -86,7 +96,9 @@ std::vector<std::string> choices(const Parameter& parameter) {
   if (parameter.name == "mode")
     for (const SolverMode& mode : solver_modes()) names.push_back(mode.name);
   if (parameter.name == "constraints")
-    for (const ConstraintKind& kind : constraint_kinds) names.push_back(kind.name);
+    for (const ConstraintKind& kind : constraint_kinds)
+      if (!kind.of_material()) names.push_back(kind.name);
+  if (parameter.name == "material") names = {"none", "springs", "neo-hookean"};
   return names;
 }
 
@@ -171,14 +183,17 @@ const std::vector<SolverPreset>& solver_presets() {
   return rows;
 }
 
-void apply_preset(Settings& settings, const SolverPreset& preset) {
-  for (const std::string& value : split(preset.values, ',')) {
+void apply_values(Settings& settings, const std::string& values, const std::string& where) {
+  for (const std::string& value : split(values, ',')) {
     const std::size_t equals = value.find('=');
-    set_parameter(settings, *find_parameter(value.substr(0, equals)), value.substr(equals + 1), preset.name);
+    set_parameter(settings, *find_parameter(value.substr(0, equals)), value.substr(equals + 1), where);
   }
 }
 
 bool uses(const Settings& settings, const ConstraintKind& kind) {
+  if (settings.material == "neo-hookean") return kind.of_material();
+  if (settings.material == "springs")
+    return kind.name == std::string("stretch") || kind.name == std::string("volume");
   const auto names = split(settings.constraints, ',');
   return std::find(names.begin(), names.end(), kind.name) != names.end();
 }
@@ -186,7 +201,7 @@ bool uses(const Settings& settings, const ConstraintKind& kind) {
 bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
 
 bool compliant(const Settings& settings) {
-  bool any = damped(settings);
+  bool any = damped(settings) || settings.material != "none";
   for (std::size_t k = 0; k < kind_count; ++k)
     any = any || (settings.compliance[k] > 0 && uses(settings, constraint_kinds[k]));
   return any;
@@ -204,6 +219,9 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && !mode.compliance)
     throw Error(fmt::format("mode {} has no compliance", mode.name), where,
                 "set compliance and constraint_damping to 0 or use another mode");
+  if (settings.material == "springs" && settings.poisson_ratio < 0.25)
+    throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
+                "give 0.25 or more, or material neo-hookean");
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");

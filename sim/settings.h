@@ -21,6 +21,9 @@ struct Settings {
     return hard;
   }();
   std::array<double, kind_count> compliance{};  ///< compliance_NAME by kind
+  std::string material = "none";                ///< in place of kinds, stiffness and compliance (material.h)
+  double young_modulus = 1e6;
+  double poisson_ratio = 0.3;
   double constraint_damping = 0;
   double omega = 1.5;
   bool mass_splitting = false;
@@ -91,13 +94,15 @@ struct SolverPreset {
   const char* values;  ///< PARAMETER=TEXT, separated by commas
 };
 const std::vector<SolverPreset>& solver_presets();
-void apply_preset(Settings& settings, const SolverPreset& preset);
+/// `values`: of a preset.
+void apply_values(Settings& settings, const std::string& values, const std::string& where);
 
-/// Whether constraints are XPBD's (method.md eq. 25): any kind in use has compliance, or there is damping.
+/// Whether constraints are XPBD's (method.md eq. 25): there is a material or damping, or a kind in use has
+/// compliance.
 bool compliant(const Settings& settings);
 /// Whether constraints resist their rate.
 bool damped(const Settings& settings);
-/// Whether the list `constraints` names this kind.
+/// Whether the list `constraints` names this kind, or the material has it.
 bool uses(const Settings& settings, const ConstraintKind& kind);
 
 /// Throws Error for values out of range, and for those that do not go together; `where` names the file or

@@ -9,6 +9,7 @@
 
 #include "sim/error.h"
 #include "sim/hash.h"
+#include "sim/material.h"
 #include "sim/parallel.h"
 #include "sim/solvers/cpu_pbd.h"
 
@@ -139,13 +140,19 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   return sim;
 }
 
+// What decides which constraints there are.
+auto kinds_of(const Settings& s) {
+  return std::tuple(s.material == "none" ? s.constraints : "", s.material, s.young_modulus, s.poisson_ratio);
+}
+
 // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
 void remake(Sim& sim, const Settings& settings) {
   if (check_finite(sim, true)) restore_checkpoint(sim);  // it has nothing better to start from
   const State state = read_state(sim);
-  const bool same_kinds = settings.constraints == sim.settings.constraints;
-  Sim fresh = make_sim(sim.model, settings, sim.tuning,
-                       same_kinds ? sim.system : build_constraints(sim.model->rest, settings.constraints));
+  Sim fresh =
+      make_sim(sim.model, settings, sim.tuning,
+               kinds_of(settings) == kinds_of(sim.settings) ? sim.system
+                                                            : build_constraints(sim.model->rest, settings));
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps;
   fresh.timed = sim.timed;
@@ -177,7 +184,7 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
   if (model->obstacles.size() + 1 > MAX_PLANES)
     throw Error("too many obstacles", fmt::format("{} planes", model->obstacles.size()),
                 fmt::format("at most {} beside the ground", MAX_PLANES - 1));
-  ConstraintSystem system = build_constraints(model->rest, settings.constraints);
+  ConstraintSystem system = build_constraints(model->rest, settings);
   Sim sim = make_sim(std::move(model), settings, tuning, std::move(system));
   reset(sim);
   return sim;
@@ -213,7 +220,7 @@ void write_state(Sim& sim, const State& state) {
 
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
-  const auto made_for = [](const Settings& s) { return std::tuple(s.mode, s.constraints, compliant(s)); };
+  const auto made_for = [](const Settings& s) { return std::tuple(s.mode, kinds_of(s), compliant(s)); };
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
   sim.settings = settings;

@@ -45,7 +45,6 @@ struct Sim {
   bool timed = false;
   GuardCounts guards{};  ///< since the last reset; ask guard_counts()
   FiniteCheck check;     ///< ask check_finite()
-
 };
 
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.

@@ -15,6 +15,12 @@ struct Constraint4 {
   real floor;
   uint guards;
 };
+// Two that are solved together: C[k] and its gradient by each vertex.
+struct Constraint4x2 {
+  real C[2];
+  vec3 gradient[2][4];
+  uint guards;
+};
 
 // A direction for two vertices in one place: of unit length, the opposite one for (b, a), and unlike that of other pairs,
 // so that a body that has collapsed to a point does not unfold along a line only.
@@ -78,4 +84,42 @@ Multiplier multiplier(Constraint2 c, real w[2], real k, real max_correction, rea
 Multiplier multiplier(Constraint4 c, real w[4], real k, real max_correction, real a, real share) {
   Weighted s = weighted(c, w);
   return bounded(c.C, c.guards, s, share * max(s.sum, s.least) + a, k, max_correction);
+}
+
+// Of two constraints (method.md eq. 32): (share grad C W grad C^T + a) lambda = -C. As above, `c.C` is the whole residual.
+struct Multiplier2 {
+  real lambda[2];
+  uint guards;
+};
+Multiplier2 multiplier(Constraint4x2 c, real w[4], real max_correction, real a[2], real share) {
+  real g00 = real(0), g01 = real(0), g11 = real(0), apart = real(0), longest = real(0);
+  for (int j = 0; j < 4; ++j) {
+    g00 += w[j] * dot(c.gradient[0][j], c.gradient[0][j]);
+    g01 += w[j] * dot(c.gradient[0][j], c.gradient[1][j]);
+    g11 += w[j] * dot(c.gradient[1][j], c.gradient[1][j]);
+  }
+  // The determinant without cancellation: at rest both gradients point the same way.
+  real slope = g00 > real(0) ? g01 / g00 : real(0);
+  for (int j = 0; j < 4; ++j) {
+    vec3 rest = c.gradient[1][j] - slope * c.gradient[0][j];
+    apart += w[j] * dot(rest, rest);
+  }
+  real unit = real(1) / (share * (g00 + g11) + a[0] + a[1]), b0 = a[0] * unit, b1 = a[1] * unit;
+  g00 *= share * unit;
+  g01 *= share * unit;
+  g11 *= share * unit;
+  real factor = -unit / (g00 * (apart * share * unit) + g00 * b1 + g11 * b0 + b0 * b1);
+  Multiplier2 m;
+  m.lambda[0] = factor * ((g11 + b1) * c.C[0] - g01 * c.C[1]);
+  m.lambda[1] = factor * ((g00 + b0) * c.C[1] - g01 * c.C[0]);
+  for (int j = 0; j < 4; ++j) {
+    vec3 move = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
+    longest = max(longest, dot(move, move));
+  }
+  bool beyond = longest > max_correction * max_correction, number = longest * real(0) == real(0);
+  real scale = number ? (beyond ? max_correction / sqrt(longest) : real(1)) : real(0);
+  m.lambda[0] = number ? m.lambda[0] * scale : real(0);
+  m.lambda[1] = number ? m.lambda[1] * scale : real(0);
+  m.guards = c.guards | (!number ? GUARD_NOT_FINITE : beyond ? GUARD_LIMIT : 0u);
+  return m;
 }

@@ -11,24 +11,43 @@ namespace tetpbd {
 
 namespace {
 
-// Calls visit(Kind{}, list, alpha, offset of its first part) for every kind that has constraints and a finite
-// compliance.
+// As for_each_elastic, with the offset of the list's first part.
 template <class F>
 void for_each_spring(const Leapfrog& run, F&& visit) {
   std::size_t offset = 0;
-  for_each_kind([&](auto kind, int k) {
-    const ConstraintList& list = run.input.system.lists[std::size_t(k)];
-    const double alpha = run.compliances[std::size_t(k)];
-    if (list.count() == 0 || std::isinf(alpha)) return;
-    visit(kind, list, alpha, offset);
-    offset += list.vertices.size();
-  });
+  for_each_elastic(run.input.system, run.compliances,
+                   [&](auto kind, const ConstraintList& list, auto&& alpha) {
+                     visit(kind, list, alpha, offset);
+                     offset += list.vertices.size();
+                   });
+}
+
+// Kelvin and Voigt's stress tau (2 mu E' + lambda tr E' I), mu and lambda of linear elasticity: the forces of
+// its power tau V (mu |E'|^2 + lambda/2 (tr E')^2), E' the rate of Green's strain. By the deformation
+// gradient, as the solvers do not. `rest` as in neo_hookean.glsl, whose first compliance is 1 / (4/3 mu V).
+void add_viscosity(const Leapfrog& run, const double* rest, double alpha, const std::uint32_t* v,
+                   glm::dvec3* forces) {
+  const auto sides = [&](const Points& p) {
+    return glm::dmat3(p[v[1]] - p[v[0]], p[v[2]] - p[v[0]], p[v[3]] - p[v[0]]);
+  };
+  const glm::dmat3 rest_sides(run.input.model.rest.positions[v[1]] - run.input.model.rest.positions[v[0]],
+                              run.input.model.rest.positions[v[2]] - run.input.model.rest.positions[v[0]],
+                              run.input.model.rest.positions[v[3]] - run.input.model.rest.positions[v[0]]);
+  const glm::dmat3 inverse = glm::inverse(rest_sides), F = sides(run.x) * inverse,
+                   rate = sides(run.v) * inverse;
+  const glm::dmat3 strain_rate = 0.5 * (glm::transpose(rate) * F + glm::transpose(F) * rate);
+  const double trace = strain_rate[0][0] + strain_rate[1][1] + strain_rate[2][2];
+  const double mu_volume = 0.75 / alpha, ratio = 1 / (rest[7] - 1) - 5.0 / 6;  // lambda / mu
+  const glm::dmat3 stress =
+      mu_volume * run.input.settings.constraint_damping * (2.0 * strain_rate + glm::dmat3(ratio * trace));
+  const glm::dmat3 push = -(F * stress * glm::transpose(inverse));  // by sides
+  for (int j = 0; j < 3; ++j) forces[j + 1] += push[j], forces[0] -= push[j];
 }
 
 // Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha.
 Points accelerations(Leapfrog& run) {
   const double tau = run.input.settings.constraint_damping;
-  for_each_spring(run, [&](auto kind, const ConstraintList& list, double alpha, std::size_t offset) {
+  for_each_spring(run, [&](auto kind, const ConstraintList& list, auto&& alpha, std::size_t offset) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
     parallel_for(
         list.count(),
@@ -36,12 +55,19 @@ Points accelerations(Leapfrog& run) {
           const std::uint32_t* vertices = list.vertices.data() + c * arity;
           std::array<glm::dvec3, arity> x;
           for (std::size_t j = 0; j < arity; ++j) x[j] = run.x[vertices[j]] - run.x[vertices[0]];
-          const auto value = unclamped<decltype(kind)>(x, list.rest[c]);
-          double size = value.C;
-          for (std::size_t j = 0; j < arity; ++j)
-            size += tau * glm::dot(value.gradient[j], run.v[vertices[j]]);
-          for (std::size_t j = 0; j < arity; ++j)
-            run.parts[offset + c * arity + j] = -size / alpha * value.gradient[j];
+          const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
+          for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] = glm::dvec3(0);
+          for (int k = 0; k < kind.row.components; ++k) {
+            const auto [C, gradient] = component(value, k);
+            double size = C;
+            if constexpr (!kind.row.of_material())
+              for (std::size_t j = 0; j < arity; ++j) size += tau * glm::dot(gradient[j], run.v[vertices[j]]);
+            for (std::size_t j = 0; j < arity; ++j)
+              run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
+          }
+          if constexpr (kind.row.of_material())
+            if (tau > 0)
+              add_viscosity(run, &list.rest[c * 8], alpha(c)[0], vertices, &run.parts[offset + c * arity]);
         },
         1024);
   });
@@ -78,7 +104,7 @@ Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, c
   require_compliances(compliances);
   Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}};
   std::vector<std::uint32_t> vertices;
-  for_each_spring(run, [&](auto, const ConstraintList& list, double, std::size_t) {
+  for_each_spring(run, [&](auto, const ConstraintList& list, auto&&, std::size_t) {
     vertices.insert(vertices.end(), list.vertices.begin(), list.vertices.end());
   });
   run.parts.resize(vertices.size());

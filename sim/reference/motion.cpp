@@ -44,6 +44,7 @@ void require_answer(const ReferenceInput& input) {
   };
   if (!compliant(settings) && !uses(settings, Stretch::row))
     refuse("without stretch constraints bodies have no shape to keep");
+  if (settings.material != "none") return;
   for (std::size_t k = 0; k < kind_count; ++k) {
     if (!uses(settings, constraint_kinds[k])) continue;
     if (settings.stiffness[k] != 1)
@@ -77,8 +78,9 @@ Pair rigid_pair(const ReferenceInput& input) {
 Pair leapfrog_pair(const ReferenceInput& input) {
   Compliances compliances;
   for (std::size_t k = 0; k < kind_count; ++k)
-    compliances[k] =
-        input.system.present[k] ? input.settings.compliance[k] : std::numeric_limits<double>::infinity();
+    compliances[k] = input.system.present[k] && input.system.lists[k].compliance.empty()
+                         ? input.settings.compliance[k]
+                         : std::numeric_limits<double>::infinity();
   const double dt = input.settings.dt, stable = stable_step(input, compliances, input.model.rest.positions);
   const long steps = long(std::ceil(dt / (part_of_stable * stable)));
   const State start{input.model.positions, input.model.velocities};
@@ -157,7 +159,10 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   add(model.rest.positions), add(model.rest.tets), add(model.positions), add(model.velocities);
   add(model.masses), add(model.obstacles), add(input.inverse_masses);
   const Settings& s = input.settings;
-  add(s.constraints), add(s.stiffness), add(s.compliance);
+  if (s.material == "none")
+    add(s.constraints), add(s.stiffness), add(s.compliance);
+  else
+    add(s.material), add(std::array{s.young_modulus, s.poisson_ratio});
   const double numbers[] = {s.constraint_damping, s.dt,      s.damping, s.gravity, double(s.ground),
                             s.ground_height,      s.friction};
   add(numbers);

@@ -9,20 +9,17 @@ namespace tetpbd {
 
 namespace {
 
-// Calls visit(Kind{}, vertex indices, positions relative to the first, rest, alpha) for every constraint with
-// an energy.
+// Calls visit(Kind{}, vertex indices, positions relative to the first, rest values, alpha of each component)
+// for every constraint with an energy.
 template <class F>
 void for_each_constraint(const Objective& o, const Points& positions, F&& visit) {
-  for_each_kind([&](auto kind, int k) {
+  for_each_elastic(o.system, o.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
-    const double alpha = o.compliances[std::size_t(k)];
-    if (std::isinf(alpha)) return;
-    const ConstraintList& list = o.system.lists[std::size_t(k)];
     std::array<glm::dvec3, arity> x;
     for (std::size_t c = 0; c < list.count(); ++c) {
       const std::uint32_t* vertices = list.vertices.data() + c * arity;
       for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
-      visit(kind, vertices, x, list.rest[c], alpha);
+      visit(kind, vertices, x, &list.rest[c * std::size_t(decltype(kind)::row.values)], alpha(c));
     }
   });
 }
@@ -40,10 +37,14 @@ Energy evaluate_energy(const Objective& o, const Points& positions) {
     add(0.5 * o.masses[i] * o.inertia * glm::dot(moved, moved));
     add(-o.masses[i] * glm::dot(o.gravity, moved));
   }
-  for_each_constraint(o, positions, [&](auto kind, const std::uint32_t*, auto& x, double rest, double alpha) {
-    const double C = unclamped<decltype(kind)>(x, rest).C;
-    add(C * C / (2 * alpha));
-  });
+  for_each_constraint(o, positions,
+                      [&](auto kind, const auto*, auto& x, const double* rest, const double* alpha) {
+                        const auto c = unclamped<decltype(kind)>(x, rest);
+                        for (int k = 0; k < kind.row.components; ++k) {
+                          const double C = component(c, k).first;
+                          add(C * C / (2 * alpha[k]));
+                        }
+                      });
   return e;
 }
 
@@ -57,10 +58,14 @@ Points gradient(const Objective& o, const Points& positions) {
   Points g(positions.size());
   for (std::size_t i = 0; i < g.size(); ++i)
     g[i] = o.masses[i] * (o.inertia * (positions[i] - o.predicted[i]) - o.gravity);
-  for_each_constraint(o, positions, [&](auto kind, const auto* vertices, auto& x, double rest, double alpha) {
-    const auto c = unclamped<decltype(kind)>(x, rest);
-    for (std::size_t j = 0; j < x.size(); ++j) g[vertices[j]] += c.C / alpha * c.gradient[j];
-  });
+  for_each_constraint(o, positions,
+                      [&](auto kind, const auto* v, auto& x, const double* rest, const double* alpha) {
+                        const auto c = unclamped<decltype(kind)>(x, rest);
+                        for (int k = 0; k < kind.row.components; ++k) {
+                          const auto [C, of] = component(c, k);
+                          for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += C / alpha[k] * of[j];
+                        }
+                      });
   return g;
 }
 
@@ -72,35 +77,45 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Factor = Eigen::SimplicialLDLT<Sparse>;
 
-// Of C^2 / (2 alpha): (grad C grad C^T + C Hess C) / alpha. Hess C by central differences of the gradient
-// over 1e-5 of the smallest side: truncation and rounding are both near 1e-10 relative, and Newton converges
-// with far worse.
+// Of C^2 / (2 alpha), summed over components: (grad C grad C^T + C Hess C) / alpha. Hess C by central
+// differences of the gradient over 1e-5 of the smallest side: truncation and rounding are both near 1e-10
+// relative, and Newton converges with far worse.
 template <class Kind, std::size_t arity>
-auto constraint_hessian(std::array<glm::dvec3, arity>& x, double rest, double alpha, bool project) {
+auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, const double* alpha,
+                        bool project) {
   constexpr int n = 3 * int(arity);
   using Matrix = Eigen::Matrix<double, n, n>;
   using Vector = Eigen::Matrix<double, n, 1>;
   Matrix hessian = Matrix::Zero();
-  const auto flat = [](const auto& c) { return Vector(Eigen::Map<const Vector>(&c.gradient[0].x)); };
   const auto here = unclamped<Kind>(x, rest);
-  const auto g = flat(here);
+  // Sum of C grad C / alpha, with the C of `here`.
+  const auto weighted = [&](const auto& c) {
+    Vector sum = Vector::Zero();
+    for (int k = 0; k < Kind::row.components; ++k)
+      sum += component(here, k).first / alpha[k] * Eigen::Map<const Vector>(&component(c, k).second->x);
+    return sum;
+  };
   double side = std::numeric_limits<double>::max();
   for (std::size_t i = 0; i < arity; ++i)
     for (std::size_t j = 0; j < i; ++j) side = std::min(side, glm::length(x[i] - x[j]));
   const double step = 1e-5 * side;
-  if (here.C != 0 && step > 0)
+  if (weighted(here) != Vector::Zero() && step > 0)
     for (int column = 0; column < n; ++column) {
       double& coordinate = x[std::size_t(column / 3)][column % 3];
       const double start = coordinate;
       coordinate = start + step;
       const double high = coordinate;
-      hessian.col(column) = flat(Kind::template evaluate<double>(x.data(), rest));
+      hessian.col(column) = weighted(Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest)));
       coordinate = start - step;
-      hessian.col(column) -= flat(Kind::template evaluate<double>(x.data(), rest));
-      hessian.col(column) *= here.C / (high - coordinate);
+      hessian.col(column) -= weighted(Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest)));
+      hessian.col(column) /= high - coordinate;
       coordinate = start;
     }
-  hessian = ((0.5 * (hessian + hessian.transpose()) + g * g.transpose()) / alpha).eval();
+  hessian = (0.5 * (hessian + hessian.transpose())).eval();
+  for (int k = 0; k < Kind::row.components; ++k) {
+    const Eigen::Map<const Vector> g(&component(here, k).second->x);
+    hessian += g * g.transpose() / alpha[k];
+  }
   if (project) {
     const Eigen::SelfAdjointEigenSolver<Matrix> modes(hessian);
     hessian = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).asDiagonal() *
@@ -118,16 +133,17 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
     const double mass = o.masses[std::size_t(row / 3)];
     entries.emplace_back(row, row, mass > 0 ? mass * o.inertia : 1.0);
   }
-  for_each_constraint(o, positions, [&](auto kind, const auto* vertices, auto& x, double rest, double alpha) {
-    const auto local = constraint_hessian<decltype(kind)>(x, rest, alpha, project);
-    for (int r = 0; r < int(local.rows()); ++r)
-      for (int c = 0; c < int(local.cols()); ++c) {
-        const std::uint32_t to = vertices[r / 3], from = vertices[c / 3];
-        const int row = 3 * int(to) + r % 3, column = 3 * int(from) + c % 3;
-        if (row >= column && o.masses[to] > 0 && o.masses[from] > 0)
-          entries.emplace_back(row, column, local(r, c));
-      }
-  });
+  for_each_constraint(o, positions,
+                      [&](auto kind, const auto* vertices, auto& x, const double* rest, const double* alpha) {
+                        const auto local = constraint_hessian<decltype(kind)>(x, rest, alpha, project);
+                        for (int r = 0; r < int(local.rows()); ++r)
+                          for (int c = 0; c < int(local.cols()); ++c) {
+                            const std::uint32_t to = vertices[r / 3], from = vertices[c / 3];
+                            const int row = 3 * int(to) + r % 3, column = 3 * int(from) + c % 3;
+                            if (row >= column && o.masses[to] > 0 && o.masses[from] > 0)
+                              entries.emplace_back(row, column, local(r, c));
+                          }
+                      });
   Sparse hessian(rows, rows);
   hessian.setFromTriplets(entries.begin(), entries.end());
   return hessian;

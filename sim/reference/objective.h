@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "sim/constraints.h"
@@ -13,7 +14,7 @@ using Points = std::vector<glm::dvec3>;  ///< m, by vertex
 
 /// alpha of each kind, in the order of Kinds: a constraint's energy is C^2 / (2 alpha), so alpha is in
 /// unit(C)^2 / J. Stretch: m^2/J = m/N, one over a spring's stiffness; bend: rad^2/J; volume: m^6/J = m^3/Pa.
-/// Above 0 (rigid_step is the limit); infinity leaves the kind out.
+/// Above 0 (rigid_step is the limit); infinity leaves the kind out. A material's constraints have their own.
 using Compliances = std::array<double, kind_count>;
 
 /// What is minimised, in joules, over the positions x of vertices with mass:
@@ -37,17 +38,33 @@ Points gradient(const Objective& objective, const Points& positions);
 /// found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long
 /// gets the same C.
 template <class Kind, class Positions>
-auto unclamped(Positions& x, double rest) {
-  auto c = Kind::template evaluate<double>(x.data(), rest);
-  const double unit = c.C;
-  if (unit == 1 || unit == -1) {
-    double further = unit;
-    for (int turns = 1; turns <= 3 && further == unit; ++turns) {
-      further = Kind::template evaluate<double>(x.data(), rest + turns * unit).C;
-      c.C = turns * unit + further;
+auto unclamped(Positions& x, const double* rest) {
+  auto c = Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest));
+  if constexpr (Kind::row.components == 1) {
+    const double unit = c.C;
+    if (unit == 1 || unit == -1) {
+      double further = unit;
+      for (int turns = 1; turns <= 3 && further == unit; ++turns) {
+        further = Kind::template evaluate<double>(x.data(), *rest + turns * unit).C;
+        c.C = turns * unit + further;
+      }
     }
   }
   return c;
+}
+/// Calls visit(Kind{}, list, alpha) for every kind that has constraints and an energy; alpha(c) points to the
+/// compliances of the components of constraint c.
+template <class F>
+void for_each_elastic(const ConstraintSystem& system, const Compliances& compliances, F&& visit) {
+  for_each_kind([&](auto kind, int k) {
+    constexpr std::size_t components = std::size_t(decltype(kind)::row.components);
+    const ConstraintList& list = system.lists[std::size_t(k)];
+    const double* all = &compliances[std::size_t(k)];
+    const bool own = !list.compliance.empty();
+    if (list.count() == 0 || (!own && std::isinf(*all))) return;
+    visit(kind, list,
+          [&list, all, own](std::size_t c) { return own ? &list.compliance[c * components] : all; });
+  });
 }
 
 struct Minimum {

@@ -27,7 +27,7 @@ Coloured coloured(const ConstraintList& list, std::size_t vertices) {
   result.list.arity = list.arity;
   for (const Colour& colour : colours) {
     result.first.push_back(result.list.count());
-    for (const std::size_t c : colour.members) result.list.add(list.ends(c), list.rest[c]);
+    for (const std::size_t c : colour.members) result.list.add(list, c);
   }
   result.first.push_back(result.list.count());
   return result;

@@ -38,14 +38,23 @@ struct alignas(sizeof(Row)) Vertex {
 template <class Kind>
 struct Batch {
   std::uint32_t vertices[std::size_t(Kind::row.arity)][lanes];
-  float rest[lanes], multipliers[lanes];  // the latter in this substep
-  std::uint32_t count;                    // lanes in use; the others repeat the first
+  float rest[std::size_t(Kind::row.values)][lanes];
+  float multipliers[std::size_t(Kind::row.multipliers())][lanes];  // in this substep
+  std::uint32_t count;  // lanes in use; the others repeat the first
 };
 template <class Kind>
 using Batches = std::vector<Batch<Kind>>;
+// A material's compliances of such constraints.
+template <class Kind>
+struct Softness {
+  double values[std::size_t(Kind::row.components)][lanes];
+};
+template <class Kind>
+using Softnesses = std::vector<Softness<Kind>>;
 
 struct Work {
   OfEachKind<Batches> batches;
+  OfEachKind<Softnesses> softnesses;  // of each batch, or none
   std::vector<Vertex> x;
   std::vector<Vertex> starts;  // of the substep, with constraint damping
 
@@ -58,12 +67,19 @@ struct Work {
 
 // A batch where a guard triggers: one constraint after the other.
 template <class Kind>
-[[gnu::noinline]] void project_guarded(Batch<Kind>& batch, Work& work, const Rule<float>& rule,
-                                       GuardCounts& guards) {
+[[gnu::noinline]] void project_guarded(Batch<Kind>& batch, const Softness<Kind>* softness, Work& work,
+                                       const Rule<float>& rule, GuardCounts& guards) {
+  constexpr std::size_t components = std::size_t(Kind::row.components);
   for (std::size_t lane = 0; lane < batch.count; ++lane) {
     std::uint32_t ids[std::size_t(Kind::row.arity)];
+    float rest[std::size_t(Kind::row.values)], multipliers[std::size_t(Kind::row.multipliers())];
+    double compliance[components];
     for (std::size_t j = 0; j < std::size(ids); ++j) ids[j] = batch.vertices[j][lane];
-    project<Kind>(ids, batch.rest[lane], rule, batch.multipliers[lane], work, guards);
+    for (std::size_t v = 0; v < std::size(rest); ++v) rest[v] = batch.rest[v][lane];
+    for (std::size_t k = 0; k < std::size(multipliers); ++k) multipliers[k] = batch.multipliers[k][lane];
+    for (std::size_t k = 0; k < components; ++k) compliance[k] = softness ? softness->values[k][lane] : 0;
+    project<Kind>(ids, rest, softness ? compliance : nullptr, rule, multipliers, work, guards);
+    for (std::size_t k = 0; k < std::size(multipliers); ++k) batch.multipliers[k][lane] = multipliers[k];
   }
 }
 
@@ -99,13 +115,19 @@ template <class Kind>
 
 // Corrections in place of positions; false, and multipliers as they were, if a guard triggered.
 template <class Kind, bool damped>
-[[gnu::always_inline]] inline bool evaluate(Batch<Kind>& batch, const Rule<float>& rule, Rows<Kind>& rows,
+[[gnu::always_inline]] inline bool evaluate(Batch<Kind>& batch, const Softness<Kind>* softness,
+                                            const Rule<float>& rule, Rows<Kind>& rows,
                                             [[maybe_unused]] const Rows<Kind>& starts) {
-  constexpr std::size_t arity = std::size_t(Kind::row.arity);
+  constexpr std::size_t arity = std::size_t(Kind::row.arity), components = std::size_t(Kind::row.components),
+                        values = std::size_t(Kind::row.values);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   std::uint32_t guards[lanes];
-  float multipliers[lanes];
-  const auto [k, limit, a, gamma, share] = rule;
+  constexpr std::size_t all_multipliers = std::size_t(Kind::row.multipliers());
+  float multipliers[all_multipliers][lanes], softness_now[components][lanes];
+  const auto [k, limit, all, gamma, share, share_of_material, inverse_h2] = rule;
+  for (std::size_t part = 0; part < components; ++part)
+    for (std::size_t lane = 0; lane < lanes; ++lane)
+      softness_now[part][lane] = softness ? float(softness->values[part][lane] * inverse_h2) : all;
 #pragma GCC ivdep
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     glm::vec3 x[arity];
@@ -115,28 +137,60 @@ template <class Kind, bool damped>
       x[j] = glm::vec3(rows[j][lane][0], rows[j][lane][1], rows[j][lane][2]);
       w[j] = rows[j][lane][3];
     }
-    auto c = Kind::template evaluate<float, LaneMath>(x, batch.rest[lane], no_ids);
+    float rest[values], a[components];
+    for (std::size_t v = 0; v < values; ++v) rest[v] = batch.rest[v][lane];
+    for (std::size_t part = 0; part < components; ++part) a[part] = softness_now[part][lane];
+    auto c = Kind::template evaluate<float, LaneMath>(x, rest_of<Kind>(rest), no_ids);
+    [[maybe_unused]] glm::vec3 start[arity];
     if constexpr (damped) {
-      glm::vec3 start[arity];
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
         start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
-      c.C += gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, batch.rest[lane], no_ids).C);
+      if constexpr (components == 1)
+        c.C += gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, rest[0], no_ids).C);
     }
-    c.C += a * batch.multipliers[lane];
-    const auto m = Formulas<float, LaneMath>{}.multiplier(c, w, k, limit, a, share);
+    glm::vec3 corrections[arity];
+    if constexpr (components == 1) {
+      c.C += a[0] * batch.multipliers[0][lane];
+      const auto m = Formulas<float, LaneMath>{}.multiplier(c, w, k, limit, a[0], share);
+#pragma GCC unroll 4
+      for (std::size_t j = 0; j < arity; ++j) corrections[j] = m.lambda * w[j] * c.gradient[j];
+      multipliers[0][lane] = batch.multipliers[0][lane] + m.lambda;
+      guards[lane] = m.guards;
+    } else {
+      for (std::size_t part = 0; part < components; ++part)
+        c.C[part] += a[part] * batch.multipliers[part][lane];
+      const auto m = Formulas<float, LaneMath>{}.multiplier(c, w, limit, a, share_of_material);
+#pragma GCC unroll 4
+      for (std::size_t j = 0; j < arity; ++j)
+        corrections[j] = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
+      for (std::size_t part = 0; part < components; ++part)
+        multipliers[part][lane] = batch.multipliers[part][lane] + m.lambda[part];
+      guards[lane] = m.guards;
+      if constexpr (damped) {
+#pragma GCC unroll 4
+        for (std::size_t j = 0; j < arity; ++j) x[j] += corrections[j];
+        auto v = Kind::template viscosity<float, LaneMath>(x, start, rest);
+        const float av = Formulas<float, LaneMath>{}.neo_hookean_viscous_compliance(a[0], gamma);
+        v.C += av * batch.multipliers[components][lane];
+        const auto n = Formulas<float, LaneMath>{}.multiplier(v, w, 1.0f, limit, av, share_of_material);
+#pragma GCC unroll 4
+        for (std::size_t j = 0; j < arity; ++j) corrections[j] += n.lambda * w[j] * v.gradient[j];
+        multipliers[components][lane] = batch.multipliers[components][lane] + n.lambda;
+        guards[lane] |= n.guards;
+      } else if constexpr (Kind::row.of_material()) {
+        multipliers[components][lane] = 0;
+      }
+    }
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < arity; ++j) {
-      const glm::vec3 correction = m.lambda * w[j] * c.gradient[j];
-      for (int axis = 0; axis < 3; ++axis) rows[j][lane][axis] = correction[axis];
+      for (int axis = 0; axis < 3; ++axis) rows[j][lane][axis] = corrections[j][axis];
       rows[j][lane][3] = 0;
     }
-    multipliers[lane] = batch.multipliers[lane] + m.lambda;
-    guards[lane] = m.guards;
   }
   std::uint32_t triggered = 0;
   for (std::uint32_t lane : guards) triggered |= lane;
-  if (triggered == 0) std::copy_n(multipliers, lanes, batch.multipliers);
+  if (triggered == 0) std::copy_n(&multipliers[0][0], all_multipliers * lanes, &batch.multipliers[0][0]);
   return triggered == 0;
 }
 
@@ -148,6 +202,8 @@ template <class Kind, bool damped>
   // stores.
   constexpr std::size_t together = 4;
   Batch<Kind>* batches = std::get<Batches<Kind>>(work.batches).data();
+  const auto& own = std::get<Softnesses<Kind>>(work.softnesses);
+  const auto softness_of = [&](std::size_t b) { return own.empty() ? nullptr : &own[b]; };
   for (std::size_t b = begin; b < end; b += together) {
     const std::size_t count = std::min(together, end - b);
     Rows<Kind> rows[together];
@@ -157,14 +213,16 @@ template <class Kind, bool damped>
     if constexpr (damped)
       for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.starts, starts[i]);
     if (first)
-      for (std::size_t i = 0; i < count; ++i) std::fill_n(batches[b + i].multipliers, lanes, 0.0f);
+      for (std::size_t i = 0; i < count; ++i)
+        std::fill_n(&batches[b + i].multipliers[0][0], std::size_t(Kind::row.multipliers()) * lanes, 0.0f);
     for (std::size_t i = 0; i < count; ++i)
-      sound[i] = evaluate<Kind, damped>(batches[b + i], rule, rows[i], starts[damped ? i : 0]);
+      sound[i] =
+          evaluate<Kind, damped>(batches[b + i], softness_of(b + i), rule, rows[i], starts[damped ? i : 0]);
     for (std::size_t i = 0; i < count; ++i)
       if (sound[i])
         scatter(batches[b + i], work, rows[i]);
       else
-        project_guarded(batches[b + i], work, rule, guards);
+        project_guarded(batches[b + i], softness_of(b + i), work, rule, guards);
   }
 }
 
@@ -196,7 +254,8 @@ class FastPbd {
       for (std::size_t colour = 0; colour + 1 < colours.first.size(); ++colour) {
         const std::size_t before = batches.size(), end = colours.first[colour + 1];
         for (std::size_t begin = colours.first[colour]; begin < end; begin += lanes)
-          fill(batches.emplace_back(), colours.list, begin, std::min(begin + lanes, end));
+          fill(batches.emplace_back(), std::get<Softnesses<decltype(is)>>(work_.softnesses), colours.list,
+               begin, std::min(begin + lanes, end));
         turns_.push_back({kind, before, batches.size()});
       }
       all += batches.size();
@@ -255,13 +314,18 @@ class FastPbd {
   static constexpr std::size_t batches_of_a_useful_thread = 16, batches_worth_a_barrier = 4;
 
   template <class Kind>
-  static void fill(Batch<Kind>& batch, const ConstraintList& list, std::size_t begin, std::size_t end) {
-    constexpr std::size_t arity = std::size_t(Kind::row.arity);
+  static void fill(Batch<Kind>& batch, Softnesses<Kind>& softnesses, const ConstraintList& list,
+                   std::size_t begin, std::size_t end) {
+    constexpr std::size_t arity = std::size_t(Kind::row.arity), values = std::size_t(Kind::row.values),
+                          components = std::size_t(Kind::row.components);
     batch.count = std::uint32_t(end - begin);
+    if (!list.compliance.empty()) softnesses.emplace_back();
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::size_t c = begin + (lane < batch.count ? lane : 0);
       for (std::size_t j = 0; j < arity; ++j) batch.vertices[j][lane] = list.vertices[c * arity + j];
-      batch.rest[lane] = float(list.rest[c]);
+      for (std::size_t v = 0; v < values; ++v) batch.rest[v][lane] = float(list.rest[c * values + v]);
+      for (std::size_t k = 0; k < components && !list.compliance.empty(); ++k)
+        softnesses.back().values[k][lane] = list.compliance[c * components + k];
     }
   }
 

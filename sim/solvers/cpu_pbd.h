@@ -44,37 +44,71 @@ struct Substep {
 /// What constraints of a kind share (shaders/constraints/types.glsl, multiplier).
 template <class real>
 struct Rule {
-  real k, limit, a, gamma, share;
-  Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1)
+  real k, limit, a, gamma, share, share_of_material;
+  double inverse_h2;  ///< 1/s^2
+  Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1, bool jacobi = false)
       : k(real(settings.stiffness[kind])), limit(real(longest)) {
     const double h = settings.dt / settings.substeps;
+    inverse_h2 = 1 / (h * h);
     a = real(settings.compliance[kind] / (h * h));
     gamma = real(settings.constraint_damping / h);
     share = (1 + gamma) / real(omega);
+    share_of_material = real((jacobi && gamma > 0 ? 2 : 1) / omega);  // two moves, elastic and viscous
   }
 };
 
-/// Projects one constraint (eqs. 4, 25-26). `vertices` tells of a vertex where it is (at), where it was at
-/// the substep's start (start), its inverse mass (weight), and takes its correction (move).
+/// Projects one constraint (eqs. 4, 25-26, 32-33). `compliance`: of a material, or null; `vertices` tells of a
+/// vertex where it is (at), where it was at the substep's start (start), its inverse mass (weight), and takes
+/// its correction (move).
 template <class Kind, class real, class Vertices>
-[[gnu::always_inline]] inline void project(const std::uint32_t* ids, real rest, const Rule<real>& rule,
-                                           real& multiplier, Vertices&& vertices, GuardCounts& guards) {
+[[gnu::always_inline]] inline void project(const std::uint32_t* ids, const real* rest,
+                                           const double* compliance, const Rule<real>& rule,
+                                           real* multipliers, Vertices&& vertices, GuardCounts& guards) {
+  constexpr int components = Kind::row.components;
   constexpr std::size_t arity = std::size_t(Kind::row.arity);
   const auto evaluate = [&](auto&& position) {
     glm::vec<3, real> local[arity];
     for (std::size_t j = 0; j < arity; ++j) local[j] = glm::vec<3, real>(position(ids[j]) - position(ids[0]));
-    return Kind::template evaluate<real>(local, rest, ids);
+    return Kind::template evaluate<real>(local, rest_of<Kind>(rest), ids);
   };
   auto c = evaluate([&](std::uint32_t v) { return vertices.at(v); });
-  if (rule.gamma > 0)
-    c.C += rule.gamma * (c.C - evaluate([&](std::uint32_t v) { return vertices.start(v); }).C);
-  c.C += rule.a * multiplier;
-  real w[arity];
+  real w[arity], a[components];
   for (std::size_t j = 0; j < arity; ++j) w[j] = vertices.weight(ids[j]);
-  const auto [lambda, triggered] = Formulas<real>{}.multiplier(c, w, rule.k, rule.limit, rule.a, rule.share);
-  multiplier += lambda;
-  for (std::size_t j = 0; lambda != 0 && j < arity; ++j)
-    vertices.move(ids[j], glm::dvec3(lambda * w[j] * c.gradient[j]));
+  for (int k = 0; k < components; ++k) a[k] = compliance ? real(compliance[k] * rule.inverse_h2) : rule.a;
+  std::uint32_t triggered = 0;
+  if constexpr (components == 1) {
+    if (rule.gamma > 0)
+      c.C += rule.gamma * (c.C - evaluate([&](std::uint32_t v) { return vertices.start(v); }).C);
+    c.C += a[0] * multipliers[0];
+    const auto m = Formulas<real>{}.multiplier(c, w, rule.k, rule.limit, a[0], rule.share);
+    multipliers[0] += m.lambda;
+    triggered = m.guards;
+    for (std::size_t j = 0; m.lambda != 0 && j < arity; ++j)
+      vertices.move(ids[j], glm::dvec3(m.lambda * w[j] * c.gradient[j]));
+  } else {
+    for (int k = 0; k < components; ++k) c.C[k] += a[k] * multipliers[k];
+    const auto m = Formulas<real>{}.multiplier(c, w, rule.limit, a, rule.share_of_material);
+    for (int k = 0; k < components; ++k) multipliers[k] += m.lambda[k];
+    triggered = m.guards;
+    glm::vec<3, real> moves[arity];
+    for (std::size_t j = 0; j < arity; ++j)
+      moves[j] = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
+    if (rule.gamma > 0) {
+      glm::vec<3, real> now[arity], start[arity];
+      for (std::size_t j = 0; j < arity; ++j) {
+        now[j] = glm::vec<3, real>(vertices.at(ids[j]) - vertices.at(ids[0])) + moves[j];
+        start[j] = glm::vec<3, real>(vertices.start(ids[j]) - vertices.start(ids[0]));
+      }
+      auto v = Kind::template viscosity<real>(now, start, rest);
+      const real av = Formulas<real>{}.neo_hookean_viscous_compliance(a[0], rule.gamma);
+      v.C += av * multipliers[components];
+      const real lambda =
+          Formulas<real>{}.multiplier(v, w, real(1), rule.limit, av, rule.share_of_material).lambda;
+      multipliers[components] += lambda;
+      for (std::size_t j = 0; j < arity; ++j) moves[j] += lambda * w[j] * v.gradient[j];
+    }
+    for (std::size_t j = 0; j < arity; ++j) vertices.move(ids[j], glm::dvec3(moves[j]));
+  }
   if (triggered)
     for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
 }
@@ -82,7 +116,7 @@ template <class Kind, class real, class Vertices>
 /// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
 /// finer: their rounding is what moves the centre of a free body then.
 inline double longest_correction(const Model& model, const Settings& settings) {
-  return settings.mass_splitting ? model.size / 64 : model.size;
+  return settings.mass_splitting || compliant(settings) ? model.size / 64 : model.size;
 }
 
 /// `jacobi`: all corrections from the same positions, averaged with omega / n_i, or with
@@ -100,8 +134,10 @@ class CpuPbd {
       items.resize(list.count());
       for (std::size_t c = 0; c < items.size(); ++c) {
         std::copy_n(list.vertices.data() + c * arity, arity, items[c].vertices.data());
-        items[c].rest = real(list.rest[c]);
+        for (std::size_t v = 0; v < items[c].rest.size(); ++v)
+          items[c].rest[v] = real(list.rest[c * items[c].rest.size() + v]);
       }
+      compliances_[std::size_t(k)] = list.compliance;
     });
   }
 
@@ -129,10 +165,15 @@ class CpuPbd {
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
         for_each_kind([&](auto kind, int k) {
-          const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1);
+          const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1,
+                                jacobi);
+          const std::vector<double>& own = compliances_[std::size_t(k)];
+          const double* compliance = own.empty() ? nullptr : own.data();
           for (auto& item : std::get<Items<decltype(kind)>>(items_)) {
-            if (iteration == 0) item.multiplier = 0;
-            project<decltype(kind)>(item.vertices.data(), item.rest, rule, item.multiplier, vertices, guards);
+            if (iteration == 0) item.multipliers = {};
+            project<decltype(kind)>(item.vertices.data(), item.rest.data(), compliance, rule,
+                                    item.multipliers.data(), vertices, guards);
+            if (compliance) compliance += decltype(kind)::row.components;
           }
         });
         for (std::size_t i = 0; i < x.size(); ++i) {
@@ -151,7 +192,8 @@ class CpuPbd {
   template <class Kind>
   struct Item {
     std::array<std::uint32_t, std::size_t(Kind::row.arity)> vertices;
-    real rest, multiplier;  // the latter in this substep
+    std::array<real, std::size_t(Kind::row.values)> rest;
+    std::array<real, std::size_t(Kind::row.multipliers())> multipliers;  // in this substep
   };
   template <class Kind>
   using Items = std::vector<Item<Kind>>;  // contiguous, in the order they are projected
@@ -168,6 +210,7 @@ class CpuPbd {
   const Model& model_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;
+  std::array<std::vector<double>, kind_count> compliances_;  // of a material, else empty
 };
 
 }  // namespace tetpbd

@@ -34,6 +34,21 @@ struct LaneMath {
     }
     return root * root;
   }
+  /// Of x > 0, to 2e-7 of the larger of 1 and the result. Polynomial of Cephes' logf (Moshier 1989).
+  static float log(float x) {
+    const std::int32_t bits = std::bit_cast<std::int32_t>(x);
+    std::int32_t exponent = (bits >> 23) - 126;
+    float m = std::bit_cast<float>((bits & 0x007fffff) | 0x3f000000);  // 0.5 to 1
+    const bool lower = m < 0.707106781f;
+    exponent -= lower ? 1 : 0;
+    m = (lower ? m + m : m) - 1.0f;
+    const float z = m * m;
+    float p = 7.0376836292e-2f;
+    for (const float next : {-1.1514610310e-1f, 1.1676998740e-1f, -1.2420140846e-1f, 1.4249322787e-1f,
+                             -1.6668057665e-1f, 2.0000714765e-1f, -2.4999993993e-1f, 3.3333331174e-1f})
+      p = p * m + next;
+    return m - 0.5f * z + p * m * z + float(exponent) * 0.693147181f;
+  }
 };
 
 }  // namespace tetpbd

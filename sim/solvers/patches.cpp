@@ -11,7 +11,7 @@ namespace tetpbd {
 
 namespace {
 
-using Record = std::array<std::uint32_t, 2>;
+using Record = std::array<std::uint32_t, 2>;  // vertices, constraint
 
 // A chunk as it is written.
 struct Chunk {
@@ -39,7 +39,7 @@ class ChunkWriter {
     const auto ends = list.ends(constraint);
     const auto added = std::ranges::count_if(ends, [&](std::uint32_t v) { return local_[v] == none; });
     if (chunk_.vertices.size() + std::size_t(added) > Patches::most_vertices) return false;
-    Record record = {0, std::bit_cast<std::uint32_t>(float(list.rest[constraint]))};
+    Record record = {0, constraint};
     for (std::size_t j = 0; j < ends.size(); ++j) record[0] |= vertex(ends[j]) << (8 * j);
     chunk_.records[kind].push_back(record);
     return true;
@@ -75,6 +75,16 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
   result.chunked = chunks > patches.size();
   result.chunks.resize(chunks * result.chunk_words);
   result.vertices.resize(chunks * result.largest);
+  const auto write_record = [&](const ConstraintList& list, const Record& record) {
+    std::vector<std::uint32_t> words = {record[0]};
+    for (const auto* values : {&list.rest, &list.compliance}) {
+      const std::size_t each = values->size() / list.count();
+      for (std::size_t v = 0; v < each; ++v)
+        words.push_back(std::bit_cast<std::uint32_t>(float((*values)[record[1] * each + v])));
+    }
+    words.resize(2 * record_pairs(list));
+    for (std::size_t w = 0; w < words.size(); w += 2) result.records.push_back({words[w], words[w + 1]});
+  };
   std::size_t further = patches.size();  // where the next chunk goes that is not the first of its patch
   const auto write = [&](const Chunk& chunk, std::size_t number, std::size_t next) {
     std::uint32_t* words = result.chunks.data() + number * result.chunk_words;
@@ -91,7 +101,8 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
       // sum would wait for each other.
       const std::size_t stride = (records.size() + 31) / 32;
       for (std::size_t start = 0; start < stride; ++start)
-        for (std::size_t r = start; r < records.size(); r += stride) result.records.push_back(records[r]);
+        for (std::size_t r = start; r < records.size(); r += stride)
+          write_record(system.lists[k], records[r]);
     }
     for (std::size_t v = 0; v < result.largest; ++v) {
       const std::uint32_t vertex = chunk.vertices[v < chunk.vertices.size() ? v : 0];

@@ -14,17 +14,23 @@ struct Patches {
   static constexpr std::size_t most_vertices = 256;  ///< of a chunk: a byte holds their number
   std::size_t count = 0;                             ///< of patches
   /// Words of a chunk: how many vertices, how many of these are owned (they come first), the first of them,
-  /// the next chunk of the patch (0: none); then for each kind present its first record and how many. The
-  /// patches' first chunks come first.
+  /// the next chunk of the patch (0: none); then for each kind present its first pair and how many records.
+  /// The patches' first chunks come first.
   std::vector<std::uint32_t> chunks;
   std::size_t chunk_words = 0;
   /// `largest` per chunk: the vertex, and the number of constraints on it as float bits.
   std::vector<std::array<std::uint32_t, 2>> vertices;
-  /// The chunk's vertices, a byte each; rest value as float bits.
+  /// Constraints, as many pairs of words each as record_pairs() says: its vertices in the chunk, a byte each;
+  /// rest values and a material's compliances as float bits.
   std::vector<std::array<std::uint32_t, 2>> records;
   std::size_t largest = 0, most_owned = 0;  ///< vertices, owned ones, of any chunk
   bool chunked = false;                     ///< any patch has several chunks
 };
+
+/// Pairs of words of a record of the list.
+inline std::size_t record_pairs(const ConstraintList& list) {
+  return (1 + (list.rest.size() + list.compliance.size()) / std::max<std::size_t>(list.count(), 1) + 1) / 2;
+}
 
 /// Each constraint in one patch of at most `most`; all its vertices are owned.
 Patches constraint_patches(const ConstraintSystem& system, std::size_t most);

@@ -104,6 +104,10 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
       words.push_back({{"KIND", constraint_kinds[k].name},
                        {"ARITY", std::to_string(constraint_kinds[k].arity)},
                        {"INDEX", std::to_string(words.size())},
+                       {"PAIRS", std::to_string(record_pairs(system.lists[k]))},
+                       {"MATERIAL", system.lists[k].compliance.empty() ? "0" : "1"},
+                       {"PROJECT", constraint_kinds[k].components == 1 ? "project" : "project_two"},
+                       {"VALUES", std::to_string(constraint_kinds[k].values)},
                        {"KIND_ROW", std::to_string(k / 4)},
                        {"KIND_COLUMN", std::to_string(k % 4)}});
   return words;

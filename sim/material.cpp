@@ -1,0 +1,76 @@
+#include "sim/material.h"
+
+#include <algorithm>
+
+namespace tetpbd {
+
+Lame lame(double young_modulus, double poisson_ratio) {
+  return {young_modulus / (2 * (1 + poisson_ratio)),
+          young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))};
+}
+
+namespace {
+
+// Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest: mu = 4/3 mu_Lame,
+// lambda = lambda_Lame + 5/6 mu_Lame.
+void make_neo_hookean(ConstraintList& tets, const Lame& m) {
+  const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu;
+  for (std::size_t c = 0; c < tets.count(); ++c) {
+    double* rest = tets.rest.data() + 8 * c;
+    rest[7] = 1 + 0.75 * mu / lambda;
+    const double volume = 1 / (6 * rest[6]);
+    tets.compliance.insert(tets.compliance.end(), {1 / (mu * volume), 1 / (lambda * volume)});
+  }
+}
+
+// Springs along edges in all directions alike, of stiffness k over a length L, are isotropic with
+// mu = lambda = (sum k L^2) / (15 V) (Cauchy: Poisson's ratio 1/4); what is left of lambda is the volumes'.
+// Each tet gives its six edges the same k L^2.
+void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
+  std::vector<double> stiffness(edges.count());
+  const auto number_of = [&](std::uint32_t a, std::uint32_t b) {
+    const std::array<std::uint32_t, 2> edge = {std::min(a, b), std::max(a, b)};
+    std::size_t low = 0, high = edges.count();  // sorted by their vertices
+    while (low + 1 < high) {
+      const std::size_t middle = (low + high) / 2;
+      (std::ranges::lexicographical_compare(edge, edges.ends(middle)) ? high : low) = middle;
+    }
+    return low;
+  };
+  for (std::size_t t = 0; t < volumes.count(); ++t) {
+    const auto v = volumes.ends(t);
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const std::size_t e = number_of(v[i], v[j]);
+        stiffness[e] += 15.0 / 6 * m.mu * volumes.rest[t] / (edges.rest[e] * edges.rest[e]);
+      }
+    volumes.compliance.push_back(volumes.rest[t] / (m.lambda - m.mu));
+  }
+  for (const double k : stiffness) edges.compliance.push_back(1 / k);
+}
+
+}  // namespace
+
+ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings) {
+  if (settings.material == "none") return build_constraints(mesh, settings.constraints);
+  const Lame m = lame(settings.young_modulus, settings.poisson_ratio);
+  const bool springs = settings.material == "springs";
+  ConstraintSystem system = build_constraints(mesh, springs ? "stretch,volume" : "neo_hookean");
+  if (springs)
+    make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
+  else
+    make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  return system;
+}
+
+const std::vector<MaterialPreset>& material_presets() {
+  static const std::vector<MaterialPreset> rows = {
+      {"rubber", "soft vulcanised rubber", "material=neo-hookean,young_modulus=1e6,poisson_ratio=0.48"},
+      {"gelatine", "10 % in water", "material=neo-hookean,young_modulus=2e4,poisson_ratio=0.45"},
+      {"muscle", "at rest, across its fibres", "material=neo-hookean,young_modulus=6e4,poisson_ratio=0.45"},
+      {"foam", "soft polyurethane", "material=neo-hookean,young_modulus=1e5,poisson_ratio=0.2"},
+  };
+  return rows;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,29 @@
+// Materials: what Young's modulus and Poisson's ratio make of the constraints of a mesh (method.md,
+// "Materials").
+#pragma once
+
+#include <vector>
+
+#include "sim/constraints.h"
+#include "sim/settings.h"
+
+namespace tetpbd {
+
+/// Lame's parameters of linear elasticity, Pa.
+struct Lame {
+  double mu, lambda;
+};
+Lame lame(double young_modulus, double poisson_ratio);
+
+/// The constraints of a mesh of the kinds that settings use, with their material's compliances if they have
+/// one.
+ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings);
+
+/// A material by name: what a scene's "material": "rubber" puts in place.
+struct MaterialPreset {
+  const char *name, *help;
+  const char* values;  ///< PARAMETER=TEXT, separated by commas
+};
+const std::vector<MaterialPreset>& material_presets();
+
+}  // namespace tetpbd

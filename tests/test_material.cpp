@@ -1,0 +1,358 @@
+// Materials: their formulas, their elasticity at rest, and the modes that solve them.
+#include <Eigen/Dense>
+#include <Eigen/Sparse>
+#include <nlohmann/json.hpp>
+
+#include "sim/material.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/reference/motion.h"
+#include "sim/sim.h"
+#include "tests/gl_test.h"
+#include "tests/reference_scenes.h"
+#include "tests/run_program.h"
+
+using namespace reference_scenes;
+using namespace run_program;
+
+namespace {
+
+constexpr Compliances none{infinity, infinity, infinity, infinity};
+
+glm::dmat3 random_matrix(double amplitude) { return {noise(amplitude), noise(amplitude), noise(amplitude)}; }
+
+std::array<glm::dvec3, 4> random_tet(double scale) {
+  std::array<glm::dvec3, 4> x = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0),
+                                 glm::dvec3(0, 0, 1)};
+  for (auto& p : x) p = scale * (p + noise(0.3));
+  return x;
+}
+
+std::array<double, 8> rest_of_tet(std::array<glm::dvec3, 4> x, double alpha) {
+  auto rest = NeoHookean::rest(x.data());
+  rest[7] = alpha;
+  return rest;
+}
+
+// Largest difference of `gradient` from central differences of `value`, over its largest.
+template <class Value>
+double gradient_error(std::array<glm::dvec3, 4> x, double scale, const glm::dvec3* gradient, Value&& value) {
+  double worst = 0, largest = 0;
+  for (std::size_t j = 0; j < 4; ++j)
+    for (int a = 0; a < 3; ++a) {
+      const double step = 1e-6 * scale, start = x[j][a];
+      x[j][a] = start + step;
+      const double high = value(x);
+      x[j][a] = start - step;
+      const double low = value(x);
+      x[j][a] = start;
+      worst = std::max(worst, std::abs(gradient[j][a] - (high - low) / (2 * step)));
+      largest = std::max(largest, std::abs(gradient[j][a]));
+    }
+  return worst / largest;
+}
+
+// A clamped block of `material`, with what a run of it needs.
+Scene beam_of(const std::string& material, const glm::ivec3& cells, double young_modulus,
+              double poisson_ratio, const glm::dvec3& size = {1, 0.25, 0.25}) {
+  Scene scene;
+  scene.settings.material = material;
+  scene.settings.young_modulus = young_modulus, scene.settings.poisson_ratio = poisson_ratio;
+  scene.settings.ground = false;
+  const TetMesh mesh = make_block(size, cells);
+  std::vector<std::uint32_t> fixed;
+  const double end = bounds(mesh.positions).low.x;
+  for (std::uint32_t i = 0; i < mesh.positions.size(); ++i)
+    if (mesh.positions[i].x < end + 1e-9) fixed.push_back(i);
+  add_body(scene.model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), fixed);
+  scene.system = build_constraints(scene.model.rest, scene.settings);
+  return scene;
+}
+
+double sag_of(const Scene& scene, const Points& x) {
+  double sum = 0;
+  int count = 0;
+  const Bounds box = bounds(scene.model.positions);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (scene.model.positions[i].x > box.high.x - 1e-9) sum += scene.model.positions[i].y - x[i].y, ++count;
+  return sum / count;
+}
+
+double static_sag(const Scene& scene) {
+  return sag_of(scene, static_equilibrium(scene.input(), scene.model.positions, none).state.positions);
+}
+
+// Linear finite elements under gravity, assembled anew: K = sum V B^T D B.
+double linear_sag(const Scene& scene) {
+  const Lame m = lame(scene.settings.young_modulus, scene.settings.poisson_ratio);
+  Eigen::Matrix<double, 6, 6> D = Eigen::Matrix<double, 6, 6>::Zero();
+  D.topLeftCorner<3, 3>().setConstant(m.lambda);
+  for (int i = 0; i < 6; ++i) D(i, i) += i < 3 ? 2 * m.mu : m.mu;
+  const TetMesh& mesh = scene.model.rest;
+  const int rows = 3 * int(mesh.positions.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const Tet& t : mesh.tets) {
+    Eigen::Matrix4d P;
+    for (int j = 0; j < 4; ++j) {
+      const glm::dvec3& p = mesh.positions[t[std::size_t(j)]];
+      P.row(j) << 1, p.x, p.y, p.z;
+    }
+    const Eigen::Matrix4d shape = P.inverse();  // rows 1 to 3: gradients of the shape functions
+    Eigen::Matrix<double, 6, 12> B = Eigen::Matrix<double, 6, 12>::Zero();
+    for (int j = 0; j < 4; ++j) {
+      const double x = shape(1, j), y = shape(2, j), z = shape(3, j);
+      B.block<6, 3>(0, 3 * j) << x, 0, 0, 0, y, 0, 0, 0, z, y, x, 0, 0, z, y, z, 0, x;
+    }
+    const Eigen::Matrix<double, 12, 12> K = std::abs(P.determinant()) / 6 * B.transpose() * D * B;
+    for (int r = 0; r < 12; ++r)
+      for (int c = 0; c < 12; ++c)
+        entries.emplace_back(3 * int(t[std::size_t(r / 3)]) + r % 3, 3 * int(t[std::size_t(c / 3)]) + c % 3,
+                             K(r, c));
+  }
+  Eigen::SparseMatrix<double> K(rows, rows);
+  K.setFromTriplets(entries.begin(), entries.end());
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(rows);
+  for (int i = 0; i < rows / 3; ++i)
+    if (scene.model.inverse_masses[std::size_t(i)] > 0)
+      load(3 * i + 1) = -scene.model.masses[std::size_t(i)] * scene.settings.gravity;
+    else
+      for (int a = 0; a < 3; ++a) K.coeffRef(3 * i + a, 3 * i + a) *= 1e12;
+  const Eigen::VectorXd u = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(K).solve(load);
+  Points x = scene.model.positions;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (int a = 0; a < 3; ++a) x[i][a] += u(3 * Eigen::Index(i) + a);
+  return sag_of(scene, x);
+}
+
+}  // namespace
+
+TEST_CASE("material: gradients of neo-hookean tets and of their viscosity are those of finite differences") {
+  for (const double scale : {1e-3, 1.0, 1e3})
+    for (int trial = 0; trial < 100; ++trial) {
+      const auto rest = rest_of_tet(random_tet(scale), 1.3);
+      auto x = random_tet(scale), start = random_tet(scale);
+      if (trial % 4 == 0) x[3] = -x[3];  // also inverted
+      const auto c = NeoHookean::evaluate(x.data(), rest.data());
+      for (int k = 0; k < 2; ++k)
+        CHECK(gradient_error(x, scale, c.gradient[k], [&](auto y) {
+                return NeoHookean::evaluate(y.data(), rest.data()).C[k];
+              }) < 1e-6);
+      const auto v = NeoHookean::viscosity(x.data(), start.data(), rest.data());
+      CHECK(gradient_error(x, scale, v.gradient, [&](auto y) {
+              return NeoHookean::viscosity(y.data(), start.data(), rest.data()).C;
+            }) < 1e-6);
+      // Turning is no deformation.
+      const glm::dmat3 turn(0, 1, 0, 0, 0, 1, 1, 0, 0);
+      for (std::size_t j = 0; j < 4; ++j) start[j] = turn * x[j] + glm::dvec3(scale);
+      CHECK(NeoHookean::viscosity(x.data(), start.data(), rest.data()).C < 1e-7 * c.C[0]);
+      std::array<glm::vec3, 4> y;
+      std::array<float, 8> values;
+      for (std::size_t j = 0; j < 4; ++j) y[j] = glm::vec3(x[j] - x[0]);
+      std::copy(rest.begin(), rest.end(), values.begin());
+      const auto rough = NeoHookean::evaluate(y.data(), values.data());
+      for (int k = 0; k < 2; ++k)
+        CHECK(rough.C[k] == doctest::Approx(c.C[k]).epsilon(1e-4).scale(std::abs(c.C[0]) + 1));
+    }
+}
+
+TEST_CASE("material: neo-hookean is Smith's energy, with no stress at rest and linear elasticity about it") {
+  const double E = 3e5;
+  for (const double nu : {0.0, 0.3, 0.49}) {
+    const Lame m = lame(E, nu);
+    const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu, alpha = 1 + 0.75 * mu / lambda;
+    const auto at_rest = random_tet(1);
+    const auto rest = rest_of_tet(at_rest, alpha);
+    const glm::dmat3 sides(at_rest[1] - at_rest[0], at_rest[2] - at_rest[0], at_rest[3] - at_rest[0]);
+    const auto deformed = [&](const glm::dmat3& F) {
+      auto x = at_rest;
+      for (auto& p : x) p = F * p;
+      return x;
+    };
+    const auto density = [&](const glm::dmat3& F) {  // J/m^3, by the constraints
+      const auto x = deformed(F);
+      const auto c = NeoHookean::evaluate(const_cast<glm::dvec3*>(x.data()), rest.data());
+      return mu / 2 * c.C[0] * c.C[0] + lambda / 2 * c.C[1] * c.C[1];
+    };
+    const auto smith = [&](const glm::dmat3& F) {
+      double I = 0;
+      for (int k = 0; k < 3; ++k) I += glm::dot(F[k], F[k]);
+      const double J = glm::determinant(F);
+      return mu / 2 * (I - 3) + lambda / 2 * (J - alpha) * (J - alpha) - mu / 2 * std::log(I + 1);
+    };
+    const glm::dmat3 one(1), F = one + random_matrix(0.4), G = one + random_matrix(0.4);
+    CHECK(density(F) - density(G) == doctest::Approx(smith(F) - smith(G)).epsilon(1e-9));
+    const double least = density(one);
+    for (int trial = 0; trial < 20; ++trial) {
+      const glm::dmat3 u = random_matrix(1e-4), strain = 0.5 * (u + glm::transpose(u));
+      double squares = 0, trace = 0;
+      for (int k = 0; k < 3; ++k) squares += glm::dot(strain[k], strain[k]), trace += strain[k][k];
+      // Both ways, so that what is of third order is gone.
+      CHECK(density(one + u) + density(one - u) - 2 * least ==
+            doctest::Approx(2 * m.mu * squares + m.lambda * trace * trace).epsilon(1e-3));
+    }
+  }
+}
+
+TEST_CASE("material: patch test: a homogeneous strain leaves inner vertices without force") {
+  Scene scene;
+  TetMesh mesh = make_block({1, 0.7, 0.5}, {3, 3, 3});
+  generator.seed(11);
+  for (auto& p : mesh.positions) p += noise(0.02);
+  finish_tets(mesh, "block");
+  add_body(scene.model, "block", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), {});
+  scene.settings.material = "neo-hookean";
+  scene.settings.gravity = 0;
+  scene.system = build_constraints(scene.model.rest, scene.settings);
+  const Objective elastic = static_objective(scene.input(), scene.model.positions, none);
+  std::vector<bool> outside(mesh.positions.size());
+  for (const Triangle& t : mesh.surface)
+    for (std::uint32_t v : t) outside[v] = true;
+  const glm::dmat3 F = glm::dmat3(1) + random_matrix(0.3);
+  Points x = scene.model.positions;
+  for (auto& p : x) p = F * p;
+  const Points forces = gradient(elastic, x), none_at_rest = gradient(elastic, scene.model.positions);
+  double inner = 0, outer = 0, rest = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    (outside[i] ? outer : inner) = std::max(outside[i] ? outer : inner, glm::length(forces[i]));
+    rest = std::max(rest, glm::length(none_at_rest[i]));
+  }
+  CHECK(outer > 0);
+  CHECK(inner < 1e-11 * outer);
+  CHECK(rest < 1e-11 * outer);
+}
+
+TEST_CASE(
+    "material: a neo-hookean cantilever sags as linear finite elements and, refined, as Timoshenko says") {
+  const double E = 5e7, nu = 0.3;
+  std::array<double, 2> sags;
+  for (std::size_t level = 0; level < 2; ++level) {
+    const int n = level == 0 ? 2 : 4;
+    const Scene scene = beam_of("neo-hookean", {4 * n, n, n}, E, nu);
+    sags[level] = static_sag(scene);
+    CHECK(sags[level] < 0.02);
+    CHECK(sags[level] == doctest::Approx(linear_sag(scene)).epsilon(0.005));
+  }
+  // q L^4 / (8 E I) + q L^2 / (2 kappa G A)
+  const double b = 0.25, q = 1000 * 9.81 * b * b, kappa = 10 * (1 + nu) / (12 + 11 * nu);
+  const double exact = q / (8 * E * b * b * b * b / 12) + q / (2 * kappa * E / (2 * (1 + nu)) * b * b);
+  CHECK(sags[0] < sags[1]);
+  CHECK(sags[1] < exact);  // linear tets are too stiff
+  CHECK((4 * sags[1] - sags[0]) / 3 == doctest::Approx(exact).epsilon(0.05));
+}
+
+TEST_CASE("material: springs of a fine mesh and a coarse one are the same body, near to neo-hookean tets") {
+  std::array<double, 3> stretched;  // the lowest layer's displacement of a hanging block, which bends nothing
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::string material = i < 2 ? "springs" : "neo-hookean";
+    const Scene scene = [&] {
+      Scene s = beam_of(material, i == 1 ? glm::ivec3(8, 8, 8) : glm::ivec3(4, 4, 4), 1e6, 0.3, {1, 1, 1});
+      return s;
+    }();
+    stretched[i] = static_sag(scene);
+  }
+  CHECK(stretched[0] == doctest::Approx(stretched[1]).epsilon(0.1));
+  CHECK(stretched[0] == doctest::Approx(stretched[2]).epsilon(0.15));
+}
+
+TEST_CASE("material: every mode keeps the rest state, and goes where the leapfrog goes as substeps shrink") {
+  const GlTest gl;
+  for (const std::string material : {"neo-hookean", "springs"})
+    for (const double damping : {0.0, 0.002}) {
+      Scene scene = beam_of(material, {4, 2, 2}, 2e5, 0.35);
+      const auto model = std::make_shared<Model>(scene.model);
+      scene.settings.constraint_damping = damping;
+      const double h = 0.5 * stable_step(scene.input(), none, scene.model.positions);
+      const long steps = long(std::ceil(0.1 / h));
+      Leapfrog right = leapfrog(scene.input(), none, scene.start(), 0.1 / double(steps));
+      advance(right, steps);
+      const State end = state_of(right);
+      const double moved = error_to(scene.model, scene.start(), end);
+      for (const std::string mode : {"cpu-double", "cpu", "cpu-fast", "node", "constraint"}) {
+        CAPTURE(material);
+        CAPTURE(mode);
+        CAPTURE(damping);
+        Settings settings = scene.settings;
+        settings.mode = mode, settings.iterations = 1;
+        std::array<double, 2> off;
+        for (std::size_t i = 0; i < 2; ++i) {
+          settings.substeps = i == 0 ? 50 : 200;
+          Sim sim = create_sim(model, settings);
+          for (int s = 0; s < 20; ++s) step(sim);
+          off[i] = error_to(scene.model, end, read_state(sim)) / moved;
+        }
+        CHECK(off[0] < (damping > 0 ? 0.15 : 0.01));
+        CHECK(off[1] < 0.4 * off[0] + 2e-4);
+        CHECK(off[1] < (damping > 0 ? 0.05 : 0.002));
+        settings.gravity = 0, settings.substeps = 1;
+        Sim still = create_sim(model, settings);
+        for (int s = 0; s < 5; ++s) step(still);
+        CHECK(error_to(scene.model, scene.start(), read_state(still)) < 1e-6);
+      }
+    }
+}
+
+TEST_CASE("material: modes node and constraint give the same bits, and momentum is kept while spinning") {
+  const GlTest gl;
+  auto model = std::make_shared<Model>();
+  const TetMesh mesh = make_block({1, 0.5, 0.4}, {5, 3, 2});
+  add_body(*model, "block", mesh, 1000, mesh.positions, {1, 0, 0}, {2, 5, 1}, {});
+  Settings settings{
+      .material = "neo-hookean", .young_modulus = 1e5, .constraint_damping = 1e-3, .gravity = 0};
+  settings.ground = false;
+  std::array<std::uint64_t, 2> hashes;
+  for (std::size_t i = 0; i < 2; ++i) {
+    settings.mode = i == 0 ? "node" : "constraint";
+    Sim sim = create_sim(model, settings);
+    const auto momenta = [&](const State& s) {
+      std::array<glm::dvec3, 2> sum{};
+      for (std::size_t v = 0; v < s.positions.size(); ++v) {
+        sum[0] += model->masses[v] * s.velocities[v];
+        sum[1] += model->masses[v] * glm::cross(s.positions[v], s.velocities[v]);
+      }
+      return sum;
+    };
+    const auto before = momenta(read_state(sim));
+    for (int s = 0; s < 40; ++s) step(sim);
+    const auto after = momenta(read_state(sim));
+    CHECK(glm::length(after[0] - before[0]) < 1e-4 * glm::length(before[0]));
+    CHECK(glm::length(after[1] - before[1]) < 1e-2 * glm::length(before[1]));
+    hashes[i] = state_hash(sim);
+  }
+  CHECK(hashes[0] == hashes[1]);
+}
+
+TEST_CASE("material: scenes and flags name it, and say what is wrong with it") {
+  const Folder folder;
+  const auto scene = [&](const std::string& material) {
+    std::ofstream(folder.path / "m.json")
+        << R"({"bodies": [{"block": {"size": [1, 0.5, 0.5], "cells": [2, 1, 1]}, "material": )" << material
+        << "}]}";
+  };
+  const auto settings = [&](const std::string& more) {
+    const Outcome run = program("run --scene m.json --steps 2 --mode cpu --out r " + more, folder);
+    CHECK(run.err == "");
+    return nlohmann::json::parse(read(folder.path / "r/stats.json"))["settings"];
+  };
+  scene(R"("gelatine")");
+  CHECK(settings("")["material"] == "neo-hookean");
+  CHECK(settings("")["young_modulus"] == 2e4);
+  CHECK(settings("--young-modulus 5e4")["young_modulus"] == 5e4);
+  CHECK(settings("--material none")["material"] == "none");
+  scene(R"({"model": "springs", "young_modulus": 1e5, "poisson_ratio": 0.4})");
+  CHECK(settings("")["material"] == "springs");
+  CHECK(settings("")["poisson_ratio"] == 0.4);
+  const auto refused = [&](const std::string& material, const std::string& message) {
+    scene(material);
+    const Outcome run = program("run --scene m.json --steps 1 --mode cpu --out r", folder);
+    CHECK(run.status == 2);
+    CHECK_MESSAGE(run.err.find(message) != std::string::npos, run.err);
+  };
+  refused(R"("jam")", "there are rubber, gelatine, muscle, foam");
+  refused("3", "'bodies.0.material' must be an object in braces");
+  refused(R"({"modulus": 3})", "'bodies.0.material.modulus' is not known here");
+  refused(R"({"poisson_ratio": 0.5})", "'poisson_ratio' cannot be 0.5");
+  refused(R"({"model": "springs", "poisson_ratio": 0.1})", "springs have no Poisson's ratio of 0.1");
+  std::ofstream(folder.path / "m.json")
+      << R"({"bodies": [{"block": {}, "material": "foam"}, {"block": {}, "position": [3, 0, 0]}]})";
+  CHECK(program("run --scene m.json --steps 1 --out r", folder).err.find("different materials") !=
+        std::string::npos);
+}

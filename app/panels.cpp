@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <optional>
 #include <string_view>
+#include <tuple>
 
 #include "app/ui.h"
 
@@ -19,8 +20,8 @@ namespace {
 using Words = std::vector<std::string>;
 
 // What a widget means, while the cursor is over it, and where it is, for tests.
-void describe_item(Session& s, Ui& ui, const std::string& name, const std::string& help = "") {
-  mark(s, ui, name);
+void describe_item(Session& s, const std::string& name, const std::string& help = "") {
+  mark(s, name);
   if (help.empty() || ImGui::IsItemActive() || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
     return;
   ImGui::BeginTooltip();
@@ -39,50 +40,49 @@ std::string begin_row(const std::string& label) {
   return "##" + label;
 }
 
-bool button(Session& s, Ui& ui, const char* label, const char* name, const char* help, float width = 0) {
+bool button(Session& s, const char* label, const char* name, const char* help, float width = 0) {
   const bool pressed = ImGui::Button(label, ImVec2(width, 0));
-  describe_item(s, ui, name, help);
+  describe_item(s, name, help);
   return pressed;
 }
 
-bool check_box(Session& s, Ui& ui, const char* label, bool& value, const std::string& help = "") {
+bool check_box(Session& s, const char* label, bool& value, const std::string& help = "") {
   const bool changed = ImGui::Checkbox(label, &value);
   if (changed) s.log("{} {}", label, value);
-  describe_item(s, ui, label, help);
+  describe_item(s, label, help);
   return changed;
 }
 
 // The word chosen, once.
-std::optional<std::string> combo(Session& s, Ui& ui, const std::string& label, const std::string& now,
+std::optional<std::string> combo(Session& s, const std::string& label, const std::string& now,
                                  const Words& words, const std::string& help = "") {
   std::optional<std::string> chosen;
   if (ImGui::BeginCombo(begin_row(label).c_str(), now.c_str(), ImGuiComboFlags_HeightLarge)) {
     for (const std::string& word : words) {
       if (ImGui::Selectable(word.c_str(), word == now)) chosen = word;
-      mark(s, ui, label + "=" + word);
+      mark(s, label + "=" + word);
     }
     ImGui::EndCombo();
   }
-  describe_item(s, ui, label, help);
+  describe_item(s, label, help);
   return chosen;
 }
 
 // For an enumeration whose names are in its order.
 template <class Enum, class Names>
-void enum_combo(Session& s, Ui& ui, const char* label, const Names& names, Enum& value) {
-  const auto chosen =
-      combo(s, ui, label, names[std::size_t(value)], Words(std::begin(names), std::end(names)));
+void enum_combo(Session& s, const char* label, const Names& names, Enum& value) {
+  const auto chosen = combo(s, label, names[std::size_t(value)], Words(std::begin(names), std::end(names)));
   if (!chosen) return;
   value = Enum(std::ranges::find(names, *chosen) - std::begin(names));
   s.log("{} {}", label, *chosen);
 }
 
-bool slider(Session& s, Ui& ui, const char* label, double& value, double low, double high, const char* format,
+bool slider(Session& s, const char* label, double& value, double low, double high, const char* format,
             const char* help, bool logarithmic = false) {
   const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   const bool changed =
       ImGui::SliderScalar(begin_row(label).c_str(), ImGuiDataType_Double, &value, &low, &high, format, flags);
-  describe_item(s, ui, label, help);
+  describe_item(s, label, help);
   return changed;
 }
 
@@ -118,14 +118,14 @@ std::string help_text(const Parameter& row) {
 }
 
 // A row of check boxes for a list of words.
-bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) {
+bool words_widget(Session& s, const Parameter& row, std::string& value) {
   Words chosen = split(value, ',');
   bool changed = false;
   int place = 0;
   for (const std::string& word : choices(row)) {
     if (place++ % 3) ImGui::SameLine();
     bool on = std::ranges::count(chosen, word) > 0;
-    if (!check_box(s, ui, word.c_str(), on, help_text(row))) continue;
+    if (!check_box(s, word.c_str(), on, help_text(row))) continue;
     changed = true;
     on ? chosen.push_back(word) : void(std::erase(chosen, word));
   }
@@ -135,19 +135,17 @@ bool words_widget(Session& s, Ui& ui, const Parameter& row, std::string& value) 
 
 // A stiffness of a kind that is switched off has no effect.
 bool is_idle(const Settings& settings, const Parameter& row) {
-  const std::string_view name = row.name;
-  if (name == "mass_splitting") return compliant(settings);  // brings it with it
+  if (row.name == "mass_splitting") return compliant(settings);  // brings it with it
   const bool material = settings.material != "none";
-  if (name == "young_modulus" || name == "poisson_ratio") return !material;
-  if (!name.starts_with("k_") && !name.starts_with("compliance_")) return false;
-  if (material) return true;
-  return std::ranges::count(split(settings.constraints, ','), name.substr(name.find('_') + 1)) == 0;
+  if (row.name == "young_modulus" || row.name == "poisson_ratio") return !material;
+  const auto* of = std::get_if<KindMember>(&row.member);
+  return of && (material || !uses(settings, constraint_kinds[of->kind]));
 }
 
-bool parameter_widget(Session& s, Ui& ui, const Parameter& row, Settings& settings) {
+bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
   if (const auto* word = std::get_if<std::string Settings::*>(&row.member)) {
-    if (std::string_view(row.name) == "constraints") return words_widget(s, ui, row, settings.**word);
-    const auto chosen = combo(s, ui, row.name, settings.**word, choices(row), help_text(row));
+    if (std::string_view(row.name) == "constraints") return words_widget(s, row, settings.**word);
+    const auto chosen = combo(s, row.name, settings.**word, choices(row), help_text(row));
     if (chosen) settings.** word = *chosen;
     return chosen.has_value();
   }
@@ -160,21 +158,21 @@ bool parameter_widget(Session& s, Ui& ui, const Parameter& row, Settings& settin
     else if constexpr (!std::is_same_v<T, std::string>)
       changed = number_widget(row, id, value);
   });
-  describe_item(s, ui, row.name, help_text(row));
+  describe_item(s, row.name, help_text(row));
   ImGui::EndDisabled();
   return changed;
 }
 
-void draw_parameters(Session& s, Ui& ui, std::string_view section) {
+void draw_parameters(Session& s, std::string_view section) {
   Settings wanted = s.loaded.sim.settings;
   bool changed = false;
   for (const Parameter& row : parameters())
-    if (section == row.section) changed |= parameter_widget(s, ui, row, wanted);
+    if (section == row.section) changed |= parameter_widget(s, row, wanted);
   if (changed) change_settings(s, wanted);
 }
 
 // The whole way to solve by one word, and what auto picked.
-void draw_solver(Session& s, Ui& ui) {
+void draw_solver(Session& s) {
   const Settings now = s.loaded.sim.settings;
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
@@ -191,91 +189,88 @@ void draw_solver(Session& s, Ui& ui) {
     help += fmt::format("\n{}: {}", preset.name, preset.help);
   }
   words.push_back("auto");
-  if (const auto chosen = combo(s, ui, "solver", current, words, help))
+  if (const auto chosen = combo(s, "solver", current, words, help))
     ways.contains(*chosen) ? change_settings(s, ways[*chosen]) : choose_soon(s);
   if (!automatic) return;
-  slider(s, ui, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
+  slider(s, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
          "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);
   if (ImGui::IsItemDeactivatedAfterEdit()) choose_soon(s);
   ImGui::TextWrapped("%s", describe(*choice).c_str());
 }
 
-void draw_run(Session& s, Ui& ui) {
+void draw_run(Session& s) {
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
-  if (button(s, ui, s.playing ? "Pause##play" : "Play##play", "play", "Space", width)) play(s, !s.playing);
+  if (button(s, s.playing ? "Pause##play" : "Play##play", "play", "Space", width)) play(s, !s.playing);
   ImGui::SameLine();
-  if (button(s, ui, "Step", "step", "S or Right", width)) single_step(s);
+  if (button(s, "Step", "step", "S or Right", width)) single_step(s);
   ImGui::SameLine();
-  if (button(s, ui, "Reset", "reset", "R", width)) restart(s);
-  check_box(s, ui, "fast", s.clock.fast, "steps as often as the machine can, instead of in real time");
+  if (button(s, "Reset", "reset", "R", width)) restart(s);
+  check_box(s, "fast", s.clock.fast, "steps as often as the machine can, instead of in real time");
   ImGui::SameLine(label_width());
-  check_box(s, ui, "vsync", s.vsync, "draw as often as the display shows");
+  check_box(s, "vsync", s.vsync, "draw as often as the display shows");
 }
 
-void draw_scene(Session& s, Ui& ui) {
-  if (const auto name = combo(s, ui, "scene", s.loaded.scene.name, scene_names(), s.loaded.scene.description))
+void draw_scene(Session& s) {
+  if (const auto name = combo(s, "scene", s.loaded.scene.name, scene_names(), s.loaded.scene.description))
     load_soon(s, *name, {}, false, false);
   begin_row("mesh file");
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
   bool load_it =
-      ImGui::InputTextWithHint("##mesh", "path, Enter", &ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
+      ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
   describe_item(
-      s, ui, "mesh",
+      s, "mesh",
       "in place of the scene's first body: .ply .obj .stl .off surfaces, .node/.ele .msh tetrahedra");
   ImGui::SameLine();
-  load_it |= button(s, ui, "Load", "load", "");
-  if (!load_it || ui.mesh.empty()) return;
+  load_it |= button(s, "Load", "load", "");
+  if (!load_it || s.ui.mesh.empty()) return;
   SceneOverrides overrides = s.loaded.overrides;
-  overrides.mesh = ui.mesh;
+  overrides.mesh = s.ui.mesh;
   load_soon(s, s.loaded.name, overrides, true, false);
 }
 
-void draw_colour_range(Session& s, Ui& ui) {
+void draw_colour_range(Session& s) {
   ColourRange& range = s.view.range();
   if (s.view.colour == Colour::plain) {
     ImGui::ColorEdit3(begin_row("body colour").c_str(), &s.view.body_colour.x, ImGuiColorEditFlags_NoInputs);
-    mark(s, ui, "body colour");
+    mark(s, "body colour");
   } else if (s.view.colour == Colour::velocity) {
-    slider(s, ui, "colour range", range.high, 0.1, 50, "0 .. %.2f m/s", "", true);
+    slider(s, "colour range", range.high, 0.1, 50, "0 .. %.2f m/s", "", true);
   } else if (double percent = range.high * 100;
-             slider(s, ui, "colour range", percent, 0.1, 100, "+/- %.1f %%", "", true)) {
+             slider(s, "colour range", percent, 0.1, 100, "+/- %.1f %%", "", true)) {
     range = {-percent / 100, percent / 100};
   }
 }
 
-void draw_view(Session& s, Ui& ui) {
+void draw_view(Session& s) {
   ViewOptions& view = s.view;
-  enum_combo(s, ui, "look", look_names, view.look);
-  enum_combo(s, ui, "colour", colour_names, view.colour);
-  draw_colour_range(s, ui);
+  enum_combo(s, "look", look_names, view.look);
+  enum_combo(s, "colour", colour_names, view.colour);
+  draw_colour_range(s);
   if (view.look == Look::tets) {
-    slider(s, ui, "shrink", view.shrink, 0, 1, "%.2f", "each tetrahedron, towards its centre");
-    slider(s, ui, "explode", view.explode, 0, 3, "%.2f", "tetrahedra away from the bodies' centre");
-    slider(s, ui, "cut", view.cut, 0, 1, "%.2f", "show tetrahedra below this part of the body; 1 shows all");
-    enum_combo(s, ui, "cut along", std::array{"x", "y", "z"}, view.cut_axis);
+    slider(s, "shrink", view.shrink, 0, 1, "%.2f", "each tetrahedron, towards its centre");
+    slider(s, "explode", view.explode, 0, 3, "%.2f", "tetrahedra away from the bodies' centre");
+    slider(s, "cut", view.cut, 0, 1, "%.2f", "show tetrahedra below this part of the body; 1 shows all");
+    enum_combo(s, "cut along", std::array{"x", "y", "z"}, view.cut_axis);
   }
-  struct Switch {
-    const char *name, *help;
-    bool& value;
-  };
-  const Switch switches[] = {{"smooth normals", "N", view.smooth_normals},
-                             {"shadow", "", view.shadow},
-                             {"grid", "lines on the ground and on walls\nG", view.grid},
-                             {"sky and ground", "also walls; without: one colour", view.backdrop},
-                             {"legend", "with every colour but plain", view.legend},
-                             {"follow", "the camera goes where the bodies go\nL", view.follow}};
-  for (std::size_t i = 0; i < std::size(switches); ++i) {
-    if (i % 2) ImGui::SameLine(label_width());
-    check_box(s, ui, switches[i].name, switches[i].value, switches[i].help);
+  const std::tuple<const char*, const char*, bool&> switches[] = {
+      {"smooth normals", "N", view.smooth_normals},
+      {"shadow", "", view.shadow},
+      {"grid", "lines on the ground and on walls\nG", view.grid},
+      {"sky and ground", "also walls; without: one colour", view.backdrop},
+      {"legend", "with every colour but plain", view.legend},
+      {"follow", "the camera goes where the bodies go\nL", view.follow}};
+  for (int i = 0; const auto& [name, help, value] : switches) {
+    if (i++ % 2) ImGui::SameLine(label_width());
+    check_box(s, name, value, help);
   }
   int doublings = std::bit_width(unsigned(s.samples) / 2);
-  enum_combo(s, ui, "MSAA", std::array{"none", "2x", "4x", "8x"}, doublings);
+  enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, doublings);
   s.samples = doublings ? 1 << doublings : 0;
 }
 
-bool section(Session& s, Ui& ui, const char* name) {
+bool section(Session& s, const char* name) {
   const bool shown = ImGui::CollapsingHeader(name, ImGuiTreeNodeFlags_DefaultOpen);
-  mark(s, ui, std::string("section ") + name);
+  mark(s, std::string("section ") + name);
   return shown;
 }
 
@@ -283,32 +278,32 @@ bool section(Session& s, Ui& ui, const char* name) {
 
 std::string label_of(const char* name) {
   std::string label = name;
-  std::replace(label.begin(), label.end(), '_', ' ');
+  std::ranges::replace(label, '_', ' ');
   return label;
 }
 
 float label_width() { return ImGui::GetFontSize() * 9.4f; }
 
-void mark(Session& s, Ui& ui, const std::string& name, const Rect& place) {
+void mark(Session& s, const std::string& name, const Rect& place) {
   if (!s.log.file.is_open()) return;
-  Rect& last = ui.places[name];
+  Rect& last = s.ui.places[name];
   if (last == place) return;
   last = place;
   s.log("at {} {:.0f} {:.0f} {:.0f} {:.0f}", name, place.x, place.y, place.width, place.height);
 }
 
-void mark(Session& s, Ui& ui, const std::string& name) {
+void mark(Session& s, const std::string& name) {
   if (!s.log.file.is_open() || !ImGui::IsItemVisible()) return;
   const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
-  mark(s, ui, name, {low.x, low.y, high.x - low.x, high.y - low.y});
+  mark(s, name, {low.x, low.y, high.x - low.x, high.y - low.y});
 }
 
-void draw_panel(Session& s, Ui& ui) {
-  draw_run(s, ui);
-  if (section(s, ui, "Scene")) draw_scene(s, ui);
-  if (section(s, ui, "Solver")) draw_solver(s, ui), draw_parameters(s, ui, "solver");
-  if (section(s, ui, "View")) draw_view(s, ui);
-  if (section(s, ui, "World")) draw_parameters(s, ui, "world");
+void draw_panel(Session& s) {
+  draw_run(s);
+  if (section(s, "Scene")) draw_scene(s);
+  if (section(s, "Solver")) draw_solver(s), draw_parameters(s, "solver");
+  if (section(s, "View")) draw_view(s);
+  if (section(s, "World")) draw_parameters(s, "world");
 }
 
 }  // namespace tetpbd

@@ -53,59 +53,33 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimut
 
 namespace {
 
-// ------------------------------------------------------------------------------------------------------------
-// what a scene may say, whoever wrote it
-
 constexpr std::size_t most_bytes = 1u << 20, most_depth = 32, most_tets = 30'000'000;
-constexpr double far = 1e6;  // metres; further out even pairs of floats lose a body's shape
 
-json list(std::size_t least, std::size_t most, const char* of, const json& each) {
-  return {{"least", least}, {"most", most}, {"of", of}, {"each", each}};
-}
-json vector(double low, double high, const char* kind = "number") {
-  return list(3, 3, "three numbers", {low, high, kind});
-}
-
-/// By key: "text"; [low, high, kind] of a number; list(); null for what set_parameter() checks.
+/// By key: "text"; [low, high] of a number; {"three": of each}; {"least", "most", "of", "each"} of a list;
+/// null for what set_parameter() checks. Further out than 1e6 m even pairs of floats lose a body's shape.
 json schema() {
-  const json box = {{"low", vector(-1, 2)}, {"high", vector(-1, 2)}};
-  json heavy = box;
-  heavy.update({{"ratio", {1e-9, 1e9, "number"}}, {"share", {0, 1, "number"}}});
-  const char* boxes = "at most 100 boxes {\"low\": [x,y,z], \"high\": [x,y,z]}";
-  const json body = {
-      {"name", "text"},
-      {"mesh", "text"},
-      {"block", {{"size", vector(1e-6, far)}, {"cells", vector(1, 2000, "whole number")}}},
-      {"tet", list(4, 4, "four points", vector(-far, far))},
-      {"tetgen", "text"},
-      {"scale", vector(1e-6, 1e6)},
-      {"height", {1e-6, far, "number"}},
-      {"rotation", vector(-3600, 3600)},
-      {"position", vector(-far, far)},
-      {"density", {1e-6, 1e9, "number"}},
-      {"velocity", vector(-1e5, 1e5)},
-      {"spin", vector(-1e5, 1e5)},
-      {"fixed", list(0, 100, boxes, box)},
-      {"heavy", list(0, 100, boxes, heavy)},
-      {"deform", "text"},
-      {"material",
-       {{"or", "text"}, {"model", nullptr}, {"young_modulus", nullptr}, {"poisson_ratio", nullptr}}},
-  };
-  const json plane = {{"point", vector(-far, far)}, {"normal", vector(-1e3, 1e3)}};
-  json result = {
-      {"name", "text"},
-      {"description", "text"},
-      {"bodies", list(1, 10000, "1 to 10000 bodies", body)},
-      {"world", {{"obstacles", list(0, MAX_PLANES - 1, "planes, few enough for the GPU", plane)}}},
-      {"solver", json::object()},
-      {"camera",
-       {{"target", vector(-far, far)},
-        {"distance", {1e-4, far, "number"}},
-        {"azimuth", {-360, 360, "number"}},
-        {"elevation", {-89, 89, "number"}},
-        {"fov", {5, 120, "number"}}}},
-      {"duration", {1e-6, 1e6, "number"}},
-  };
+  json result = json::parse(R"({
+    "name": "text", "description": "text", "duration": [1e-6, 1e6],
+    "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
+      "name": "text", "mesh": "text", "tetgen": "text", "deform": "text",
+      "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
+      "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]}},
+      "tet": {"least": 4, "most": 4, "of": "four points", "each": {"three": [-1e6, 1e6]}},
+      "scale": {"three": [1e-6, 1e6]}, "height": [1e-6, 1e6],
+      "rotation": {"three": [-3600, 3600]}, "position": {"three": [-1e6, 1e6]},
+      "density": [1e-6, 1e9], "velocity": {"three": [-1e5, 1e5]}, "spin": {"three": [-1e5, 1e5]},
+      "fixed": {"least": 0, "most": 100, "of": "at most 100 boxes {\"low\": [x,y,z], \"high\": [x,y,z]}",
+        "each": {"low": {"three": [-1, 2]}, "high": {"three": [-1, 2]}}}}},
+    "world": {"obstacles": {"least": 0, "of": "planes, few enough for the GPU",
+      "each": {"point": {"three": [-1e6, 1e6]}, "normal": {"three": [-1e3, 1e3]}}}},
+    "solver": {},
+    "camera": {"target": {"three": [-1e6, 1e6]}, "distance": [1e-4, 1e6],
+      "azimuth": [-360, 360], "elevation": [-89, 89], "fov": [5, 120]}
+  })");
+  json& body = result["bodies"]["each"];
+  body["heavy"] = body["fixed"];
+  body["heavy"]["each"].update({{"ratio", {1e-9, 1e9}}, {"share", {0, 1}}});
+  result["world"]["obstacles"]["most"] = MAX_PLANES - 1;
   for (const Parameter& row : parameters()) result[row.section][row.name] = nullptr;
   return result;
 }
@@ -127,13 +101,15 @@ void check(const json& value, const json& allowed, const std::string& path, cons
     require(value.is_string(), "a text in quotes");
   } else if (allowed.is_array()) {
     const double low = allowed[0], high = allowed[1], x = value.is_number() ? value.get<double>() : NAN;
-    const std::string kind = allowed[2];
-    require(x >= low && x <= high && (kind == "number" || x == std::floor(x)),
-            fmt::format("a {} from {:g} to {:g}", kind, low, high));
+    const bool whole = allowed.size() > 2;
+    require(x >= low && x <= high && (!whole || x == std::floor(x)),
+            fmt::format("a {} from {:g} to {:g}", whole ? "whole number" : "number", low, high));
+  } else if (allowed.contains("three")) {
+    check(value, {{"least", 3}, {"most", 3}, {"of", "three numbers"}, {"each", allowed["three"]}}, path,
+          file);
   } else if (allowed.contains("each")) {
-    const std::string of = allowed["of"];
     require(value.is_array() && value.size() >= allowed["least"] && value.size() <= allowed["most"],
-            "a list of " + of);
+            "a list of " + allowed["of"].get<std::string>());
     for (std::size_t i = 0; i < value.size(); ++i)
       check(value[i], allowed["each"], inner(std::to_string(i)), file);
   } else if (allowed.is_object() && !(allowed.contains("or") && value.is_string())) {
@@ -150,18 +126,14 @@ void check(const json& value, const json& allowed, const std::string& path, cons
   }
 }
 
-// ------------------------------------------------------------------------------------------------------------
-// reading what was checked
-
 void read_settings(const json& section, Settings& settings, const std::string& file) {
   for (const auto& [key, value] : section.items()) {
     const Parameter* row = find_parameter(key);
     if (!row) continue;  // obstacles
     std::string text = value.is_string() ? value.get<std::string>() : value.dump();
     if (key == "constraints" && value.is_array()) {
-      text = value.empty() ? "none" : "";
-      for (const json& word : value)
-        text += (text.empty() ? "" : ",") + (word.is_string() ? word.get<std::string>() : word.dump());
+      std::erase_if(text, [](char c) { return c == '[' || c == ']' || c == '"'; });
+      if (text.empty()) text = "none";
     }
     set_parameter(settings, *row, text, file);
   }
@@ -381,8 +353,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     std::vector<double> mass_factors(mesh.positions.size(), 1);
     std::mt19937 generator{std::uint32_t(scene.settings.seed)};
     for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
-      if (std::any_of(body.fixed.begin(), body.fixed.end(), [&](const auto& box) { return is_in(i, box); }))
-        fixed.push_back(i);
+      if (std::ranges::any_of(body.fixed, [&](const auto& box) { return is_in(i, box); })) fixed.push_back(i);
       for (const BodyDescription::Box& heavy : body.heavy) {
         const bool chosen = double(generator()) / 4294967296.0 < heavy.share;
         if (chosen && is_in(i, heavy)) mass_factors[i] *= heavy.ratio;

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -72,9 +73,27 @@ struct Task {
   std::function<void()> act;
 };
 
+/// Window coordinates, from the top left.
+struct Rect {
+  float x = 0, y = 0, width = 0, height = 0;
+  bool contains(double px, double py) const {
+    return px >= double(x) && py >= double(y) && px < double(x + width) && py < double(y + height);
+  }
+  bool operator==(const Rect&) const = default;
+};
+
+/// What is shown of the panels.
+struct Ui {
+  bool panels = true, plots = true, help = false;
+  float scale = 1;                     ///< of the display: 2 on a dense one
+  std::string mesh;                    ///< path being typed
+  std::map<std::string, Rect> places;  ///< of widgets, as last logged
+};
+
 struct Session {
   Capabilities gl;
   EventLog log;
+  Ui ui;
   Loaded loaded;
   Camera camera;
   ViewOptions view;

@@ -24,9 +24,9 @@ void next_colour(Session& s) {
 
 void flip(Session& s, const char* name, bool& value) { s.log("{} {}", name, value = !value); }
 
-void escape(Session& s, Ui& ui) {
-  if (ui.help)
-    flip(s, "help", ui.help);
+void escape(Session& s) {
+  if (s.ui.help)
+    flip(s, "help", s.ui.help);
   else if (s.grab)
     let_go(s);
   else
@@ -87,15 +87,15 @@ void draw_status(const Session& s, const Rect& place) {
   ImGui::End();
 }
 
-void draw_messages(Session& s, Ui& ui, const Rect& view) {
+void draw_messages(Session& s, const Rect& view) {
   constexpr double lasting = 4;  // s, of one that is no error
   std::erase_if(s.messages, [&](const Message& m) { return !m.error && s.now - m.since > lasting; });
-  const float margin = 14 * ui.scale, width = std::min(view.width - 2 * margin, 560 * ui.scale);
+  const float margin = 14 * s.ui.scale, width = std::min(view.width - 2 * margin, 560 * s.ui.scale);
   float top = view.y + margin;
   std::function<void()> pressed;  // changes the messages, so after the loop
   const auto offer = [&](const char* label, const char* name, auto act) {
     if (ImGui::SmallButton(label)) pressed = act;
-    mark(s, ui, name);
+    mark(s, name);
   };
   for (std::size_t i = 0; i < s.messages.size(); ++i) {
     const Message& message = s.messages[i];
@@ -120,7 +120,7 @@ void draw_messages(Session& s, Ui& ui, const Rect& view) {
         s.log("dismissed");
       });
     }
-    top += ImGui::GetWindowHeight() + 6 * ui.scale;
+    top += ImGui::GetWindowHeight() + 6 * s.ui.scale;
     ImGui::End();
   }
   if (pressed) pressed();
@@ -166,23 +166,23 @@ void set_style(float scale, float density) {
 
 const std::vector<Shortcut>& shortcuts() {
   static const std::vector<Shortcut> rows = {
-      {GLFW_KEY_SPACE, "Space", "play, pause", [](Session& s, Ui&) { play(s, !s.playing); }},
-      {GLFW_KEY_S, "S, Right", "one step", [](Session& s, Ui&) { single_step(s); }, GLFW_KEY_RIGHT},
-      {GLFW_KEY_R, "R", "reset", [](Session& s, Ui&) { restart(s); }},
-      {GLFW_KEY_F, "F", "show all of the body", [](Session& s, Ui&) { frame_body(s); }},
-      {GLFW_KEY_1, "1", "surface", [](Session& s, Ui&) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
-      {GLFW_KEY_2, "2", "with edges", [](Session& s, Ui&) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
-      {GLFW_KEY_3, "3", "tetrahedra", [](Session& s, Ui&) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
-      {GLFW_KEY_C, "C", "next colour", [](Session& s, Ui&) { next_colour(s); }},
-      {GLFW_KEY_N, "N", "flat normals", [](Session& s, Ui&) { flip(s, "normals", s.view.smooth_normals); }},
-      {GLFW_KEY_G, "G", "grid", [](Session& s, Ui&) { flip(s, "grid", s.view.grid); }},
-      {GLFW_KEY_L, "L", "follow the bodies", [](Session& s, Ui&) { flip(s, "follow", s.view.follow); }},
-      {GLFW_KEY_M, "M", "plots", [](Session& s, Ui& ui) { flip(s, "plots", ui.plots); }},
-      {GLFW_KEY_TAB, "Tab", "panels", [](Session& s, Ui& ui) { flip(s, "panels", ui.panels); }},
-      {GLFW_KEY_P, "P", "screenshot without panels", [](Session& s, Ui&) { s.take_screenshot = true; }},
-      {GLFW_KEY_H, "H, F1", "this help", [](Session& s, Ui& ui) { flip(s, "help", ui.help); }, GLFW_KEY_F1},
+      {GLFW_KEY_SPACE, "Space", "play, pause", [](Session& s) { play(s, !s.playing); }},
+      {GLFW_KEY_S, "S, Right", "one step", [](Session& s) { single_step(s); }, GLFW_KEY_RIGHT},
+      {GLFW_KEY_R, "R", "reset", [](Session& s) { restart(s); }},
+      {GLFW_KEY_F, "F", "show all of the body", [](Session& s) { frame_body(s); }},
+      {GLFW_KEY_1, "1", "surface", [](Session& s) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
+      {GLFW_KEY_2, "2", "with edges", [](Session& s) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
+      {GLFW_KEY_3, "3", "tetrahedra", [](Session& s) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
+      {GLFW_KEY_C, "C", "next colour", [](Session& s) { next_colour(s); }},
+      {GLFW_KEY_N, "N", "flat normals", [](Session& s) { flip(s, "normals", s.view.smooth_normals); }},
+      {GLFW_KEY_G, "G", "grid", [](Session& s) { flip(s, "grid", s.view.grid); }},
+      {GLFW_KEY_L, "L", "follow the bodies", [](Session& s) { flip(s, "follow", s.view.follow); }},
+      {GLFW_KEY_M, "M", "plots", [](Session& s) { flip(s, "plots", s.ui.plots); }},
+      {GLFW_KEY_TAB, "Tab", "panels", [](Session& s) { flip(s, "panels", s.ui.panels); }},
+      {GLFW_KEY_P, "P", "screenshot without panels", [](Session& s) { s.take_screenshot = true; }},
+      {GLFW_KEY_H, "H, F1", "this help", [](Session& s) { flip(s, "help", s.ui.help); }, GLFW_KEY_F1},
       {GLFW_KEY_ESCAPE, "Esc", "close help; let go; close messages", escape},
-      {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s, Ui&) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
+      {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
   };
   return rows;
 }
@@ -200,17 +200,17 @@ Layout make_layout(const Ui& ui, float width, float height) {
   return layout;
 }
 
-void draw_ui(Session& s, Ui& ui, const Layout& layout) {
-  mark(s, ui, "view", layout.view);
-  if (ui.panels) {
+void draw_ui(Session& s, const Layout& layout) {
+  mark(s, "view", layout.view);
+  if (s.ui.panels) {
     begin_part("panel", layout.panel);
-    draw_panel(s, ui);
+    draw_panel(s);
     ImGui::End();
     if (layout.plots.height > 0) draw_plots(s, layout.plots);
     draw_status(s, layout.status);
   }
-  draw_messages(s, ui, layout.view);
-  if (ui.help) draw_help(ui);
+  draw_messages(s, layout.view);
+  if (s.ui.help) draw_help(s.ui);
 }
 
 void draw_busy(const Layout& layout, const std::string& what) {

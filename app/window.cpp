@@ -29,7 +29,6 @@ namespace {
 
 struct Input {
   Session& session;
-  Ui& ui;
   Rect view{};
   /// `asking`: pressed, and the picker has not answered yet.
   enum class Drag { none, asking, grab, orbit, pan } drag = Drag::none;
@@ -112,7 +111,7 @@ void key(Input& in, int code, int modifiers) {
   modifiers &= GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER;
   for (const Shortcut& row : shortcuts())
     if ((code == row.key || code == row.alternative) && modifiers == row.modifiers)
-      return row.act(in.session, in.ui);
+      return row.act(in.session);
 }
 
 void take_answer(Input& in) {
@@ -179,9 +178,8 @@ std::string last_glfw_error() {
 struct Desktop {
   GLFWwindow* window = nullptr;
   int width = 0, height = 0;  ///< of this frame, in window coordinates
-  float density = 1;          ///< framebuffer pixels a window coordinate: more on some dense displays
+  float density = 0;          ///< framebuffer pixels a window coordinate: more on some dense displays
   bool visible = false;       ///< not minimised
-  float style_scale = 0, style_density = 0;  ///< what the style was made for
 
   Desktop(int wanted_width, int wanted_height, const std::string& title) {
     if (!glfwInit())
@@ -216,20 +214,20 @@ struct Desktop {
 };
 
 // Sizes of this frame, and a style for them: another monitor can have another scale.
-void measure_window(Desktop& d, Ui& ui) {
+void measure_window(Desktop& d, Session& s) {
   int pixels_x = 0, pixels_y = 0;
   glfwGetWindowSize(d.window, &d.width, &d.height);
   glfwGetFramebufferSize(d.window, &pixels_x, &pixels_y);
   d.visible = pixels_x > 0 && pixels_y > 0 && d.width > 0 && d.height > 0 &&
               !glfwGetWindowAttrib(d.window, GLFW_ICONIFIED);
   if (!d.visible) return;
+  const std::pair before(s.ui.scale, d.density);
   d.density = float(pixels_x) / float(d.width);
   float content = 1;
   glfwGetWindowContentScale(d.window, &content, nullptr);
-  ui.scale = std::clamp(content / d.density, 0.5f, 4.0f);
-  if (ui.scale == d.style_scale && d.density == d.style_density) return;
-  d.style_scale = ui.scale, d.style_density = d.density;
-  set_style(ui.scale, d.density);
+  s.ui.scale = std::clamp(content / d.density, 0.5f, 4.0f);
+  if (before == std::pair(s.ui.scale, d.density)) return;
+  set_style(s.ui.scale, d.density);
   ImGui_ImplOpenGL3_DestroyFontsTexture();
   ImGui_ImplOpenGL3_CreateFontsTexture();
 }
@@ -295,11 +293,11 @@ void end_imgui_frame(const Desktop& d, const Target& target) {
 }
 
 // The first scene loads before there is anything to show, so this says what is going on.
-void show_start(Session& s, Ui& ui, Desktop& d, const std::string& scene) {
+void show_start(Session& s, Desktop& d, const std::string& scene) {
   for (int frame = 0; frame < 2; ++frame) {  // the first has no size for what it places
     glfwPollEvents();
-    measure_window(d, ui);
-    const Layout layout = make_layout(ui, float(std::max(d.width, 1)), float(std::max(d.height, 1)));
+    measure_window(d, s);
+    const Layout layout = make_layout(s.ui, float(std::max(d.width, 1)), float(std::max(d.height, 1)));
     s.aspect = layout.view.width / layout.view.height;
     if (!d.visible) return;
     begin_imgui_frame();
@@ -308,17 +306,17 @@ void show_start(Session& s, Ui& ui, Desktop& d, const std::string& scene) {
   }
 }
 
-void draw_frame(Session& s, Ui& ui, View& view, Input& input, const Desktop& d) {
+void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   begin_imgui_frame();
-  handle_input(input, make_layout(ui, float(d.width), float(d.height)).view);
-  const Layout layout = make_layout(ui, float(d.width), float(d.height));  // a key can hide the panels
+  handle_input(input, make_layout(s.ui, float(d.width), float(d.height)).view);
+  const Layout layout = make_layout(s.ui, float(d.width), float(d.height));  // a key can hide the panels
   const auto pixels = [&](float length) { return std::max(int(std::lround(length * d.density)), 1); };
   const int width = pixels(layout.view.width), height = pixels(layout.view.height);
   s.aspect = float(width) / float(height);
   draw_view(s, view, width, height);
   take_screenshots(s, view);
   const bool named = s.task.has_value();
-  draw_ui(s, ui, layout);
+  draw_ui(s, layout);
   if (s.task) draw_busy(layout, s.task->name);
   end_imgui_frame(d, view.target);
   if (named) attempt(s, std::exchange(s.task, std::nullopt)->act);  // its name has been on the screen
@@ -335,14 +333,13 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.samples = options.samples;
   s.view = options.view;
   s.view.follow = true;
-  Ui ui;
-  ui.mesh = overrides.mesh.string();
-  Input input{s, ui};
+  s.ui.mesh = overrides.mesh.string();
+  Input input{s};
   listen(desktop.window, input);
   ImGui::CreateContext();
   ImGui_ImplGlfw_InitForOpenGL(desktop.window, true);
   ImGui_ImplOpenGL3_Init("#version 430 core");
-  show_start(s, ui, desktop, "loading " + scene.name);
+  show_start(s, desktop, "loading " + scene.name);
   take_over(s, load(name, overrides, scene), false);
 
   View view;
@@ -361,7 +358,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
       glfwWaitEventsTimeout(0.1);
     else
       glfwPollEvents();
-    measure_window(desktop, ui);
+    measure_window(desktop, s);
     s.now = glfwGetTime();
     if (!input.events.empty()) last_event = s.now;
     const double elapsed = s.now - std::exchange(before, s.now);
@@ -373,20 +370,20 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     if (s.loaded.scene.name != title)
       glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
     if (s.vsync != vsync) glfwSwapInterval((vsync = s.vsync) ? 1 : 0);
-    s.measuring = ui.panels && ui.plots;
+    s.measuring = s.ui.panels && s.ui.plots;
     const long steps = s.loaded.sim.steps;
     if (!attempt(s, [&] {
           advance(s, elapsed);
           watch_state(s);
           measure_frame(s, s.loaded.sim.steps != steps);
         }))
-      ui.plots = false, play(s, false);  // said once, not every frame
+      s.ui.plots = false, play(s, false);  // said once, not every frame
     moving = follow_bodies(s, elapsed);
     if (s.now - last_check > 0.5) {
       last_check = s.now;
       follow_shaders(s);
     }
-    draw_frame(s, ui, view, input, desktop);
+    draw_frame(s, view, input, desktop);
   }
   s.log("closed");
   return 0;

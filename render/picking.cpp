@@ -44,7 +44,8 @@ std::optional<Pick> poll(Picker& picker, bool wait) {
   const auto answer = take<std::uint32_t>(picker.answered, picker.result, "picking", wait);
   if (!answer) return std::nullopt;
   const std::uint32_t triangle = answer->at(1), vertex = answer->at(2);
-  return Pick{triangle != none, triangle, vertex, std::bit_cast<float>(answer->at(0)), picker.ray};
+  if (triangle == none) return Pick{.ray = picker.ray};
+  return Pick{true, triangle, vertex, std::bit_cast<float>(answer->at(0)), picker.ray};
 }
 
 }  // namespace tetpbd

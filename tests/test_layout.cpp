@@ -108,12 +108,14 @@ TEST_CASE("#include, #foreach and words expand") {
   const std::string text = shader_text(
       "solve_node.comp",
       {{},
-       {{{"KIND", "stretch"}, {"ARITY", "2"}, {"INDEX", "0"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}},
-        {{"KIND", "bend"}, {"ARITY", "4"}, {"INDEX", "1"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}}}},
+       {{{"KIND", "stretch"}, {"ARITY", "2"}, {"INDEX", "0"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"},
+         {"PROJECT", "project"}, {"PAIRS", "1"}, {"MATERIAL", "0"}},
+        {{"KIND", "bend"}, {"ARITY", "4"}, {"INDEX", "1"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"},
+         {"PROJECT", "project"}, {"PAIRS", "3"}, {"MATERIAL", "1"}}}},
       files);
-  CHECK(text.find("project_stretch(records_stretch.x + (t - begin_stretch), chunk.owned)") !=
+  CHECK(text.find("project_stretch(records_stretch.x + 1 * (t - begin_stretch), chunk.owned)") !=
         std::string::npos);
-  CHECK(text.find("project_bend(records_bend.x + (t - begin_bend), chunk.owned)") != std::string::npos);
+  CHECK(text.find("project_bend(records_bend.x + 3 * (t - begin_bend), chunk.owned)") != std::string::npos);
   CHECK(text.find("project_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);

@@ -62,6 +62,9 @@ Capabilities load_gl() {
   if (result != GLEW_OK && result != GLEW_ERROR_NO_GLX_DISPLAY)
     throw Error("OpenGL functions did not load", reinterpret_cast<const char*>(glewGetErrorString(result)),
                 "check the OpenGL driver", 1);
+  if (gl_integer(GL_MAJOR_VERSION) * 10 + gl_integer(GL_MINOR_VERSION) < 43)
+    throw Error("OpenGL 4.3 is needed", "the driver offers " + gl_string(GL_VERSION),
+                "use a newer driver or another GPU (tetpbd info lists them)", 1);
   if (gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT) {
     glEnable(GL_DEBUG_OUTPUT);
     glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
@@ -105,8 +108,9 @@ bool is_software(EGLDeviceEXT device) {
   return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
 }
 
-/// Current, or none. With `reset`, the driver tells of a GPU that was reset, and checks no bounds in shaders.
-EGLContext make_context(EGLDisplay display, bool debug, bool reset) {
+/// Current, or none. `any_version`: what the driver has, so that load_gl() can say it. With `reset`, the
+/// driver tells of a GPU that was reset, and checks no bounds in shaders.
+EGLContext make_context(EGLDisplay display, bool debug, bool any_version, bool reset) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
   const EGLint attributes[][2] = {
@@ -116,7 +120,8 @@ EGLContext make_context(EGLDisplay display, bool debug, bool reset) {
       {EGL_CONTEXT_OPENGL_DEBUG, debug},
       {reset ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY : EGL_NONE, EGL_LOSE_CONTEXT_ON_RESET},
       {EGL_NONE, EGL_NONE}};
-  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes[0]);
+  const EGLContext context =
+      eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes[any_version ? 3 : 0]);
   if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
     return context;
   eglDestroyContext(display, context);
@@ -146,9 +151,10 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
       displays.push_back(display_of(one));
   if (device < 0)
     displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
-  for (EGLDisplay display : displays)
-    for (const bool reset : {true, false}) {
-      context_ = make_context(display, debug, reset);
+  for (const bool any_version : {false, true})
+    for (std::size_t i = 0; i < 2 * displays.size(); ++i) {
+      EGLDisplay display = displays[i / 2];
+      context_ = make_context(display, debug, any_version, i % 2 == 0);
       if (context_ == EGL_NO_CONTEXT) continue;
       display_ = display;
       capabilities_ = load_gl();

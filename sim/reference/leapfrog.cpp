@@ -101,7 +101,7 @@ void touch(const glm::dvec4& plane, double friction, const glm::dvec3& before, d
 }
 
 Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
-  require_compliances(compliances);
+  require_compliances(input.system, compliances);
   Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}};
   std::vector<std::uint32_t> vertices;
   for_each_spring(run, [&](auto, const ConstraintList& list, auto&&, std::size_t) {

@@ -14,7 +14,8 @@ using Points = std::vector<glm::dvec3>;  ///< m, by vertex
 
 /// alpha of each kind, in the order of Kinds: a constraint's energy is C^2 / (2 alpha), so alpha is in
 /// unit(C)^2 / J. Stretch: m^2/J = m/N, one over a spring's stiffness; bend: rad^2/J; volume: m^6/J = m^3/Pa.
-/// Above 0 (rigid_step is the limit); infinity leaves the kind out. A material's constraints have their own.
+/// Above 0 where there are such constraints (rigid_step is the limit); infinity leaves the kind out. A
+/// material's constraints have their own.
 using Compliances = std::array<double, kind_count>;
 
 /// What is minimised, in joules, over the positions x of vertices with mass:

@@ -80,9 +80,9 @@ State rigid_step(const ReferenceInput& input, State state) {
   return state;
 }
 
-void require_compliances(const Compliances& compliances) {
+void require_compliances(const ConstraintSystem& system, const Compliances& compliances) {
   for (std::size_t k = 0; k < compliances.size(); ++k)
-    if (!(compliances[k] > 0))
+    if (system.lists[k].count() > 0 && system.lists[k].compliance.empty() && !(compliances[k] > 0))
       throw Error("compliance must be above 0",
                   fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
                   "rigid_step is the limit of 0, infinity leaves a kind out");
@@ -91,7 +91,7 @@ void require_compliances(const Compliances& compliances) {
 namespace {
 
 Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
-  require_compliances(compliances);
+  require_compliances(input.system, compliances);
   Objective o{.system = input.system, .compliances = compliances, .masses = {}, .predicted = {}};
   for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);
   return o;

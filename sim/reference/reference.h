@@ -30,8 +30,8 @@ struct ReferenceInput {
 /// line, say).
 State rigid_step(const ReferenceInput& input, State state);
 
-/// Throws Error unless all are above 0, infinity included.
-void require_compliances(const Compliances& compliances);
+/// Throws Error unless those of the kinds that have constraints are above 0, infinity included.
+void require_compliances(const ConstraintSystem& system, const Compliances& compliances);
 /// The implicit-Euler step of length h (s) from `state`: inertia 1/h^2, unit M size^2 / h^2 with M the moving
 /// mass.
 Objective step_objective(const ReferenceInput& input, State state, const Compliances& compliances, double h);

@@ -69,8 +69,8 @@ def fronts(source, date):
         for row in rows:
             row["ms"] = float(row["gpu_ms_per_step"] or row["wall_ms_per_step"])
             row["lost"] = float(row["max_volume_loss_percent"])
-        common = lambda r: [r["mode"], r["iterations"], r["substeps"], number(r["ms"]), number(r["lost"], 3)]
-        head = ["iterations", "substeps", "ms per step", "largest loss %"]
+        common = lambda r: [r["mode"], number(r["omega"]), r["iterations"], r["substeps"], number(r["ms"]), number(r["lost"], 3)]
+        head = ["ω", "iterations", "substeps", "ms per step", "largest loss %"]
         front = sorted((r for r in rows if r["pareto"] == "true"), key=lambda r: r["ms"])
         out.append(f"## {scene}: {rows[0]['tets']} tets\n")
         out.append(table(["on the front", *head, "rigid distance at the end", "left of a 5 % stretch after one step"],

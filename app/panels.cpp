@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "app/ui.h"
+#include "sim/material.h"
 
 namespace tetpbd {
 
@@ -198,6 +199,22 @@ void draw_solver(Session& s) {
   ImGui::TextWrapped("%s", describe(*choice).c_str());
 }
 
+// What the body is made of, by name; its numbers are below.
+void draw_material(Session& s) {
+  const Settings now = s.loaded.sim.settings;
+  std::string current = now.material == "none" ? "constraints as set below" : "numbers as set below",
+              help = "a material by name";
+  Words words;
+  std::map<std::string, Settings> ways;
+  for (const MaterialPreset& preset : material_presets()) {
+    apply_values(ways[preset.name] = now, preset.values, preset.name);
+    if (ways[preset.name] == now) current = preset.name;
+    words.push_back(preset.name);
+    help += fmt::format("\n{}: {}", preset.name, preset.help);
+  }
+  if (const auto chosen = combo(s, "made of", current, words, help)) change_settings(s, ways[*chosen]);
+}
+
 void draw_run(Session& s) {
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
   if (button(s, s.playing ? "Pause##play" : "Play##play", "play", "Space", width)) play(s, !s.playing);
@@ -301,7 +318,7 @@ void mark(Session& s, const std::string& name) {
 void draw_panel(Session& s) {
   draw_run(s);
   if (section(s, "Scene")) draw_scene(s);
-  if (section(s, "Solver")) draw_solver(s), draw_parameters(s, "solver");
+  if (section(s, "Solver")) draw_solver(s), draw_material(s), draw_parameters(s, "solver");
   if (section(s, "View")) draw_view(s);
   if (section(s, "World")) draw_parameters(s, "world");
 }

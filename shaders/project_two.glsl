@@ -1,5 +1,4 @@
-// As project.glsl, of a kind of two components, which only a material has: they are solved together, then its viscosity where they moved
-// the vertices (method.md eqs. 32-33).
+// As project.glsl, of a kind of two components, which only a material has: they are solved together (method.md eq. 32).
 float word_of_$KIND(uint number, uint word) { return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2][word % 2]); }
 void project_$KIND(uint number, uint owned) {
   uint ids = patch_words[RECORDS_AT + number].x;  // its vertices, a byte each
@@ -19,34 +18,16 @@ void project_$KIND(uint number, uint owned) {
     if ((phases & PHASE_PREDICT) == 0u) before[k] = multipliers[number + k];  // a record has several words, the first is theirs
     c.C[k] += a[k] * before[k];
   }
-  // Two moves of the same vertices, one after the other: each gets half of the relaxation.
-  float share = (params.damping > 0.0 ? 2.0 : 1.0) / params.soft_omega;
-  Multiplier2 m = multiplier(c, w, params.max_correction, a, share);
+  Multiplier2 m = multiplier(c, w, params.max_correction, a, 1.0 / params.soft_omega);
   if ((phases & PHASE_FINISH) == 0u)
     for (uint k = 0u; k < 2u; ++k) multipliers[number + k] = before[k] + m.lambda[k];
 #if COUNT_GUARDS
   if (local_id(ids, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
 #endif
-  vec3 moves[4], start[4];
-  for (int j = 0; j < 4; ++j) moves[j] = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
-  if (params.damping > 0.0) {
-    ivec4 first_start = start_positions[ids & 255u];
-    for (int j = 0; j < 4; ++j) {
-      start[j] = between(start_positions[local_id(ids, j)], first_start);
-      x[j] += moves[j];
-    }
-    Constraint4 v = $KIND_viscosity(x, start, rest);
-    float av = $KIND_viscous_compliance(a[0], params.damping), held = 0.0;
-    if ((phases & PHASE_PREDICT) == 0u) held = multipliers[number + 2u];
-    v.C += av * held;
-    float lambda = multiplier(v, w, 1.0, params.max_correction, av, share).lambda;
-    if ((phases & PHASE_FINISH) == 0u) multipliers[number + 2u] = held + lambda;
-    for (int j = 0; j < 4; ++j) moves[j] += lambda * w[j] * v.gradient[j];
-  }
   for (int j = 0; j < 4; ++j) {
     uint local = local_id(ids, j);
     if (local >= owned) continue;
-    vec3 move = moves[j];
+    vec3 move = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
     ivec3 quanta = ivec3(round(move * quanta_per_metre[local]));
     for (uint axis = 0u; axis < 3u; ++axis) atomicAdd(sums[3u * local + axis], quanta[axis]);
   }

@@ -30,9 +30,6 @@ struct ConstraintKind {
   int values = 1;               ///< numbers that describe a constraint at rest
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
   constexpr bool of_material() const { return most_compliance == 0; }
-  constexpr int multipliers() const {
-    return components + (of_material() ? 1 : 0);
-  }  ///< with its viscosity's
 };
 
 // A row: what it is called, its formula, the vertices of each, and what these measure at rest.
@@ -69,10 +66,6 @@ struct NeoHookean {
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.neo_hookean(x, rest, id);
-  }
-  template <class real, class Math = glsl::LibraryMath>
-  static auto viscosity(glm::vec<3, real>* x, glm::vec<3, real>* start, const real* rest) {
-    return Formulas<real, Math>{}.neo_hookean_viscosity(x, start, rest);
   }
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then

@@ -31,7 +31,6 @@ template <class Real, class Math = LibraryMath>
 struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
-  using mat3 = glm::mat<3, 3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
   static constexpr real quantization_size = 0;  // positions are kept in full here
   static real atan(real y, real x) { return Math::atan(y, x); }

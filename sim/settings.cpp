@@ -222,6 +222,9 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");
+  if (settings.material == "neo-hookean" && damped(settings))
+    throw Error("material neo-hookean has no constraint_damping", where,
+                "set it to 0 and use damping, or material springs");
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");

@@ -128,25 +128,17 @@ double linear_sag(const Scene& scene) {
 
 }  // namespace
 
-TEST_CASE("material: gradients of neo-hookean tets and of their viscosity are those of finite differences") {
+TEST_CASE("material: gradients of neo-hookean tets are those of finite differences") {
   for (const double scale : {1e-3, 1.0, 1e3})
     for (int trial = 0; trial < 100; ++trial) {
       const auto rest = rest_of_tet(random_tet(scale), 1.3);
-      auto x = random_tet(scale), start = random_tet(scale);
+      auto x = random_tet(scale);
       if (trial % 4 == 0) x[3] = -x[3];  // also inverted
       const auto c = NeoHookean::evaluate(x.data(), rest.data());
       for (int k = 0; k < 2; ++k)
         CHECK(gradient_error(x, scale, c.gradient[k], [&](auto y) {
                 return NeoHookean::evaluate(y.data(), rest.data()).C[k];
               }) < 1e-6);
-      const auto v = NeoHookean::viscosity(x.data(), start.data(), rest.data());
-      CHECK(gradient_error(x, scale, v.gradient, [&](auto y) {
-              return NeoHookean::viscosity(y.data(), start.data(), rest.data()).C;
-            }) < 1e-6);
-      // Turning is no deformation.
-      const glm::dmat3 turn(0, 1, 0, 0, 0, 1, 1, 0, 0);
-      for (std::size_t j = 0; j < 4; ++j) start[j] = turn * x[j] + glm::dvec3(scale);
-      CHECK(NeoHookean::viscosity(x.data(), start.data(), rest.data()).C < 1e-7 * c.C[0]);
       std::array<glm::vec3, 4> y;
       std::array<float, 8> values;
       for (std::size_t j = 0; j < 4; ++j) y[j] = glm::vec3(x[j] - x[0]);
@@ -288,6 +280,7 @@ TEST_CASE("material: every mode keeps the rest state, and goes where the leapfro
   const GlTest gl;
   for (const std::string material : {"neo-hookean", "springs"})
     for (const double damping : {0.0, 0.002}) {
+      if (damping > 0 && material == "neo-hookean") continue;
       Scene scene = beam_of(material, {4, 2, 2}, 2e5, 0.35);
       const auto model = std::make_shared<Model>(scene.model);
       scene.settings.constraint_damping = damping;
@@ -326,8 +319,7 @@ TEST_CASE("material: modes node and constraint give the same bits, and momentum 
   auto model = std::make_shared<Model>();
   const TetMesh mesh = make_block({1, 0.5, 0.4}, {5, 3, 2});
   add_body(*model, "block", mesh, 1000, mesh.positions, {1, 0, 0}, {2, 5, 1}, {});
-  Settings settings{
-      .material = "neo-hookean", .young_modulus = 1e5, .constraint_damping = 1e-3, .gravity = 0};
+  Settings settings{.material = "neo-hookean", .young_modulus = 1e5, .gravity = 0};
   settings.ground = false;
   std::array<std::uint64_t, 2> hashes;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -381,6 +373,9 @@ TEST_CASE("material: scenes and flags name it, and say what is wrong with it") {
   refused("3", "'bodies.0.material' must be an object in braces");
   refused(R"({"modulus": 3})", "'bodies.0.material.modulus' is not known here");
   refused(R"({"poisson_ratio": 0.5})", "'poisson_ratio' cannot be 0.5");
+  scene(R"("rubber")");
+  CHECK(program("run --scene m.json --steps 1 --constraint-damping 1 --out r", folder)
+            .err.find("has no constraint_damping") != std::string::npos);
   refused(R"({"model": "springs", "poisson_ratio": 0.1})", "springs have no Poisson's ratio of 0.1");
   std::ofstream(folder.path / "m.json")
       << R"({"bodies": [{"block": {}, "material": "foam"}, {"block": {}, "position": [3, 0, 0]}]})";

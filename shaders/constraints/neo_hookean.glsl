@@ -28,30 +28,3 @@ Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
   c.guards = 0u;
   return c;
 }
-
-// Its viscosity, in proportion to its stiffness at rest (method.md eq. 33): C = sqrt(2 |dE|^2 + lambda/mu (tr dE)^2) of linear elasticity's mu
-// and lambda, where dE is the change of Green's strain since the substep's start.
-Constraint4 neo_hookean_viscosity(vec3 x[4], vec3 start[4], const real rest[8]) {
-  Constraint4 c;
-  mat3 sides = mat3(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
-  mat3 before = mat3(start[1] - start[0], start[2] - start[0], start[3] - start[0]);
-  mat3 moved = sides - before;
-  mat3 metric = mat3(rest[0], rest[1], rest[2], rest[1], rest[3], rest[4], rest[2], rest[4], rest[5]);
-  mat3 change = transpose(moved) * sides + transpose(before) * moved;  // of the sides' products
-  mat3 mixed = metric * change;
-  mat3 raised = mixed * metric;
-  real trace = real(0.5) * (mixed[0][0] + mixed[1][1] + mixed[2][2]);
-  real ratio = real(1) / (rest[7] - real(1)) - real(5) / real(6);
-  real square = real(0.5) * (dot(raised[0], change[0]) + dot(raised[1], change[1]) + dot(raised[2], change[2])) + ratio * trace * trace;
-  c.C = sqrt(max(square, real(0)));
-  mat3 gradient = (sides * raised + sides * metric * (ratio * trace)) * (c.C > real(1e-30) ? real(1) / c.C : real(0));
-  c.gradient[1] = gradient[0];
-  c.gradient[2] = gradient[1];
-  c.gradient[3] = gradient[2];
-  c.gradient[0] = -(gradient[0] + gradient[1] + gradient[2]);
-  c.floor = real(0);
-  c.guards = 0u;
-  return c;
-}
-// ... and its compliance over h^2, of the first elastic one's and gamma = tau / h.
-real neo_hookean_viscous_compliance(real a, real gamma) { return real(4) / real(3) * a / gamma; }

@@ -22,28 +22,6 @@ void for_each_spring(const Leapfrog& run, F&& visit) {
                    });
 }
 
-// Kelvin and Voigt's stress tau (2 mu E' + lambda tr E' I), mu and lambda of linear elasticity: the forces of
-// its power tau V (mu |E'|^2 + lambda/2 (tr E')^2), E' the rate of Green's strain. By the deformation
-// gradient, as the solvers do not. `rest` as in neo_hookean.glsl, whose first compliance is 1 / (4/3 mu V).
-void add_viscosity(const Leapfrog& run, const double* rest, double alpha, const std::uint32_t* v,
-                   glm::dvec3* forces) {
-  const auto sides = [&](const Points& p) {
-    return glm::dmat3(p[v[1]] - p[v[0]], p[v[2]] - p[v[0]], p[v[3]] - p[v[0]]);
-  };
-  const glm::dmat3 rest_sides(run.input.model.rest.positions[v[1]] - run.input.model.rest.positions[v[0]],
-                              run.input.model.rest.positions[v[2]] - run.input.model.rest.positions[v[0]],
-                              run.input.model.rest.positions[v[3]] - run.input.model.rest.positions[v[0]]);
-  const glm::dmat3 inverse = glm::inverse(rest_sides), F = sides(run.x) * inverse,
-                   rate = sides(run.v) * inverse;
-  const glm::dmat3 strain_rate = 0.5 * (glm::transpose(rate) * F + glm::transpose(F) * rate);
-  const double trace = strain_rate[0][0] + strain_rate[1][1] + strain_rate[2][2];
-  const double mu_volume = 0.75 / alpha, ratio = 1 / (rest[7] - 1) - 5.0 / 6;  // lambda / mu
-  const glm::dmat3 stress =
-      mu_volume * run.input.settings.constraint_damping * (2.0 * strain_rate + glm::dmat3(ratio * trace));
-  const glm::dmat3 push = -(F * stress * glm::transpose(inverse));  // by sides
-  for (int j = 0; j < 3; ++j) forces[j + 1] += push[j], forces[0] -= push[j];
-}
-
 // Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha.
 Points accelerations(Leapfrog& run) {
   const double tau = run.input.settings.constraint_damping;
@@ -60,14 +38,10 @@ Points accelerations(Leapfrog& run) {
           for (int k = 0; k < kind.row.components; ++k) {
             const auto [C, gradient] = component(value, k);
             double size = C;
-            if constexpr (!kind.row.of_material())
-              for (std::size_t j = 0; j < arity; ++j) size += tau * glm::dot(gradient[j], run.v[vertices[j]]);
+            for (std::size_t j = 0; j < arity; ++j) size += tau * glm::dot(gradient[j], run.v[vertices[j]]);
             for (std::size_t j = 0; j < arity; ++j)
               run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
           }
-          if constexpr (kind.row.of_material())
-            if (tau > 0)
-              add_viscosity(run, &list.rest[c * 8], alpha(c)[0], vertices, &run.parts[offset + c * arity]);
         },
         1024);
   });

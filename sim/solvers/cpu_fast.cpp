@@ -39,8 +39,8 @@ template <class Kind>
 struct Batch {
   std::uint32_t vertices[std::size_t(Kind::row.arity)][lanes];
   float rest[std::size_t(Kind::row.values)][lanes];
-  float multipliers[std::size_t(Kind::row.multipliers())][lanes];  // in this substep
-  std::uint32_t count;  // lanes in use; the others repeat the first
+  float multipliers[std::size_t(Kind::row.components)][lanes];  // in this substep
+  std::uint32_t count;                                          // lanes in use; the others repeat the first
 };
 template <class Kind>
 using Batches = std::vector<Batch<Kind>>;
@@ -72,7 +72,7 @@ template <class Kind>
   constexpr std::size_t components = std::size_t(Kind::row.components);
   for (std::size_t lane = 0; lane < batch.count; ++lane) {
     std::uint32_t ids[std::size_t(Kind::row.arity)];
-    float rest[std::size_t(Kind::row.values)], multipliers[std::size_t(Kind::row.multipliers())];
+    float rest[std::size_t(Kind::row.values)], multipliers[std::size_t(Kind::row.components)];
     double compliance[components];
     for (std::size_t j = 0; j < std::size(ids); ++j) ids[j] = batch.vertices[j][lane];
     for (std::size_t v = 0; v < std::size(rest); ++v) rest[v] = batch.rest[v][lane];
@@ -122,9 +122,8 @@ template <class Kind, bool damped>
                         values = std::size_t(Kind::row.values);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   std::uint32_t guards[lanes];
-  constexpr std::size_t all_multipliers = std::size_t(Kind::row.multipliers());
-  float multipliers[all_multipliers][lanes], softness_now[components][lanes];
-  const auto [k, limit, all, gamma, share, share_of_material, inverse_h2] = rule;
+  float multipliers[components][lanes], softness_now[components][lanes];
+  const auto [k, limit, all, gamma, share, inverse_h2] = rule;
   for (std::size_t part = 0; part < components; ++part)
     for (std::size_t lane = 0; lane < lanes; ++lane)
       softness_now[part][lane] = softness ? float(softness->values[part][lane] * inverse_h2) : all;
@@ -160,27 +159,13 @@ template <class Kind, bool damped>
     } else {
       for (std::size_t part = 0; part < components; ++part)
         c.C[part] += a[part] * batch.multipliers[part][lane];
-      const auto m = Formulas<float, LaneMath>{}.multiplier(c, w, limit, a, share_of_material);
+      const auto m = Formulas<float, LaneMath>{}.multiplier(c, w, limit, a, share);
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
         corrections[j] = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
       for (std::size_t part = 0; part < components; ++part)
         multipliers[part][lane] = batch.multipliers[part][lane] + m.lambda[part];
       guards[lane] = m.guards;
-      if constexpr (damped) {
-#pragma GCC unroll 4
-        for (std::size_t j = 0; j < arity; ++j) x[j] += corrections[j];
-        auto v = Kind::template viscosity<float, LaneMath>(x, start, rest);
-        const float av = Formulas<float, LaneMath>{}.neo_hookean_viscous_compliance(a[0], gamma);
-        v.C += av * batch.multipliers[components][lane];
-        const auto n = Formulas<float, LaneMath>{}.multiplier(v, w, 1.0f, limit, av, share_of_material);
-#pragma GCC unroll 4
-        for (std::size_t j = 0; j < arity; ++j) corrections[j] += n.lambda * w[j] * v.gradient[j];
-        multipliers[components][lane] = batch.multipliers[components][lane] + n.lambda;
-        guards[lane] |= n.guards;
-      } else if constexpr (Kind::row.of_material()) {
-        multipliers[components][lane] = 0;
-      }
     }
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < arity; ++j) {
@@ -190,7 +175,7 @@ template <class Kind, bool damped>
   }
   std::uint32_t triggered = 0;
   for (std::uint32_t lane : guards) triggered |= lane;
-  if (triggered == 0) std::copy_n(&multipliers[0][0], all_multipliers * lanes, &batch.multipliers[0][0]);
+  if (triggered == 0) std::copy_n(&multipliers[0][0], components * lanes, &batch.multipliers[0][0]);
   return triggered == 0;
 }
 
@@ -214,7 +199,7 @@ template <class Kind, bool damped>
       for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.starts, starts[i]);
     if (first)
       for (std::size_t i = 0; i < count; ++i)
-        std::fill_n(&batches[b + i].multipliers[0][0], std::size_t(Kind::row.multipliers()) * lanes, 0.0f);
+        std::fill_n(&batches[b + i].multipliers[0][0], std::size_t(Kind::row.components) * lanes, 0.0f);
     for (std::size_t i = 0; i < count; ++i)
       sound[i] =
           evaluate<Kind, damped>(batches[b + i], softness_of(b + i), rule, rows[i], starts[damped ? i : 0]);

@@ -44,22 +44,21 @@ struct Substep {
 /// What constraints of a kind share (shaders/constraints/types.glsl, multiplier).
 template <class real>
 struct Rule {
-  real k, limit, a, gamma, share, share_of_material;
+  real k, limit, a, gamma, share;
   double inverse_h2;  ///< 1/s^2
-  Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1, bool jacobi = false)
+  Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1)
       : k(real(settings.stiffness[kind])), limit(real(longest)) {
     const double h = settings.dt / settings.substeps;
     inverse_h2 = 1 / (h * h);
     a = real(settings.compliance[kind] / (h * h));
     gamma = real(settings.constraint_damping / h);
     share = (1 + gamma) / real(omega);
-    share_of_material = real((jacobi && gamma > 0 ? 2 : 1) / omega);  // two moves, elastic and viscous
   }
 };
 
-/// Projects one constraint (eqs. 4, 25-26, 32-33). `compliance`: of a material, or null; `vertices` tells of a
-/// vertex where it is (at), where it was at the substep's start (start), its inverse mass (weight), and takes
-/// its correction (move).
+/// Projects one constraint (eqs. 4, 25-26, 32). `compliance`: of a material, or null; `vertices` tells of
+/// a vertex where it is (at), where it was at the substep's start (start), its inverse mass (weight), and
+/// takes its correction (move).
 template <class Kind, class real, class Vertices>
 [[gnu::always_inline]] inline void project(const std::uint32_t* ids, const real* rest,
                                            const double* compliance, const Rule<real>& rule,
@@ -87,27 +86,12 @@ template <class Kind, class real, class Vertices>
       vertices.move(ids[j], glm::dvec3(m.lambda * w[j] * c.gradient[j]));
   } else {
     for (int k = 0; k < components; ++k) c.C[k] += a[k] * multipliers[k];
-    const auto m = Formulas<real>{}.multiplier(c, w, rule.limit, a, rule.share_of_material);
+    const auto m = Formulas<real>{}.multiplier(c, w, rule.limit, a, rule.share);
     for (int k = 0; k < components; ++k) multipliers[k] += m.lambda[k];
     triggered = m.guards;
-    glm::vec<3, real> moves[arity];
     for (std::size_t j = 0; j < arity; ++j)
-      moves[j] = w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]);
-    if (rule.gamma > 0) {
-      glm::vec<3, real> now[arity], start[arity];
-      for (std::size_t j = 0; j < arity; ++j) {
-        now[j] = glm::vec<3, real>(vertices.at(ids[j]) - vertices.at(ids[0])) + moves[j];
-        start[j] = glm::vec<3, real>(vertices.start(ids[j]) - vertices.start(ids[0]));
-      }
-      auto v = Kind::template viscosity<real>(now, start, rest);
-      const real av = Formulas<real>{}.neo_hookean_viscous_compliance(a[0], rule.gamma);
-      v.C += av * multipliers[components];
-      const real lambda =
-          Formulas<real>{}.multiplier(v, w, real(1), rule.limit, av, rule.share_of_material).lambda;
-      multipliers[components] += lambda;
-      for (std::size_t j = 0; j < arity; ++j) moves[j] += lambda * w[j] * v.gradient[j];
-    }
-    for (std::size_t j = 0; j < arity; ++j) vertices.move(ids[j], glm::dvec3(moves[j]));
+      vertices.move(ids[j],
+                    glm::dvec3(w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j])));
   }
   if (triggered)
     for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
@@ -165,8 +149,7 @@ class CpuPbd {
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
         for_each_kind([&](auto kind, int k) {
-          const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1,
-                                jacobi);
+          const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1);
           const std::vector<double>& own = compliances_[std::size_t(k)];
           const double* compliance = own.empty() ? nullptr : own.data();
           for (auto& item : std::get<Items<decltype(kind)>>(items_)) {
@@ -193,7 +176,7 @@ class CpuPbd {
   struct Item {
     std::array<std::uint32_t, std::size_t(Kind::row.arity)> vertices;
     std::array<real, std::size_t(Kind::row.values)> rest;
-    std::array<real, std::size_t(Kind::row.multipliers())> multipliers;  // in this substep
+    std::array<real, std::size_t(Kind::row.components)> multipliers;  // in this substep
   };
   template <class Kind>
   using Items = std::vector<Item<Kind>>;  // contiguous, in the order they are projected

@@ -202,8 +202,7 @@ void draw_solver(Session& s) {
 // What the body is made of, by name; its numbers are below.
 void draw_material(Session& s) {
   const Settings now = s.loaded.sim.settings;
-  std::string current = now.material == "none" ? "constraints as set below" : "numbers as set below",
-              help = "a material by name";
+  std::string current = "as set below", help = "a material by name";
   Words words;
   std::map<std::string, Settings> ways;
   for (const MaterialPreset& preset : material_presets()) {

@@ -167,7 +167,7 @@ void add_scene(CLI::App& command, Arguments& a) {
         ->type_name("VALUE");
   }
   std::string solvers;
-  for (const SolverPreset& preset : solver_presets())
+  for (const Preset& preset : solver_presets())
     solvers += fmt::format("{} ({}), ", preset.name, preset.help);
   add(command, "--solver", a.overrides.solver,
       "how to solve, by name; other settings go on top: " + solvers +

@@ -172,26 +172,34 @@ void draw_parameters(Session& s, std::string_view section) {
   if (changed) change_settings(s, wanted);
 }
 
+// A choice among presets; `current`: the one that is set, if any.
+struct Ways {
+  std::string current = "as set below", help;
+  Words words;
+  std::map<std::string, Settings> to{};
+};
+Ways ways_of(const Settings& now, const std::vector<Preset>& presets, const std::string& help) {
+  Ways ways{.help = help, .words = names_of(presets)};
+  for (const Preset& preset : presets) {
+    apply_preset(ways.to[preset.name] = now, presets, preset.name);
+    if (ways.to[preset.name] == now) ways.current = preset.name;
+    ways.help += fmt::format("\n{}: {}", preset.name, preset.help);
+  }
+  return ways;
+}
+
 // The whole way to solve by one word, and what auto picked.
 void draw_solver(Session& s) {
   const Settings now = s.loaded.sim.settings;
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
-  std::string current = automatic ? "auto" : "as set below",
-              help =
-                  "--solver\nauto: tries ways to solve this scene and takes what loses least volume within "
-                  "the budget";
-  Words words;
-  std::map<std::string, Settings> ways;
-  for (const SolverPreset& preset : solver_presets()) {
-    apply_values(ways[preset.name] = now, preset.values, preset.name);
-    if (ways[preset.name] == now && !automatic) current = preset.name;
-    words.push_back(preset.name);
-    help += fmt::format("\n{}: {}", preset.name, preset.help);
-  }
-  words.push_back("auto");
-  if (const auto chosen = combo(s, "solver", current, words, help))
-    ways.contains(*chosen) ? change_settings(s, ways[*chosen]) : choose_soon(s);
+  Ways ways = ways_of(now, solver_presets(),
+                      "--solver\nauto: tries ways to solve this scene and takes what loses least volume "
+                      "within the budget");
+  if (automatic) ways.current = "auto";
+  ways.words.push_back("auto");
+  if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
+    ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
   if (!automatic) return;
   slider(s, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
          "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);
@@ -201,17 +209,9 @@ void draw_solver(Session& s) {
 
 // What the body is made of, by name; its numbers are below.
 void draw_material(Session& s) {
-  const Settings now = s.loaded.sim.settings;
-  std::string current = "as set below", help = "a material by name";
-  Words words;
-  std::map<std::string, Settings> ways;
-  for (const MaterialPreset& preset : material_presets()) {
-    apply_values(ways[preset.name] = now, preset.values, preset.name);
-    if (ways[preset.name] == now) current = preset.name;
-    words.push_back(preset.name);
-    help += fmt::format("\n{}: {}", preset.name, preset.help);
-  }
-  if (const auto chosen = combo(s, "made of", current, words, help)) change_settings(s, ways[*chosen]);
+  Ways ways = ways_of(s.loaded.sim.settings, material_presets(), "a material by name");
+  if (const auto chosen = combo(s, "made of", ways.current, ways.words, ways.help))
+    change_settings(s, ways.to[*chosen]);
 }
 
 void draw_run(Session& s) {

@@ -147,10 +147,10 @@ void read_material(const json& bodies, Settings& settings, const std::string& fi
       refuse("bodies of different materials cannot be in one scene", file);
   if (material.is_null()) return;
   if (material.is_string()) {
-    std::vector<std::string> names;
-    for (const MaterialPreset& preset : material_presets())
-      if (names.emplace_back(preset.name) == material) return apply_values(settings, preset.values, file);
-    refuse(fmt::format("'bodies.0.material' is no material; there are {}", fmt::join(names, ", ")), file);
+    if (apply_preset(settings, material_presets(), material)) return;
+    refuse(fmt::format("'bodies.0.material' is no material; there are {}",
+                       fmt::join(names_of(material_presets()), ", ")),
+           file);
   }
   settings.material = "neo-hookean";
   json rows = material;
@@ -253,13 +253,10 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   if (overrides.budget_ms)
     throw Error("a budget is for --solver auto", fmt::format("--solver {} --budget-ms", name),
                 "leave out one of the two");
-  if (name.empty()) return false;
-  std::vector<std::string> names{"auto"};
-  for (const SolverPreset& preset : solver_presets()) {
-    names.emplace_back(preset.name);
-    if (name == preset.name) return apply_values(settings, preset.values, preset.name), false;
-  }
-  throw Error("no such solver", "--solver " + name, fmt::format("choose from {}", fmt::join(names, ", ")));
+  if (!name.empty() && !apply_preset(settings, solver_presets(), name))
+    throw Error("no such solver", "--solver " + name,
+                fmt::format("choose from auto, {}", fmt::join(names_of(solver_presets()), ", ")));
+  return false;
 }
 
 TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {

@@ -23,10 +23,6 @@ struct ConstraintList {
   std::span<const std::uint32_t> ends(std::size_t c) const {  ///< of constraint c
     return std::span(vertices).subspan(c * std::size_t(arity), std::size_t(arity));
   }
-  void add(std::span<const std::uint32_t> vertex, double value) {
-    vertices.insert(vertices.end(), vertex.begin(), vertex.end());
-    rest.push_back(value);
-  }
   /// Constraint c of a list of the same kind.
   void add(const ConstraintList& from, std::size_t c) {
     const auto append = [&](auto& to, const auto& values) {

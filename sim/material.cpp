@@ -1,6 +1,7 @@
 #include "sim/material.h"
 
 #include <algorithm>
+#include <ranges>
 
 namespace tetpbd {
 
@@ -28,14 +29,10 @@ void make_neo_hookean(ConstraintList& tets, const Lame& m) {
 // Each tet gives its six edges the same k L^2.
 void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
   std::vector<double> stiffness(edges.count());
-  const auto number_of = [&](std::uint32_t a, std::uint32_t b) {
-    const std::array<std::uint32_t, 2> edge = {std::min(a, b), std::max(a, b)};
-    std::size_t low = 0, high = edges.count();  // sorted by their vertices
-    while (low + 1 < high) {
-      const std::size_t middle = (low + high) / 2;
-      (std::ranges::lexicographical_compare(edge, edges.ends(middle)) ? high : low) = middle;
-    }
-    return low;
+  const auto number_of = [&](std::uint32_t a, std::uint32_t b) {  // they are sorted by their vertices
+    const auto vertices = [&](std::size_t e) { return std::pair(edges.ends(e)[0], edges.ends(e)[1]); };
+    return *std::ranges::lower_bound(std::views::iota(std::size_t(0), edges.count()), std::minmax({a, b}), {},
+                                     vertices);
   };
   for (std::size_t t = 0; t < volumes.count(); ++t) {
     const auto v = volumes.ends(t);
@@ -52,19 +49,16 @@ void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m)
 }  // namespace
 
 ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings) {
-  if (settings.material == "none") return build_constraints(mesh, settings.constraints);
+  ConstraintSystem system = build_constraints(mesh, kinds_in_use(settings));
   const Lame m = lame(settings.young_modulus, settings.poisson_ratio);
-  const bool springs = settings.material == "springs";
-  ConstraintSystem system = build_constraints(mesh, springs ? "stretch,volume" : "neo_hookean");
-  if (springs)
+  if (settings.material == "springs")
     make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
-  else
-    make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  if (settings.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
   return system;
 }
 
-const std::vector<MaterialPreset>& material_presets() {
-  static const std::vector<MaterialPreset> rows = {
+const std::vector<Preset>& material_presets() {
+  static const std::vector<Preset> rows = {
       {"rubber", "soft vulcanised rubber", "material=neo-hookean,young_modulus=1e6,poisson_ratio=0.48"},
       {"gelatine", "10 % in water", "material=neo-hookean,young_modulus=2e4,poisson_ratio=0.45"},
       {"muscle", "at rest, across its fibres", "material=neo-hookean,young_modulus=6e4,poisson_ratio=0.45"},

@@ -19,11 +19,7 @@ Lame lame(double young_modulus, double poisson_ratio);
 /// one.
 ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings);
 
-/// A material by name: what a scene's "material": "rubber" puts in place.
-struct MaterialPreset {
-  const char *name, *help;
-  const char* values;  ///< PARAMETER=TEXT, separated by commas
-};
-const std::vector<MaterialPreset>& material_presets();
+/// Materials by name: what a scene's "material": "rubber" puts in place.
+const std::vector<Preset>& material_presets();
 
 }  // namespace tetpbd

@@ -174,8 +174,8 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
   settings.mode = word;
 }
 
-const std::vector<SolverPreset>& solver_presets() {
-  static const std::vector<SolverPreset> rows = {
+const std::vector<Preset>& solver_presets() {
+  static const std::vector<Preset> rows = {
       {"paper", "25 iterations a step, averaged",
        "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false"},
       {"substeps", "20 substeps of 1 iteration", "mode=node,iterations=1,substeps=20,omega=1.5"},
@@ -183,18 +183,29 @@ const std::vector<SolverPreset>& solver_presets() {
   return rows;
 }
 
-void apply_values(Settings& settings, const std::string& values, const std::string& where) {
-  for (const std::string& value : split(values, ',')) {
+bool apply_preset(Settings& settings, const std::vector<Preset>& presets, const std::string& name) {
+  const auto preset = std::ranges::find(presets, name, &Preset::name);
+  if (preset == presets.end()) return false;
+  for (const std::string& value : split(preset->values, ',')) {
     const std::size_t equals = value.find('=');
-    set_parameter(settings, *find_parameter(value.substr(0, equals)), value.substr(equals + 1), where);
+    set_parameter(settings, *find_parameter(value.substr(0, equals)), value.substr(equals + 1), name);
   }
+  return true;
+}
+
+std::vector<std::string> names_of(const std::vector<Preset>& presets) {
+  std::vector<std::string> names;
+  for (const Preset& preset : presets) names.emplace_back(preset.name);
+  return names;
+}
+
+std::string kinds_in_use(const Settings& settings) {
+  if (settings.material == "springs") return "stretch,volume";
+  return settings.material == "neo-hookean" ? "neo_hookean" : settings.constraints;
 }
 
 bool uses(const Settings& settings, const ConstraintKind& kind) {
-  if (settings.material == "neo-hookean") return kind.of_material();
-  if (settings.material == "springs")
-    return kind.name == std::string("stretch") || kind.name == std::string("volume");
-  const auto names = split(settings.constraints, ',');
+  const auto names = split(kinds_in_use(settings), ',');
   return std::find(names.begin(), names.end(), kind.name) != names.end();
 }
 

@@ -88,22 +88,24 @@ std::vector<std::string> choices(const Parameter& parameter);
 /// Also the modes that are not offered elsewhere. Throws Error naming `where` if there is none.
 void set_mode(Settings& settings, const std::string& word, const std::string& where);
 
-/// A way to solve, by name: what --solver puts in place of the scene's settings.
-struct SolverPreset {
+/// Settings by name: a way to solve (--solver), a material (material.h).
+struct Preset {
   const char *name, *help;
   const char* values;  ///< PARAMETER=TEXT, separated by commas
 };
-const std::vector<SolverPreset>& solver_presets();
-/// `values`: of a preset.
-void apply_values(Settings& settings, const std::string& values, const std::string& where);
+const std::vector<Preset>& solver_presets();
+/// Puts the one of that name in place; false if there is none.
+bool apply_preset(Settings& settings, const std::vector<Preset>& presets, const std::string& name);
+std::vector<std::string> names_of(const std::vector<Preset>& presets);
 
 /// Whether constraints are XPBD's (method.md eq. 25): there is a material or damping, or a kind in use has
 /// compliance.
 bool compliant(const Settings& settings);
 /// Whether constraints resist their rate.
 bool damped(const Settings& settings);
-/// Whether the list `constraints` names this kind, or the material has it.
-bool uses(const Settings& settings, const ConstraintKind& kind);
+/// The kinds in use, as the setting `constraints` lists them: the material's, if there is one.
+std::string kinds_in_use(const Settings& settings);
+bool uses(const Settings& settings, const ConstraintKind& kind);  ///< whether it is one of them
 
 /// Throws Error for values out of range, and for those that do not go together; `where` names the file or
 /// flag.

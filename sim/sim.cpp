@@ -142,7 +142,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 
 // What decides which constraints there are.
 auto kinds_of(const Settings& s) {
-  return std::tuple(s.material == "none" ? s.constraints : "", s.material, s.young_modulus, s.poisson_ratio);
+  return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio);
 }
 
 // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.

@@ -64,8 +64,10 @@ inline Scene chain_scene(const std::vector<glm::dvec3>& positions,
   scene.system.present = {true, false, false};
   scene.system.at_vertex.assign(positions.size(), 2);
   scene.system.lists[0].arity = 2;
-  for (std::uint32_t i = 0; i + 1 < positions.size(); ++i)
-    scene.system.lists[0].add(std::array{i, i + 1}, glm::length(positions[i + 1] - positions[i]));
+  for (std::uint32_t i = 0; i + 1 < positions.size(); ++i) {
+    scene.system.lists[0].vertices.insert(scene.system.lists[0].vertices.end(), {i, i + 1});
+    scene.system.lists[0].rest.push_back(glm::length(positions[i + 1] - positions[i]));
+  }
   return scene;
 }
 

@@ -32,7 +32,7 @@ struct Spring {
     system.present = {true, false, false};
     system.at_vertex = {1, 1};
     system.lists[0].arity = 2;
-    system.lists[0].add(std::array<std::uint32_t, 2>{0, 1}, 1);
+    system.lists[0].vertices = {0, 1}, system.lists[0].rest = {1};
     settings.ground = false, settings.gravity = 0;
     settings.constraints = "stretch";
     state = {model.positions, {glm::dvec3(0), glm::dvec3(0)}};

@@ -233,6 +233,29 @@ TEST_CASE(
   CHECK(off((4 * sags[1] - sags[0]) / 3, exact) < 0.15);
 }
 
+// By hand, for docs/results.md: some seconds.
+TEST_CASE("material: sag tables" * doctest::skip()) {
+  const double E = 5e7, b = 0.25, q = 1000 * 9.81 * b * b;
+  for (const double nu : {0.25, 0.3, 0.4, 0.45}) {
+    const double kappa = 10 * (1 + nu) / (12 + 11 * nu);
+    const double exact = q / (8 * E * b * b * b * b / 12) + q / (2 * kappa * E / (2 * (1 + nu)) * b * b);
+    std::array<double, 3> sags;
+    for (std::size_t level = 0; level < 3; ++level) {
+      const int n = 2 << level;
+      const Scene scene = beam_of("neo-hookean", {4 * n, n, n}, E, nu);
+      sags[level] = static_sag(scene);
+      CHECK(off(sags[level], linear_sag(scene)) < 0.005);
+    }
+    const auto springs_over_tets = [&](const glm::ivec3& cells, const glm::dvec3& size) {
+      return static_sag(beam_of("springs", cells, E, nu, size)) /
+             static_sag(beam_of("neo-hookean", cells, E, nu, size));
+    };
+    MESSAGE(nu, ": ", sags[0] / exact, " ", sags[1] / exact, " ", sags[2] / exact, " extrapolated ",
+            (4 * sags[2] - sags[1]) / 3 / exact, "; springs over tets, beam ",
+            springs_over_tets({16, 4, 4}, {1, b, b}), ", cube ", springs_over_tets({6, 6, 6}, {1, 1, 1}));
+  }
+}
+
 TEST_CASE("material: springs have the right stiffness averaged over directions, on any mesh") {
   const double delta = 1e-4;
   for (const int cells : {2, 4}) {

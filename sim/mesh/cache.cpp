@@ -40,13 +40,22 @@ std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, 
   return hash_bytes(bytes);
 }
 
+void seal(std::string& bytes, std::uint64_t key) { put_array(bytes, std::vector{hash_bytes(bytes, key)}); }
+
+bool unseal(std::string_view& bytes, std::uint64_t key) {
+  constexpr std::size_t seal_size = 16;  // an array of one
+  if (bytes.size() < seal_size) return false;
+  std::string_view end = bytes.substr(bytes.size() - seal_size);
+  bytes.remove_suffix(seal_size);
+  std::vector<std::uint64_t> sum;
+  return take_array(end, sum) && sum == std::vector{hash_bytes(bytes, key)};
+}
+
 std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try {
   TetMesh mesh;
-  std::vector<std::uint64_t> sum;
-  std::string_view rest = bytes;
-  if (!take_array(rest, mesh.positions) || !take_array(rest, mesh.tets)) return {};
-  const std::uint64_t found = hash_bytes(bytes.substr(0, bytes.size() - rest.size()), key);
-  if (!take_array(rest, sum) || !rest.empty() || sum != std::vector{found}) return {};
+  if (!unseal(bytes, key) || !take_array(bytes, mesh.positions) || !take_array(bytes, mesh.tets) ||
+      !bytes.empty())
+    return {};
   finish_tets(mesh, "cache");
   return mesh;
 } catch (const Error&) {  // damage passes the checksum only by malice, but a cache folder may be shared
@@ -69,7 +78,7 @@ void keep_mesh(std::uint64_t key, const TetMesh& mesh) try {
   fs::create_directories(file.parent_path());
   std::string bytes;
   put_array(bytes, mesh.positions), put_array(bytes, mesh.tets);
-  put_array(bytes, std::vector{hash_bytes(bytes, key)});
+  seal(bytes, key);
   write_file(file, bytes);
 } catch (const std::exception&) {  // read-only or full
 }

@@ -39,6 +39,11 @@ bool take_array(std::string_view& bytes, std::vector<T>& values) {
   return true;
 }
 
+/// A checksum of all that is there, with `key` in it, at the end; and off it again, false where it does not
+/// match.
+void seal(std::string& bytes, std::uint64_t key);
+bool unseal(std::string_view& bytes, std::uint64_t key);
+
 /// Of the surface's bits, the switches and the program that fills it.
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches,
                        const std::filesystem::path& program);

@@ -128,7 +128,7 @@ void save_unfinished(const std::filesystem::path& file, std::uint64_t key, const
   put_array(bytes, motion.rows), put_array(bytes, motion.kept);
   for (const Points& positions : motion.positions) put_array(bytes, positions);
   pair.save(bytes);
-  put_array(bytes, std::vector{hash_bytes(bytes, key)});
+  seal(bytes, key);
   write_file(file, bytes);
 }
 
@@ -136,12 +136,7 @@ bool load_unfinished(const std::filesystem::path& file, std::uint64_t key, Motio
   std::ifstream in(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   std::string_view bytes = text;
-  std::vector<std::uint64_t> sum;
-  constexpr std::size_t tail = 16;  // that array
-  if (bytes.size() < tail) return false;
-  std::string_view end = bytes.substr(bytes.size() - tail);
-  bytes.remove_suffix(tail);
-  if (!take_array(end, sum) || sum != std::vector{hash_bytes(bytes, key)}) return false;
+  if (!unseal(bytes, key)) return false;
   Motion held = motion;
   bool whole = take_array(bytes, held.rows) && take_array(bytes, held.kept);
   held.positions.resize(held.kept.size());

@@ -197,7 +197,7 @@ void read_cache_file(std::string_view bytes) {
   constexpr std::uint64_t key = 1;
   if (const auto mesh = parse_mesh(bytes, key)) require_sound(*mesh);
   std::string sealed(bytes);
-  put_array(sealed, std::vector{hash_bytes(bytes, key)});
+  seal(sealed, key);
   if (const auto mesh = parse_mesh(sealed, key)) require_sound(*mesh);
 }
 

@@ -60,7 +60,8 @@ struct BenchOptions {
   Axes axes = {.modes = {"cpu", "constraint", "node"},
                .constraint_sets = {"stretch+bend", "stretch+bend+volume"},
                .iterations = {1, 150},
-               .substeps = {1}};
+               .substeps = {1},
+               .rigid_contact = {0}};
   long frames = 400, warm_up = 50;
   int repeats = 3;
   double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)

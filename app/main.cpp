@@ -138,6 +138,8 @@ void add_axes(CLI::App& command, Axes& axes) {
   add(command, "--modes,--mode", axes.modes, "solver modes; paper: as published");
   add(command, "--iterations", axes.iterations, 1, 100000, "iterations a substep");
   add(command, "--substeps", axes.substeps, 1, 100000, "substeps a step");
+  add(command, "--rigid-contact", axes.rigid_contact, 0, 1,
+      "whether touching hard bodies move as rigid ones (default: bench 0, as published; else the scene's)");
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -167,8 +169,7 @@ void add_scene(CLI::App& command, Arguments& a) {
         ->type_name("VALUE");
   }
   std::string solvers;
-  for (const Preset& preset : solver_presets())
-    solvers += fmt::format("{} ({}), ", preset.name, preset.help);
+  for (const Preset& preset : solver_presets()) solvers += fmt::format("{} ({}), ", preset.name, preset.help);
   add(command, "--solver", a.overrides.solver,
       "how to solve, by name; other settings go on top: " + solvers +
           "auto (tries, and takes what loses least volume within --budget-ms)")

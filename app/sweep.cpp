@@ -122,6 +122,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
     set_parameter(s, *find_parameter("constraints"), set, "--constraint-sets");
   });
   vary(axes.modes, [](Settings& s, const std::string& mode) { set_mode(s, mode, "--modes"); });
+  vary(axes.rigid_contact, [](Settings& s, int on) { s.rigid_contact = on != 0; });
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
   vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
   vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });

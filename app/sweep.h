@@ -20,6 +20,7 @@ struct Axes {
   std::vector<std::string> modes{}, constraint_sets{};  ///< sets of kinds joined by +
   std::vector<double> omegas{};
   std::vector<int> iterations{}, substeps{};
+  std::vector<int> rigid_contact{};  ///< 0 or 1, one at most: it is no column
 };
 /// Every combination, the last of the lists varying fastest. Throws Error.
 std::vector<Settings> combinations(const Settings& base, const Axes& axes);

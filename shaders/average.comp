@@ -7,9 +7,7 @@ layout(local_size_x = GROUP_SIZE) in;
 layout(std430, binding = BIND_SUMS) buffer Sums { ivec4 correction_sums[]; };
 #include "vertex.glsl"
 
-void main() {
-  uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-  if (i >= params.vertex_count) return;
+void average(uint i) {
   Position own = positions[i];
   Velocity speed;
   if ((phases & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
@@ -24,4 +22,19 @@ void main() {
 #endif
   }
   advance(i, own, speed, correction);
+}
+
+void main() {
+  uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+  bool mine = i < params.vertex_count;
+#if RIGID_CONTACT
+  clear_rigid_sums();
+  group_state = state_of(body_of(min(i - gl_LocalInvocationIndex, params.vertex_count - 1u)));
+  barrier();
+#endif
+  if (mine) average(i);
+#if RIGID_CONTACT
+  barrier();
+  if ((phases & PHASE_FINISH) != 0u) flush_rigid_sums(group_state.body);
+#endif
 }

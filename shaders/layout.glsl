@@ -24,6 +24,9 @@ struct Record4 {
   float rest;
 };
 #define MAX_PLANES 8
+#define RIGID_SUMS 15
+#define RIGID_SPEED 1024.0  // m/s, the fastest that sums hold
+#define MOST_TOUCHES 16  // contacts of a hard body that carry it
 // Everything of a step that does not change within it (a uniform block, std140).
 struct Step {
   vec3 gravity;             // m/s^2
@@ -42,11 +45,36 @@ struct Step {
   float mass_splitting;     // 1: neighbours see n_i w_i, not w_i
   float damping;            // of constraints over h, gamma (with compliance)
   float soft_omega;         // over-relaxation with compliance (`omega` is 1 then)
-  float _0;
-  float _1;
+  float body_size;          // m, of the largest body at rest
+  float restitution;        // of hard bodies
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind
+};
+
+// A hard body that touches half spaces (rigid.glsl). Momenta and impulses per mass of the body.
+struct RigidSide {
+  int sums[RIGID_SUMS];   // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and products
+  uint near;              // how many vertices would be in a half space next
+  uint fixed_vertices;
+  uint carried;           // 1: all velocities are the body's in this substep
+  uint touching;          // how many contacts carried it
+  uint soon;              // 1: a vertex would be in a few substeps
+  vec3 origin;            // of arms
+  uint summed;            // 1: there are sums on this side
+  vec3 velocity;          // where carried
+  float _0;
+  vec3 angular;
+  float _1;
+  vec4 impulses[MOST_TOUCHES];
+  uint touches[MOST_TOUCHES];  // vertex * MAX_PLANES + plane
+};
+struct RigidRecord {
+  uint first;      // of its vertices
+  uint vertices;
+  uint one_piece;  // 1: no hinges, so that it can be rigid
+  float mass;      // kg
+  RigidSide sides[2];
 };
 
 // Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in the order
@@ -63,6 +91,7 @@ struct Step {
 // What a dispatch does (a dispatch parameter); bits.
 #define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v
 #define PHASE_SOLVE 2u    // corrections, then contacts
+#define PHASE_SIDE 8u     // which side of hard bodies' records (rigid.glsl)
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 
 // Storage bindings of the simulation; a kernel has 8 at most.
@@ -78,6 +107,7 @@ struct Step {
 #define BIND_RECORDS 9        // mode paper: of one constraint kind
 #define BIND_CHECKPOINT_FROM 10
 #define BIND_CHECKPOINT_TO 11
+#define BIND_RIGID 12         // hard bodies in contact
 // Uniform blocks.
 #define BIND_STEP 0
 // Atomic counters.

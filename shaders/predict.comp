@@ -6,14 +6,38 @@
 layout(local_size_x = 256) in;
 #include "vertex.glsl"
 
-void main() {
-  uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-  if (i >= params.vertex_count) return;
+void predict(uint i) {
   Position own = positions[i];
   Pair x = Pair(own.high, own.low);
 #if COMPLIANT
   if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
-  if (own.inverse_mass > 0.0) x = predict_position(x, predict_velocity(Pair(velocities[i].high, velocities[i].low)));
+  Pair here = x, v = Pair(velocities[i].high, velocities[i].low);
+  if (own.inverse_mass > 0.0) x = predict_position(x, predict_velocity(v));
+#if RIGID_CONTACT
+  RigidState body = state_at(i);
+  body.summed = true;
+  body.origin = positions[rigid_bodies[body.body].first].high;
+  if (own.inverse_mass > 0.0) note_motion(body, i, here, v, x, own.inverse_mass);
+  else atomicAdd(rigid_bodies[body.body].sides[side_now()].fixed_vertices, 1u);
+  if (i == rigid_bodies[body.body].first) {
+    rigid_bodies[body.body].sides[side_now()].origin = body.origin;
+    rigid_bodies[body.body].sides[side_now()].summed = 1u;
+  }
+#endif
   quantized_out[i] = quantize(x, weight_of(own));
+}
+
+void main() {
+  uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+#if RIGID_CONTACT
+  clear_rigid_sums();
+  group_state = state_of(body_of(min(i - gl_LocalInvocationIndex, params.vertex_count - 1u)));
+  barrier();
+#endif
+  if (i < params.vertex_count) predict(i);
+#if RIGID_CONTACT
+  barrier();
+  flush_rigid_sums(group_state.body);
+#endif
 }

@@ -20,6 +20,10 @@ void main() {
     clear_sums();
     load_chunk(chunk.number);
   }
+#if RIGID_CONTACT
+  clear_rigid_sums();
+  group_state = state_of(body_of(chunk.first));
+#endif
   barrier();
   vec3 correction = vec3(0.0);
   if (solves) {
@@ -46,4 +50,8 @@ void main() {
       quantized_out[params.vertex_count + i] = quantized[params.vertex_count + i];
 #endif
   }
+#if RIGID_CONTACT
+  barrier();
+  if ((phases & PHASE_FINISH) != 0u) flush_rigid_sums(group_state.body);
+#endif
 }

@@ -43,6 +43,10 @@ Pair resolve_contacts(Pair x, vec3 moved) {
   return x;
 }
 
+#if RIGID_CONTACT
+#include "rigid.glsl"
+#endif
+
 // Notes a vertex that is not finite. Taken almost never, so it costs a test of numbers that are in registers anyway.
 void note_unless_finite(uint i, vec3 position, vec3 velocity) {
   if (!is_finite(position) || !is_finite(velocity)) {
@@ -54,8 +58,13 @@ void note_unless_finite(uint i, vec3 position, vec3 velocity) {
 Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   bool predicts = (phases & PHASE_PREDICT) != 0u, finishes = (phases & PHASE_FINISH) != 0u;
   Pair x = Pair(own.high, own.low), v = Pair(speed.high, speed.low), start = x;
+  bool carried = false;
+#if RIGID_CONTACT
+  RigidState body = state_at(i);
+  carried = body.carried;
+#endif
   if (predicts) {
-    v = predict_velocity(v);
+    if (!carried) v = predict_velocity(v);
     start = x = predict_position(x, v);
   }
   if ((phases & PHASE_SOLVE) != 0u) {
@@ -71,7 +80,7 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   if (finishes) {
     if (!predicts) start = Pair(predicted[i].high, predicted[i].low);
-    v = pair_add(v, relative(x, start) * params.inverse_h);
+    if (!carried) v = pair_add(v, relative(x, start) * params.inverse_h);
     note_unless_finite(i, x.high + x.low, v.high + v.low);
   } else if (predicts) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
@@ -81,7 +90,13 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   if (finishes && params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
   // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
-  if (finishes) x = predict_position(x, predict_velocity(v));
+  if (finishes) {
+    Pair here = x;
+    x = predict_position(x, predict_velocity(v));
+#if RIGID_CONTACT
+    note_motion(body, i, here, v, x, own.inverse_mass);
+#endif
+  }
   return x;
 }
 // Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases
@@ -92,6 +107,9 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
     x = moved(i, own, speed, correction);
   } else if ((phases & PHASE_FINISH) != 0u) {
     note_unless_finite(i, x.high + x.low, vec3(0.0));
+#if RIGID_CONTACT
+    atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u);
+#endif
 #if COMPLIANT
     if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif

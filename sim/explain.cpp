@@ -12,9 +12,10 @@ Explanation explain(const Sim& sim) {
     result.buffers.push_back({buffer.label(), buffer.bytes()});
     result.bytes += buffer.bytes();
   };
-  for (const Buffer* buffer : {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0],
-                               &sim.quantized[1], &sim.step_block, &sim.guard_counts, &sim.check.words,
-                               &sim.check.read_back, &sim.check.positions, &sim.check.velocities})
+  for (const Buffer* buffer :
+       {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0], &sim.quantized[1],
+        &sim.step_block, &sim.guard_counts, &sim.check.words, &sim.check.read_back, &sim.check.positions,
+        &sim.check.velocities, &sim.rigid_bodies})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
@@ -25,6 +26,7 @@ Explanation explain(const Sim& sim) {
     result.bytes_per_step += (pass.bytes + more) * std::size_t(per_step);
   };
   kernel(sim.predict, "", 0, 0);
+  if (sim.rigid_bodies) kernel(sim.rigid_contact, "", sim.settings.substeps, 0);
   std::map<std::pair<std::size_t, unsigned>, long> times;  // of a pass with these phases, per substep
   for (const Dispatch& dispatch : sim.substep) ++times[{dispatch.pass, dispatch.phases}];
   for (const auto& [dispatch, count] : times) {

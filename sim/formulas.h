@@ -31,6 +31,7 @@ template <class Real, class Math = LibraryMath>
 struct Formulas {
   using real = Real;
   using vec3 = glm::vec<3, Real>;
+  using mat3 = glm::mat<3, 3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
   static constexpr real quantization_size = 0;  // positions are kept in full here
   static real atan(real y, real x) { return Math::atan(y, x); }
@@ -45,6 +46,11 @@ struct Formulas {
 #include "shaders/constraints/types.glsl"
 #include "constraint_formulas.inc"  // CMake's: every other file there
 #include "shaders/contact.glsl"
+#define SHARED_TOUCHES  // a work-group's in GLSL, the caller's here
+#define TOUCHES Touch *contacts,
+#include "shaders/impulses.glsl"
+#undef TOUCHES
+#undef SHARED_TOUCHES
 #pragma GCC diagnostic pop
   // clang-format on
 };

@@ -12,6 +12,7 @@ using glm::vec4;
 #include "shaders/layout.glsl"
 }  // namespace layout
 using layout::Position;
+using layout::RigidRecord;
 using layout::Step;
 using layout::Velocity;
 static_assert(sizeof(Position) == 32 && sizeof(Velocity) == 32 && sizeof(layout::Record4) == 20);

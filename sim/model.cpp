@@ -32,7 +32,8 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
             model.rest.tets.size(),
             mesh.tets.size(),
             model.rest.surface.size(),
-            mesh.surface.size()};
+            mesh.surface.size(),
+            mesh.one_piece};
   const auto append_shifted = [&](auto& to, const auto& from) {
     const std::size_t start = to.size();
     to.resize(start + from.size());

@@ -60,6 +60,12 @@ const std::vector<Parameter>& parameters() {
         {"ground", "world", &S::ground, "whether there is a ground plane"},
         {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
         {"friction", "world", &S::friction, "Coulomb friction of ground and obstacles", 0, 10},
+        {"restitution", "world", &S::restitution,
+         "normal velocity after an impact over before, of hard bodies (rigid_contact)"},
+        {"rigid_contact", "solver", &S::rigid_contact,
+         "touching bodies move as rigid ones, if all k are 1, stretch among them, and nothing is compliant; "
+         "else corrections of contacts and constraints become velocities, and bodies rebound",
+         0, 1, "", false, Effect::rebuild},
         {"seed", "solver", &S::seed, "seed of random start positions", 0, 2147483647, "", false,
          Effect::restart},
     };
@@ -177,8 +183,9 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
 const std::vector<Preset>& solver_presets() {
   static const std::vector<Preset> rows = {
       {"paper", "25 iterations a step, averaged",
-       "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false"},
-      {"substeps", "20 substeps of 1 iteration", "mode=node,iterations=1,substeps=20,omega=1.5"},
+       "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false,rigid_contact=false"},
+      {"substeps", "20 substeps of 1 iteration",
+       "mode=node,iterations=1,substeps=20,omega=1.5,rigid_contact=true"},
   };
   return rows;
 }
@@ -209,6 +216,13 @@ bool uses(const Settings& settings, const ConstraintKind& kind) {
   return std::find(names.begin(), names.end(), kind.name) != names.end();
 }
 
+bool rigid_in_contact(const Settings& settings) {
+  bool hard = settings.rigid_contact && !compliant(settings) && uses(settings, Stretch::row);
+  for (std::size_t k = 0; k < kind_count; ++k)
+    hard = hard && (settings.stiffness[k] == 1 || !uses(settings, constraint_kinds[k]));
+  return hard && settings.mode != "paper";
+}
+
 bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
 
 bool compliant(const Settings& settings) {
@@ -233,6 +247,9 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");
+  if (settings.restitution > 0 && !rigid_in_contact(settings))
+    throw Error("restitution is of hard bodies", where,
+                "set it to 0, or rigid_contact to true and all k to 1, without compliance or material");
   if (settings.material == "neo-hookean" && damped(settings))
     throw Error("material neo-hookean has no constraint_damping", where,
                 "set it to 0 and use damping, or material springs");

@@ -35,6 +35,8 @@ struct Settings {
   bool ground = true;
   double ground_height = 0;
   double friction = 0.5;
+  bool rigid_contact = true;
+  double restitution = 0;
   int seed = 1;
   bool operator==(const Settings&) const = default;
 };
@@ -103,6 +105,9 @@ std::vector<std::string> names_of(const std::vector<Preset>& presets);
 bool compliant(const Settings& settings);
 /// Whether constraints resist their rate.
 bool damped(const Settings& settings);
+/// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use hold a
+/// shape, all with k = 1.
+bool rigid_in_contact(const Settings& settings);
 /// The kinds in use, as the setting `constraints` lists them: the material's, if there is one.
 std::string kinds_in_use(const Settings& settings);
 bool uses(const Settings& settings, const ConstraintKind& kind);  ///< whether it is one of them

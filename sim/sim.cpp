@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <tuple>
 
@@ -48,6 +49,8 @@ void write_step_block(Sim& sim) {
   block.omega = soft ? 1.0f : float(s.omega);
   block.soft_omega = float(s.omega);
   block.friction = float(s.friction);
+  block.restitution = float(s.restitution);
+  block.body_size = float(sim.model->size);
   block.velocity_scale = float(std::exp(-s.damping * h));
   block.max_correction = float(longest_correction(*sim.model, s));
   block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
@@ -87,6 +90,19 @@ double quantum_of(const Sim& sim, const State& state) {
   return std::exp2(std::ceil(std::log2(reach)) - 27);
 }
 
+// As they are before anything is known of the bodies' motion.
+std::vector<RigidRecord> rigid_records(const Model& model) {
+  std::vector<RigidRecord> records;
+  for (const Body& body : model.bodies) {
+    RigidRecord& record = records.emplace_back();
+    record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
+    record.one_piece = body.one_piece;
+    const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
+    record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
+  }
+  return records;
+}
+
 // What the driver allows, where nothing lower is asked for.
 Tuning within_limits(Tuning tuning) {
   GLint row = 0;
@@ -112,12 +128,13 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  const bool soft = compliant(settings);
+  const bool soft = compliant(settings), rigid = rigid_in_contact(settings);
   const std::size_t count = sim.model->positions.size();
-  sim.predict = {Program::compute("predict.comp", {}, {soft ? "COMPLIANT 1" : "COMPLIANT 0"}),
-                 work_groups(count, group_size), count * (sizeof(Position) + sizeof(Velocity) + 16)};
+  const auto defines = vertex_defines(*sim.model, soft, rigid);
+  sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
+                 count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.solver = find_solver_mode(settings.mode)
-                   ->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft});
+                   ->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft, rigid});
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
     return Buffer(label, bytes);
@@ -130,6 +147,12 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.quantized[0] = buffer("quantized positions", count * 16 * (soft ? 2 : 1));
   if (sim.solver.double_buffered)
     sim.quantized[1] = buffer("quantized positions, other side", sim.quantized[0].bytes());
+  if (rigid) {
+    sim.rigid_bodies =
+        buffer("hard bodies", rigid_records(*sim.model).size() * sizeof(RigidRecord) + 8 * count);
+    sim.rigid_contact = {Program::compute("rigid_contact.comp", {}, defines), work_groups(count, group_size),
+                         4 * count};
+  }
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", 8);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -190,6 +213,12 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
   return sim;
 }
 
+void forget_contacts(Sim& sim) {
+  if (!sim.rigid_bodies) return;
+  const auto records = rigid_records(*sim.model);
+  sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
+}
+
 void reset(Sim& sim) {
   sim.steps = 0;
   if (sim.guard_counts) sim.guard_counts.clear();
@@ -220,7 +249,9 @@ void write_state(Sim& sim, const State& state) {
 
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
-  const auto made_for = [](const Settings& s) { return std::tuple(s.mode, kinds_of(s), compliant(s)); };
+  const auto made_for = [](const Settings& s) {
+    return std::tuple(s.mode, kinds_of(s), compliant(s), rigid_in_contact(s));
+  };
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
   sim.settings = settings;

@@ -31,7 +31,10 @@ struct Sim {
   Buffer step_block;    ///< Step
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
-  Pass predict;  ///< makes the quantized positions of the next step, after a change from outside
+  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies in contact (rigid.glsl), and vertices near half spaces
+  Pass rigid_contact;   ///< before each substep, where there are any
+  unsigned rigid_side = 0;  ///< of their records, which was written last
+  Pass predict;             ///< makes the quantized positions of the next step, after a change from outside
   std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;
   double quantum = 1;               ///< m, of quantized positions
@@ -65,6 +68,8 @@ void reset(Sim& sim);
 /// Whether the mode steps on the CPU: then `host` is the state.
 inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
 
+/// What is known of hard bodies in contact, before something else moves them.
+void forget_contacts(Sim& sim);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 /// A state that is not finite is taken, and found by check_finite() at once.

@@ -18,6 +18,7 @@ struct Dispatcher {
         BIND_QUANTIZED_OUT);
   }
   void run(Pass& pass, unsigned phases) {
+    if (sim.rigid_side) phases |= PHASE_SIDE;
     if (pass.program.id() != program) pass.program.use(), program = pass.program.id();
     constexpr std::array names = {"phases", "step_number"};
     const std::array<unsigned, 2> parameters = {phases, unsigned(sim.steps + 1)};
@@ -48,6 +49,7 @@ void bind(Sim& sim) {
   sim.velocities.bind_storage(BIND_VELOCITIES);
   sim.predicted.bind_storage(BIND_PREDICTED);
   sim.check.words.bind_storage(BIND_CHECK);
+  if (sim.rigid_bodies) sim.rigid_bodies.bind_storage(BIND_RIGID);
   for (const auto& [binding, buffer] : sim.solver.bindings)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
   if (!sim.guard_counts) return;
@@ -64,17 +66,20 @@ void step_on_gpu(Sim& sim) {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
   Dispatcher dispatcher{sim};
   if (sim.needs_predict) {
+    forget_contacts(sim);
     sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
     dispatcher.run(sim.predict, 0);
   }
   dispatcher.bind_quantized();
   sim.needs_predict = false;
-  for (int substep = 0; substep < sim.settings.substeps; ++substep)
+  for (int substep = 0; substep < sim.settings.substeps; ++substep) {
+    if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
     for (const Dispatch& dispatch : sim.substep)
       if (dispatch.pass + 1 == sim.solver.iteration.size())
         dispatcher.move(dispatch.phases);
       else
         dispatcher.run(sim.solver.iteration[dispatch.pass], dispatch.phases);
+  }
   // Vertex fetches and copies read the state next.
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   if (sim.timed) sim.timer.end();

@@ -19,7 +19,9 @@ TEST_CASE("the same run gives the same bits") {
       hash = state_hash(sim);
     }
     CHECK(hashes[0] == hashes[1]);
-    Sim other = create_sim(model, quick(mode.name, 6, 2));
+    Settings settings = quick(mode.name, 6, 2);
+    settings.rigid_contact = false;
+    Sim other = create_sim(model, settings);
     for (int s = 0; s < 15; ++s) step(other);
     CHECK(state_hash(other) != hashes[0]);
   }
@@ -198,8 +200,14 @@ TEST_CASE("only what a scene needs is allocated and dispatched") {
   CHECK(!has(some, "bend"));
   CHECK(!has(some, "volume"));
   CHECK(some.bytes < all.bytes);
-  CHECK(some.dispatches_per_step == 10 * 2);
+  CHECK(some.dispatches_per_step == 1 + 10 * 2);
+  CHECK(all.dispatches_per_step == 1 + 10 * 2);
+  CHECK(has(all, "rigid_contact"));
+  settings.rigid_contact = false;
+  all = explain(create_sim(model, settings));
   CHECK(all.dispatches_per_step == 10 * 2);
+  CHECK(!has(all, "rigid_contact"));
+  CHECK(!has(all, "hard bodies"));
   settings.mode = "node";
   CHECK(explain(create_sim(model, settings)).dispatches_per_step == 10);
   settings.constraints = "stretch,bend,volume";

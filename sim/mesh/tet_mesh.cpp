@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "sim/error.h"
+#include "sim/mesh/disjoint_sets.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -85,6 +86,7 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
   };
   std::vector<std::uint32_t> boundary;
   std::vector<Face> faces;
+  DisjointSets pieces(mesh.tets.size());
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
     faces.clear();
     for (std::uint32_t i = grouped.first[v]; i < grouped.first[v + 1]; ++i) {
@@ -103,13 +105,19 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
                     fmt::format("near {} in {}", point_text(mesh.positions[v]), source),
                     "remove duplicate or folded elements");
       }
-      if (next - f == 1) boundary.push_back(f->id);
+      if (next - f == 1)
+        boundary.push_back(f->id);
+      else
+        pieces.join(f->id / 4, f[1].id / 4);
       f = next;
     }
   }
   std::ranges::sort(boundary);  // the order of the tets
   mesh.surface.clear();
   for (const std::uint32_t face : boundary) mesh.surface.push_back(outward(face));
+  mesh.one_piece = true;
+  for (std::uint32_t t = 1; t < mesh.tets.size(); ++t)
+    mesh.one_piece = mesh.one_piece && pieces.root(t) == pieces.root(0);
 }
 
 }  // namespace

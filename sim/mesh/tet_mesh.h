@@ -27,6 +27,7 @@ struct TetMesh {
   std::vector<glm::dvec3> positions;
   std::vector<Tet> tets;
   std::vector<Triangle> surface;
+  bool one_piece = false;  ///< tets joined by faces: no hinges
 };
 
 /// Largest coordinate of a mesh file: volumes (cubes of it) and their products stay far inside a double.

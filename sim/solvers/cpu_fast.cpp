@@ -253,6 +253,7 @@ class FastPbd {
   /// As CpuPbd::step, in another order.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses) {
     const Substep substep(model_, settings);
+    RigidContact contact(model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
     x.resize(state.positions.size());
@@ -272,8 +273,11 @@ class FastPbd {
       GuardCounts counts{};
       for (int s = 0; s < settings.substeps; ++s) {
         if (damped(settings)) std::copy(&x[begin], &x[end], &work_.starts[begin]);
+#pragma omp barrier
+#pragma omp single
+        contact.prepare(substep, inverse_masses, work_, v);
         for_each_free_vertex([&](std::size_t i) {
-          predicted_[i] = substep.predict(x[i].position(), v[i]);
+          predicted_[i] = contact.predict(substep, i, x[i].position(), v[i]);
           move_to(i, predicted_[i]);
         });
         for (int iteration = 0; iteration < settings.iterations; ++iteration) {
@@ -282,7 +286,9 @@ class FastPbd {
             move_to(i, substep.out_of_planes(x[i].position(), predicted_[i], v[i]));
           });
         }
-        for_each_free_vertex([&](std::size_t i) { v[i] += (x[i].position() - predicted_[i]) / substep.h; });
+        for_each_free_vertex([&](std::size_t i) {
+          if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;
+        });
       }
 #pragma omp critical
       for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += counts[g];

@@ -9,37 +9,10 @@
 #include "sim/constraints.h"
 #include "sim/model.h"
 #include "sim/settings.h"
+#include "sim/solvers/rigid_contact.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
-
-/// What moves a vertex in a substep besides its constraints.
-struct Substep {
-  double h, velocity_scale, friction;
-  glm::dvec3 gravity;
-  std::vector<glm::dvec4> planes;  ///< half spaces n.x >= d as (n, d)
-
-  Substep(const Model& model, const Settings& settings)
-      : h(settings.dt / settings.substeps),
-        velocity_scale(std::exp(-settings.damping * h)),
-        friction(settings.friction),
-        gravity(0, -settings.gravity, 0),
-        planes(planes_of(model, settings)) {}
-  /// Where prediction moves x (eqs. 1-2); changes v.
-  glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
-    v = (v + h * gravity) * velocity_scale;
-    return x + h * v;
-  }
-  /// x out of all half spaces (eqs. 11-12).
-  glm::dvec3 out_of_planes(glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v) const {
-    for (const glm::dvec4& plane : planes) {
-      const glm::dvec3 n(plane);
-      const double depth = glm::dot(n, x) - plane.w;
-      if (depth < 0) x += Formulas<double>{}.plane_correction(n, depth, h * v + (x - predicted), friction);
-    }
-    return x;
-  }
-};
 
 /// What constraints of a kind share (shaders/constraints/types.glsl, multiplier).
 template <class real>
@@ -133,6 +106,7 @@ class CpuPbd {
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
     const Substep substep(model_, settings);
+    RigidContact contact(model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;
@@ -143,8 +117,9 @@ class CpuPbd {
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
     for (int s = 0; s < settings.substeps; ++s) {
       if (damped(settings)) start = x;
+      contact.prepare(substep, inverse_masses, vertices, v);
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) x[i] = substep.predict(x[i], v[i]);
+        if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
       predicted = x;
       for (int iteration = 0; iteration < settings.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
@@ -166,7 +141,7 @@ class CpuPbd {
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) v[i] += (x[i] - predicted[i]) / substep.h;
+        if (inverse_masses[i] > 0 && !contact.carries(i)) v[i] += (x[i] - predicted[i]) / substep.h;
     }
     return guards;
   }

@@ -97,6 +97,12 @@ Tuning tuning_from_environment() {
   return tuning;
 }
 
+namespace {
+
+std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
+
+}  // namespace
+
 std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   std::vector<Substitutions> words;
   for (std::size_t k = 0; k < kind_count; ++k)
@@ -111,6 +117,11 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
                        {"KIND_ROW", std::to_string(k / 4)},
                        {"KIND_COLUMN", std::to_string(k % 4)}});
   return words;
+}
+
+std::vector<std::string> vertex_defines(const Model& model, bool compliant, bool rigid) {
+  return {define("COMPLIANT", compliant), define("RIGID_CONTACT", rigid),
+          define("BODY_COUNT", model.bodies.size())};
 }
 
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
@@ -144,12 +155,6 @@ Cut tuned(Cut cut, const Tuning& tuning) {
   return cut;
 }
 
-namespace {
-
-std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
-
-}  // namespace
-
 void add_patches(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
                  unsigned group) {
   const std::size_t chunk_bytes = patches.chunks.size() * 4, vertex_bytes = patches.vertices.size() * 8,
@@ -168,25 +173,25 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
   }
   const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
                     vertices = std::max<std::size_t>(patches.largest, 1);
+  std::vector<std::string> defines = vertex_defines(input.model, input.compliant, input.rigid);
+  defines.insert(defines.end(),
+                 {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
+                  define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
+                  define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8), define("MAX_VERTICES", vertices),
+                  define("MAX_OWNED", owned), define("CHUNKED", patches.chunked),
+                  define("COUNT_GUARDS", input.tuning.count_guards)});
   solver.iteration.push_back(
-      {Program::compute(
-           shader, {{}, kind_words(input.system)},
-           {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
-            define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
-            define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8), define("MAX_VERTICES", vertices),
-            define("MAX_OWNED", owned), define("CHUNKED", patches.chunked),
-            define("COMPLIANT", input.compliant), define("COUNT_GUARDS", input.tuning.count_guards)}),
-       patches.count, bytes});
+      {Program::compute(shader, {{}, kind_words(input.system)}, defines), patches.count, bytes});
 }
 
 void add_average(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {
   const std::size_t vertices = input.model.positions.size();
   // Itself, its sum there and back, what neighbours see of it.
   const std::size_t bytes = vertices * (2 * sizeof(Position) + 3 * 16);
-  solver.iteration.push_back({Program::compute("average.comp", {},
-                                               {define("GROUP_SIZE", group), define("FLOAT_SUMS", float_sums),
-                                                define("COMPLIANT", input.compliant)}),
-                              work_groups(vertices, group), bytes});
+  std::vector<std::string> defines = vertex_defines(input.model, input.compliant, input.rigid);
+  defines.insert(defines.end(), {define("GROUP_SIZE", group), define("FLOAT_SUMS", float_sums)});
+  solver.iteration.push_back(
+      {Program::compute("average.comp", {}, defines), work_groups(vertices, group), bytes});
   Buffer sums("correction sums", vertices * 16);
   sums.clear();
   add_buffer(solver, input.tuning, BIND_SUMS, std::move(sums));

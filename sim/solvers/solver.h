@@ -74,6 +74,7 @@ struct SolverInput {
   Tuning tuning;           ///< `row` and `storage` filled in
   bool software = false;   ///< the "GPU" is a CPU
   bool compliant = false;  ///< settings.h
+  bool rigid = false;      ///< rigid_in_contact(), settings.h
 };
 
 /// A row of the table: what the mode is called, what makes it, and what it can do.
@@ -89,6 +90,8 @@ const std::vector<SolverMode>& solver_modes();
 /// Of all modes; nullptr if there is none.
 const SolverMode* find_solver_mode(const std::string& name);
 
+/// Definitions for the shaders that move vertices (vertex.glsl).
+std::vector<std::string> vertex_defines(const Model& model, bool compliant, bool rigid);
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), KIND_ROW and
 /// KIND_COLUMN (of the stiffness), PAIRS (of a record), MATERIAL (1: it has compliances of its own), PROJECT
 /// (the file that projects it), VALUES (at rest).

@@ -1,0 +1,74 @@
+// Hard bodies that touch (method.md, "Contact of a hard body"): what a vertex tells of itself at the end of a substep, for
+// rigid_contact.comp, and whether its body is carried as a rigid one in this substep. Two sides take turns: one is read, the other written.
+layout(std430, binding = BIND_RIGID) buffer RigidBodies {
+  RigidRecord rigid_bodies[BODY_COUNT];
+  uint near[];  // by side and body: vertices that would be in a half space next, in any order
+};
+shared int rigid_sums[RIGID_SUMS];
+
+uint side_now() { return (phases & PHASE_SIDE) != 0u ? 1u : 0u; }
+uint body_of(uint i) {  // the last that starts at i or before
+  uint low = 0u, high = BODY_COUNT;
+  while (low + 1u < high) {
+    uint middle = (low + high) / 2u;
+    if (rigid_bodies[middle].first <= i) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+// From the origin of its body.
+vec3 arm_of(Pair x, vec3 origin) { return (x.high - origin) + x.low; }
+
+void clear_rigid_sums() {
+  if (gl_LocalInvocationIndex < RIGID_SUMS) rigid_sums[gl_LocalInvocationIndex] = 0;
+}
+// A body's record as vertices ask for it.
+struct RigidState {
+  uint body;
+  bool carried, summed;
+  vec3 origin;
+  float mass;
+};
+RigidState state_of(uint b) {
+  uint s = side_now();
+  return RigidState(b, rigid_bodies[b].sides[s].carried != 0u, rigid_bodies[b].sides[s].summed != 0u, rigid_bodies[b].sides[s].origin, rigid_bodies[b].mass);
+}
+RigidState group_state;  // of the body that the work-group's first vertex belongs to
+RigidState state_at(uint i) {
+  uint b = body_of(i);
+  if (b == group_state.body) return group_state;
+  return state_of(b);
+}
+void add_rigid_sum(uint b, int which, float value) {
+  int quanta = int(round(clamp(value, -1.0, 1.0) * 1073741824.0));  // of 2^30: weights add up to 1, so no sum overflows
+  if (b == group_state.body) atomicAdd(rigid_sums[which], quanta);
+  else atomicAdd(rigid_bodies[b].sides[side_now()].sums[which], quanta);
+}
+// Vertex i is at x with velocity v and will be at `next`.
+void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
+  uint b = state.body, s = side_now();
+  vec3 way = relative(next, x);
+  if (touches(pair_add(next, 3.0 * way))) {
+    rigid_bodies[b].sides[s].soon = 1u;
+    if (touches(next)) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
+  }
+  if (!state.summed) return;
+  float weight = 1.0 / (inverse_mass * state.mass);
+  vec3 arm = clamp(arm_of(x, state.origin) / (2.0 * params.body_size), vec3(-1.0), vec3(1.0));
+  for (int a = 0; a < 3; ++a) {
+    add_rigid_sum(b, a, weight * arm[a]);
+    add_rigid_sum(b, 9 + a, weight * arm[a] * arm[a]);
+    add_rigid_sum(b, 12 + a, weight * arm[a] * arm[(a + 1) % 3]);
+  }
+  if (state.carried) return;  // then its momenta are known
+  vec3 speed = clamp((v.high + v.low) / RIGID_SPEED, vec3(-1.0), vec3(1.0)), turn = 0.5 * cross(arm, speed);
+  for (int a = 0; a < 3; ++a) {
+    add_rigid_sum(b, 3 + a, weight * speed[a]);
+    add_rigid_sum(b, 6 + a, weight * turn[a]);
+  }
+}
+// Needs a barrier before it.
+void flush_rigid_sums(uint b) {
+  uint k = gl_LocalInvocationIndex;
+  if (k < RIGID_SUMS && rigid_sums[k] != 0) atomicAdd(rigid_bodies[b].sides[side_now()].sums[k], rigid_sums[k]);
+}

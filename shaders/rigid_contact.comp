@@ -1,0 +1,154 @@
+// Contact of hard bodies (method.md, "Contact of a hard body"), before each substep: a body of which a vertex would get into a half space
+// gets the velocities of a rigid body in inelastic frictional contact. Every work-group finds them for itself.
+#include "types.glsl"
+#include "pair.glsl"
+#undef BIND_QUANTIZED_OUT  // in place
+#define BIND_QUANTIZED_OUT BIND_QUANTIZED
+#include "quantized.glsl"
+layout(local_size_x = 256) in;
+#include "vertex.glsl"
+#define SHARED_TOUCHES shared Touch contacts[MOST_TOUCHES];
+#define TOUCHES
+#include "impulses.glsl"
+shared Rigid before, body;  // the centre from the body's origin; momenta per mass
+shared uint worst, worst_place;
+shared uint places[MOST_TOUCHES];  // of the touches: vertex * MAX_PLANES + plane
+
+Pair position_of(uint i) { return Pair(positions[i].high, positions[i].low); }
+
+// The rigid motion of body b, from its sums on side s.
+Rigid rigid_motion(uint b, uint s) {
+  float sums[RIGID_SUMS];
+  for (int k = 0; k < RIGID_SUMS; ++k) sums[k] = float(rigid_bodies[b].sides[s].sums[k]) / 1073741824.0;
+  float reach = 2.0 * params.body_size;
+  vec3 c = vec3(sums[0], sums[1], sums[2]);
+  mat3 moments = mat3(sums[9], sums[12], sums[14], sums[12], sums[10], sums[13], sums[14], sums[13], sums[11]) - outerProduct(c, c);
+  Rigid motion;
+  motion.centre = reach * c;
+  motion.inverse_inertia = inverse_inertia_of(moments * (reach * reach));
+  vec3 angular;
+  if (rigid_bodies[b].sides[s].carried != 0u) {  // known better than from sums
+    motion.velocity = rigid_bodies[b].sides[s].velocity;
+    angular = rigid_bodies[b].sides[s].angular;
+  } else {
+    vec3 speed = vec3(sums[3], sums[4], sums[5]);
+    motion.velocity = RIGID_SPEED * speed;
+    angular = reach * RIGID_SPEED * (2.0 * vec3(sums[6], sums[7], sums[8]) - cross(c, speed));
+  }
+  motion.spin = motion.inverse_inertia * angular;
+  return motion;
+}
+
+// The normal velocity at a contact may not be under this.
+float least_at(Pair x, vec4 plane, vec3 arm) {
+  return least_velocity(dot(plane.xyz, velocity_at(before, arm)), depth_of(x, plane), params.h, params.h * length(params.gravity), params.restitution);
+}
+void take_in(int k, uint place, vec3 origin, vec3 impulse) {
+  Pair x = position_of(place / MAX_PLANES);
+  vec4 plane = params.planes[place % MAX_PLANES];
+  vec3 arm = arm_of(x, origin) - before.centre;
+  contacts[k] = touch_at(before, plane.xyz, arm, least_at(x, plane, arm), impulse);
+  places[k] = place;
+}
+
+// Of body b, with `count` of its vertices near half spaces; false if it has no inertia. Side s is read, the other written.
+bool find_motion(uint b, uint s, uint count, bool writes) {
+  uint lane = gl_LocalInvocationIndex;
+  int touching = int(rigid_bodies[b].sides[s].touching);
+  vec3 origin = rigid_bodies[b].sides[s].origin;
+  float fall = params.h * length(params.gravity), still = 1e-4 * fall;
+  if (lane == 0u) before = rigid_motion(b, s);
+  barrier();
+  if (!has_inertia(before)) return false;
+  if (lane < uint(touching)) take_in(int(lane), rigid_bodies[b].sides[s].touches[lane], origin, rigid_bodies[b].sides[s].impulses[lane].xyz);
+  Rigid now = before;
+  now.velocity = (now.velocity + params.h * params.gravity) * params.velocity_scale;
+  now.spin *= params.velocity_scale;
+  float enough = 2e-7 * length(now.velocity) + 2e-5 * fall, loose = 1e-3 * fall + 4.0 * enough;
+  barrier();
+  if (lane == 0u) {  // starts from the impulses before
+    for (int k = 0; k < touching; ++k) now = pushed(now, contacts[k].arm, contacts[k].impulse);
+    body = settled(now, touching, params.friction, enough, still);
+  }
+  // Contacts are taken in as the motion found so far breaks them, the worst first.
+  for (int round = 0; round < MOST_TOUCHES; ++round) {
+    if (lane == 0u) {
+      worst = 0u;
+      worst_place = ~0u;
+    }
+    barrier();
+    float most = loose;
+    uint place = ~0u;
+    for (uint k = lane; k < count; k += gl_WorkGroupSize.x) {
+      uint vertex = near[s * params.vertex_count + rigid_bodies[b].first + k];
+      Pair x = position_of(vertex);
+      vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
+      for (uint p = 0u; p < uint(params.plane_count); ++p) {
+        vec4 plane = params.planes[p];
+        float over = least_at(x, plane, arm) - dot(plane.xyz, speed);
+        if (over > most || (over == most && vertex * MAX_PLANES + p < place)) {
+          most = over;
+          place = vertex * MAX_PLANES + p;
+        }
+      }
+    }
+    if (place != ~0u) atomicMax(worst, floatBitsToUint(most));
+    barrier();
+    if (place != ~0u && floatBitsToUint(most) == worst) atomicMin(worst_place, place);
+    barrier();
+    if (worst_place == ~0u) break;
+    int at = touching;
+    for (int k = touching - 1; k >= 0; --k)
+      if (contacts[k].impulse == vec3(0.0) || places[k] == worst_place) at = k;
+    if (at == MOST_TOUCHES) break;
+    touching = max(touching, at + 1);
+    barrier();
+    if (lane == 0u) {
+      take_in(at, worst_place, origin, vec3(0.0));
+      body = settled(body, touching, params.friction, enough, still);
+    }
+    barrier();
+  }
+  uint o = 1u - s;
+  if (writes && lane < uint(touching)) {
+    rigid_bodies[b].sides[o].touches[lane] = places[lane];
+    rigid_bodies[b].sides[o].impulses[lane] = vec4(contacts[lane].impulse, 0.0);
+  }
+  if (writes && lane == 0u) {
+    rigid_bodies[b].sides[o].touching = uint(touching);
+    rigid_bodies[b].sides[o].velocity = body.velocity;
+    rigid_bodies[b].sides[o].angular = length(body.spin) > 0.0 ? inverse(body.inverse_inertia) * body.spin : vec3(0.0);
+  }
+  return true;
+}
+
+void main() {
+  uint lane = gl_LocalInvocationIndex, base = group_index() * gl_WorkGroupSize.x, i = base + lane, s = side_now(), o = 1u - s;
+  if (base >= params.vertex_count) return;
+  uint last = body_of(min(base + gl_WorkGroupSize.x, params.vertex_count) - 1u);
+  for (uint b = body_of(base); b <= last; ++b) {
+    uint first = rigid_bodies[b].first, count = rigid_bodies[b].sides[s].near;
+    bool writes = first >= base && first < base + gl_WorkGroupSize.x;
+    vec3 origin = rigid_bodies[b].sides[s].origin;
+    bool moves = count > 0u && rigid_bodies[b].sides[s].summed != 0u && rigid_bodies[b].one_piece != 0u && rigid_bodies[b].sides[s].fixed_vertices == 0u;
+    if (moves) moves = find_motion(b, s, count, writes);
+    if (writes) {
+      if (lane < RIGID_SUMS) rigid_bodies[b].sides[o].sums[lane] = 0;
+      if (lane == 0u) {
+        rigid_bodies[b].sides[o].near = rigid_bodies[b].sides[o].soon = 0u;
+        rigid_bodies[b].sides[o].summed = rigid_bodies[b].sides[s].soon;
+        rigid_bodies[b].sides[o].fixed_vertices = 0u;
+        rigid_bodies[b].sides[o].carried = moves ? 1u : 0u;
+        rigid_bodies[b].sides[o].origin = positions[first].high;
+        if (!moves) rigid_bodies[b].sides[o].touching = 0u;
+      }
+    }
+    if (moves && i >= first && i < first + rigid_bodies[b].vertices) {
+      Pair x = position_of(i);
+      vec3 v = velocity_at(body, arm_of(x, origin) - body.centre);
+      velocities[i] = Velocity(v, 0.0, vec3(0.0), 0.0);
+      quantized_out[i] = quantize(predict_position(x, Pair(v, vec3(0.0))), weight_of(positions[i]));
+    }
+    barrier();
+  }
+}

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "sim/formulas.h"
+#include "sim/model.h"
+#include "sim/settings.h"
+
+namespace tetpbd {
+
+/// What moves a vertex in a substep besides its constraints.
+struct Substep {
+  double h, velocity_scale, friction;
+  glm::dvec3 gravity;
+  std::vector<glm::dvec4> planes;  ///< half spaces n.x >= d as (n, d)
+
+  Substep(const Model& model, const Settings& settings)
+      : h(settings.dt / settings.substeps),
+        velocity_scale(std::exp(-settings.damping * h)),
+        friction(settings.friction),
+        gravity(0, -settings.gravity, 0),
+        planes(planes_of(model, settings)) {}
+  /// Where prediction moves x (eqs. 1-2); changes v.
+  glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
+    v = (v + h * gravity) * velocity_scale;
+    return x + h * v;
+  }
+  /// x out of all half spaces (eqs. 11-12).
+  glm::dvec3 out_of_planes(glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v) const {
+    for (const glm::dvec4& plane : planes) {
+      const glm::dvec3 n(plane);
+      const double depth = glm::dot(n, x) - plane.w;
+      if (depth < 0) x += Formulas<double>{}.plane_correction(n, depth, h * v + (x - predicted), friction);
+    }
+    return x;
+  }
+};
+
+}  // namespace tetpbd

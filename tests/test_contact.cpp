@@ -1,0 +1,281 @@
+// Hard bodies on half spaces, in every mode: against closed forms and the rigid reference.
+#include <doctest/doctest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+
+#include "sim/error.h"
+#include "sim/reference/rigid.h"
+#include "sim/rotation.h"
+#include "sim/sim.h"
+#include "tests/gl_test.h"
+
+using namespace tetpbd;
+
+namespace {
+
+const std::vector<std::string> all_modes = {"node", "constraint", "cpu", "cpu-double", "cpu-fast"};
+
+// An icosahedron's faces with its centre, a corner at the bottom.
+TetMesh ball_mesh(double radius) {
+  TetMesh mesh;
+  mesh.positions = {{0, 0, 0}, {0, radius, 0}, {0, -radius, 0}};
+  for (int k = 0; k < 10; ++k) {
+    const double a = k * std::numbers::pi / 5, y = radius / std::sqrt(5.0) * (k % 2 ? -1 : 1);
+    mesh.positions.push_back(
+        {2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
+  }
+  for (std::uint32_t k = 0; k < 10; ++k) {
+    const std::uint32_t a = 3 + k, b = 3 + (k + 1) % 10, c = 3 + (k + 2) % 10;
+    mesh.tets.push_back({0, a, b, c});
+    mesh.tets.push_back({0, k % 2 ? 2u : 1u, a, c});
+  }
+  finish_tets(mesh, "ball");
+  return mesh;
+}
+
+TetMesh irregular_block() {
+  TetMesh mesh = make_block({1, 0.6, 0.3}, {3, 2, 2});
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+    mesh.positions[i] +=
+        0.02 * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+  finish_tets(mesh, "block");
+  return mesh;
+}
+
+void add(Model& model, const TetMesh& mesh, const glm::dvec3& centre,
+         const glm::dmat3& rotation = glm::dmat3(1), const glm::dvec3& velocity = glm::dvec3(0),
+         const glm::dvec3& spin = glm::dvec3(0), const std::vector<std::uint32_t>& fixed = {}) {
+  std::vector<glm::dvec3> start;
+  for (const glm::dvec3& p : mesh.positions) start.push_back(centre + rotation * p);
+  add_body(model, "body", mesh, 1000, start, velocity, spin, fixed);
+}
+
+glm::dmat3 tilted() {
+  return glm::dmat3(glm::rotate(glm::dmat4(1), 0.7, glm::normalize(glm::dvec3(1, 0.5, 2))));
+}
+
+Settings in_mode(const std::string& mode, int substeps = 20) {
+  return {.mode = mode, .iterations = 1, .substeps = substeps};
+}
+
+struct Totals {
+  glm::dvec3 centre{0}, velocity{0};
+  double kinetic = 0, potential = 0;
+  double energy() const { return kinetic + potential; }
+};
+Totals totals(const Model& model, const State& state) {
+  Totals t;
+  double mass = 0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i) {
+    const double m = model.masses[i];
+    mass += m, t.centre += m * state.positions[i], t.velocity += m * state.velocities[i];
+    t.kinetic += m * glm::dot(state.velocities[i], state.velocities[i]) / 2;
+    t.potential += m * 9.81 * state.positions[i].y;
+  }
+  t.centre /= mass, t.velocity /= mass;
+  return t;
+}
+
+State after(const std::shared_ptr<Model>& model, const Settings& settings, int steps) {
+  Sim sim = create_sim(model, settings);
+  for (int s = 0; s < steps; ++s) step(sim);
+  return read_state(sim);
+}
+
+}  // namespace
+
+TEST_CASE_FIXTURE(GlTest, "contact: a hard ball bounces to the square of its restitution, in every mode") {
+  const auto model = std::make_shared<Model>();
+  add(*model, ball_mesh(0.25), {0, 0.75, 0});
+  for (const std::string& mode : all_modes)
+    for (const int substeps : {1, 5, 20, 50})
+      for (const double restitution : {0.0, 0.5, 0.9}) {
+        if (substeps != 20 && mode != "node" && mode != "cpu-double") continue;
+        CAPTURE(mode);
+        CAPTURE(substeps);
+        CAPTURE(restitution);
+        Settings settings = in_mode(mode, substeps);
+        settings.restitution = restitution;
+        Sim sim = create_sim(model, settings);
+        double apex = 0;
+        bool hit = false;
+        for (int s = 0; s < 160; ++s) {
+          step(sim);
+          const Totals now = totals(*model, read_state(sim));
+          hit = hit || (now.velocity.y > -0.5 && s > 40);
+          if (hit) apex = std::max(apex, now.centre.y - 0.25);
+        }
+        CHECK(hit);
+        // Its speed after the impact over before; without restitution it stays where it touches.
+        if (restitution > 0)
+          CHECK(std::sqrt(apex / 0.5) / restitution == doctest::Approx(1).epsilon(0.03));
+        else
+          CHECK(apex < 1e-3);
+        const State end = read_state(sim);
+        if (restitution == 0) CHECK(totals(*model, end).kinetic == 0);
+      }
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "contact: a hard block on a slope slides as Coulomb has it, or sticks, in every mode") {
+  for (const double degrees : {25.0, 28.0})
+    for (const std::string& mode : all_modes) {
+      CAPTURE(degrees);
+      CAPTURE(mode);
+      const double angle = degrees * std::numbers::pi / 180;
+      const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0),
+          down(-std::cos(angle), -std::sin(angle), 0);
+      const auto model = std::make_shared<Model>();
+      add(*model, make_block({0.4, 0.2, 0.4}, {4, 2, 4}), 0.1 * normal,
+          glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
+      model->obstacles = {glm::dvec4(normal, 0)};
+      Settings settings = in_mode(mode);
+      settings.ground = false;
+      const glm::dvec3 moved = totals(*model, after(model, settings, 100)).centre - 0.1 * normal;
+      const double pull = 9.81 * (std::sin(angle) - 0.5 * std::cos(angle));
+      if (pull > 0)
+        CHECK(glm::dot(moved, down) / (pull * 0.5 * 0.5 / 2) == doctest::Approx(1).epsilon(0.003));
+      else
+        CHECK(glm::length(moved) < 1e-6);
+      CHECK(std::abs(glm::dot(moved, normal)) < 1e-4);
+    }
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "contact: a hard body that falls on a corner moves on as a rigid one, in every mode, and "
+                  "loses energy only") {
+  const auto model = std::make_shared<Model>();
+  add(*model, irregular_block(), {0, 1, 0}, tilted(), {0.3, -2, 0}, {1, 2, 3});
+  RigidBody right = rigid_bodies(*model).at(0);
+  const Settings any = in_mode("node");
+  double lowest = right.centre.y;
+  for (int s = 0; s < 120; ++s) {
+    for (int k = 0; k < 100; ++k) advance(right, *model, any, any.dt / 100);
+    lowest = std::min(lowest, right.centre.y);
+  }
+  const Totals reference = totals(*model, state_of(*model, {right}));
+  for (const std::string& mode : all_modes) {
+    CAPTURE(mode);
+    Sim sim = create_sim(model, in_mode(mode));
+    double before = totals(*model, read_state(sim)).energy(), rise = 0;
+    const double start = before;
+    for (int s = 0; s < 120; ++s) {
+      step(sim);
+      const double now = totals(*model, read_state(sim)).energy();
+      rise = std::max(rise, now - before), before = now;
+    }
+    CHECK(rise < 1e-3 * start);
+    const Totals end = totals(*model, read_state(sim));
+    CHECK(end.energy() / reference.energy() == doctest::Approx(1).epsilon(0.02));
+    CHECK(glm::length(end.centre - reference.centre) < 0.02);
+    CHECK(glm::length(end.velocity - reference.velocity) < 0.1);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "contact: hard bodies come to rest and stay, to the last bit") {
+  const auto model = std::make_shared<Model>();
+  add(*model, make_block({1, 0.6, 0.3}, {3, 2, 2}), {0, 0.6, 0}, tilted(), {0.5, 0, 0}, {1, 2, 3});
+  for (const char* mode : {"node", "cpu-double"}) {
+    CAPTURE(mode);
+    Sim sim = create_sim(model, in_mode(mode));
+    for (int s = 0; s < 800; ++s) step(sim);
+    const State rest = read_state(sim);
+    CHECK(totals(*model, rest).kinetic == 0);
+    for (int s = 0; s < 200; ++s) step(sim);
+    const State later = read_state(sim);
+    double moved = 0;
+    for (std::size_t i = 0; i < rest.positions.size(); ++i)
+      moved = std::max(moved, glm::length(later.positions[i] - rest.positions[i]));
+    CHECK(moved < 1e-7 * model->size);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "contact: a hard body tumbles in flight by Euler's equations, in every mode") {
+  const auto model = std::make_shared<Model>();
+  add(*model, irregular_block(), {0, 9, 0}, glm::dmat3(1), {1, 2, 3}, {0.1, 6, 0.05});
+  RigidBody right = rigid_bodies(*model).at(0);
+  Settings settings = in_mode("node");
+  settings.ground = false;
+  for (int k = 0; k < 200 * 50; ++k) advance(right, *model, settings, settings.dt / 50);
+  for (const std::string& mode : all_modes) {
+    CAPTURE(mode);
+    settings.mode = mode, settings.mass_splitting = true;
+    const State end = after(model, settings, 200);
+    glm::dmat3 fit(0);
+    glm::dvec3 angular(0);
+    const Totals all = totals(*model, end);
+    for (std::size_t i = 0; i < end.positions.size(); ++i) {
+      fit += model->masses[i] * glm::outerProduct(end.positions[i] - all.centre, right.rest[i]);
+      angular += model->masses[i] * glm::cross(end.positions[i] - all.centre, end.velocities[i]);
+    }
+    const glm::dmat3 turn = glm::transpose(best_rotation(fit).R) * right.rotation;
+    const double off = std::acos(std::clamp((turn[0][0] + turn[1][1] + turn[2][2] - 1) / 2, -1.0, 1.0));
+    MESSAGE(mode, " angle ", off, " angular ",
+            glm::length(angular - right.angular) / glm::length(right.angular));
+    CHECK(off < 0.1);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "contact: bodies do not know of each other's contacts") {
+  const glm::dvec3 places[] = {{0, 0.5, 0}, {3, 0.45, 0}, {6, 5, 0}};
+  const auto all = std::make_shared<Model>();
+  for (const glm::dvec3& place : places) add(*all, irregular_block(), place, tilted());
+  for (const char* mode : {"node", "constraint", "cpu-double"}) {
+    const State together = after(all, in_mode(mode), 60);
+    for (std::size_t b = 0; b < 3; ++b) {
+      CAPTURE(mode);
+      CAPTURE(b);
+      const auto one = std::make_shared<Model>();
+      add(*one, irregular_block(), places[b], tilted());
+      const State alone = after(one, in_mode(mode), 60);
+      double apart = 0;
+      for (std::size_t i = 0; i < alone.positions.size(); ++i)
+        apart = std::max(
+            apart, glm::length(alone.positions[i] - together.positions[all->bodies[b].first_vertex + i]));
+      CHECK(apart < 1e-5);
+    }
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "contact: bodies with hinges, or held somewhere, move as their constraints have them") {
+  TetMesh hinge;  // two tets with an edge in common
+  hinge.positions = {{0, 0, 0},       {1, 0, 0},         {0.3, 0.8, 0},
+                     {0.3, 0.2, 0.8}, {0.3, -0.6, -0.8}, {0.4, 0.3, -0.9}};
+  hinge.tets = {{0, 1, 2, 3}, {0, 1, 4, 5}};
+  finish_tets(hinge, "hinge");
+  CHECK(!hinge.one_piece);
+  CHECK(irregular_block().one_piece);
+  const auto hinged = std::make_shared<Model>(), held = std::make_shared<Model>();
+  add(*hinged, hinge, {0, 0.9, 0});
+  add(*held, irregular_block(), {0, 0.4, 0}, tilted(), glm::dvec3(0), glm::dvec3(0), {0});
+  for (const auto& model : {hinged, held})
+    for (const std::string& mode : all_modes) {
+      CAPTURE(mode);
+      Settings settings = in_mode(mode);
+      const State with = after(model, settings, 60);
+      settings.rigid_contact = false;
+      const State without = after(model, settings, 60);
+      CHECK(with.positions == without.positions);
+      const glm::dvec3 start = totals(*model, {model->positions, model->velocities}).centre;
+      CHECK(glm::length(totals(*model, with).centre - start) > 0.01);
+    }
+}
+
+TEST_CASE("contact: restitution is of hard bodies") {
+  Settings settings;
+  settings.restitution = 0.5;
+  check_settings(settings, "here");
+  const auto refused = [&](auto&& change) {
+    Settings other = settings;
+    change(other);
+    CHECK(!rigid_in_contact(other));
+    CHECK_THROWS_AS(check_settings(other, "here"), Error);
+  };
+  refused([](Settings& s) { s.stiffness[0] = 0.9; });
+  refused([](Settings& s) { s.compliance[0] = 1e-6; });
+  refused([](Settings& s) { s.material = "neo-hookean"; });
+  refused([](Settings& s) { s.rigid_contact = false; });
+  refused([](Settings& s) { s.constraints = "volume"; });
+}

@@ -13,17 +13,23 @@ void project_$KIND(uint number, uint owned) {
   float k = params.stiffness[$KIND_ROW][$KIND_COLUMN];
 #if COMPLIANT
 #if $MATERIAL
-  float a = uintBitsToFloat(patch_words[RECORDS_AT + number + 1].x) * params.inverse_h * params.inverse_h;
+  float a = uintBitsToFloat(patch_words[RECORDS_AT + number + 1].x) * ($RATE == 1 ? params.inverse_h : params.inverse_h * params.inverse_h);
 #else
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
 #endif
-  float before = 0.0, gamma = params.damping, share = (1.0 + gamma) / params.soft_omega;
+  float before = 0.0, gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) / params.soft_omega;
   if ((phases & PHASE_PREDICT) == 0u) before = multipliers[number];
   if (gamma > 0.0) {
     vec3 start[$ARITY];
     ivec4 first_start = start_positions[record.x & 255u];
     for (int j = 0; j < $ARITY; ++j) start[j] = between(start_positions[local_id(record.x, j)], first_start);
-    c.C += gamma * (c.C - $KIND(start, uintBitsToFloat(record.y), record.x).C);
+    Constraint$ARITY then = $KIND(start, uintBitsToFloat(record.y), record.x);
+#if $RATE  // the change of C, without its cancellation
+    c.C = 0.0;
+    for (int j = 0; j < $ARITY; ++j) c.C += 0.5 * dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);
+#else
+    c.C += gamma * (c.C - then.C);
+#endif
   }
   c.C += a * before;
 #else

@@ -29,6 +29,7 @@ struct ConstraintKind {
   double most_compliance;       ///< the largest that settings take; 0: only a material has this kind
   int values = 1;               ///< numbers that describe a constraint at rest
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
+  bool rate = false;  ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
   constexpr bool of_material() const { return most_compliance == 0; }
 };
 
@@ -70,9 +71,18 @@ struct NeoHookean {
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then
 };
+struct Dashpot {
+  static constexpr ConstraintKind row{"dashpot", 2, "edges", "m/(N s)", 0, 1, 1, true};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.dashpot(x, rest, id);
+  }
+  static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
+  static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
+};
 // The next row goes here.
 
-using Kinds = std::tuple<Stretch, Bend, Volume, NeoHookean  // and its name here
+using Kinds = std::tuple<Stretch, Bend, Volume, NeoHookean, Dashpot  // and its name here
                          >;
 
 /// A constraint's rest values as its formula takes them: a number, or where there are several.

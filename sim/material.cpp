@@ -25,25 +25,39 @@ void make_neo_hookean(ConstraintList& tets, const Lame& m) {
 }
 
 // Springs along edges in all directions alike, of stiffness k over a length L, are isotropic with
-// mu = lambda = (sum k L^2) / (15 V) (Cauchy: Poisson's ratio 1/4); what is left of lambda is the volumes'.
-// Each tet gives its six edges the same k L^2.
-void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
+// mu = lambda = (sum k L^2) / (15 V) (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k
+// L^2. `volume(t)`: of tet t at rest.
+std::vector<double> spring_stiffness(const ConstraintList& edges, const ConstraintList& tets, double mu,
+                                     const auto& volume) {
   std::vector<double> stiffness(edges.count());
   const auto number_of = [&](std::uint32_t a, std::uint32_t b) {  // they are sorted by their vertices
     const auto vertices = [&](std::size_t e) { return std::pair(edges.ends(e)[0], edges.ends(e)[1]); };
     return *std::ranges::lower_bound(std::views::iota(std::size_t(0), edges.count()), std::minmax({a, b}), {},
                                      vertices);
   };
-  for (std::size_t t = 0; t < volumes.count(); ++t) {
-    const auto v = volumes.ends(t);
+  for (std::size_t t = 0; t < tets.count(); ++t) {
+    const auto v = tets.ends(t);
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t j = 0; j < i; ++j) {
         const std::size_t e = number_of(v[i], v[j]);
-        stiffness[e] += 15.0 / 6 * m.mu * volumes.rest[t] / (edges.rest[e] * edges.rest[e]);
+        stiffness[e] += 15.0 / 6 * mu * volume(t) / (edges.rest[e] * edges.rest[e]);
       }
-    volumes.compliance.push_back(volumes.rest[t] / (m.lambda - m.mu));
   }
-  for (const double k : stiffness) edges.compliance.push_back(1 / k);
+  return stiffness;
+}
+
+// What such springs leave of lambda is the volumes'.
+void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
+  const auto volume = [&](std::size_t t) { return volumes.rest[t]; };
+  for (const double k : spring_stiffness(edges, volumes, m.mu, volume)) edges.compliance.push_back(1 / k);
+  for (const double V : volumes.rest) volumes.compliance.push_back(V / (m.lambda - m.mu));
+}
+
+// Dashpots along edges, tau times as damping as those springs are stiff.
+void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame& m, double tau) {
+  const auto volume = [&](std::size_t t) { return 1 / (6 * tets.rest[8 * t + 6]); };
+  for (const double k : spring_stiffness(edges, tets, m.mu, volume))
+    edges.compliance.push_back(1 / (k * tau));
 }
 
 }  // namespace
@@ -54,6 +68,9 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings
   if (settings.material == "springs")
     make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
   if (settings.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  if (system.present[index_of<Dashpot>])
+    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m,
+                  settings.constraint_damping);
   return system;
 }
 

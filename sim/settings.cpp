@@ -184,6 +184,8 @@ const std::vector<Preset>& solver_presets() {
   static const std::vector<Preset> rows = {
       {"paper", "25 iterations a step, averaged",
        "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false,rigid_contact=false"},
+      {"hard", "5 substeps of 1 iteration, for bodies with k = 1",
+       "mode=node,iterations=1,substeps=5,omega=1.5,rigid_contact=true"},
       {"substeps", "20 substeps of 1 iteration",
        "mode=node,iterations=1,substeps=20,omega=1.5,rigid_contact=true"},
   };
@@ -206,9 +208,12 @@ std::vector<std::string> names_of(const std::vector<Preset>& presets) {
   return names;
 }
 
+bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
+
 std::string kinds_in_use(const Settings& settings) {
   if (settings.material == "springs") return "stretch,volume";
-  return settings.material == "neo-hookean" ? "neo_hookean" : settings.constraints;
+  if (settings.material == "none") return settings.constraints;
+  return damped(settings) ? "neo_hookean,dashpot" : "neo_hookean";
 }
 
 bool uses(const Settings& settings, const ConstraintKind& kind) {
@@ -222,8 +227,6 @@ bool rigid_in_contact(const Settings& settings) {
     hard = hard && (settings.stiffness[k] == 1 || !uses(settings, constraint_kinds[k]));
   return hard && settings.mode != "paper";
 }
-
-bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
 
 bool compliant(const Settings& settings) {
   bool any = damped(settings) || settings.material != "none";
@@ -250,9 +253,6 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (settings.restitution > 0 && !rigid_in_contact(settings))
     throw Error("restitution is of hard bodies", where,
                 "set it to 0, or rigid_contact to true and all k to 1, without compliance or material");
-  if (settings.material == "neo-hookean" && damped(settings))
-    throw Error("material neo-hookean has no constraint_damping", where,
-                "set it to 0 and use damping, or material springs");
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");

@@ -165,7 +165,9 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 
 // What decides which constraints there are.
 auto kinds_of(const Settings& s) {
-  return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio);
+  const bool dashpots = s.material == "neo-hookean";
+  return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio,
+                    dashpots ? s.constraint_damping : 0);
 }
 
 // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.

@@ -31,8 +31,9 @@ struct Sim {
   Buffer step_block;    ///< Step
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
-  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies in contact (rigid.glsl), and vertices near half spaces
-  Pass rigid_contact;   ///< before each substep, where there are any
+  Buffer
+      rigid_bodies;    ///< RigidRecord, of hard bodies in contact (rigid.glsl), and vertices near half spaces
+  Pass rigid_contact;  ///< before each substep, where there are any
   unsigned rigid_side = 0;  ///< of their records, which was written last
   Pass predict;             ///< makes the quantized positions of the next step, after a change from outside
   std::vector<Dispatch> substep;  ///< the dispatches of a substep

@@ -15,16 +15,18 @@ namespace {
 template <class F>
 void for_each_spring(const Leapfrog& run, F&& visit) {
   std::size_t offset = 0;
-  for_each_elastic(run.input.system, run.compliances,
-                   [&](auto kind, const ConstraintList& list, auto&& alpha) {
-                     visit(kind, list, alpha, offset);
-                     offset += list.vertices.size();
-                   });
+  for_each_elastic<true>(run.input.system, run.compliances,
+                         [&](auto kind, const ConstraintList& list, auto&& alpha) {
+                           visit(kind, list, alpha, offset);
+                           offset += list.vertices.size();
+                         });
 }
 
-// Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha.
+// Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha,
+// of rates -(grad C . v) grad C / alpha.
 Points accelerations(Leapfrog& run) {
   const double tau = run.input.settings.constraint_damping;
+  const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
   for_each_spring(run, [&](auto kind, const ConstraintList& list, auto&& alpha, std::size_t offset) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
     parallel_for(
@@ -37,8 +39,10 @@ Points accelerations(Leapfrog& run) {
           for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] = glm::dvec3(0);
           for (int k = 0; k < kind.row.components; ++k) {
             const auto [C, gradient] = component(value, k);
-            double size = C;
-            for (std::size_t j = 0; j < arity; ++j) size += tau * glm::dot(gradient[j], run.v[vertices[j]]);
+            double size = kind.row.rate ? 0 : C;
+            const double resists = kind.row.rate ? 1 : dashpots ? 0 : tau;
+            for (std::size_t j = 0; j < arity; ++j)
+              size += resists * glm::dot(gradient[j], run.v[vertices[j]]);
             for (std::size_t j = 0; j < arity; ++j)
               run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
           }

@@ -53,15 +53,16 @@ auto unclamped(Positions& x, const double* rest) {
   }
   return c;
 }
-/// Calls visit(Kind{}, list, alpha) for every kind that has constraints and an energy; alpha(c) points to the
-/// compliances of the components of constraint c.
-template <class F>
+/// Calls visit(Kind{}, list, alpha) for every kind that has constraints and an energy, or `rates` too;
+/// alpha(c) points to the compliances of the components of constraint c.
+template <bool rates = false, class F>
 void for_each_elastic(const ConstraintSystem& system, const Compliances& compliances, F&& visit) {
   for_each_kind([&](auto kind, int k) {
     constexpr std::size_t components = std::size_t(decltype(kind)::row.components);
     const ConstraintList& list = system.lists[std::size_t(k)];
     const double* all = &compliances[std::size_t(k)];
     const bool own = !list.compliance.empty();
+    if constexpr (decltype(kind)::row.rate && !rates) return;
     if (list.count() == 0 || (!own && std::isinf(*all))) return;
     visit(kind, list,
           [&list, all, own](std::size_t c) { return own ? &list.compliance[c * components] : all; });

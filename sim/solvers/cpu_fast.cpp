@@ -123,10 +123,10 @@ template <class Kind, bool damped>
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   std::uint32_t guards[lanes];
   float multipliers[components][lanes], softness_now[components][lanes];
-  const auto [k, limit, all, gamma, share, inverse_h2] = rule;
+  const auto [k, limit, all, gamma, share, unit] = rule;
   for (std::size_t part = 0; part < components; ++part)
     for (std::size_t lane = 0; lane < lanes; ++lane)
-      softness_now[part][lane] = softness ? float(softness->values[part][lane] * inverse_h2) : all;
+      softness_now[part][lane] = softness ? float(softness->values[part][lane] * unit) : all;
 #pragma GCC ivdep
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     glm::vec3 x[arity];
@@ -145,8 +145,10 @@ template <class Kind, bool damped>
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
         start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
-      if constexpr (components == 1)
-        c.C += gamma * (c.C - Kind::template evaluate<float, LaneMath>(start, rest[0], no_ids).C);
+      if constexpr (components == 1) {
+        const auto then = Kind::template evaluate<float, LaneMath>(start, rest[0], no_ids);
+        c.C = Kind::row.rate ? change_of(c, then, x, start) : c.C + gamma * (c.C - then.C);
+      }
     }
     glm::vec3 corrections[arity];
     if constexpr (components == 1) {

@@ -18,16 +18,27 @@ namespace tetpbd {
 template <class real>
 struct Rule {
   real k, limit, a, gamma, share;
-  double inverse_h2;  ///< 1/s^2
+  double softness;  ///< of a material's compliance: 1/s^2, of rates 1/s
   Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1)
       : k(real(settings.stiffness[kind])), limit(real(longest)) {
     const double h = settings.dt / settings.substeps;
-    inverse_h2 = 1 / (h * h);
+    const bool rate = constraint_kinds[kind].rate;
+    softness = rate ? 1 / h : 1 / (h * h);
     a = real(settings.compliance[kind] / (h * h));
     gamma = real(settings.constraint_damping / h);
-    share = (1 + gamma) / real(omega);
+    share = (rate ? 1 : 1 + gamma) / real(omega);
   }
 };
+
+/// How much C changed from `then` to c, without cancellation; at positions x and start.
+template <class Constraint, class Vector>
+[[gnu::always_inline]] inline auto change_of(const Constraint& c, const Constraint& then, const Vector* x,
+                                             const Vector* start) {
+  decltype(c.C) sum = 0;
+  for (std::size_t j = 0; j < std::size(c.gradient); ++j)
+    sum += decltype(c.C)(0.5) * glm::dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);
+  return sum;
+}
 
 /// Projects one constraint (eqs. 4, 25-26, 32). `compliance`: of a material, or null; `vertices` tells of
 /// a vertex where it is (at), where it was at the substep's start (start), its inverse mass (weight), and
@@ -38,19 +49,22 @@ template <class Kind, class real, class Vertices>
                                            real* multipliers, Vertices&& vertices, GuardCounts& guards) {
   constexpr int components = Kind::row.components;
   constexpr std::size_t arity = std::size_t(Kind::row.arity);
+  glm::vec<3, real> local[arity];
   const auto evaluate = [&](auto&& position) {
-    glm::vec<3, real> local[arity];
     for (std::size_t j = 0; j < arity; ++j) local[j] = glm::vec<3, real>(position(ids[j]) - position(ids[0]));
     return Kind::template evaluate<real>(local, rest_of<Kind>(rest), ids);
   };
   auto c = evaluate([&](std::uint32_t v) { return vertices.at(v); });
   real w[arity], a[components];
   for (std::size_t j = 0; j < arity; ++j) w[j] = vertices.weight(ids[j]);
-  for (int k = 0; k < components; ++k) a[k] = compliance ? real(compliance[k] * rule.inverse_h2) : rule.a;
+  for (int k = 0; k < components; ++k) a[k] = compliance ? real(compliance[k] * rule.softness) : rule.a;
   std::uint32_t triggered = 0;
   if constexpr (components == 1) {
-    if (rule.gamma > 0)
-      c.C += rule.gamma * (c.C - evaluate([&](std::uint32_t v) { return vertices.start(v); }).C);
+    if (rule.gamma > 0) {
+      const auto here = std::to_array(local);
+      const auto then = evaluate([&](std::uint32_t v) { return vertices.start(v); });
+      c.C = Kind::row.rate ? change_of(c, then, here.data(), local) : c.C + rule.gamma * (c.C - then.C);
+    }
     c.C += a[0] * multipliers[0];
     const auto m = Formulas<real>{}.multiplier(c, w, rule.k, rule.limit, a[0], rule.share);
     multipliers[0] += m.lambda;

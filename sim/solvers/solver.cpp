@@ -113,6 +113,7 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
                        {"PAIRS", std::to_string(record_pairs(system.lists[k]))},
                        {"MATERIAL", system.lists[k].compliance.empty() ? "0" : "1"},
                        {"PROJECT", constraint_kinds[k].components == 1 ? "project" : "project_two"},
+                       {"RATE", constraint_kinds[k].rate ? "1" : "0"},
                        {"VALUES", std::to_string(constraint_kinds[k].values)},
                        {"KIND_ROW", std::to_string(k / 4)},
                        {"KIND_COLUMN", std::to_string(k % 4)}});

@@ -94,7 +94,7 @@ const SolverMode* find_solver_mode(const std::string& name);
 std::vector<std::string> vertex_defines(const Model& model, bool compliant, bool rigid);
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), KIND_ROW and
 /// KIND_COLUMN (of the stiffness), PAIRS (of a record), MATERIAL (1: it has compliances of its own), PROJECT
-/// (the file that projects it), VALUES (at rest).
+/// (the file that projects it), RATE (1: only its change counts), VALUES (at rest).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
 /// The records of one list (layout.glsl: Record2, Record4).
 Buffer record_buffer(const ConstraintList& list, const std::string& kind);

@@ -45,7 +45,7 @@ fs::path models_folder() {
   return TETPBD_SOURCE_MODELS;
 }
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells, taper)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, tetgen, scale, height, rotation,
                                                 position, density, velocity, spin, fixed, heavy, deform)
@@ -63,7 +63,8 @@ json schema() {
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
       "name": "text", "mesh": "text", "tetgen": "text", "deform": "text",
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
-      "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]}},
+      "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
+        "taper": [0, 0.95]},
       "tet": {"least": 4, "most": 4, "of": "four points", "each": {"three": [-1e6, 1e6]}},
       "scale": {"three": [1e-6, 1e6]}, "height": [1e-6, 1e6],
       "rotation": {"three": [-3600, 3600]}, "position": {"three": [-1e6, 1e6]},
@@ -260,7 +261,8 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
 }
 
 TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
-  if (body.block) return make_block(body.block->size, body.block->cells);
+  if (const auto& b = body.block)
+    return b->taper > 0 ? make_spindle(b->size, b->cells, b->taper) : make_block(b->size, b->cells);
   if (!body.tet) return load_mesh(body.mesh, body.tetgen);
   TetMesh mesh{{body.tet->begin(), body.tet->end()}, {{0, 1, 2, 3}}, {}};
   finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene));

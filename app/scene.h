@@ -21,6 +21,7 @@ struct BodyDescription {
   struct Block {
     glm::dvec3 size{1};  ///< m
     glm::ivec3 cells{1};
+    double taper = 0;  ///< make_spindle()
   };
   /// Vertices in a box; heavy ones, a pseudo-random `share`, have `ratio` times the mass of the material.
   struct Box {

@@ -22,7 +22,9 @@ mat3 inverse_inertia_of(mat3 moments) {
 }
 bool has_inertia(Rigid b) { return b.inverse_inertia[0][0] > real(0); }
 vec3 velocity_at(Rigid b, vec3 arm) { return b.velocity + cross(b.spin, arm); }
-// `approach`: normal velocity before; under what gravity alone makes of it in two substeps there is no rebound. `gap`: closed in h at most.
+// `approach`: normal velocity before; under what gravity alone makes of it in two substeps there is no rebound. `gap`: closed in h at most,
+// but for one that rounding may have opened.
+const real closed_gap = real(1e-6);  // of the body's size
 real least_velocity(real approach, real gap, real h, real fall, real restitution) {
   return restitution > real(0) && approach < real(-2) * fall ? -restitution * approach : -max(gap, real(0)) / h;
 }

@@ -41,7 +41,7 @@ Rigid rigid_motion(uint b, uint s) {
 
 // The normal velocity at a contact may not be under this.
 float least_at(Pair x, vec4 plane, vec3 arm) {
-  return least_velocity(dot(plane.xyz, velocity_at(before, arm)), depth_of(x, plane), params.h, params.h * length(params.gravity), params.restitution);
+  return least_velocity(dot(plane.xyz, velocity_at(before, arm)), depth_of(x, plane) - closed_gap * params.body_size, params.h, params.h * length(params.gravity), params.restitution);
 }
 void take_in(int k, uint place, vec3 origin, vec3 impulse) {
   Pair x = position_of(place / MAX_PLANES);

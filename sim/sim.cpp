@@ -118,6 +118,11 @@ void schedule(Sim& sim) {
   if (!on_cpu(sim)) sim.substep = substep_dispatches(sim.solver, sim.settings.iterations);
 }
 
+// Without half spaces nothing touches.
+bool touches_rigidly(const Model& model, const Settings& settings) {
+  return rigid_in_contact(settings) && !planes_of(model, settings).empty();
+}
+
 // Everything but the state.
 Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning,
              ConstraintSystem system) {
@@ -128,7 +133,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  const bool soft = compliant(settings), rigid = rigid_in_contact(settings);
+  const bool soft = compliant(settings), rigid = touches_rigidly(*sim.model, settings);
   const std::size_t count = sim.model->positions.size();
   const auto defines = vertex_defines(*sim.model, soft, rigid);
   sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
@@ -251,8 +256,8 @@ void write_state(Sim& sim, const State& state) {
 
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
-  const auto made_for = [](const Settings& s) {
-    return std::tuple(s.mode, kinds_of(s), compliant(s), rigid_in_contact(s));
+  const auto made_for = [&](const Settings& s) {
+    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s));
   };
   const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);

@@ -155,6 +155,18 @@ TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
   return mesh;
 }
 
+TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper) {
+  TetMesh mesh = make_block(size, cells);
+  for (glm::dvec3& p : mesh.positions) {
+    const glm::dvec3 u = 2.0 * p / size;  // -1 to 1
+    const double thin = 1 - taper * u.y * u.y;
+    p.x *= thin * std::sqrt(1 - u.z * u.z / 4);
+    p.z *= thin * std::sqrt(1 - u.x * u.x / 4);
+  }
+  finish_tets(mesh, "spindle");
+  return mesh;
+}
+
 double tet_volume(const TetMesh& mesh, const Tet& tet) {
   const glm::dvec3& origin = mesh.positions[tet[0]];
   return glm::dot(glm::cross(mesh.positions[tet[1]] - origin, mesh.positions[tet[2]] - origin),

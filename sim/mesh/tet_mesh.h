@@ -98,6 +98,8 @@ void write_surface(const std::filesystem::path& file, const SurfaceMesh& surface
 void finish_tets(TetMesh& mesh, const std::string& source);
 /// A block of cells nx * ny * nz, each cut into six tets (Kuhn), size in metres, centred on the origin.
 TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);
+/// The same with rounded cross-sections along y, thinner by `taper` at the ends.
+TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper);
 
 double tet_volume(const TetMesh& mesh, const Tet& tet);
 std::vector<double> tet_volumes(const TetMesh& mesh);

@@ -68,7 +68,8 @@ Pair rigid_pair(const ReferenceInput& input) {
     for (Run& run : *runs)
       for (RigidBody& body : run.bodies)
         for (long s = 0; s < run.steps; ++s)
-          advance(body, input.model, input.settings, input.settings.dt / double(run.steps));
+          advance(body, input.model, input.settings, input.settings.dt / double(run.steps),
+                  input.settings.restitution);
   };
   pair.coarse = [runs, input] { return state_of(input.model, (*runs)[0].bodies); };
   pair.fine = [runs, input] { return state_of(input.model, (*runs)[1].bodies); };
@@ -158,8 +159,8 @@ std::uint64_t scene_key(const ReferenceInput& input) {
     add(s.constraints), add(s.stiffness), add(s.compliance);
   else
     add(s.material), add(std::array{s.young_modulus, s.poisson_ratio});
-  const double numbers[] = {s.constraint_damping, s.dt,      s.damping, s.gravity, double(s.ground),
-                            s.ground_height,      s.friction};
+  const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
+                            s.ground_height,      s.friction, s.restitution};
   add(numbers);
   return key;
 }

@@ -94,8 +94,9 @@ class RigidContact {
       for (const std::size_t i : near)
         for (const glm::dvec4& plane : s.planes) {
           const glm::dvec3 n(plane), arm = at(i) - body.centre;
-          const double least = Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm)),
-                                                      glm::dot(n, at(i)) - plane.w, s.h, fall, restitution_);
+          const double least = Rules{}.least_velocity(
+              glm::dot(n, Rules{}.velocity_at(before, arm)),
+              glm::dot(n, at(i)) - plane.w - Rules{}.closed_gap * model_.size, s.h, fall, restitution_);
           const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm));
           if (over > most) most = over, worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0));
         }

@@ -137,9 +137,11 @@ bool words_widget(Session& s, const Parameter& row, std::string& value) {
 // What has no effect, as the stiffness of a kind that is switched off.
 bool is_idle(const Settings& settings, const Parameter& row) {
   if (row.name == "mass_splitting") return compliant(settings);  // brings it with it
-  Settings hard = settings;
-  hard.rigid_contact = true;
-  if (row.name == "rigid_contact") return !rigid_in_contact(hard);
+  if (row.name == "rigid_contact") {
+    Settings on = settings;
+    on.rigid_contact = true;
+    return !rigid_in_contact(on);
+  }
   if (row.name == "restitution") return settings.restitution == 0 && !rigid_in_contact(settings);
   const bool material = settings.material != "none";
   if (row.name == "young_modulus" || row.name == "poisson_ratio") return !material;

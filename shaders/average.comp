@@ -26,15 +26,12 @@ void average(uint i) {
 
 void main() {
   uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-  bool mine = i < params.vertex_count;
 #if RIGID_CONTACT
-  clear_rigid_sums();
-  group_state = state_of(body_of(min(i - gl_LocalInvocationIndex, params.vertex_count - 1u)));
+  begin_sums(i - gl_LocalInvocationIndex);
   barrier();
 #endif
-  if (mine) average(i);
+  if (i < params.vertex_count) average(i);
 #if RIGID_CONTACT
-  barrier();
-  if ((phases & PHASE_FINISH) != 0u) flush_rigid_sums(group_state.body);
+  if ((phases & PHASE_FINISH) != 0u) end_sums();
 #endif
 }

@@ -19,7 +19,7 @@ void predict(uint i) {
   body.summed = true;
   body.origin = positions[rigid_bodies[body.body].first].high;
   if (own.inverse_mass > 0.0) note_motion(body, i, here, v, x, own.inverse_mass);
-  else atomicAdd(rigid_bodies[body.body].sides[side_now()].fixed_vertices, 1u);
+  else note_fixed(i);
   if (i == rigid_bodies[body.body].first) {
     rigid_bodies[body.body].sides[side_now()].origin = body.origin;
     rigid_bodies[body.body].sides[side_now()].summed = 1u;
@@ -31,13 +31,11 @@ void predict(uint i) {
 void main() {
   uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 #if RIGID_CONTACT
-  clear_rigid_sums();
-  group_state = state_of(body_of(min(i - gl_LocalInvocationIndex, params.vertex_count - 1u)));
+  begin_sums(i - gl_LocalInvocationIndex);
   barrier();
 #endif
   if (i < params.vertex_count) predict(i);
 #if RIGID_CONTACT
-  barrier();
-  flush_rigid_sums(group_state.body);
+  end_sums();
 #endif
 }

@@ -19,9 +19,6 @@ uint body_of(uint i) {  // the last that starts at i or before
 // From the origin of its body.
 vec3 arm_of(Pair x, vec3 origin) { return (x.high - origin) + x.low; }
 
-void clear_rigid_sums() {
-  if (gl_LocalInvocationIndex < RIGID_SUMS) rigid_sums[gl_LocalInvocationIndex] = 0;
-}
 // A body's record as vertices ask for it.
 struct RigidState {
   uint body;
@@ -39,11 +36,17 @@ RigidState state_at(uint i) {
   if (b == group_state.body) return group_state;
   return state_of(b);
 }
+// A work-group whose first vertex is i begins; needs a barrier behind it.
+void begin_sums(uint i) {
+  if (gl_LocalInvocationIndex < RIGID_SUMS) rigid_sums[gl_LocalInvocationIndex] = 0;
+  group_state = state_of(body_of(min(i, params.vertex_count - 1u)));
+}
 void add_rigid_sum(uint b, int which, float value) {
   int quanta = int(round(clamp(value, -1.0, 1.0) * 1073741824.0));  // of 2^30: weights add up to 1, so no sum overflows
   if (b == group_state.body) atomicAdd(rigid_sums[which], quanta);
   else atomicAdd(rigid_bodies[b].sides[side_now()].sums[which], quanta);
 }
+void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u); }
 // Vertex i is at x with velocity v and will be at `next`.
 void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
   uint b = state.body, s = side_now();
@@ -67,8 +70,9 @@ void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inve
     add_rigid_sum(b, 6 + a, weight * turn[a]);
   }
 }
-// Needs a barrier before it.
-void flush_rigid_sums(uint b) {
+// What the work-group has added up goes to its body.
+void end_sums() {
+  barrier();
   uint k = gl_LocalInvocationIndex;
-  if (k < RIGID_SUMS && rigid_sums[k] != 0) atomicAdd(rigid_bodies[b].sides[side_now()].sums[k], rigid_sums[k]);
+  if (k < RIGID_SUMS && rigid_sums[k] != 0) atomicAdd(rigid_bodies[group_state.body].sides[side_now()].sums[k], rigid_sums[k]);
 }

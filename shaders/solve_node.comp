@@ -21,8 +21,7 @@ void main() {
     load_chunk(chunk.number);
   }
 #if RIGID_CONTACT
-  clear_rigid_sums();
-  group_state = state_of(body_of(chunk.first));
+  begin_sums(chunk.first);
 #endif
   barrier();
   vec3 correction = vec3(0.0);
@@ -51,7 +50,6 @@ void main() {
 #endif
   }
 #if RIGID_CONTACT
-  barrier();
-  if ((phases & PHASE_FINISH) != 0u) flush_rigid_sums(group_state.body);
+  if ((phases & PHASE_FINISH) != 0u) end_sums();
 #endif
 }

@@ -108,7 +108,7 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
   } else if ((phases & PHASE_FINISH) != 0u) {
     note_unless_finite(i, x.high + x.low, vec3(0.0));
 #if RIGID_CONTACT
-    atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u);
+    note_fixed(i);
 #endif
 #if COMPLIANT
     if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);

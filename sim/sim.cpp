@@ -118,11 +118,6 @@ void schedule(Sim& sim) {
   if (!on_cpu(sim)) sim.substep = substep_dispatches(sim.solver, sim.settings.iterations);
 }
 
-// Without half spaces nothing touches.
-bool touches_rigidly(const Model& model, const Settings& settings) {
-  return rigid_in_contact(settings) && !planes_of(model, settings).empty();
-}
-
 // Everything but the state.
 Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning,
              ConstraintSystem system) {

@@ -275,9 +275,11 @@ class FastPbd {
       GuardCounts counts{};
       for (int s = 0; s < settings.substeps; ++s) {
         if (damped(settings)) std::copy(&x[begin], &x[end], &work_.starts[begin]);
+        if (contact.wanted()) {
 #pragma omp barrier
 #pragma omp single
-        contact.prepare(substep, inverse_masses, work_, v);
+          contact.prepare(substep, inverse_masses, work_, v);
+        }
         for_each_free_vertex([&](std::size_t i) {
           predicted_[i] = contact.predict(substep, i, x[i].position(), v[i]);
           move_to(i, predicted_[i]);

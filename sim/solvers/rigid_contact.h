@@ -10,15 +10,20 @@
 
 namespace tetpbd {
 
+/// Whether hard bodies are carried: rigid_in_contact(), and there is something to touch.
+inline bool touches_rigidly(const Model& model, const Settings& settings) {
+  return rigid_in_contact(settings) && !planes_of(model, settings).empty();
+}
+
 class RigidContact {
  public:
   RigidContact(const Model& model, const Settings& settings)
       : model_(model),
-        wanted_(rigid_in_contact(settings)),
-        friction_(settings.friction),
+        wanted_(touches_rigidly(model, settings)),
         restitution_(settings.restitution),
         carried_(model.positions.size()) {}
 
+  bool wanted() const { return wanted_; }  ///< else prepare() does nothing
   /// Whether vertex i belongs to a body that touches: then its velocity is the body's in the whole substep.
   bool carries(std::size_t i) const { return carried_[i]; }
 
@@ -32,8 +37,9 @@ class RigidContact {
   template <class Place>
   void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
                std::vector<glm::dvec3>& v) {
+    if (!wanted_) return;
     for (const Body& body : model_.bodies) {
-      if (!wanted_ || !body.one_piece) continue;
+      if (!body.one_piece) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto near = near_contacts(s, inverse_masses, place, v, first, end);
       const bool moved = !near.empty() && move(s, near, place, v, first, end);
@@ -102,7 +108,7 @@ class RigidContact {
         }
       if (most == loose) break;
       touches[count] = worst;
-      body = Rules{}.settled(touches, body, count + 1, friction_, enough, 1e-4 * fall);
+      body = Rules{}.settled(touches, body, count + 1, s.friction, enough, 1e-4 * fall);
     }
     for (std::size_t i = first; i < end; ++i) v[i] = Rules{}.velocity_at(body, at(i) - body.centre);
     return true;
@@ -110,7 +116,7 @@ class RigidContact {
 
   const Model& model_;
   bool wanted_;
-  double friction_, restitution_;
+  double restitution_;
   std::vector<char> carried_;
 };
 

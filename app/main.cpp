@@ -236,6 +236,9 @@ void add_commands(CLI::App& app, Arguments& a) {
               [](const Arguments& a) { return run_reference(*a.opened, a.reference); });
   add_scene(reference, a);
   add(reference, "--steps", a.reference.steps, 1L, most_steps, "steps of the scene (default: its duration)");
+  add(reference, "--method", a.reference.method,
+      "leapfrog or implicit, for soft bodies (default: leapfrog, unless its steps are too short)")
+      ->check(one_of(std::array{"leapfrog", "implicit"}));
   add(reference, "--out", a.reference.out,
       "file to write (default: in the cache, where runs of the scene find it)");
   add_progress(reference, a.reference.progress);

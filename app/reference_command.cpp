@@ -119,8 +119,8 @@ int run_reference(const Scene& scene, const ReferenceOptions& options) {
   if (options.out.empty()) std::filesystem::create_directories(file.parent_path(), ignored);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   Progress progress("the right motion", steps, options.progress);
-  const Motion motion =
-      find_motion(input, steps, file.string() + ".unfinished", [&](long done) { progress.update(done); });
+  const Motion motion = find_motion(input, steps, options.method, file.string() + ".unfinished",
+                                    [&](long done) { progress.update(done); });
   write_motion(file, *model, motion);
   print_motion(scene, motion);
   fmt::print("{}\n", file.string());

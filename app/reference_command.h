@@ -12,6 +12,7 @@ namespace tetpbd {
 
 struct ReferenceOptions {
   long steps = 0;             ///< 0: the scene's duration
+  std::string method;         ///< leapfrog or implicit; empty: what suits the scene
   std::filesystem::path out;  ///< empty: in the cache, where runs of the scene find it
   bool progress = false;      ///< show it even if standard error is no terminal
 };

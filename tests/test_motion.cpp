@@ -4,6 +4,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
+#include "sim/material.h"
+#include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
 #include "sim/reference/rigid.h"
@@ -206,30 +208,38 @@ TEST_CASE("motion: two masses on a spring fall, stick, and leave the ground when
     return sag * std::cos(omega * t) + speed / omega * std::sin(omega * t);
   };
   while (height(lift) < 2 * sag || lift < pi / omega / 2) lift += 1e-6;
-  const double h = 2e-5;
-  Leapfrog run = leapfrog(scene.input(), {alpha, infinity, infinity},
-                          {scene.model.positions, scene.model.velocities}, h);
-  advance(run, std::lround((fall + 0.5 * lift) / h));
-  CHECK(run.x[0].y == doctest::Approx(0).epsilon(1e-6).scale(1));
-  CHECK(run.x[1].y == doctest::Approx(1 - sag + height(0.5 * lift)).epsilon(1e-4));
-  advance(run, std::lround(0.48 * lift / h));
-  CHECK(run.x[0].y < 1e-6);
-  advance(run, std::lround(0.06 * lift / h));
-  CHECK(run.x[0].y > 1e-6);
-  CHECK(run.x[0].x == 0);
+  const Compliances compliances{alpha, infinity, infinity};
+  const auto lands_and_leaves = [&](auto run) {
+    advance(run, std::lround((fall + 0.5 * lift) / run.h));
+    Points x = state_of(run).positions;
+    CHECK(x[0].y == doctest::Approx(0).epsilon(1e-6).scale(1));
+    CHECK(x[1].y == doctest::Approx(1 - sag + height(0.5 * lift)).epsilon(1e-4));
+    advance(run, std::lround(0.48 * lift / run.h));
+    CHECK(state_of(run).positions[0].y < 1e-6);
+    advance(run, std::lround(0.06 * lift / run.h));
+    x = state_of(run).positions;
+    CHECK(x[0].y > 1e-6);
+    CHECK(x[0].x == 0);
+  };
+  lands_and_leaves(leapfrog(scene.input(), compliances, scene.start(), 2e-5));
+  lands_and_leaves(implicit(scene.input(), compliances, scene.start(), 2e-5));
 }
 
-TEST_CASE("motion: leapfrog slides v^2 / (2 friction g) and stops") {
+TEST_CASE("motion: soft bodies slide v^2 / (2 friction g) and stop") {
   Scene scene = chain_scene({{0, 0, 0}, {1, 0, 0}}, {1, 1});
   scene.settings.ground = true;
   scene.settings.friction = 0.5;
   const State start{scene.model.positions, {{1, 0, 0}, {1, 0, 0}}};
-  Leapfrog run = leapfrog(scene.input(), {1e-4, infinity, infinity}, start, 1e-4);
-  advance(run, 3000);
-  CHECK(run.x[0].x == doctest::Approx(1 / (2 * 0.5 * 9.81)).epsilon(0.005));
-  const double stopped = run.x[0].x;
-  advance(run, 1000);
-  CHECK(run.x[0].x == doctest::Approx(stopped).epsilon(1e-9));
+  const auto slides_and_stops = [](auto run, double creep) {
+    advance(run, std::lround(0.3 / run.h));
+    const double stopped = state_of(run).positions[0].x;
+    CHECK(stopped == doctest::Approx(1 / (2 * 0.5 * 9.81)).epsilon(0.005));
+    advance(run, std::lround(0.1 / run.h));
+    CHECK(std::abs(state_of(run).positions[0].x - stopped) <= creep);
+  };
+  const Compliances compliances{1e-4, infinity, infinity};
+  slides_and_stops(leapfrog(scene.input(), compliances, start, 1e-4), 1e-9);
+  slides_and_stops(implicit(scene.input(), compliances, start, 1e-4), 1e-7);  // below 1e-6 m/s
 }
 
 TEST_CASE(
@@ -274,6 +284,57 @@ TEST_CASE(
   CHECK(error_to(scene.model, limit, quarter) < 1e-3 * moved);
 }
 
+TEST_CASE("motion: implicit steps, which share no line with the leapfrog, go where it goes") {
+  // An irregular block of neo-hookean tets hits the ground aslant and slides; with and without damping.
+  for (const double damping : {0.0, 0.002}) {
+    CAPTURE(damping);
+    Scene scene = block_scene({3, 2, 2});
+    for (auto& p : scene.model.positions) p.y -= 1.05;
+    scene.model.velocities.assign(scene.model.positions.size(), {2, -1, 0});
+    scene.settings.friction = 0.5;
+    scene.settings.constraint_damping = damping;
+    scene.settings.material = "neo-hookean";
+    scene.settings.young_modulus = 1e5, scene.settings.poisson_ratio = 0.4;
+    scene.system = build_constraints(scene.model.rest, scene.settings);
+    Compliances own;
+    own.fill(infinity);
+    const double end = 0.4, stable = stable_step(scene.input(), own, scene.model.rest.positions);
+    const long steps = std::lround(16 * end / stable);
+    Leapfrog right = leapfrog(scene.input(), own, scene.start(), end / double(steps));
+    advance(right, steps);
+    const State answer = state_of(right);
+    std::vector<double> errors;
+    for (const long n : {80l, 320l}) {
+      Implicit run = implicit(scene.input(), own, scene.start(), end / double(n));
+      advance(run, n);
+      errors.push_back(error_to(scene.model, answer, run.now));
+    }
+    CHECK(errors[0] < 0.006);
+    CHECK(errors[1] < 0.0006);
+    CHECK(errors[1] < 0.2 * errors[0]);  // first order would be 0.25, without contact it is 1/16
+  }
+}
+
+TEST_CASE("motion: implicit steps in flight are of second order, with drag and constraint damping too") {
+  Scene scene = block_scene({2, 1, 1});
+  scene.settings.ground = false;
+  scene.settings.damping = 3;
+  scene.settings.constraint_damping = 0.002;
+  const Compliances compliances{1e-4, 1e-1, 1e-7};
+  const double end = 0.05, h = stable_step(scene.input(), compliances, scene.model.rest.positions) / 40;
+  Leapfrog other = leapfrog(scene.input(), compliances, scene.start(), end / std::round(end / h));
+  advance(other, std::lround(end / other.h));
+  std::vector<State> states;
+  for (const long n : {200l, 400l, 800l}) {
+    Implicit run = implicit(scene.input(), compliances, scene.start(), end / double(n));
+    advance(run, n);
+    states.push_back(run.now);
+  }
+  const auto apart = [&](const State& a, const State& b) { return error_to(scene.model, a, b); };
+  CHECK(apart(states[2], state_of(other)) < 1e-4);
+  CHECK(apart(states[2], states[0]) / apart(states[2], states[1]) == doctest::Approx(5).epsilon(0.2));
+}
+
 TEST_CASE("motion: what is found states its own error, and does not depend on how the scene is solved") {
   Scene scene = block_scene({2, 1, 1});
   for (auto& p : scene.model.positions) p.y -= 1.1;
@@ -285,6 +346,14 @@ TEST_CASE("motion: what is found states its own error, and does not depend on ho
   CHECK(scene_key(scene.input()) != key);
   const Motion motion = find_motion(scene.input(), 40);
   CHECK(motion.method == "leapfrog");
+  scene.settings.constraint_damping = 1000;  // too short steps for an explicit method
+  CHECK(find_motion(scene.input(), 1).method == "implicit");
+  scene.settings.constraint_damping = 0;
+  const Motion other = find_motion(scene.input(), 40, "implicit");
+  CHECK(error_to(scene.model, {motion.positions.back(), {}}, {other.positions.back(), {}}) <
+        motion.rows.back().error + 2 * other.rows.back().error);
+  CHECK(other.rows.back().error < 2e-3);
+  CHECK_THROWS_AS(find_motion(scene.input(), 1, "rigid body"), Error);
   CHECK(motion.rows.size() == 41);
   CHECK(motion.kept.front() == 0);
   CHECK(motion.kept.back() == 40);
@@ -335,11 +404,15 @@ TEST_CASE(
 
   // By name; and the same bits whether it was interrupted or not.
   const std::string stiff = "reference --scene soft.json --set solver.compliance_stretch=1e-8 --out ";
-  const Outcome stopped = program(stiff + "a --steps 400", folder, cache + " timeout -s INT 1");
-  CHECK(stopped.status == 124);
-  CHECK(stopped.err.find("interrupted") != std::string::npos);
-  CHECK_FALSE(fs::exists(folder.path / "a"));
-  REQUIRE(fs::exists(folder.path / "a.unfinished"));
+  for (const std::string name : {"a", "c"}) {
+    const std::string method = name == "a" ? "" : " --method implicit";
+    const Outcome stopped =
+        program(stiff + name + " --steps 400" + method, folder, cache + " timeout -s INT 1");
+    CHECK(stopped.status == 124);
+    CHECK(stopped.err.find("interrupted") != std::string::npos);
+    CHECK_FALSE(fs::exists(folder.path / name));
+    REQUIRE(fs::exists(folder.path / (name + ".unfinished")));
+  }
   fs::copy(folder.path / "a.unfinished", folder.path / "short.unfinished");
   REQUIRE(program(stiff + "short --steps 3", folder, cache).status == 0);  // what is longer is not taken up
   const std::string found_short = read(folder.path / "short");

@@ -12,6 +12,7 @@
 #include "sim/hash.h"
 #include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
+#include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"
 
@@ -22,6 +23,9 @@ namespace {
 // Far below what changes a motion to four digits; of the leapfrog's, the part of its stable step.
 constexpr double rigid_step_length = 4e-5;  // s
 constexpr double part_of_stable = 0.5;
+constexpr long implicit_steps = 8;  // in one of the scene
+constexpr double most_stable =
+    3000;                           // stable steps in one of the scene: shorter ones cost more than Newton's
 constexpr double most_bytes = 9e6;  // of positions kept, as long as they are 20 instants or more
 constexpr std::size_t least_instants = 21;
 constexpr double seconds_between_saves = 20;
@@ -76,32 +80,63 @@ Pair rigid_pair(const ReferenceInput& input) {
   return pair;
 }
 
-Pair leapfrog_pair(const ReferenceInput& input) {
+Compliances compliances_of(const ReferenceInput& input) {
   Compliances compliances;
   for (std::size_t k = 0; k < kind_count; ++k)
     compliances[k] = input.system.present[k] && input.system.lists[k].compliance.empty()
                          ? input.settings.compliance[k]
                          : std::numeric_limits<double>::infinity();
-  const double dt = input.settings.dt, stable = stable_step(input, compliances, input.model.rest.positions);
-  const long steps = long(std::ceil(dt / (part_of_stable * stable)));
-  const State start{input.model.positions, input.model.velocities};
-  auto runs = std::make_shared<std::array<Leapfrog, 2>>(
-      std::array{leapfrog(input, compliances, start, dt / double(steps)),
-                 leapfrog(input, compliances, start, dt / double(2 * steps))});
+  return compliances;
+}
+
+// Of make(h), with `steps` of them and twice as many in a step of the scene. `arrays(run, f)` calls f for all
+// that a run consists of.
+template <class Make, class Arrays>
+Pair pair_of(double dt, long steps, const Make& make, const Arrays& arrays) {
+  using Run = decltype(make(dt));
+  auto runs = std::make_shared<std::array<Run, 2>>(
+      std::array{make(dt / double(steps)), make(dt / double(2 * steps))});
   Pair pair;
   pair.step = (*runs)[1].h;
   pair.advance = [runs, steps] { advance((*runs)[0], steps), advance((*runs)[1], 2 * steps); };
   pair.coarse = [runs] { return state_of((*runs)[0]); };
   pair.fine = [runs] { return state_of((*runs)[1]); };
-  pair.save = [runs](std::string& bytes) {
-    for (const Leapfrog& run : *runs) put_array(bytes, run.x), put_array(bytes, run.v);
+  pair.save = [runs, arrays](std::string& bytes) {
+    for (Run& run : *runs) arrays(run, [&](auto& values) { put_array(bytes, values); });
   };
-  pair.load = [runs](std::string_view& bytes) {
+  pair.load = [runs, arrays](std::string_view& bytes) {
     bool whole = true;
-    for (Leapfrog& run : *runs) whole = whole && take_array(bytes, run.x) && take_array(bytes, run.v);
+    for (Run& run : *runs) arrays(run, [&](auto& values) { whole = whole && take_array(bytes, values); });
     return whole;
   };
   return pair;
+}
+
+Pair leapfrog_pair(const ReferenceInput& input) {
+  const Compliances compliances = compliances_of(input);
+  const double stable = stable_step(input, compliances, input.model.rest.positions);
+  const State start{input.model.positions, input.model.velocities};
+  return pair_of(
+      input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
+      [&](double h) { return leapfrog(input, compliances, start, h); },
+      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v); });
+}
+
+Pair implicit_pair(const ReferenceInput& input) {
+  const State start{input.model.positions, input.model.velocities};
+  return pair_of(
+      input.settings.dt, implicit_steps,
+      [&](double h) { return implicit(input, compliances_of(input), start, h); },
+      [](Implicit& run, auto&& each) {
+        for (State* state : {&run.now, &run.before}) each(state->positions), each(state->velocities);
+        each(run.anew), each(run.touching);
+      });
+}
+
+const char* usual_method(const ReferenceInput& input) {
+  if (!compliant(input.settings)) return "rigid body";
+  const double stable = stable_step(input, compliances_of(input), input.model.rest.positions);
+  return most_stable * stable < input.settings.dt ? "implicit" : "leapfrog";
 }
 
 Motion::Row measured(const ReferenceInput& input, const State& state, double time, double error) {
@@ -165,13 +200,18 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   return key;
 }
 
-Motion find_motion(const ReferenceInput& input, long steps, const std::filesystem::path& unfinished,
-                   const std::function<void(long)>& progress) {
+Motion find_motion(const ReferenceInput& input, long steps, const std::string& method,
+                   const std::filesystem::path& unfinished, const std::function<void(long)>& progress) {
   require_answer(input);
-  const bool soft = compliant(input.settings);
-  const Pair pair = soft ? leapfrog_pair(input) : rigid_pair(input);
   Motion motion;
-  motion.method = soft ? "leapfrog" : "rigid body";
+  motion.method = method;
+  if (method.empty()) motion.method = usual_method(input);
+  if ((motion.method == "rigid body") == compliant(input.settings))
+    throw Error("no method for this scene", method,
+                "with compliance or a material leapfrog or implicit, for k = 1 a rigid body");
+  const Pair pair = motion.method == "implicit"   ? implicit_pair(input)
+                    : motion.method == "leapfrog" ? leapfrog_pair(input)
+                                                  : rigid_pair(input);
   motion.scene = scene_key(input);
   motion.dt = input.settings.dt, motion.step = pair.step;
   const double instant_bytes = double(input.model.masses.size() * sizeof(glm::dvec3));
@@ -186,7 +226,7 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::filesyste
     motion.positions.push_back(fine.positions);
   };
   const bool resumable = pair.save && !unfinished.empty();
-  const std::uint64_t key = hash_values(std::array{steps}, motion.scene);
+  const std::uint64_t key = hash_values(motion.method, hash_values(std::array{steps}, motion.scene));
   if (!resumable || !load_unfinished(unfinished, key, motion, pair)) add(0);
   auto saved = std::chrono::steady_clock::now();
   for (long step = long(motion.rows.size()); step <= steps; ++step) {

@@ -13,7 +13,7 @@
 namespace tetpbd {
 
 struct Motion {
-  std::string method;       ///< "rigid body" or "leapfrog"
+  std::string method;       ///< "rigid body", "leapfrog" or "implicit"
   std::uint64_t scene = 0;  ///< scene_key() of what it is the motion of
   double dt = 0;            ///< s, a step of the scene
   double step = 0;          ///< s, of the shorter of the two runs
@@ -35,11 +35,12 @@ struct Motion {
 /// solved.
 std::uint64_t scene_key(const ReferenceInput& input);
 
-/// The motion over `steps` steps of the scene. `progress` is told each that is done; where `unfinished` names
-/// a file, what is done is kept there from time to time, and taken up again. Throws Error for scenes without
-/// a right answer (k between 0 and 1, fixed vertices and k = 1, compliance of some kinds only), and
-/// Interrupted.
-Motion find_motion(const ReferenceInput& input, long steps, const std::filesystem::path& unfinished = {},
+/// The motion over `steps` steps of the scene, by the method named or the one that suits it. `progress` is
+/// told each that is done; where `unfinished` names a file, what is done is kept there from time to time, and
+/// taken up again. Throws Error for scenes without a right answer (k between 0 and 1, fixed vertices and k =
+/// 1, compliance of some kinds only), and Interrupted.
+Motion find_motion(const ReferenceInput& input, long steps, const std::string& method = {},
+                   const std::filesystem::path& unfinished = {},
                    const std::function<void(long)>& progress = {});
 
 /// How far a run is from the right motion: RMS distances by mass over the body's size (reference.h,

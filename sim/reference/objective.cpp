@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <Eigen/Sparse>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,17 +10,35 @@ namespace tetpbd {
 
 namespace {
 
-// Calls visit(Kind{}, vertex indices, positions relative to the first, rest values, alpha of each component)
-// for every constraint with an energy.
+glm::dvec3 way_of(const Objective::Drag& drag, const Points& positions) {
+  const glm::dvec3 moved = positions[drag.vertex] - drag.from;
+  return moved - drag.normal * glm::dot(drag.normal, moved);
+}
+
+// What a component of C costs: stiffness / 2 (C - offset)^2.
+struct Spring {
+  double stiffness = 0, offset = 0;
+};
+
+// Calls visit(Kind{}, vertex indices, positions relative to the first, rest values, a Spring per component)
+// for every constraint with an energy or damping.
 template <class F>
 void for_each_constraint(const Objective& o, const Points& positions, F&& visit) {
-  for_each_elastic(o.system, o.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
-    constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
+  std::size_t number = 0;  // of the component
+  for_each_elastic<true>(o.system, o.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
+    constexpr ConstraintKind row = decltype(kind)::row;
+    constexpr std::size_t arity = std::size_t(row.arity);
+    const double held = row.rate ? 0 : 1, damped = row.rate ? o.per_step : o.damping;
     std::array<glm::dvec3, arity> x;
+    std::array<Spring, std::size_t(row.components)> springs;
     for (std::size_t c = 0; c < list.count(); ++c) {
       const std::uint32_t* vertices = list.vertices.data() + c * arity;
       for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
-      visit(kind, vertices, x, &list.rest[c * std::size_t(decltype(kind)::row.values)], alpha(c));
+      for (std::size_t k = 0; k < springs.size(); ++k, ++number) {
+        springs[k] = {(held + damped) / alpha(c)[k], 0};
+        if (damped > 0) springs[k].offset = damped / (held + damped) * o.before[number];
+      }
+      visit(kind, vertices, x, &list.rest[c * std::size_t(row.values)], springs);
     }
   });
 }
@@ -37,18 +56,32 @@ Energy evaluate_energy(const Objective& o, const Points& positions) {
     add(0.5 * o.masses[i] * o.inertia * glm::dot(moved, moved));
     add(-o.masses[i] * glm::dot(o.gravity, moved));
   }
-  for_each_constraint(o, positions,
-                      [&](auto kind, const auto*, auto& x, const double* rest, const double* alpha) {
-                        const auto c = unclamped<decltype(kind)>(x, rest);
-                        for (int k = 0; k < kind.row.components; ++k) {
-                          const double C = component(c, k).first;
-                          add(C * C / (2 * alpha[k]));
-                        }
-                      });
+  for_each_constraint(o, positions, [&](auto kind, const auto*, auto& x, const double* rest, auto& springs) {
+    const auto c = unclamped<decltype(kind)>(x, rest);
+    for (int k = 0; k < kind.row.components; ++k) {
+      const auto [stiffness, offset] = springs[std::size_t(k)];
+      const double C = component(c, k).first - offset;
+      add(stiffness / 2 * C * C);
+    }
+  });
+  for (const Objective::Drag& drag : o.drags) {
+    const double way = glm::length(way_of(drag, positions));
+    add(drag.force * (way < drag.reach ? way * way / (2 * drag.reach) : way - drag.reach / 2));
+  }
   return e;
 }
 
 }  // namespace
+
+std::vector<double> constraint_values(const Objective& o, const Points& positions) {
+  Objective undamped{o.system, o.compliances, {}, {}};
+  std::vector<double> values;
+  for_each_constraint(undamped, positions, [&](auto kind, const auto*, auto& x, const double* rest, auto&) {
+    const auto c = unclamped<decltype(kind)>(x, rest);
+    for (int k = 0; k < kind.row.components; ++k) values.push_back(component(c, k).first);
+  });
+  return values;
+}
 
 double energy(const Objective& objective, const Points& positions) {
   return evaluate_energy(objective, positions).value;
@@ -59,13 +92,19 @@ Points gradient(const Objective& o, const Points& positions) {
   for (std::size_t i = 0; i < g.size(); ++i)
     g[i] = o.masses[i] * (o.inertia * (positions[i] - o.predicted[i]) - o.gravity);
   for_each_constraint(o, positions,
-                      [&](auto kind, const auto* v, auto& x, const double* rest, const double* alpha) {
+                      [&](auto kind, const auto* v, auto& x, const double* rest, auto& springs) {
                         const auto c = unclamped<decltype(kind)>(x, rest);
                         for (int k = 0; k < kind.row.components; ++k) {
                           const auto [C, of] = component(c, k);
-                          for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += C / alpha[k] * of[j];
+                          const auto [stiffness, offset] = springs[std::size_t(k)];
+                          for (std::size_t j = 0; j < x.size(); ++j)
+                            g[v[j]] += stiffness * (C - offset) * of[j];
                         }
                       });
+  for (const Objective::Drag& drag : o.drags) {
+    const glm::dvec3 way = way_of(drag, positions);
+    g[drag.vertex] += drag.force / std::max(glm::length(way), drag.reach) * way;
+  }
   return g;
 }
 
@@ -75,24 +114,27 @@ Points gradient(const Objective& o, const Points& positions) {
 namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
-using Factor = Eigen::SimplicialLDLT<Sparse>;
+struct Factor : Eigen::SimplicialLDLT<Sparse> {
+  Eigen::Index entries = -1;  // of the pattern that was analysed
+};
 
-// Of C^2 / (2 alpha), summed over components: (grad C grad C^T + C Hess C) / alpha. Hess C by central
+// Of s/2 (C - o)^2, summed over components: s (grad C grad C^T + (C - o) Hess C). Hess C by central
 // differences of the gradient over 1e-5 of the smallest side: truncation and rounding are both near 1e-10
 // relative, and Newton converges with far worse.
-template <class Kind, std::size_t arity>
-auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, const double* alpha,
+template <class Kind, std::size_t arity, class Springs>
+auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, const Springs& springs,
                         bool project) {
   constexpr int n = 3 * int(arity);
   using Matrix = Eigen::Matrix<double, n, n>;
   using Vector = Eigen::Matrix<double, n, 1>;
   Matrix hessian = Matrix::Zero();
   const auto here = unclamped<Kind>(x, rest);
-  // Sum of C grad C / alpha, with the C of `here`.
+  // Sum of s (C - o) grad C, with the C of `here`.
   const auto weighted = [&](const auto& c) {
     Vector sum = Vector::Zero();
     for (int k = 0; k < Kind::row.components; ++k)
-      sum += component(here, k).first / alpha[k] * Eigen::Map<const Vector>(&component(c, k).second->x);
+      sum += springs[std::size_t(k)].stiffness * (component(here, k).first - springs[std::size_t(k)].offset) *
+             Eigen::Map<const Vector>(&component(c, k).second->x);
     return sum;
   };
   double side = std::numeric_limits<double>::max();
@@ -114,7 +156,7 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
   hessian = (0.5 * (hessian + hessian.transpose())).eval();
   for (int k = 0; k < Kind::row.components; ++k) {
     const Eigen::Map<const Vector> g(&component(here, k).second->x);
-    hessian += g * g.transpose() / alpha[k];
+    hessian += springs[std::size_t(k)].stiffness * g * g.transpose();
   }
   if (project) {
     const Eigen::SelfAdjointEigenSolver<Matrix> modes(hessian);
@@ -134,8 +176,8 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
     entries.emplace_back(row, row, mass > 0 ? mass * o.inertia : 1.0);
   }
   for_each_constraint(o, positions,
-                      [&](auto kind, const auto* vertices, auto& x, const double* rest, const double* alpha) {
-                        const auto local = constraint_hessian<decltype(kind)>(x, rest, alpha, project);
+                      [&](auto kind, const auto* vertices, auto& x, const double* rest, auto& springs) {
+                        const auto local = constraint_hessian<decltype(kind)>(x, rest, springs, project);
                         for (int r = 0; r < int(local.rows()); ++r)
                           for (int c = 0; c < int(local.cols()); ++c) {
                             const std::uint32_t to = vertices[r / 3], from = vertices[c / 3];
@@ -144,62 +186,169 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
                               entries.emplace_back(row, column, local(r, c));
                           }
                       });
+  for (const Objective::Drag& drag : o.drags) {
+    const glm::dvec3 way = way_of(drag, positions);
+    const double length = glm::length(way);
+    glm::dmat3 local = drag.force / std::max(length, drag.reach) *
+                       (glm::dmat3(1) - glm::outerProduct(drag.normal, drag.normal));
+    if (length > drag.reach) local -= drag.force / (length * length * length) * glm::outerProduct(way, way);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c <= r; ++c)
+        entries.emplace_back(3 * int(drag.vertex) + r, 3 * int(drag.vertex) + c, local[c][r]);
+  }
   Sparse hessian(rows, rows);
   hessian.setFromTriplets(entries.begin(), entries.end());
   return hessian;
 }
 
 // A pivot below 1e-14 of its diagonal entry is rounding.
-bool positive_definite(Factor& factor, const Sparse& hessian) {
-  factor.factorize(hessian);
+bool positive_definite(Factor& factor, const Sparse& matrix) {
+  if (factor.entries != matrix.nonZeros()) factor.analyzePattern(matrix);
+  factor.entries = matrix.nonZeros();
+  factor.factorize(matrix);
   if (factor.info() != Eigen::Success) return false;
   const Eigen::VectorXd pivots = factor.vectorD(),
-                        diagonal = factor.permutationP() * Eigen::VectorXd(hessian.diagonal());
+                        diagonal = factor.permutationP() * Eigen::VectorXd(matrix.diagonal());
   return (pivots.array() > 1e-14 * diagonal.array()).all();
 }
 
-// Factors the Hessian, or the nearest thing to it that is positive definite: with projected constraint
-// Hessians, and if that is singular still, with a growing multiple of the mass matrix. `exact`: it was the
-// Hessian itself.
-bool factorise(Factor& factor, const Objective& o, const Points& positions, bool& exact) {
-  Sparse hessian = assemble(o, positions, false);
-  if (factor.cols() == 0) factor.analyzePattern(hessian);
-  exact = positive_definite(factor, hessian);
-  if (exact) return true;
-  hessian = assemble(o, positions, true);
+Eigen::Map<Eigen::VectorXd> flat(Points& points) { return {&points[0].x, 3 * Eigen::Index(points.size())}; }
+
+// Which planes hold which vertices in a step from x.
+struct ActiveSet {
+  const Objective& o;
+  const Points& x;
+  std::vector<char> held;  // by vertex and plane
+  double slack = 0;        // m, what is no gap
+
+  double gap(std::size_t i, std::size_t p, const glm::dvec3& moved) const {
+    return glm::dot(glm::dvec3(o.planes[p]), x[i] + moved) - o.planes[p].w;
+  }
+  bool any() const { return std::ranges::find(held, 1) != held.end(); }
+  // What a vertex is free to do, as a projector, and how it first gets onto the planes that hold it.
+  std::pair<glm::dmat3, glm::dvec3> freedom(std::size_t i) const {
+    glm::dmat3 free(1);
+    glm::dvec3 way(0);
+    for (std::size_t p = 0; p < o.planes.size(); ++p) {
+      if (!held[i * o.planes.size() + p]) continue;
+      const glm::dvec3 n(o.planes[p]), e = free * n;
+      if (glm::dot(e, e) < 1e-12) continue;
+      way -= e * (gap(i, p, way) / glm::dot(n, e));
+      free -= glm::outerProduct(e, e) / glm::dot(e, e);
+    }
+    return {free, way};
+  }
+  // Takes in what the step carries through a plane, lets go what its plane would pull at (`forces`: of
+  // planes on vertices). False if all stays.
+  bool update(const Points& step, const Points& forces) {
+    bool changed = false;
+    for (std::size_t i = 0; i < x.size(); ++i)
+      for (std::size_t p = 0; p < o.planes.size() && o.masses[i] > 0; ++p) {
+        char& now = held[i * o.planes.size() + p];
+        const char next =
+            now ? glm::dot(glm::dvec3(o.planes[p]), forces[i]) > 0 : gap(i, p, step[i]) < -slack;
+        changed = changed || next != now;
+        now = next;
+      }
+    return changed;
+  }
+};
+
+// The Hessian where held vertices move along their planes only, and across them not at all.
+Sparse constrained(const Sparse& hessian, const ActiveSet& set, Sparse& projector) {
+  std::vector<Eigen::Triplet<double>> free, fixed;
+  const double scale = hessian.diagonal().sum() / double(hessian.rows());
+  for (std::size_t i = 0; i < set.x.size(); ++i) {
+    const glm::dmat3 of = set.freedom(i).first;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        free.emplace_back(3 * int(i) + r, 3 * int(i) + c, of[c][r]);
+        if (r >= c) fixed.emplace_back(3 * int(i) + r, 3 * int(i) + c, scale * (double(r == c) - of[c][r]));
+      }
+  }
+  projector = Sparse(hessian.rows(), hessian.rows());
+  projector.setFromTriplets(free.begin(), free.end());
+  Sparse rest(hessian.rows(), hessian.rows());
+  rest.setFromTriplets(fixed.begin(), fixed.end());
+  const Sparse whole = hessian.selfadjointView<Eigen::Lower>(), moving = projector * whole * projector;
+  return Sparse(moving.triangularView<Eigen::Lower>()) + rest;
+}
+
+// The step to the minimum of the energy's second-order model in the half spaces.
+struct NewtonStep {
+  Points step, forces;  // m; N, of planes
+  double descent = 0;   // of the energy along the step, < 0
+  bool exact = true;    // with the Hessian, not the nearest thing to it that is positive definite: ...
+};
+
+// ... with projected constraint Hessians, and if that is singular still, with a growing multiple of the mass
+// matrix. False where nothing helps.
+bool newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
+  const Objective& o = set.o;
+  const std::size_t n = set.x.size();
+  for (std::size_t i = 0; i < n; ++i)
+    if (!(o.masses[i] > 0)) g[i] = glm::dvec3(0);
+  Sparse hessian = assemble(o, set.x, false), projector;
   Eigen::VectorXd masses(hessian.rows());
   for (Eigen::Index row = 0; row < masses.size(); ++row) masses(row) = o.masses[std::size_t(row / 3)];
-  double shift = 1e-8 * Eigen::VectorXd(hessian.diagonal()).sum() / masses.sum();
-  for (int attempt = 0; attempt <= 10; ++attempt, shift *= 100) {
-    if (positive_definite(factor, hessian)) return true;
-    hessian.diagonal() += shift * masses;
+  double shift = 0;
+  const auto next_hessian = [&] {
+    if (result.exact)
+      hessian = assemble(o, set.x, true), shift = 1e-8 * hessian.diagonal().sum() / masses.sum();
+    else
+      hessian.diagonal() += shift * masses, shift *= 100;
+    result.exact = false;
+  };
+  constexpr int most_rounds = 50;
+  for (int round = 0, attempt = 0; round < most_rounds; ++round) {
+    const bool holds = set.any();
+    while (!positive_definite(factor, holds ? constrained(hessian, set, projector) : hessian)) {
+      if (++attempt > 12) return false;
+      next_hessian();
+    }
+    result.step.assign(n, glm::dvec3(0)), result.forces = g;
+    if (holds) {
+      for (std::size_t i = 0; i < n; ++i) result.step[i] = set.freedom(i).second;
+      const Eigen::VectorXd rhs = flat(g) + hessian.selfadjointView<Eigen::Lower>() * flat(result.step);
+      const Eigen::VectorXd solved = factor.solve(projector * rhs);
+      flat(result.step) -= projector * solved;
+      flat(result.forces) += hessian.selfadjointView<Eigen::Lower>() * flat(result.step);
+    } else {
+      flat(result.step) = factor.solve(-flat(g));
+    }
+    if (o.planes.empty() || !set.update(result.step, result.forces)) break;
   }
-  return false;
+  result.descent = flat(g).dot(flat(result.step));
+  return true;
 }
 
 // Stiff bodies that turn far take hundreds of short steps, all others under 30.
 constexpr int newton_limit = 1000;
 
-Eigen::Map<Eigen::VectorXd> flat(Points& points) { return {&points[0].x, 3 * Eigen::Index(points.size())}; }
-
 Minimum newton(const Objective& o, Points start) {
   Minimum result;
   Points& x = result.positions = std::move(start);
-  for (std::size_t i = 0; i < x.size(); ++i)
+  ActiveSet set{o, x, std::vector<char>(x.size() * o.planes.size(), 0)};
+  for (std::size_t i = 0; i < x.size(); ++i) {
     if (!(o.masses[i] > 0)) x[i] = o.predicted[i];
+    set.slack = std::max(set.slack, 1e-14 * glm::length(x[i]));
+  }
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t p = 0; p < o.planes.size() && o.masses[i] > 0; ++p) {
+      const double gap = set.gap(i, p, glm::dvec3(0));
+      if (gap < 0) x[i] -= gap * glm::dvec3(o.planes[p]);
+      set.held[i * o.planes.size() + p] = gap <= set.slack;
+    }
   Factor factor;
+  NewtonStep newton;
   while (!result.converged) {
-    Points g = gradient(o, x);
-    for (std::size_t i = 0; i < x.size(); ++i)
-      if (!(o.masses[i] > 0)) g[i] = glm::dvec3(0);
-    bool exact = false;
-    if (!factorise(factor, o, x, exact)) return result.reason = "the Hessian has no factors", result;
-    const Eigen::VectorXd step = factor.solve(-flat(g));
-    const double descent = flat(g).dot(step);  // < 0
-    result.residual = std::sqrt(-descent / o.unit);
-    result.converged = exact && result.residual <= minimum_tolerance;
+    newton.exact = true;
+    if (!newton_step(factor, set, gradient(o, x), newton))
+      return result.reason = "the Hessian has no factors", result;
+    result.residual = std::sqrt(std::max(-newton.descent, 0.0) / o.unit);
+    result.converged = newton.exact && result.residual <= minimum_tolerance;
     // The step at hand is taken even so: it squares what is left.
-    if (!exact && result.residual <= 1e-4 * minimum_tolerance)
+    if (!newton.exact && result.residual <= 1e-4 * minimum_tolerance)
       return result.reason = "not a stable, isolated minimum", result;
     if (result.iterations == newton_limit) return result.reason = "too many Newton steps", result;
     // Armijo; the last steps lower E by less than its rounding, which is allowed for.
@@ -209,12 +358,17 @@ Minimum newton(const Objective& o, Points start) {
     double t = 1;
     for (int halvings = 0;; ++halvings, t *= 0.5) {
       if (halvings == 60) return result.reason = "no step lowers the energy", result;
-      flat(trial) = flat(x) + t * step;
-      if (evaluate_energy(o, trial).value <= before.value + 1e-4 * t * descent + rounding) break;
+      flat(trial) = flat(x) + t * flat(newton.step);
+      if (evaluate_energy(o, trial).value <= before.value + 1e-4 * t * newton.descent + rounding) break;
     }
-    x = std::move(trial);
+    std::ranges::copy(trial, x.begin());
     ++result.iterations;
   }
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t p = 0; p < o.planes.size(); ++p)
+      if (set.held[i * o.planes.size() + p])
+        result.touching.push_back(
+            {std::uint32_t(i), std::uint32_t(p), glm::dot(glm::dvec3(o.planes[p]), newton.forces[i])});
   return result;
 }
 
@@ -225,6 +379,8 @@ Minimum minimise(Objective o, Points start) {
   const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
   for (Points* list : {&o.predicted, &start})
     for (glm::dvec3& p : *list) p -= origin;
+  for (glm::dvec4& plane : o.planes) plane.w -= glm::dot(glm::dvec3(plane), origin);
+  for (Objective::Drag& drag : o.drags) drag.from -= origin;
   Minimum result = newton(o, std::move(start));
   for (glm::dvec3& p : result.positions) p += origin;
   return result;

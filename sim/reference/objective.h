@@ -25,12 +25,28 @@ using Compliances = std::array<double, kind_count>;
 struct Objective {
   const ConstraintSystem& system;
   Compliances compliances;
-  std::vector<double> masses;  ///< kg; 0: fixed
-  Points predicted;            ///< y; of fixed vertices, where they are
-  double inertia = 0;          ///< 1/s^2, 1 / h^2; 0: static
-  glm::dvec3 gravity{0};       ///< m/s^2; 0 for a step, whose y has it already
-  double unit = 1;             ///< J, what tolerances are relative to (`Minimum::residual`)
+  std::vector<double> masses{};  ///< kg; 0: fixed
+  Points predicted{};            ///< y; of fixed vertices, where they are
+  double inertia = 0;            ///< 1/s^2, 1 / h^2; 0: static
+  glm::dvec3 gravity{0};         ///< m/s^2; 0 for a step, whose y has it already
+  double unit = 1;               ///< J, what tolerances are relative to (`Minimum::residual`)
+  /// Damping over a step: E += ((C - before)^2 per_step) / (2 alpha) of kinds of which only the change
+  /// counts, and `damping` in place of per_step of the others. Empty: none.
+  std::vector<double> before{};      ///< by component (constraint_values)
+  double damping = 0, per_step = 0;  ///< constraint_damping over the step's length; 1/s
+  /// Vertices with mass are kept in these half spaces (n, d), n . x >= d.
+  std::vector<glm::dvec4> planes{};
+  /// Resists moving along a plane: |t| force, where the way t from `from` is longer than `reach`, and
+  /// smoothly below.
+  struct Drag {
+    std::uint32_t vertex;
+    glm::dvec3 normal, from;
+    double force, reach;  ///< N, m
+  };
+  std::vector<Drag> drags{};
 };
+/// C of every component of every constraint that has an energy or damping, in the order of `before`.
+std::vector<double> constraint_values(const Objective& objective, const Points& positions);
 double energy(const Objective& objective, const Points& positions);
 /// dE/dx, newtons; of fixed vertices too, where it is the force they are held with.
 Points gradient(const Objective& objective, const Points& positions);
@@ -69,8 +85,14 @@ void for_each_elastic(const ConstraintSystem& system, const Compliances& complia
   });
 }
 
+/// A vertex on a plane, and what that pushes it with, N.
+struct Touching {
+  std::uint32_t vertex, plane;
+  double force;
+};
 struct Minimum {
   Points positions;
+  std::vector<Touching> touching;
   int iterations = 0;  ///< Newton steps taken
   /// Norm of the gradient g in the inverse Hessian, sqrt(g . H^-1 g / unit): a number without unit. In a step
   /// it bounds the RMS (by mass) distance to the minimiser over the body's size, as H >= M/h^2 but for
@@ -81,7 +103,8 @@ struct Minimum {
   const char* reason = "";  ///< why not
 };
 constexpr double minimum_tolerance = 1e-10;
-/// A minimum of E, by Newton with an Armijo line search; of several, the one that `start` leads to.
+/// A minimum of E, by Newton with an Armijo line search, among half spaces with an active set in each step
+/// (Nocedal and Wright 2006, ch. 16); of several minima, the one that `start` leads to.
 Minimum minimise(Objective objective, Points start);
 
 }  // namespace tetpbd

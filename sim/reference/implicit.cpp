@@ -1,0 +1,140 @@
+#include "sim/reference/implicit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/error.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Friction is Coulomb's above this slip, m/s, and grows up to there: what sticks creeps by less.
+constexpr double least_slip = 1e-6;
+
+// A vertex that has arrived on a plane stands there within a step, and the step after has that behind it.
+constexpr int steps_anew = 3;
+
+// What a step makes of the instants before: x = z + h v, v = w + h times acceleration.
+struct Start {
+  Points z, w;
+  std::vector<double> h;
+};
+Start start_of(const Implicit& run) {
+  Start start{run.now.positions, run.now.velocities, std::vector<double>(run.anew.size(), run.h)};
+  for (std::size_t i = 0; i < run.anew.size(); ++i) {
+    if (run.anew[i] > 0) continue;
+    start.z[i] = (4.0 * run.now.positions[i] - run.before.positions[i]) / 3.0;
+    start.w[i] = (4.0 * run.now.velocities[i] - run.before.velocities[i]) / 3.0;
+    start.h[i] = run.h * 2 / 3;
+  }
+  return start;
+}
+
+Objective objective_of(const Implicit& run, const Start& start) {
+  const Settings& settings = run.input.settings;
+  Objective o{.system = run.input.system, .compliances = run.compliances};
+  o.inertia = 1 / (run.h * run.h);
+  o.planes = planes_of(run.input.model, settings);
+  double mass = 0;
+  for (std::size_t i = 0; i < start.z.size(); ++i) {
+    const double h = start.h[i], w = run.input.inverse_masses[i], drag = 1 + settings.damping * h;
+    // m (x - z - h w) / h^2 + damping m (x - z) / h = m g + ...
+    const glm::dvec3 free = h * start.w[i] + h * h * glm::dvec3(0, -settings.gravity, 0);
+    o.masses.push_back(w > 0 ? drag / (w * h * h * o.inertia) : 0), mass += o.masses.back();
+    o.predicted.push_back(w > 0 ? start.z[i] + free / drag : run.now.positions[i]);
+  }
+  o.unit = mass * o.inertia * run.input.model.size * run.input.model.size;
+  if (settings.constraint_damping > 0) {
+    const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
+    o.before = constraint_values(o, run.now.positions);
+    const std::vector<double> earlier = constraint_values(o, run.before.positions);
+    for (std::size_t k = 0; k < earlier.size(); ++k) o.before[k] = (4 * o.before[k] - earlier[k]) / 3;
+    o.per_step = 1.5 / run.h;
+    o.damping = dashpots ? 0 : settings.constraint_damping * o.per_step;
+  }
+  return o;
+}
+
+// What the last solution's forces and the way since z make of friction.
+std::vector<Objective::Drag> drags(const Implicit& run, const Objective& o, const Start& start,
+                                   const std::vector<Touching>& touching) {
+  std::vector<Objective::Drag> list;
+  for (const Touching& t : touching)
+    if (t.force > 0)
+      list.push_back({t.vertex, glm::dvec3(o.planes[t.plane]), start.z[t.vertex],
+                      run.input.settings.friction * t.force, least_slip * start.h[t.vertex]});
+  return list;
+}
+
+// Forces depend on friction and friction on them: solved in turn until none changes by more than a part of
+// all of them.
+Minimum solve(const Implicit& run, const Start& start) {
+  Objective o = objective_of(run, start);
+  o.drags = drags(run, o, start, run.touching);
+  constexpr int most_rounds = 50;
+  Minimum minimum = minimise(o, o.predicted);
+  for (int round = 0; run.input.settings.friction > 0 && !o.planes.empty() && round < most_rounds; ++round) {
+    if (!minimum.converged) break;
+    std::vector<double> change(run.now.positions.size(), 0);
+    double all = 0, most = 0;
+    for (const Objective::Drag& d : o.drags) all += d.force;
+    const std::vector<Objective::Drag> next = drags(run, o, start, minimum.touching);
+    for (const Objective::Drag& d : o.drags) change[d.vertex] -= d.force;
+    for (const Objective::Drag& d : next) change[d.vertex] += d.force;
+    for (const double c : change) most = std::max(most, std::abs(c));
+    if (most <= 1e-8 * all) break;
+    o.drags = next;
+    minimum = minimise(o, std::move(minimum.positions));
+  }
+  return minimum;
+}
+
+// Has those that have just arrived begin anew; false if there are none.
+bool arrivals(Implicit& run, const std::vector<Touching>& touching) {
+  bool any = false;
+  for (const Touching& t : touching) {
+    if (run.anew[t.vertex] == steps_anew) continue;
+    const bool arrived = std::ranges::none_of(
+        run.touching, [&](const Touching& old) { return old.vertex == t.vertex && old.plane == t.plane; });
+    if (arrived) run.anew[t.vertex] = steps_anew, any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+Implicit implicit(const ReferenceInput& input, const Compliances& compliances, const State& start, double h) {
+  require_compliances(input.system, compliances);
+  Implicit run{input, compliances, h, start, start, std::vector<int>(start.positions.size(), 1), {}};
+  for (std::size_t i = 0; i < run.anew.size(); ++i) run.before.positions[i] -= h * start.velocities[i];
+  return run;
+}
+
+void advance(Implicit& run, long steps) {
+  for (long s = 0; s < steps; ++s) {
+    Start start = start_of(run);
+    Minimum minimum = solve(run, start);
+    while (minimum.converged && arrivals(run, minimum.touching)) {
+      start = start_of(run);
+      minimum = solve(run, start);
+    }
+    if (!minimum.converged)
+      throw Error(
+          "the reference did not converge",
+          fmt::format("{} after {}, residual {:.1e}", minimum.reason, minimum.iterations, minimum.residual),
+          "take shorter steps", 1);
+    run.before = run.now;
+    for (std::size_t i = 0; i < minimum.positions.size(); ++i) {
+      if (run.anew[i] > 0) --run.anew[i];
+      if (run.input.inverse_masses[i] == 0) continue;
+      run.now.positions[i] = minimum.positions[i];
+      run.now.velocities[i] = (minimum.positions[i] - start.z[i]) / start.h[i];
+    }
+    run.touching = std::move(minimum.touching);
+  }
+}
+
+}  // namespace tetpbd

@@ -51,10 +51,9 @@ void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].f
 void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
   uint b = state.body, s = side_now();
   vec3 way = relative(next, x);
-  if (touches(pair_add(next, 3.0 * way))) {
-    rigid_bodies[b].sides[s].soon = 1u;
-    if (touches(next)) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
-  }
+  bool inside = touches(next);
+  if (inside || touches(pair_add(next, 3.0 * way))) rigid_bodies[b].sides[s].soon = 1u;
+  if (inside) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
   if (!state.summed) return;
   float weight = 1.0 / (inverse_mass * state.mass);
   vec3 arm = clamp(arm_of(x, state.origin) / (2.0 * params.body_size), vec3(-1.0), vec3(1.0));

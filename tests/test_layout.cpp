@@ -45,8 +45,7 @@ TEST_CASE("struct offsets and strides are GL's") {
   const auto paper = [](Substitutions words) {
     return Program::compute("solve_paper.comp", {words, {}}, {"GROUP_SIZE 1024", "COUNT 7"});
   };
-  const Program volume =
-      paper({{"KIND", "volume"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "2"}});
+  const Program volume = paper({{"KIND", "volume"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "2"}});
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
         offsetof(layout::Record4, rest));
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
@@ -105,14 +104,25 @@ TEST_CASE("a shader that does not compile names its file and line") {
 
 TEST_CASE("#include, #foreach and words expand") {
   std::vector<std::string> files;
-  const std::string text = shader_text(
-      "solve_node.comp",
-      {{},
-       {{{"KIND", "stretch"}, {"ARITY", "2"}, {"INDEX", "0"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"},
-         {"PROJECT", "project"}, {"PAIRS", "1"}, {"MATERIAL", "0"}},
-        {{"KIND", "bend"}, {"ARITY", "4"}, {"INDEX", "1"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"},
-         {"PROJECT", "project"}, {"PAIRS", "3"}, {"MATERIAL", "1"}}}},
-      files);
+  const std::string text = shader_text("solve_node.comp",
+                                       {{},
+                                        {{{"KIND", "stretch"},
+                                          {"ARITY", "2"},
+                                          {"INDEX", "0"},
+                                          {"KIND_ROW", "0"},
+                                          {"KIND_COLUMN", "0"},
+                                          {"PROJECT", "project"},
+                                          {"PAIRS", "1"},
+                                          {"MATERIAL", "0"}},
+                                         {{"KIND", "bend"},
+                                          {"ARITY", "4"},
+                                          {"INDEX", "1"},
+                                          {"KIND_ROW", "0"},
+                                          {"KIND_COLUMN", "0"},
+                                          {"PROJECT", "project"},
+                                          {"PAIRS", "3"},
+                                          {"MATERIAL", "1"}}}},
+                                       files);
   CHECK(text.find("project_stretch(records_stretch.x + 1 * (t - begin_stretch), chunk.owned)") !=
         std::string::npos);
   CHECK(text.find("project_bend(records_bend.x + 3 * (t - begin_bend), chunk.owned)") != std::string::npos);

@@ -79,8 +79,7 @@ struct ShaderVariant {
       } else {
         text = replaced(text, "gl_GlobalInvocationID.x", "ordered_invocation()");
       }
-      if (order.enlarged > 1)
-        text = replaced(text, "GROUP_SIZE", "1024");
+      if (order.enlarged > 1) text = replaced(text, "GROUP_SIZE", "1024");
       const std::string row = "return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;";
       if (entry.path() == folder / "types.glsl") {
         REQUIRE(text.find(row) != std::string::npos);
@@ -150,7 +149,8 @@ TEST_CASE("any order and size of work-groups gives the same state") {
       std::vector<Settings> all = {settings_of(mode)};
       if (cells.x == 4) {  // with all that compliance and constraint damping keep
         Settings& soft = all.emplace_back(all[0]);
-        soft.compliance[index_of<Stretch>] = 1e-6, soft.compliance[index_of<Volume>] = 1e-9, soft.constraint_damping = 1e-3;
+        soft.compliance[index_of<Stretch>] = 1e-6, soft.compliance[index_of<Volume>] = 1e-9,
+        soft.constraint_damping = 1e-3;
       }
       for (const Settings& settings : all) {
         const std::uint64_t expected = hash_after(model, settings);

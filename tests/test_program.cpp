@@ -13,7 +13,8 @@ namespace {
 std::vector<unsigned> run_copy(const Program& program) {
   const std::vector<unsigned> numbers = {1, 2, 3};
   const Buffer from("from", numbers), to("to", 12), check("check", std::vector<unsigned>{~0u, ~0u});
-  from.bind_storage(BIND_CHECKPOINT_FROM), to.bind_storage(BIND_CHECKPOINT_TO), check.bind_storage(BIND_CHECK);
+  from.bind_storage(BIND_CHECKPOINT_FROM), to.bind_storage(BIND_CHECKPOINT_TO),
+      check.bind_storage(BIND_CHECK);
   program.use();
   program.set("count", 3u);
   glDispatchCompute(1, 1, 1);

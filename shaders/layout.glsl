@@ -24,8 +24,9 @@ struct Record4 {
   float rest;
 };
 #define MAX_PLANES 8
-#define RIGID_SUMS 15
+#define RIGID_SUMS 21
 #define RIGID_SPEED 1024.0  // m/s, the fastest that sums hold
+#define RIGID_PARTS 256.0  // of a quantum: of 2^23 vertices they do not overflow
 #define MOST_TOUCHES 16  // contacts of a hard body that carry it
 // Everything of a step that does not change within it (a uniform block, std140).
 struct Step {
@@ -54,12 +55,14 @@ struct Step {
 
 // A hard body that touches half spaces (rigid.glsl). Momenta and impulses per mass of the body.
 struct RigidSide {
-  int sums[RIGID_SUMS];   // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and products
+  int sums[RIGID_SUMS];   // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and products; then what is
+                          // finer than a quantum of velocity and arm x velocity
   uint near;              // how many vertices would be in a half space next
   uint fixed_vertices;
   uint carried;           // 1: all velocities are the body's in this substep
   uint touching;          // how many contacts carried it
   uint soon;              // 1: a vertex would be in a few substeps
+  uint _2, _3;
   vec3 origin;            // of arms
   uint summed;            // 1: there are sums on this side
   vec3 velocity;          // where carried

@@ -41,10 +41,17 @@ void begin_sums(uint i) {
   if (gl_LocalInvocationIndex < RIGID_SUMS) rigid_sums[gl_LocalInvocationIndex] = 0;
   group_state = state_of(body_of(min(i, params.vertex_count - 1u)));
 }
-void add_rigid_sum(uint b, int which, float value) {
-  int quanta = int(round(clamp(value, -1.0, 1.0) * 1073741824.0));  // of 2^30: weights add up to 1, so no sum overflows
-  if (b == group_state.body) atomicAdd(rigid_sums[which], quanta);
-  else atomicAdd(rigid_bodies[b].sides[side_now()].sums[which], quanta);
+void add_quanta(uint b, int which, float quanta) {
+  if (b == group_state.body) atomicAdd(rigid_sums[which], int(quanta));
+  else atomicAdd(rigid_bodies[b].sides[side_now()].sums[which], int(quanta));
+}
+float quanta_of(float value) { return clamp(value, -1.0, 1.0) * 1073741824.0; }  // of 2^-30: weights add up to 1, so no sum overflows
+void add_rigid_sum(uint b, int which, float value) { add_quanta(b, which, round(quanta_of(value))); }
+// Of momenta, which are small beside RIGID_SPEED: `rest` counts parts of a quantum.
+void add_rigid_sum(uint b, int which, int rest, float value) {
+  float quanta = quanta_of(value), whole = round(quanta);
+  add_quanta(b, which, whole);
+  add_quanta(b, rest, round((quanta - whole) * RIGID_PARTS));
 }
 void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u); }
 // Vertex i is at x with velocity v and will be at `next`.
@@ -65,8 +72,8 @@ void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inve
   if (state.carried) return;  // then its momenta are known
   vec3 speed = clamp((v.high + v.low) / RIGID_SPEED, vec3(-1.0), vec3(1.0)), turn = 0.5 * cross(arm, speed);
   for (int a = 0; a < 3; ++a) {
-    add_rigid_sum(b, 3 + a, weight * speed[a]);
-    add_rigid_sum(b, 6 + a, weight * turn[a]);
+    add_rigid_sum(b, 3 + a, 15 + a, weight * speed[a]);
+    add_rigid_sum(b, 6 + a, 18 + a, weight * turn[a]);
   }
 }
 // What the work-group has added up goes to its body.

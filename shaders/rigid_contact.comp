@@ -20,6 +20,7 @@ Pair position_of(uint i) { return Pair(positions[i].high, positions[i].low); }
 Rigid rigid_motion(uint b, uint s) {
   float sums[RIGID_SUMS];
   for (int k = 0; k < RIGID_SUMS; ++k) sums[k] = float(rigid_bodies[b].sides[s].sums[k]) / 1073741824.0;
+  for (int k = 0; k < 6; ++k) sums[3 + k] += sums[15 + k] / RIGID_PARTS;
   float reach = 2.0 * params.body_size;
   vec3 c = vec3(sums[0], sums[1], sums[2]);
   mat3 moments = mat3(sums[9], sums[12], sums[14], sums[12], sums[10], sums[13], sums[14], sums[13], sums[11]) - outerProduct(c, c);

@@ -269,6 +269,17 @@ TEST_CASE_FIXTURE(GlTest, "contact: bodies do not know of each other's contacts"
   }
 }
 
+TEST_CASE_FIXTURE(GlTest, "contact: momenta of many vertices are summed as exactly on the GPU as in double") {
+  const auto model = std::make_shared<Model>();
+  const TetMesh mesh = make_block({1, 0.6, 0.3}, {20, 15, 10});
+  double low = 0;
+  for (const glm::dvec3& p : mesh.positions) low = std::min(low, (tilted() * p).y);
+  add(*model, mesh, {3, 0.0001 - low, -2}, tilted(), {0.03, -0.4, 0.01}, {0.1, 0.2, 0.3});
+  const State right = after(model, in_mode("cpu-double", 5), 3), state = after(model, in_mode("node", 5), 3);
+  const glm::dvec3 momentum = angular_momentum(*model, right);
+  CHECK(glm::length(angular_momentum(*model, state) - momentum) < 3e-4 * glm::length(momentum));
+}
+
 TEST_CASE_FIXTURE(GlTest, "contact: what leaves the ground fast is carried on its way out, in every mode") {
   // Inside at the start and after a substep, outside after four; a little squashed, which as a free body it
   // would turn into motion.

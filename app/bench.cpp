@@ -17,7 +17,8 @@ namespace {
 
 const char* columns =
     "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
-    "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent";
+    "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent,"
+    "motion_final,motion_rms,motion_peak,motion_relative";
 const char* table =
     "scene -16, mode -18, constraints -20, iterations:iter 5, substeps:sub 5, size 10, picture 8, fps 10, "
     "gpu_ms_per_step:GPU-ms 10, gpu_us_per_iteration:us/iter 10, draw_ms 10, "
@@ -94,8 +95,10 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
   Sim sim = create_sim(model, settings);
   const Explanation cost = explain(sim);
   Metrics metrics = create_metrics(*model, sim.system);
+  const auto right = right_motion(*model, settings);
   const MeasuredRun run =
-      run_loop(sim, &metrics, options.frames, {.most_seconds = 12 * options.most_seconds});
+      run_loop(sim, &metrics, options.frames,
+               {.most_seconds = 12 * options.most_seconds, .right = right ? &*right : nullptr});
   ordered_json row = row_of(scene, *model, sim.settings, run);
   row.update({{"size", ""},
               {"picture", ""},

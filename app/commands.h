@@ -85,6 +85,7 @@ struct CompareOptions {
   std::filesystem::path out = "compare";
   Shards shards;
   std::optional<double> budget_ms, error_percent;
+  std::string judge;               ///< motion, volume, strain; empty: motion where the right one is known
   std::vector<std::string> cases;  ///< of hard cases; empty: all of models/scenes/hard
   std::vector<std::string> meshes = {"bunny", "block", "tet"};
 };
@@ -128,6 +129,8 @@ std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 
 ordered_json mesh_json(const MeshReport& report);
 ordered_json error_json(const RunErrors& errors);
+/// The distance from the right motion; nulls where there is none.
+ordered_json motion_json(const MeasuredRun& run);
 /// {"step", "vertex"}, or null.
 ordered_json non_finite_json(const std::optional<NonFinite>& found);
 /// Puts into the row whether the run stayed finite, and says on standard error where not.

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -9,9 +10,14 @@
 #include "app/chart.h"
 #include "app/commands.h"
 #include "app/files.h"
+#include "app/reference_command.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
+#include "sim/material.h"
+#include "sim/reference/implicit.h"
+#include "sim/reference/rigid.h"
+#include "sim/solvers/rigid_contact.h"
 
 namespace tetpbd {
 
@@ -23,11 +29,12 @@ namespace {
 const char* compare_columns =
     "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
     "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
-    "angular_drift,inverted_tets,finite,pareto";
+    "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
+    "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy";
 const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
-    "wall_ms_per_step:wall-ms 11, max_volume_loss_percent:loss-% 11, rigid_distance 16, "
-    "reference_distance:one-step 11, pareto 8";
+    "wall_ms_per_step:wall-ms 11, motion_final:motion 11, motion_rms:rms 11, max_volume_loss_percent:loss-% "
+    "11, stretch_rms_peak:strain 11, rise 9, apex 9, energy 9, pareto 8";
 
 /// What a step costs: GPU time, or wall time where the CPU does the work.
 double cost_ms(const ordered_json& row) {
@@ -35,10 +42,28 @@ double cost_ms(const ordered_json& row) {
   return gpu > 0 ? gpu : number(row, "wall_ms_per_step");
 }
 
-double loss(const ordered_json& row) {
-  const double value = number(row, "max_volume_loss_percent");
+/// By what rows are judged, in percent.
+struct Judge {
+  const char *name, *column, *label;
+  double scale;
+};
+constexpr Judge judges[] = {
+    {"motion", "motion_final", "distance from the right motion, % of the size", 100},
+    {"volume", "max_volume_loss_percent", "largest volume loss, %", 1},
+    {"strain", "stretch_rms_peak", "largest RMS strain of edges, %", 100},
+};
+// Infinite where nothing is known.
+double error_by(const Judge& judge, const ordered_json& row) {
+  const double value = judge.scale * number(row, judge.column);
   return row["finite"] == true && std::isfinite(value) ? std::max(0.0, value)
                                                        : std::numeric_limits<double>::infinity();
+}
+// The one asked for; else the motion where it is known.
+const Judge& judge_of(const std::string& name, const ordered_json& rows) {
+  if (!name.empty()) return *std::ranges::find(judges, name, &Judge::name);
+  const bool known =
+      std::ranges::any_of(rows, [](const auto& row) { return std::isfinite(number(row, "motion_final")); });
+  return judges[known ? 0 : 1];
 }
 
 /// One step from the rest shape stretched by 5 % without gravity or ground: the exact answer is the rest
@@ -57,32 +82,163 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }
 
-// Losses that agree to a thousandth are the same: two Jacobi modes differ by rounding. Times that agree to a
-// fiftieth are, too: then the smaller loss counts.
-void mark_front(ordered_json& rows) {
+/// What sets a row apart, over the whole run: worst shapes; steepest rise of the centre of mass, m/s, and its
+/// highest place after it had fallen, m; energy at the end, J.
+ordered_json course_of(const MeasuredRun& run) {
+  double volume = 0, strain = 0, rise = std::nan(""), apex = std::nan("");
+  for (std::size_t i = 0; i < run.measurements.size(); ++i) {
+    const Measurement& now = run.measurements[i];
+    volume = std::max(volume, now.tet_volume_rms), strain = std::max(strain, now.stretch_rms);
+    if (i == 0) continue;
+    const Measurement& before = run.measurements[i - 1];
+    const double speed = (now.centre.y - before.centre.y) / (now.time - before.time);
+    if (speed > 0) rise = std::max(speed, std::isnan(rise) ? 0.0 : rise);
+    if (!std::isnan(rise)) apex = std::max(now.centre.y, std::isnan(apex) ? now.centre.y : apex);
+  }
+  return {{"tet_volume_rms_peak", volume},
+          {"stretch_rms_peak", strain},
+          {"rise", rise},
+          {"apex", apex},
+          {"energy", run.measurements.empty() ? std::nan("") : run.measurements.back().energy()}};
+}
+
+ordered_json compared(const Scene& scene, const Model& model, const Settings& settings,
+                      const MeasuredRun& run) {
+  ordered_json row = row_of(scene, model, settings, run);
+  row.update(course_of(run));
+  row["mass_splitting"] = settings.mass_splitting ? 1 : 0;
+  row["gpu_ms_per_step"] = median(run.gpu_ms);
+  row["wall_ms_per_step"] = median(run.wall_ms);
+  row["motion_over_time"] = run.motion_over_time;
+  row["reference_distance"] = nullptr;
+  row["pareto"] = false;
+  return row;
+}
+
+// ------------------------------------------------------------------------------------------------------------
+// what else would solve the scene, on one core: no modes
+
+/// Steps that `advance` takes and `state` shows, held against the right motion.
+MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
+                         const std::function<void()>& advance, const std::function<State()>& state) {
+  MeasuredRun run;
+  const double ground = settings.ground ? settings.ground_height : 0;
+  for (long s = 0; s <= steps && !interrupted(); ++s) {
+    if (s > 0) {
+      const auto begin = std::chrono::steady_clock::now();
+      advance();
+      run.wall_ms.push_back(1e3 * seconds_since(begin));
+    }
+    const State now = state();
+    Measurement m;
+    m.step = s, m.time = double(s) * settings.dt;
+    double mass = 0;
+    for (std::size_t i = 0; i < now.positions.size(); ++i) {
+      const double own = model.masses[i];
+      mass += own, m.centre += own * now.positions[i];
+      m.kinetic += own / 2 * glm::dot(now.velocities[i], now.velocities[i]);
+      m.potential += own * settings.gravity * (now.positions[i].y - ground);
+    }
+    m.centre /= mass;
+    run.measurements.push_back(m);
+    run.steps = s;
+    if (!right || !is_kept(*right, s)) continue;
+    if (!run.motion) run.motion = MotionError{};
+    add_state(*run.motion, *right, model, s, now);
+    run.motion_over_time.push_back({m.time, run.motion->final});
+  }
+  return run;
+}
+
+/// A rigid body of six degrees of freedom, where k = 1: flight as in rigid.h, contact as the modes have it
+/// (rigid_contact.h), in double.
+MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+  std::vector<RigidBody> bodies = rigid_bodies(model);
+  RigidContact contact(model, settings);
+  const Substep substep(model, settings);
+  const Model nothing;  // to touch: contact is found here
+  Settings flight = settings, carried = settings;
+  flight.ground = carried.ground = false, carried.gravity = 0;
+  State now = state_of(model, bodies);
+  struct Place {
+    const Points& points;
+    const glm::dvec3& at(std::uint32_t i) const { return points[i]; }
+  };
+  return baseline_run(
+      model, settings, steps, right,
+      [&] {
+        for (int s = 0; s < settings.substeps; ++s) {
+          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities);
+          for (RigidBody& body : bodies) {
+            const bool touches = contact.carries(body.first);
+            if (touches) {
+              body.velocity = body.angular = glm::dvec3(0);
+              for (std::size_t i = body.first; i < body.first + body.rest.size(); ++i) {
+                const glm::dvec3 momentum = model.masses[i] * now.velocities[i];
+                body.velocity += momentum / body.mass;
+                body.angular += glm::cross(now.positions[i] - body.centre, momentum);
+              }
+            }
+            advance(body, nothing, touches ? carried : flight, substep.h);
+          }
+          now = state_of(model, bodies);
+        }
+      },
+      [&] { return now; });
+}
+
+/// Newton steps with sparse Cholesky factors, `iterations` of them in each implicit step.
+MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+  const ConstraintSystem system = build_constraints(model.rest, settings);
+  const ReferenceInput input{model, system, settings, model.inverse_masses};
+  Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities},
+                          settings.dt / settings.substeps);
+  run.most = settings.iterations;
+  return baseline_run(
+      model, settings, steps, right, [&] { advance(run, settings.substeps); }, [&] { return run.now; });
+}
+
+struct Baseline {
+  const char* name;
+  bool soft;
+  MeasuredRun (*run)(const Model&, const Settings&, long steps, const Motion* right);
+};
+constexpr Baseline baselines[] = {{"rigid-body", false, rigid_run}, {"direct", true, direct_run}};
+
+// ------------------------------------------------------------------------------------------------------------
+
+// Errors that agree to a thousandth are the same: two Jacobi modes differ by rounding. Times that agree to a
+// fiftieth are, too: then the smaller error counts.
+void mark_front(ordered_json& rows, const Judge& judge) {
   for (auto& row : rows) {
-    const auto beats = [cost = cost_ms(row), lost = loss(row)](const ordered_json& other) {
-      return (cost_ms(other) < cost && loss(other) <= 1.001 * lost) ||
-             (cost_ms(other) <= 1.02 * cost && 1.001 * loss(other) < lost);
+    const double cost = cost_ms(row), error = error_by(judge, row);
+    const auto beats = [=, &judge](const ordered_json& other) {
+      const double others = error_by(judge, other);
+      return (cost_ms(other) < cost && others <= 1.001 * error) ||
+             (cost_ms(other) <= 1.02 * cost && 1.001 * others < error);
     };
-    row["pareto"] = std::isfinite(loss(row)) && std::ranges::none_of(rows, beats);
+    row["pareto"] = std::isfinite(error) && std::ranges::none_of(rows, beats);
   }
 }
 
-Chart chart_of(const ordered_json& document) {
+std::string label_of(const ordered_json& row) {
+  return text_of(row["iterations"]) + " x " + text_of(row["substeps"]);
+}
+
+Chart chart_of(const ordered_json& document, const Judge& judge) {
   const auto& rows = document["rows"];
   Chart chart{"Speed against error: " + text_of(rows[0]["scene"]),
               fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
                           text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
                           text_of(document["device"]["gl_renderer"])),
-              "time of a step, ms (GPU time; cpu modes: wall time)", "largest volume loss, %", true};
+              "time of a step, ms (GPU time; cpu modes: wall time)", judge.label, true};
   Series front{"Pareto front", "#999999", Series::dashes};
   for (const auto& row : rows) {
-    const glm::dvec2 point(cost_ms(row), loss(row));
+    const glm::dvec2 point(cost_ms(row), error_by(judge, row));
     if (!std::isfinite(point.y)) continue;
     if (row["pareto"] == true) {
       front.points.push_back(point);
-      chart.notes.push_back({point, text_of(row["iterations"]) + " x " + text_of(row["substeps"])});
+      chart.notes.push_back({point, label_of(row)});
     }
     const std::string mode = text_of(row["mode"]);
     auto series = std::ranges::find(chart.series, mode, &Series::name);
@@ -94,21 +250,38 @@ Chart chart_of(const ordered_json& document) {
   return chart;
 }
 
-using Quantity = double (*)(const ordered_json& row);
+/// The distance from the right motion over time, of what is on the front.
+Chart course_chart(const ordered_json& document) {
+  Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
+              "what is on the front; labels: mode, iterations x substeps", "time, s",
+              "distance from the right motion, % of the size"};
+  for (const auto& row : document["rows"]) {
+    if (row["pareto"] != true || chart.series.size() == 8) continue;
+    Series series{text_of(row["mode"]) + ", " + label_of(row), palette_colour(chart.series.size()),
+                  Series::line};
+    for (const auto& point : row["motion_over_time"])
+      series.points.emplace_back(point[0].get<double>(), 100 * point[1].get<double>());
+    if (!series.points.empty()) chart.series.push_back(series);
+  }
+  return chart;
+}
+
+using Quantity = std::function<double(const ordered_json& row)>;
 
 /// The row within a limit, where one is asked for, that is best by something else.
-void print_best(ordered_json rows, const char* what, std::optional<double> limit, Quantity limited,
-                Quantity judged) {
+void print_best(ordered_json rows, const char* what, std::optional<double> limit, const Judge& judge,
+                const Quantity& limited, const Quantity& judged) {
   if (!limit) return;
   fmt::print(fmt::runtime(what), *limit);
-  std::erase_if(rows.get_ref<ordered_json::array_t&>(),
-                [&](const auto& row) { return !std::isfinite(loss(row)) || !(limited(row) <= *limit); });
+  std::erase_if(rows.get_ref<ordered_json::array_t&>(), [&](const auto& row) {
+    return !std::isfinite(error_by(judge, row)) || !(limited(row) <= *limit);
+  });
   if (rows.empty()) return fmt::print(": nothing measured is\n");
   const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
   const auto& best = *std::ranges::min_element(rows, {}, order);
-  fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, loss {:.3g} %)\n", text_of(best["mode"]),
+  fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, {} {:.3g} %)\n", text_of(best["mode"]),
              text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best),
-             loss(best));
+             judge.name, error_by(judge, best));
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -220,29 +393,54 @@ int run_compare(const CompareOptions& options) {
   ordered_json document = run_or_merge(sweep, options, [&] {
     const Scene scene = load_scene(options.scene, options.overrides);
     sweep.facts["dt"] = scene.settings.dt;
-    const auto all = combinations(scene.settings, options.axes);
     const auto model = build_model(scene);
-    for (const Settings& settings : all)
-      sweep.work.push_back([=, steps = options.steps] {
-        const MeasuredRun run = run_model(model, settings, steps);
-        ordered_json row = row_of(scene, *model, settings, run);
-        row["gpu_ms_per_step"] = median(run.gpu_ms);
-        row["wall_ms_per_step"] = median(run.wall_ms);
+    const long steps = options.steps;
+    if (options.judge == "motion") require_motion(scene, *model, steps);
+    Axes axes = options.axes;
+    for (const Baseline& baseline : baselines) {
+      if (std::erase(axes.modes, baseline.name) == 0) continue;
+      if (baseline.soft != compliant(scene.settings))
+        throw Error("no baseline for this scene", baseline.name,
+                    "rigid-body is for k = 1, direct for compliance and materials");
+      Axes own = options.axes;
+      own.modes = {}, own.omegas = {};
+      for (Settings settings : combinations(scene.settings, own)) {
+        settings.mode = baseline.name;
+        sweep.work.push_back([=] {
+          const auto right = right_motion(*model, settings);
+          const MeasuredRun run = baseline.run(*model, settings, steps, right ? &*right : nullptr);
+          ordered_json row = compared(scene, *model, settings, run);
+          for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
+          return std::vector{row};
+        });
+      }
+    }
+    if (axes.modes.empty() && !options.axes.modes.empty()) return;
+    for (const Settings& settings : combinations(scene.settings, axes))
+      sweep.work.push_back([=] {
+        const auto right = right_motion(*model, settings);
+        const MeasuredRun run = run_model(model, settings, steps, right ? &*right : nullptr);
+        ordered_json row = compared(scene, *model, settings, run);
         row["reference_distance"] = remaining_after_one_step(model, settings);
-        row["pareto"] = false;
         return std::vector{row};
       });
   });
   ordered_json& rows = document["rows"];
-  mark_front(rows);
+  const Judge& judge = judge_of(options.judge, rows);
+  mark_front(rows, judge);
   print_table(sweep, document);
-  if (std::ranges::all_of(rows, [](const auto& row) { return loss(row) == 0; }))
-    fmt::print("nothing has lost volume in {} steps: take more --steps, or these say nothing about error\n",
-               text_of(document["steps"]));
-  print_best(rows, "best within {:g} ms a step", options.budget_ms, cost_ms, loss);
-  print_best(rows, "cheapest with a loss of at most {:g} %", options.error_percent, loss, cost_ms);
+  fmt::print("judged by {}: {}\n", judge.name, judge.label);
+  if (options.judge.empty() && std::string(judge.name) == "volume")
+    fmt::print("the right motion is not known; --judge motion finds it\n");
+  if (std::ranges::all_of(rows, [&](const auto& row) { return error_by(judge, row) == 0; }))
+    fmt::print("no error in {} steps: take more --steps, or these say nothing\n", text_of(document["steps"]));
+  const Quantity error = [&](const ordered_json& row) { return error_by(judge, row); };
+  print_best(rows, "best within {:g} ms a step", options.budget_ms, judge, cost_ms, error);
+  print_best(rows, "cheapest with an error of at most {:g} %", options.error_percent, judge, error, cost_ms);
   write_sweep(sweep, options.out, document);
-  write_chart(options.out / "compare", chart_of(document));
+  write_chart(options.out / "compare", chart_of(document, judge));
+  if (const Chart course = course_chart(document); !course.series.empty())
+    write_chart(options.out / "motion", course);
   return 0;
 }
 

@@ -76,8 +76,7 @@ ordered_json settings_json(const Scene& scene, const Settings& settings) {
 }
 
 ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
-                             const ordered_json& hash, const std::optional<SolverChoice>& choice,
-                             const std::optional<MotionError>& motion) {
+                             const ordered_json& hash, const std::optional<SolverChoice>& choice) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -91,10 +90,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);
-  for (const auto& [key, member] :
-       {std::pair("motion_final", &MotionError::final), std::pair("motion_rms", &MotionError::rms),
-        std::pair("motion_peak", &MotionError::peak), std::pair("motion_relative", &MotionError::relative)})
-    j["error"][key] = motion ? *motion.*member : std::nan("");  // written as null
+  j["error"].update(motion_json(run));
   j["momentum"] = {{"linear_drift", errors.linear_drift},
                    {"angular_drift", errors.angular_drift},
                    {"linear", vector(last.momentum)},
@@ -134,7 +130,6 @@ int run_headless(Scene scene, const RunOptions& options) {
   Metrics metrics = create_metrics(*model, sim.system);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
-  auto motion_error = right ? std::optional(MotionError{}) : std::nullopt;
   std::optional<FrameWriter> frames;
   if (options.png_every > 0 || !options.video.empty()) frames.emplace(scene, sim, options);
   std::optional<GrowingFile> csv;
@@ -143,14 +138,13 @@ int run_headless(Scene scene, const RunOptions& options) {
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
-    RunPlan plan{.measure_every = options.measure_every};
+    RunPlan plan{.measure_every = options.measure_every, .right = right ? &*right : nullptr};
     plan.measured = [&](const Measurement& measurement, const RunErrors& errors) {
       if (csv && measurement.step % options.csv_every == 0) csv->add(csv_row(measurement, errors));
     };
     plan.stepped = [&](long s) {
       progress.update(s);
       if (frames) frames->draw_frame(s);
-      if (right && is_kept(*right, s)) add_state(*motion_error, *right, *model, s, read_state(sim));
     };
     if (!check_finite(sim)) plan.stepped(0);
     run = run_loop(sim, &metrics, steps, plan);
@@ -160,8 +154,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   const bool good = !found || restore_checkpoint(sim);
   while (good && found && sim.steps < found->step - 1) step(sim);  // the last good one: the same bits again
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
-  const auto statistics =
-      statistics_json(scene, sim, context.capabilities(), run, hash, choice, motion_error);
+  const auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
   write_file(options.out / "stats.json", json_text(statistics, 2) + "\n");
   if (csv) csv->close();
   if (options.positions && good) write_positions(sim, options.out);

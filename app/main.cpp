@@ -133,6 +133,21 @@ void add_overrides(CLI::App& command, SceneOverrides& overrides) {
       ->take_all();
 }
 
+/// A flag for every setting that the command has none of its own for.
+void add_parameters(CLI::App& command, SceneOverrides& overrides) {
+  for (const Parameter& row : parameters()) {
+    if (command.get_option_no_throw(flag_name(row))) continue;
+    const auto words = choices(row);
+    const std::string allowed =
+        words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
+                      : fmt::format(": {}", fmt::join(words, ", "));
+    const auto set = [&](const std::string& text) { overrides.parameters.emplace_back(row.name, text); };
+    command.add_option_function<std::string>(flag_name(row), set, row.help + allowed)
+        ->group("Settings")
+        ->type_name("VALUE");
+  }
+}
+
 /// Lists of modes, iterations and substeps, every combination of which is run.
 void add_axes(CLI::App& command, Axes& axes) {
   add(command, "--modes,--mode", axes.modes, "solver modes; paper: as published");
@@ -158,16 +173,7 @@ void add_scene(CLI::App& command, Arguments& a) {
   command.add_option("--deform", a.overrides.deform,
                      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
                      "twist:DEGREES, invert-one, coincident, fold");
-  for (const Parameter& row : parameters()) {
-    const auto words = choices(row);
-    const std::string allowed =
-        words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
-                      : fmt::format(": {}", fmt::join(words, ", "));
-    const auto set = [&](const std::string& text) { a.overrides.parameters.emplace_back(row.name, text); };
-    command.add_option_function<std::string>(flag_name(row), set, row.help + allowed)
-        ->group("Settings")
-        ->type_name("VALUE");
-  }
+  add_parameters(command, a.overrides);
   std::string solvers;
   for (const Preset& preset : solver_presets()) solvers += fmt::format("{} ({}), ", preset.name, preset.help);
   add(command, "--solver", a.overrides.solver,
@@ -289,11 +295,16 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_overrides(compare, a.compare.overrides);
   add_axes(compare, a.compare.axes);
   add(compare, "--omegas", a.compare.axes.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
+  add_parameters(compare, a.compare.overrides);
   add(compare, "--steps", a.compare.steps, 1L, most_steps, "steps of each run");
+  add(compare, "--judge", a.compare.judge,
+      "by what: motion (the distance from the right one, found first if need be), volume (largest net loss), "
+      "strain (default: motion where it is known)")
+      ->check(one_of(std::array{"motion", "volume", "strain"}));
   add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9,
       "print the best setting within so many ms per step");
   add(compare, "--error", a.compare.error_percent, 1e-9, 1e9,
-      "print the cheapest setting that loses at most this volume, %");
+      "print the cheapest setting with at most this error, %");
   compare.add_option_function<std::string>(
       "--shard",
       [&](const std::string& text) {

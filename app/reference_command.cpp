@@ -108,11 +108,11 @@ std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesyst
   return read_motion(from, input.model, scene);
 }
 
-int run_reference(const Scene& scene, const ReferenceOptions& options) {
-  catch_interrupts();
-  const auto model = build_model(scene);
-  const ConstraintSystem system = build_constraints(model->rest, scene.settings);
-  const ReferenceInput input{*model, system, scene.settings, model->inverse_masses};
+namespace {
+
+std::filesystem::path find_and_keep(const Scene& scene, const Model& model, const ReferenceOptions& options) {
+  const ConstraintSystem system = build_constraints(model.rest, scene.settings);
+  const ReferenceInput input{model, system, scene.settings, model.inverse_masses};
   const std::filesystem::path file = options.out.empty() ? cached_motion(scene_key(input)) : options.out;
   if (file.empty()) throw Error("nowhere to keep it", "there is no cache folder", "give --out FILE");
   std::error_code ignored;  // a folder that cannot be made is named when the file is written
@@ -121,9 +121,26 @@ int run_reference(const Scene& scene, const ReferenceOptions& options) {
   Progress progress("the right motion", steps, options.progress);
   const Motion motion = find_motion(input, steps, options.method, file.string() + ".unfinished",
                                     [&](long done) { progress.update(done); });
-  write_motion(file, *model, motion);
+  write_motion(file, model, motion);
   print_motion(scene, motion);
-  fmt::print("{}\n", file.string());
+  return file;
+}
+
+}  // namespace
+
+std::optional<Motion> right_motion(const Model& model, const Settings& settings) {
+  const ConstraintSystem none;  // what moves it stands in the settings
+  return motion_of({model, none, settings, model.inverse_masses}, {});
+}
+
+void require_motion(const Scene& scene, const Model& model, long steps) {
+  const auto known = right_motion(model, scene.settings);
+  if (!known || known->kept.back() < steps) find_and_keep(scene, model, {.steps = steps});
+}
+
+int run_reference(const Scene& scene, const ReferenceOptions& options) {
+  catch_interrupts();
+  fmt::print("{}\n", find_and_keep(scene, *build_model(scene), options).string());
   return 0;
 }
 

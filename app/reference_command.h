@@ -11,10 +11,10 @@
 namespace tetpbd {
 
 struct ReferenceOptions {
-  long steps = 0;             ///< 0: the scene's duration
-  std::string method;         ///< leapfrog or implicit; empty: what suits the scene
-  std::filesystem::path out;  ///< empty: in the cache, where runs of the scene find it
-  bool progress = false;      ///< show it even if standard error is no terminal
+  long steps = 0;               ///< 0: the scene's duration
+  std::string method{};         ///< leapfrog or implicit; empty: what suits the scene
+  std::filesystem::path out{};  ///< empty: in the cache, where runs of the scene find it
+  bool progress = false;        ///< show it even if standard error is no terminal
 };
 /// Prints what the motion is and how wrong it may be. An interrupted search goes on where it was.
 int run_reference(const Scene& scene, const ReferenceOptions& options);
@@ -25,5 +25,9 @@ void write_motion(const std::filesystem::path& file, const Model& model, const M
 Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene);
 /// The motion in `file`, or without one the cache's of this scene, if it has any.
 std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
+/// The cache's.
+std::optional<Motion> right_motion(const Model& model, const Settings& settings);
+/// Puts it there, over so many steps at least, if it is not. Throws Error for scenes without one.
+void require_motion(const Scene& scene, const Model& model, long steps);
 
 }  // namespace tetpbd

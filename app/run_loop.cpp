@@ -53,7 +53,14 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     }
     while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.push_back(*ms);
   };
+  const auto hold_against = [&](long s) {
+    if (!plan.right || !is_kept(*plan.right, s)) return;
+    if (!run.motion) run.motion = MotionError{};
+    add_state(*run.motion, *plan.right, *sim.model, s, read_state(sim));
+    run.motion_over_time.push_back({double(s) * sim.settings.dt, run.motion->final});
+  };
   if (metrics) measure(*metrics, sim);
+  hold_against(0);
   const auto begin = steady_clock::now();
   while (run.steps < steps && !interrupted() && !check_finite(sim)) {
     const auto step_begin = steady_clock::now();
@@ -67,6 +74,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     run.steps = s;
     if (plan.wait) run.wall_ms.push_back(seconds * 1e3), run.seconds += seconds;
     take(false);
+    hold_against(s);
     if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }
@@ -80,10 +88,11 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   return run;
 }
 
-MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps) {
+MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
+                      const Motion* right) {
   Sim sim = create_sim(model, settings);
   Metrics metrics = create_metrics(*model, sim.system);
-  return run_loop(sim, &metrics, steps);
+  return run_loop(sim, &metrics, steps, {.right = right});
 }
 
 void warm_up(Sim& sim) {

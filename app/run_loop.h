@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sim/metrics.h"
+#include "sim/reference/motion.h"
 
 namespace tetpbd {
 
@@ -40,23 +41,27 @@ struct RunPlan {
   bool wait = true;   ///< for each step, to time it; without: steps are queued, and timed all together
   bool timed = true;  ///< GPU time of each step; its queries are GL objects that come and go
   std::function<void(long)> stepped{};  ///< after each step
+  const Motion* right = nullptr;        ///< what the run is held against, at the instants it has
   /// Takes each measurement as it arrives; without, the run keeps them.
   std::function<void(const Measurement&, const RunErrors&)> measured{};
 };
 
 struct MeasuredRun {
   RunErrors errors;
-  std::vector<Measurement> measurements;  ///< the start first
-  std::vector<double> gpu_ms, wall_ms;    ///< a step; GPU time is that of its passes alone
-  double seconds = 0;                     ///< of all steps, without what came between those waited for
-  long steps = 0;                         ///< taken, and finite
+  std::optional<MotionError> motion;  ///< of the instants up to the last step, where there is a right one
+  std::vector<std::array<double, 2>> motion_over_time;  ///< s, distance over the size
+  std::vector<Measurement> measurements;                ///< the start first
+  std::vector<double> gpu_ms, wall_ms;                  ///< a step; GPU time is that of its passes alone
+  double seconds = 0;  ///< of all steps, without what came between those waited for
+  long steps = 0;      ///< taken, and finite
 };
 
 /// Steps `steps` times. Ends early when the state is not finite (its errors then say so) or when
 /// interrupted() says so: ask it before making anything of the result. No metrics: nothing is measured.
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});
 /// The same with a simulation of its own, every step measured.
-MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps);
+MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
+                      const Motion* right = nullptr);
 /// Steps until a GPU that has rested runs at its full clock: 0.3 s. Nothing on a software renderer.
 void warm_up(Sim& sim);
 

@@ -58,6 +58,15 @@ ordered_json error_json(const RunErrors& errors) {
   return result;
 }
 
+ordered_json motion_json(const MeasuredRun& run) {
+  ordered_json result;
+  for (const auto& [key, member] :
+       {std::pair("motion_final", &MotionError::final), std::pair("motion_rms", &MotionError::rms),
+        std::pair("motion_peak", &MotionError::peak), std::pair("motion_relative", &MotionError::relative)})
+    result[key] = run.motion && run.errors.finite ? *run.motion.*member : std::nan("");  // written as null
+  return result;
+}
+
 ordered_json non_finite_json(const std::optional<NonFinite>& found) {
   if (!found) return nullptr;
   return {{"step", found->step}, {"vertex", found->vertex}};
@@ -90,6 +99,7 @@ ordered_json row_of(const Scene& scene, const Model& model, const Settings& sett
                       {"linear_drift", run.errors.linear_drift},
                       {"angular_drift", run.errors.angular_drift}};
   row.update(error_json(run.errors));
+  row.update(motion_json(run));
   put_finite(row, run);
   return row;
 }

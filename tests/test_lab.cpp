@@ -62,7 +62,7 @@ TEST_CASE(
   CHECK(csv.starts_with(
       "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
       "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_"
-      "percent\n"));
+      "percent,motion_final,motion_rms,motion_peak,motion_relative\n"));
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 37);
   for (const json& row : bench["rows"]) {
     const int iterations = row["iterations"], kinds = row["constraints"] == "stretch" ? 1 : 3;
@@ -75,6 +75,58 @@ TEST_CASE(
     CHECK((row["picture"] == "") == row["draw_ms"].is_null());
     CHECK((row["gpu_ms_per_step"]["median"].get<double>() > 0) == (row["mode"] != "cpu"));
   }
+}
+
+TEST_CASE("compare judges by the motion, beside a rigid body and a direct solver") {
+  const Folder folder;
+  const std::string
+      cache = "TETPBD_CACHE=" + (folder.path / "cache").string(),
+      falls =
+          "compare --scene beam --set bodies.0.fixed=[] --set bodies.0.block.cells=[4,2,2] "
+          "--set bodies.0.position=[0,0.1,0] --set bodies.0.rotation=[10,20,30] --steps 60 --iterations 1 ";
+  // k = 1: what is not known is not judged by, and found when asked for.
+  const Outcome unknown =
+      program(falls + "--modes node --substeps 2 --out a --rigid-contact 0", folder, cache);
+  REQUIRE(unknown.status == 0);
+  CHECK(unknown.out.find("judged by volume") != std::string::npos);
+  CHECK(unknown.out.find("--judge motion finds it") != std::string::npos);
+  const std::string all = falls + "--modes rigid-body,node,cpu-double --substeps 1,20 --error 0.1 --out b";
+  const Outcome hard = program(all + " --judge motion", folder, cache);
+  REQUIRE(hard.status == 0);
+  CHECK(hard.out.find("judged by motion") != std::string::npos);
+  const json rows = json::parse(read(folder.path / "b/compare.json"))["rows"];
+  REQUIRE(rows.size() == 6);
+  for (const json& row : rows) {
+    CAPTURE(row.dump());
+    const double error = row["motion_final"].get<double>();
+    CHECK((row["substeps"] == 1 || error < 1e-3));
+    CHECK(row["motion_peak"].get<double>() >= row["motion_rms"].get<double>());
+    CHECK(row["motion_over_time"].back()[1] == row["motion_final"]);
+    CHECK(row["tet_volume_rms_peak"].is_null() == (row["mode"] == "rigid-body"));
+    for (const json& other : rows)  // nothing on the front is beaten
+      if (row["pareto"] == true && other["wall_ms_per_step"] < row["wall_ms_per_step"] &&
+          row["mode"] != "node" && other["mode"] != "node")
+        CHECK(other["motion_final"] >= row["motion_final"]);
+  }
+  CHECK(read(folder.path / "b/motion.svg").starts_with("<svg"));
+  // What costs little is not what errs little.
+  CHECK(hard.out.substr(hard.out.find("cheapest with")).find("20 sub") != std::string::npos);
+  CHECK(program(all + " --judge looks", folder, cache).status == 2);
+
+  // A material: Newton's one step of 5 ms is nearer than twenty of Jacobi.
+  const std::string soft = falls + "--material neo-hookean --young-modulus 2e5 --judge motion --out c ";
+  REQUIRE(program(soft + "--modes direct,node --substeps 1,20 ", folder, cache).status == 0);
+  double direct = 1, jacobi = 0;
+  const json softs = json::parse(read(folder.path / "c/compare.json"))["rows"];
+  for (const json& row : softs) {
+    if (row["mode"] == "direct" && row["substeps"] == 20) direct = row["motion_final"];
+    if (row["mode"] == "node" && row["substeps"] == 1) jacobi = row["motion_final"];
+  }
+  CHECK(direct < 0.005);
+  CHECK(direct < jacobi);
+  const Outcome wrong = program(soft + "--modes rigid-body", folder, cache);
+  CHECK(wrong.status == 2);
+  CHECK(wrong.err.find("no baseline for this scene: rigid-body") != std::string::npos);
 }
 
 TEST_CASE("compare finds the front, and shards merge to the same rows") {

@@ -74,8 +74,8 @@ std::vector<Objective::Drag> drags(const Implicit& run, const Objective& o, cons
 Minimum solve(const Implicit& run, const Start& start) {
   Objective o = objective_of(run, start);
   o.drags = drags(run, o, start, run.touching);
-  constexpr int most_rounds = 50;
-  Minimum minimum = minimise(o, o.predicted);
+  const int most_rounds = run.most > 0 ? 0 : 50;
+  Minimum minimum = minimise(o, o.predicted, run.most);
   for (int round = 0; run.input.settings.friction > 0 && !o.planes.empty() && round < most_rounds; ++round) {
     if (!minimum.converged) break;
     std::vector<double> change(run.now.positions.size(), 0);

@@ -80,15 +80,6 @@ Pair rigid_pair(const ReferenceInput& input) {
   return pair;
 }
 
-Compliances compliances_of(const ReferenceInput& input) {
-  Compliances compliances;
-  for (std::size_t k = 0; k < kind_count; ++k)
-    compliances[k] = input.system.present[k] && input.system.lists[k].compliance.empty()
-                         ? input.settings.compliance[k]
-                         : std::numeric_limits<double>::infinity();
-  return compliances;
-}
-
 // Of make(h), with `steps` of them and twice as many in a step of the scene. `arrays(run, f)` calls f for all
 // that a run consists of.
 template <class Make, class Arrays>
@@ -182,6 +173,15 @@ bool load_unfinished(const std::filesystem::path& file, std::uint64_t key, Motio
 }
 
 }  // namespace
+
+Compliances compliances_of(const ReferenceInput& input) {
+  Compliances compliances;
+  for (std::size_t k = 0; k < kind_count; ++k)
+    compliances[k] = input.system.present[k] && input.system.lists[k].compliance.empty()
+                         ? input.settings.compliance[k]
+                         : std::numeric_limits<double>::infinity();
+  return compliances;
+}
 
 std::uint64_t scene_key(const ReferenceInput& input) {
   std::uint64_t key = fnv_basis;

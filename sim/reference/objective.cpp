@@ -325,7 +325,7 @@ bool newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
 // Stiff bodies that turn far take hundreds of short steps, all others under 30.
 constexpr int newton_limit = 1000;
 
-Minimum newton(const Objective& o, Points start) {
+Minimum newton(const Objective& o, Points start, int most) {
   Minimum result;
   Points& x = result.positions = std::move(start);
   ActiveSet set{o, x, std::vector<char>(x.size() * o.planes.size(), 0)};
@@ -362,7 +362,7 @@ Minimum newton(const Objective& o, Points start) {
       if (evaluate_energy(o, trial).value <= before.value + 1e-4 * t * newton.descent + rounding) break;
     }
     std::ranges::copy(trial, x.begin());
-    ++result.iterations;
+    if (++result.iterations == most) result.converged = true;
   }
   for (std::size_t i = 0; i < x.size(); ++i)
     for (std::size_t p = 0; p < o.planes.size(); ++p)
@@ -375,13 +375,13 @@ Minimum newton(const Objective& o, Points start) {
 }  // namespace
 
 // Around the first vertex: far from the origin, positions have no digits left for small strains.
-Minimum minimise(Objective o, Points start) {
+Minimum minimise(Objective o, Points start, int most) {
   const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
   for (Points* list : {&o.predicted, &start})
     for (glm::dvec3& p : *list) p -= origin;
   for (glm::dvec4& plane : o.planes) plane.w -= glm::dot(glm::dvec3(plane), origin);
   for (Objective::Drag& drag : o.drags) drag.from -= origin;
-  Minimum result = newton(o, std::move(start));
+  Minimum result = newton(o, std::move(start), most);
   for (glm::dvec3& p : result.positions) p += origin;
   return result;
 }

@@ -105,6 +105,7 @@ struct Minimum {
 constexpr double minimum_tolerance = 1e-10;
 /// A minimum of E, by Newton with an Armijo line search, among half spaces with an active set in each step
 /// (Nocedal and Wright 2006, ch. 16); of several minima, the one that `start` leads to.
-Minimum minimise(Objective objective, Points start);
+/// `most`: Newton steps, after which what there is counts as converged; 0: to convergence.
+Minimum minimise(Objective objective, Points start, int most = 0);
 
 }  // namespace tetpbd

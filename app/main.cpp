@@ -178,7 +178,7 @@ void add_scene(CLI::App& command, Arguments& a) {
   for (const Preset& preset : solver_presets()) solvers += fmt::format("{} ({}), ", preset.name, preset.help);
   add(command, "--solver", a.overrides.solver,
       "how to solve, by name; other settings go on top: " + solvers +
-          "auto (tries, and takes what loses least volume within --budget-ms)")
+          "auto (tries, and takes what moves most nearly right within --budget-ms)")
       ->type_name("NAME");
   add(command, "--budget-ms", a.overrides.budget_ms, 1e-6, 1e6,
       "GPU ms per step, for --solver auto (default: a tenth of dt)");

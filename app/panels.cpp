@@ -200,8 +200,8 @@ void draw_solver(Session& s) {
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
   Ways ways = ways_of(now, solver_presets(),
-                      "--solver\nauto: tries ways to solve this scene and takes what loses least volume "
-                      "within the budget");
+                      "--solver\nauto: tries ways to solve this scene and takes the one whose motion is "
+                      "nearest to the right one within the budget");
   if (automatic) ways.current = "auto";
   ways.words.push_back("auto");
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))

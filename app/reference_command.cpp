@@ -133,6 +133,18 @@ std::optional<Motion> right_motion(const Model& model, const Settings& settings)
   return motion_of({model, none, settings, model.inverse_masses}, {});
 }
 
+std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps) {
+  if (compliant(settings)) return std::nullopt;
+  const ConstraintSystem none;
+  try {
+    return find_motion({model, none, settings, model.inverse_masses}, steps);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 void require_motion(const Scene& scene, const Model& model, long steps) {
   const auto known = right_motion(model, scene.settings);
   if (!known || known->kept.back() < steps) find_and_keep(scene, model, {.steps = steps});

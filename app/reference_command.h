@@ -27,6 +27,8 @@ Motion read_motion(const std::filesystem::path& file, const Model& model, std::u
 std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
 /// The cache's.
 std::optional<Motion> right_motion(const Model& model, const Settings& settings);
+/// Of rigid bodies, found at once; nothing for scenes that are not theirs.
+std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps);
 /// Puts it there, over so many steps at least, if it is not. Throws Error for scenes without one.
 void require_motion(const Scene& scene, const Model& model, long steps);
 

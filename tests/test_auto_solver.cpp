@@ -4,8 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "app/auto_solver.h"
+#include "app/run_loop.h"
 #include "app/scene.h"
+#include "sim/error.h"
 #include "sim/gl/context.h"
+#include "sim/material.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;
@@ -32,7 +35,8 @@ TEST_CASE("a solver by name puts its settings in place of the scene's; flags go 
       load_scene("bunny-drop", {.solver = "substeps", .parameters = {{"substeps", "7"}}}).settings;
   CHECK(substeps.iterations == 1);
   CHECK(substeps.substeps == 7);
-  CHECK_THROWS(load_scene("bunny-drop", {.solver = "hard"}));
+  CHECK(load_scene("bunny-drop", {.solver = "hard"}).settings.substeps == 5);
+  CHECK_THROWS(load_scene("bunny-drop", {.solver = "rigid"}));
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "paper", .budget_ms = 1.0}));
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "auto", .parameters = {{"substeps", "7"}}}));
   CHECK(load_scene("bunny-drop", {.budget_ms = 2.0}).budget_ms == 2.0);
@@ -41,36 +45,49 @@ TEST_CASE("a solver by name puts its settings in place of the scene's; flags go 
   CHECK_FALSE(load_scene("bunny-drop").budget_ms);
 }
 
-TEST_CASE("auto takes what loses least volume, and as many substeps as the budget holds") {
+TEST_CASE("auto takes what moves most nearly right, and as many substeps as the budget holds") {
   GlTest gl;
-  Scene scene = falling({.budget_ms = 4.0});
-  const auto model = build_model(scene);
-  scene.duration = 0.4;
-  const auto choice = choose_for(scene, model);
-  REQUIRE(choice);
-  CHECK_FALSE(scene.budget_ms);
-  CHECK(scene.settings == choice->settings());
-  CHECK(choice->trials.size() == 3);  // averaged, with more over-relaxation, with masses split
-  CHECK(choice->trials[2].settings.mass_splitting);
-  for (const SolverTrial& trial : choice->trials) {
-    CHECK(trial.settings.iterations == 1);
-    CHECK(trial.settings.substeps >= 1);
-    CHECK(trial.ms > 0);
-    CHECK(0.99 * choice->trials[choice->best].loss_percent <=
-          trial.loss_percent + 1e-4);  // nothing lost: any
+  for (const bool soft : {false, true}) {
+    CAPTURE(soft);
+    Scene scene = falling({.budget_ms = 4.0});
+    scene.duration = 0.4;
+    scene.bodies[0].rotation = {10, 20, 30};
+    if (soft) scene.settings.material = "neo-hookean", scene.settings.young_modulus = 2e5;
+    const Settings own = scene.settings;
+    const auto model = build_model(scene);
+    const auto choice = choose_for(scene, model);
+    REQUIRE(choice);
+    CHECK_FALSE(scene.budget_ms);
+    CHECK(scene.settings == choice->settings());
+    CHECK(choice->judged == (soft ? "finer steps" : "motion"));
+    REQUIRE(choice->trials.size() == (soft ? 3 : 5));  // node in its ways, cpu-fast, the scene's own
+    CHECK(choice->trials.back().settings == own);
+    CHECK(choice->trials.end()[-2].settings.mode == "cpu-fast");
+    CHECK(choice->trials[choice->best].fits);
+    // Against the right motion, found anew: 1.3 times the best error that fits, at most.
+    const ConstraintSystem system = build_constraints(model->rest, own);
+    const Motion right = find_motion({*model, system, own, model->inverse_masses}, choice->steps);
+    double chosen = 0, least = 1;
+    for (const SolverTrial& trial : choice->trials) {
+      CHECK(trial.ms > 0);
+      CHECK(trial.fits == (trial.ms <= 1.05 * 4));
+      if (!trial.fits) continue;
+      const MeasuredRun run = run_model(model, trial.settings, choice->steps, &right);
+      least = std::min(least, run.motion->rms);
+      if (&trial == &choice->trials[choice->best]) chosen = run.motion->rms;
+    }
+    CHECK(chosen > 0);
+    CHECK(chosen <= 1.3 * std::max(least, 1e-5));
+    CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
+    CHECK(describe(*choice).find(soft ? "from finer steps" : "from the right motion") != std::string::npos);
+    CHECK(solver_choice_json(*choice)["trials"].size() == choice->trials.size());
+    if (soft) continue;
+    // k between 0 and 1 has no right motion.
+    Settings paper = own;
+    paper.stiffness[index_of<Volume>] = 0.5;
+    CHECK(choose_solver(model, paper, 4, 5).judged == "volume");
+    CHECK(choose_solver(model, own, 100, 2).settings().substeps > 4);
+    CHECK_THROWS_WITH_AS(choose_solver(model, own, 1e-6, 2), doctest::Contains("nothing fits the budget"),
+                         Error);
   }
-  CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
-  CHECK(solver_choice_json(*choice)["trials"].size() == 3);
-
-  // What over-relaxation would change is not tried with it.
-  Settings soft = scene.settings;
-  soft.compliance[index_of<Volume>] = 1e-6, soft.omega = 1.5;
-  CHECK(choose_solver(model, soft, 1, 3).trials.size() == 1);
-  // No budget is too small for one substep, and a hundred times the budget holds more.
-  CHECK(choose_solver(model, scene.settings, 1e-6, 2).settings().substeps == 1);
-  const SolverChoice early = choose_solver(model, scene.settings, 100, 2);
-  CHECK(early.settings().substeps > 4);
-  CHECK(early.lost_nothing);  // it has not hit the ground: the first is taken
-  CHECK(early.best == 0);
-  CHECK(describe(early).find("none lost volume in 2 steps") != std::string::npos);
 }

@@ -45,7 +45,7 @@ struct Axis {
 };
 
 Axis fit(const Chart& chart, int component, double from, double to) {
-  Axis axis{chart.log, from, to};
+  Axis axis{component == 0 ? chart.log_x : chart.log_y, from, to};
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const Series& series : chart.series)
     for (const glm::dvec2& point : series.points)
@@ -88,6 +88,7 @@ std::string palette_colour(std::size_t index) {
 }
 
 std::string mode_colour(const std::string& mode) {
+  if (mode == "rigid-body" || mode == "direct") return palette_colour(mode == "direct" ? 7 : 6);  // no modes
   const auto& modes = solver_modes();
   return palette_colour(std::size_t(std::ranges::find(modes, mode, &SolverMode::name) - modes.begin()));
 }

@@ -16,7 +16,7 @@ struct Series {
 
 struct Chart {
   std::string title, subtitle, x_label, y_label;
-  bool log = false;  ///< both axes
+  bool log_x = false, log_y = false;
   std::vector<Series> series{};
   struct Note {
     glm::dvec2 at;

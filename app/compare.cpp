@@ -231,7 +231,10 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
               fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
                           text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
                           text_of(document["device"]["gl_renderer"])),
-              "time of a step, ms (GPU time; cpu modes: wall time)", judge.label, true};
+              "time of a step, ms (GPU time; cpu modes: wall time)",
+              judge.label,
+              true,
+              true};
   Series front{"Pareto front", "#999999", Series::dashes};
   for (const auto& row : rows) {
     const glm::dvec2 point(cost_ms(row), error_by(judge, row));
@@ -253,8 +256,11 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
 /// The distance from the right motion over time, of what is on the front.
 Chart course_chart(const ordered_json& document) {
   Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
-              "what is on the front; labels: mode, iterations x substeps", "time, s",
-              "distance from the right motion, % of the size"};
+              "what is on the front; labels: mode, iterations x substeps",
+              "time, s",
+              "distance from the right motion, % of the size",
+              false,
+              true};
   for (const auto& row : document["rows"]) {
     if (row["pareto"] != true || chart.series.size() == 8) continue;
     Series series{text_of(row["mode"]) + ", " + label_of(row), palette_colour(chart.series.size()),

@@ -23,13 +23,6 @@ constexpr double finer = 8;        // times the substeps, of the run that stands
 constexpr double no_error = 1e-3;  // percent: below it settings are equally right
 constexpr double fitting = 1.05;   // of the budget: times differ by as much from run to run
 
-bool hard(const Settings& settings) {
-  if (compliant(settings)) return false;
-  for (std::size_t k = 0; k < kind_count; ++k)
-    if (uses(settings, constraint_kinds[k]) && settings.stiffness[k] != 1) return false;
-  return true;
-}
-
 // One iteration per substep first, which is on the front wherever it was measured (docs/results.md).
 std::vector<Settings> candidates(const Settings& own) {
   Settings base = own;

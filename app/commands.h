@@ -61,7 +61,8 @@ struct BenchOptions {
                .constraint_sets = {"stretch+bend", "stretch+bend+volume"},
                .iterations = {1, 150},
                .substeps = {1},
-               .rigid_contact = {0}};
+               .rigid_contact = {0},
+               .mass_splitting = {0}};
   long frames = 400, warm_up = 50;
   int repeats = 3;
   double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)
@@ -98,9 +99,10 @@ int run_compare(const CompareOptions& options);
 int run_hard_cases(const CompareOptions& options);
 inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu",
                                                       "cpu-double"};
-/// The first step of those at the end that all keep the volume within 1 % and no tet inverted, if they are
-/// 5 % of the run's `steps` at least: what is good for less long may be passing through.
-std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps);
+/// The first step of those at the end that all keep the volume within 1 %, no tet inverted and, of `hard`
+/// bodies, their shape within 1 % of the size, if they are 5 % of the run's `steps` at least: what is good
+/// for less long may be passing through.
+std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps, bool hard);
 
 struct ReproduceOptions {
   std::filesystem::path out = "reproduce";

@@ -1,23 +1,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <tuple>
 
+#include "app/baselines.h"
 #include "app/chart.h"
 #include "app/commands.h"
 #include "app/files.h"
 #include "app/reference_command.h"
 #include "sim/error.h"
-#include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/material.h"
-#include "sim/reference/implicit.h"
-#include "sim/reference/rigid.h"
-#include "sim/solvers/rigid_contact.h"
 
 namespace tetpbd {
 
@@ -115,98 +109,6 @@ ordered_json compared(const Scene& scene, const Model& model, const Settings& se
   return row;
 }
 
-// ------------------------------------------------------------------------------------------------------------
-// what else would solve the scene, on one core: no modes
-
-/// Steps that `advance` takes and `state` shows, held against the right motion.
-MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
-                         const std::function<void()>& advance, const std::function<State()>& state) {
-  MeasuredRun run;
-  const double ground = settings.ground ? settings.ground_height : 0;
-  for (long s = 0; s <= steps && !interrupted(); ++s) {
-    if (s > 0) {
-      const auto begin = std::chrono::steady_clock::now();
-      advance();
-      run.wall_ms.push_back(1e3 * seconds_since(begin));
-    }
-    const State now = state();
-    Measurement m;
-    m.step = s, m.time = double(s) * settings.dt;
-    double mass = 0;
-    for (std::size_t i = 0; i < now.positions.size(); ++i) {
-      const double own = model.masses[i];
-      mass += own, m.centre += own * now.positions[i];
-      m.kinetic += own / 2 * glm::dot(now.velocities[i], now.velocities[i]);
-      m.potential += own * settings.gravity * (now.positions[i].y - ground);
-    }
-    m.centre /= mass;
-    run.measurements.push_back(m);
-    run.steps = s;
-    if (!right || !is_kept(*right, s)) continue;
-    if (!run.motion) run.motion = MotionError{};
-    add_state(*run.motion, *right, model, s, now);
-    run.motion_over_time.push_back({m.time, run.motion->final});
-  }
-  return run;
-}
-
-/// A rigid body of six degrees of freedom, where k = 1: flight as in rigid.h, contact as the modes have it
-/// (rigid_contact.h), in double.
-MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
-  std::vector<RigidBody> bodies = rigid_bodies(model);
-  RigidContact contact(model, settings);
-  const Substep substep(model, settings);
-  const Model nothing;  // to touch: contact is found here
-  Settings flight = settings, carried = settings;
-  flight.ground = carried.ground = false, carried.gravity = 0;
-  State now = state_of(model, bodies);
-  struct Place {
-    const Points& points;
-    const glm::dvec3& at(std::uint32_t i) const { return points[i]; }
-  };
-  return baseline_run(
-      model, settings, steps, right,
-      [&] {
-        for (int s = 0; s < settings.substeps; ++s) {
-          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities);
-          for (RigidBody& body : bodies) {
-            const bool touches = contact.carries(body.first);
-            if (touches) {
-              body.velocity = body.angular = glm::dvec3(0);
-              for (std::size_t i = body.first; i < body.first + body.rest.size(); ++i) {
-                const glm::dvec3 momentum = model.masses[i] * now.velocities[i];
-                body.velocity += momentum / body.mass;
-                body.angular += glm::cross(now.positions[i] - body.centre, momentum);
-              }
-            }
-            advance(body, nothing, touches ? carried : flight, substep.h);
-          }
-          now = state_of(model, bodies);
-        }
-      },
-      [&] { return now; });
-}
-
-/// Newton steps with sparse Cholesky factors, `iterations` of them in each implicit step.
-MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
-  const ConstraintSystem system = build_constraints(model.rest, settings);
-  const ReferenceInput input{model, system, settings, model.inverse_masses};
-  Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities},
-                          settings.dt / settings.substeps);
-  run.most = settings.iterations;
-  return baseline_run(
-      model, settings, steps, right, [&] { advance(run, settings.substeps); }, [&] { return run.now; });
-}
-
-struct Baseline {
-  const char* name;
-  bool soft;
-  MeasuredRun (*run)(const Model&, const Settings&, long steps, const Motion* right);
-};
-constexpr Baseline baselines[] = {{"rigid-body", false, rigid_run}, {"direct", true, direct_run}};
-
-// ------------------------------------------------------------------------------------------------------------
-
 // Errors that agree to a thousandth are the same: two Jacobi modes differ by rounding. Times that agree to a
 // fiftieth are, too: then the smaller error counts.
 void mark_front(ordered_json& rows, const Judge& judge) {
@@ -290,124 +192,23 @@ void print_best(ordered_json rows, const char* what, std::optional<double> limit
              judge.name, error_by(judge, best));
 }
 
-// ------------------------------------------------------------------------------------------------------------
-// hard cases
-
-const char* case_columns =
-    "case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,rigid_distance,"
-    "reference_recovered_at_step,linear_drift,angular_drift";
-const char* case_table =
-    "case -18, mesh -7, mode -26, steps 7, finite 8, recovered_at_step:recovered 11, "
-    "reference_recovered_at_step:reference 11, final_volume_error_percent:volume-err-% 14, "
-    "inverted_tets:inverted 10, rigid_distance 16";
-
-/// The case's scene with `mesh` for its body; a scene whose body is no bunny is itself the only mesh.
-std::optional<Scene> scene_of(const std::string& name, const std::string& mesh) {
-  Scene scene = load_scene("hard/" + name);
-  BodyDescription& body = scene.bodies.at(0);
-  const std::string own = body.block ? "block" : body.tet ? "tet" : "bunny";
-  if (mesh == own) return scene;
-  if (own != "bunny" || body.tetgen != BodyDescription{}.tetgen) return std::nullopt;  // about this very mesh
-  body.mesh.clear();
-  if (mesh == "block") body.block = {{0.8, 1, 0.6}, {8, 10, 6}};
-  const double low = -std::sqrt(3.0) / 6, high = std::sqrt(3.0) / 3;
-  if (mesh == "tet") body.tet = {{{-0.5, 0, low}, {0.5, 0, low}, {0, 0, high}, {0, std::sqrt(2.0 / 3), 0}}};
-  return scene;
-}
-
-bool is_constrained(const Settings& settings) {
-  for (std::size_t k = 0; k < kind_count; ++k)
-    if (settings.stiffness[k] > 0 && uses(settings, constraint_kinds[k])) return true;
-  return false;
-}
-
-Settings settings_of(const Scene& scene, std::string mode) {
-  Settings settings = scene.settings;
-  const std::string suffix = "-substeps", where = "--modes " + mode;
-  if (mode.ends_with(suffix)) {
-    mode.resize(mode.size() - suffix.size());
-    std::swap(settings.substeps, settings.iterations);
-  }
-  set_mode(settings, mode, where);
-  check_settings(settings, where);
-  return settings;
-}
-
-ordered_json case_row(const Scene& scene, const Settings& settings, long steps) {
-  const auto model = build_model(scene);
-  Sim sim = create_sim(model, settings, {.count_guards = true});
-  Metrics metrics = create_metrics(*model, sim.system);
-  const MeasuredRun run = run_loop(sim, &metrics, steps);
-  const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps) : std::nullopt;
-  ordered_json row = row_of(scene, *model, settings, run);
-  row.update({{"steps", run.steps},
-              {"recovered_at_step", recovered ? ordered_json(*recovered) : nullptr},
-              {"reference_recovered_at_step", nullptr}});
-  const GuardCounts guards = guard_counts(sim);
-  for (std::size_t g = 0; g < GUARDS; ++g) row[fmt::format("guard_{}", guard_names[g])] = guards[g];
-  return row;
-}
-
-void add_cases(Sweep& sweep, const CompareOptions& options) {
-  std::vector<std::string> names = options.cases.empty() ? scene_names("scenes/hard") : options.cases;
-  if (names.empty())
-    throw Error("no hard cases", (models_folder() / "scenes/hard").string(),
-                "point TETPBD_MODELS at the folder models/");
-  std::ranges::sort(names);
-  for (const std::string& name : names)
-    for (const std::string& mesh : options.meshes) {
-      if (mesh != "bunny" && mesh != "block" && mesh != "tet")
-        throw Error("no such mesh", "--meshes " + mesh, "choose from bunny, block, tet");
-      const auto scene = scene_of(name, mesh);
-      if (!scene || !is_constrained(scene->settings)) continue;  // where nothing acts, nothing recovers
-      for (const std::string& mode : options.axes.modes)
-        sweep.work.push_back([=, settings = settings_of(*scene, mode),
-                              steps = options.steps ? options.steps : duration_in_steps(*scene)] {
-          ordered_json row = case_row(*scene, settings, steps);
-          row.update({{"case", name}, {"mesh", mesh}, {"mode", mode}});
-          return std::vector{row};
-        });
-    }
-}
-
-// Every row says when the reference recovered in its case: Gauss-Seidel in double precision.
-void add_reference(ordered_json& rows) {
-  for (const auto& reference : rows)
-    if (reference["mode"] == "cpu-double")
-      for (auto& row : rows)
-        if (row["case"] == reference["case"] && row["mesh"] == reference["mesh"])
-          row["reference_recovered_at_step"] = reference["recovered_at_step"];
-}
-
-/// Runs what `add` gives the sweep, or merges shards of it.
-ordered_json run_or_merge(Sweep& sweep, const CompareOptions& options, const std::function<void()>& add) {
-  make_output_folder(options.out);
-  std::optional<HeadlessContext> context;
-  if (options.shards.merge.empty()) {
-    add();
-    context.emplace(options.gpu);
-    sweep.facts["device"] = device_json(context->capabilities());
-  }
-  return run_sweep(sweep, options.shards);
-}
-
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
   Sweep sweep{"compare", "comparison", split(compare_columns, ','), 5, compare_table, {}};
   sweep.facts = {{"steps", options.steps}, {"dt", 0.005}};
-  ordered_json document = run_or_merge(sweep, options, [&] {
+  ordered_json document = run_or_merge(sweep, options.shards, options.out, options.gpu, [&] {
     const Scene scene = load_scene(options.scene, options.overrides);
     sweep.facts["dt"] = scene.settings.dt;
     const auto model = build_model(scene);
     const long steps = options.steps;
     if (options.judge == "motion") require_motion(scene, *model, steps);
     Axes axes = options.axes;
-    for (const Baseline& baseline : baselines) {
+    for (const Baseline& baseline : baselines()) {
       if (std::erase(axes.modes, baseline.name) == 0) continue;
-      if (baseline.soft != compliant(scene.settings))
+      if (!baseline.suits(scene.settings))
         throw Error("no baseline for this scene", baseline.name,
-                    "rigid-body is for k = 1, direct for compliance and materials");
+                    fmt::format("it is for scenes {}", baseline.scenes));
       Axes own = options.axes;
       own.modes = {}, own.omegas = {};
       for (Settings settings : combinations(scene.settings, own)) {
@@ -448,28 +249,6 @@ int run_compare(const CompareOptions& options) {
   if (const Chart course = course_chart(document); !course.series.empty())
     write_chart(options.out / "motion", course);
   return 0;
-}
-
-std::optional<long> recovered_at(const std::vector<Measurement>& measurements, long steps) {
-  std::optional<long> step;
-  for (auto m = measurements.rbegin(); m != measurements.rend(); ++m) {
-    if (!(std::abs(m->volume_error_percent) < 1) || m->inverted_tets > 0 || !m->finite()) break;
-    step = m->step;
-  }
-  return step && double(*step) <= 0.95 * double(steps) ? step : std::nullopt;
-}
-
-int run_hard_cases(const CompareOptions& options) {
-  Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), 3, case_table, {}};
-  sweep.facts = ordered_json::object();
-  for (const char* guard : guard_names) sweep.columns.push_back(fmt::format("guard_{}", guard));
-  ordered_json document = run_or_merge(sweep, options, [&] { add_cases(sweep, options); });
-  ordered_json& rows = document["rows"];
-  const auto name = [](const ordered_json& row) { return std::tie(row["case"], row["mesh"], row["mode"]); };
-  std::sort(rows.begin(), rows.end(), [&](const auto& a, const auto& b) { return name(a) < name(b); });
-  add_reference(rows);
-  print_table(sweep, document);
-  return write_sweep(sweep, options.out, document);
 }
 
 }  // namespace tetpbd

@@ -155,6 +155,9 @@ void add_axes(CLI::App& command, Axes& axes) {
   add(command, "--substeps", axes.substeps, 1, 100000, "substeps a step");
   add(command, "--rigid-contact", axes.rigid_contact, 0, 1,
       "whether touching hard bodies move as rigid ones (default: bench 0, as published; else the scene's)");
+  add(command, "--mass-splitting", axes.mass_splitting, 0, 1,
+      "whether masses are split; else corrections are averaged (default: bench 0, as published; else the "
+      "scene's)");
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -289,8 +292,9 @@ void add_commands(CLI::App& app, Arguments& a) {
         a.compare.axes.modes = hard_case_modes, a.compare.steps = 0, a.compare.out = "stability";
       },
       "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
-      "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 % and no tet "
-      "inverted; scenes in which no constraint acts are left out");
+      "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 %, no tet "
+      "inverted "
+      "and hard bodies within 1 % of their shape; scenes in which no constraint acts are left out");
   add(compare, "--scene", a.compare.scene, "a scene");
   add_overrides(compare, a.compare.overrides);
   add_axes(compare, a.compare.axes);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -123,6 +124,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   });
   vary(axes.modes, [](Settings& s, const std::string& mode) { set_mode(s, mode, "--modes"); });
   vary(axes.rigid_contact, [](Settings& s, int on) { s.rigid_contact = on != 0; });
+  vary(axes.mass_splitting, [](Settings& s, int on) { s.mass_splitting = on != 0; });
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
   vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
   vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });
@@ -135,6 +137,18 @@ ordered_json run_sweep(const Sweep& sweep, const Shards& shards) {
   if (interrupted()) throw Error("interrupted", "before the first row", "nothing was written", 1);
   throw Error("nothing to run", fmt::format("--shard {}/{}", shards.shard, shards.shards),
               "name combinations that there are, and no more shards than those");
+}
+
+ordered_json run_or_merge(Sweep& sweep, const Shards& shards, const std::filesystem::path& out, int gpu,
+                          const std::function<void()>& add) {
+  make_output_folder(out);
+  std::optional<HeadlessContext> context;
+  if (shards.merge.empty()) {
+    add();
+    context.emplace(gpu);
+    sweep.facts["device"] = device_json(context->capabilities());
+  }
+  return run_sweep(sweep, shards);
 }
 
 void print_table(const Sweep& sweep, const ordered_json& document) {

@@ -20,7 +20,7 @@ struct Axes {
   std::vector<std::string> modes{}, constraint_sets{};  ///< sets of kinds joined by +
   std::vector<double> omegas{};
   std::vector<int> iterations{}, substeps{};
-  std::vector<int> rigid_contact{};  ///< 0 or 1, one at most: it is no column
+  std::vector<int> rigid_contact{}, mass_splitting{};  ///< 0 or 1, one at most: they tell no rows apart
 };
 /// Every combination, the last of the lists varying fastest. Throws Error.
 std::vector<Settings> combinations(const Settings& base, const Axes& axes);
@@ -44,6 +44,9 @@ struct Shards {
 /// The facts, "combinations", "shard", "shards" and "rows", those that were finished if interrupted. Throws
 /// Error if there are none.
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards = {});
+/// Of what `add` gives the sweep in a context of its own, which is among the facts; or the shards to merge.
+ordered_json run_or_merge(Sweep& sweep, const Shards& shards, const std::filesystem::path& out, int gpu,
+                          const std::function<void()>& add);
 /// The device, the table's head, the rows so far.
 void print_table(const Sweep& sweep, const ordered_json& document);
 /// Writes NAME.json and NAME.csv and says where. The exit status: 1 if a row is not finite, else 0. Throws

@@ -4,7 +4,7 @@
 docs/make_tables.py fronts R DATE: speed against error, and the paper's experiments (kept as they are without R/rep)
 
   for s in bunny-drop armadillo-drop dragon-drop bunny-100k.json; do
-    c() { tetpbd compare --rigid-contact 0 --scene $s --steps 200 --out R/c/${s%-drop}_$n "$@"; n=$((n + 1)); }; n=1
+    c() { tetpbd compare --rigid-contact 0 --mass-splitting 0 --scene $s --steps 200 --out R/c/${s%-drop}_$n "$@"; n=$((n + 1)); }; n=1
     c --modes node --iterations 1 --substeps 1,2,3,5,7,10,12,15,20,30,50,100
     c --modes node --iterations 1 --substeps 5,10,20,50 --omegas 2.5
     c --modes node,constraint --iterations 5,25 --substeps 1,5,20

@@ -50,8 +50,8 @@ const std::vector<Parameter>& parameters() {
          "modes)",
          0, 4},
         {"mass_splitting", "solver", &S::mass_splitting,
-         "masses shared out among a vertex's constraints: keeps momentum (modes node, constraint); "
-         "with compliance always"},
+         "masses shared out among a vertex's constraints, which keeps momentum; else corrections are "
+         "averaged, as in the paper (modes node, constraint); with compliance always"},
         {"iterations", "solver", &S::iterations, "iterations per substep", 0, 100000, "", true},
         {"substeps", "solver", &S::substeps, "substeps per step", 1, 100000, "", true},
         {"dt", "solver", &S::dt, "time of one step", 1e-6, 1, "s", true},
@@ -185,9 +185,9 @@ const std::vector<Preset>& solver_presets() {
       {"paper", "25 iterations a step, averaged",
        "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false,rigid_contact=false"},
       {"hard", "5 substeps of 1 iteration, for bodies with k = 1",
-       "mode=node,iterations=1,substeps=5,omega=1.5,rigid_contact=true"},
+       "mode=node,iterations=1,substeps=5,omega=1.5,mass_splitting=true,rigid_contact=true"},
       {"substeps", "20 substeps of 1 iteration",
-       "mode=node,iterations=1,substeps=20,omega=1.5,rigid_contact=true"},
+       "mode=node,iterations=1,substeps=20,omega=1.5,mass_splitting=true,rigid_contact=true"},
   };
   return rows;
 }
@@ -222,10 +222,14 @@ bool uses(const Settings& settings, const ConstraintKind& kind) {
 }
 
 bool rigid_in_contact(const Settings& settings) {
-  bool hard = settings.rigid_contact && !compliant(settings) && uses(settings, Stretch::row);
+  return settings.rigid_contact && hard(settings) && uses(settings, Stretch::row) && settings.mode != "paper";
+}
+
+bool hard(const Settings& settings) {
+  bool all = !compliant(settings);
   for (std::size_t k = 0; k < kind_count; ++k)
-    hard = hard && (settings.stiffness[k] == 1 || !uses(settings, constraint_kinds[k]));
-  return hard && settings.mode != "paper";
+    all = all && (settings.stiffness[k] == 1 || !uses(settings, constraint_kinds[k]));
+  return all;
 }
 
 bool compliant(const Settings& settings) {

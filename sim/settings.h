@@ -26,7 +26,7 @@ struct Settings {
   double poisson_ratio = 0.3;
   double constraint_damping = 0;
   double omega = 1.5;
-  bool mass_splitting = false;
+  bool mass_splitting = true;
   int iterations = 1;
   int substeps = 20;
   double dt = 0.005;
@@ -108,6 +108,9 @@ bool damped(const Settings& settings);
 /// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use hold a
 /// shape, all with k = 1.
 bool rigid_in_contact(const Settings& settings);
+/// All kinds in use have k = 1 and nothing has compliance: the exact answer is a rigid body, if they include
+/// stretch.
+bool hard(const Settings& settings);
 /// The kinds in use, as the setting `constraints` lists them: the material's, if there is one.
 std::string kinds_in_use(const Settings& settings);
 bool uses(const Settings& settings, const ConstraintKind& kind);  ///< whether it is one of them

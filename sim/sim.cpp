@@ -13,6 +13,7 @@
 #include "sim/material.h"
 #include "sim/parallel.h"
 #include "sim/solvers/cpu_pbd.h"
+#include "sim/solvers/substep.h"
 
 namespace tetpbd {
 
@@ -56,7 +57,7 @@ void write_step_block(Sim& sim) {
   block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
   // With compliance always: with averages, a constraint's multiplier would not be what its vertices were
   // moved by.
-  block.mass_splitting = s.mass_splitting || soft;
+  block.mass_splitting = splits_masses(s);
   block.quantum = float(sim.quantum);
   block.inverse_quantum = float(1 / sim.quantum);
   block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));

@@ -243,11 +243,15 @@ TEST_CASE("hard cases: recovered is what stays good for the last 5 % of the step
     for (int s = 0; s <= 100; ++s) measurements[s].step = s, measurements[s].inverted_tets = s < bad;
     return measurements;
   };
-  CHECK(recovered_at(series(0), 100) == 0);
-  CHECK(recovered_at(series(95), 100) == 95);
-  CHECK_FALSE(recovered_at(series(96), 100));
-  CHECK_FALSE(recovered_at(series(100), 100));
-  CHECK_FALSE(recovered_at(series(101), 100));
+  CHECK(recovered_at(series(0), 100, true) == 0);
+  CHECK(recovered_at(series(95), 100, true) == 95);
+  CHECK_FALSE(recovered_at(series(96), 100, true));
+  CHECK_FALSE(recovered_at(series(100), 100, true));
+  CHECK_FALSE(recovered_at(series(101), 100, true));
+  auto bent = series(50);
+  for (Measurement& m : bent) m.rigid_distance = 0.02;  // the volume is right and the shape is not
+  CHECK_FALSE(recovered_at(bent, 100, true));
+  CHECK(recovered_at(bent, 100, false) == 50);
 }
 
 TEST_CASE("hard cases: where no constraint acts there is nothing to recover by") {

@@ -87,7 +87,7 @@ template <class Kind, class real, class Vertices>
 /// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
 /// finer: their rounding is what moves the centre of a free body then.
 inline double longest_correction(const Model& model, const Settings& settings) {
-  return settings.mass_splitting || compliant(settings) ? model.size / 64 : model.size;
+  return splits_masses(settings) ? model.size / 64 : model.size;
 }
 
 /// `jacobi`: all corrections from the same positions, averaged with omega / n_i, or with
@@ -125,7 +125,7 @@ class CpuPbd {
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
-    if (jacobi && (soft || settings.mass_splitting))
+    if (jacobi && splits_masses(settings))
       for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
     GuardCounts guards{};
     const Vertices vertices{x, start, weights, jacobi ? sums : x};

@@ -9,6 +9,11 @@
 
 namespace tetpbd {
 
+/// Whether Jacobi shares masses out among a vertex's constraints; else it averages corrections.
+inline bool splits_masses(const Settings& settings) {
+  return (settings.mass_splitting && settings.mode != "paper") || compliant(settings);
+}
+
 /// What moves a vertex in a substep besides its constraints.
 struct Substep {
   double h, velocity_scale, friction;

@@ -1,0 +1,108 @@
+#include "app/baselines.h"
+
+#include "sim/interrupt.h"
+#include "sim/material.h"
+#include "sim/reference/implicit.h"
+#include "sim/reference/rigid.h"
+#include "sim/solvers/rigid_contact.h"
+
+namespace tetpbd {
+
+namespace {
+
+using std::chrono::steady_clock;
+
+/// Steps that `advance` takes and `state` shows, held against the right motion.
+MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
+                         const std::function<void()>& advance, const std::function<State()>& state) {
+  MeasuredRun run;
+  const double ground = settings.ground ? settings.ground_height : 0;
+  for (long s = 0; s <= steps && !interrupted(); ++s) {
+    if (s > 0) {
+      const auto begin = steady_clock::now();
+      advance();
+      run.wall_ms.push_back(1e3 * seconds_since(begin));
+    }
+    const State now = state();
+    Measurement m;
+    m.step = s, m.time = double(s) * settings.dt;
+    double mass = 0;
+    for (std::size_t i = 0; i < now.positions.size(); ++i) {
+      const double own = model.masses[i];
+      mass += own, m.centre += own * now.positions[i];
+      m.kinetic += own / 2 * glm::dot(now.velocities[i], now.velocities[i]);
+      m.potential += own * settings.gravity * (now.positions[i].y - ground);
+    }
+    m.centre /= mass;
+    run.measurements.push_back(m);
+    run.steps = s;
+    if (!right || !is_kept(*right, s)) continue;
+    if (!run.motion) run.motion = MotionError{};
+    add_state(*run.motion, *right, model, s, now);
+    run.motion_over_time.push_back({m.time, run.motion->final});
+  }
+  return run;
+}
+
+/// A rigid body of six degrees of freedom, where k = 1: flight as in rigid.h, contact as the modes have it
+/// (rigid_contact.h), in double.
+MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+  std::vector<RigidBody> bodies = rigid_bodies(model);
+  Settings touching = settings;
+  touching.rigid_contact = true;
+  RigidContact contact(model, touching);
+  const Substep substep(model, settings);
+  const Model nothing;  // to touch: contact is found here
+  Settings flight = settings, carried = settings;
+  flight.ground = carried.ground = false, carried.gravity = 0;
+  State now = state_of(model, bodies);
+  struct Place {
+    const Points& points;
+    const glm::dvec3& at(std::uint32_t i) const { return points[i]; }
+  };
+  return baseline_run(
+      model, settings, steps, right,
+      [&] {
+        for (int s = 0; s < settings.substeps; ++s) {
+          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities);
+          for (RigidBody& body : bodies) {
+            const bool touches = contact.carries(body.first);
+            if (touches) {
+              body.velocity = body.angular = glm::dvec3(0);
+              for (std::size_t i = body.first; i < body.first + body.rest.size(); ++i) {
+                const glm::dvec3 momentum = model.masses[i] * now.velocities[i];
+                body.velocity += momentum / body.mass;
+                body.angular += glm::cross(now.positions[i] - body.centre, momentum);
+              }
+            }
+            advance(body, nothing, touches ? carried : flight, substep.h);
+          }
+          now = state_of(model, bodies);
+        }
+      },
+      [&] { return now; });
+}
+
+/// Newton steps with sparse Cholesky factors, `iterations` of them in each implicit step.
+MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+  const ConstraintSystem system = build_constraints(model.rest, settings);
+  const ReferenceInput input{model, system, settings, model.inverse_masses};
+  Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities},
+                          settings.dt / settings.substeps);
+  run.most = settings.iterations;
+  return baseline_run(
+      model, settings, steps, right, [&] { advance(run, settings.substeps); }, [&] { return run.now; });
+}
+
+}  // namespace
+
+const std::vector<Baseline>& baselines() {
+  static const std::vector<Baseline> rows = {
+      {"rigid-body", "with k = 1 and stretch",
+       [](const Settings& s) { return hard(s) && uses(s, Stretch::row); }, rigid_run},
+      {"direct", "with compliance or a material", compliant, direct_run},
+  };
+  return rows;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,17 @@
+// What else would solve a scene, on one core: no solver modes, but what modes have to face.
+#pragma once
+
+#include "app/run_loop.h"
+
+namespace tetpbd {
+
+struct Baseline {
+  const char* name;
+  const char* scenes;  ///< it is for
+  bool (*suits)(const Settings&);
+  /// Steps, each measured and held against the right motion, where there is one.
+  MeasuredRun (*run)(const Model&, const Settings&, long steps, const Motion* right);
+};
+const std::vector<Baseline>& baselines();
+
+}  // namespace tetpbd

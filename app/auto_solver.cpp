@@ -111,7 +111,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
         choice.judged = "volume";
       }
     }
-    for (int attempt = 0; attempt < 3; ++attempt) {
+    for (int attempt = 1;; ++attempt) {
       apply_settings(sim, trial.settings);
       reset(sim);
       Metrics metrics = create_metrics(*model, sim.system);
@@ -126,7 +126,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
                     : run.motion       ? 100 * run.motion->rms
                                        : run.errors.max_volume_loss_percent;
       // In contact a step takes longer than those it was fitted to.
-      if (trial.fits || own || trial.settings.substeps == 1) break;
+      if (trial.fits || own || trial.settings.substeps == 1 || attempt == 3) break;
       trial.settings.substeps =
           std::max(1, int(trial.settings.substeps * std::min(0.95, budget_ms / trial.ms)));
     }

@@ -16,30 +16,18 @@ using std::chrono::steady_clock;
 MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
                          const std::function<void()>& advance, const std::function<State()>& state) {
   MeasuredRun run;
-  const double ground = settings.ground ? settings.ground_height : 0;
   for (long s = 0; s <= steps && !interrupted(); ++s) {
     if (s > 0) {
       const auto begin = steady_clock::now();
       advance();
       run.wall_ms.push_back(1e3 * seconds_since(begin));
     }
-    const State now = state();
-    Measurement m;
-    m.step = s, m.time = double(s) * settings.dt;
-    double mass = 0;
-    for (std::size_t i = 0; i < now.positions.size(); ++i) {
-      const double own = model.masses[i];
-      mass += own, m.centre += own * now.positions[i];
-      m.kinetic += own / 2 * glm::dot(now.velocities[i], now.velocities[i]);
-      m.potential += own * settings.gravity * (now.positions[i].y - ground);
-    }
-    m.centre /= mass;
-    run.measurements.push_back(m);
+    const Motion::Row now = measured(model, settings, state(), double(s) * settings.dt);
+    Measurement& m = run.measurements.emplace_back();
+    m.step = s, m.time = now.time;
+    m.centre = now.centre, m.kinetic = now.kinetic, m.potential = now.potential;
     run.steps = s;
-    if (!right || !is_kept(*right, s)) continue;
-    if (!run.motion) run.motion = MotionError{};
-    add_state(*run.motion, *right, model, s, now);
-    run.motion_over_time.push_back({m.time, run.motion->final});
+    hold_against(run, right, model, s, now.time, state);
   }
   return run;
 }

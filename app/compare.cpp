@@ -203,6 +203,8 @@ int run_compare(const CompareOptions& options) {
     const auto model = build_model(scene);
     const long steps = options.steps;
     if (options.judge == "motion") require_motion(scene, *model, steps);
+    // The same for all rows: what is varied decides how the scene is solved, not how it moves.
+    const auto right = std::make_shared<const std::optional<Motion>>(right_motion(*model, scene.settings));
     Axes axes = options.axes;
     for (const Baseline& baseline : baselines()) {
       if (std::erase(axes.modes, baseline.name) == 0) continue;
@@ -214,8 +216,7 @@ int run_compare(const CompareOptions& options) {
       for (Settings settings : combinations(scene.settings, own)) {
         settings.mode = baseline.name;
         sweep.work.push_back([=] {
-          const auto right = right_motion(*model, settings);
-          const MeasuredRun run = baseline.run(*model, settings, steps, right ? &*right : nullptr);
+          const MeasuredRun run = baseline.run(*model, settings, steps, *right ? &**right : nullptr);
           ordered_json row = compared(scene, *model, settings, run);
           for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
           return std::vector{row};
@@ -225,8 +226,7 @@ int run_compare(const CompareOptions& options) {
     if (axes.modes.empty() && !options.axes.modes.empty()) return;
     for (const Settings& settings : combinations(scene.settings, axes))
       sweep.work.push_back([=] {
-        const auto right = right_motion(*model, settings);
-        const MeasuredRun run = run_model(model, settings, steps, right ? &*right : nullptr);
+        const MeasuredRun run = run_model(model, settings, steps, *right ? &**right : nullptr);
         ordered_json row = compared(scene, *model, settings, run);
         row["reference_distance"] = remaining_after_one_step(model, settings);
         return std::vector{row};

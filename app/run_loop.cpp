@@ -40,6 +40,14 @@ void Progress::update(long done) {
                           seconds_since(start) * double(total - done) / double(done)));
 }
 
+void hold_against(MeasuredRun& run, const Motion* right, const Model& model, long step, double time,
+                  const std::function<State()>& state) {
+  if (!right || !is_kept(*right, step)) return;
+  if (!run.motion) run.motion = MotionError{};
+  add_state(*run.motion, *right, model, step, state());
+  run.motion_over_time.push_back({time, run.motion->final});
+}
+
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
   MeasuredRun run;
   sim.timed = plan.timed;
@@ -53,14 +61,12 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     }
     while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.push_back(*ms);
   };
-  const auto hold_against = [&](long s) {
-    if (!plan.right || !is_kept(*plan.right, s)) return;
-    if (!run.motion) run.motion = MotionError{};
-    add_state(*run.motion, *plan.right, *sim.model, s, read_state(sim));
-    run.motion_over_time.push_back({double(s) * sim.settings.dt, run.motion->final});
+  const auto hold = [&](long s) {
+    hold_against(run, plan.right, *sim.model, s, double(s) * sim.settings.dt,
+                 [&] { return read_state(sim); });
   };
   if (metrics) measure(*metrics, sim);
-  hold_against(0);
+  hold(0);
   const auto begin = steady_clock::now();
   while (run.steps < steps && !interrupted() && !check_finite(sim)) {
     const auto step_begin = steady_clock::now();
@@ -74,7 +80,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     run.steps = s;
     if (plan.wait) run.wall_ms.push_back(seconds * 1e3), run.seconds += seconds;
     take(false);
-    hold_against(s);
+    hold(s);
     if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }

@@ -56,6 +56,11 @@ struct MeasuredRun {
   long steps = 0;      ///< taken, and finite
 };
 
+/// Of a state that the run has reached: its distance from the right motion there, where `right` has that
+/// step.
+void hold_against(MeasuredRun& run, const Motion* right, const Model& model, long step, double time,
+                  const std::function<State()>& state);
+
 /// Steps `steps` times. Ends early when the state is not finite (its errors then say so) or when
 /// interrupted() says so: ask it before making anything of the result. No metrics: nothing is measured.
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});

@@ -55,8 +55,6 @@ void write_step_block(Sim& sim) {
   block.velocity_scale = float(std::exp(-s.damping * h));
   block.max_correction = float(longest_correction(*sim.model, s));
   block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
-  // With compliance always: with averages, a constraint's multiplier would not be what its vertices were
-  // moved by.
   block.mass_splitting = splits_masses(s);
   block.quantum = float(sim.quantum);
   block.inverse_quantum = float(1 / sim.quantum);

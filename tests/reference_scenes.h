@@ -8,6 +8,7 @@
 #include <random>
 
 #include "sim/error.h"
+#include "sim/material.h"
 #include "sim/reference/reference.h"
 
 namespace reference_scenes {
@@ -68,6 +69,33 @@ inline Scene chain_scene(const std::vector<glm::dvec3>& positions,
     scene.system.lists[0].vertices.insert(scene.system.lists[0].vertices.end(), {i, i + 1});
     scene.system.lists[0].rest.push_back(glm::length(positions[i + 1] - positions[i]));
   }
+  return scene;
+}
+
+// Of all kinds: materials have their own.
+inline const Compliances none = [] {
+  Compliances all;
+  all.fill(infinity);
+  return all;
+}();
+
+// Relative; doctest's Approx has a floor of 1.
+inline double off(double value, double right) { return std::abs(value / right - 1); }
+
+// A clamped block of `material`, with what a run of it needs.
+inline Scene beam_of(const std::string& material, const glm::ivec3& cells, double young_modulus,
+                     double poisson_ratio, const glm::dvec3& size = {1, 0.25, 0.25}) {
+  Scene scene;
+  scene.settings.material = material;
+  scene.settings.young_modulus = young_modulus, scene.settings.poisson_ratio = poisson_ratio;
+  scene.settings.ground = false;
+  const TetMesh mesh = make_block(size, cells);
+  std::vector<std::uint32_t> fixed;
+  const double end = bounds(mesh.positions).low.x;
+  for (std::uint32_t i = 0; i < mesh.positions.size(); ++i)
+    if (mesh.positions[i].x < end + 1e-9) fixed.push_back(i);
+  add_body(scene.model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), fixed);
+  scene.system = build_constraints(scene.model.rest, scene.settings);
   return scene;
 }
 

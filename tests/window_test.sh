@@ -138,7 +138,7 @@ await '^set omega 1\.2'
 choose mode cpu; await '^set mode cpu'
 key s; await '^step'
 choose mode node; await '^set mode node'
-choose solver auto; await '^message solver: '; shot auto.png
+choose solver auto; await '^message solver: (node|cpu-fast), '; shot auto.png
 choose solver paper; await '^set iterations 25'
 choose solver substeps; await '^set substeps 20'
 click bend 0.1; await '^set constraints stretch,volume'

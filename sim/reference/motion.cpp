@@ -103,13 +103,11 @@ Pair pair_of(double dt, long steps, const Make& make, const Arrays& arrays) {
   return pair;
 }
 
-Pair leapfrog_pair(const ReferenceInput& input) {
-  const Compliances compliances = compliances_of(input);
-  const double stable = stable_step(input, compliances, input.model.rest.positions);
+Pair leapfrog_pair(const ReferenceInput& input, double stable) {
   const State start{input.model.positions, input.model.velocities};
   return pair_of(
       input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
-      [&](double h) { return leapfrog(input, compliances, start, h); },
+      [&](double h) { return leapfrog(input, compliances_of(input), start, h); },
       [](Leapfrog& run, auto&& each) { each(run.x), each(run.v); });
 }
 
@@ -122,29 +120,6 @@ Pair implicit_pair(const ReferenceInput& input) {
         for (State* state : {&run.now, &run.before}) each(state->positions), each(state->velocities);
         each(run.anew), each(run.touching);
       });
-}
-
-const char* usual_method(const ReferenceInput& input) {
-  if (!compliant(input.settings)) return "rigid body";
-  const double stable = stable_step(input, compliances_of(input), input.model.rest.positions);
-  return most_stable * stable < input.settings.dt ? "implicit" : "leapfrog";
-}
-
-Motion::Row measured(const ReferenceInput& input, const State& state, double time, double error) {
-  Motion::Row row;
-  row.time = time, row.error = error;
-  const double ground = input.settings.ground ? input.settings.ground_height : 0;
-  double mass = 0;
-  for (std::size_t i = 0; i < state.positions.size(); ++i) {
-    const double m = input.model.masses[i];
-    mass += m;
-    row.centre += m * state.positions[i];
-    row.velocity += m * state.velocities[i];
-    row.kinetic += 0.5 * m * glm::dot(state.velocities[i], state.velocities[i]);
-    row.potential += m * input.settings.gravity * (state.positions[i].y - ground);
-  }
-  row.centre /= mass, row.velocity /= mass;
-  return row;
 }
 
 // What is done so far, for a later run to take up; its checksum has `key` in it, the scene and the number of
@@ -173,6 +148,23 @@ bool load_unfinished(const std::filesystem::path& file, std::uint64_t key, Motio
 }
 
 }  // namespace
+
+Motion::Row measured(const Model& model, const Settings& settings, const State& state, double time) {
+  Motion::Row row;
+  row.time = time;
+  const double ground = settings.ground ? settings.ground_height : 0;
+  double mass = 0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i) {
+    const double m = model.masses[i];
+    mass += m;
+    row.centre += m * state.positions[i];
+    row.velocity += m * state.velocities[i];
+    row.kinetic += 0.5 * m * glm::dot(state.velocities[i], state.velocities[i]);
+    row.potential += m * settings.gravity * (state.positions[i].y - ground);
+  }
+  row.centre /= mass, row.velocity /= mass;
+  return row;
+}
 
 Compliances compliances_of(const ReferenceInput& input) {
   Compliances compliances;
@@ -205,12 +197,17 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   require_answer(input);
   Motion motion;
   motion.method = method;
-  if (method.empty()) motion.method = usual_method(input);
-  if ((motion.method == "rigid body") == compliant(input.settings))
+  const bool soft = compliant(input.settings);
+  const double stable = !soft || method == "implicit"
+                            ? 0
+                            : stable_step(input, compliances_of(input), input.model.rest.positions);
+  if (method.empty())
+    motion.method = !soft ? "rigid body" : most_stable * stable < input.settings.dt ? "implicit" : "leapfrog";
+  if ((motion.method == "rigid body") == soft)
     throw Error("no method for this scene", method,
                 "with compliance or a material leapfrog or implicit, for k = 1 a rigid body");
   const Pair pair = motion.method == "implicit"   ? implicit_pair(input)
-                    : motion.method == "leapfrog" ? leapfrog_pair(input)
+                    : motion.method == "leapfrog" ? leapfrog_pair(input, stable)
                                                   : rigid_pair(input);
   motion.scene = scene_key(input);
   motion.dt = input.settings.dt, motion.step = pair.step;
@@ -219,8 +216,8 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   const long keep_every = long(std::ceil(double(steps) / double(instants - 1)));
   const auto add = [&](long step) {
     const State fine = pair.fine();
-    motion.rows.push_back(
-        measured(input, fine, double(step) * motion.dt, error_to(input.model, fine, pair.coarse())));
+    motion.rows.push_back(measured(input.model, input.settings, fine, double(step) * motion.dt));
+    motion.rows.back().error = error_to(input.model, fine, pair.coarse());
     if (step % keep_every != 0 && step != steps) return;
     motion.kept.push_back(step);
     motion.positions.push_back(fine.positions);

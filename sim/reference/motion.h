@@ -31,6 +31,8 @@ struct Motion {
   std::vector<Points> positions;
 };
 
+/// Of a state at `time` (s), but for the error.
+Motion::Row measured(const Model& model, const Settings& settings, const State& state, double time);
 /// Those of the settings; of kinds that are absent, or a material's, infinity.
 Compliances compliances_of(const ReferenceInput& input);
 /// Of all that decides the motion: mesh, masses, start, kinds and compliances, world, `dt`. Not of how it is

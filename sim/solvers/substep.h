@@ -9,7 +9,8 @@
 
 namespace tetpbd {
 
-/// Whether Jacobi shares masses out among a vertex's constraints; else it averages corrections.
+/// Whether Jacobi shares masses out among a vertex's constraints; else it averages corrections. With
+/// compliance always: with averages, a constraint's multiplier would not be what its vertices were moved by.
 inline bool splits_masses(const Settings& settings) {
   return (settings.mass_splitting && settings.mode != "paper") || compliant(settings);
 }

@@ -4,8 +4,10 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <memory>
+#include <thread>
 
 #include "sim/solvers/colours.h"
 #include "sim/solvers/cpu_pbd.h"
@@ -90,34 +92,72 @@ inline FloatRow load(const float* from) {
   return row;
 }
 
-// By vertex and lane: first positions relative to the first vertex and inverse masses, then corrections.
+// Four rows become four columns.
+[[gnu::always_inline]] inline void transpose(FloatRow (&r)[4]) {
+  using Pick = std::int32_t __attribute__((vector_size(16)));
+  const FloatRow xy01 = __builtin_shuffle(r[0], r[1], Pick{0, 4, 1, 5}),
+                 xy23 = __builtin_shuffle(r[2], r[3], Pick{0, 4, 1, 5}),
+                 zw01 = __builtin_shuffle(r[0], r[1], Pick{2, 6, 3, 7}),
+                 zw23 = __builtin_shuffle(r[2], r[3], Pick{2, 6, 3, 7});
+  r[0] = __builtin_shuffle(xy01, xy23, Pick{0, 1, 4, 5});
+  r[1] = __builtin_shuffle(xy01, xy23, Pick{2, 3, 6, 7});
+  r[2] = __builtin_shuffle(zw01, zw23, Pick{0, 1, 4, 5});
+  r[3] = __builtin_shuffle(zw01, zw23, Pick{2, 3, 6, 7});
+}
+
+// By vertex, coordinate and lane: first positions relative to the first vertex, then corrections; fourth,
+// inverse masses.
 template <class Kind>
-using Rows = float[std::size_t(Kind::row.arity)][lanes][4];
+using Columns = float[std::size_t(Kind::row.arity)][4][lanes];
 
 template <class Kind>
 [[gnu::always_inline]] inline void gather(const Batch<Kind>& batch, const std::vector<Vertex>& x,
-                                          Rows<Kind>& rows) {
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    Row origin = x[batch.vertices[0][lane]].row;
-    store(rows[0][lane], FloatRow{0, 0, 0, float(origin[3])});
-    origin[3] = 0;
-    for (std::size_t j = 1; j < std::size_t(Kind::row.arity); ++j)
-      store(rows[j][lane], __builtin_convertvector(x[batch.vertices[j][lane]].row - origin, FloatRow));
+                                          Columns<Kind>& columns) {
+  for (std::size_t lane = 0; lane < lanes; lane += 4) {
+    Row origins[4];
+#pragma GCC unroll 4
+    for (std::size_t i = 0; i < 4; ++i) {
+      origins[i] = x[batch.vertices[0][lane + i]].row;
+      columns[0][3][lane + i] = float(origins[i][3]);
+      origins[i][3] = 0;
+    }
+#pragma GCC unroll 4
+    for (std::size_t j = 1; j < std::size_t(Kind::row.arity); ++j) {
+      FloatRow rows[4];
+#pragma GCC unroll 4
+      for (std::size_t i = 0; i < 4; ++i)
+        rows[i] = __builtin_convertvector(x[batch.vertices[j][lane + i]].row - origins[i], FloatRow);
+      transpose(rows);
+#pragma GCC unroll 4
+      for (std::size_t axis = 0; axis < 4; ++axis) store(&columns[j][axis][lane], rows[axis]);
+    }
   }
 }
 
 template <class Kind>
-[[gnu::always_inline]] inline void scatter(const Batch<Kind>& batch, Work& work, const Rows<Kind>& rows) {
-  for (std::size_t lane = 0; lane < batch.count; ++lane)
-    for (std::size_t j = 0; j < std::size_t(Kind::row.arity); ++j)
-      work.x[batch.vertices[j][lane]].row += __builtin_convertvector(load(rows[j][lane]), Row);
+[[gnu::always_inline]] inline void scatter(const Batch<Kind>& batch, Work& work,
+                                           const Columns<Kind>& columns) {
+  const auto add = [&](std::size_t lane, std::size_t count) __attribute__((always_inline)) {
+#pragma GCC unroll 4
+    for (std::size_t j = 0; j < std::size_t(Kind::row.arity); ++j) {
+      FloatRow rows[4] = {};
+#pragma GCC unroll 3
+      for (std::size_t axis = 0; axis < 3; ++axis) rows[axis] = load(&columns[j][axis][lane]);
+      transpose(rows);
+      for (std::size_t i = 0; i < count; ++i)
+        work.x[batch.vertices[j][lane + i]].row += __builtin_convertvector(rows[i], Row);
+    }
+  };
+  std::size_t lane = 0;
+  for (; lane + 4 <= batch.count; lane += 4) add(lane, 4);
+  if (lane < batch.count) add(lane, batch.count - lane);
 }
 
 // Corrections in place of positions; false, and multipliers as they were, if a guard triggered.
 template <class Kind, bool damped>
 [[gnu::always_inline]] inline bool evaluate(Batch<Kind>& batch, const Softness<Kind>* softness,
-                                            const Rule<float>& rule, Rows<Kind>& rows,
-                                            [[maybe_unused]] const Rows<Kind>& starts) {
+                                            const Rule<float>& rule, Columns<Kind>& columns,
+                                            [[maybe_unused]] const Columns<Kind>& starts) {
   constexpr std::size_t arity = std::size_t(Kind::row.arity), components = std::size_t(Kind::row.components),
                         values = std::size_t(Kind::row.values);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
@@ -133,8 +173,8 @@ template <class Kind, bool damped>
     float w[arity];
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < arity; ++j) {
-      x[j] = glm::vec3(rows[j][lane][0], rows[j][lane][1], rows[j][lane][2]);
-      w[j] = rows[j][lane][3];
+      x[j] = j == 0 ? glm::vec3(0) : glm::vec3(columns[j][0][lane], columns[j][1][lane], columns[j][2][lane]);
+      w[j] = columns[j][3][lane];
     }
     float rest[values], a[components];
     for (std::size_t v = 0; v < values; ++v) rest[v] = batch.rest[v][lane];
@@ -144,7 +184,8 @@ template <class Kind, bool damped>
     if constexpr (damped) {
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
-        start[j] = glm::vec3(starts[j][lane][0], starts[j][lane][1], starts[j][lane][2]);
+        start[j] =
+            j == 0 ? glm::vec3(0) : glm::vec3(starts[j][0][lane], starts[j][1][lane], starts[j][2][lane]);
       if constexpr (components == 1) {
         const auto then = Kind::template evaluate<float, LaneMath>(start, rest[0], no_ids);
         c.C = Kind::row.rate ? change_of(c, then, x, start) : c.C + gamma * (c.C - then.C);
@@ -170,10 +211,8 @@ template <class Kind, bool damped>
       guards[lane] = m.guards;
     }
 #pragma GCC unroll 4
-    for (std::size_t j = 0; j < arity; ++j) {
-      for (int axis = 0; axis < 3; ++axis) rows[j][lane][axis] = corrections[j][axis];
-      rows[j][lane][3] = 0;
-    }
+    for (std::size_t j = 0; j < arity; ++j)
+      for (int axis = 0; axis < 3; ++axis) columns[j][axis][lane] = corrections[j][axis];
   }
   std::uint32_t triggered = 0;
   for (std::uint32_t lane : guards) triggered |= lane;
@@ -185,31 +224,19 @@ template <class Kind, bool damped>
 template <class Kind, bool damped>
 [[gnu::always_inline]] inline void project_batches(Work& work, std::size_t begin, std::size_t end,
                                                    const Rule<float>& rule, bool first, GuardCounts& guards) {
-  // Some batches together: reading a row's floats as vectors right after storing the row would wait for the
-  // stores.
-  constexpr std::size_t together = 4;
   Batch<Kind>* batches = std::get<Batches<Kind>>(work.batches).data();
   const auto& own = std::get<Softnesses<Kind>>(work.softnesses);
-  const auto softness_of = [&](std::size_t b) { return own.empty() ? nullptr : &own[b]; };
-  for (std::size_t b = begin; b < end; b += together) {
-    const std::size_t count = std::min(together, end - b);
-    Rows<Kind> rows[together];
-    [[maybe_unused]] Rows<Kind> starts[damped ? together : 1];
-    bool sound[together];
-    for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.x, rows[i]);
-    if constexpr (damped)
-      for (std::size_t i = 0; i < count; ++i) gather(batches[b + i], work.starts, starts[i]);
-    if (first)
-      for (std::size_t i = 0; i < count; ++i)
-        std::fill_n(&batches[b + i].multipliers[0][0], std::size_t(Kind::row.components) * lanes, 0.0f);
-    for (std::size_t i = 0; i < count; ++i)
-      sound[i] =
-          evaluate<Kind, damped>(batches[b + i], softness_of(b + i), rule, rows[i], starts[damped ? i : 0]);
-    for (std::size_t i = 0; i < count; ++i)
-      if (sound[i])
-        scatter(batches[b + i], work, rows[i]);
-      else
-        project_guarded(batches[b + i], softness_of(b + i), work, rule, guards);
+  for (std::size_t b = begin; b < end; ++b) {
+    const Softness<Kind>* softness = own.empty() ? nullptr : &own[b];
+    Columns<Kind> columns;
+    [[maybe_unused]] Columns<Kind> starts;
+    gather(batches[b], work.x, columns);
+    if constexpr (damped) gather(batches[b], work.starts, starts);
+    if (first) std::fill_n(&batches[b].multipliers[0][0], std::size_t(Kind::row.components) * lanes, 0.0f);
+    if (evaluate<Kind, damped>(batches[b], softness, rule, columns, starts))
+      scatter(batches[b], work, columns);
+    else
+      project_guarded(batches[b], softness, work, rule, guards);
   }
 }
 
@@ -224,6 +251,28 @@ WIDEST void project_kind(Work& work, int kind, std::size_t begin, std::size_t en
       project_batches<decltype(is), false>(work, begin, end, rule, first, guards);
   });
 }
+
+// Where threads wait for each other, some hundred times a step. Each writes a number of its own and watches
+// those of the others for a while before it lets others run.
+class Barrier {
+ public:
+  void set(int threads) { arrivals_ = std::vector<Arrivals>(std::size_t(threads)); }
+  void wait(std::size_t thread) {
+    if (arrivals_.size() == 1) return;
+    const unsigned now = arrivals_[thread].count.load(std::memory_order_relaxed) + 1;
+    arrivals_[thread].count.store(now, std::memory_order_release);
+    int looks = 0;
+    for (const Arrivals& other : arrivals_)
+      while (int(other.count.load(std::memory_order_acquire) - now) < 0)
+        if (++looks > 4000) std::this_thread::yield();
+  }
+
+ private:
+  struct alignas(64) Arrivals {
+    std::atomic<unsigned> count = 0;
+  };
+  std::vector<Arrivals> arrivals_;  // by thread
+};
 
 // A colour of a kind: batches [begin, end).
 struct Turn {
@@ -266,6 +315,7 @@ class FastPbd {
     };
     for (std::size_t i = 0; i < x.size(); ++i) move_to(i, state.positions[i]);
     GuardCounts guards{};
+    Barrier barrier;
     const auto substeps = [&](std::size_t thread, std::size_t threads) {
       const std::size_t begin = x.size() * thread / threads, end = x.size() * (thread + 1) / threads;
       const auto for_each_free_vertex = [&](auto&& act) {
@@ -276,16 +326,16 @@ class FastPbd {
       for (int s = 0; s < settings.substeps; ++s) {
         if (damped(settings)) std::copy(&x[begin], &x[end], &work_.starts[begin]);
         if (contact.wanted()) {
-#pragma omp barrier
-#pragma omp single
-          contact.prepare(substep, inverse_masses, work_, v);
+          barrier.wait(thread);
+          if (thread == 0) contact.prepare(substep, inverse_masses, work_, v);
+          barrier.wait(thread);
         }
         for_each_free_vertex([&](std::size_t i) {
           predicted_[i] = contact.predict(substep, i, x[i].position(), v[i]);
           move_to(i, predicted_[i]);
         });
         for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-          solve(settings, thread, threads, iteration == 0, counts);
+          solve(settings, thread, threads, iteration == 0, barrier, counts);
           for_each_free_vertex([&](std::size_t i) {
             move_to(i, substep.out_of_planes(x[i].position(), predicted_[i], v[i]));
           });
@@ -299,14 +349,19 @@ class FastPbd {
     };
 // Loops inside the region itself would be 4 % slower on one thread.
 #pragma omp parallel num_threads(int(threads_))
-    substeps(std::size_t(omp_get_thread_num()), std::size_t(omp_get_num_threads()));
+    {
+#pragma omp single
+      barrier.set(omp_get_num_threads());
+      substeps(std::size_t(omp_get_thread_num()), std::size_t(omp_get_num_threads()));
+    }
     for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = x[i].position();
     return guards;
   }
 
  private:
-  // A colour's batches take about 0.2 us each, a barrier one to several.
-  static constexpr std::size_t batches_of_a_useful_thread = 16, batches_worth_a_barrier = 4;
+  // Of a colour, on average: they take about 0.2 us each, and a barrier with fetching what other threads have
+  // moved about 2.
+  static constexpr std::size_t batches_of_a_useful_thread = 2;
 
   template <class Kind>
   static void fill(Batch<Kind>& batch, Softnesses<Kind>& softnesses, const ConstraintList& list,
@@ -326,15 +381,13 @@ class FastPbd {
 
   // One iteration's constraints, colour after colour. Small colours are left to the first thread: neighbours
   // among them then need no barrier.
-  void solve(const Settings& settings, std::size_t thread, std::size_t threads, bool first,
+  void solve(const Settings& settings, std::size_t thread, std::size_t threads, bool first, Barrier& barrier,
              GuardCounts& guards) {
     bool shared_before = true;
     for (const Turn& turn : turns_) {
       const std::size_t count = turn.end - turn.begin;
-      const bool shared = count >= batches_worth_a_barrier * threads;
-      if (shared || shared_before) {
-#pragma omp barrier
-      }
+      const bool shared = count >= threads;
+      if (shared || shared_before) barrier.wait(thread);
       shared_before = shared;
       if (!shared && thread > 0) continue;
       const std::size_t begin = turn.begin + (shared ? count * thread / threads : 0);
@@ -342,7 +395,7 @@ class FastPbd {
       const Rule<float> rule(settings, std::size_t(turn.kind), model_.size);
       project_kind(work_, turn.kind, begin, end, rule, first, guards);
     }
-#pragma omp barrier
+    barrier.wait(thread);
   }
 
   const Model& model_;

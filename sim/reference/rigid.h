@@ -20,6 +20,11 @@ struct RigidBody {
   glm::dmat3 rotation{1};
   glm::dvec3 velocity{0};  ///< m/s
   glm::dvec3 angular{0};   ///< kg m^2/s
+  double radius = 0;       ///< m, of the vertices about the centre
+  /// Of `rest`, those within `reach` of a plane when they were found, and how far any has moved since, m.
+  std::vector<std::uint32_t> near{};
+  double reach = 0, moved = 1;
+  std::vector<std::pair<std::size_t, glm::dvec3>> impulses{};  ///< of the last step's contacts, by number
 };
 
 /// The model's bodies at their start. Throws Error for fixed vertices, and for starts that are not the rest

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the pages of docs/generated, which hold tables only, and the charts of docs/figures.
 
-docs/make_tables.py fronts R DATE: speed against error, and the paper's experiments (kept as they are without R/rep)
+docs/make_tables.py fronts R DATE: speed against error
 
   for s in bunny-drop armadillo-drop dragon-drop bunny-100k.json; do
     c() { tetpbd compare --rigid-contact 0 --mass-splitting 0 --scene $s --steps 200 --out R/c/${s%-drop}_$n "$@"; n=$((n + 1)); }; n=1
@@ -15,7 +15,6 @@ docs/make_tables.py fronts R DATE: speed against error, and the paper's experime
     c --modes cpu --iterations 1 --substeps 1,5
     tetpbd compare --merge R/c/${s%-drop}_* --out R/c/${s%-drop}
   done
-  tetpbd reproduce --out R/rep
 
 docs/make_tables.py performance B/bench.json S/bench.json ...: what a step costs; a later file's row replaces an equal one's
 
@@ -84,18 +83,9 @@ def fronts(source, date):
         out.append("Against each setting of `paper` and `cpu-fast`, the best of mode `node`: how many times less "
                    "net volume loss in no more time (below 0.01 % counts as 0.01), how many times faster at no more loss:\n")
         out.append(table(["against", *head, "times less error", "times faster"], lines))
-    heading = "## The paper's experiments"
-    if (source / "rep").exists():
-        out += [heading, "\n`tetpbd reproduce`, mode `constraint`.\n"]
-        for scene in ("bunny", "armadillo"):
-            shutil.copy(source / f"rep/figures/volume_error_{scene}_all.svg", docs / f"figures/volume_error_{scene}_all.svg")
-            out.append(f"### Largest loss, {scene}\n")
-            out.append(table(["constraints", "iterations", "published %", "ours %", "ours / published"],
-                             [r.values() for r in read(source / f"rep/tables/volume_error_{scene}.csv")]))
-        heights = "### Every drop height"  # searched for once: no longer measured
-        out.append(heights + (docs / "generated/fronts.md").read_text().split(heights, 1)[1])
-    else:
-        out.append(heading + (docs / "generated/fronts.md").read_text().split(heading, 1)[1])
+    heading = "## Readings of the paper"
+    # Searched for once, no longer measured.
+    out.append(heading + (docs / "generated/fronts.md").read_text().split(heading, 1)[1])
     write("fronts.md", out)
 
 

@@ -68,6 +68,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   if (metrics) measure(*metrics, sim);
   hold(0);
   const auto begin = steady_clock::now();
+  run.substeps = sim.settings.substeps;
   while (run.steps < steps && !interrupted() && !check_finite(sim)) {
     const auto step_begin = steady_clock::now();
     step(sim);

@@ -54,6 +54,7 @@ struct MeasuredRun {
   std::vector<double> gpu_ms, wall_ms;                  ///< a step; GPU time is that of its passes alone
   double seconds = 0;  ///< of all steps, without what came between those waited for
   long steps = 0;      ///< taken, and finite
+  int substeps = 0;    ///< of a step
 };
 
 /// Of a state that the run has reached: its distance from the right motion there, where `right` has that

@@ -15,6 +15,7 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
+#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 
@@ -128,7 +129,13 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
   vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
   vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });
-  return all;
+  std::vector<Settings> different;
+  for (Settings& settings : all) {
+    if (find_solver_mode(settings.mode)->leapfrog)
+      settings.iterations = settings.substeps = 1;  // its own choice
+    if (std::ranges::find(different, settings) == different.end()) different.push_back(settings);
+  }
+  return different;
 }
 
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards) {

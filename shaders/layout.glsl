@@ -45,7 +45,7 @@ struct Step {
   float quantized_size;     // m, the size whose rounding is one quantum (constraints/types.glsl)
   float mass_splitting;     // 1: neighbours see n_i w_i, not w_i
   float damping;            // of constraints over h, gamma (with compliance)
-  float soft_omega;         // over-relaxation with compliance (`omega` is 1 then)
+  float share;              // with compliance (`omega` is 1 then) 1 over the over-relaxation; 0: leapfrog
   float body_size;          // m, of the largest body at rest
   float restitution;        // of hard bodies
   vec4 stiffness[2];        // by constraint kind

@@ -1,4 +1,4 @@
-// Where every vertex will be after prediction (method.md eqs. 1-2), as its neighbours see it: needed once after positions, velocities,
+// Where every vertex will be after prediction (method.md eqs. 1-2), as its neighbours see it (mode explicit: where it is): needed once after positions, velocities,
 // pins or settings were changed from outside. Otherwise each substep's last dispatch has done it. One thread per vertex.
 #include "types.glsl"
 #include "pair.glsl"
@@ -9,11 +9,15 @@ layout(local_size_x = 256) in;
 void predict(uint i) {
   Position own = positions[i];
   Pair x = Pair(own.high, own.low);
-#if COMPLIANT
-  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
-#endif
-  Pair here = x, v = Pair(velocities[i].high, velocities[i].low);
+  Pair here = x, start = x, v = Pair(velocities[i].high, velocities[i].low);
+#if LEAPFROG
+  start = predict_position(x, Pair(-v.high, -v.low));  // where it was a substep before
+#else
   if (own.inverse_mass > 0.0) x = predict_position(x, predict_velocity(v));
+#endif
+#if COMPLIANT
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(start, 0.0);
+#endif
 #if RIGID_CONTACT
   RigidState body = state_at(i);
   body.summed = true;

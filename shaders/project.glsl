@@ -17,7 +17,7 @@ void project_$KIND(uint number, uint owned) {
 #else
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
 #endif
-  float before = 0.0, gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) / params.soft_omega;
+  float before = 0.0, gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
   if ((phases & PHASE_PREDICT) == 0u) before = multipliers[number];
   if (gamma > 0.0) {
     vec3 start[$ARITY];

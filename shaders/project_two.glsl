@@ -18,7 +18,7 @@ void project_$KIND(uint number, uint owned) {
     if ((phases & PHASE_PREDICT) == 0u) before[k] = multipliers[number + k];  // a record has several words, the first is theirs
     c.C[k] += a[k] * before[k];
   }
-  Multiplier2 m = multiplier(c, w, params.max_correction, a, 1.0 / params.soft_omega);
+  Multiplier2 m = multiplier(c, w, params.max_correction, a, params.share);
   if ((phases & PHASE_FINISH) == 0u)
     for (uint k = 0u; k < 2u; ++k) multipliers[number + k] = before[k] + m.lambda[k];
 #if COUNT_GUARDS

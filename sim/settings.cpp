@@ -251,6 +251,16 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && !mode.compliance)
     throw Error(fmt::format("mode {} has no compliance", mode.name), where,
                 "set compliance and constraint_damping to 0 or use another mode");
+  if (mode.leapfrog) {
+    for (std::size_t k = 0; k < kind_count; ++k)
+      if (settings.material == "none" && uses(settings, constraint_kinds[k]) && !(settings.compliance[k] > 0))
+        throw Error(
+            fmt::format("mode {} needs forces, and k_{} has none", mode.name, constraint_kinds[k].name),
+            where,
+            fmt::format(
+                "give a material or compliance_{0}, leave {0} out of the constraints, or use another mode",
+                constraint_kinds[k].name));
+  }
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");

@@ -12,6 +12,7 @@
 #include "sim/hash.h"
 #include "sim/material.h"
 #include "sim/parallel.h"
+#include "sim/reference/leapfrog.h"
 #include "sim/solvers/cpu_pbd.h"
 #include "sim/solvers/substep.h"
 
@@ -39,6 +40,18 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
   return p;
 }
 
+bool leaps(const Settings& settings) { return find_solver_mode(settings.mode)->leapfrog; }
+
+// In mode explicit a step has one iteration in each of as many substeps as stay stable. What deforms gets
+// stiffer than it is at rest.
+Settings fitted(const Sim& sim, Settings settings) {
+  constexpr double part = 0.8;  // of the longest substep that is stable at rest
+  if (!leaps(settings)) return settings;
+  settings.iterations = 1;
+  settings.substeps = std::max(1, int(std::ceil(settings.dt / (part * sim.longest_substep))));
+  return settings;
+}
+
 void write_step_block(Sim& sim) {
   const Settings& s = sim.settings;
   const double h = s.dt / s.substeps;
@@ -48,7 +61,7 @@ void write_step_block(Sim& sim) {
   block.h = float(h);
   block.inverse_h = float(1 / h);
   block.omega = soft ? 1.0f : float(s.omega);
-  block.soft_omega = float(s.omega);
+  block.share = leaps(s) ? 0.0f : float(1 / s.omega);
   block.friction = float(s.friction);
   block.restitution = float(s.restitution);
   block.body_size = float(sim.model->size);
@@ -129,11 +142,16 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.system = std::move(system);
   const bool soft = compliant(settings), rigid = touches_rigidly(*sim.model, settings);
   const std::size_t count = sim.model->positions.size();
-  const auto defines = vertex_defines(*sim.model, soft, rigid);
+  const SolverInput input{*sim.model, sim.system, sim.tuning,     is_software_renderer(),
+                          soft,       rigid,      leaps(settings)};
+  const auto defines = vertex_defines(input);
   sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
                  count * (sizeof(Position) + sizeof(Velocity) + 16)};
-  sim.solver = find_solver_mode(settings.mode)
-                   ->create({*sim.model, sim.system, sim.tuning, is_software_renderer(), soft, rigid});
+  sim.solver = find_solver_mode(settings.mode)->create(input);
+  if (leaps(settings))
+    sim.longest_substep = stable_step({*sim.model, sim.system, settings, sim.inverse_masses},
+                                      settings.compliance, sim.model->rest.positions);
+  sim.settings = fitted(sim, settings);
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
     return Buffer(label, bytes);
@@ -251,11 +269,14 @@ void write_state(Sim& sim, const State& state) {
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s));
+    const auto forces =
+        leaps(s) ? std::pair(s.compliance, s.constraint_damping) : std::pair(Compliances{}, 0.0);
+    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), forces);
   };
-  const double upwards = half_substep_fall(settings) - half_substep_fall(sim.settings);
+  const double before = half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
-  sim.settings = settings;
+  sim.settings = fitted(sim, settings);
+  const double upwards = half_substep_fall(sim.settings) - before;
   schedule(sim);
   write_step_block(sim);
   if (upwards == 0) return;

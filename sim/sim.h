@@ -39,6 +39,7 @@ struct Sim {
   std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;
   double quantum = 1;               ///< m, of quantized positions
+  double longest_substep = 0;       ///< s, that is stable at rest, of mode explicit: it decides settings.substeps
   bool needs_predict = true;        ///< the quantized positions are not those of the next step
   unsigned read_index = 0;          ///< which of `quantized` is read next
   long steps = 0;                   ///< taken since the start

@@ -27,6 +27,10 @@ const std::vector<SolverMode> rows = {
     {.name = "node",
      .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch",
      .create = create_node_solver},
+    {.name = "explicit",
+     .help = "leapfrog on the GPU, of what has a material or compliance: as many substeps as stay stable",
+     .create = create_node_solver,
+     .leapfrog = true},
     {.name = "constraint",
      .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics",
      .create = create_constraint_solver},
@@ -120,9 +124,9 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   return words;
 }
 
-std::vector<std::string> vertex_defines(const Model& model, bool compliant, bool rigid) {
-  return {define("COMPLIANT", compliant), define("RIGID_CONTACT", rigid),
-          define("BODY_COUNT", model.bodies.size())};
+std::vector<std::string> vertex_defines(const SolverInput& input) {
+  return {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),
+          define("LEAPFROG", input.leapfrog), define("BODY_COUNT", input.model.bodies.size())};
 }
 
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
@@ -174,7 +178,7 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
   }
   const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
                     vertices = std::max<std::size_t>(patches.largest, 1);
-  std::vector<std::string> defines = vertex_defines(input.model, input.compliant, input.rigid);
+  std::vector<std::string> defines = vertex_defines(input);
   defines.insert(defines.end(),
                  {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
                   define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
@@ -189,7 +193,7 @@ void add_average(Solver& solver, const SolverInput& input, unsigned group, bool 
   const std::size_t vertices = input.model.positions.size();
   // Itself, its sum there and back, what neighbours see of it.
   const std::size_t bytes = vertices * (2 * sizeof(Position) + 3 * 16);
-  std::vector<std::string> defines = vertex_defines(input.model, input.compliant, input.rigid);
+  std::vector<std::string> defines = vertex_defines(input);
   defines.insert(defines.end(), {define("GROUP_SIZE", group), define("FLOAT_SUMS", float_sums)});
   solver.iteration.push_back(
       {Program::compute("average.comp", {}, defines), work_groups(vertices, group), bytes});

@@ -75,6 +75,7 @@ struct SolverInput {
   bool software = false;   ///< the "GPU" is a CPU
   bool compliant = false;  ///< settings.h
   bool rigid = false;      ///< rigid_in_contact(), settings.h
+  bool leapfrog = false;   ///< SolverMode
 };
 
 /// A row of the table: what the mode is called, what makes it, and what it can do.
@@ -83,6 +84,7 @@ struct SolverMode {
   const char* help;
   Solver (*create)(const SolverInput&);
   bool compliance = true;  ///< and compliance
+  bool leapfrog = false;   ///< forces in place of corrections: substeps are as many as stay stable
   bool offered = true;     ///< in --mode and the window; else in bench and compare alone
 };
 /// Those that are offered.
@@ -91,7 +93,7 @@ const std::vector<SolverMode>& solver_modes();
 const SolverMode* find_solver_mode(const std::string& name);
 
 /// Definitions for the shaders that move vertices (vertex.glsl).
-std::vector<std::string> vertex_defines(const Model& model, bool compliant, bool rigid);
+std::vector<std::string> vertex_defines(const SolverInput& input);
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), KIND_ROW and
 /// KIND_COLUMN (of the stiffness), PAIRS (of a record), MATERIAL (1: it has compliances of its own), PROJECT
 /// (the file that projects it), RATE (1: only its change counts), VALUES (at rest).

@@ -42,6 +42,10 @@ std::vector<Settings> candidates(const Settings& own) {
   base = all[0];
   set_mode(base, "cpu-fast", "auto");
   all.push_back(base);
+  if (compliant(own) && !kind_without_force(own)) {
+    set_mode(base, "explicit", "auto");
+    all.push_back(base);
+  }
   all.push_back(own);
   return all;
 }
@@ -91,12 +95,13 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   std::optional<Motion> right = right_motion(*model, settings);
   if (right) choice.judged = "motion";
   for (const Settings& candidate : candidates(settings)) {
-    const bool first = choice.trials.empty(), own = candidate == settings;
+    const bool first = choice.trials.empty(), as_it_is = candidate == settings || leaps(candidate);
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
     Sim sim = create_sim(model, candidate);
     if (first) warm_up(sim);
     step(sim);  // the first of a new solver is not like the others
-    if (!own) fit_substeps(sim, trial.settings, budget_ms);
+    trial.settings = sim.settings;
+    if (!as_it_is) fit_substeps(sim, trial.settings, budget_ms);
     if (first && !right) {
       if (const auto found = rigid_motion(*model, settings, steps)) {
         right = found, choice.judged = "motion";
@@ -126,7 +131,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
                     : run.motion       ? 100 * run.motion->rms
                                        : run.errors.max_volume_loss_percent;
       // In contact a step takes longer than those it was fitted to.
-      if (trial.fits || own || trial.settings.substeps == 1 || attempt == 3) break;
+      if (trial.fits || as_it_is || trial.settings.substeps == 1 || attempt == 3) break;
       trial.settings.substeps =
           std::max(1, int(trial.settings.substeps * std::min(0.95, budget_ms / trial.ms)));
     }

@@ -137,6 +137,9 @@ bool words_widget(Session& s, const Parameter& row, std::string& value) {
 // What has no effect, as the stiffness of a kind that is switched off.
 bool is_idle(const Settings& settings, const Parameter& row) {
   if (row.name == "mass_splitting") return compliant(settings);  // brings it with it
+  if (row.name == "stability") return !leaps(settings);
+  if (row.name == "substeps" || row.name == "iterations" || row.name == "omega")
+    if (leaps(settings)) return true;
   if (row.name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;

@@ -129,13 +129,15 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
   vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
   vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });
-  std::vector<Settings> different;
+  std::vector<Settings> chosen;
   for (Settings& settings : all) {
-    if (find_solver_mode(settings.mode)->leapfrog)
-      settings.iterations = settings.substeps = 1;  // its own choice
-    if (std::ranges::find(different, settings) == different.end()) different.push_back(settings);
+    if (leaps(settings)) {  // iterations and substeps are its own choice
+      settings.iterations = settings.substeps = 1;
+      if (std::ranges::find(chosen, settings) != chosen.end()) continue;
+    }
+    chosen.push_back(settings);
   }
-  return different;
+  return chosen;
 }
 
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards) {

@@ -6,7 +6,9 @@
 // All of patches.h's words in pairs: headers of chunks, their vertices, their records.
 layout(std430, binding = BIND_PATCHES) restrict readonly buffer Patches { uvec2 patch_words[]; };
 #if COMPLIANT
+#if !LEAPFROG
 layout(std430, binding = BIND_MULTIPLIERS) restrict buffer Multipliers { float multipliers[]; };  // of records, in this substep
+#endif
 shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
 #endif
 shared ivec4 local_positions[MAX_VERTICES];  // quantized

@@ -18,7 +18,9 @@ void project_$KIND(uint number, uint owned) {
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
 #endif
   float before = 0.0, gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
+#if !LEAPFROG
   if ((phases & PHASE_PREDICT) == 0u) before = multipliers[number];
+#endif
   if (gamma > 0.0) {
     vec3 start[$ARITY];
     ivec4 first_start = start_positions[record.x & 255u];
@@ -36,7 +38,7 @@ void project_$KIND(uint number, uint owned) {
   const float a = 0.0, share = 1.0;
 #endif
   Multiplier m = multiplier(c, w, k, params.max_correction, a, share);
-#if COMPLIANT
+#if COMPLIANT && !LEAPFROG
   if ((phases & PHASE_FINISH) == 0u) multipliers[number] = before + m.lambda;
 #endif
 #if COUNT_GUARDS

@@ -15,12 +15,16 @@ void project_$KIND(uint number, uint owned) {
   float a[2], before[2] = float[2](0.0, 0.0);
   for (uint k = 0u; k < 2u; ++k) {
     a[k] = word_of_$KIND(number, 1u + $VALUES + k) * params.inverse_h * params.inverse_h;
+#if !LEAPFROG
     if ((phases & PHASE_PREDICT) == 0u) before[k] = multipliers[number + k];  // a record has several words, the first is theirs
+#endif
     c.C[k] += a[k] * before[k];
   }
   Multiplier2 m = multiplier(c, w, params.max_correction, a, params.share);
+#if !LEAPFROG
   if ((phases & PHASE_FINISH) == 0u)
     for (uint k = 0u; k < 2u; ++k) multipliers[number + k] = before[k] + m.lambda[k];
+#endif
 #if COUNT_GUARDS
   if (local_id(ids, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
 #endif

@@ -63,21 +63,6 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   RigidState body = state_at(i);
   carried = body.carried;
 #endif
-#if LEAPFROG
-  // The force where the vertex is, then the way: as the right motion is found (method.md eq. 33).
-  v = predict_velocity(pair_add(v, correction * params.inverse_h));
-  x = predict_position(start, v);
-  if (touches(x)) {
-    Pair free = x;
-    x = resolve_contacts(x, params.h * v.high);
-    v = pair_add(v, relative(x, free) * params.inverse_h);
-  }
-  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
-  note_unless_finite(i, x.high + x.low, v.high + v.low);
-  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(start, 0.0);
-  return x;
-#endif
   if (predicts) {
     if (!carried) v = predict_velocity(v);
     start = x = predict_position(x, v);
@@ -114,12 +99,35 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   }
   return x;
 }
+#if LEAPFROG
+// The same in mode explicit (method.md eq. 39): the force where the vertex is, then the way.
+Pair leapt(uint i, Position own, Velocity speed, vec3 correction) {
+  Pair start = Pair(own.high, own.low), v = Pair(speed.high, speed.low);
+  v = predict_velocity(pair_add(v, correction * params.inverse_h));
+  Pair x = predict_position(start, v);
+  if (touches(x)) {
+    Pair free = x;
+    x = resolve_contacts(x, params.h * v.high);
+    v = pair_add(v, relative(x, free) * params.inverse_h);
+  }
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
+  velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+  note_unless_finite(i, x.high + x.low, v.high + v.low);
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(start, 0.0);
+  return x;
+}
+#endif
+
 // Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases
 // predict or finish.
 void advance(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) {
+#if LEAPFROG
+    x = leapt(i, own, speed, correction);
+#else
     x = moved(i, own, speed, correction);
+#endif
   } else if ((phases & PHASE_FINISH) != 0u) {
     note_unless_finite(i, x.high + x.low, vec3(0.0));
 #if RIGID_CONTACT

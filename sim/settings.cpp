@@ -54,6 +54,8 @@ const std::vector<Parameter>& parameters() {
          "averaged, as in the paper (modes node, constraint); with compliance always"},
         {"iterations", "solver", &S::iterations, "iterations per substep", 0, 100000, "", true},
         {"substeps", "solver", &S::substeps, "substeps per step", 1, 100000, "", true},
+        {"stability", "solver", &S::stability,
+         "a substep of mode explicit, as a part of the longest that is stable at rest", 0.01, 1},
         {"dt", "solver", &S::dt, "time of one step", 1e-6, 1, "s", true},
         {"damping", "solver", &S::damping, "rate at which velocity decays, exp(-damping t)", 0, 1000, "1/s"},
         {"gravity", "world", &S::gravity, "gravity, downwards", -1000, 1000, "m/s^2"},
@@ -239,6 +241,14 @@ bool compliant(const Settings& settings) {
   return any;
 }
 
+std::optional<std::string> kind_without_force(const Settings& settings) {
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (settings.material == "none" && uses(settings, constraint_kinds[k]) &&
+        !(settings.compliance[k] > 0 && settings.stiffness[k] == 1))
+      return constraint_kinds[k].name;
+  return std::nullopt;
+}
+
 void check_settings(const Settings& settings, const std::string& where) {
   for (const Parameter& row : parameters())
     with_value(settings, row, [&]<class T>(const T& value) {
@@ -251,16 +261,10 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && !mode.compliance)
     throw Error(fmt::format("mode {} has no compliance", mode.name), where,
                 "set compliance and constraint_damping to 0 or use another mode");
-  if (mode.leapfrog) {
-    for (std::size_t k = 0; k < kind_count; ++k)
-      if (settings.material == "none" && uses(settings, constraint_kinds[k]) && !(settings.compliance[k] > 0))
-        throw Error(
-            fmt::format("mode {} needs forces, and k_{} has none", mode.name, constraint_kinds[k].name),
-            where,
-            fmt::format(
-                "give a material or compliance_{0}, leave {0} out of the constraints, or use another mode",
-                constraint_kinds[k].name));
-  }
+  if (mode.leapfrog)
+    if (const auto kind = kind_without_force(settings))
+      throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,
+                  fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");

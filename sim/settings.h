@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -29,6 +30,7 @@ struct Settings {
   bool mass_splitting = true;
   int iterations = 1;
   int substeps = 20;
+  double stability = 0.4;
   double dt = 0.005;
   double damping = 0;
   double gravity = 9.81;
@@ -103,6 +105,9 @@ std::vector<std::string> names_of(const std::vector<Preset>& presets);
 /// Whether constraints are XPBD's (method.md eq. 25): there is a material or damping, or a kind in use has
 /// compliance.
 bool compliant(const Settings& settings);
+/// A kind in use whose constraints have no force, but move as far as iterations do: k below 1, or no
+/// compliance.
+std::optional<std::string> kind_without_force(const Settings& settings);
 /// Whether constraints resist their rate.
 bool damped(const Settings& settings);
 /// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use hold a

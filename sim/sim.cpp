@@ -40,15 +40,17 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
   return p;
 }
 
-bool leaps(const Settings& settings) { return find_solver_mode(settings.mode)->leapfrog; }
-
-// In mode explicit a step has one iteration in each of as many substeps as stay stable. What deforms gets
-// stiffer than it is at rest.
+// In mode explicit a step has one iteration in each of as many substeps as stay stable.
 Settings fitted(const Sim& sim, Settings settings) {
-  constexpr double part = 0.8;  // of the longest substep that is stable at rest
   if (!leaps(settings)) return settings;
-  settings.iterations = 1;
-  settings.substeps = std::max(1, int(std::ceil(settings.dt / (part * sim.longest_substep))));
+  const double wanted =
+      sim.longest_substep > 0 ? settings.dt / (settings.stability * sim.longest_substep) : 0;
+  constexpr double most = 100000;
+  if (wanted > most)
+    throw Error("the body is too stiff for mode explicit",
+                fmt::format("a step takes {:.3g} substeps", wanted),
+                fmt::format("at most {:g}: use another mode, a softer material or a shorter dt", most));
+  settings.iterations = 1, settings.substeps = std::max(1, int(std::ceil(wanted)));
   return settings;
 }
 
@@ -150,7 +152,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.solver = find_solver_mode(settings.mode)->create(input);
   if (leaps(settings))
     sim.longest_substep = stable_step({*sim.model, sim.system, settings, sim.inverse_masses},
-                                      settings.compliance, sim.model->rest.positions);
+                                      settings.compliance, sim.model->rest.positions, 30);
   sim.settings = fitted(sim, settings);
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);

@@ -3,7 +3,17 @@
 
 #include <doctest/doctest.h>
 
+#include <vector>
+
 #include "sim/gl/context.h"
+#include "sim/solvers/solver.h"
+
+/// The modes that take bodies without compliance.
+inline std::vector<tetpbd::SolverMode> pbd_modes() {
+  auto modes = tetpbd::solver_modes();
+  std::erase_if(modes, [](const tetpbd::SolverMode& mode) { return mode.leapfrog; });
+  return modes;
+}
 
 struct GlTest {
   tetpbd::HeadlessContext context{-1, true};

@@ -67,7 +67,7 @@ void spoil(const Sim& sim, std::uint32_t vertex, bool velocity, float value) {
 
 TEST_CASE("a given state that is not finite is found at once, with its lowest vertex") {
   GlTest gl;
-  for (const SolverMode& mode : solver_modes())
+  for (const SolverMode& mode : pbd_modes())
     for (const bool velocity : {false, true})
       for (const double value : {not_a_number, infinity, -infinity, 1e39}) {  // the last is none as a float
         CAPTURE(mode.name);
@@ -124,7 +124,7 @@ TEST_CASE(
 
 TEST_CASE("a fixed vertex that is moved nowhere is found too") {
   GlTest gl;
-  for (const SolverMode& mode : solver_modes()) {
+  for (const SolverMode& mode : pbd_modes()) {
     CAPTURE(mode.name);
     Settings settings = quick(mode.name);
     settings.constraints = "";
@@ -152,7 +152,7 @@ TEST_CASE("absurd settings either stay numbers or are found, and the last good s
     const char* name;
     double size, speed, dt, omega, gravity;
   };
-  for (const SolverMode& mode : solver_modes())
+  for (const SolverMode& mode : pbd_modes())
     for (const Absurd& a : {Absurd{"fast", 1, 1e5, 1, 1.5, 9.81},
                             {"heavy", 1, 0, 1, 1.5, 1000},
                             {"omega", 1, 0, 0.005, 4, 9.81},
@@ -264,7 +264,7 @@ TEST_CASE("nothing that is not finite is drawn, in any look or colour, and none 
 
 TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode change on the way") {
   GlTest gl;
-  for (const SolverMode& mode : solver_modes()) {
+  for (const SolverMode& mode : pbd_modes()) {
     CAPTURE(mode.name);
     Settings settings = quick(mode.name);
     settings.ground = false;

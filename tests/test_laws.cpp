@@ -31,7 +31,7 @@ TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
 
 TEST_CASE("what rests stays at rest") {
   GlTest gl;
-  for (const SolverMode& mode : solver_modes())
+  for (const SolverMode& mode : pbd_modes())
     for (int substeps : {1, 5}) {
       CAPTURE(mode.name);
       CAPTURE(substeps);
@@ -62,7 +62,7 @@ TEST_CASE("what rests stays at rest") {
 
 TEST_CASE("a run moved and turned about the vertical is the same run, moved and turned") {
   GlTest gl;
-  for (const SolverMode& mode : solver_modes()) {
+  for (const SolverMode& mode : pbd_modes()) {
     CAPTURE(mode.name);
     const auto model = block_model({4, 3, 2}, 0.05);
     auto moved = std::make_shared<Model>(*model);
@@ -83,7 +83,7 @@ TEST_CASE("friction stops a sliding block and none does not") {
   GlTest gl;
   TetMesh mesh = make_block(glm::dvec3(1.0, 0.5, 0.5), {2, 1, 1});
   for (auto& p : mesh.positions) p.y += 0.25;
-  for (const SolverMode& mode : solver_modes())
+  for (const SolverMode& mode : pbd_modes())
     for (const double friction : {0.0, 0.5}) {
       CAPTURE(mode.name);
       CAPTURE(friction);
@@ -135,7 +135,7 @@ TEST_CASE("a hard body hung by a corner swings as a rigid one, and gains no ener
                  d = rate(moved(right, h, c));
     right = moved(moved(moved(moved(right, h / 6, a), h / 3, b), h / 3, c), h / 6, d);
   }
-  for (const SolverMode& mode : solver_modes()) {
+  for (const SolverMode& mode : pbd_modes()) {
     CAPTURE(mode.name);
     Settings settings = quick(mode.name, 1, 50);
     settings.ground = false;

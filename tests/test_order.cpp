@@ -130,7 +130,7 @@ std::uint64_t hash_after(const std::shared_ptr<const Model>& model, const Settin
 
 std::vector<std::string> gpu_modes() {
   std::vector<std::string> names;
-  for (const SolverMode& mode : solver_modes())
+  for (const SolverMode& mode : pbd_modes())
     if (std::string(mode.name) != "cpu") names.push_back(mode.name);
   return names;
 }
@@ -255,7 +255,7 @@ TEST_CASE("other work on the GPU at the same time changes no bit") {
   GlTest gl;
   const auto model = falling({8, 6, 4});
   std::vector<std::uint64_t> expected;
-  for (const SolverMode& mode : solver_modes()) expected.push_back(hash_after(model, settings_of(mode.name)));
+  for (const SolverMode& mode : pbd_modes()) expected.push_back(hash_after(model, settings_of(mode.name)));
   std::atomic<bool> ready = false, stop = false;
   std::atomic<long> steps = 0;
   std::thread other([&] {
@@ -278,9 +278,9 @@ TEST_CASE("other work on the GPU at the same time changes no bit") {
   });
   while (!ready) std::this_thread::yield();
   for (int repeat = 0; repeat < 3; ++repeat)
-    for (std::size_t m = 0; m < solver_modes().size(); ++m) {
-      CAPTURE(solver_modes()[m].name);
-      CHECK(hash_after(model, settings_of(solver_modes()[m].name)) == expected[m]);
+    for (std::size_t m = 0; m < pbd_modes().size(); ++m) {
+      CAPTURE(pbd_modes()[m].name);
+      CHECK(hash_after(model, settings_of(pbd_modes()[m].name)) == expected[m]);
     }
   stop = true;
   other.join();
@@ -296,7 +296,7 @@ TEST_CASE("every mode, scene and mesh size gives the same bits twice") {
   for (const glm::ivec3& cells : sizes)
     models.emplace_back("block " + std::to_string(cells.x), falling(cells, 2));
   for (const auto& [name, model] : models)
-    for (const SolverMode& mode : solver_modes()) {
+    for (const SolverMode& mode : pbd_modes()) {
       CAPTURE(name);
       CAPTURE(mode.name);
       Settings settings = settings_of(mode.name);

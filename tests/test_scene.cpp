@@ -181,7 +181,7 @@ TEST_CASE("every shipped scene runs in every mode") {
   for (const std::string& name : scene_names()) {
     CAPTURE(name);
     const auto model = build_model(load_scene(name));
-    for (const SolverMode& mode : solver_modes()) {
+    for (const SolverMode& mode : pbd_modes()) {
       CAPTURE(mode.name);
       const Scene scene =
           load_scene(name, {.parameters = {{"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}}});

@@ -10,7 +10,7 @@ using namespace samples;
 TEST_CASE("the same run gives the same bits") {
   GlTest gl;
   const auto model = block_model({8, 6, 4}, 0.01);
-  for (const SolverMode& mode : solver_modes()) {
+  for (const SolverMode& mode : pbd_modes()) {
     CAPTURE(mode.name);
     std::uint64_t hashes[2];
     for (auto& hash : hashes) {
@@ -76,7 +76,7 @@ TEST_CASE("vertices in another order are the same bodies, and what leaves is in 
 
 TEST_CASE("fixed and pinned vertices stay, moved ones pull, unpinned ones fall") {
   GlTest gl;
-  for (const SolverMode& mode : solver_modes()) {
+  for (const SolverMode& mode : pbd_modes()) {
     CAPTURE(mode.name);
     Sim sim = create_sim(block_model({4, 3, 2}, 0.5), quick(mode.name));
     pin(sim, 7);

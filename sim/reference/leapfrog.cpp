@@ -134,7 +134,8 @@ State state_of(Leapfrog& run) {
   return state;
 }
 
-double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
+double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
+                   int iterations) {
   Settings settings = input.settings;
   settings.constraint_damping = 0;
   const ReferenceInput still{input.model, input.system, settings, input.inverse_masses};
@@ -145,7 +146,7 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
   for (glm::dvec3& q : p) q = {unit(random), unit(random), unit(random)};
   const double reach = 1e-7 * input.model.size;
   double largest = 0;  // 1/s^2
-  for (int iteration = 0; iteration < 100; ++iteration) {
+  for (int iteration = 0; iteration < iterations; ++iteration) {
     double squares = 0;
     for (std::size_t i = 0; i < p.size(); ++i) squares += glm::dot(p[i], p[i]);
     const double scale = std::sqrt(double(p.size()) / squares);

@@ -31,6 +31,7 @@ State state_of(Leapfrog& run);
 
 /// The longest step that is stable about these positions, s: of the largest eigenvalue of M^-1 K, by power
 /// iteration on differences of forces, and of constraint_damping. Bodies that deform far need less.
-double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions);
+double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
+                   int iterations = 100);
 
 }  // namespace tetpbd

@@ -27,10 +27,6 @@ const std::vector<SolverMode> rows = {
     {.name = "node",
      .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch",
      .create = create_node_solver},
-    {.name = "explicit",
-     .help = "leapfrog on the GPU, of what has a material or compliance: as many substeps as stay stable",
-     .create = create_node_solver,
-     .leapfrog = true},
     {.name = "constraint",
      .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics",
      .create = create_constraint_solver},
@@ -43,6 +39,10 @@ const std::vector<SolverMode> rows = {
     {.name = "cpu-fast",
      .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions",
      .create = create_cpu_fast_solver},
+    {.name = "explicit",
+     .help = "leapfrog on the GPU, of what has a material or compliance: as many substeps as stay stable",
+     .create = create_node_solver,
+     .leapfrog = true},
     {.name = "paper",
      .help = "the paper's GPU pipeline: a kernel per kind, floats added by compare-and-swap",
      .create = create_paper_solver,
@@ -67,6 +67,8 @@ const SolverMode* find_solver_mode(const std::string& name) {
       std::find_if(rows.begin(), rows.end(), [&](const SolverMode& mode) { return name == mode.name; });
   return row == rows.end() ? nullptr : &*row;
 }
+
+bool leaps(const Settings& settings) { return find_solver_mode(settings.mode)->leapfrog; }
 
 std::vector<Dispatch> substep_dispatches(const Solver& solver, int iterations) {
   const std::size_t move = solver.iteration.size() - 1;
@@ -171,7 +173,7 @@ void add_patches(Solver& solver, const SolverInput& input, const Patches& patche
   words.write(chunk_bytes + vertex_bytes, record_bytes, patches.records.data());
   std::size_t bytes = words.bytes() + 16 * patches.vertices.size();  // and quantized positions
   add_buffer(solver, input.tuning, BIND_PATCHES, std::move(words));
-  if (input.compliant) {
+  if (input.compliant && !input.leapfrog) {
     add_buffer(solver, input.tuning, BIND_MULTIPLIERS,
                Buffer("multipliers", std::vector<float>(patches.records.size())));
     bytes += 2 * 4 * patches.records.size();  // read and written

@@ -92,6 +92,9 @@ const std::vector<SolverMode>& solver_modes();
 /// Of all modes; nullptr if there is none.
 const SolverMode* find_solver_mode(const std::string& name);
 
+/// Whether its mode does.
+bool leaps(const Settings& settings);
+
 /// Definitions for the shaders that move vertices (vertex.glsl).
 std::vector<std::string> vertex_defines(const SolverInput& input);
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), KIND_ROW and

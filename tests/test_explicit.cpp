@@ -1,0 +1,154 @@
+// Mode explicit: its substeps are those of leapfrog in double, as many as stay stable.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "sim/error.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/reference/motion.h"
+#include "sim/sim.h"
+#include "tests/gl_test.h"
+#include "tests/reference_scenes.h"
+
+using namespace tetpbd;
+
+namespace {
+
+// In flight or above the ground, irregular; one corner held, if `held`.
+std::shared_ptr<const Model> irregular_block(double height, bool held) {
+  TetMesh mesh = make_block({1, 0.7, 0.5}, {5, 4, 3});
+  reference_scenes::generator.seed(3);
+  for (auto& p : mesh.positions) p += reference_scenes::noise(0.02) + glm::dvec3(0, 0.4 + height, 0);
+  finish_tets(mesh, "block");
+  auto model = std::make_shared<Model>();
+  add_body(*model, "block", mesh, 1000, mesh.positions, glm::dvec3(1, 0, 0), glm::dvec3(2, -1, 3),
+           held ? std::vector<std::uint32_t>{0, 1} : std::vector<std::uint32_t>{});
+  return model;
+}
+
+Settings soft(const std::string& material, double tau) {
+  Settings settings;
+  settings.mode = "explicit", settings.material = material, settings.constraint_damping = tau;
+  settings.young_modulus = 5e6, settings.damping = 0.3, settings.stability = 0.25;
+  if (material == "none") {
+    settings.compliance[index_of<Stretch>] = 2e-6, settings.compliance[index_of<Volume>] = 1e-10;
+    settings.compliance[index_of<Bend>] = 1e-2;
+  }
+  return settings;
+}
+
+double distance(const std::vector<glm::dvec3>& a, const std::vector<glm::dvec3>& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, glm::length(a[i] - b[i]));
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("explicit: a run is that of leapfrog in double, damped or not, in flight, held and in contact") {
+  GlTest gl;
+  for (const char* material : {"none", "springs", "neo-hookean"})
+    for (const double tau : {0.0, 1e-3})
+      for (const int kind : {0, 1, 2}) {
+        CAPTURE(material);
+        CAPTURE(tau);
+        CAPTURE(kind);
+        const auto model = irregular_block(kind == 2 ? 0.01 : 1, kind == 1);
+        Sim sim = create_sim(model, soft(material, tau));
+        const double h = sim.settings.dt / sim.settings.substeps;
+        const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
+        Leapfrog right = leapfrog(input, compliances_of(input), {model->positions, model->velocities}, h);
+        for (int s = 0; s < 20; ++s) step(sim), advance(right, sim.settings.substeps);
+        const State state = read_state(sim);
+        CHECK(distance(state.positions, right.x) < 2e-5);
+        CHECK(distance(state.velocities, right.v) < 2e-2);
+        double deformed = 0;  // or nothing was tested
+        for (std::size_t i = 0; i < 20; ++i)
+          deformed =
+              std::max(deformed, std::abs(glm::distance(right.x[i], right.x[i + 7]) /
+                                              glm::distance(model->positions[i], model->positions[i + 7]) -
+                                          1));
+        if (kind > 0) CHECK(deformed > 1e-3);
+      }
+}
+
+TEST_CASE("explicit: substeps follow stiffness, dt and the part of the stable one that is asked for") {
+  GlTest gl;
+  Settings settings = soft("neo-hookean", 0);
+  Sim sim = create_sim(irregular_block(1, false), settings);
+  const auto substeps = [&](auto&& change) {
+    Settings wanted = settings;
+    change(wanted);
+    apply_settings(sim, wanted);
+    CHECK(sim.settings.iterations == 1);
+    return sim.settings.substeps;
+  };
+  const double longest = stable_step({*sim.model, sim.system, settings, sim.inverse_masses},
+                                     settings.compliance, sim.model->rest.positions);
+  const double all = settings.dt / (settings.stability * longest);
+  REQUIRE(all > 3);
+  CHECK(std::abs(substeps([](Settings&) {}) - all) < 1.05);
+  CHECK(std::abs(substeps([](Settings& s) { s.young_modulus *= 16; }) - 4 * all) < 1.2);
+  CHECK(std::abs(substeps([](Settings& s) { s.dt *= 3; }) - 3 * all) < 1.2);
+  CHECK(std::abs(substeps([](Settings& s) { s.stability /= 2; }) - 2 * all) < 1.2);
+  CHECK(substeps([](Settings& s) { s.substeps = 77, s.iterations = 9; }) == substeps([](Settings&) {}));
+  CHECK_THROWS_WITH_AS(substeps([](Settings& s) { s.young_modulus = 1e12, s.dt = 1, s.stability = 0.01; }),
+                       doctest::Contains("too stiff for mode explicit"), Error);
+  Settings bare = settings;
+  bare.material = "none", bare.constraints = "";
+  apply_settings(sim, bare);
+  CHECK(sim.settings.substeps == 1);
+}
+
+TEST_CASE("explicit: what has no force is refused in a line") {
+  GlTest gl;
+  const auto model = irregular_block(1, false);
+  Settings hard;
+  hard.mode = "explicit";
+  CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"),
+                       Error);
+  Settings weak = soft("none", 0);
+  weak.stiffness[index_of<Bend>] = 0.5;
+  CHECK_THROWS_WITH_AS(create_sim(model, weak), doctest::Contains("bend has none"), Error);
+  Sim sim = create_sim(model, soft("none", 0));
+  CHECK_THROWS_AS(apply_settings(sim, weak), Error);
+  step(sim);  // goes on as it was
+  CHECK(sim.settings.mode == "explicit");
+}
+
+TEST_CASE("explicit: the same bits every time, however the mesh is cut") {
+  GlTest gl;
+  const auto model = irregular_block(0.01, true);
+  std::uint64_t bits = 0;
+  for (const unsigned patch : {0u, 0u, 5u, 24u, 200u}) {
+    CAPTURE(patch);
+    Sim sim = create_sim(model, soft("neo-hookean", 1e-3), {.group = patch ? 256u : 0u, .patch = patch});
+    for (int s = 0; s < 10; ++s) step(sim);
+    if (!bits) bits = state_hash(sim);
+    CHECK(state_hash(sim) == bits);
+  }
+}
+
+TEST_CASE("explicit: a body swings on where another mode left it, and another where it did") {
+  GlTest gl;
+  // In free fall, so that the place is known: the velocities of one mode are those of the other's substeps.
+  auto settings = soft("neo-hookean", 0);
+  settings.damping = 0;
+  const auto model = irregular_block(5, false);
+  Sim sim = create_sim(model, settings);
+  const auto centre = [&] {
+    const State state = read_state(sim);
+    double y = 0, mass = 0;
+    for (std::size_t i = 0; i < model->masses.size(); ++i)
+      y += model->masses[i] * state.positions[i].y, mass += model->masses[i];
+    return y / mass;
+  };
+  const double start = centre();
+  double time = 0;
+  for (const char* mode : {"explicit", "node", "explicit", "cpu-fast", "explicit"}) {
+    settings.mode = mode, settings.substeps = 7;
+    apply_settings(sim, settings);
+    for (int s = 0; s < 10; ++s) step(sim), time += settings.dt;
+    CHECK(std::abs(centre() - (start - 9.81 / 2 * time * time)) < 2e-5);
+  }
+}

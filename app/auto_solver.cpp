@@ -69,6 +69,19 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
   }
 }
 
+/// What stands in for the right motion: leapfrog at a tenth of what is stable where there are forces and that
+/// takes no longer, else more substeps.
+Settings finer_than(const Settings& settings, const std::shared_ptr<const Model>& model) {
+  Settings fine = settings;
+  fine.substeps = int(std::min(finer * fine.substeps, double(most_substeps)));
+  if (!compliant(settings) || kind_without_force(settings)) return fine;
+  Settings leapfrog = settings;
+  set_mode(leapfrog, "explicit", "auto");
+  leapfrog.stability = 0.1;
+  leapfrog = create_sim(model, leapfrog).settings;
+  return leapfrog.substeps <= fine.substeps ? leapfrog : fine;
+}
+
 /// Positions of a run, for others to be held against.
 Motion motion_of_run(const std::shared_ptr<const Model>& model, const Settings& settings, long steps) {
   Sim sim = create_sim(model, settings);
@@ -106,8 +119,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       if (const auto found = rigid_motion(*model, settings, steps)) {
         right = found, choice.judged = "motion";
       } else if (compliant(settings) || hard(settings)) {
-        Settings fine = trial.settings;
-        fine.substeps = int(std::min(finer * fine.substeps, double(most_substeps)));
+        const Settings fine = finer_than(trial.settings, model);
         // What a slow machine can afford: the reference takes as long as all trials together.
         const double seconds = 1e-3 * fine.substeps / double(trial.settings.substeps) * budget_ms;
         choice.steps = std::clamp(long(2 * most_seconds / seconds), 2L, steps);

@@ -23,6 +23,9 @@ constexpr double finer = 8;        // times the substeps, of the run that stands
 constexpr double no_error = 1e-3;  // percent: below it settings are equally right
 constexpr double fitting = 1.05;   // of the budget: times differ by as much from run to run
 
+// What mode explicit can take.
+bool has_forces(const Settings& settings) { return compliant(settings) && !kind_without_force(settings); }
+
 // One iteration per substep first, which is on the front wherever it was measured (docs/results.md).
 std::vector<Settings> candidates(const Settings& own) {
   Settings base = own;
@@ -42,7 +45,7 @@ std::vector<Settings> candidates(const Settings& own) {
   base = all[0];
   set_mode(base, "cpu-fast", "auto");
   all.push_back(base);
-  if (compliant(own) && !kind_without_force(own)) {
+  if (has_forces(own)) {
     set_mode(base, "explicit", "auto");
     all.push_back(base);
   }
@@ -71,20 +74,21 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
 
 /// What stands in for the right motion: leapfrog at a tenth of what is stable where there are forces and that
 /// takes no longer, else more substeps.
-Settings finer_than(const Settings& settings, const std::shared_ptr<const Model>& model) {
+Sim finer_than(const Settings& settings, const std::shared_ptr<const Model>& model) {
   Settings fine = settings;
   fine.substeps = int(std::min(finer * fine.substeps, double(most_substeps)));
-  if (!compliant(settings) || kind_without_force(settings)) return fine;
-  Settings leapfrog = settings;
-  set_mode(leapfrog, "explicit", "auto");
-  leapfrog.stability = 0.1;
-  leapfrog = create_sim(model, leapfrog).settings;
-  return leapfrog.substeps <= fine.substeps ? leapfrog : fine;
+  if (has_forces(settings)) {
+    Settings leapfrog = settings;
+    set_mode(leapfrog, "explicit", "auto");
+    leapfrog.stability = 0.1;
+    Sim sim = create_sim(model, leapfrog);
+    if (sim.settings.substeps <= fine.substeps) return sim;
+  }
+  return create_sim(model, fine);
 }
 
 /// Positions of a run, for others to be held against.
-Motion motion_of_run(const std::shared_ptr<const Model>& model, const Settings& settings, long steps) {
-  Sim sim = create_sim(model, settings);
+Motion motion_of_run(Sim& sim, long steps) {
   Motion motion;
   const auto keep = [&](long step) {
     motion.kept.push_back(step);
@@ -119,11 +123,11 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       if (const auto found = rigid_motion(*model, settings, steps)) {
         right = found, choice.judged = "motion";
       } else if (compliant(settings) || hard(settings)) {
-        const Settings fine = finer_than(trial.settings, model);
+        Sim fine = finer_than(trial.settings, model);
         // What a slow machine can afford: the reference takes as long as all trials together.
-        const double seconds = 1e-3 * fine.substeps / double(trial.settings.substeps) * budget_ms;
+        const double seconds = 1e-3 * fine.settings.substeps / double(trial.settings.substeps) * budget_ms;
         choice.steps = std::clamp(long(2 * most_seconds / seconds), 2L, steps);
-        right = motion_of_run(model, fine, choice.steps), choice.judged = "finer steps";
+        right = motion_of_run(fine, choice.steps), choice.judged = "finer steps";
       } else {
         choice.judged = "volume";
       }

@@ -16,6 +16,7 @@ using std::chrono::steady_clock;
 MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
                          const std::function<void()>& advance, const std::function<State()>& state) {
   MeasuredRun run;
+  run.substeps = settings.substeps;
   for (long s = 0; s <= steps && !interrupted(); ++s) {
     if (s > 0) {
       const auto begin = steady_clock::now();

@@ -82,15 +82,16 @@ constexpr std::array markers = {"m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", "m-3.7 -3.
 }  // namespace
 
 std::string palette_colour(std::size_t index) {
-  static constexpr std::array colours = {"#0072b2", "#d55e00", "#555555", "#009e73",
-                                         "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
+  static constexpr std::array colours = {"#0072b2", "#d55e00", "#555555", "#009e73", "#cc79a7",
+                                         "#e69f00", "#56b4e9", "#000000", "#882255", "#8c564b"};
   return colours[index % colours.size()];
 }
 
 std::string mode_colour(const std::string& mode) {
-  if (mode == "rigid-body" || mode == "direct") return palette_colour(mode == "direct" ? 7 : 6);  // no modes
-  const auto& modes = solver_modes();
-  return palette_colour(std::size_t(std::ranges::find(modes, mode, &SolverMode::name) - modes.begin()));
+  // In every chart the same, baselines too; a mode that is not here has the colour after these.
+  static const std::vector<std::string> order = {"node",  "constraint", "cpu",    "cpu-double", "cpu-fast",
+                                                 "paper", "rigid-body", "direct", "explicit"};
+  return palette_colour(std::size_t(std::ranges::find(order, mode) - order.begin()));
 }
 
 std::string to_svg(const Chart& chart) {

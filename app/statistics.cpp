@@ -93,7 +93,7 @@ ordered_json row_of(const Scene& scene, const Model& model, const Settings& sett
                       {"omega", settings.omega},
                       {"constraints", kinds},
                       {"iterations", settings.iterations},
-                      {"substeps", run.substeps > 0 ? run.substeps : settings.substeps},
+                      {"substeps", run.substeps},
                       {"vertices", model.positions.size()},
                       {"tets", model.rest.tets.size()},
                       {"linear_drift", run.errors.linear_drift},

@@ -40,11 +40,17 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
   return p;
 }
 
+// That is stable at rest, s; 0 but in mode explicit.
+double longest_substep(const Sim& sim, const Settings& settings) {
+  if (!leaps(settings)) return 0;
+  return stable_step({*sim.model, sim.system, settings, sim.inverse_masses}, settings.compliance,
+                     sim.model->rest.positions, 30);
+}
+
 // In mode explicit a step has one iteration in each of as many substeps as stay stable.
-Settings fitted(const Sim& sim, Settings settings) {
+Settings fitted(Settings settings, double longest) {
   if (!leaps(settings)) return settings;
-  const double wanted =
-      sim.longest_substep > 0 ? settings.dt / (settings.stability * sim.longest_substep) : 0;
+  const double wanted = longest > 0 ? settings.dt / (settings.stability * longest) : 0;
   constexpr double most = 100000;
   if (wanted > most)
     throw Error("the body is too stiff for mode explicit",
@@ -150,10 +156,8 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
                  count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.solver = find_solver_mode(settings.mode)->create(input);
-  if (leaps(settings))
-    sim.longest_substep = stable_step({*sim.model, sim.system, settings, sim.inverse_masses},
-                                      settings.compliance, sim.model->rest.positions, 30);
-  sim.settings = fitted(sim, settings);
+  sim.longest_substep = longest_substep(sim, settings);
+  sim.settings = fitted(settings, sim.longest_substep);
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
     return Buffer(label, bytes);
@@ -271,13 +275,15 @@ void write_state(Sim& sim, const State& state) {
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
   const auto made_for = [&](const Settings& s) {
-    const auto forces =
-        leaps(s) ? std::pair(s.compliance, s.constraint_damping) : std::pair(Compliances{}, 0.0);
-    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), forces);
+    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s));
   };
+  const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
   const double before = half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
-  sim.settings = fitted(sim, settings);
+  const double longest =
+      forces(settings) == forces(sim.settings) ? sim.longest_substep : longest_substep(sim, settings);
+  sim.settings = fitted(settings, longest);
+  sim.longest_substep = longest;
   const double upwards = half_substep_fall(sim.settings) - before;
   schedule(sim);
   write_step_block(sim);

@@ -23,7 +23,7 @@ constexpr double finer = 8;        // times the substeps, of the run that stands
 constexpr double no_error = 1e-3;  // percent: below it settings are equally right
 constexpr double fitting = 1.05;   // of the budget: times differ by as much from run to run
 
-// What mode explicit can take.
+// What modes explicit and newton can take.
 bool has_forces(const Settings& settings) { return compliant(settings) && !kind_without_force(settings); }
 
 // One iteration per substep first, which is on the front wherever it was measured (docs/results.md).
@@ -47,6 +47,9 @@ std::vector<Settings> candidates(const Settings& own) {
   all.push_back(base);
   if (has_forces(own)) {
     set_mode(base, "explicit", "auto");
+    all.push_back(base);
+    set_mode(base, "newton", "auto");
+    base.iterations = 4;
     all.push_back(base);
   }
   all.push_back(own);

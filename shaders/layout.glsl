@@ -48,6 +48,8 @@ struct Step {
   float share;              // with compliance (`omega` is 1 then) 1 over the over-relaxation; 0: leapfrog
   float body_size;          // m, of the largest body at rest
   float restitution;        // of hard bodies
+  float drag;               // 1/s, rate at which velocity decays (mode newton)
+  float _0, _1, _2;
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind
@@ -111,6 +113,12 @@ struct RigidRecord {
 #define BIND_CHECKPOINT_FROM 10
 #define BIND_CHECKPOINT_TO 11
 #define BIND_RIGID 12         // hard bodies in contact
+// Mode newton (newton/newton.glsl).
+#define BIND_NEWTON_VECTORS 6
+#define BIND_NEWTON_BLOCKS 7
+#define BIND_NEWTON_SUMS 8
+#define BIND_NEWTON_MESH 9
+#define BIND_NEWTON_COARSE 13
 // Uniform blocks.
 #define BIND_STEP 0
 // Atomic counters.

@@ -1,15 +1,8 @@
 // What happens to a vertex besides gathering its corrections: prediction before the first iteration of a substep, contacts in
 // each, velocity after the last (method.md eqs. 1-2, 5, 11-13); and what its neighbours see next.
-layout(std430, binding = BIND_POSITIONS) buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_VELOCITIES) buffer Velocities { Velocity velocities[]; };
+#include "vertex_state.glsl"
 layout(std430, binding = BIND_PREDICTED) buffer Predicted { Velocity predicted[]; };  // a Pair, padded
-// The first step whose state is not finite, and the lowest vertex that is not; ~0: none.
-layout(std430, binding = BIND_CHECK) buffer Check { uint bad_step, bad_vertex; };
-// Dispatch parameters: what this one does (PHASE_ bits), and the number of the step, for the check.
-uniform uint phases;
-uniform uint step_number;
 #include "contact.glsl"
-#include "finite.glsl"
 
 Pair predict_velocity(Pair v) {
   v = pair_add(v, params.gravity * params.h);
@@ -23,7 +16,6 @@ Pair predict_position(Pair x, Pair v) {
 // average over them then keeps momentum (method.md eq. 13m).
 float weight_of(Position own) { return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass; }
 
-float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
 bool touches(Pair x) {
   bool any = params.plane_count > 0 && depth_of(x, params.planes[0]) < 0.0;  // mostly there is one, or none
   for (int k = 1; k < params.plane_count; ++k) any = any || depth_of(x, params.planes[k]) < 0.0;
@@ -46,13 +38,6 @@ Pair resolve_contacts(Pair x, vec3 moved) {
 #if RIGID_CONTACT
 #include "rigid.glsl"
 #endif
-
-// Notes a vertex that is not finite. Taken almost never, so it costs a test of numbers that are in registers anyway.
-void note_unless_finite(uint i, vec3 position, vec3 velocity) {
-  if (!is_finite(position) || !is_finite(velocity)) {
-    if (atomicMin(bad_step, step_number) >= step_number) atomicMin(bad_vertex, i);
-  }
-}
 
 // Moves vertex i, which is not fixed; returns where its neighbours see it.
 Pair moved(uint i, Position own, Velocity speed, vec3 correction) {

@@ -29,13 +29,21 @@ struct ConstraintKind {
   double most_compliance;       ///< the largest that settings take; 0: only a material has this kind
   int values = 1;               ///< numbers that describe a constraint at rest
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
+  bool curved =
+      false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
+  bool tet = false;   ///< NAME_jacobian(): the volume over that at rest
   bool rate = false;  ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
   constexpr bool of_material() const { return most_compliance == 0; }
 };
 
 // A row: what it is called, its formula, the vertices of each, and what these measure at rest.
 struct Stretch {
-  static constexpr ConstraintKind row{"stretch", 2, "edges", "m/N", 1};
+  static constexpr ConstraintKind row{.name = "stretch",
+                                      .arity = 2,
+                                      .noun = "edges",
+                                      .compliance_unit = "m/N",
+                                      .most_compliance = 1,
+                                      .curved = true};
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.stretch(x, rest, id);
@@ -54,7 +62,12 @@ struct Bend {
   static double rest(glm::dvec3* x) { return Formulas<double>{}.hinge_angle(x); }
 };
 struct Volume {
-  static constexpr ConstraintKind row{"volume", 4, "tets' volumes", "m^3/Pa", 1};
+  static constexpr ConstraintKind row{.name = "volume",
+                                      .arity = 4,
+                                      .noun = "tets' volumes",
+                                      .compliance_unit = "m^3/Pa",
+                                      .most_compliance = 1,
+                                      .tet = true};
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.volume(x, rest, id);
@@ -63,7 +76,15 @@ struct Volume {
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
 struct NeoHookean {
-  static constexpr ConstraintKind row{"neo_hookean", 4, "tets", "1/J", 0, 8, 2};
+  static constexpr ConstraintKind row{.name = "neo_hookean",
+                                      .arity = 4,
+                                      .noun = "tets",
+                                      .compliance_unit = "1/J",
+                                      .most_compliance = 0,
+                                      .values = 8,
+                                      .components = 2,
+                                      .curved = true,
+                                      .tet = true};
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.neo_hookean(x, rest, id);
@@ -72,7 +93,12 @@ struct NeoHookean {
   static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then
 };
 struct Dashpot {
-  static constexpr ConstraintKind row{"dashpot", 2, "edges", "m/(N s)", 0, 1, 1, true};
+  static constexpr ConstraintKind row{.name = "dashpot",
+                                      .arity = 2,
+                                      .noun = "edges",
+                                      .compliance_unit = "m/(N s)",
+                                      .most_compliance = 0,
+                                      .rate = true};
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.dashpot(x, rest, id);

@@ -28,12 +28,13 @@ Explanation explain(const Sim& sim) {
   kernel(sim.predict, "", 0, 0);
   if (sim.rigid_bodies) kernel(sim.rigid_contact, "", sim.settings.substeps, 0);
   std::map<std::pair<std::size_t, unsigned>, long> times;  // of a pass with these phases, per substep
-  for (const Dispatch& dispatch : sim.substep) ++times[{dispatch.pass, dispatch.phases}];
+  for (const Dispatch& dispatch : sim.substep)
+    ++times[{dispatch.pass, sim.solver.schedule ? 0 : dispatch.phases}];
   for (const auto& [dispatch, count] : times) {
     const auto& [pass, phases] = dispatch;
     std::string what;
     std::size_t more = 0;  // velocities and predicted positions, there or back
-    if (pass + 1 == sim.solver.iteration.size()) {
+    if (pass + 1 == sim.solver.iteration.size() && !sim.solver.schedule) {
       const bool predicts = phases & PHASE_PREDICT, finishes = phases & PHASE_FINISH;
       for (const auto& [does, name] : {std::pair(predicts, ", predict"), std::pair(finishes, ", finish")})
         if (does) what += name;

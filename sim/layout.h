@@ -16,5 +16,5 @@ using layout::RigidRecord;
 using layout::Step;
 using layout::Velocity;
 static_assert(sizeof(Position) == 32 && sizeof(Velocity) == 32 && sizeof(layout::Record4) == 20);
-static_assert(sizeof(Step) == 80 + 32 + 16 * MAX_PLANES + 32);
+static_assert(sizeof(Step) == 96 + 32 + 16 * MAX_PLANES + 32);
 }  // namespace tetpbd

@@ -190,6 +190,7 @@ const std::vector<Preset>& solver_presets() {
        "mode=node,iterations=1,substeps=5,omega=1.5,mass_splitting=true,rigid_contact=true"},
       {"substeps", "20 substeps of 1 iteration",
        "mode=node,iterations=1,substeps=20,omega=1.5,mass_splitting=true,rigid_contact=true"},
+      {"newton", "an implicit step of 4 iterations, for soft bodies", "mode=newton,iterations=4,substeps=1"},
   };
   return rows;
 }
@@ -261,7 +262,7 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && !mode.compliance)
     throw Error(fmt::format("mode {} has no compliance", mode.name), where,
                 "set compliance and constraint_damping to 0 or use another mode");
-  if (mode.leapfrog)
+  if (mode.leapfrog || mode.implicit)
     if (const auto kind = kind_without_force(settings))
       throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,
                   fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));

@@ -71,6 +71,7 @@ void write_step_block(Sim& sim) {
   block.omega = soft ? 1.0f : float(s.omega);
   block.share = leaps(s) ? 0.0f : float(1 / s.omega);
   block.friction = float(s.friction);
+  block.drag = float(s.damping);
   block.restitution = float(s.restitution);
   block.body_size = float(sim.model->size);
   block.velocity_scale = float(std::exp(-s.damping * h));
@@ -150,12 +151,13 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.system = std::move(system);
   const bool soft = compliant(settings), rigid = touches_rigidly(*sim.model, settings);
   const std::size_t count = sim.model->positions.size();
-  const SolverInput input{*sim.model, sim.system, sim.tuning,     is_software_renderer(),
+  const SolverInput input{*sim.model, sim.system, settings,       sim.tuning, is_software_renderer(),
                           soft,       rigid,      leaps(settings)};
   const auto defines = vertex_defines(input);
   sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
                  count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.solver = find_solver_mode(settings.mode)->create(input);
+  if (sim.solver.schedule) sim.predict = std::move(sim.solver.begin);
   sim.longest_substep = longest_substep(sim, settings);
   sim.settings = fitted(settings, sim.longest_substep);
   const auto buffer = [&](const char* label, std::size_t bytes) {
@@ -166,8 +168,10 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.positions = buffer("positions", count * sizeof(Position));
   sim.velocities = buffer("velocities", count * sizeof(Velocity));
   if (on_cpu(sim)) return sim;
-  sim.predicted = buffer("predicted", count * sizeof(Velocity));
-  sim.quantized[0] = buffer("quantized positions", count * 16 * (soft ? 2 : 1));
+  if (!sim.solver.schedule) {
+    if (!leaps(settings)) sim.predicted = buffer("predicted", count * sizeof(Velocity));
+    sim.quantized[0] = buffer("quantized positions", count * 16 * (soft ? 2 : 1));
+  }
   if (sim.solver.double_buffered)
     sim.quantized[1] = buffer("quantized positions, other side", sim.quantized[0].bytes());
   if (rigid) {
@@ -210,7 +214,9 @@ void remake(Sim& sim, const Settings& settings) {
 
 // Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
 // constant acceleration is integrated exactly (method.md eq. 3).
-double half_substep_fall(const Settings& s) { return 0.5 * s.dt / s.substeps * s.gravity; }
+double half_substep_fall(const Settings& s) {
+  return is_implicit(s) ? 0 : 0.5 * s.dt / s.substeps * s.gravity;
+}
 
 void add_upwards(const Sim& sim, State& state, double speed) {
   for (std::size_t i = 0; i < state.velocities.size(); ++i)
@@ -275,7 +281,11 @@ void write_state(Sim& sim, const State& state) {
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s));
+    // The coarse level of implicit steps is that of their length.
+    const double h = is_implicit(s) ? s.dt / s.substeps : 0;
+    const auto softness = is_implicit(s) ? std::tuple(s.compliance, s.constraint_damping)
+                                         : decltype(std::tuple(s.compliance, 0.0)){};
+    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), h, softness);
   };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
   const double before = half_substep_fall(sim.settings);

@@ -13,6 +13,7 @@ struct Dispatcher {
   Sim& sim;
   GLuint program = 0;
   void bind_quantized() const {  // read these, write the others
+    if (sim.solver.schedule) return;
     sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED);
     sim.quantized[sim.solver.double_buffered ? 1 - sim.read_index : sim.read_index].bind_storage(
         BIND_QUANTIZED_OUT);
@@ -47,7 +48,7 @@ void bind(Sim& sim) {
   sim.step_block.bind_uniform(BIND_STEP);
   sim.positions.bind_storage(BIND_POSITIONS);
   sim.velocities.bind_storage(BIND_VELOCITIES);
-  sim.predicted.bind_storage(BIND_PREDICTED);
+  if (sim.predicted) sim.predicted.bind_storage(BIND_PREDICTED);
   sim.check.words.bind_storage(BIND_CHECK);
   if (sim.rigid_bodies) sim.rigid_bodies.bind_storage(BIND_RIGID);
   for (const auto& [binding, buffer] : sim.solver.bindings)
@@ -67,7 +68,7 @@ void step_on_gpu(Sim& sim) {
   Dispatcher dispatcher{sim};
   if (sim.needs_predict) {
     forget_contacts(sim);
-    sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
+    if (!sim.solver.schedule) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
     dispatcher.run(sim.predict, 0);
   }
   dispatcher.bind_quantized();

@@ -11,7 +11,7 @@
 /// The modes that take bodies without compliance.
 inline std::vector<tetpbd::SolverMode> pbd_modes() {
   auto modes = tetpbd::solver_modes();
-  std::erase_if(modes, [](const tetpbd::SolverMode& mode) { return mode.leapfrog; });
+  std::erase_if(modes, [](const tetpbd::SolverMode& mode) { return mode.leapfrog || mode.implicit; });
   return modes;
 }
 

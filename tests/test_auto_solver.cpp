@@ -60,10 +60,9 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     CHECK_FALSE(scene.budget_ms);
     CHECK(scene.settings == choice->settings());
     CHECK(choice->judged == (soft ? "finer steps" : "motion"));
-    REQUIRE(choice->trials.size() ==
-            (soft ? 4 : 5));  // node in its ways, cpu-fast, explicit, the scene's own
+    REQUIRE(choice->trials.size() == 5);  // node in its ways, cpu-fast, explicit and newton, the scene's own
     CHECK(choice->trials.back().settings == own);
-    CHECK(choice->trials.end()[-2].settings.mode == (soft ? "explicit" : "cpu-fast"));
+    CHECK(choice->trials.end()[-2].settings.mode == (soft ? "newton" : "cpu-fast"));
     CHECK(choice->trials[choice->best].fits);
     // Against the right motion, found anew: 1.3 times the best error that fits, at most.
     const ConstraintSystem system = build_constraints(model->rest, own);

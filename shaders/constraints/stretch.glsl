@@ -13,3 +13,8 @@ Constraint2 stretch(vec3 x[2], real rest, Ids ids) {
   c.floor = real(0);
   return c;
 }
+// What C Hess C has of use: a stretched edge resists turning; that of a compressed one would not be positive.
+mat3 stretch_curvature(Constraint2 c, vec3 x[2], int i, int j) {
+  vec3 n = c.gradient[0];
+  return (mat3(real(1)) - outerProduct(n, n)) * (-max(c.C, real(0)) / max(length(x[0] - x[1]), real(1e-30)));
+}

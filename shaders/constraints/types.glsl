@@ -22,6 +22,20 @@ struct Constraint4x2 {
   uint guards;
 };
 
+// Blocks of Hessians (mode newton; method.md eq. 41), of vertices i and j != i: what the gradient of i gains per way of j. Chosen by
+// conditions: an array with an index that is not constant would lie in memory.
+vec3 chosen(int j, vec3 v0, vec3 v1, vec3 v2, vec3 v3) { return j == 0 ? v0 : j == 1 ? v1 : j == 2 ? v2 : v3; }
+vec3 gradient_of(Constraint2 c, int j) { return j == 0 ? c.gradient[0] : c.gradient[1]; }
+vec3 gradient_of(Constraint4 c, int j) { return chosen(j, c.gradient[0], c.gradient[1], c.gradient[2], c.gradient[3]); }
+// matrix * p = cross(v, p)
+mat3 cross_matrix(vec3 v) { return mat3(real(0), v.z, -v.y, -v.z, real(0), v.x, v.y, -v.x, real(0)); }
+
+// What a constraint adds to an edge of mode newton's matrix: a block, and a force on i that is opposite on j.
+struct EdgePart {
+  mat3 block;
+  vec3 force;
+};
+
 // A direction for two vertices in one place: of unit length, the opposite one for (b, a), and unlike that of other pairs,
 // so that a body that has collapsed to a point does not unfold along a line only.
 vec3 any_direction(uint a, uint b) {

@@ -31,3 +31,7 @@ Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   }
   return c;
 }
+// The volume over that at rest.
+real volume_jacobian(vec3 x[4], real rest) {
+  return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]) / (real(6) * rest);
+}

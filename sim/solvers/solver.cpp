@@ -19,6 +19,7 @@ Solver create_constraint_solver(const SolverInput&);
 Solver create_cpu_solver(const SolverInput&);
 Solver create_cpu_double_solver(const SolverInput&);
 Solver create_cpu_fast_solver(const SolverInput&);
+Solver create_newton_solver(const SolverInput&);
 Solver create_paper_solver(const SolverInput&);
 
 namespace {
@@ -43,6 +44,11 @@ const std::vector<SolverMode> rows = {
      .help = "leapfrog on the GPU, of what has a material or compliance: as many substeps as stay stable",
      .create = create_node_solver,
      .leapfrog = true},
+    {.name = "newton",
+     .help =
+         "implicit steps on the GPU, of what has a material or compliance: conjugate gradients on two levels",
+     .create = create_newton_solver,
+     .implicit = true},
     {.name = "paper",
      .help = "the paper's GPU pipeline: a kernel per kind, floats added by compare-and-swap",
      .create = create_paper_solver,
@@ -69,8 +75,10 @@ const SolverMode* find_solver_mode(const std::string& name) {
 }
 
 bool leaps(const Settings& settings) { return find_solver_mode(settings.mode)->leapfrog; }
+bool is_implicit(const Settings& settings) { return find_solver_mode(settings.mode)->implicit; }
 
 std::vector<Dispatch> substep_dispatches(const Solver& solver, int iterations) {
+  if (solver.schedule) return solver.schedule(iterations);
   const std::size_t move = solver.iteration.size() - 1;
   const bool apart = solver.unfused || iterations == 0;
   std::vector<Dispatch> dispatches;
@@ -121,6 +129,10 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
                        {"PROJECT", constraint_kinds[k].components == 1 ? "project" : "project_two"},
                        {"RATE", constraint_kinds[k].rate ? "1" : "0"},
                        {"VALUES", std::to_string(constraint_kinds[k].values)},
+                       {"REST", constraint_kinds[k].values == 1 ? "one" : "some"},
+                       {"COMPONENTS", std::to_string(constraint_kinds[k].components)},
+                       {"CURVED", constraint_kinds[k].curved ? "1" : "0"},
+                       {"TETS", constraint_kinds[k].tet ? "1" : "0"},
                        {"KIND_ROW", std::to_string(k / 4)},
                        {"KIND_COLUMN", std::to_string(k % 4)}});
   return words;

@@ -35,6 +35,12 @@ using GuardCounts = std::array<std::uint64_t, GUARDS>;
 inline constexpr std::array<const char*, GUARDS> guard_names = {
     "direction", "hinge", "angle", "volume_floor", "collapsed", "limit", "not_finite"};
 
+/// A pass in a substep, and the phases (layout.glsl PHASE_) it goes through.
+struct Dispatch {
+  std::size_t pass;
+  unsigned phases;
+};
+
 /// Passes or a function, never both.
 struct Solver {
   std::vector<Buffer> buffers;
@@ -42,15 +48,14 @@ struct Solver {
   std::vector<Pass> iteration;  ///< the passes of one iteration, in order; the last one moves the vertices
   bool double_buffered =
       false;             ///< an iteration reads one buffer of quantized positions and writes the other
+  /// The dispatches of a substep of so many iterations, where they are not those of Jacobi; and the pass in
+  /// place of predict.comp.
+  std::vector<Dispatch> (*schedule)(int iterations) = nullptr;
+  Pass begin;
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
   std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };
 
-/// A pass in a substep, and the phases (layout.glsl PHASE_) it goes through.
-struct Dispatch {
-  std::size_t pass;
-  unsigned phases;
-};
 /// The dispatches of a substep in order (method.md, "A step"): predict, solve x iterations, finish.
 /// Prediction and velocities ride on the first and last iteration, but where the solver has them apart.
 std::vector<Dispatch> substep_dispatches(const Solver& solver, int iterations);
@@ -71,6 +76,7 @@ Tuning tuning_from_environment();
 struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
+  const Settings& settings;
   Tuning tuning;           ///< `row` and `storage` filled in
   bool software = false;   ///< the "GPU" is a CPU
   bool compliant = false;  ///< settings.h
@@ -84,6 +90,7 @@ struct SolverMode {
   const char* help;
   Solver (*create)(const SolverInput&);
   bool compliance = true;  ///< and compliance
+  bool implicit = false;   ///< forces, in implicit steps
   bool leapfrog = false;   ///< forces in place of corrections: substeps are as many as stay stable
   bool offered = true;     ///< in --mode and the window; else in bench and compare alone
 };
@@ -94,6 +101,7 @@ const SolverMode* find_solver_mode(const std::string& name);
 
 /// Whether its mode does.
 bool leaps(const Settings& settings);
+bool is_implicit(const Settings& settings);
 
 /// Definitions for the shaders that move vertices (vertex.glsl).
 std::vector<std::string> vertex_defines(const SolverInput& input);

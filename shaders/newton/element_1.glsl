@@ -1,0 +1,32 @@
+// A constraint with one value: its energy is C^2 / (2 a), and its rate is resisted by tau / a.
+void add_$KIND(uint record, uint part, int i, int j, inout mat3 block, inout vec3 force) {
+  vec3 x[$ARITY];
+  ivec4 first = start_at(part, mesh[record]);
+  for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(part, mesh[record + k]), first);
+  Constraint$ARITY c = $KIND(x, rest_$KIND(record), record);
+#if $MATERIAL
+  float a = uintBitsToFloat(mesh[record + $ARITY + $VALUES]);
+#else
+  float a = params.compliance[$KIND_ROW][$KIND_COLUMN] * (params.h * params.h);
+#endif
+  float push = $RATE == 1 ? 0.0 : c.C, held = $RATE == 1 ? 0.0 : 1.0;
+  float tau = $RATE == 1 ? 1.0 : params.damping * params.h;
+  if (tau > 0.0) {
+    // Along the way since z.
+    float h = at(OFFSET, mesh[record]).w, rate = 0.0;
+    for (int k = 0; k < $ARITY; ++k) {
+      uint v = mesh[record + uint(k)];
+      Position own = positions[v];
+      vec3 moved = own.inverse_mass > 0.0 ? start_of(v, Pair(own.high, own.low)) - at(OFFSET, v).xyz : vec3(0.0);
+      rate += dot(c.gradient[k], moved) / h;
+    }
+    push += tau * rate;
+    held += tau / h;
+  }
+  vec3 gi = gradient_of(c, i), gj = gradient_of(c, j);
+  block += outerProduct(gi * (held / a), gj);
+#if $CURVED
+  block += $KIND_curvature(c, x, i, j) * (1.0 / a);
+#endif
+  force += (gi - gj) * (push / (a * float($ARITY)));
+}

@@ -1,0 +1,40 @@
+// The last iteration's step, then where each vertex is and how fast (method.md eq. 40). One invocation per vertex.
+#include "newton/newton.glsl"
+#include "newton/advance.glsl"
+void main() {
+  Lengths l = Lengths(0.0, 0.0, 0.0, false);
+  if (phases > 0u) l = lengths(phases);
+  uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
+  if (i >= VERTICES) return;
+  Position own = positions[i];
+  Pair x = Pair(own.high, own.low);
+  vec4 offset = at(OFFSET, i);
+  vec3 u = vec3(0.0), v = vec3(0.0), before = velocities[i].high + velocities[i].low;
+  uint touched = 0u;
+  float push = 0.0;
+  if (own.inverse_mass > 0.0) {
+    uint holds = held_by(at(RESIDUAL, i));
+    Advanced last = advance(i, l);
+    vec3 free = start_of(i, x) + last.step;
+    u = kept_out(x, free);
+    bool known = (floatBitsToUint(at(WAY, i).w) & KNOWN) != 0u;
+    v = (u - offset.xyz) / offset.w;
+    if (!known) v += (0.5 * params.h) * params.gravity;
+    for (int k = 0; k < params.plane_count; ++k) {
+      vec3 n = params.planes[k].xyz;
+      bool clamped = depth_of(x, params.planes[k]) + dot(n, free) < 0.0;
+      if ((holds & (1u << k)) != 0u || clamped) {
+        float force = -dot(n, last.residual);
+        if (force > 0.0 || clamped) touched |= 1u << k;
+        push = max(push, force);
+      }
+    }
+    v = free_part(v, touched);
+  }
+  x = pair_add(x, u);
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
+  velocities[i] = Velocity(v, 0.0, vec3(0.0), 0.0);
+  note_unless_finite(i, x.high, v);
+  put(WAY, i, free_part(u, touched), uintBitsToFloat(touched | KNOWN));
+  put(GAIN, i, free_part(v - before, touched), push);
+}

@@ -1,0 +1,1 @@
+float rest_$KIND(uint record) { return uintBitsToFloat(mesh[record + $ARITY]); }

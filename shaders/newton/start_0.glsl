@@ -1,0 +1,1 @@
+void start_$KIND(uint c, inout uint bad) {}

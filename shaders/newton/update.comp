@@ -1,0 +1,63 @@
+// An iteration's end: step lengths, the vectors of each vertex, and the coarse residual. Iteration 0: its beginning. A work-group per
+// aggregate, then an invocation per vertex.
+#include "newton/newton.glsl"
+#include "newton/advance.glsl"
+shared vec3 forces[GROUP_SIZE], torques[GROUP_SIZE];
+
+// The coarse residual of the vectors in `slot`, by its rotated rigid motions. An aggregate that a half space holds has none: it cannot move as
+// one, and the coarse matrix does not know.
+void restrict_to(uint aggregate, uint slot, Lengths l) {
+  uint lane = gl_LocalInvocationIndex, end = mesh[AGGREGATES_AT + aggregate + 1u];
+  vec4 centre = centre_of(aggregate), back = opposite(rotation_of(aggregate));
+  vec3 force = vec3(0.0), torque = vec3(0.0);
+  float held = 0.0;
+  for (uint k = mesh[AGGREGATES_AT + aggregate] + lane; k < end; k += GROUP_SIZE) {
+    uint i = mesh[MEMBERS_AT + 2u * k];
+    float weight = float(mesh[MEMBERS_AT + 2u * k + 1u]) * (1.0 / 65535.0);
+    vec3 f = weight * turned(back, at(slot, i).xyz);
+    if (held_by(at(RESIDUAL, i)) != 0u) held = 1.0;
+    force += f;
+    torque += cross((at(REST, i).xyz - centre.xyz) / centre.w, f);
+  }
+  forces[lane] = force;
+  torques[lane] = torque;
+  barrier();
+  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
+    if (lane < half_size) {
+      forces[lane] += forces[lane + half_size];
+      torques[lane] += torques[lane + half_size];
+    }
+    barrier();
+  }
+  held = slot == RESIDUAL ? group_sum(vec2(held, 0.0)).x : 1.0 - sums[FREE_AT + aggregate];
+  if (lane >= 6u) return;
+  if (slot == RESIDUAL && lane == 0u) sums[FREE_AT + aggregate] = held > 0.0 ? 0.0 : 1.0;
+  float value = held > 0.0 ? 0.0 : lane < 3u ? forces[0][lane] : torques[0][lane - 3u];
+  uint k = 6u * aggregate + lane;
+  if (slot == RESIDUAL) {
+    sums[COARSE_Q + k] = 0.0;
+    sums[COARSE_R + k] = value;
+  } else {
+    float q = value + l.beta * sums[COARSE_Q + k];
+    sums[COARSE_Q + k] = q;
+    sums[COARSE_R + k] = l.coarse ? sums[COARSE_R + k] - l.alpha * q : 0.0;
+  }
+}
+
+void main() {
+  uint group = group_index();
+  Lengths l = Lengths(0.0, 0.0, 0.0, AGGREGATES > 0);
+  if (phases > 0u) l = lengths(phases);
+  if (group == 0u && gl_LocalInvocationIndex == 0u) {
+    uint k = SCALARS_AT + 3u * (phases & 1u);
+    sums[k] = l.rz;
+    sums[k + 1u] = l.alpha;
+    sums[k + 2u] = l.coarse ? 1.0 : 0.0;
+  }
+  if (group < AGGREGATES) {
+    restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, l);
+    return;
+  }
+  uint i = (group - AGGREGATES) * GROUP_SIZE + gl_LocalInvocationIndex;
+  if (i < VERTICES && phases > 0u && l.alpha > 0.0) advance(i, l);
+}

@@ -1,0 +1,18 @@
+// The state of vertices, for kernels that move them.
+layout(std430, binding = BIND_POSITIONS) buffer Positions { Position positions[]; };
+layout(std430, binding = BIND_VELOCITIES) buffer Velocities { Velocity velocities[]; };
+// The first step whose state is not finite, and the lowest vertex that is not; ~0: none.
+layout(std430, binding = BIND_CHECK) buffer Check { uint bad_step, bad_vertex; };
+// Dispatch parameters: what this one does (PHASE_ bits; mode newton: which iteration), and the number of the step, for the check.
+uniform uint phases;
+uniform uint step_number;
+#include "finite.glsl"
+
+float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
+
+// Notes a vertex that is not finite. Taken almost never, so it costs a test of numbers that are in registers anyway.
+void note_unless_finite(uint i, vec3 position, vec3 velocity) {
+  if (!is_finite(position) || !is_finite(velocity)) {
+    if (atomicMin(bad_step, step_number) >= step_number) atomicMin(bad_vertex, i);
+  }
+}

@@ -1,0 +1,218 @@
+#include "sim/solvers/aggregates.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <limits>
+#include <queue>
+
+#include "sim/parallel.h"
+
+namespace tetpbd {
+
+namespace {
+
+constexpr std::uint32_t none = ~0u;
+
+struct Nearest {
+  std::vector<std::uint32_t> seed;  // which, by vertex
+  std::vector<double> distance;
+};
+
+// Dijkstra from all seeds at once.
+void spread(const Model& model, const Grouped& neighbours, const std::vector<std::uint32_t>& seeds,
+            std::size_t first, Nearest& nearest) {
+  using Entry = std::pair<double, std::uint32_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (std::size_t s = first; s < seeds.size(); ++s) {
+    nearest.distance[seeds[s]] = 0, nearest.seed[seeds[s]] = std::uint32_t(s);
+    queue.push({0, seeds[s]});
+  }
+  while (!queue.empty()) {
+    const auto [distance, v] = queue.top();
+    queue.pop();
+    if (distance > nearest.distance[v]) continue;
+    for (std::uint32_t k = neighbours.first[v]; k < neighbours.first[v + 1]; ++k) {
+      const std::uint32_t u = neighbours.values[k];
+      if (!(model.inverse_masses[u] > 0)) continue;
+      const double further = distance + glm::distance(model.rest.positions[u], model.rest.positions[v]);
+      if (further < nearest.distance[u]) {
+        nearest.distance[u] = further, nearest.seed[u] = nearest.seed[v];
+        queue.push({further, u});
+      }
+    }
+  }
+}
+
+// Around evenly spread vertices (they are numbered along a curve), moved to the middle of what is nearest to
+// them a few times over (k-means).
+Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wanted,
+                std::vector<std::uint32_t>& seeds) {
+  const std::size_t vertices = model.positions.size();
+  std::vector<std::uint32_t> moving;
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    if (model.inverse_masses[v] > 0) moving.push_back(v);
+  wanted = std::min(wanted, moving.size());
+  for (std::size_t s = 0; s < wanted; ++s)
+    seeds.push_back(moving[(2 * s + 1) * moving.size() / (2 * wanted)]);
+  Nearest nearest;
+  for (int round = 0; round < 6; ++round) {
+    nearest.seed.assign(vertices, none);
+    nearest.distance.assign(vertices, std::numeric_limits<double>::max());
+    spread(model, neighbours, seeds, 0, nearest);
+    for (const std::uint32_t v : moving)  // a part that no seed is in
+      if (nearest.seed[v] == none && seeds.size() < 65535)
+        seeds.push_back(v), spread(model, neighbours, seeds, seeds.size() - 1, nearest);
+    if (round == 5) break;
+    std::vector<glm::dvec4> centres(seeds.size(), glm::dvec4(0));
+    for (const std::uint32_t v : moving)
+      if (nearest.seed[v] != none)
+        centres[nearest.seed[v]] += model.masses[v] * glm::dvec4(model.rest.positions[v], 1);
+    std::vector<double> best(seeds.size(), std::numeric_limits<double>::max());
+    for (const std::uint32_t v : moving) {
+      const std::uint32_t s = nearest.seed[v];
+      if (s == none) continue;
+      const double off = glm::distance(model.rest.positions[v], glm::dvec3(centres[s]) / centres[s].w);
+      if (off < best[s]) best[s] = off, seeds[s] = v;
+    }
+  }
+  return nearest;
+}
+
+using Weights = std::vector<std::pair<std::uint32_t, double>>;  // aggregate, weight
+
+// Each round a vertex takes three fifths from its neighbours.
+std::vector<Weights> smoothed(const Model& model, const Grouped& neighbours, const Nearest& nearest) {
+  std::vector<Weights> weights(nearest.seed.size()), next(nearest.seed.size());
+  for (std::size_t v = 0; v < weights.size(); ++v)
+    if (nearest.seed[v] != none) weights[v] = {{nearest.seed[v], 1}};
+  for (int round = 0; round < 4; ++round) {
+    parallel_for(weights.size(), [&](std::size_t v) {
+      Weights& sum = next[v];
+      sum.clear();
+      if (!(model.inverse_masses[v] > 0)) return;
+      const auto add = [&](const Weights& from, double factor) {
+        for (const auto& [aggregate, weight] : from) {
+          const auto found = std::ranges::find(sum, aggregate, &Weights::value_type::first);
+          if (found == sum.end())
+            sum.push_back({aggregate, factor * weight});
+          else
+            found->second += factor * weight;
+        }
+      };
+      const auto all = std::span(neighbours.values)
+                           .subspan(neighbours.first[v], neighbours.first[v + 1] - neighbours.first[v]);
+      const auto count =
+          std::ranges::count_if(all, [&](std::uint32_t u) { return model.inverse_masses[u] > 0; });
+      add(weights[v], count > 0 ? 0.4 : 1);
+      for (const std::uint32_t u : all)
+        if (model.inverse_masses[u] > 0) add(weights[u], 0.6 / double(count));
+      std::ranges::sort(sum, [](const auto& a, const auto& b) { return a.second > b.second; });
+      if (sum.size() > 8) sum.resize(8);
+    });
+    std::swap(weights, next);
+  }
+  return weights;
+}
+
+std::array<Share, 4> shares_of(const Weights& weights) {
+  std::array<Share, 4> shares{};
+  double sum = 0;
+  const std::size_t count = std::min<std::size_t>(weights.size(), 4);
+  for (std::size_t k = 0; k < count; ++k) sum += weights[k].second;
+  std::uint32_t left = 65535;
+  for (std::size_t k = count; k-- > 0;) {
+    const std::uint32_t weight = k == 0 ? left : std::uint32_t(65535 * weights[k].second / sum);
+    shares[k] = {weights[k].first, weight}, left -= weight;
+  }
+  return shares;
+}
+
+using Modes = Eigen::Matrix<double, 3, 6>;
+using Block = Eigen::Matrix<double, 6, 6>;
+
+// Displacements of a vertex with its aggregate: three ways, three turns.
+Modes modes(const Model& model, const Aggregates& aggregates, std::size_t v, const Share& share) {
+  const Aggregate& aggregate = aggregates.all[share.aggregate];
+  const glm::dvec3 r = (model.rest.positions[v] - aggregate.centre) / aggregate.reach;
+  Modes m;
+  m << 1, 0, 0, 0, r.z, -r.y,  //
+      0, 1, 0, -r.z, 0, r.x,   //
+      0, 0, 1, r.y, -r.x, 0;
+  return m * (double(share.weight) / 65535);
+}
+
+}  // namespace
+
+Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::size_t wanted) {
+  std::vector<std::uint32_t> seeds;
+  const Nearest nearest = cluster(model, neighbours, wanted, seeds);
+  const auto weights = smoothed(model, neighbours, nearest);
+  Aggregates result;
+  result.of_vertex.resize(weights.size());
+  parallel_for(weights.size(), [&](std::size_t v) { result.of_vertex[v] = shares_of(weights[v]); });
+  result.members = group_by_key(weights.size(), seeds.size(), [&](std::size_t v, auto&& emit) {
+    for (std::size_t k = 0; k < 4; ++k)
+      if (const Share& share = result.of_vertex[v][k]; share.weight > 0)
+        emit(share.aggregate, std::uint32_t(4 * v + k));
+  });
+  for (std::size_t a = 0; a < seeds.size(); ++a) {
+    glm::dvec4 centre(0);
+    double squares = 0;
+    const auto each = [&](auto&& f) {
+      for (std::uint32_t k = result.members.first[a]; k < result.members.first[a + 1]; ++k) {
+        const std::uint32_t member = result.members.values[k], v = member / 4;
+        f(model.rest.positions[v], model.masses[v] * result.of_vertex[v][member % 4].weight);
+      }
+    };
+    each([&](const glm::dvec3& x, double m) { centre += m * glm::dvec4(x, 1); });
+    const glm::dvec3 middle = centre.w > 0 ? glm::dvec3(centre) / centre.w : model.rest.positions[seeds[a]];
+    each([&](const glm::dvec3& x, double m) { squares += m * glm::dot(x - middle, x - middle); });
+    result.all.push_back({middle, centre.w > 0 && squares > 0 ? std::sqrt(squares / centre.w) : model.size});
+  }
+  return result;
+}
+
+std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows) {
+  const auto count = Eigen::Index(6 * aggregates.all.size());
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(count, count);
+  // Columns of one aggregate at a time; the matrix is symmetric.
+  parallel_for(
+      aggregates.all.size(),
+      [&](std::size_t a) {
+        const auto add = [&](const Share& other, std::size_t v, const Eigen::Matrix<double, 6, 3>& from) {
+          if (other.weight > 0)
+            A.block<6, 6>(6 * Eigen::Index(other.aggregate), 6 * Eigen::Index(a)) +=
+                (from * modes(model, aggregates, v, other)).transpose();
+        };
+        for (std::uint32_t k = aggregates.members.first[a]; k < aggregates.members.first[a + 1]; ++k) {
+          const std::uint32_t member = aggregates.members.values[k], v = member / 4;
+          const Modes own = modes(model, aggregates, v, aggregates.of_vertex[v][member % 4]);
+          Eigen::Matrix3d diagonal = rows.inertia[v] * Eigen::Matrix3d::Identity();
+          for (std::uint32_t e = rows.neighbours.first[v]; e < rows.neighbours.first[v + 1]; ++e) {
+            const Eigen::Map<const Eigen::Matrix3d> block(&rows.blocks[e][0].x);
+            diagonal -= block;
+            const std::uint32_t u = rows.neighbours.values[e];
+            for (const Share& share : aggregates.of_vertex[u]) add(share, u, own.transpose() * block);
+          }
+          for (const Share& share : aggregates.of_vertex[v]) add(share, v, own.transpose() * diagonal);
+        }
+      },
+      1);
+  A = (0.5 * (A + A.transpose())).eval();
+  // An aggregate of one vertex does not turn; what no member feels may have any value.
+  A.diagonal() *= 1 + 1e-6;
+  if (count > 0) A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
+  const Eigen::MatrixXd inverse = A.llt().solve(Eigen::MatrixXd::Identity(count, count));
+  const std::size_t width = (std::size_t(count) + 3) / 4 * 4;
+  std::vector<float> values(width * std::size_t(count), 0.0f);
+  parallel_for(
+      std::size_t(count),
+      [&](std::size_t row) {
+        for (Eigen::Index c = 0; c < count; ++c)
+          values[row * width + std::size_t(c)] = float(inverse(Eigen::Index(row), c));
+      },
+      64);
+  return values;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,374 @@
+// Mode newton: blocks of its matrix against finite differences, its second level against algebra, its steps
+// against leapfrog in double.
+#include <doctest/doctest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "sim/error.h"
+#include "sim/material.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/reference/motion.h"
+#include "sim/sim.h"
+#include "sim/solvers/aggregates.h"
+#include "tests/gl_test.h"
+#include "tests/reference_scenes.h"
+
+using namespace tetpbd;
+using reference_scenes::noise;
+
+namespace {
+
+struct Tet4 {
+  std::array<glm::dvec3, 4> x;
+  std::array<double, 8> rest;
+  std::array<double, 2> compliance;
+};
+
+// At rest irregular; then moved by `strain` times its size at random.
+Tet4 tet_of(double strain, double nu) {
+  Tet4 tet;
+  tet.x = {glm::dvec3(0), {1, 0.1, 0}, {0.2, 0.9, 0.1}, {0.1, 0.3, 1.1}};
+  for (auto& p : tet.x) p += noise(0.1);
+  const double six = glm::dot(glm::cross(tet.x[1] - tet.x[0], tet.x[2] - tet.x[0]), tet.x[3] - tet.x[0]);
+  const auto [mu, lambda] = lame(1e6, nu);
+  const double ours = 4.0 / 3 * mu, bulk = lambda + 5.0 / 6 * mu;
+  tet.rest = NeoHookean::rest(tet.x.data());
+  tet.rest[7] = 1 + 0.75 * ours / bulk;
+  tet.compliance = {6 / (ours * six), 6 / (bulk * six)};
+  for (auto& p : tet.x) p += noise(strain);
+  return tet;
+}
+
+// dE/dx of E = sum C^2 / (2 compliance).
+std::array<glm::dvec3, 4> forces(Tet4 tet) {
+  const auto c = NeoHookean::evaluate<double>(tet.x.data(), tet.rest.data());
+  std::array<glm::dvec3, 4> sum;
+  for (int j = 0; j < 4; ++j)
+    sum[std::size_t(j)] =
+        c.C[0] / tet.compliance[0] * c.gradient[0][j] + c.C[1] / tet.compliance[1] * c.gradient[1][j];
+  return sum;
+}
+
+auto part_of(Tet4 tet, int i, int j) {
+  return Formulas<double>{}.neo_hookean_part(tet.x.data(), tet.rest.data(), tet.compliance.data(), i, j);
+}
+
+std::shared_ptr<const Model> block_model(double height, bool held, glm::dvec3 velocity, glm::dvec3 spin) {
+  TetMesh mesh = make_block({1, 0.7, 0.5}, {5, 4, 3});
+  reference_scenes::generator.seed(3);
+  for (auto& p : mesh.positions) p += noise(0.02) + glm::dvec3(0, 0.4 + height, 0);
+  finish_tets(mesh, "block");
+  auto model = std::make_shared<Model>();
+  add_body(*model, "block", mesh, 1000, mesh.positions, velocity, spin,
+           held ? std::vector<std::uint32_t>{0, 1} : std::vector<std::uint32_t>{});
+  return model;
+}
+
+Settings soft(const std::string& material, double tau = 0) {
+  Settings settings;
+  settings.mode = "newton", settings.material = material, settings.constraint_damping = tau;
+  settings.young_modulus = 1e5, settings.iterations = 30, settings.substeps = 1;
+  if (material == "none") {
+    settings.compliance[index_of<Stretch>] = 1e-4, settings.compliance[index_of<Volume>] = 5e-9;
+    settings.compliance[index_of<Bend>] = 1;
+  }
+  return settings;
+}
+
+double distance(const std::vector<glm::dvec3>& a, const std::vector<glm::dvec3>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i] - b[i], a[i] - b[i]);
+  return std::sqrt(sum / double(a.size()));
+}
+
+Grouped neighbours_of(const TetMesh& mesh) {
+  const auto edges = tet_edges(mesh);
+  return group_by_key(edges.size(), mesh.positions.size(), [&](std::size_t e, auto&& emit) {
+    emit(edges[e][0], edges[e][1]), emit(edges[e][1], edges[e][0]);
+  });
+}
+
+}  // namespace
+
+TEST_CASE("newton: blocks of a neo-Hookean tet are its forces' derivatives, wherever nothing is left out") {
+  reference_scenes::generator.seed(5);
+  int exact = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    Tet4 tet = tet_of(0.05, trial % 2 ? 0.3 : 0.45);
+    // The part of J is taken whole where the tet is stretched little or compressed less than at rest.
+    for (auto& p : tet.x) p *= 1.03;
+    const auto here = forces(tet);
+    double largest = 0, off = 0;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        if (i == j) continue;
+        glm::dmat3 block;
+        for (int a = 0; a < 3; ++a) {
+          Tet4 low = tet, high = tet;
+          low.x[std::size_t(j)][a] -= 1e-6, high.x[std::size_t(j)][a] += 1e-6;
+          block[a] = (forces(high)[std::size_t(i)] - forces(low)[std::size_t(i)]) / 2e-6;
+        }
+        const auto part = part_of(tet, i, j);
+        for (int a = 0; a < 3; ++a)
+          largest = std::max(largest, glm::length(block[a])),
+          off = std::max(off, glm::length(block[a] - part.block[a]));
+        const auto back = part_of(tet, j, i);
+        CHECK(glm::length(part.force + back.force) <= 1e-9 * (1 + glm::length(part.force)));
+      }
+    if (off < 1e-6 * largest) ++exact;
+    for (int i = 0; i < 4; ++i) {
+      glm::dvec3 sum(0);
+      for (int j = 0; j < 4; ++j)
+        if (i != j) sum += part_of(tet, i, j).force;
+      CHECK(glm::length(sum - here[std::size_t(i)]) <= 1e-9 * (1 + glm::length(sum)));
+    }
+  }
+  CHECK(exact >= 20);
+}
+
+TEST_CASE("newton: a neo-Hookean tet's matrix has no negative direction, however it is bent") {
+  reference_scenes::generator.seed(6);
+  for (const double strain : {0.0, 0.3, 1.0, 3.0})
+    for (int trial = 0; trial < 50; ++trial) {
+      const Tet4 tet = tet_of(strain, trial % 2 ? 0.3 : 0.49);
+      Eigen::Matrix<double, 12, 12> whole = Eigen::Matrix<double, 12, 12>::Zero();
+      for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+          if (i == j) continue;
+          const auto part = part_of(tet, i, j);
+          const Eigen::Map<const Eigen::Matrix3d> block(&part.block[0].x);
+          whole.block<3, 3>(3 * i, 3 * j) = block, whole.block<3, 3>(3 * i, 3 * i) -= block;
+        }
+      CHECK((whole - whole.transpose()).norm() <= 1e-9 * whole.norm());
+      const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(whole).eigenvalues();
+      CHECK(values.minCoeff() >= -1e-6 * values.maxCoeff());
+      if (strain == 0) CHECK(values(6) > 1e-4 * values(11));  // six ways to move freely, no more
+    }
+}
+
+TEST_CASE("newton: aggregates share all that moves, and nothing across a gap") {
+  // Two slabs a hundredth apart, and one vertex held.
+  auto model = std::make_shared<Model>();
+  for (const double y : {0.0, 0.11}) {
+    TetMesh mesh = make_block({1, 0.1, 0.5}, {20, 2, 10});
+    for (auto& p : mesh.positions) p.y += y;
+    finish_tets(mesh, "slab");
+    add_body(*model, "slab", mesh, 1000, mesh.positions, {}, {}, {7});
+  }
+  const Aggregates aggregates = make_aggregates(*model, neighbours_of(model->rest), 12);
+  CHECK(aggregates.all.size() >= 12);
+  std::vector<int> slab(aggregates.all.size(), -1);
+  for (std::size_t v = 0; v < model->positions.size(); ++v) {
+    std::uint32_t sum = 0;
+    const int which = v >= model->bodies[1].first_vertex;
+    for (const Share& share : aggregates.of_vertex[v]) {
+      sum += share.weight;
+      if (share.weight == 0) continue;
+      if (slab[share.aggregate] < 0) slab[share.aggregate] = which;
+      CHECK(slab[share.aggregate] == which);
+    }
+    CHECK(sum == (model->inverse_masses[v] > 0 ? 65535 : 0));
+  }
+}
+
+TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inverted") {
+  const auto model = block_model(1, true, {}, {});
+  const Grouped neighbours = neighbours_of(model->rest);
+  const Aggregates aggregates = make_aggregates(*model, neighbours, 4);
+  const std::size_t n = model->positions.size();
+  std::vector<double> inertia;
+  for (const double w : model->inverse_masses) inertia.push_back(w > 0 ? 1e5 / w : 0);
+  // Springs between neighbours.
+  std::vector<glm::dmat3> blocks;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(Eigen::Index(3 * n), Eigen::Index(3 * n));
+  for (std::size_t v = 0; v < n; ++v) {
+    A.block<3, 3>(Eigen::Index(3 * v), Eigen::Index(3 * v)) += inertia[v] * Eigen::Matrix3d::Identity();
+    for (std::uint32_t k = neighbours.first[v]; k < neighbours.first[v + 1]; ++k) {
+      const std::uint32_t u = neighbours.values[k];
+      const glm::dvec3 along = glm::normalize(model->rest.positions[u] - model->rest.positions[v]);
+      blocks.push_back(-1e4 * glm::outerProduct(along, along));
+      const Eigen::Map<const Eigen::Matrix3d> block(&blocks.back()[0].x);
+      A.block<3, 3>(Eigen::Index(3 * v), Eigen::Index(3 * u)) += block;
+      A.block<3, 3>(Eigen::Index(3 * v), Eigen::Index(3 * v)) -= block;
+    }
+  }
+  const std::size_t unknowns = 6 * aggregates.all.size(), width = (unknowns + 3) / 4 * 4;
+  Eigen::MatrixXd Q = Eigen::MatrixXd::Zero(Eigen::Index(3 * n), Eigen::Index(unknowns));
+  for (std::size_t v = 0; v < n; ++v)
+    for (const Share& share : aggregates.of_vertex[v])
+      for (int mode = 0; mode < 6 && share.weight > 0; ++mode) {
+        glm::dvec3 axis(0);
+        axis[mode % 3] = 1;
+        const Aggregate& a = aggregates.all[share.aggregate];
+        const glm::dvec3 way =
+            mode < 3 ? axis : glm::cross(axis, (model->rest.positions[v] - a.centre) / a.reach);
+        for (int c = 0; c < 3; ++c)
+          Q(Eigen::Index(3 * v) + c, Eigen::Index(6 * share.aggregate) + mode) +=
+              way[c] * share.weight / 65535.0;
+      }
+  const Eigen::MatrixXd coarse = Q.transpose() * A * Q;
+  const std::vector<float> inverse = coarse_inverse(*model, aggregates, {neighbours, inertia, blocks});
+  REQUIRE(inverse.size() == unknowns * width);
+  Eigen::MatrixXd found{Eigen::Index(unknowns), Eigen::Index(unknowns)};
+  for (std::size_t r = 0; r < unknowns; ++r)
+    for (std::size_t c = 0; c < unknowns; ++c)
+      found(Eigen::Index(r), Eigen::Index(c)) = inverse[r * width + c];
+  CHECK((found * coarse - Eigen::MatrixXd::Identity(Eigen::Index(unknowns), Eigen::Index(unknowns))).norm() <
+        1e-2);
+}
+
+TEST_CASE("newton: its motion nears that of leapfrog with the square of the step, damped or not") {
+  GlTest gl;
+  for (const auto& [material, tau] : {std::pair{"none", 2e-3}, {"springs", 0.0}, {"neo-hookean", 2e-3}}) {
+    CAPTURE(material);
+    const auto model = block_model(1, true, {0.3, 0, 0}, {0, 0, 1});
+    Settings settings = soft(material, tau);
+    settings.damping = 0.3, settings.iterations = 15;
+    std::vector<double> off;
+    for (const int substeps : {2, 4, 8}) {
+      settings.substeps = substeps;
+      Sim sim = create_sim(model, settings);
+      const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
+      Leapfrog right = leapfrog(input, compliances_of(input), {model->positions, model->velocities}, 2e-4);
+      for (int s = 0; s < 20; ++s) step(sim), advance(right, 25);
+      off.push_back(distance(read_state(sim).positions, right.x));
+    }
+    const double moved = 0.5 * 9.81 * 0.1 * 0.1;
+    CHECK(off[0] < 0.03 * moved);
+    CHECK(off[1] < 0.45 * off[0]);
+    CHECK(off[2] < 0.45 * off[1]);
+  }
+}
+
+TEST_CASE("newton: what falls freely falls as it should, spinning, in few iterations") {
+  GlTest gl;
+  const auto model = block_model(30, false, {1, 0, 2}, {3, -2, 4});
+  Settings settings = soft("neo-hookean");
+  settings.iterations = 4;
+  Sim sim = create_sim(model, settings);
+  const auto sums = [&](const State& state) {
+    std::pair<glm::dvec3, glm::dvec3> result{};  // centre, angular momentum about it
+    glm::dvec3 velocity(0);
+    double mass = 0;
+    for (std::size_t i = 0; i < model->masses.size(); ++i) {
+      const double m = model->masses[i];
+      result.first += m * state.positions[i], velocity += m * state.velocities[i], mass += m;
+    }
+    result.first /= mass, velocity /= mass;
+    for (std::size_t i = 0; i < model->masses.size(); ++i)
+      result.second +=
+          model->masses[i] * glm::cross(state.positions[i] - result.first, state.velocities[i] - velocity);
+    return result;
+  };
+  const auto [centre, spin] = sums({model->positions, model->velocities});
+  for (int s = 0; s < 80; ++s) step(sim);
+  const auto [now, left] = sums(read_state(sim));
+  CHECK(glm::length(now - (centre + glm::dvec3(0.4, -0.5 * 9.81 * 0.16, 0.8))) < 1e-3);
+  CHECK(glm::length(left - spin) < 0.03 * glm::length(spin));
+}
+
+TEST_CASE("newton: a soft block lands, stays out of the ground, gains no energy and comes to rest") {
+  GlTest gl;
+  const auto model = block_model(0.2, false, {}, {});
+  Settings settings = soft("neo-hookean", 2e-3);
+  settings.iterations = 8, settings.substeps = 2, settings.damping = 4;
+  Sim sim = create_sim(model, settings);
+  double lowest = 0, fastest = 0;
+  const double start = 0.6 * 9.81;  // of the centre, at most
+  for (int s = 0; s < 400; ++s) {
+    step(sim);
+    const State state = read_state(sim);
+    double kinetic = 0, mass = 0;
+    for (std::size_t i = 0; i < state.positions.size(); ++i) {
+      lowest = std::min(lowest, state.positions[i].y);
+      kinetic += 0.5 * model->masses[i] * glm::dot(state.velocities[i], state.velocities[i]);
+      mass += model->masses[i];
+    }
+    CHECK(kinetic / mass < start);
+    fastest = std::sqrt(2 * kinetic / mass);
+  }
+  CHECK(lowest > -1e-4);
+  CHECK(fastest < 0.005);
+}
+
+TEST_CASE("newton: a block that slides stops where friction stops it") {
+  GlTest gl;
+  const auto mesh = [] {
+    TetMesh block = make_block({0.6, 0.2, 0.4}, {6, 2, 4});
+    for (auto& p : block.positions) p.y += 0.1;
+    finish_tets(block, "block");
+    return block;
+  }();
+  auto model = std::make_shared<Model>();
+  add_body(*model, "block", mesh, 1000, mesh.positions, {1.5, 0, 0}, {}, {});
+  Settings settings = soft("neo-hookean", 2e-3);
+  settings.young_modulus = 1e6, settings.iterations = 8, settings.substeps = 2, settings.friction = 0.5;
+  Sim sim = create_sim(model, settings);
+  for (int s = 0; s < 120; ++s) step(sim);
+  const State state = read_state(sim);
+  double way = 0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    way += state.positions[i].x - model->positions[i].x;
+  way /= double(state.positions.size());
+  CHECK(way == doctest::Approx(1.5 * 1.5 / (2 * 0.5 * 9.81)).epsilon(0.07));
+}
+
+TEST_CASE("newton: hostile starts end whole") {
+  GlTest gl;
+  for (const char* how : {"squash:0.1", "mirror", "random", "invert-one", "stretch:4", "plane"}) {
+    CAPTURE(how);
+    TetMesh mesh = make_block({0.8, 1, 0.6}, {4, 5, 3});
+    finish_tets(mesh, "block");
+    auto start = mesh.positions;
+    for (auto& p : start) p.y += 2;
+    deform(start, mesh, how == std::string("plane") ? "flatten" : how, 1);
+    auto model = std::make_shared<Model>();
+    add_body(*model, "block", mesh, 1000, start, {}, {}, {});
+    Settings settings = soft("neo-hookean", 2e-3);
+    settings.young_modulus = 1e6, settings.poisson_ratio = 0.45, settings.iterations = 8;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 200; ++s) step(sim);
+    CHECK_FALSE(check_finite(sim, true));
+    const State state = read_state(sim);
+    int inverted = 0;
+    for (const Tet& t : mesh.tets) {
+      const auto& x = state.positions;
+      inverted += glm::dot(glm::cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]), x[t[3]] - x[t[0]]) <= 0;
+    }
+    CHECK(inverted == 0);
+  }
+}
+
+TEST_CASE("newton: the same bits twice; other modes go on from where it is; what has no force is refused") {
+  GlTest gl;
+  const auto model = block_model(0.01, true, {1, 0, 0}, {});
+  std::uint64_t bits = 0;
+  for (int run = 0; run < 2; ++run) {
+    Sim sim = create_sim(model, soft("springs", 1e-3));
+    for (int s = 0; s < 10; ++s) step(sim);
+    if (run == 0) bits = state_hash(sim);
+    CHECK(state_hash(sim) == bits);
+  }
+  const auto free = block_model(5, false, {}, {});
+  Settings settings = soft("neo-hookean");
+  Sim sim = create_sim(free, settings);
+  double time = 0;
+  for (const char* mode : {"newton", "node", "newton", "explicit", "newton"}) {
+    settings.mode = mode, settings.substeps = 3, settings.iterations = 4;
+    apply_settings(sim, settings);
+    for (int s = 0; s < 10; ++s) step(sim), time += settings.dt;
+  }
+  const State state = read_state(sim);
+  double fall = 0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    fall += free->masses[i] * (free->positions[i].y - state.positions[i].y);
+  double mass = 0;
+  for (const double m : free->masses) mass += m;
+  CHECK(fall / mass == doctest::Approx(0.5 * 9.81 * time * time).epsilon(1e-3));
+  Settings hard;
+  hard.mode = "newton";
+  CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"),
+                       Error);
+}

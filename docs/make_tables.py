@@ -155,7 +155,7 @@ def stability(note, *folders):
     recovered = lambda *key: (r := rows.get(key)) is not None and r["recovered_at_step"] is not None
     out = ["# Hard cases: the tables\n",
            f"Written by `docs/make_tables.py stability`; its head has the commands, [results.md](../results.md#hard-cases) what they mean. {note}\n",
-           "A number is the step from which to the end of the run the volume is within 1 % and no tet is inverted; \"never\" has the final volume "
+           "A number is the step from which to the end of the run the volume is within 1 %, no tet is inverted and a hard body's shape is within 1 % of its size; \"never\" has the final volume "
            "error and the inverted tets; \"–\": not run.\n"]
     for mesh in meshes:
         out.append(f"## {mesh}\n")

@@ -281,11 +281,9 @@ void write_state(Sim& sim, const State& state) {
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
   const auto made_for = [&](const Settings& s) {
-    // The coarse level of implicit steps is that of their length.
-    const double h = is_implicit(s) ? s.dt / s.substeps : 0;
-    const auto softness = is_implicit(s) ? std::tuple(s.compliance, s.constraint_damping)
-                                         : decltype(std::tuple(s.compliance, 0.0)){};
-    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), h, softness);
+    const Settings coarse = is_implicit(s) ? s : Settings{};  // what implicit steps' second level is made for
+    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), coarse.compliance,
+                      coarse.constraint_damping, coarse.dt / coarse.substeps);
   };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
   const double before = half_substep_fall(sim.settings);

@@ -341,6 +341,36 @@ TEST_CASE("newton: hostile starts end whole") {
   }
 }
 
+TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraints fall as all else") {
+  GlTest gl;
+  TetMesh one;
+  one.positions = {{0, 5, 0}, {1, 5, 0}, {0, 6, 0}, {0, 5, 1}};
+  one.tets = {{0, 1, 2, 3}};
+  finish_tets(one, "tet");
+  TetMesh many;
+  for (unsigned t = 0; t < 600; ++t) {
+    for (const auto& p : one.positions)
+      many.positions.push_back(0.1 * p + glm::dvec3(0.2 * (t % 40), 5, 0.2 * (t / 40)));
+    many.tets.push_back({4 * t, 4 * t + 1, 4 * t + 2, 4 * t + 3});
+  }
+  finish_tets(many, "tets");
+  for (const TetMesh* mesh : {&one, &many})
+    for (const char* material : {"neo-hookean", "none"}) {
+      if (mesh == &many && material == std::string("none")) continue;
+      auto model = std::make_shared<Model>();
+      add_body(*model, "tets", *mesh, 1000, mesh->positions, {}, {}, {});
+      Settings settings = soft(material);
+      settings.constraints = "", settings.iterations = 4;
+      Sim sim = create_sim(model, settings);
+      for (int s = 0; s < 20; ++s) step(sim);
+      const State state = read_state(sim);
+      double off = 0;
+      for (std::size_t i = 0; i < state.positions.size(); ++i)
+        off = std::max(off, std::abs(model->positions[i].y - state.positions[i].y - 0.5 * 9.81 * 0.01));
+      CHECK(off < 1e-5);
+    }
+}
+
 TEST_CASE("newton: the same bits twice; other modes go on from where it is; what has no force is refused") {
   GlTest gl;
   const auto model = block_model(0.01, true, {1, 0, 0}, {});

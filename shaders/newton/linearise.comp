@@ -13,10 +13,10 @@ uint id_of(Ids record, int j) { return mesh[record + uint(j)]; }
 void main() {
   uint edge = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (edge >= EDGES) return;
-  uint part = start_part(), end = mesh[EDGES_AT + 3u * edge + 5u];
+  uint part = start_part(), end = mesh[EDGES_AT + edge + 1u];
   mat3 block = mat3(0.0);
   vec3 force = vec3(0.0);
-  for (uint k = mesh[EDGES_AT + 3u * edge + 2u]; k < end; ++k) {
+  for (uint k = mesh[EDGES_AT + edge]; k < end; ++k) {
     uint entry = mesh[ENTRIES_AT + k], kind = (entry >> 4) & 7u, c = entry >> 7;
     int i = int((entry >> 2) & 3u), j = int(entry & 3u);
     #foreach if (kind == $INDEXu) add_$KIND(RECORDS_$KIND + WORDS_$KIND * c, part, i, j, block, force);

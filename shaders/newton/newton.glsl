@@ -34,7 +34,7 @@ ivec4 start_at(uint part, uint i) { return floatBitsToInt(at(RESIDUAL + part, i)
 #endif
 layout(std430, binding = BIND_NEWTON_BLOCKS) restrict BLOCKS_ARE buffer Blocks { vec4 blocks[]; };
 
-// Numbers: edges (first vertex, second, its first entry), entries (constraint << 7 | kind << 4 | i << 2 | j), the first neighbour of each
+// Numbers: the first entry of each edge, entries (constraint << 7 | kind << 4 | i << 2 | j), the first neighbour of each
 // vertex, neighbours (edge * 2 + 1 where the vertex is its second, vertex), records of each kind, 4 aggregates of each vertex
 // (number << 16 | weight * 65535), the first vertex of each aggregate, its vertices (vertex, weight * 65535).
 layout(std430, binding = BIND_NEWTON_MESH) restrict readonly buffer Mesh { uint mesh[]; };

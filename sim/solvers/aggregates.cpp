@@ -60,7 +60,7 @@ Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wante
     nearest.distance.assign(vertices, std::numeric_limits<double>::max());
     spread(model, neighbours, seeds, 0, nearest);
     for (const std::uint32_t v : moving)  // a part that no seed is in
-      if (nearest.seed[v] == none && seeds.size() < 65535)
+      if (nearest.seed[v] == none && seeds.size() < most_aggregates)
         seeds.push_back(v), spread(model, neighbours, seeds, seeds.size() - 1, nearest);
     if (round == 5) break;
     std::vector<glm::dvec4> centres(seeds.size(), glm::dvec4(0));
@@ -202,7 +202,12 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
   // An aggregate of one vertex does not turn; what no member feels may have any value.
   A.diagonal() *= 1 + 1e-6;
   if (count > 0) A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
-  const Eigen::MatrixXd inverse = A.llt().solve(Eigen::MatrixXd::Identity(count, count));
+  const Eigen::LLT<Eigen::MatrixXd> factors(A);
+  Eigen::MatrixXd& inverse = A;  // each part of its columns for itself
+  inverse.setIdentity();
+  parallel_parts(std::size_t(count), 32, [&](std::size_t first, std::size_t end) {
+    factors.solveInPlace(inverse.middleCols(Eigen::Index(first), Eigen::Index(end - first)));
+  });
   const std::size_t width = (std::size_t(count) + 3) / 4 * 4;
   std::vector<float> values(width * std::size_t(count), 0.0f);
   parallel_for(

@@ -26,7 +26,9 @@ struct Aggregates {
   Grouped members;                              ///< by aggregate, vertex * 4 + which of its shares
 };
 /// About `wanted`, by distance along `neighbours` (so that parts that are near but not joined stay apart), of
-/// vertices that move. A body of several parts has one in each, as far as there is room for 65535.
+/// vertices that move. A part without any gets one of its own while there are fewer than most_aggregates;
+/// the others have none.
+constexpr std::size_t most_aggregates = 500;
 Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::size_t wanted);
 
 /// Rows of the block matrix that the coarse one is made from: by directed edge, as `neighbours`.

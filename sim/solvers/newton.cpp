@@ -122,7 +122,7 @@ std::vector<glm::dmat3> blocks_at_rest(const SolverInput& input, const Graph& gr
 
 // Enough to carry what 3x3 blocks alone do not in a few iterations, and few enough to invert.
 std::size_t aggregates_for(std::size_t vertices) {
-  return std::size_t(std::clamp(1.3 * std::sqrt(double(vertices)), 1.0, 680.0));
+  return std::size_t(std::clamp(1.3 * std::sqrt(double(vertices)), 1.0, double(most_aggregates)));
 }
 
 std::vector<Dispatch> schedule(int iterations) {
@@ -161,16 +161,13 @@ std::vector<std::uint32_t> records_of(const ConstraintList& list, std::size_t wo
 
 Words mesh_words(const ConstraintSystem& system, const Graph& graph, const Aggregates& aggregates) {
   Words words;
-  std::vector<std::uint32_t> edges, entries, neighbours, weights;
-  for (std::size_t e = 0; e < graph.edge_count(); ++e)
-    edges.insert(edges.end(), {graph.first(e), graph.second(e), graph.edges[e]});
-  edges.insert(edges.end(), {0, 0, graph.edges.back()});
+  std::vector<std::uint32_t> entries, neighbours, weights;
   for (const Use& use : graph.uses) entries.push_back(use.entry);
   for (std::size_t n = 0; n < graph.edge_of.size(); ++n)
     neighbours.insert(neighbours.end(), {graph.edge_of[n], graph.neighbours.values[n]});
   for (const auto& shares : aggregates.of_vertex)
     for (const Share& share : shares) weights.push_back(share.aggregate << 16 | share.weight);
-  words.add("EDGES_AT", edges);
+  words.add("EDGES_AT", graph.edges);
   words.add("ENTRIES_AT", entries);
   words.add("ROWS_AT", graph.neighbours.first);
   words.add("NEIGHBOURS_AT", neighbours);
@@ -219,7 +216,7 @@ Solver create_newton_solver(const SolverInput& input) {
   std::vector<glm::vec4> vectors(slots * vertices, glm::vec4(0));
   for (std::size_t v = 0; v < vertices; ++v)
     vectors[(slots - 1) * vertices + v] = glm::vec4(glm::vec3(input.model.rest.positions[v]), 0);
-  const unsigned group = input.tuning.group ? input.tuning.group : 128, rows = group / lanes;
+  const unsigned group = std::max(tuned({0, 128}, input.tuning).group, row_lanes), rows = group / lanes;
   const std::size_t count = aggregates.all.size(), unknowns = 6 * count, turns = (vertices + rows - 1) / rows;
   std::size_t tests = 0;  // of constraints at Newton's start
   for (std::size_t k = 0; k < kind_count; ++k)

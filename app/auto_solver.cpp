@@ -48,8 +48,7 @@ std::vector<Settings> candidates(const Settings& own) {
   if (has_forces(own)) {
     set_mode(base, "explicit", "auto");
     all.push_back(base);
-    set_mode(base, "newton", "auto");
-    base.iterations = 4;
+    apply_preset(base, solver_presets(), "newton");
     all.push_back(base);
   }
   all.push_back(own);

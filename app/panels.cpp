@@ -139,8 +139,8 @@ bool is_idle(const Settings& settings, const Parameter& row) {
   if (row.name == "mass_splitting") return compliant(settings);  // brings it with it
   if (row.name == "stability") return !leaps(settings);
   if (row.name == "omega" && is_implicit(settings)) return true;
-  if (row.name == "substeps" || row.name == "iterations" || row.name == "omega")
-    if (leaps(settings)) return true;
+  if (leaps(settings) && (row.name == "substeps" || row.name == "iterations" || row.name == "omega"))
+    return true;
   if (row.name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;

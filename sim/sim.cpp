@@ -154,10 +154,12 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   const SolverInput input{*sim.model, sim.system, settings,       sim.tuning, is_software_renderer(),
                           soft,       rigid,      leaps(settings)};
   const auto defines = vertex_defines(input);
-  sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
-                 count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.solver = find_solver_mode(settings.mode)->create(input);
-  if (sim.solver.schedule) sim.predict = std::move(sim.solver.begin);
+  if (sim.solver.schedule)
+    sim.predict = std::move(sim.solver.begin);
+  else
+    sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
+                   count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.longest_substep = longest_substep(sim, settings);
   sim.settings = fitted(settings, sim.longest_substep);
   const auto buffer = [&](const char* label, std::size_t bytes) {

@@ -13,7 +13,7 @@ struct Dispatcher {
   Sim& sim;
   GLuint program = 0;
   void bind_quantized() const {  // read these, write the others
-    if (sim.solver.schedule) return;
+    if (!sim.quantized[0]) return;
     sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED);
     sim.quantized[sim.solver.double_buffered ? 1 - sim.read_index : sim.read_index].bind_storage(
         BIND_QUANTIZED_OUT);
@@ -68,7 +68,7 @@ void step_on_gpu(Sim& sim) {
   Dispatcher dispatcher{sim};
   if (sim.needs_predict) {
     forget_contacts(sim);
-    if (!sim.solver.schedule) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
+    if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
     dispatcher.run(sim.predict, 0);
   }
   dispatcher.bind_quantized();

@@ -48,6 +48,20 @@ inline Scene block_scene(glm::ivec3 cells = {3, 2, 2}, double irregular = 0.02) 
   return scene;
 }
 
+// Another, 6 x 5 x 4 vertices, in flight or above the ground; one edge of it held, if `held`.
+inline std::shared_ptr<const Model> irregular_block(double height, bool held,
+                                                    const glm::dvec3& velocity = {1, 0, 0},
+                                                    const glm::dvec3& spin = {2, -1, 3}) {
+  TetMesh mesh = make_block({1, 0.7, 0.5}, {5, 4, 3});
+  generator.seed(3);
+  for (auto& p : mesh.positions) p += noise(0.02) + glm::dvec3(0, 0.4 + height, 0);
+  finish_tets(mesh, "block");
+  auto model = std::make_shared<Model>();
+  add_body(*model, "block", mesh, 1000, mesh.positions, velocity, spin,
+           held ? std::vector<std::uint32_t>{0, 1} : std::vector<std::uint32_t>{});
+  return model;
+}
+
 // Springs along a line from the origin, built by hand: `positions` at rest, a spring from each vertex to the
 // next.
 inline Scene chain_scene(const std::vector<glm::dvec3>& positions,

@@ -11,20 +11,9 @@
 #include "tests/reference_scenes.h"
 
 using namespace tetpbd;
+using reference_scenes::centre_of, reference_scenes::irregular_block, reference_scenes::largest_distance;
 
 namespace {
-
-// In flight or above the ground, irregular; one corner held, if `held`.
-std::shared_ptr<const Model> irregular_block(double height, bool held) {
-  TetMesh mesh = make_block({1, 0.7, 0.5}, {5, 4, 3});
-  reference_scenes::generator.seed(3);
-  for (auto& p : mesh.positions) p += reference_scenes::noise(0.02) + glm::dvec3(0, 0.4 + height, 0);
-  finish_tets(mesh, "block");
-  auto model = std::make_shared<Model>();
-  add_body(*model, "block", mesh, 1000, mesh.positions, glm::dvec3(1, 0, 0), glm::dvec3(2, -1, 3),
-           held ? std::vector<std::uint32_t>{0, 1} : std::vector<std::uint32_t>{});
-  return model;
-}
 
 Settings soft(const std::string& material, double tau) {
   Settings settings;
@@ -35,12 +24,6 @@ Settings soft(const std::string& material, double tau) {
     settings.compliance[index_of<Bend>] = 1e-2;
   }
   return settings;
-}
-
-double distance(const std::vector<glm::dvec3>& a, const std::vector<glm::dvec3>& b) {
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, glm::length(a[i] - b[i]));
-  return largest;
 }
 
 }  // namespace
@@ -60,8 +43,8 @@ TEST_CASE("explicit: a run is that of leapfrog in double, damped or not, in flig
         Leapfrog right = leapfrog(input, compliances_of(input), {model->positions, model->velocities}, h);
         for (int s = 0; s < 20; ++s) step(sim), advance(right, sim.settings.substeps);
         const State state = read_state(sim);
-        CHECK(distance(state.positions, right.x) < 2e-5);
-        CHECK(distance(state.velocities, right.v) < 2e-2);
+        CHECK(largest_distance(state.positions, right.x) < 2e-5);
+        CHECK(largest_distance(state.velocities, right.v) < 2e-2);
         double deformed = 0;  // or nothing was tested
         for (std::size_t i = 0; i < 20; ++i)
           deformed =
@@ -136,13 +119,7 @@ TEST_CASE("explicit: a body swings on where another mode left it, and another wh
   settings.damping = 0;
   const auto model = irregular_block(5, false);
   Sim sim = create_sim(model, settings);
-  const auto centre = [&] {
-    const State state = read_state(sim);
-    double y = 0, mass = 0;
-    for (std::size_t i = 0; i < model->masses.size(); ++i)
-      y += model->masses[i] * state.positions[i].y, mass += model->masses[i];
-    return y / mass;
-  };
+  const auto centre = [&] { return centre_of(*model, read_state(sim).positions).y; };
   const double start = centre();
   double time = 0;
   for (const char* mode : {"explicit", "node", "explicit", "cpu-fast", "explicit"}) {

@@ -16,7 +16,7 @@
 #include "tests/reference_scenes.h"
 
 using namespace tetpbd;
-using reference_scenes::noise;
+using reference_scenes::centre_of, reference_scenes::irregular_block, reference_scenes::noise;
 
 namespace {
 
@@ -53,17 +53,6 @@ std::array<glm::dvec3, 4> forces(Tet4 tet) {
 
 auto part_of(Tet4 tet, int i, int j) {
   return Formulas<double>{}.neo_hookean_part(tet.x.data(), tet.rest.data(), tet.compliance.data(), i, j);
-}
-
-std::shared_ptr<const Model> block_model(double height, bool held, glm::dvec3 velocity, glm::dvec3 spin) {
-  TetMesh mesh = make_block({1, 0.7, 0.5}, {5, 4, 3});
-  reference_scenes::generator.seed(3);
-  for (auto& p : mesh.positions) p += noise(0.02) + glm::dvec3(0, 0.4 + height, 0);
-  finish_tets(mesh, "block");
-  auto model = std::make_shared<Model>();
-  add_body(*model, "block", mesh, 1000, mesh.positions, velocity, spin,
-           held ? std::vector<std::uint32_t>{0, 1} : std::vector<std::uint32_t>{});
-  return model;
 }
 
 Settings soft(const std::string& material, double tau = 0) {
@@ -174,7 +163,7 @@ TEST_CASE("newton: aggregates share all that moves, and nothing across a gap") {
 }
 
 TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inverted") {
-  const auto model = block_model(1, true, {}, {});
+  const auto model = irregular_block(1, true, {}, {});
   const Grouped neighbours = neighbours_of(model->rest);
   const Aggregates aggregates = make_aggregates(*model, neighbours, 4);
   const std::size_t n = model->positions.size();
@@ -223,7 +212,7 @@ TEST_CASE("newton: its motion nears that of leapfrog with the square of the step
   GlTest gl;
   for (const auto& [material, tau] : {std::pair{"none", 2e-3}, {"springs", 0.0}, {"neo-hookean", 2e-3}}) {
     CAPTURE(material);
-    const auto model = block_model(1, true, {0.3, 0, 0}, {0, 0, 1});
+    const auto model = irregular_block(1, true, {0.3, 0, 0}, {0, 0, 1});
     Settings settings = soft(material, tau);
     settings.damping = 0.3, settings.iterations = 15;
     std::vector<double> off;
@@ -244,19 +233,14 @@ TEST_CASE("newton: its motion nears that of leapfrog with the square of the step
 
 TEST_CASE("newton: what falls freely falls as it should, spinning, in few iterations") {
   GlTest gl;
-  const auto model = block_model(30, false, {1, 0, 2}, {3, -2, 4});
+  const auto model = irregular_block(30, false, {1, 0, 2}, {3, -2, 4});
   Settings settings = soft("neo-hookean");
   settings.iterations = 4;
   Sim sim = create_sim(model, settings);
   const auto sums = [&](const State& state) {
-    std::pair<glm::dvec3, glm::dvec3> result{};  // centre, angular momentum about it
-    glm::dvec3 velocity(0);
-    double mass = 0;
-    for (std::size_t i = 0; i < model->masses.size(); ++i) {
-      const double m = model->masses[i];
-      result.first += m * state.positions[i], velocity += m * state.velocities[i], mass += m;
-    }
-    result.first /= mass, velocity /= mass;
+    // The centre, and angular momentum about it.
+    std::pair<glm::dvec3, glm::dvec3> result{centre_of(*model, state.positions), glm::dvec3(0)};
+    const glm::dvec3 velocity = centre_of(*model, state.velocities);
     for (std::size_t i = 0; i < model->masses.size(); ++i)
       result.second +=
           model->masses[i] * glm::cross(state.positions[i] - result.first, state.velocities[i] - velocity);
@@ -271,7 +255,7 @@ TEST_CASE("newton: what falls freely falls as it should, spinning, in few iterat
 
 TEST_CASE("newton: a soft block lands, stays out of the ground, gains no energy and comes to rest") {
   GlTest gl;
-  const auto model = block_model(0.2, false, {}, {});
+  const auto model = irregular_block(0.2, false, {}, {});
   Settings settings = soft("neo-hookean", 2e-3);
   settings.iterations = 8, settings.substeps = 2, settings.damping = 4;
   Sim sim = create_sim(model, settings);
@@ -373,7 +357,7 @@ TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraint
 
 TEST_CASE("newton: the same bits twice; other modes go on from where it is; what has no force is refused") {
   GlTest gl;
-  const auto model = block_model(0.01, true, {1, 0, 0}, {});
+  const auto model = irregular_block(0.01, true, {1, 0, 0}, {});
   std::uint64_t bits = 0;
   for (int run = 0; run < 2; ++run) {
     Sim sim = create_sim(model, soft("springs", 1e-3));
@@ -381,7 +365,7 @@ TEST_CASE("newton: the same bits twice; other modes go on from where it is; what
     if (run == 0) bits = state_hash(sim);
     CHECK(state_hash(sim) == bits);
   }
-  const auto free = block_model(5, false, {}, {});
+  const auto free = irregular_block(5, false, {}, {});
   Settings settings = soft("neo-hookean");
   Sim sim = create_sim(free, settings);
   double time = 0;
@@ -390,13 +374,8 @@ TEST_CASE("newton: the same bits twice; other modes go on from where it is; what
     apply_settings(sim, settings);
     for (int s = 0; s < 10; ++s) step(sim), time += settings.dt;
   }
-  const State state = read_state(sim);
-  double fall = 0;
-  for (std::size_t i = 0; i < state.positions.size(); ++i)
-    fall += free->masses[i] * (free->positions[i].y - state.positions[i].y);
-  double mass = 0;
-  for (const double m : free->masses) mass += m;
-  CHECK(fall / mass == doctest::Approx(0.5 * 9.81 * time * time).epsilon(1e-3));
+  const double fall = centre_of(*free, free->positions).y - centre_of(*free, read_state(sim).positions).y;
+  CHECK(fall == doctest::Approx(0.5 * 9.81 * time * time).epsilon(1e-3));
   Settings hard;
   hard.mode = "newton";
   CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"),

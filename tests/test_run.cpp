@@ -207,7 +207,7 @@ TEST_CASE("a driver that is not there, or too old, gets one line and status 1") 
   if (info.find("Mesa") != std::string::npos)  // others take no orders about their version
     for (const char* version : {"4.2", "3.3"})
       fails(std::string("MESA_GL_VERSION_OVERRIDE=") + version, std::string("the driver offers ") + version);
-  fails("TETPBD_SHADERS=/nonexistent", "/nonexistent/predict.comp", 2);
+  fails("TETPBD_SHADERS=/nonexistent", "/nonexistent/solve_node.comp", 2);
 }
 
 TEST_CASE("a run that stops being numbers leaves those of the last good step, and says where and why") {

@@ -31,8 +31,9 @@ Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
 real neo_hookean_jacobian(vec3 x[4], const real rest[8]) {
   return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]) * rest[6];
 }
-// A block of the Hessian of the energy, with compliances a[0] and a[1], and a quarter of the difference of the gradients; the part that can be negative, (J - alpha) Hess J, is taken up to
-// where it meets the positive one: that of I over the largest singular value. At rest it just does, as a body turns freely.
+// A block of the Hessian of the energy, with compliances a[0] and a[1], and a quarter of the difference of the gradients. The part that
+// can be negative, (J - alpha) Hess J, is taken up to where it meets the positive one: that of I over the largest singular value. At
+// rest it just does, as a body turns freely.
 EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i, int j) {
   vec3 s1 = x[1] - x[0], s2 = x[2] - x[0], s3 = x[3] - x[0];
   vec3 t1 = rest[0] * s1 + rest[1] * s2 + rest[2] * s3;

@@ -14,7 +14,7 @@ void main() {
   float push = 0.0;
   if (own.inverse_mass > 0.0) {
     uint holds = held_by(at(RESIDUAL, i));
-    Advanced last = advance(i, l);
+    Advanced last = advanced(i, l);
     vec3 free = start_of(i, x) + last.step;
     u = kept_out(x, free);
     bool known = (floatBitsToUint(at(WAY, i).w) & KNOWN) != 0u;

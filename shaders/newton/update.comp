@@ -4,8 +4,8 @@
 #include "newton/advance.glsl"
 shared vec3 forces[GROUP_SIZE], torques[GROUP_SIZE];
 
-// The coarse residual of the vectors in `slot`, by its rotated rigid motions. An aggregate that a half space holds has none: it cannot move as
-// one, and the coarse matrix does not know.
+// The coarse residual of the vectors in `slot`, by its rotated rigid motions. An aggregate that a half space holds has none: it cannot
+// move as one, and the coarse matrix does not know.
 void restrict_to(uint aggregate, uint slot, Lengths l) {
   uint lane = gl_LocalInvocationIndex, end = mesh[AGGREGATES_AT + aggregate + 1u];
   vec4 centre = centre_of(aggregate), back = opposite(rotation_of(aggregate));
@@ -59,5 +59,10 @@ void main() {
     return;
   }
   uint i = (group - AGGREGATES) * GROUP_SIZE + gl_LocalInvocationIndex;
-  if (i < VERTICES && phases > 0u && l.alpha > 0.0) advance(i, l);
+  if (i >= VERTICES || phases == 0u || !(l.alpha > 0.0)) return;
+  Advanced now = advanced(i, l);
+  put(DIRECTION, i, now.direction, 0.0);
+  put(IMAGE, i, now.image, 0.0);
+  put(STEP, i, now.step, 0.0);
+  put(RESIDUAL, i, now.residual, at(RESIDUAL, i).w);
 }

@@ -192,9 +192,11 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
             const Eigen::Map<const Eigen::Matrix3d> block(&rows.blocks[e][0].x);
             diagonal -= block;
             const std::uint32_t u = rows.neighbours.values[e];
-            for (const Share& share : aggregates.of_vertex[u]) add(share, u, own.transpose() * block);
+            const Eigen::Matrix<double, 6, 3> from = own.transpose() * block;
+            for (const Share& share : aggregates.of_vertex[u]) add(share, u, from);
           }
-          for (const Share& share : aggregates.of_vertex[v]) add(share, v, own.transpose() * diagonal);
+          const Eigen::Matrix<double, 6, 3> from = own.transpose() * diagonal;
+          for (const Share& share : aggregates.of_vertex[v]) add(share, v, from);
         }
       },
       1);

@@ -99,24 +99,26 @@ glm::dmat3 block_at_rest(const SolverInput& input, const ConstraintList& list, s
 }
 
 std::vector<glm::dmat3> blocks_at_rest(const SolverInput& input, const Graph& graph, double h) {
-  std::vector<glm::dmat3> blocks(graph.edge_of.size());
+  std::vector<glm::dmat3> of_edge(graph.edge_count(), glm::dmat3(0)), blocks(graph.edge_of.size());
   parallel_for(
-      graph.edge_of.size(),
-      [&](std::size_t n) {
-        const std::size_t e = graph.edge_of[n] / 2;
-        glm::dmat3 block(0);
+      of_edge.size(),
+      [&](std::size_t e) {
         for (std::uint32_t u = graph.edges[e]; u < graph.edges[e + 1]; ++u) {
           const std::uint32_t entry = graph.uses[u].entry;
           std::uint32_t kind = (entry >> 4) & 7;
           for_each_kind([&](auto row, int k) {
             if (input.system.present[std::size_t(k)] && kind-- == 0)
-              block += block_at_rest<decltype(row)>(input, input.system.lists[std::size_t(k)], entry >> 7,
-                                                    int((entry >> 2) & 3), int(entry & 3), h);
+              of_edge[e] +=
+                  block_at_rest<decltype(row)>(input, input.system.lists[std::size_t(k)], entry >> 7,
+                                               int((entry >> 2) & 3), int(entry & 3), h);
           });
         }
-        blocks[n] = graph.edge_of[n] % 2 ? glm::transpose(block) : block;
       },
       1024);
+  parallel_for(blocks.size(), [&](std::size_t n) {
+    const glm::dmat3& block = of_edge[graph.edge_of[n] / 2];
+    blocks[n] = graph.edge_of[n] % 2 ? glm::transpose(block) : block;
+  });
   return blocks;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "app/reference_command.h"
 #include "app/run_loop.h"
@@ -165,6 +166,26 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
                             quickest.settings.mode, quickest.ms),
                 "raise --budget-ms, or take fewer tets", 1);
   }
+  return choice;
+}
+
+std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
+  if (!std::exchange(scene.mode_open, false) || !has_forces(scene.settings)) return std::nullopt;
+  Settings& s = scene.settings;
+  const double wanted = explicit_substeps(model, s), most = is_software_renderer() ? 20 : 40;
+  if (wanted <= most) {
+    set_mode(s, "explicit", scene.name);
+    return fmt::format("explicit, about {:g} substeps", wanted);
+  }
+  set_mode(s, "newton", scene.name);
+  s.iterations = 4, s.substeps = 2;
+  return fmt::format("newton, 2 substeps of 4 iterations: explicit would take {:g}, over {:g}", wanted, most);
+}
+
+std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model) {
+  if (const auto rule = choose_by_rule(scene, *model)) fmt::print("solver: {}\n", *rule);
+  auto choice = choose_for(scene, model);
+  if (choice) fmt::print("solver: {}\n", describe(*choice));
   return choice;
 }
 

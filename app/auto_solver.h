@@ -38,8 +38,14 @@ double default_budget_ms(const Settings& settings);
 /// Throws Error where nothing fits the budget.
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
                            double budget_ms, long steps);
+/// The mode of bodies that have forces, where nobody says one: `explicit` up to 40 substeps, 20 on a software
+/// renderer, else `newton` in two substeps of 4 iterations. Where it leads (docs/results.md), without a race.
+/// What it took; nothing otherwise.
+std::optional<std::string> choose_by_rule(Scene& scene, const Model& model);
 /// For a scene that asks for it: over its first 400 steps at most. The scene then has the settings chosen.
 std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model);
+/// Both, and says on standard output what was chosen.
+std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model);
 /// "node, 17 substeps, omega 2.5: 0.143 ms of 0.15 ms a step, 0.02 % from the right motion over 160 steps"
 std::string describe(const SolverChoice& choice);
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice);

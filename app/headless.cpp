@@ -87,6 +87,11 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"gpu_ms_per_step", times(run.gpu_ms)},
                  {"wall_ms_per_step", times(run.wall_ms)},
                  {"fps", double(sim.steps) / run.seconds}};
+  const Watch& watch = watched(sim);
+  if (leaps(sim.settings))
+    j["watch"] = {{"longest_substep_at_rest", sim.longest_substep}, {"most_substeps", watch.most_substeps}};
+  if (is_implicit(sim.settings))
+    j["watch"] = {{"largest_residual", watch.largest_residual}, {"least_health", watch.least_health}};
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);
@@ -122,8 +127,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
-  const auto choice = choose_for(scene, model);
-  if (choice) fmt::print("solver: {}\n", describe(*choice));
+  const auto choice = choose_and_say(scene, model);
   Tuning tuning = tuning_from_environment();
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
@@ -171,7 +175,7 @@ int run_headless(Scene scene, const RunOptions& options) {
 int print_explanation(Scene scene, int gpu) {
   const auto model = build_model(scene);
   HeadlessContext context(gpu);
-  if (const auto choice = choose_for(scene, model)) fmt::print("solver: {}\n", describe(*choice));
+  choose_and_say(scene, model);
   const Sim sim = create_sim(model, scene.settings);
   const Explanation e = explain(sim);
   fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),

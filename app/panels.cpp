@@ -210,6 +210,14 @@ void draw_solver(Session& s) {
   ways.words.push_back("auto");
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
+  const Watch& watch = s.loaded.sim.watch;
+  if (leaps(now))
+    ImGui::TextWrapped("%d substeps%s", now.substeps,
+                       watch.stiffening > 1
+                           ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
+                           : "");
+  if (is_implicit(now))
+    ImGui::TextWrapped("residual %.1e of the start's, health %.2f", watch.residual, watch.health);
   if (!automatic) return;
   slider(s, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
          "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);

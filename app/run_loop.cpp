@@ -68,7 +68,6 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   if (metrics) measure(*metrics, sim);
   hold(0);
   const auto begin = steady_clock::now();
-  run.substeps = sim.settings.substeps;
   while (run.steps < steps && !interrupted() && !check_finite(sim)) {
     const auto step_begin = steady_clock::now();
     step(sim);
@@ -91,6 +90,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   }
   take(true);
   run.errors.non_finite = check_finite(sim, true);
+  run.substeps = std::max(sim.settings.substeps, sim.watch.most_substeps);
   run.errors.finite = run.errors.finite && !run.errors.non_finite;
   return run;
 }

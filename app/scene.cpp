@@ -301,6 +301,15 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   std::string where = file.string();
   if (!overrides.set.empty()) where += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));
   Scene scene = read_scene(document, where, file);
+  const auto said = [&](const char* key) {
+    return document.contains(json::json_pointer("/solver/" + std::string(key)));
+  };
+  const auto flag = [&](const char* key) {
+    return std::ranges::any_of(overrides.parameters, [&](const auto& given) { return given.first == key; });
+  };
+  scene.mode_open = !flag("mode") && !flag("iterations") && !flag("substeps") && overrides.solver.empty() &&
+                    !overrides.budget_ms &&
+                    (flag("material") || !(said("mode") || said("iterations") || said("substeps")));
   const bool by_trying = apply_solver(scene.settings, overrides);
   for (const auto& [name, text] : overrides.parameters) {
     const Parameter& row = *find_parameter(name);

@@ -52,6 +52,7 @@ struct Scene {
   Settings settings;
   std::optional<Camera> camera;
   double duration = 2;              ///< s
+  bool mode_open = false;           ///< nobody says how it is solved: so the bodies do (auto_solver.h)
   std::optional<double> budget_ms;  ///< --solver auto: settings are yet to be chosen (auto_solver.h)
 };
 

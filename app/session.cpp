@@ -55,6 +55,7 @@ bool is_fixed(Session& s, std::uint32_t vertex) {
 
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene) {
   const auto model = build_model(scene);
+  choose_by_rule(scene, *model);
   auto choice = choose_for(scene, model);
   Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, choice};
   loaded.renderer = make_renderer(*model);

@@ -40,7 +40,7 @@ int run_soak(Scene scene, const SoakOptions& options) {
   make_output_folder(options.out);
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
-  if (const auto choice = choose_for(scene, model)) fmt::print("solver: {}\n", describe(*choice));
+  choose_and_say(scene, model);
   Sim sim = create_sim(model, scene.settings);
   Metrics metrics = create_metrics(*model, sim.system);
 

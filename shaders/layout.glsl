@@ -49,7 +49,8 @@ struct Step {
   float body_size;          // m, of the largest body at rest
   float restitution;        // of hard bodies
   float drag;               // 1/s, rate at which velocity decays (mode newton)
-  float _0, _1, _2;
+  float kick;               // of a substep after longer or shorter ones: accelerations times this (mode explicit)
+  float _0, _1;
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind
@@ -98,6 +99,8 @@ struct RigidRecord {
 #define PHASE_SOLVE 2u    // corrections, then contacts
 #define PHASE_SIDE 8u     // which side of hard bodies' records (rigid.glsl)
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
+#define PHASE_WATCH 16u   // mode explicit: notes how stiff constraints are
+#define PHASE_CHANGED 32u // mode explicit: the substeps before were longer or shorter
 
 // Storage bindings of the simulation; a kernel has 8 at most.
 #define BIND_POSITIONS 0
@@ -105,7 +108,7 @@ struct RigidRecord {
 #define BIND_PREDICTED 2
 #define BIND_QUANTIZED 3      // what the neighbours of a vertex see of it (quantized.glsl)
 #define BIND_QUANTIZED_OUT 4
-#define BIND_CHECK 5          // the first state that is not finite
+#define BIND_CHECK 5          // the first state that is not finite, and the stiffest constraint
 #define BIND_PATCHES 6        // sim/solvers/patches.h
 #define BIND_MULTIPLIERS 7    // with compliance, of each of the patches' records
 #define BIND_SUMS 8           // constraint modes: sums of corrections

@@ -15,6 +15,11 @@ shared ivec4 local_positions[MAX_VERTICES];  // quantized
 shared uint global_ids[MAX_VERTICES];
 shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];
+#if LEAPFROG
+shared uint stiffest_here;
+// Of a constraint, h^2 b.
+void note_stiffness(float value) { atomicMax(stiffest_here, floatBitsToUint(value)); }
+#endif
 // Bytes of a record: its vertices' numbers in the chunk.
 uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
 #define Ids uint
@@ -53,6 +58,9 @@ Chunk chunk_at(uint number) {
 
 void clear_sums() {
   for (uint k = gl_LocalInvocationIndex; k < 3 * MAX_OWNED; k += GROUP_SIZE) sums[k] = 0;
+#if LEAPFROG
+  if (gl_LocalInvocationIndex == 0u) stiffest_here = 0u;
+#endif
 }
 /// A chunk's vertices as their neighbours see them. Needs a barrier behind it.
 void load_chunk(uint number) {

@@ -41,6 +41,9 @@ void project_$KIND(uint number, uint owned) {
 #if COMPLIANT && !LEAPFROG
   if ((phases & PHASE_FINISH) == 0u) multipliers[number] = before + m.lambda;
 #endif
+#if LEAPFROG && !$RATE
+  if ((phases & PHASE_WATCH) != 0u) note_stiffness(weighted(c, w).sum / a);
+#endif
 #if COUNT_GUARDS
   if (local_id(record.x, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
 #endif

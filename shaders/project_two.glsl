@@ -21,7 +21,14 @@ void project_$KIND(uint number, uint owned) {
     c.C[k] += a[k] * before[k];
   }
   Multiplier2 m = multiplier(c, w, params.max_correction, a, params.share);
-#if !LEAPFROG
+#if LEAPFROG
+  if ((phases & PHASE_WATCH) != 0u) {
+    float b = 0.0;
+    for (int j = 0; j < 4; ++j)
+      b += w[j] * (dot(c.gradient[0][j], c.gradient[0][j]) / a[0] + dot(c.gradient[1][j], c.gradient[1][j]) / a[1]);
+    note_stiffness(b);
+  }
+#else
   if ((phases & PHASE_FINISH) == 0u)
     for (uint k = 0u; k < 2u; ++k) multipliers[number + k] = before[k] + m.lambda[k];
 #endif

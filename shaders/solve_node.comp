@@ -36,6 +36,9 @@ void main() {
       barrier();
     }
 #endif
+#if LEAPFROG
+    if (lane == 0u && (phases & PHASE_WATCH) != 0u) atomicMax(largest, stiffest_here);
+#endif
     if (mine) correction = vec3(sums[3u * lane], sums[3u * lane + 1u], sums[3u * lane + 2u]) * (params.correction_quantum * params.omega);
   }
 

@@ -88,7 +88,10 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
 // The same in mode explicit (method.md eq. 39): the force where the vertex is, then the way.
 Pair leapt(uint i, Position own, Velocity speed, vec3 correction) {
   Pair start = Pair(own.high, own.low), v = Pair(speed.high, speed.low);
-  v = predict_velocity(pair_add(v, correction * params.inverse_h));
+  // From the middle of the last substep to the middle of this.
+  float time = (phases & PHASE_CHANGED) != 0u ? params.h * params.kick : params.h;
+  v = pair_add(pair_add(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
+  v = Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
   Pair x = predict_position(start, v);
   if (touches(x)) {
     Pair free = x;

@@ -53,7 +53,7 @@ void take_answer(FiniteCheck& check, bool wait) {
   const auto answer =
       take<std::uint32_t>(check.asked, check.read_back, "checking for numbers that are not finite", wait);
   if (!answer) return;
-  const std::uint32_t step = answer->front(), vertex = answer->back();
+  const std::uint32_t step = (*answer)[0], vertex = (*answer)[1];
   if (step != ~0u) check.found = {long(step), vertex};
   check.known = check.asked_step;
 }
@@ -62,7 +62,7 @@ void take_answer(FiniteCheck& check, bool wait) {
 void ask(Sim& sim) {
   FiniteCheck& check = sim.check;
   if (check.found || check.asked || check.known >= sim.steps) return;
-  check.words.copy_to(check.read_back, 0, 0, check.words.bytes());
+  check.words.copy_to(check.read_back, 0, 0, check.read_back.bytes());
   check.asked = Fence::here();
   check.asked_step = sim.steps;
 }

@@ -47,11 +47,13 @@ double longest_substep(const Sim& sim, const Settings& settings) {
                      sim.model->rest.positions, 30);
 }
 
-// In mode explicit a step has one iteration in each of as many substeps as stay stable.
-Settings fitted(Settings settings, double longest) {
+// In mode explicit a step has one iteration in each of as many substeps as stay stable at rest, or are
+// `stiffening` times as short.
+Settings fitted(Settings settings, double longest, double stiffening) {
   if (!leaps(settings)) return settings;
-  const double wanted = longest > 0 ? settings.dt / (settings.stability * longest) : 0;
+  const double at_rest = longest > 0 ? settings.dt / (settings.stability * longest) : 0;
   constexpr double most = 100000;
+  const double wanted = at_rest > most ? at_rest : std::min(at_rest * stiffening, most);
   if (wanted > most)
     throw Error("the body is too stiff for mode explicit",
                 fmt::format("a step takes {:.3g} substeps", wanted),
@@ -60,7 +62,8 @@ Settings fitted(Settings settings, double longest) {
   return settings;
 }
 
-void write_step_block(Sim& sim) {
+// `before`: substeps of the last step, if others.
+void write_step_block(Sim& sim, int before = 0) {
   const Settings& s = sim.settings;
   const double h = s.dt / s.substeps;
   const bool soft = compliant(s);
@@ -72,6 +75,7 @@ void write_step_block(Sim& sim) {
   block.share = leaps(s) ? 0.0f : float(1 / s.omega);
   block.friction = float(s.friction);
   block.drag = float(s.damping);
+  block.kick = before ? float(0.5 * (1 + double(s.substeps) / before)) : 1;
   block.restitution = float(s.restitution);
   block.body_size = float(sim.model->size);
   block.velocity_scale = float(std::exp(-s.damping * h));
@@ -139,6 +143,31 @@ void schedule(Sim& sim) {
   if (!on_cpu(sim)) sim.substep = substep_dispatches(sim.solver, sim.settings.iterations);
 }
 
+// As kernels note it (project.glsl), in mode explicit.
+double stiffest(const Sim& sim, const Settings& settings, const std::vector<glm::dvec3>& positions) {
+  return leaps(settings) ? stiffest_constraint({*sim.model, sim.system, settings, sim.inverse_masses},
+                                               settings.compliance, positions)
+                         : 0;
+}
+
+// What is noted of other settings or another state.
+void forget_answers(Sim& sim) {
+  sim.watch.asked = {};
+  if (sim.watch.answer) sim.watch.nothing.copy_to(sim.check.words, 8, 0, 8);
+}
+
+// Of a state that is given, before its first step.
+void start_watch(Sim& sim, const std::vector<glm::dvec3>& positions) {
+  forget_answers(sim);
+  Watch& w = sim.watch;
+  w.most_substeps = 0, w.stiffer = 1, w.calm = 0;
+  w.residual = w.largest_residual = 0, w.health = w.least_health = 1;
+  if (!(w.at_rest > 0)) return;
+  const double now = stiffest(sim, sim.settings, positions) / w.at_rest;
+  w.stiffening = std::isfinite(now) ? stiffening_for(now, sim.settings.stability) : 1;
+  sim.settings = fitted(sim.settings, sim.longest_substep, w.stiffening);
+}
+
 // Everything but the state.
 Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning,
              ConstraintSystem system) {
@@ -161,7 +190,8 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
     sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
                    count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.longest_substep = longest_substep(sim, settings);
-  sim.settings = fitted(settings, sim.longest_substep);
+  sim.settings = fitted(settings, sim.longest_substep, 1);
+  sim.watch.at_rest = stiffest(sim, settings, sim.model->rest.positions);
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
     return Buffer(label, bytes);
@@ -183,11 +213,15 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
                          4 * count};
   }
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
-  sim.check.words = Buffer("check", 8);
+  sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
   sim.check.copy = Program::compute("checkpoint.comp");
   sim.check.positions = buffer("checkpoint positions", sim.positions.bytes());
   sim.check.velocities = buffer("checkpoint velocities", sim.velocities.bytes());
+  if (leaps(settings) || is_implicit(settings)) {
+    sim.watch.answer = Buffer("watch read-back", 8, nullptr, GL_STREAM_READ);
+    sim.watch.nothing = Buffer("nothing", 8, std::array{0.0f, 1.0f}.data());
+  }
   schedule(sim);
   return sim;
 }
@@ -210,6 +244,7 @@ void remake(Sim& sim, const Settings& settings) {
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps;
   fresh.timed = sim.timed;
+  start_watch(fresh, state.positions);
   write_state(fresh, state);
   sim = std::move(fresh);
 }
@@ -233,6 +268,20 @@ void write_velocities(const Sim& sim, const State& state) {
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
+// What fits; `before`: half_substep_fall() of the velocities.
+void put_settings(Sim& sim, const Settings& settings, double before) {
+  sim.settings = settings;
+  const double upwards = half_substep_fall(settings) - before;
+  schedule(sim);
+  write_step_block(sim);
+  if (upwards == 0) return;
+  // Velocities are half a substep old: with another substep or gravity they are those of another time.
+  State state = read_state(sim);
+  add_upwards(sim, state, upwards);
+  write_velocities(sim, state);
+  if (on_cpu(sim)) sim.host = std::move(state);
+}
+
 }  // namespace
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
@@ -246,6 +295,13 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
   return sim;
 }
 
+double explicit_substeps(const Model& model, const Settings& s) {
+  const ConstraintSystem system = build_constraints(model.rest, s);
+  const ReferenceInput input{model, system, s, model.inverse_masses};
+  const double longest = stable_step(input, s.compliance, model.rest.positions, 12);
+  return std::max(1.0, std::ceil(s.dt / (s.stability * longest)));
+}
+
 void forget_contacts(Sim& sim) {
   if (!sim.rigid_bodies) return;
   const auto records = rigid_records(*sim.model);
@@ -257,6 +313,7 @@ void reset(Sim& sim) {
   if (sim.guard_counts) sim.guard_counts.clear();
   sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
+  start_watch(sim, sim.model->positions);
   State state{sim.model->positions, sim.model->velocities};
   add_upwards(sim, state, half_substep_fall(sim.settings));
   write_state(sim, state);
@@ -290,19 +347,22 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
   const double before = half_substep_fall(sim.settings);
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
-  const double longest =
-      forces(settings) == forces(sim.settings) ? sim.longest_substep : longest_substep(sim, settings);
-  sim.settings = fitted(settings, longest);
+  const bool same = forces(settings) == forces(sim.settings);
+  const double longest = same ? sim.longest_substep : longest_substep(sim, settings);
+  const Settings now = fitted(settings, longest, sim.watch.stiffening);
+  if (!same) sim.watch.at_rest = stiffest(sim, settings, sim.model->rest.positions);
   sim.longest_substep = longest;
-  const double upwards = half_substep_fall(sim.settings) - before;
-  schedule(sim);
-  write_step_block(sim);
-  if (upwards == 0) return;
-  // Velocities are half a substep old: with another substep or gravity they are those of another time.
-  State state = read_state(sim);
-  add_upwards(sim, state, upwards);
-  write_velocities(sim, state);
-  if (on_cpu(sim)) sim.host = std::move(state);
+  forget_answers(sim);
+  put_settings(sim, now, before);
+}
+
+void set_stiffening(Sim& sim, double stiffening) {
+  const int before = sim.settings.substeps;
+  sim.watch.stiffening = stiffening;
+  sim.settings = fitted(sim.settings, sim.longest_substep, stiffening);
+  if (sim.settings.substeps == before) return;
+  sim.watch.changed = true;
+  write_step_block(sim, before);
 }
 
 void rebuild_shaders(Sim& sim) { remake(sim, sim.settings); }

@@ -14,6 +14,7 @@
 #include "sim/layout.h"
 #include "sim/model.h"
 #include "sim/solvers/solver.h"
+#include "sim/watch.h"
 
 namespace tetpbd {
 
@@ -38,11 +39,11 @@ struct Sim {
   Pass predict;             ///< makes the quantized positions of the next step, after a change from outside
   std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;
-  double quantum = 1;               ///< m, of quantized positions
-  double longest_substep = 0;       ///< s, that is stable at rest, of mode explicit: it decides settings.substeps
-  bool needs_predict = true;        ///< the quantized positions are not those of the next step
-  unsigned read_index = 0;          ///< which of `quantized` is read next
-  long steps = 0;                   ///< taken since the start
+  double quantum = 1;          ///< m, of quantized positions
+  double longest_substep = 0;  ///< s, that is stable at rest, of mode explicit: it decides settings.substeps
+  bool needs_predict = true;   ///< the quantized positions are not those of the next step
+  unsigned read_index = 0;     ///< which of `quantized` is read next
+  long steps = 0;              ///< taken since the start
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
   State host;   ///< state of a CPU mode; the GPU buffers follow it
@@ -50,11 +51,14 @@ struct Sim {
   bool timed = false;
   GuardCounts guards{};  ///< since the last reset; ask guard_counts()
   FiniteCheck check;     ///< ask check_finite()
+  Watch watch;           ///< ask watched()
 };
 
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
+/// How many substeps mode explicit takes of a step at rest, within some percent; settings that have forces.
+double explicit_substeps(const Model& model, const Settings& settings);
 /// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
 /// solver again if the mode, the constraint kinds or whether there is compliance changed; where
 /// that fails, throws and leaves the simulation as it was.
@@ -92,6 +96,13 @@ void check_step(Sim& sim);
 /// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
 /// ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
+/// Before a step: asks what kernels noted; in mode explicit takes as many substeps as the last answer needs.
+/// Phases of the step's first substep.
+unsigned watch(Sim& sim);
+void set_stiffening(Sim& sim, double stiffening);
+/// As of the last step. Waits.
+const Watch& watched(Sim& sim);
+
 /// Back to the last good state that was kept, at most 64 steps before the one found, and to its step; false
 /// where there is none.
 bool restore_checkpoint(Sim& sim);

@@ -62,6 +62,7 @@ void bind(Sim& sim) {
 }
 
 void step_on_gpu(Sim& sim) {
+  const unsigned watched = watch(sim);
   bind(sim);
   if (sim.timed) sim.timer.begin();
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
@@ -77,7 +78,7 @@ void step_on_gpu(Sim& sim) {
     if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
     for (const Dispatch& dispatch : sim.substep)
       if (dispatch.pass + 1 == sim.solver.iteration.size())
-        dispatcher.move(dispatch.phases);
+        dispatcher.move(dispatch.phases | (substep == 0 ? watched : 0));
       else
         dispatcher.run(sim.solver.iteration[dispatch.pass], dispatch.phases);
   }

@@ -1,5 +1,6 @@
 // --solver auto and the named solvers.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -43,6 +44,32 @@ TEST_CASE("a solver by name puts its settings in place of the scene's; flags go 
   CHECK(*load_scene("bunny-drop", {.solver = "auto", .parameters = {{"dt", "0.01"}}}).budget_ms ==
         doctest::Approx(1));
   CHECK_FALSE(load_scene("bunny-drop").budget_ms);
+}
+
+TEST_CASE("a soft body that nobody says the mode of takes explicit where that is cheap, else newton") {
+  GlTest gl;
+  const auto chosen = [](std::vector<std::pair<std::string, std::string>> parameters) {
+    Scene scene = falling({.parameters = std::move(parameters)});
+    const auto said = choose_by_rule(scene, *build_model(scene));
+    CHECK_FALSE(scene.mode_open);
+    return fmt::format("{} {}x{} {}", scene.settings.mode, scene.settings.substeps, scene.settings.iterations,
+                       said.value_or("-"));
+  };
+  CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e4"}}).starts_with("explicit"));
+  CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e9"}})
+            .starts_with("newton 2x4 newton, 2 sub"));
+  CHECK(chosen({{"material", "springs"}, {"mode", "node"}, {"substeps", "9"}}) == "node 9x1 -");
+  CHECK(chosen({{"material", "springs"}, {"substeps", "9"}}) == "node 9x1 -");
+  CHECK(chosen({}).ends_with(" -"));  // nothing has a force
+  CHECK(load_scene("soft-beam").mode_open);
+  CHECK_FALSE(load_scene("soft-beam", {.solver = "newton"}).mode_open);
+  CHECK_FALSE(load_scene("bunny-drop").mode_open);
+  // What the rule expects is what the mode takes.
+  Scene scene =
+      falling({.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e8"}, {"mode", "explicit"}}});
+  const auto model = build_model(scene);
+  const Sim sim = create_sim(model, scene.settings);
+  CHECK(explicit_substeps(*model, scene.settings) == doctest::Approx(sim.settings.substeps).epsilon(0.08));
 }
 
 TEST_CASE("auto takes what moves most nearly right, and as many substeps as the budget holds") {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "sim/error.h"
+#include "sim/metrics.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -81,6 +82,87 @@ TEST_CASE("explicit: substeps follow stiffness, dt and the part of the stable on
   bare.material = "none", bare.constraints = "";
   apply_settings(sim, bare);
   CHECK(sim.settings.substeps == 1);
+}
+
+namespace {
+
+// The block in flight, `by` times as large along its axes at the start.
+std::shared_ptr<const Model> deformed_block(const glm::dvec3& by) {
+  auto model = std::make_shared<Model>(*irregular_block(5, false));
+  const glm::dvec3 centre = centre_of(*model, model->positions);
+  for (glm::dvec3& p : model->positions) p = centre + by * (p - centre);
+  return model;
+}
+
+}  // namespace
+
+TEST_CASE("explicit: kernels note the stiffest constraint; it moves with the largest eigenvalue") {
+  GlTest gl;
+  for (const char* material : {"none", "springs", "neo-hookean"})
+    for (const glm::dvec3 by : {glm::dvec3(1), glm::dvec3(2, 1, 1), glm::dvec3(0.3, 1.2, 1.2),
+                                glm::dvec3(-1, 1, 1), glm::dvec3(1, 3, 3), glm::dvec3(2.5)}) {
+      CAPTURE(material);
+      CAPTURE(by.x);
+      CAPTURE(by.y);
+      const auto model = deformed_block(by);
+      Sim sim = create_sim(model, soft(material, 0));
+      const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
+      const auto& alpha = sim.settings.compliance;
+      const double stiffest = stiffest_constraint(input, alpha, model->positions);
+      const double ratio = stiffest / stiffest_constraint(input, alpha, model->rest.positions);
+      const double eigenvalues = std::pow(
+          stable_step(input, alpha, model->rest.positions) / stable_step(input, alpha, model->positions), 2);
+      CHECK(stiffest > 0.98 / std::pow(stable_step(input, alpha, model->positions) / 2, 2));
+      CHECK(ratio > 0.4 * eigenvalues);
+      CHECK(ratio < 2.5 * eigenvalues);
+      const double h = sim.settings.dt / sim.settings.substeps;
+      step(sim);
+      const float noted = sim.check.words.read_all<float>()[2];
+      CHECK(noted / (h * h) == doctest::Approx(stiffest).epsilon(1e-3));
+    }
+}
+
+TEST_CASE("explicit: a body that becomes stiffer takes more substeps before it blows up, and fewer after") {
+  GlTest gl;
+  CHECK(stiffening_for(1, 0.9) == 1);
+  CHECK(stiffening_for(3, 0.4) == 1);
+  CHECK(stiffening_for(4, 0.7) == 2);
+  CHECK(stiffening_for(1e9, 0.4) == 32);
+  Settings settings = soft("neo-hookean", 0);
+  settings.stability = 0.4, settings.damping = 2;
+  // It flies apart, until it is some three times as large.
+  auto model = std::make_shared<Model>(*irregular_block(5, false, {0, 0, 0}, {0, 0, 0}));
+  const glm::dvec3 centre = centre_of(*model, model->positions);
+  double start = 0;
+  for (std::size_t i = 0; i < model->positions.size(); ++i) {
+    model->velocities[i] = 160.0 * (model->positions[i] - centre);
+    start += model->masses[i] / 2 * glm::dot(model->velocities[i], model->velocities[i]);
+  }
+  std::uint64_t bits = 0;
+  for (const int run : {0, 1, 2}) {
+    CAPTURE(run);
+    Sim sim = create_sim(model, settings);
+    const int at_rest = sim.settings.substeps;
+    if (run == 0) sim.watch.answer = {};  // not watched
+    double most = 0;
+    Metrics metrics = create_metrics(*model, sim.system);
+    for (int s = 0; s < 400; ++s) {
+      step(sim);
+      measure(metrics, sim);
+      most = std::max(most, collect(metrics, true)->kinetic);
+    }
+    CHECK_FALSE(check_finite(sim, true));
+    if (run == 0) CHECK(most > 1.5 * start);
+    if (run == 0) continue;
+    CHECK(most < start);
+    CHECK(sim.watch.most_substeps > 1.5 * at_rest);
+    CHECK(sim.settings.substeps == at_rest);
+    if (run == 1) bits = state_hash(sim);
+    CHECK(state_hash(sim) == bits);
+  }
+  // Also from a start that is deformed already.
+  Sim large = create_sim(deformed_block(glm::dvec3(3)), settings), small = create_sim(model, settings);
+  CHECK(large.settings.substeps > 2 * small.settings.substeps);
 }
 
 TEST_CASE("explicit: what has no force is refused in a line") {

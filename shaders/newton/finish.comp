@@ -5,6 +5,11 @@ void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);
   if (phases > 0u) l = lengths(phases);
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
+  if (i == 0u && phases > 0u) {
+    float first = phases == 1u ? l.rz : sums[FIRST_AT];
+    if (first > 0.0) atomicMax(largest, floatBitsToUint(sqrt(l.rz / first)));
+    if (phases == 1u) atomicMin(least, floatBitsToUint(l.alpha));
+  }
   if (i >= VERTICES) return;
   Position own = positions[i];
   Pair x = Pair(own.high, own.low);

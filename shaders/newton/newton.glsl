@@ -45,7 +45,8 @@ layout(std430, binding = BIND_NEWTON_COARSE) restrict readonly buffer Coarse { v
 vec4 centre_of(uint aggregate) { return coarse_words[CENTRES_AT + aggregate]; }
 
 // How many tets each part of the way turns over or blows up; then floats: two dot products of every work-group of the matrix's product, their sums, three
-// numbers of this and the last iteration, of coarse unknowns r, q and y, rotations as quaternions, and whether an aggregate is free (0 or 1).
+// numbers of this and the last iteration, of coarse unknowns r, q and y, rotations as quaternions, whether an aggregate is free (0 or 1), and
+// another number.
 #ifndef SUMS_ARE
 #define SUMS_ARE
 #endif
@@ -57,6 +58,7 @@ layout(std430, binding = BIND_NEWTON_SUMS) restrict SUMS_ARE buffer Sums { uint 
 #define COARSE_Y (COARSE_Q + UNKNOWNS)
 #define ROTATIONS_AT (COARSE_Y + UNKNOWNS)
 #define FREE_AT (ROTATIONS_AT + 4 * AGGREGATES)
+#define FIRST_AT (FREE_AT + AGGREGATES)  // r . z of the first iteration
 
 // The largest part that a hundredth of all tets at most bears badly: contact crushes a few at any start, and they recover.
 uint start_part() {

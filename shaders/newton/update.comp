@@ -53,6 +53,10 @@ void main() {
     sums[k] = l.rz;
     sums[k + 1u] = l.alpha;
     sums[k + 2u] = l.coarse ? 1.0 : 0.0;
+    if (phases == 1u) {
+      sums[FIRST_AT] = l.rz;
+      atomicMin(least, floatBitsToUint(l.alpha));
+    }
   }
   if (group < AGGREGATES) {
     restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, l);

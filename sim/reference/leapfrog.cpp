@@ -168,4 +168,28 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
   return (std::sqrt(damped * damped + 4) - damped) / omega;
 }
 
+double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances,
+                           const Points& positions) {
+  double stiffest = 0;
+  for_each_elastic(input.system, compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
+    constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
+#pragma omp parallel for reduction(max : stiffest)
+    for (std::size_t c = 0; c < list.count(); ++c) {
+      const auto vertices = list.ends(c);
+      std::array<glm::dvec3, arity> x;
+      for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
+      const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
+      double sum = 0;
+      for (int k = 0; k < kind.row.components; ++k)
+        for (std::size_t j = 0; j < arity; ++j) {
+          const glm::dvec3 g = component(value, k).second[j];
+          sum += input.inverse_masses[vertices[j]] * input.system.at_vertex[vertices[j]] * glm::dot(g, g) /
+                 alpha(c)[k];
+        }
+      stiffest = std::max(stiffest, sum);
+    }
+  });
+  return stiffest;
+}
+
 }  // namespace tetpbd

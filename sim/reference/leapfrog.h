@@ -34,4 +34,9 @@ State state_of(Leapfrog& run);
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
                    int iterations = 100);
 
+/// How stiff the stiffest constraint is, 1/s^2 (method.md eq. 39b): the largest eigenvalue of M^-1 K is at most
+/// this where each has its part of its vertices' masses, but for what bends and turns.
+double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances,
+                           const Points& positions);
+
 }  // namespace tetpbd

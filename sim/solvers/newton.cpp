@@ -232,7 +232,7 @@ Solver create_newton_solver(const SolverInput& input) {
   add_buffer(solver, input.tuning, BIND_NEWTON_COARSE, Buffer("coarse matrix", second));
   add_buffer(
       solver, input.tuning, BIND_NEWTON_SUMS,
-      Buffer("sums", std::vector<float>(4 + 2 * turns + 8 + 3 * unknowns + 5 * count), GL_DYNAMIC_COPY));
+      Buffer("sums", std::vector<float>(4 + 2 * turns + 8 + 3 * unknowns + 5 * count + 1), GL_DYNAMIC_COPY));
   std::vector<std::string> defines = std::move(mesh.defines);
   for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"GROUP_SIZE", group},
                                     {"LANES", lanes},

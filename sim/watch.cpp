@@ -1,0 +1,79 @@
+#include "sim/watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+double stiffening_for(double stiffer, double stability) {
+  // The bound moves with the largest eigenvalue but not exactly, and the body goes on deforming until the
+  // answer comes.
+  constexpr double safe = 0.7, most = 32;
+  const double needed = std::sqrt(stiffer) * stability / std::max(safe, stability);
+  if (!(needed > 1)) return 1;
+  return std::min(most, std::exp2(std::ceil(4 * std::log2(needed)) / 4));
+}
+
+namespace {
+
+// What kernels noted, and asks again; none if it is not there yet.
+std::optional<std::vector<float>> look(Sim& sim, bool wait) {
+  Watch& w = sim.watch;
+  const auto answer = take<float>(w.asked, w.answer, "watching the solver", wait);
+  if (w.asked) return std::nullopt;
+  sim.check.words.copy_to(w.answer, 0, 8, 8);
+  w.nothing.copy_to(sim.check.words, 8, 0, 8);
+  w.asked = Fence::here();
+  return answer;
+}
+
+void watch_stiffness(Sim& sim) {
+  Watch& w = sim.watch;
+  const double h = sim.settings.dt / sim.settings.substeps;
+  const auto answer = look(sim, true);
+  const double asked_h = std::exchange(w.asked_h, h);
+  if (!answer || !std::isfinite(answer->front())) return;
+  const double stiffer = answer->front() / (asked_h * asked_h * w.at_rest);
+  const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next answer, if it goes on so
+  w.stiffer = stiffer;
+  const double needed = stiffening_for(next, sim.settings.stability);
+  // Up at once; down a quarter at a time, as bodies swing.
+  w.calm = needed < w.stiffening ? w.calm + 1 : 0;
+  if (needed > w.stiffening) set_stiffening(sim, needed);
+  if (w.calm == 16) w.calm = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
+}
+
+void watch_convergence(Sim& sim, bool wait) {
+  Watch& w = sim.watch;
+  const auto answer = look(sim, wait);
+  if (!answer) return;
+  w.residual = (*answer)[0], w.health = (*answer)[1];
+  w.largest_residual = std::max(w.largest_residual, w.residual);
+  w.least_health = std::min(w.least_health, w.health);
+}
+
+}  // namespace
+
+unsigned watch(Sim& sim) {
+  Watch& w = sim.watch;
+  if (!w.answer) return 0;
+  const bool now = sim.steps % Watch::every == 0;
+  if (!(w.at_rest > 0)) {
+    if (now) watch_convergence(sim, false);
+    return 0;
+  }
+  if (now) watch_stiffness(sim);
+  w.most_substeps = std::max(w.most_substeps, sim.settings.substeps);
+  return PHASE_WATCH | (std::exchange(w.changed, false) ? PHASE_CHANGED : 0u);
+}
+
+const Watch& watched(Sim& sim) {
+  if (is_implicit(sim.settings))  // the answer that is under way, then of what came since
+    for (int turn = 0; turn < 2; ++turn) watch_convergence(sim, true);
+  return sim.watch;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,37 @@
+// Modes explicit and newton, watched while they run. A body that deforms becomes stiffer than it is at rest,
+// and a substep of mode explicit that was stable is too long then: kernels note the stiffest constraint of a
+// step; the answer comes back some steps later, always as many, so that a run is the same every time. Of mode
+// newton they note how far it converges, for whoever asks.
+#pragma once
+
+#include "sim/gl/gpu.h"
+
+namespace tetpbd {
+
+/// Part of a Sim (sim.h), whose steps keep it up to date.
+struct Watch {
+  static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
+  Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
+  Fence asked;
+
+  // Mode explicit.
+  double at_rest = 0;     ///< 1/s^2, the stiffest constraint there; 0: not in mode explicit
+  double stiffening = 1;  ///< by how much shorter than at rest a substep is, because the body is stiffer
+  double stiffer = 1;     ///< than at rest, by the last answer
+  int calm = 0;           ///< answers in a row that asked for longer substeps
+  bool changed = false;   ///< substeps are others than in the last step
+  int most_substeps = 0;  ///< of a step, since the start
+  double asked_h = 0;     ///< s, the substep that the answer was noted in
+
+  // Mode newton: the residual before the last iteration over that of Newton's start, and the length of the
+  // first step of conjugate gradients, which is near 1 where the second level knows the body and 0 where it
+  // was left out; the last answer, and the worst since the start.
+  double residual = 0, largest_residual = 0, health = 1, least_health = 1;
+};
+
+/// By how much shorter a substep is, of `stability` times the longest stable at rest, where the stiffest
+/// constraint is `stiffer` times as stiff as at rest: enough to stay within 0.7 of what is stable, in steps
+/// of a quarter of an octave, at most 32.
+double stiffening_for(double stiffer, double stability);
+
+}  // namespace tetpbd

@@ -17,7 +17,8 @@ namespace tetpbd {
 
 namespace {
 
-constexpr double most_seconds = 3;  // of the first trial: a slow machine compares fewer steps
+// Of the first trial: a slow machine compares fewer steps, though not so few that nothing has happened yet.
+double most_seconds() { return is_software_renderer() ? 8 : 3; }
 constexpr int most_substeps = 1000;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double finer = 8;        // times the substeps, of the run that stands in for the right motion
@@ -129,7 +130,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
         Sim fine = finer_than(trial.settings, model);
         // What a slow machine can afford: the reference takes as long as all trials together.
         const double seconds = 1e-3 * fine.settings.substeps / double(trial.settings.substeps) * budget_ms;
-        choice.steps = std::clamp(long(2 * most_seconds / seconds), 2L, steps);
+        choice.steps = std::clamp(long(2 * most_seconds() / seconds), 2L, steps);
         right = motion_of_run(fine, choice.steps), choice.judged = "finer steps";
       } else {
         choice.judged = "volume";
@@ -139,7 +140,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       apply_settings(sim, trial.settings);
       reset(sim);
       Metrics metrics = create_metrics(*model, sim.system);
-      const double enough = first ? most_seconds : 2e-3 * budget_ms * double(choice.steps) + 0.5;
+      const double enough = first ? most_seconds() : 2e-3 * budget_ms * double(choice.steps) + 0.5;
       const MeasuredRun run =
           run_loop(sim, &metrics, choice.steps, {.most_seconds = enough, .right = right ? &*right : nullptr});
       if (interrupted()) throw Interrupted();

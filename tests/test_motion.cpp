@@ -154,6 +154,22 @@ TEST_CASE("motion: a corner that hits turns the body by its arm times the impuls
   }
 }
 
+TEST_CASE("motion: a rigid block that three fixed vertices hold stays; on a line they leave it free to turn") {
+  Scene scene = block_at({1, 1, 1}, {0, 2, 0});
+  scene.model.inverse_masses[0] = scene.model.inverse_masses[1] = scene.model.inverse_masses[2] = 0;  // an edge
+  CHECK_THROWS_WITH_AS(find_motion(scene.input(), 5), doctest::Contains("can turn about its fixed vertices"),
+                       Error);
+  scene.model.inverse_masses[3] = 0;
+  const Motion motion = find_motion(scene.input(), 5);
+  CHECK(motion.method == "rigid body");
+  REQUIRE(motion.kept.back() == 5);
+  for (const auto& positions : motion.positions)
+    CHECK(largest_distance(positions, scene.model.positions) < 1e-12);
+  CHECK(motion.rows.back().kinetic == 0);
+  scene.model.velocities[5].x = 1;
+  CHECK_THROWS_AS(find_motion(scene.input(), 5), Error);  // cannot set off
+}
+
 TEST_CASE("motion: what is no rigid motion is refused") {
   Scene scene = block_at({1, 1, 1}, {0, 2, 0});
   scene.model.positions[0].x += 0.01;

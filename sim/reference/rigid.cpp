@@ -91,6 +91,20 @@ glm::dvec3 into_cone(const glm::dvec3& p, double friction) {
   return {normal, p.y * friction * normal / slip, p.z * friction * normal / slip};
 }
 
+// Whether the body's fixed vertices hold it. Throws Error where they leave it free to turn about them.
+bool is_held(const Model& model, const Body& body) {
+  std::vector<glm::dvec3> fixed;
+  for (std::size_t i = body.first_vertex; i < body.first_vertex + body.vertices; ++i)
+    if (model.inverse_masses[i] == 0) fixed.push_back(model.positions[i]);
+  if (fixed.empty()) return false;
+  const auto from_first = [&](const glm::dvec3& p) { return glm::length(p - fixed[0]); };
+  const glm::dvec3 far = *std::ranges::max_element(fixed, {}, from_first) - fixed[0];
+  for (const glm::dvec3& p : fixed)
+    if (glm::length(glm::cross(p - fixed[0], far)) > 1e-6 * model.size * model.size) return true;
+  throw Error("a rigid body is free, or held", fmt::format("{} can turn about its fixed vertices", body.name),
+              "free them, or fix three that are not on a line");
+}
+
 }  // namespace
 
 std::vector<RigidBody> rigid_bodies(const Model& model) {
@@ -98,13 +112,12 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
   for (const Body& body : model.bodies) {
     RigidBody b;
     b.first = body.first_vertex;
+    b.held = is_held(model, body);
     glm::dvec3 rest_centre(0), momentum(0);
     const auto each = [&](auto&& visit) {
       for (std::size_t i = b.first; i < b.first + body.vertices; ++i) visit(i, model.masses[i]);
     };
     each([&](std::size_t i, double m) {
-      if (model.inverse_masses[i] == 0)
-        throw Error("a rigid body is free", fmt::format("vertex {} of {} is fixed", i, body.name), "free it");
       b.mass += m;
       b.centre += m * model.positions[i];
       rest_centre += m * model.rest.positions[i];
@@ -121,6 +134,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
       b.angular += m * glm::cross(x, model.velocities[i]);
     });
     b.rotation = best_rotation(covariance).R;
+    if (b.held) b.velocity = b.angular = glm::dvec3(0);
     const glm::dvec3 spin = angular_velocity(b);
     each([&](std::size_t i, double) {
       const glm::dvec3 arm = b.rotation * b.rest[i - b.first];
@@ -137,6 +151,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
 }
 
 void advance(RigidBody& b, const Model& model, const Settings& settings, double h, double restitution) {
+  if (b.held) return;
   move(b, h / 2);
   const glm::dmat3 inverse = b.rotation * glm::inverse(b.inertia) * glm::transpose(b.rotation);
   const std::vector<glm::dvec4> planes = planes_of(model, settings);

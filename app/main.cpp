@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "app/commands.h"
+#include "app/lanes.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
@@ -210,6 +211,7 @@ int start_view(const Arguments& a) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
     throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
                 "start it in a desktop session, or use tetpbd run");
+  for (const std::string& words : a.run.lanes) lane_settings(a.opened->settings, words, "--lane " + words);
   return run_window(*a.opened, a.scene, a.overrides, a.run);
 }
 
@@ -221,7 +223,13 @@ void add_commands(CLI::App& app, Arguments& a) {
     return added;
   };
 
-  add_scene(command("view", "a window (the default where there is a display)", start_view), a);
+  CLI::App& view = command("view", "a window (the default where there is a display)", start_view);
+  add_scene(view, a);
+  view.add_option("--lane", a.run.lanes,
+                  "solve the scene side by side in up to 4 ways: of each, solvers by name or "
+                  "PARAMETER=VALUE, separated by commas")
+      ->type_name("WORDS")
+      ->expected(1, int(most_lanes));
 
   CLI::App& run = command("run", "headless: steps a scene, writes frames, video, statistics",
                           [](const Arguments& a) { return run_headless(*a.opened, a.run); });

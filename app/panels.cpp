@@ -175,7 +175,7 @@ bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
 }
 
 void draw_parameters(Session& s, std::string_view section) {
-  Settings wanted = s.loaded.sim.settings;
+  Settings wanted = s.loaded.sim().settings;
   bool changed = false;
   for (const Parameter& row : parameters())
     if (section == row.section) changed |= parameter_widget(s, row, wanted);
@@ -200,7 +200,7 @@ Ways ways_of(const Settings& now, const std::vector<Preset>& presets, const std:
 
 // The whole way to solve by one word, and what auto picked.
 void draw_solver(Session& s) {
-  const Settings now = s.loaded.sim.settings;
+  const Settings now = s.loaded.sim().settings;
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
   Ways ways = ways_of(now, solver_presets(),
@@ -210,7 +210,7 @@ void draw_solver(Session& s) {
   ways.words.push_back("auto");
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
-  const Watch& watch = s.loaded.sim.watch;
+  const Watch& watch = s.loaded.sim().watch;
   if (leaps(now))
     ImGui::TextWrapped("%d substeps%s", now.substeps,
                        watch.stiffening > 1
@@ -227,7 +227,7 @@ void draw_solver(Session& s) {
 
 // What the body is made of, by name; its numbers are below.
 void draw_material(Session& s) {
-  Ways ways = ways_of(s.loaded.sim.settings, material_presets(), "a material by name");
+  Ways ways = ways_of(s.loaded.sim().settings, material_presets(), "a material by name");
   if (const auto chosen = combo(s, "made of", ways.current, ways.words, ways.help))
     change_settings(s, ways.to[*chosen]);
 }
@@ -260,6 +260,38 @@ void draw_scene(Session& s) {
   SceneOverrides overrides = s.loaded.overrides;
   overrides.mesh = s.ui.mesh;
   load_soon(s, s.loaded.name, overrides, true, false);
+}
+
+void draw_lane_rows(Session& s) {
+  const auto& lanes = s.loaded.lanes;
+  const std::string help =
+      "the same bodies solved in several ways at once: pull one and all are pulled; the panel is of the "
+      "chosen lane";
+  Ways ways{.help = help, .words = {}};
+  for (const Comparison& row : comparisons())
+    ways.words.push_back(row.name), ways.help += fmt::format("\n{}: {}", row.name, row.help);
+  if (const auto name =
+          combo(s, "side by side", lanes.size() > 1 ? "as below" : "one way", ways.words, ways.help))
+    compare_lanes(s, std::ranges::find(comparisons(), *name, &Comparison::name)->lanes);
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
+  if (button(s, "Add a lane", "add lane", "K", width)) add_lane(s);
+  ImGui::SameLine();
+  ImGui::BeginDisabled(lanes.size() < 2);
+  if (button(s, "Remove this one", "remove lane", "J", width)) remove_lane(s);
+  ImGui::EndDisabled();
+  if (lanes.size() < 2) return;
+  for (std::size_t i = 0; i < lanes.size(); ++i) {
+    const glm::vec3 colour = lane_colour(i);
+    ImGui::ColorButton(fmt::format("##colour {}", i).c_str(), ImVec4(colour.x, colour.y, colour.z, 1),
+                       ImGuiColorEditFlags_NoTooltip);
+    ImGui::SameLine();
+    if (ImGui::Selectable(fmt::format("{}##lane {}", describe(lanes[i]), i).c_str(), i == s.loaded.chosen))
+      choose_lane(s, i);
+    mark(s, fmt::format("lane {}", i + 1));
+  }
+  check_box(s, "overlaid", s.overlaid, "all lanes in one place, in their colours");
+  ImGui::SameLine(label_width());
+  check_box(s, "ghost", s.ghost, "beside each lane the one that is nearest to the right motion");
 }
 
 void draw_colour_range(Session& s) {
@@ -335,6 +367,7 @@ void mark(Session& s, const std::string& name) {
 void draw_panel(Session& s) {
   draw_run(s);
   if (section(s, "Scene")) draw_scene(s);
+  if (section(s, "Side by side")) draw_lane_rows(s);
   if (section(s, "Solver")) draw_solver(s), draw_material(s), draw_parameters(s, "solver");
   if (section(s, "View")) draw_view(s);
   if (section(s, "World")) draw_parameters(s, "world");

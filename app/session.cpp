@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <new>
+#include <utility>
 
+#include "app/reference_command.h"
 #include "app/run_loop.h"
 #include "sim/error.h"
 
@@ -17,9 +19,12 @@ using Steady = std::chrono::steady_clock;
 void start_afresh(Session& s) {
   s.clock.owed = 0;
   s.messages.clear();
-  while (s.loaded.metrics && collect(*s.loaded.metrics, true)) {
+  for (Lane& lane : s.loaded.lanes) {
+    while (lane.metrics && collect(*lane.metrics, true)) {
+    }
+    lane.volume_error = lane.distance = {};
   }
-  s.volume_error.values.clear();
+  s.loaded.disturbed = false;
 }
 
 bool differs(const Settings& a, const Settings& b, const Parameter& row) {
@@ -27,17 +32,28 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
 }
 
 void one_step(Session& s) {
-  Sim& sim = s.loaded.sim;
-  if (s.grab) lead(*s.grab, sim);
-  const auto begin = Steady::now();
-  step(sim);
-  if (sim.solver.step_on_cpu && s.measuring) s.step_ms.add(seconds_since(begin) * 1e3);
-  s.clock.simulated += sim.settings.dt;
+  if (s.grab) lead(*s.grab, s.loaded.sim());
+  auto& lanes = s.loaded.lanes;
+  for (Lane& lane : lanes) {
+    if (lanes.size() > 1 && check_finite(lane.sim)) continue;
+    if (s.grab && &lane != &s.loaded.lane()) move_pinned(lane.sim, s.grab->vertex, s.grab->position);
+    const auto begin = Steady::now();
+    step(lane.sim);
+    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3);
+  }
+  if (lanes.size() > 1 && s.loaded.comparable)
+    hold_lanes(lanes, s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr);
+  s.clock.simulated += s.loaded.sim().settings.dt;
 }
 
 // For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& s) {
-  if (s.log.file.is_open()) s.log("state {} {:016x}", s.loaded.sim.steps, state_hash(s.loaded.sim));
+  if (!s.log.file.is_open()) return;
+  for (std::size_t i = 0; s.loaded.lanes.size() > 1 && i < s.loaded.lanes.size(); ++i) {
+    const Sim& sim = s.loaded.lanes[i].sim;
+    s.log("lane {} {} {} {:016x}", i + 1, sim.settings.mode, sim.steps, state_hash(sim));
+  }
+  s.log("state {} {:016x}", s.loaded.sim().steps, state_hash(s.loaded.sim()));
 }
 
 void say_choice(Session& s) {
@@ -45,8 +61,44 @@ void say_choice(Session& s) {
   say(s, "solver: " + describe(*s.loaded.choice));
 }
 
+// The clock and the world are those of all lanes.
+void share(Session& s, const Settings& wanted, const Parameter& row) {
+  s.loaded.right.reset();  // it is of another
+  for (Lane& lane : s.loaded.lanes) {
+    Settings other = lane.sim.settings;
+    set_parameter(other, row, parameter_text(wanted, row), row.name);
+    if (other != lane.sim.settings) apply_settings(lane.sim, other);
+  }
+}
+
+// From a common start; what they are held against, if one answer is right for all.
+void start_lanes(Session& s) {
+  let_go(s);
+  const auto& lanes = s.loaded.lanes;
+  const Model& model = *lanes[0].sim.model;
+  const auto key = [&](const Lane& lane) {
+    const ConstraintSystem none;
+    return scene_key({model, none, lane.sim.settings, model.inverse_masses});
+  };
+  s.loaded.right.reset();
+  s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& l) { return key(l) == key(lanes[0]); });
+  if (lanes.size() > 1 && s.loaded.comparable) {
+    s.loaded.right = right_motion(model, lanes[0].sim.settings);
+    if (!s.loaded.right)
+      s.loaded.right = rigid_motion(model, lanes[0].sim.settings, duration_in_steps(s.loaded.scene));
+  }
+  restart(s);
+  for (const Lane& lane : lanes) s.log("lane {}", describe(lane));
+}
+
+// A hand in the motion: the right one is another now.
+void disturb(Session& s) {
+  if (!std::exchange(s.loaded.disturbed, true))
+    for (Lane& lane : s.loaded.lanes) lane.distance = {};
+}
+
 bool is_fixed(Session& s, std::uint32_t vertex) {
-  const bool fixed = !(s.loaded.sim.model->inverse_masses[vertex] > 0);
+  const bool fixed = !(s.loaded.sim().model->inverse_masses[vertex] > 0);
   if (fixed) say(s, fmt::format("vertex {} is fixed by the scene", vertex));
   return fixed;
 }
@@ -57,7 +109,8 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
   const auto model = build_model(scene);
   choose_by_rule(scene, *model);
   auto choice = choose_for(scene, model);
-  Loaded loaded{name, overrides, scene, create_sim(model, scene.settings), {}, {}, {}, choice};
+  Loaded loaded{name, overrides, scene, {}, {}, {}, choice};
+  loaded.lanes.push_back({create_sim(model, scene.settings)});
   loaded.renderer = make_renderer(*model);
   loaded.picker = make_picker(model->rest);
   return loaded;
@@ -99,18 +152,20 @@ void single_step(Session& s) {
     one_step(s);
     measure_frame(s, true);
   });
-  s.log("step {}", s.loaded.sim.steps);
+  s.log("step {}", s.loaded.sim().steps);
   log_state(s);
 }
 
 void restart(Session& s) {
   let_go(s);
   const auto made_with_another = [&](const Parameter& row) {
-    return row.effect == Effect::restart && differs(s.loaded.scene.settings, s.loaded.sim.settings, row);
+    return row.effect == Effect::restart && differs(s.loaded.scene.settings, s.loaded.sim().settings, row);
   };
   if (std::ranges::any_of(parameters(), made_with_another))
     return load_soon(s, s.loaded.name, s.loaded.overrides, true, true);
-  attempt(s, [&] { reset(s.loaded.sim); });
+  attempt(s, [&] {
+    for (Lane& lane : s.loaded.lanes) reset(lane.sim);
+  });
   start_afresh(s);
   s.log("reset");
 }
@@ -118,15 +173,16 @@ void restart(Session& s) {
 void go_back(Session& s) {
   let_go(s);
   attempt(s, [&] {
-    if (!check_finite(s.loaded.sim, true)) return;
-    if (!restore_checkpoint(s.loaded.sim)) return say(s, "no good state is kept: reset (R)");
+    if (!check_finite(s.loaded.sim(), true)) return;
+    if (!restore_checkpoint(s.loaded.sim())) return say(s, "no good state is kept: reset (R)");
     start_afresh(s);
-    s.log("back {}", s.loaded.sim.steps);
+    s.log("back {}", s.loaded.sim().steps);
   });
 }
 
 void watch_state(Session& s) {
-  const auto& found = check_finite(s.loaded.sim);
+  if (s.loaded.lanes.size() > 1) return;  // that lane stops, and says so in its picture
+  const auto& found = check_finite(s.loaded.sim());
   if (!found || (!s.playing && std::ranges::any_of(s.messages, &Message::non_finite))) return;
   let_go(s);
   play(s, false);
@@ -134,7 +190,7 @@ void watch_state(Session& s) {
 }
 
 void change_settings(Session& s, const Settings& wanted) {
-  const Settings old = s.loaded.sim.settings;
+  const Settings old = s.loaded.sim().settings;
   // Nothing ends a step early, so a slider does not go where one takes minutes.
   constexpr long most = 10000;
   const auto passes = [](const Settings& settings) { return long(settings.iterations) * settings.substeps; };
@@ -142,13 +198,14 @@ void change_settings(Session& s, const Settings& wanted) {
     return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more",
                               most));
   attempt(s, [&] {
-    apply_settings(s.loaded.sim, wanted);
+    apply_settings(s.loaded.sim(), wanted);
     for (const Parameter& row : parameters()) {
       if (!differs(wanted, old, row)) continue;
+      if (row.section == std::string_view("world") || row.name == "dt") share(s, wanted, row);
       s.log("set {} {}", row.name, parameter_text(wanted, row));
       if (row.effect == Effect::restart)
         say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
-      if (row.effect == Effect::rebuild) s.step_ms.values.clear();
+      if (row.effect == Effect::rebuild) s.loaded.lane().step_ms = {};
     }
   });
 }
@@ -156,9 +213,9 @@ void change_settings(Session& s, const Settings& wanted) {
 void choose_soon(Session& s) {
   s.task = Task{"trying ways to solve", [&s] {
                   Scene scene = s.loaded.scene;
-                  scene.settings = s.loaded.sim.settings;
+                  scene.settings = s.loaded.sim().settings;
                   scene.budget_ms = s.budget_ms;
-                  s.loaded.choice = choose_for(scene, s.loaded.sim.model);
+                  s.loaded.choice = choose_for(scene, s.loaded.sim().model);
                   change_settings(s, scene.settings);
                   say_choice(s);
                 }};
@@ -168,13 +225,13 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset();
   s.loaded = std::move(loaded);
   if (!keep_camera) {
-    s.camera = scene_camera(s.loaded.scene, *s.loaded.sim.model, s.aspect);
+    s.camera = scene_camera(s.loaded.scene, *s.loaded.sim().model, s.aspect);
     s.beside = glm::vec3(0);
   }
   s.centre.reset();
-  s.step_ms.values.clear();
+  s.loaded.lane().step_ms = {};
   start_afresh(s);
-  s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim.model->positions.size());
+  s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }
 
@@ -182,16 +239,100 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                bool keep_camera) {
   s.task = Task{"loading " + (overrides.mesh.empty() ? name : overrides.mesh.string()), [=, &s] {
                   Scene scene = load_scene(name, overrides);
-                  if (keep_settings) scene.settings = s.loaded.sim.settings, scene.budget_ms.reset();
+                  if (keep_settings) scene.settings = s.loaded.sim().settings, scene.budget_ms.reset();
                   take_over(s, load(name, overrides, scene), keep_camera);
                   // What was there before is gone.
                   s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);
                 }};
 }
 
+Viewport tile_in(const Session& s, std::size_t lane, int width, int height) {
+  if (s.overlaid) return {0, 0, width, height};
+  return tile_of(lane, s.loaded.lanes.size(), width, height);
+}
+
+Rect lane_place(const Session& s, std::size_t lane, const Rect& view) {
+  const Viewport tile = tile_in(s, lane, int(view.width), int(view.height));
+  return {view.x + float(tile.x), view.y + view.height - float(tile.y + tile.height), float(tile.width),
+          float(tile.height)};
+}
+
+void draw_lanes(Session& s, const Target& target) {
+  const auto& lanes = s.loaded.lanes;
+  const bool several = lanes.size() > 1;
+  const std::size_t right = best_lane(lanes);
+  for (std::size_t i = 0; i < lanes.size(); ++i) {
+    Frame frame = frame_of(lanes[i].sim, s.camera, s.view, target);
+    frame.viewport = tile_in(s, i, target.width, target.height);
+    if (s.grab) frame.grabbed.push_back(s.grab->vertex);
+    frame.options.follow = s.view.follow && i == s.loaded.chosen;
+    if (several) {
+      frame.options.body_colour = lane_colour(i);
+      frame.options.legend = s.view.legend && i + 1 == lanes.size();
+      frame.caption = describe(lanes[i]);
+      if (const auto& far = lanes[i].distance.values; !far.empty() && !lanes[i].stopped())
+        frame.caption +=
+            far.back() < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", far.back());
+    }
+    if (s.overlaid) frame.caption.clear();
+    if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;
+    draw(s.loaded.renderer, frame);
+    if (!several || s.overlaid || !s.ghost || i == right) continue;
+    frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
+    frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
+    frame.pinned.clear(), frame.grabbed.clear();
+    frame.options.colour = Colour::plain, frame.options.body_colour = glm::vec3(0.25f);
+    frame.options.shadow = frame.options.follow = frame.options.legend = false;
+    draw(s.loaded.renderer, frame);
+  }
+}
+
+void add_lane(Session& s, const std::string& words) {
+  attempt(s, [&] {
+    auto& lanes = s.loaded.lanes;
+    if (lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
+    const Sim& own = s.loaded.sim();
+    lanes.push_back({create_sim(own.model, lane_settings(own.settings, words, "--lane " + words))});
+    s.loaded.chosen = lanes.size() - 1;
+    start_lanes(s);
+  });
+}
+
+void remove_lane(Session& s) {
+  if (s.loaded.lanes.size() == 1) return;
+  let_go(s);
+  s.loaded.lanes.erase(s.loaded.lanes.begin() + std::ptrdiff_t(s.loaded.chosen));
+  s.loaded.chosen = std::min(s.loaded.chosen, s.loaded.lanes.size() - 1);
+  start_lanes(s);
+}
+
+void choose_lane(Session& s, std::size_t lane) {
+  if (lane >= s.loaded.lanes.size() || lane == s.loaded.chosen) return;
+  let_go(s);
+  s.loaded.chosen = lane;
+  s.log("lane {} chosen", lane + 1);
+}
+
+void compare_lanes(Session& s, const std::vector<std::string>& words) {
+  attempt(s, [&] {
+    const Sim& first = s.loaded.lanes.front().sim;
+    const Settings base = words.empty() ? first.settings : s.loaded.scene.settings;
+    std::vector<Lane> lanes;
+    for (const std::string& own : words)
+      lanes.push_back({create_sim(first.model, lane_settings(base, own, "--lane " + own))});
+    let_go(s);
+    if (words.empty())
+      s.loaded.lanes.resize(1);
+    else
+      s.loaded.lanes = std::move(lanes);
+    s.loaded.chosen = 0;
+    start_lanes(s);
+  });
+}
+
 // Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
 void frame_body(Session& s) {
-  const Bounds box = bounds(read_state(s.loaded.sim).positions);
+  const Bounds box = bounds(read_state(s.loaded.sim()).positions);
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
   s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
@@ -211,20 +352,25 @@ bool follow_bodies(Session& s, double elapsed) {
 
 void toggle_pin(Session& s, std::uint32_t vertex) {
   if (is_fixed(s, vertex)) return;
-  const bool pinned = is_pinned(s.loaded.sim, vertex);
-  (pinned ? unpin : pin)(s.loaded.sim, vertex);
+  disturb(s);
+  const bool pinned = is_pinned(s.loaded.sim(), vertex);
+  for (Lane& lane : s.loaded.lanes) (pinned ? unpin : pin)(lane.sim, vertex);
   s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
 
 void catch_vertex(Session& s, const Pick& pick) {
   if (is_fixed(s, pick.vertex)) return;
-  s.grab = begin_grab(s.loaded.sim, pick);
+  disturb(s);
+  s.grab = begin_grab(s.loaded.sim(), pick);
+  for (Lane& lane : s.loaded.lanes)
+    if (&lane != &s.loaded.lane()) pin(lane.sim, pick.vertex);
   s.log("grab {}", pick.vertex);
 }
 
 void let_go(Session& s) {
   if (!s.grab) return;
-  if (!s.grab->was_pinned) unpin(s.loaded.sim, s.grab->vertex);
+  for (Lane& lane : s.loaded.lanes)
+    if (!s.grab->was_pinned) unpin(lane.sim, s.grab->vertex);
   s.log("release {} moved {:.4f}", s.grab->vertex, glm::length(s.grab->position - s.grab->start));
   s.grab.reset();
 }
@@ -234,16 +380,17 @@ void advance(Session& s, double elapsed) {
   clock.real += elapsed;
   if (clock.real >= 0.5) {
     clock.factor = clock.simulated / clock.real;
-    if (s.playing) s.log("running {} {:.3f}x", s.loaded.sim.steps, clock.factor);
+    if (s.playing) s.log("running {} {:.3f}x", s.loaded.sim().steps, clock.factor);
     clock.real = clock.simulated = 0;
   }
   if (!s.playing) return;
-  const double dt = s.loaded.sim.settings.dt;
+  const double dt = s.loaded.sim().settings.dt;
   clock.owed += std::min(elapsed, 0.25);
   // A driver that queues work hides what a step costs until the frame is late: then the number of steps a
   // frame is halved, and doubled while there is room. Where a step returns when it is done (CPU modes,
   // software GL) the time spent here says it all.
-  const bool queued = !s.gl.software && !s.loaded.sim.solver.step_on_cpu;
+  const bool queued =
+      !s.gl.software && std::ranges::none_of(s.loaded.lanes, [](const Lane& l) { return on_cpu(l.sim); });
   constexpr double patience = 0.04;  // s of stepping between two frames
   const auto begin = Steady::now();
   int taken = 0;
@@ -261,28 +408,28 @@ void advance(Session& s, double elapsed) {
 }
 
 void measure_frame(Session& s, bool stepped) {
-  Sim& sim = s.loaded.sim;
-  sim.timed = s.measuring;
-  while (const auto ms = sim.timer.poll()) s.step_ms.add(*ms);
-  if (!s.measuring) return;
-  if (!s.loaded.metrics) s.loaded.metrics = create_metrics(*sim.model, sim.system);
-  Metrics& metrics = *s.loaded.metrics;
-  while (const auto measurement = collect(metrics))
-    s.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
-  // Half the ring of results: with more under way, asking again would wait for the oldest.
-  if (stepped && metrics.pending.size() < 8) measure(metrics, sim);
+  for (Lane& lane : s.loaded.lanes) {
+    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms);
+    lane.sim.timed = s.measuring;
+    if (!s.measuring) continue;
+    if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
+    while (const auto measurement = collect(*lane.metrics))
+      lane.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
+    // Half the ring of results: with more under way, asking again would wait for the oldest.
+    if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim);
+  }
 }
 
 void follow_shaders(Session& s) {
   const auto version = shader_folder_version();
-  if (version == s.loaded.sim.shader_version) return;
+  if (version == s.loaded.sim().shader_version) return;
   const bool done = attempt(s, [&] {
-    rebuild_shaders(s.loaded.sim);
+    for (Lane& lane : s.loaded.lanes) rebuild_shaders(lane.sim), lane.metrics.reset();
     reload_shaders(s.loaded.renderer);
-    s.loaded.picker = make_picker(s.loaded.sim.model->rest);
-    s.loaded.metrics.reset();
+    s.loaded.picker = make_picker(s.loaded.sim().model->rest);
   });
-  s.loaded.sim.shader_version = version;  // also after an error: said once an edit
+  for (Lane& lane : s.loaded.lanes)
+    lane.sim.shader_version = version;  // also after an error: said once an edit
   if (!done) return;
   std::erase_if(s.messages, [](const Message& m) { return m.error && m.text.starts_with("shader "); });
   say(s, "shaders compiled again");

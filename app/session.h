@@ -12,6 +12,7 @@
 
 #include "app/auto_solver.h"
 #include "app/grab.h"
+#include "app/lanes.h"
 #include "app/scene.h"
 #include "render/picking.h"
 #include "render/renderer.h"
@@ -25,11 +26,17 @@ struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
   Scene scene;
-  Sim sim;
+  std::vector<Lane> lanes;  ///< one, or several side by side; the first has the scene's settings
   Renderer renderer;
   Picker picker;
-  std::optional<Metrics> metrics;      ///< made when first shown
-  std::optional<SolverChoice> choice;  ///< made last, by --solver auto or in the window
+  std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
+  std::size_t chosen = 0;                ///< the lane that the panel is of
+  std::optional<Motion> right{};         ///< of several lanes, where it is known
+  bool comparable = true;                ///< lanes differ in how they are solved alone
+  bool disturbed = false;                ///< somebody pulled or pinned since the start
+  Lane& lane() { return lanes[chosen]; }
+  Sim& sim() { return lane().sim; }
+  const Sim& sim() const { return lanes[chosen].sim; }
 };
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene);
 
@@ -56,15 +63,6 @@ struct Clock {
   int most_steps = 4;              ///< a frame; follows what the GPU can do
   double real = 0, simulated = 0;  ///< s, since the factor was last worked out
   double factor = 0;               ///< simulated seconds a real one
-};
-
-/// The last values of something that changes from frame to frame.
-struct History {
-  std::vector<float> values;
-  void add(double value) {
-    if (values.size() >= 240) values.erase(values.begin());
-    values.push_back(float(value));
-  }
 };
 
 /// Something that stops the window for a while: done once its name has been on the screen.
@@ -109,8 +107,10 @@ struct Session {
   bool measuring = true;            ///< somebody looks at the measurements
   std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago
   glm::vec3 beside{0};              ///< from there to what a following camera looks at, by moving the view
-  History frames_per_second, step_ms, volume_error;
-  double now = 0;  ///< s since the start
+  History frames_per_second;
+  bool overlaid = false;  ///< lanes are drawn in one place
+  bool ghost = true;      ///< beside the others stands the one they are held against
+  double now = 0;         ///< s since the start
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);
@@ -130,6 +130,19 @@ void load_soon(Session& session, const std::string& name, const SceneOverrides& 
 void choose_soon(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
+/// Where a lane is drawn: pixels, from the lower left.
+Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
+/// The same within a view, in window coordinates.
+Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
+/// All of them, and the ghost of the one that others are held against.
+void draw_lanes(Session& session, const Target& target);
+/// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
+void add_lane(Session& session, const std::string& words = {});
+/// The chosen one; the last stays.
+void remove_lane(Session& session);
+void choose_lane(Session& session, std::size_t lane);
+/// In place of all lanes; the first keeps the scene's settings where there is no word for it.
+void compare_lanes(Session& session, const std::vector<std::string>& words);
 /// Leads the camera after the bodies; whether it is still on its way.
 bool follow_bodies(Session& session, double elapsed);
 void toggle_pin(Session& session, std::uint32_t vertex);

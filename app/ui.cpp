@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/run_loop.h"
 #include "render/legend.h"
 
 namespace tetpbd {
@@ -58,19 +59,93 @@ void draw_plot(const char* title, const char* unit, const History& history, floa
   ImGui::EndGroup();
 }
 
+// Lines, or with `against` the last value over what it costs and the trail there, by lane; powers of ten up,
+// and across where there is a cost.
+void draw_lane_plot(const Session& s, const char* title, const char* unit, History Lane::*of,
+                    const History Lane::*against, float x, float width) {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  ImGui::SetCursorPos(ImVec2(x, style.WindowPadding.y));
+  ImGui::BeginGroup();
+  ImGui::Text("%s, %s", title, unit);
+  const ImVec2 low = ImGui::GetCursorScreenPos(), size(width, ImGui::GetContentRegionAvail().y);
+  ImGui::InvisibleButton(title, size);
+  ImDrawList& lines = *ImGui::GetWindowDrawList();
+  lines.AddRectFilled(low, ImVec2(low.x + size.x, low.y + size.y), ImGui::GetColorU32(ImGuiCol_FrameBg));
+  const auto height = [](float v) { return std::log10(std::max(v, 1e-4f)); };
+  const auto cost = [&](const Lane& lane) {
+    return height(float(median({(lane.*against).values.begin(), (lane.*against).values.end()})));
+  };
+  float least = 1e9f, most = -1e9f, left = 1e9f, right = -1e9f;
+  for (const Lane& lane : s.loaded.lanes) {
+    for (const float v : (lane.*of).values)
+      least = std::min(least, height(v)), most = std::max(most, height(v));
+    if (against && !(lane.*against).values.empty())
+      left = std::min(left, cost(lane)), right = std::max(right, cost(lane));
+  }
+  if (least > most) return ImGui::EndGroup();  // nothing yet
+  least = std::floor(least), most = std::max(std::ceil(most), least + 1);
+  left = std::floor(left), right = std::max(std::ceil(right), left + 1);
+  const auto place = [&](float across, float up) {
+    return ImVec2(low.x + across * size.x, low.y + (1 - (up - least) / (most - least)) * size.y);
+  };
+  for (float decade = least; decade <= most; ++decade)
+    lines.AddLine(place(0, decade), place(1, decade), ImGui::GetColorU32(ImGuiCol_Text, 0.15f));
+  const auto label = [&](const ImVec2& at, float power, const char* what) {
+    lines.AddText(at, ImGui::GetColorU32(ImGuiCol_Text, 0.6f),
+                  fmt::format("{:g} {}", std::pow(10.0, double(power)), what).c_str());
+  };
+  label(ImVec2(low.x + 2, low.y), most, unit);
+  label(ImVec2(low.x + 2, low.y + size.y - ImGui::GetFontSize()), least, unit);
+  if (against) {
+    const std::string end = fmt::format("{:g} ms", std::pow(10.0, double(right)));
+    lines.AddText(ImVec2(low.x + size.x - ImGui::CalcTextSize(end.c_str()).x - 2,
+                         low.y + size.y - ImGui::GetFontSize()),
+                  ImGui::GetColorU32(ImGuiCol_Text, 0.6f), end.c_str());
+  }
+  std::string values;
+  for (std::size_t i = 0; i < s.loaded.lanes.size(); ++i) {
+    const Lane& lane = s.loaded.lanes[i];
+    const auto& all = (lane.*of).values;
+    if (all.empty() || (against && (lane.*against).values.empty())) continue;
+    const glm::vec3 c = lane_colour(i) * 0.8f;
+    const ImU32 colour = ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1));
+    std::vector<ImVec2> points;
+    for (std::size_t k = 0; k < all.size(); ++k)
+      points.push_back(place(against ? (cost(lane) - left) / (right - left)
+                                     : float(k) / float(std::max<std::size_t>(all.size() - 1, 1)),
+                             height(all[k])));
+    lines.AddPolyline(points.data(), int(points.size()), colour, 0, 1.6f * s.ui.scale);
+    lines.AddCircleFilled(points.back(), 3.5f * s.ui.scale, colour);
+    values += fmt::format("{}{}: {:.3g} {}", values.empty() ? "" : "\n", describe(lane), all.back(), unit);
+    if (against) values += fmt::format(" in {:.3g} ms", std::pow(10.0, double(cost(lane))));
+  }
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", values.c_str());
+  ImGui::EndGroup();
+}
+
 void draw_plots(const Session& s, const Rect& place) {
   begin_part("plots", place);
   const float pad = ImGui::GetStyle().WindowPadding.x, width = (place.width - 4 * pad) / 3;
-  draw_plot("frames per second", "fps", s.frames_per_second, pad, width);
-  draw_plot(s.loaded.sim.solver.step_on_cpu ? "CPU time per step" : "GPU time per step", "ms", s.step_ms,
-            2 * pad + width, width);
-  draw_plot("volume error", "%", s.volume_error, 3 * pad + 2 * width, width);
+  const Lane& lane = s.loaded.lanes[s.loaded.chosen];
+  if (s.loaded.lanes.size() > 1) {
+    const char* from = s.loaded.right && !s.loaded.disturbed ? "distance from the right motion"
+                                                             : "distance from the finest lane";
+    draw_lane_plot(s, "time per step", "ms", &Lane::step_ms, nullptr, pad, width);
+    draw_lane_plot(s, from, "%", &Lane::distance, nullptr, 2 * pad + width, width);
+    draw_lane_plot(s, "the same over time per step", "%", &Lane::distance, &Lane::step_ms,
+                   3 * pad + 2 * width, width);
+  } else {
+    draw_plot("frames per second", "fps", s.frames_per_second, pad, width);
+    draw_plot(on_cpu(lane.sim) ? "CPU time per step" : "GPU time per step", "ms", lane.step_ms,
+              2 * pad + width, width);
+    draw_plot("volume error", "%", lane.volume_error, 3 * pad + 2 * width, width);
+  }
   ImGui::End();
 }
 
 // What is cut off first in a narrow window stands last.
 void draw_status(const Session& s, const Rect& place) {
-  const Sim& sim = s.loaded.sim;
+  const Sim& sim = s.loaded.sim();
   begin_part("status", place);
   const bool slow = s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95;
   const std::string speed = s.playing ? fmt::format("{:.2g}x real time", s.clock.factor) : "paused";
@@ -181,6 +256,9 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_TAB, "Tab", "panels", [](Session& s) { flip(s, "panels", s.ui.panels); }},
       {GLFW_KEY_P, "P", "screenshot without panels", [](Session& s) { s.take_screenshot = true; }},
       {GLFW_KEY_H, "H, F1", "this help", [](Session& s) { flip(s, "help", s.ui.help); }, GLFW_KEY_F1},
+      {GLFW_KEY_K, "K", "a lane more", [](Session& s) { add_lane(s); }},
+      {GLFW_KEY_J, "J", "a lane less", [](Session& s) { remove_lane(s); }},
+      {GLFW_KEY_O, "O", "lanes overlaid", [](Session& s) { flip(s, "overlaid", s.overlaid); }},
       {GLFW_KEY_ESCAPE, "Esc", "close help; let go; close messages", escape},
       {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
   };
@@ -202,6 +280,15 @@ Layout make_layout(const Ui& ui, float width, float height) {
 
 void draw_ui(Session& s, const Layout& layout) {
   mark(s, "view", layout.view);
+  for (std::size_t i = 0; i < s.loaded.lanes.size() && s.loaded.lanes.size() > 1 && !s.overlaid; ++i) {
+    const Rect place = lane_place(s, i, layout.view);
+    const glm::vec3 colour = lane_colour(i);
+    const bool chosen = i == s.loaded.chosen;
+    ImGui::GetBackgroundDrawList()->AddRect(
+        ImVec2(place.x + 1, place.y + 1), ImVec2(place.x + place.width - 1, place.y + place.height - 1),
+        ImGui::GetColorU32(ImVec4(colour.x, colour.y, colour.z, chosen ? 1.0f : 0.5f)), 0, 0,
+        (chosen ? 3.0f : 1.0f) * s.ui.scale);
+  }
   if (s.ui.panels) {
     begin_part("panel", layout.panel);
     draw_panel(s);

@@ -49,8 +49,9 @@ constexpr double same_place = 6;       // window coordinates between the clicks 
 
 Ray ray_at_cursor(const Input& in) {
   // Only ratios count, so window coordinates do as well as pixels.
-  return pixel_ray(in.session.camera, float(in.x) - in.view.x, float(in.y) - in.view.y, int(in.view.width),
-                   int(in.view.height));
+  const Rect tile = lane_place(in.session, in.session.loaded.chosen, in.view);
+  return pixel_ray(in.session.camera, float(in.x) - tile.x, float(in.y) - tile.y, int(tile.width),
+                   int(tile.height));
 }
 
 bool on_view(const Input& in) { return in.view.contains(in.x, in.y) && !ImGui::GetIO().WantCaptureMouse; }
@@ -63,7 +64,8 @@ void move(Input& in, double x, double y) {
   if (in.drag == Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees);
   if (in.drag != Drag::pan) return;
   const glm::vec3 before = s.camera.target;
-  pan(s.camera, dx, dy, int(in.view.height));
+  const Rect place = lane_place(s, s.loaded.chosen, in.view);
+  pan(s.camera, dx, dy, int(std::min(place.width, place.height)));
   s.beside += s.camera.target - before;
 }
 
@@ -72,6 +74,8 @@ void press(Input& in, int button, int modifiers) {
   Session& s = in.session;
   const bool left = button == GLFW_MOUSE_BUTTON_LEFT;
   in.button = button;
+  for (std::size_t lane = 0; lane < s.loaded.lanes.size() && !s.overlaid; ++lane)
+    if (lane_place(s, lane, in.view).contains(in.x, in.y)) choose_lane(s, lane);
   if (button == GLFW_MOUSE_BUTTON_MIDDLE || (left && (modifiers & GLFW_MOD_SHIFT))) {
     in.drag = Drag::pan;
   } else if (button == GLFW_MOUSE_BUTTON_RIGHT) {
@@ -83,7 +87,7 @@ void press(Input& in, int button, int modifiers) {
     in.drag = Drag::asking;
     in.last_press = twice ? -1 : s.now;
     in.press_x = in.x, in.press_y = in.y;
-    request(s.loaded.picker, s.loaded.sim.positions.id(), ray_at_cursor(in));
+    request(s.loaded.picker, s.loaded.sim().positions.id(), ray_at_cursor(in));
   }
 }
 
@@ -164,7 +168,7 @@ void handle_input(Input& in, const Rect& view) {
   attempt(s, [&] { take_answer(in); });
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
-  const Sim& sim = s.loaded.sim;
+  const Sim& sim = s.loaded.sim();
   aim(*s.grab, sim, s.camera, ray_at_cursor(in), planes_of(*sim.model, sim.settings));
 }
 
@@ -249,9 +253,7 @@ void draw_view(Session& s, View& view, int width, int height) {
     });
   }
   if (!view.target.framebuffer) return;
-  Frame frame = frame_of(s.loaded.sim, s.camera, s.view, view.target);
-  if (s.grab) frame.grabbed.push_back(s.grab->vertex);
-  if (attempt(s, [&] { draw(s.loaded.renderer, frame); })) {
+  if (attempt(s, [&] { draw_lanes(s, view.target); })) {
     view.drawn = s.view;
   } else {
     s.view = view.drawn;  // a look whose shaders do not compile is left again
@@ -312,7 +314,8 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   const Layout layout = make_layout(s.ui, float(d.width), float(d.height));  // a key can hide the panels
   const auto pixels = [&](float length) { return std::max(int(std::lround(length * d.density)), 1); };
   const int width = pixels(layout.view.width), height = pixels(layout.view.height);
-  s.aspect = float(width) / float(height);
+  const Viewport tile = tile_in(s, 0, width, height);
+  s.aspect = float(tile.width) / float(tile.height);
   draw_view(s, view, width, height);
   take_screenshots(s, view);
   const bool named = s.task.has_value();
@@ -341,6 +344,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   ImGui_ImplOpenGL3_Init("#version 430 core");
   show_start(s, desktop, "loading " + scene.name);
   take_over(s, load(name, overrides, scene), false);
+  if (!options.lanes.empty()) compare_lanes(s, options.lanes);
 
   View view;
   view.drawn = s.view;
@@ -371,11 +375,11 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
       glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
     if (s.vsync != vsync) glfwSwapInterval((vsync = s.vsync) ? 1 : 0);
     s.measuring = s.ui.panels && s.ui.plots;
-    const long steps = s.loaded.sim.steps;
+    const double simulated = s.clock.simulated;
     if (!attempt(s, [&] {
           advance(s, elapsed);
           watch_state(s);
-          measure_frame(s, s.loaded.sim.steps != steps);
+          measure_frame(s, s.clock.simulated != simulated);
         }))
       s.ui.plots = false, play(s, false);  // said once, not every frame
     moving = follow_bodies(s, elapsed);

@@ -12,9 +12,17 @@ void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees) {
   camera.elevation = std::clamp(camera.elevation + elevation_degrees, -89.0f, 89.0f);
 }
 
-void pan(Camera& camera, float dx, float dy, int viewport_height) {
-  const float metres = 2.0f * camera.distance * std::tan(glm::radians(camera.fov) * 0.5f) /
-                       float(std::max(viewport_height, 1));
+namespace {
+
+// Tangent of half the vertical field of view.
+float half_height(const Camera& camera, float aspect) {
+  return std::tan(glm::radians(camera.fov) * 0.5f) / std::min(aspect, 1.0f);
+}
+
+}  // namespace
+
+void pan(Camera& camera, float dx, float dy, int shorter_side) {
+  const float metres = 2.0f * camera.distance * half_height(camera, 1) / float(std::max(shorter_side, 1));
   const glm::mat4 view = view_matrix(camera);
   const glm::vec3 right{view[0][0], view[1][0], view[2][0]}, up{view[0][1], view[1][1], view[2][1]};
   camera.target += metres * (-dx * right + dy * up);
@@ -31,7 +39,7 @@ void follow(Camera& camera, const glm::vec3& goal, float seconds) {
 void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect, float margin) {
   camera.target = 0.5f * (low + high);
   const glm::mat3 rotation(view_matrix(camera));
-  const float tan_y = std::tan(glm::radians(camera.fov) * 0.5f), tan_x = tan_y * aspect;
+  const float tan_y = half_height(camera, aspect), tan_x = tan_y * aspect;
   float distance = 1e-3f;
   for (int corner = 0; corner < 8; ++corner) {
     const glm::vec3 point{corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y,
@@ -55,12 +63,13 @@ glm::mat4 view_matrix(const Camera& camera) {
 }
 
 glm::mat4 projection_matrix(const Camera& camera, float aspect) {
-  return glm::perspective(glm::radians(camera.fov), aspect, camera.distance * 0.01f,
+  return glm::perspective(2.0f * std::atan(half_height(camera, aspect)), aspect, camera.distance * 0.01f,
                           camera.distance * 100.0f);
 }
 
 Ray pixel_ray(const Camera& camera, float x, float y, int width, int height) {
-  const float tan_y = std::tan(glm::radians(camera.fov) * 0.5f), tan_x = tan_y * float(width) / float(height);
+  const float aspect = float(width) / float(height), tan_y = half_height(camera, aspect),
+              tan_x = tan_y * aspect;
   const glm::vec3 seen{(2.0f * x / float(width) - 1.0f) * tan_x, (1.0f - 2.0f * y / float(height)) * tan_y,
                        -1.0f};
   return {eye(camera), glm::normalize(glm::transpose(glm::mat3(view_matrix(camera))) * seen)};

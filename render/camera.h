@@ -10,7 +10,7 @@ struct Camera {
   float distance = 3.0f;
   float azimuth = 30.0f;    ///< about +y; 0 looks from +z, 90 from +x
   float elevation = 18.0f;  ///< above the horizon, -89..89
-  float fov = 35.0f;        ///< vertical
+  float fov = 35.0f;        ///< of the shorter side of the picture
 };
 
 struct Ray {
@@ -19,8 +19,9 @@ struct Ray {
 };
 
 void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees);
-/// Moves the target so that what lies at its depth follows a cursor by (dx, dy) pixels (y down).
-void pan(Camera& camera, float dx, float dy, int viewport_height);
+/// Moves the target so that what lies at its depth follows a cursor by (dx, dy) pixels (y down) of a viewport
+/// whose shorter side has so many.
+void pan(Camera& camera, float dx, float dy, int shorter_side);
 /// Multiplies the distance; less than 1 comes closer.
 void zoom(Camera& camera, float factor);
 /// Moves the target towards `goal`, two thirds of the way in 0.3 s, in steps of any length.

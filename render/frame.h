@@ -68,6 +68,8 @@ struct Frame {
   std::vector<glm::vec4> planes;  ///< walls: dot(xyz, x) = w, xyz of unit length towards the bodies
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
   std::string caption;                         ///< upper left
+  bool over = false;  ///< the bodies alone, into what is drawn already
+  float opacity = 1;  ///< of the bodies
   GLuint target = 0;  ///< framebuffer with an sRGB colour format (Target has it) and depth
 };
 

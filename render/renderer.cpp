@@ -108,7 +108,7 @@ View view_block(const Renderer& renderer, const Frame& frame) {
                           options.look == Look::wire ? 0.85f : 0.0f);
   view.tets = glm::vec4(float(options.shrink), options.look == Look::tets ? float(options.explode) : 0.0f,
                         float(options.cut), float(options.cut_axis));
-  view.rest_low = glm::vec4(renderer.rest_low, 0.0f);
+  view.rest_low = glm::vec4(renderer.rest_low, frame.opacity);
   view.rest_high = glm::vec4(renderer.rest_high, 0.0f);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {
@@ -358,10 +358,11 @@ void draw(Renderer& renderer, const Frame& frame) {
   glEnable(GL_FRAMEBUFFER_SRGB);
   glDepthMask(GL_TRUE);
   glClearColor(0.7f, 0.73f, 0.76f, 1.0f);
-  glClear(options.backdrop ? GL_DEPTH_BUFFER_BIT : GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  if (!frame.over)
+    glClear(options.backdrop ? GL_DEPTH_BUFFER_BIT : GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
   glDisable(GL_DEPTH_TEST);
   glBindVertexArray(renderer.empty_array.id());
-  if (options.backdrop) {
+  if (options.backdrop && !frame.over) {
     use(renderer, "background");
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
@@ -377,12 +378,17 @@ void draw(Renderer& renderer, const Frame& frame) {
   glDepthFunc(GL_LESS);
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
-  if (options.backdrop) {
+  if (options.backdrop && !frame.over) {
     if (frame.ground) draw_plane(renderer, frame, glm::vec4(0.0f, 1.0f, 0.0f, *frame.ground), false);
     for (const glm::vec4& plane : frame.planes) draw_plane(renderer, frame, plane, true);
   }
-  glDisable(GL_BLEND);
+  if (frame.opacity == 1) glDisable(GL_BLEND);
+  if (frame.over) {  // behind what is there already in the same place, or the two would flicker
+    glEnable(GL_POLYGON_OFFSET_FILL);
+    glPolygonOffset(2.0f, 16.0f);
+  }
   draw_bodies(renderer, frame, false);
+  glDisable(GL_POLYGON_OFFSET_FILL);
   glEnable(GL_BLEND);
   draw_dots(renderer, frame);
   if (!options.has_scale() && frame.caption.empty()) return;

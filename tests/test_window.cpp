@@ -1,9 +1,14 @@
 // What the window does without a display: its panel's text, and a camera that follows.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
+#include "app/run_loop.h"
 #include "app/session.h"
 #include "app/ui.h"
 #include "render/target.h"
+#include "sim/error.h"
+#include "sim/material.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;
@@ -42,7 +47,7 @@ TEST_CASE("window: the camera follows bodies that go away, smoothly, and keeps w
   const auto frames = [&](int count) {
     bool moving = false;
     for (int i = 0; i < count; ++i) {
-      draw(s.loaded.renderer, frame_of(s.loaded.sim, s.camera, s.view, target));
+      draw(s.loaded.renderer, frame_of(s.loaded.sim(), s.camera, s.view, target));
       glFinish();
       moving = follow_bodies(s, 0.05);
     }
@@ -50,9 +55,9 @@ TEST_CASE("window: the camera follows bodies that go away, smoothly, and keeps w
   };
   CHECK_FALSE(frames(80));
   CHECK(glm::distance(s.camera.target, start) < 0.01f * s.camera.distance);
-  State state = read_state(s.loaded.sim);
+  State state = read_state(s.loaded.sim());
   for (glm::dvec3& p : state.positions) p += glm::dvec3(way);
-  write_state(s.loaded.sim, state);
+  write_state(s.loaded.sim(), state);
   CHECK(frames(2));
   CHECK(glm::distance(s.camera.target, start) < 0.5f * glm::length(way));  // no jump
   CHECK_FALSE(frames(80));
@@ -61,8 +66,82 @@ TEST_CASE("window: the camera follows bodies that go away, smoothly, and keeps w
   frames(80);
   CHECK(glm::distance(s.camera.target, start + way + s.beside) < 0.01f * s.camera.distance);
   s.view.follow = false;
-  reset(s.loaded.sim);
+  reset(s.loaded.sim());
   frames(10);
   CHECK(glm::distance(s.camera.target, start + way + s.beside) < 0.01f * s.camera.distance);
   CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("window: lanes share the view out, their words are settings, the finest one is the yardstick") {
+  for (std::size_t count = 1; count <= most_lanes; ++count)
+    for (const auto& [width, height] : {std::pair(1000, 700), {301, 999}, {2, 2}}) {
+      std::vector<int> drawn(std::size_t(width * height));
+      for (std::size_t lane = 0; lane < count; ++lane) {
+        const Viewport tile = tile_of(lane, count, width, height);
+        for (int y = tile.y; y < tile.y + tile.height; ++y)
+          for (int x = tile.x; x < tile.x + tile.width; ++x) ++drawn.at(std::size_t(y * width + x));
+      }
+      CHECK(std::ranges::max(drawn) == 1);
+      if (width > 2) CHECK(std::ranges::min(drawn) == (count == 3 && width < height ? 0 : 1));
+    }
+  const Settings own;
+  CHECK(lane_settings(own, "hard,substeps=7", "--lane").substeps == 7);
+  CHECK(lane_settings(own, "rubber,mode=explicit", "--lane").poisson_ratio == 0.48);
+  CHECK(lane_settings(own, "", "--lane") == own);
+  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"),
+                       doctest::Contains("'fast' is no way to solve"), Error);
+  CHECK_THROWS_WITH_AS(lane_settings(own, "mode=newton", "--lane"), doctest::Contains("needs forces"), Error);
+  for (const Comparison& row : comparisons()) {
+    CAPTURE(row.name);
+    CHECK(row.lanes.size() <= most_lanes);
+    Settings soft = own;
+    apply_preset(soft, material_presets(), "rubber");
+    for (const std::string& words : row.lanes) CHECK_NOTHROW(lane_settings(soft, words, row.name));
+  }
+}
+
+TEST_CASE("window: lanes step together from a common start, and are held against the right motion") {
+  GlTest gl;
+  Scene scene = load_scene("beam", {.solver = "hard"});
+  scene.bodies[0].fixed.clear();
+  scene.bodies[0].block->cells = {3, 2, 2};
+  Session s;
+  s.playing = false;
+  take_over(s, load("beam", {}, scene), false);
+  single_step(s);
+  compare_lanes(s, {"paper,substeps=1,iterations=1", "hard", "cpu-fast"});
+  CHECK(s.messages.size() == 1);  // no such word: nothing changed
+  CHECK(s.loaded.lanes.size() == 1);
+  CHECK(s.loaded.sim().steps == 1);
+  compare_lanes(s, {"paper,iterations=1", "hard", "mode=cpu-double,iterations=20"});
+  REQUIRE(s.loaded.lanes.size() == 3);
+  REQUIRE(s.loaded.right);
+  CHECK(yardstick(s.loaded.lanes) == 2);
+  for (int i = 0; i < 60; ++i) single_step(s);
+  for (const Lane& lane : s.loaded.lanes) {
+    CHECK(lane.sim.steps == 60);
+    REQUIRE(!lane.distance.values.empty());
+    // As a run of its own says.
+    const MeasuredRun run = run_model(lane.sim.model, lane.sim.settings, 60, &*s.loaded.right);
+    CHECK(lane.distance.values.back() == doctest::Approx(100 * run.motion->final).epsilon(1e-4));
+  }
+  Settings other = s.loaded.sim().settings;
+  other.gravity = 3;
+  change_settings(s, other);
+  for (const Lane& lane : s.loaded.lanes) CHECK(lane.sim.settings.gravity == 3);
+  CHECK_FALSE(s.loaded.right);
+  toggle_pin(s, 0);
+  for (const Lane& lane : s.loaded.lanes) CHECK(is_pinned(lane.sim, 0));
+  choose_lane(s, 2);
+  remove_lane(s);
+  CHECK(s.loaded.lanes.size() == 2);
+  CHECK(s.loaded.chosen == 1);
+  for (const Lane& lane : s.loaded.lanes) CHECK(lane.sim.steps == 0);
+  for (int i = 0; i < 5; ++i) add_lane(s);
+  CHECK(s.loaded.lanes.size() == most_lanes);
+  add_lane(s, "material=neo-hookean,mode=node");
+  compare_lanes(s, {"hard", "material=neo-hookean"});
+  CHECK_FALSE(s.loaded.comparable);
+  compare_lanes(s, {});
+  CHECK(s.loaded.lanes.size() == 1);
 }

@@ -209,6 +209,31 @@ key Tab; await '^panels true'
 forget; xdotool windowsize "$window" 900 600; await '^size 900 600'; await '^at mesh '; sleep 0.3; shot small.png
 forget; xdotool windowsize "$window" 1000 760; await '^size 1000 760'; await '^at mesh '; pause_for_frame
 
+# -------------------------------------------------------------------------------------------------------- side by side
+forget; choose "side by side" "paper, node, cpu"
+for lane in "node, 25 iterations" "node, 5 substeps" "cpu-fast, 5 substeps"; do await "^lane $lane\$"; done
+key s; await '^step 1$'; key s; await '^step 2$'; key s; await '^step 3$'
+await '^state 3 '
+for lane in "1 node paper" "2 node hard" "3 cpu-fast hard"; do  # in lock-step, each the same bits as alone
+  read -r number mode solver <<<"$lane"
+  hash=$(new_events | sed -n "s/^lane $number $mode 3 //p")
+  [[ -n $hash ]] || fail "lane $number did not step"
+  "$program" run --scene block.json --shaders shaders --solver "$solver" --mode "$mode" --steps 3 --csv-every 0 --out lane >/dev/null
+  grep -q "\"state_hash\": \"$hash\"" lane/stats.json || fail "lane $number has another state than a run without a window"
+done
+forget; shot lanes.png
+key o; await '^overlaid true'; pause_for_frame; shot overlaid.png
+differ lanes.png overlaid.png 20000 "lanes in one place"
+key o; await '^overlaid false'
+key r; await '^reset'
+click play; await '^play'
+drag 1 $cx $cy 20 -100; await '^lane 2 chosen'; await '^grab [0-9]+'; sleep 3; shot lanes_pulled.png; release 1; await '^release [0-9]+'
+key space; await '^pause'
+[[ $(new_events | grep -c '^lane [123] ') -ge 3 ]] || fail "lanes did not step together"
+forget; key j; await '^reset'; key k; await '^reset'
+[[ $(new_events | grep -c '^lane cpu-fast') -eq 2 ]] || fail "a lane more is not as the chosen one"
+choose "side by side" "one way"; await '^reset'
+
 # ------------------------------------------------------------------------------------------------- errors, other scenes
 type_mesh() {
   click mesh

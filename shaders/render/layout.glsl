@@ -37,7 +37,7 @@ struct View {
   vec4 right;                   // of the camera, for the light beside it; w: 1 with shadows
   vec4 colour;                  // COLOUR_..., low and high end of the range; w: edge opacity of the wire view
   vec4 tets;                    // shrink 0..1, explode >= 0, cut 0..1, axis of the cut 0..2
-  vec4 rest_low;                // bounds of the rest shape
+  vec4 rest_low;                // bounds of the rest shape; w: opacity
   vec4 rest_high;
   vec4 palette[PALETTE_SIZE];   // body colours
 };

@@ -1,0 +1,114 @@
+#include "app/lanes.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "sim/error.h"
+#include "sim/material.h"
+
+namespace tetpbd {
+
+namespace {
+
+constexpr long yardstick_every = 4;  // steps
+
+// How far its iterations go, about.
+double effort(const Settings& s) { return leaps(s) ? 1e9 / s.stability : double(s.iterations) * s.substeps; }
+
+}  // namespace
+
+std::string describe(const Lane& lane) {
+  const Settings& s = lane.sim.settings;
+  std::string text = s.mode;
+  const auto add = [&](int count, const char* what) {
+    if (count != 1) text += fmt::format(", {} {}s", count, what);
+  };
+  add(s.substeps, "substep");
+  add(s.iterations, "iteration");
+  if (s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
+  if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
+  return text;
+}
+
+glm::vec3 lane_colour(std::size_t lane) {
+  // Clay, and three of like lightness that also those tell apart who see few hues.
+  constexpr std::array<glm::vec3, most_lanes> colours{
+      {{0.74f, 0.50f, 0.41f}, {0.25f, 0.55f, 0.75f}, {0.45f, 0.62f, 0.30f}, {0.62f, 0.42f, 0.70f}}};
+  return colours[lane % most_lanes];
+}
+
+Viewport tile_of(std::size_t lane, std::size_t count, int width, int height) {
+  const int rows = count > 3 || (count > 1 && height > width) ? 2 : 1, all = int(count);
+  const int columns = (all + rows - 1) / rows, row = int(lane) / columns, column = int(lane) % columns;
+  const int left = width * column / columns, right = width * (column + 1) / columns;
+  const int top = height - height * row / rows, bottom = height - height * (row + 1) / rows;
+  return {left, bottom, right - left, top - bottom};
+}
+
+const std::vector<Comparison>& comparisons() {
+  static const std::vector<Comparison> rows = {
+      {"one way", "no other beside it", {}},
+      {"paper, node, cpu",
+       "the paper's 25 iterations, 5 substeps with masses split, Gauss-Seidel",
+       {"paper", "hard", "hard,mode=cpu-fast"}},
+      {"5, 10, 20 substeps", "of one iteration", {"hard", "hard,substeps=10", "substeps"}},
+      {"soft and hard",
+       "neo-Hookean by forces, and k = 1",
+       {"material=neo-hookean,mode=explicit", "material=none,hard"}},
+      {"forces, implicit, XPBD",
+       "of soft bodies: leapfrog at half of what is stable, one implicit step, 20 substeps, 5",
+       {"mode=explicit", "newton", "mode=node,iterations=1,substeps=20",
+        "mode=node,iterations=1,substeps=5"}},
+  };
+  return rows;
+}
+
+Settings lane_settings(Settings settings, const std::string& words, const std::string& where) {
+  for (const std::string& word : split(words, ',')) {
+    const std::size_t equals = word.find('=');
+    const Parameter* row = find_parameter(word.substr(0, equals));
+    if (equals != std::string::npos && row)
+      set_parameter(settings, *row, word.substr(equals + 1), where);
+    else if (!apply_preset(settings, solver_presets(), word) &&
+             !apply_preset(settings, material_presets(), word))
+      throw Error(
+          fmt::format("'{}' is no way to solve", word), where,
+          fmt::format("write PARAMETER=VALUE or one of {}", fmt::join(names_of(solver_presets()), ", ")));
+  }
+  check_settings(settings, where);
+  return settings;
+}
+
+std::size_t yardstick(const std::vector<Lane>& lanes) {
+  return std::size_t(
+      std::ranges::max_element(lanes, {}, [](const Lane& l) { return effort(l.sim.settings); }) -
+      lanes.begin());
+}
+
+std::size_t best_lane(const std::vector<Lane>& lanes) {
+  const auto far = [](const Lane& lane) { return lane.stopped() ? 1e9f : lane.distance.values.back(); };
+  if (std::ranges::any_of(lanes, [](const Lane& lane) { return lane.distance.values.empty(); }))
+    return yardstick(lanes);
+  return std::size_t(std::ranges::min_element(lanes, {}, far) - lanes.begin());
+}
+
+void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
+  const Sim& first = lanes.front().sim;
+  long now = 0;
+  for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  State answer;
+  if (right) {
+    const auto kept = std::ranges::find(right->kept, now);
+    if (kept == right->kept.end()) return;
+    answer.positions = right->positions[std::size_t(kept - right->kept.begin())];
+  } else {
+    if (now % yardstick_every != 0) return;
+    answer = read_state(lanes[yardstick(lanes)].sim);
+  }
+  for (Lane& lane : lanes)
+    if (!lane.stopped()) lane.distance.add(100 * error_to(*first.model, answer, read_state(lane.sim)));
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,62 @@
+// Simulations side by side: the same bodies, start and clock, each with its own way to solve; and how far
+// each is from the right motion.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/scene.h"
+#include "render/frame.h"
+#include "sim/metrics.h"
+#include "sim/reference/motion.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+inline constexpr std::size_t most_lanes = 4;
+
+/// The last values of something that changes from frame to frame.
+struct History {
+  std::vector<float> values;
+  void add(double value) {
+    if (values.size() >= 240) values.erase(values.begin());
+    values.push_back(float(value));
+  }
+};
+
+struct Lane {
+  Sim sim;
+  std::optional<Metrics> metrics{};  ///< made when first shown
+  History step_ms{}, volume_error{};
+  History distance{};  ///< from what is right, % of the size
+  /// Steps no more, since its state is not finite, while others go on.
+  bool stopped() const { return sim.check.found.has_value(); }
+};
+
+/// "node, 25 iterations": what sets it apart from others.
+std::string describe(const Lane& lane);
+/// Body colour, sRGB.
+glm::vec3 lane_colour(std::size_t lane);
+/// Where it is drawn among `count`: side by side, four in two rows.
+Viewport tile_of(std::size_t lane, std::size_t count, int width, int height);
+
+/// Ways to solve that are worth seeing side by side, as lists of what each lane puts in place of the scene's
+/// settings: names of solvers, or PARAMETER=TEXT, separated by commas.
+struct Comparison {
+  const char *name, *help;
+  std::vector<std::string> lanes;
+};
+const std::vector<Comparison>& comparisons();
+/// Throws Error naming `where` for words that are neither.
+Settings lane_settings(Settings settings, const std::string& words, const std::string& where);
+
+/// The lane that others are held against where the right motion is not known: mode explicit, else the one
+/// with most iterations.
+std::size_t yardstick(const std::vector<Lane>& lanes);
+/// The one that is nearest to what is right now.
+std::size_t best_lane(const std::vector<Lane>& lanes);
+/// After a step of all lanes: adds each one's distance from the right motion, at instants that this has, or
+/// from the yardstick, every fourth step. Waits for the GPU then.
+void hold_lanes(std::vector<Lane>& lanes, const Motion* right);
+
+}  // namespace tetpbd

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "app/run_loop.h"
+#include "app/sweep.h"
 #include "sim/error.h"
 #include "sim/files.h"
 #include "sim/mesh/subprocess.h"
@@ -27,6 +28,19 @@ std::string text(double x, double y, const std::string& what, const char* anchor
   return fmt::format(
       "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#222222\" {}>{}</text>\n",
       x, y, size, anchor, more, escaped);
+}
+
+std::string head(const std::string& title, const std::string& subtitle, const std::string& x_label,
+                 const std::string& y_label) {
+  constexpr double middle = (top + bottom) / 2;
+  return fmt::format(
+             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
+             "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n"
+             "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+             width, height) +
+         text(left, 28, title, "start", 17, "font-weight=\"bold\"") + text(left, 48, subtitle) +
+         text((left + right) / 2, height - 18, x_label, "middle", 13) +
+         text(22, middle, y_label, "middle", 13, fmt::format("transform=\"rotate(-90 22 {})\"", middle));
 }
 
 std::string path(const std::string& points, const std::string& style = "stroke=\"#dddddd\"") {
@@ -97,24 +111,16 @@ std::string mode_colour(const std::string& mode) {
 std::string to_svg(const Chart& chart) {
   const Axis x = fit(chart, 0, left, right), y = fit(chart, 1, bottom, top);
   const double middle = (top + bottom) / 2;
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
-      "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-      width, height);
-  svg += text(left, 28, chart.title, "start", 17, "font-weight=\"bold\"") + text(left, 48, chart.subtitle);
-  svg += text((left + right) / 2, height - 18, chart.x_label, "middle", 13);
-  svg +=
-      text(22, middle, chart.y_label, "middle", 13, fmt::format("transform=\"rotate(-90 22 {})\"", middle));
-  const auto number = [](double v) {
+  std::string svg = head(chart.title, chart.subtitle, chart.x_label, chart.y_label);
+  const auto tick = [](double v) {
     return std::abs(v) >= 10000 ? fmt::format("{:g}k", v / 1000) : fmt::format("{:g}", v);
   };
   for (double v : ticks(x))
     svg += path(fmt::format("M{:.1f} {}V{}", x.at(v), top, bottom)) +
-           text(x.at(v), bottom + 18, number(v), "middle");
+           text(x.at(v), bottom + 18, tick(v), "middle");
   for (double v : ticks(y))
     svg += path(fmt::format("M{} {:.1f}H{}", left, y.at(v), right)) +
-           text(left - 8, y.at(v) + 4, number(v), "end");
+           text(left - 8, y.at(v) + 4, tick(v), "end");
   double legend = top + 10;
   bool empty = true;
   for (std::size_t k = 0; k < chart.series.size(); ++k, legend += 20) {
@@ -142,15 +148,83 @@ std::string to_svg(const Chart& chart) {
   return svg + "</svg>\n";
 }
 
-void write_chart(const std::filesystem::path& name, const Chart& chart) {
+namespace {
+
+// Also as PNG.
+void write_svg(const std::filesystem::path& name, const std::string& picture) {
   // Absolute: a folder whose name begins with a dash is no option of rsvg-convert.
   const std::string whole = std::filesystem::absolute(name).string(), svg = whole + ".svg";
-  write_file(svg, to_svg(chart));
+  write_file(svg, picture);
   const PartFile png(whole + ".png");
   const auto end = run_subprocess({"rsvg-convert", "-z", "1.5", "-o", png.part.string(), svg}, {60});
   if (end.kind == SubprocessEnd::done) return png.finish();
   print_error(fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n",
                           printable(png.file.string())));
+}
+
+// From right to wrong: dark blue, green, yellow, red; grey for what is not known.
+std::string heat(double part) {
+  constexpr std::array<glm::dvec3, 4> stops{
+      {{0.19, 0.31, 0.58}, {0.20, 0.62, 0.49}, {0.95, 0.86, 0.35}, {0.84, 0.27, 0.20}}};
+  if (!std::isfinite(part)) return "#bbbbbb";
+  const double at = std::clamp(part, 0.0, 1.0) * 3;
+  const std::size_t first = std::min<std::size_t>(std::size_t(at), 2);
+  const glm::dvec3 c = 255.0 * glm::mix(stops[first], stops[first + 1], at - double(first));
+  return fmt::format("#{:02x}{:02x}{:02x}", std::lround(c.x), std::lround(c.y), std::lround(c.z));
+}
+
+}  // namespace
+
+void write_chart(const std::filesystem::path& name, const Chart& chart) { write_svg(name, to_svg(chart)); }
+
+void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& document) {
+  const auto& rows = document["rows"];
+  std::vector<std::string> xs, ys;
+  bool motion = false;
+  const auto note = [](auto& all, const std::string& value) {
+    if (std::ranges::find(all, value) == all.end()) all.push_back(value);
+    return std::size_t(std::ranges::find(all, value) - all.begin());
+  };
+  for (const auto& row : rows) {
+    note(xs, row["x"]), note(ys, row["y"]);
+    motion = motion || std::isfinite(number(row, "motion_rms"));
+  }
+  const double most_percent = 100, least_percent = 1e-4, decades = std::log10(most_percent / least_percent);
+  const double wide = (right - left) / double(xs.size()), high = (bottom - top) / double(ys.size());
+  std::string svg = head(fmt::format("{}: {} against {}", document["scene"].get<std::string>(),
+                                     document["y"].get<std::string>(), document["x"].get<std::string>()),
+                         fmt::format("mode {}, {} tets, {:g} s: {}", document["mode"].get<std::string>(),
+                                     document["tets"].get<long>(), document["seconds"].get<double>(),
+                                     motion ? "distance from the right motion over the run, % of the size"
+                                            : "largest net volume loss, %"),
+                         document["x"], document["y"]);
+  for (const auto& row : rows) {
+    const double x = left + double(note(xs, row["x"])) * wide,
+                 y = bottom - double(note(ys, row["y"]) + 1) * high;
+    const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
+    const bool failed = !row["finite"].get<bool>();
+    const double part = std::log10(std::max(percent, least_percent) / least_percent) / decades;
+    const std::string said = failed ? fmt::format("fails at {}", text_of(row["failed_at_step"]))
+                             : std::isfinite(percent)
+                                 ? fmt::format(fmt::runtime(percent < 9.95 ? "{:.2g}" : "{:.0f}"), percent)
+                                 : "";
+    svg += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" stroke=\"white\"/>\n",
+        x, y, wide, high, failed ? "#333333" : heat(part));
+    svg += text(x + wide / 2, y + high / 2 + 4, said, "middle", std::min(11.0, wide / 5),
+                failed || part < 0.45 || part > 0.93 ? "style=\"fill:white\"" : "");
+  }
+  for (std::size_t i = 0; i < xs.size(); ++i)
+    svg += text(left + (double(i) + 0.5) * wide, bottom + 18, xs[i], "middle");
+  for (std::size_t i = 0; i < ys.size(); ++i)
+    svg += text(left - 8, bottom - (double(i) + 0.5) * high + 4, ys[i], "end");
+  for (int decade = 0; decade <= int(decades); ++decade) {
+    const double y = bottom - 20 - 22 * decade;
+    svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"18\" height=\"22\" fill=\"{}\"/>\n", right + 26,
+                       y - 15, heat(decade / decades));
+    svg += text(right + 52, y, fmt::format("{:g} %", least_percent * std::pow(10.0, decade)));
+  }
+  write_svg(name, svg + "</svg>\n");
 }
 
 }  // namespace tetpbd

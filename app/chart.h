@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,10 @@ std::string to_svg(const Chart& chart);
 /// Okabe and Ito's: told apart with any colour vision. A solver mode has the same everywhere.
 std::string palette_colour(std::size_t index);
 std::string mode_colour(const std::string& mode);
+
+/// Cells of two settings as `tetpbd map` found them, coloured by decades of the error of the motion (of the
+/// largest volume loss where no right motion is known); those that failed say at which step.
+void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& document);
 
 /// Writes NAME.svg and, with rsvg-convert, NAME.png; says on standard error when that is missing.
 void write_chart(const std::filesystem::path& name, const Chart& chart);

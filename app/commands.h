@@ -36,7 +36,8 @@ struct RunOptions {
   std::array<int, 2> size{1280, 720};  ///< pixels
   int samples = 4;
   ViewOptions view;
-  std::vector<std::string> lanes;  ///< of the window: what each puts in place of the scene's settings (lanes.h)
+  std::vector<std::string>
+      lanes;              ///< of the window: what each puts in place of the scene's settings (lanes.h)
   bool progress = false;  ///< show it even if standard error is no terminal
 };
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
@@ -93,6 +94,17 @@ struct CompareOptions {
 };
 /// `tetpbd compare`: speed against error over modes x iterations x substeps.
 int run_compare(const CompareOptions& options);
+
+struct MapOptions {
+  std::string scene = "beam", x = "omega=0.5:4:8", y = "iterations=1,2,5,10,25,50";
+  SceneOverrides overrides;
+  int gpu = -1;
+  std::filesystem::path out = "map";
+  Shards shards;
+};
+/// `tetpbd map`: the scene's duration for each pair of values of two settings, held against the right motion,
+/// which is found anew where they change it.
+int run_map(const MapOptions& options);
 
 /// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double. Of the
 /// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the

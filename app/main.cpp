@@ -34,6 +34,7 @@ struct Arguments {
   ReferenceOptions reference;
   BenchOptions bench;
   CompareOptions compare;
+  MapOptions map;
   bool hard_cases = false;
   ReproduceOptions reproduce;
   std::filesystem::path mesh_file, mesh_out;
@@ -288,6 +289,16 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_tetgen(bench, a.bench.overrides.tetgen);
   add_gpu(bench, a.bench.gpu);
   add(bench, "--out", a.bench.out, "folder for bench.csv and bench.json");
+
+  CLI::App& map = command("map", "how right a scene comes out over two settings, and where it fails",
+                          [](const Arguments& a) { return run_map(a.map); });
+  add(map, "--scene", a.map.scene, "a scene");
+  add(map, "--x", a.map.x, "a setting and its values: PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+  add(map, "--y", a.map.y, "another");
+  add_overrides(map, a.map.overrides);
+  add_parameters(map, a.map.overrides);
+  add_gpu(map, a.map.gpu);
+  add(map, "--out", a.map.out, "folder for map.csv, .json, .svg, .png");
 
   CLI::App& compare =
       command("compare", "speed against error over modes x iterations x substeps",

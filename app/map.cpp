@@ -1,0 +1,135 @@
+// `tetpbd map`: over two settings at once, how right a scene comes out, and where it fails.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "app/auto_solver.h"
+#include "app/chart.h"
+#include "app/commands.h"
+#include "sim/error.h"
+#include "sim/material.h"
+
+namespace tetpbd {
+
+namespace {
+
+const char* results =
+    "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step";
+
+struct Axis {
+  const Parameter* row;
+  std::vector<std::string> values;
+  bool logarithmic = false;
+};
+
+double to_number(const std::string& text, const std::string& where) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw Error(fmt::format("'{}' is no number", text), where,
+                "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+  return value;
+}
+
+// "omega=0.5,1,1.5", or "young_modulus=1e4:1e7:7": evenly, or by equal factors where the slider goes so.
+Axis axis_of(const std::string& text, const std::string& flag) {
+  const std::size_t equals = text.find('=');
+  const std::string where = flag + " " + text, name = text.substr(0, equals);
+  const Parameter* row = find_parameter(name);
+  if (equals == std::string::npos || !row || std::holds_alternative<std::string Settings::*>(row->member) ||
+      std::holds_alternative<bool Settings::*>(row->member))
+    throw Error(fmt::format("'{}' is no setting with a number", name), where,
+                "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+  Axis axis{row, split(text.substr(equals + 1), ','), row->logarithmic};
+  const auto range = split(text.substr(equals + 1), ':');
+  if (range.size() == 3) {
+    const double from = to_number(range[0], where), to = to_number(range[1], where),
+                 count = to_number(range[2], where);
+    const bool factors = axis.logarithmic && from > 0 && to > 0;
+    if (!(count >= 2 && count <= 100)) throw Error("bad number of values", where, "give 2 to 100");
+    axis.values.clear();
+    for (int i = 0; i < int(count); ++i) {
+      const double part = i / (std::floor(count) - 1);
+      const double value = factors ? from * std::pow(to / from, part) : from + (to - from) * part;
+      const bool whole = std::holds_alternative<int Settings::*>(row->member);
+      const std::string word = whole ? fmt::format("{}", std::lround(value)) : fmt::format("{:.4g}", value);
+      if (axis.values.empty() || axis.values.back() != word) axis.values.push_back(word);
+    }
+  }
+  Settings probe;
+  for (const std::string& value : axis.values) set_parameter(probe, *row, value, where);
+  if (axis.values.empty())
+    throw Error("no values", where, "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+  return axis;
+}
+
+// What the cell is held against: found here, since it can differ from cell to cell.
+std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps) {
+  if (auto known = right_motion(model, settings); known && known->kept.back() >= steps) return known;
+  if (!compliant(settings)) return rigid_motion(model, settings, steps);
+  if (kind_without_force(settings)) return std::nullopt;
+  const ConstraintSystem system = build_constraints(model.rest, settings);
+  return find_motion({model, system, settings, model.inverse_masses}, steps);
+}
+
+ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
+                     const std::string& x, const std::string& y, std::optional<Motion>& last) {
+  ordered_json row = {{"x", x}, {"y", y}};
+  Scene own = scene;
+  own.settings = settings;
+  const long steps = duration_in_steps(own);
+  const ConstraintSystem none;
+  if (!last || last->scene != scene_key({*model, none, settings, model->inverse_masses}))
+    last = answer_for(*model, settings, steps);
+  const MeasuredRun run = run_model(model, settings, steps, last ? &*last : nullptr);
+  const auto& found = run.errors.non_finite;
+  const double nothing = std::nan("");
+  const bool motion = run.motion && run.errors.finite;
+  row["finite"] = run.errors.finite;
+  row["failed_at_step"] = found ? ordered_json(found->step) : ordered_json();
+  row["motion_rms"] = motion ? run.motion->rms : nothing;
+  row["motion_final"] = motion ? run.motion->final : nothing;
+  row["max_volume_loss_percent"] = run.errors.finite ? run.errors.max_volume_loss_percent : nothing;
+  row["tet_volume_max"] = run.errors.finite && run.errors.last ? run.errors.last->tet_volume_max : nothing;
+  row["ms_per_step"] = median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms);
+  return row;
+}
+
+}  // namespace
+
+int run_map(const MapOptions& options) {
+  const Axis x = axis_of(options.x, "--x"), y = axis_of(options.y, "--y");
+  Sweep sweep{"map",
+              "cell",
+              split(std::string("x,y,") + results, ','),
+              2,
+              "x 12, y 12, finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
+              "max_volume_loss_percent:loss-% 10, tet_volume_max:worst-tet 12, ms_per_step:ms 10",
+              {}};
+  ordered_json document = run_or_merge(sweep, options.shards, options.out, options.gpu, [&] {
+    Scene scene = load_scene(options.scene, options.overrides);
+    const auto model = build_model(scene);
+    choose_by_rule(scene, *model);
+    sweep.facts["scene"] = scene.name, sweep.facts["mode"] = scene.settings.mode;
+    sweep.facts["tets"] = model->rest.tets.size();
+    sweep.facts["x"] = x.row->name, sweep.facts["y"] = y.row->name, sweep.facts["seconds"] = scene.duration;
+    const auto last = std::make_shared<std::optional<Motion>>();
+    for (const std::string& down : y.values)
+      for (const std::string& across : x.values) {
+        Settings settings = scene.settings;
+        set_parameter(settings, *x.row, across, "--x");
+        set_parameter(settings, *y.row, down, "--y");
+        check_settings(settings, fmt::format("{} {}, {} {}", x.row->name, across, y.row->name, down));
+        sweep.work.push_back(
+            [=] { return std::vector{cell_of(scene, model, settings, across, down, *last)}; });
+      }
+  });
+  print_table(sweep, document);
+  write_sweep(sweep, options.out, document);
+  write_map(options.out / "map", document);
+  return 0;
+}
+
+}  // namespace tetpbd

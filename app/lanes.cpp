@@ -12,7 +12,8 @@ namespace tetpbd {
 
 namespace {
 
-constexpr long yardstick_every = 4;  // steps
+// Steps between two comparisons: reading a state back takes some 0.1 ms per thousand vertices.
+long compared_every(const Model& model) { return std::max(4l, long(model.positions.size() / 1000)); }
 
 // How far its iterations go, about.
 double effort(const Settings& s) { return leaps(s) ? 1e9 / s.stability : double(s.iterations) * s.substeps; }
@@ -98,13 +99,13 @@ void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   const Sim& first = lanes.front().sim;
   long now = 0;
   for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  if (now % compared_every(*first.model) != 0) return;
   State answer;
   if (right) {
     const auto kept = std::ranges::find(right->kept, now);
     if (kept == right->kept.end()) return;
     answer.positions = right->positions[std::size_t(kept - right->kept.begin())];
   } else {
-    if (now % yardstick_every != 0) return;
     answer = read_state(lanes[yardstick(lanes)].sim);
   }
   for (Lane& lane : lanes)

@@ -55,8 +55,8 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
 std::size_t yardstick(const std::vector<Lane>& lanes);
 /// The one that is nearest to what is right now.
 std::size_t best_lane(const std::vector<Lane>& lanes);
-/// After a step of all lanes: adds each one's distance from the right motion, at instants that this has, or
-/// from the yardstick, every fourth step. Waits for the GPU then.
+/// After a step of all lanes: adds each one's distance from the right motion, where this has that step, or
+/// from the yardstick; every fourth step, of large bodies more rarely. Waits for the GPU then.
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right);
 
 }  // namespace tetpbd

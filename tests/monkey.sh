@@ -155,7 +155,7 @@ enter_text() {
   key "$r"
 }
 combo() {
-  one_of scene mode look colour MSAA
+  one_of scene mode look colour MSAA "side by side"
   local name=$r choices=() other
   [[ -n ${places[$name]:-} ]] || return
   in_widget "$name"; move; pause; click; send "sleep 0.12"
@@ -179,7 +179,7 @@ action() {
   elif ((a < 44)); then what=combo; combo
   elif ((a < 58)); then
     what=key
-    one_of space s r f 1 2 3 c n g m p h F1 Escape Right space s r KP_1 j w Up Delete BackSpace ctrl+a ctrl+z alt+s shift+r
+    one_of space s r f 1 2 3 c n g m p h F1 Escape Right space s r KP_1 k k j o w Up Delete BackSpace ctrl+a ctrl+z alt+s shift+r
     key "$r"
   elif ((a < 61)); then what="key held"; one_of s Right; send "keydown $r"; send "sleep 0.3"; send "keyup $r"
   elif ((a < 73)); then what="drag anywhere"; anywhere; move; pause; one_of 1 1 1 2 3; drag_somewhere "$r"

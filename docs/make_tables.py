@@ -135,7 +135,7 @@ def performance(*files):
 
 
 def stability(note, *folders):
-    modes = ["cpu-double", "cpu", "node", "constraint", "node-substeps"]
+    modes = ["cpu-double", "cpu", "cpu-fast", "node", "constraint", "node-substeps"]
     rows = {}
     for folder in folders:
         for r in json.load(open(pathlib.Path(folder) / "stability.json"))["rows"]:
@@ -161,7 +161,7 @@ def stability(note, *folders):
         out.append(f"## {mesh}\n")
         lines = []
         for case in (c for c in cases if any((c, mesh, m) in rows for m in modes)):
-            by = [m for m in modes[2:] if recovered(case, mesh, m)]
+            by = [m for m in modes[3:] if recovered(case, mesh, m)]
             none = "**none**" if recovered(case, mesh, "cpu-double") else "none, nor by the reference"
             lines.append([f"`{case}`", *(cell(rows.get((case, mesh, m))) for m in modes), ", ".join(by) or none])
         out.append(table(["case", *modes, "recovered on the GPU by"], lines))

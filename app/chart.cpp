@@ -204,7 +204,8 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
     const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
     const bool failed = !row["finite"].get<bool>();
     const double part = std::log10(std::max(percent, least_percent) / least_percent) / decades;
-    const std::string said = failed ? fmt::format("fails at {}", text_of(row["failed_at_step"]))
+    const std::string said = row.contains("refused") ? "refused"
+                             : failed ? fmt::format("fails at {}", text_of(row["failed_at_step"]))
                              : std::isfinite(percent)
                                  ? fmt::format(fmt::runtime(percent < 9.95 ? "{:.2g}" : "{:.0f}"), percent)
                                  : "";

@@ -100,7 +100,6 @@ struct MapOptions {
   SceneOverrides overrides;
   int gpu = -1;
   std::filesystem::path out = "map";
-  Shards shards;
 };
 /// `tetpbd map`: the scene's duration for each pair of values of two settings, held against the right motion,
 /// which is found anew where they change it.

@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string_view>
 
 #include "sim/error.h"
 #include "sim/material.h"
@@ -42,7 +44,8 @@ glm::vec3 lane_colour(std::size_t lane) {
 
 Viewport tile_of(std::size_t lane, std::size_t count, int width, int height) {
   const int rows = count > 3 || (count > 1 && height > width) ? 2 : 1, all = int(count);
-  const int columns = (all + rows - 1) / rows, row = int(lane) / columns, column = int(lane) % columns;
+  const int most = (all + rows - 1) / rows, row = int(lane) / most, column = int(lane) % most;
+  const int columns = row + 1 < rows ? most : all - most * row;  // the last row's fill it
   const int left = width * column / columns, right = width * (column + 1) / columns;
   const int top = height - height * row / rows, bottom = height - height * (row + 1) / rows;
   return {left, bottom, right - left, top - bottom};
@@ -66,10 +69,17 @@ const std::vector<Comparison>& comparisons() {
   return rows;
 }
 
+bool shared_by_lanes(const Parameter& row) {
+  return row.section == std::string_view("world") || row.name == "dt" || row.effect == Effect::restart;
+}
+
 Settings lane_settings(Settings settings, const std::string& words, const std::string& where) {
   for (const std::string& word : split(words, ',')) {
     const std::size_t equals = word.find('=');
     const Parameter* row = find_parameter(word.substr(0, equals));
+    if (row && shared_by_lanes(*row))
+      throw Error(fmt::format("{} is that of all lanes", row->name), where,
+                  "give it as a flag or in the scene");
     if (equals != std::string::npos && row)
       set_parameter(settings, *row, word.substr(equals + 1), where);
     else if (!apply_preset(settings, solver_presets(), word) &&
@@ -83,33 +93,38 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
 }
 
 std::size_t yardstick(const std::vector<Lane>& lanes) {
-  return std::size_t(
-      std::ranges::max_element(lanes, {}, [](const Lane& l) { return effort(l.sim.settings); }) -
-      lanes.begin());
+  const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane.sim.settings); };
+  return std::size_t(std::ranges::max_element(lanes, {}, worth) - lanes.begin());
 }
 
 std::size_t best_lane(const std::vector<Lane>& lanes) {
-  const auto far = [](const Lane& lane) { return lane.stopped() ? 1e9f : lane.distance.values.back(); };
-  if (std::ranges::any_of(lanes, [](const Lane& lane) { return lane.distance.values.empty(); }))
-    return yardstick(lanes);
+  const auto known = [](const Lane& lane) { return !lane.stopped() && !lane.distance.values.empty(); };
+  if (std::ranges::none_of(lanes, known)) return yardstick(lanes);
+  const auto far = [&](const Lane& lane) { return known(lane) ? lane.distance.values.back() : 1e9f; };
   return std::size_t(std::ranges::min_element(lanes, {}, far) - lanes.begin());
 }
 
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
-  const Sim& first = lanes.front().sim;
+  const Model& model = *lanes.front().sim.model;
   long now = 0;
   for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
-  if (now % compared_every(*first.model) != 0) return;
+  const long every = compared_every(model);
   State answer;
   if (right) {
     const auto kept = std::ranges::find(right->kept, now);
     if (kept == right->kept.end()) return;
-    answer.positions = right->positions[std::size_t(kept - right->kept.begin())];
+    const long number = kept - right->kept.begin(), apart = right->kept.size() > 1 ? right->kept[1] : 1;
+    if (number % std::max(1l, every / apart) != 0) return;
+    answer.positions = right->positions[std::size_t(number)];
   } else {
+    if (now % every != 0) return;
     answer = read_state(lanes[yardstick(lanes)].sim);
   }
-  for (Lane& lane : lanes)
-    if (!lane.stopped()) lane.distance.add(100 * error_to(*first.model, answer, read_state(lane.sim)));
+  for (Lane& lane : lanes) {
+    if (lane.stopped() || lane.sim.steps != now) continue;
+    const double distance = error_to(model, answer, read_state(lane.sim));
+    if (std::isfinite(distance)) lane.distance.add(100 * distance);
+  }
 }
 
 }  // namespace tetpbd

@@ -47,7 +47,9 @@ struct Comparison {
   std::vector<std::string> lanes;
 };
 const std::vector<Comparison>& comparisons();
-/// Throws Error naming `where` for words that are neither.
+/// The world, the clock and the start are those of all lanes.
+bool shared_by_lanes(const Parameter& row);
+/// Throws Error naming `where` for words that are neither, or that all lanes share.
 Settings lane_settings(Settings settings, const std::string& words, const std::string& where);
 
 /// The lane that others are held against where the right motion is not known: mode explicit, else the one

@@ -39,7 +39,7 @@ Axis axis_of(const std::string& text, const std::string& flag) {
   const std::string where = flag + " " + text, name = text.substr(0, equals);
   const Parameter* row = find_parameter(name);
   if (equals == std::string::npos || !row || std::holds_alternative<std::string Settings::*>(row->member) ||
-      std::holds_alternative<bool Settings::*>(row->member))
+      std::holds_alternative<bool Settings::*>(row->member) || row->effect == Effect::restart)
     throw Error(fmt::format("'{}' is no setting with a number", name), where,
                 "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   Axis axis{row, split(text.substr(equals + 1), ','), row->logarithmic};
@@ -83,7 +83,14 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
   const ConstraintSystem none;
   if (!last || last->scene != scene_key({*model, none, settings, model->inverse_masses}))
     last = answer_for(*model, settings, steps);
-  const MeasuredRun run = run_model(model, settings, steps, last ? &*last : nullptr);
+  MeasuredRun run;
+  try {
+    run = run_model(model, settings, steps, last ? &*last : nullptr);
+  } catch (const Error& error) {  // of this setting: its mode does not go so far
+    for (const std::string& key : split(results, ',')) row[key] = nullptr;
+    row["finite"] = false, row["refused"] = error.what();
+    return row;
+  }
   const auto& found = run.errors.non_finite;
   const double nothing = std::nan("");
   const bool motion = run.motion && run.errors.finite;
@@ -108,9 +115,11 @@ int run_map(const MapOptions& options) {
               "x 12, y 12, finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
               "max_volume_loss_percent:loss-% 10, tet_volume_max:worst-tet 12, ms_per_step:ms 10",
               {}};
-  ordered_json document = run_or_merge(sweep, options.shards, options.out, options.gpu, [&] {
+  ordered_json document = run_or_merge(sweep, {}, options.out, options.gpu, [&] {
     Scene scene = load_scene(options.scene, options.overrides);
     const auto model = build_model(scene);
+    const auto varied = [&](const char* name) { return x.row->name == name || y.row->name == name; };
+    if (varied("substeps") || varied("iterations") || varied("omega")) scene.mode_open = false;
     choose_by_rule(scene, *model);
     sweep.facts["scene"] = scene.name, sweep.facts["mode"] = scene.settings.mode;
     sweep.facts["tets"] = model->rest.tets.size();

@@ -305,7 +305,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     return document.contains(json::json_pointer("/solver/" + std::string(key)));
   };
   const auto flag = [&](const char* key) {
-    return std::ranges::any_of(overrides.parameters, [&](const auto& given) { return given.first == key; });
+    return std::ranges::any_of(overrides.parameters, [&](const auto& given) { return given.first == key; }) ||
+           std::ranges::any_of(overrides.set, [&](const std::string& given) {
+             return given.starts_with(fmt::format("solver.{}=", key));
+           });
   };
   scene.mode_open = !flag("mode") && !flag("iterations") && !flag("substeps") && overrides.solver.empty() &&
                     !overrides.budget_ms &&

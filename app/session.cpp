@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <new>
 #include <utility>
 
@@ -31,6 +32,12 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
   return parameter_text(a, row) != parameter_text(b, row);
 }
 
+// The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
+void disturb(Session& s) {
+  if (!std::exchange(s.loaded.disturbed, true))
+    for (Lane& lane : s.loaded.lanes) lane.distance = {};
+}
+
 void one_step(Session& s) {
   if (s.grab) lead(*s.grab, s.loaded.sim());
   auto& lanes = s.loaded.lanes;
@@ -41,8 +48,10 @@ void one_step(Session& s) {
     step(lane.sim);
     if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3);
   }
-  if (lanes.size() > 1 && s.loaded.comparable)
+  if (lanes.size() > 1 && s.loaded.comparable) {
+    if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
     hold_lanes(lanes, s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr);
+  }
   s.clock.simulated += s.loaded.sim().settings.dt;
 }
 
@@ -61,40 +70,30 @@ void say_choice(Session& s) {
   say(s, "solver: " + describe(*s.loaded.choice));
 }
 
-// The clock and the world are those of all lanes.
-void share(Session& s, const Settings& wanted, const Parameter& row) {
-  s.loaded.right.reset();  // it is of another
-  for (Lane& lane : s.loaded.lanes) {
-    Settings other = lane.sim.settings;
-    set_parameter(other, row, parameter_text(wanted, row), row.name);
-    if (other != lane.sim.settings) apply_settings(lane.sim, other);
-  }
+std::uint64_t key_of(const Lane& lane) {
+  const ConstraintSystem none;
+  const Model& model = *lane.sim.model;
+  return scene_key({model, none, lane.sim.settings, model.inverse_masses});
 }
 
-// From a common start; what they are held against, if one answer is right for all.
-void start_lanes(Session& s) {
-  let_go(s);
+// What lanes are held against, if one answer is right for all; found again only where it is another.
+void find_right(Session& s) {
   const auto& lanes = s.loaded.lanes;
-  const Model& model = *lanes[0].sim.model;
-  const auto key = [&](const Lane& lane) {
-    const ConstraintSystem none;
-    return scene_key({model, none, lane.sim.settings, model.inverse_masses});
-  };
-  s.loaded.right.reset();
-  s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& l) { return key(l) == key(lanes[0]); });
-  if (lanes.size() > 1 && s.loaded.comparable) {
-    s.loaded.right = right_motion(model, lanes[0].sim.settings);
-    if (!s.loaded.right)
-      s.loaded.right = rigid_motion(model, lanes[0].sim.settings, duration_in_steps(s.loaded.scene));
-  }
-  restart(s);
-  for (const Lane& lane : lanes) s.log("lane {}", describe(lane));
+  const Sim& first = lanes[0].sim;
+  const std::uint64_t key = key_of(lanes[0]);
+  s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& lane) { return key_of(lane) == key; });
+  auto& right = s.loaded.right;
+  const long steps = std::max(1l, std::lround(s.loaded.scene.duration / first.settings.dt));
+  if (lanes.size() == 1 || !s.loaded.comparable) return right.reset();
+  if (right && right->scene == key && right->kept.back() >= steps) return;
+  right = right_motion(*first.model, first.settings);
+  if (!right) right = rigid_motion(*first.model, first.settings, steps);
 }
 
-// A hand in the motion: the right one is another now.
-void disturb(Session& s) {
-  if (!std::exchange(s.loaded.disturbed, true))
-    for (Lane& lane : s.loaded.lanes) lane.distance = {};
+// From a common start.
+void start_lanes(Session& s) {
+  restart(s);
+  for (const Lane& lane : s.loaded.lanes) s.log("lane {}", describe(lane));
 }
 
 bool is_fixed(Session& s, std::uint32_t vertex) {
@@ -165,6 +164,7 @@ void restart(Session& s) {
     return load_soon(s, s.loaded.name, s.loaded.overrides, true, true);
   attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) reset(lane.sim);
+    find_right(s);
   });
   start_afresh(s);
   s.log("reset");
@@ -198,10 +198,27 @@ void change_settings(Session& s, const Settings& wanted) {
     return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more",
                               most));
   attempt(s, [&] {
-    apply_settings(s.loaded.sim(), wanted);
+    // Of all lanes, before any is changed.
+    std::vector<Settings> of_lanes;
+    for (const Lane& lane : s.loaded.lanes) {
+      Settings& own = of_lanes.emplace_back(&lane == &s.loaded.lane() ? wanted : lane.sim.settings);
+      for (const Parameter& row : parameters())
+        if (shared_by_lanes(row) && differs(wanted, old, row))
+          set_parameter(own, row, parameter_text(wanted, row), row.name);
+      check_settings(own, "settings");
+    }
+    for (std::size_t i = 0; i < of_lanes.size(); ++i) {
+      Lane& lane = s.loaded.lanes[i];
+      if (of_lanes[i] == lane.sim.settings) continue;
+      const std::uint64_t before = key_of(lane);
+      apply_settings(lane.sim, of_lanes[i]);
+      if (key_of(lane) == before) continue;
+      disturb(s);
+      s.loaded.comparable = std::ranges::all_of(
+          s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
+    }
     for (const Parameter& row : parameters()) {
       if (!differs(wanted, old, row)) continue;
-      if (row.section == std::string_view("world") || row.name == "dt") share(s, wanted, row);
       s.log("set {} {}", row.name, parameter_text(wanted, row));
       if (row.effect == Effect::restart)
         say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
@@ -239,8 +256,17 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                bool keep_camera) {
   s.task = Task{"loading " + (overrides.mesh.empty() ? name : overrides.mesh.string()), [=, &s] {
                   Scene scene = load_scene(name, overrides);
-                  if (keep_settings) scene.settings = s.loaded.sim().settings, scene.budget_ms.reset();
+                  std::vector<Settings> others;  // of further lanes, which start anew as well
+                  if (keep_settings) {
+                    for (const Lane& lane : s.loaded.lanes) others.push_back(lane.sim.settings);
+                    scene.settings = others.front();
+                    others.erase(others.begin());
+                    scene.mode_open = false, scene.budget_ms.reset();
+                  }
                   take_over(s, load(name, overrides, scene), keep_camera);
+                  for (const Settings& own : others)
+                    s.loaded.lanes.push_back({create_sim(s.loaded.sim().model, own)});
+                  if (!others.empty()) start_lanes(s);
                   // What was there before is gone.
                   s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);
                 }};
@@ -292,6 +318,7 @@ void add_lane(Session& s, const std::string& words) {
     auto& lanes = s.loaded.lanes;
     if (lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
     const Sim& own = s.loaded.sim();
+    let_go(s);
     lanes.push_back({create_sim(own.model, lane_settings(own.settings, words, "--lane " + words))});
     s.loaded.chosen = lanes.size() - 1;
     start_lanes(s);
@@ -299,10 +326,11 @@ void add_lane(Session& s, const std::string& words) {
 }
 
 void remove_lane(Session& s) {
-  if (s.loaded.lanes.size() == 1) return;
+  auto& lanes = s.loaded.lanes;
+  if (lanes.size() == 1) return;
   let_go(s);
-  s.loaded.lanes.erase(s.loaded.lanes.begin() + std::ptrdiff_t(s.loaded.chosen));
-  s.loaded.chosen = std::min(s.loaded.chosen, s.loaded.lanes.size() - 1);
+  lanes.erase(lanes.begin() + std::ptrdiff_t(s.loaded.chosen));
+  s.loaded.chosen = std::min(s.loaded.chosen, lanes.size() - 1);
   start_lanes(s);
 }
 

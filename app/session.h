@@ -26,14 +26,14 @@ struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
   Scene scene;
-  std::vector<Lane> lanes;  ///< one, or several side by side; the first has the scene's settings
+  std::vector<Lane> lanes;  ///< one, or several side by side
   Renderer renderer;
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
   std::size_t chosen = 0;                ///< the lane that the panel is of
   std::optional<Motion> right{};         ///< of several lanes, where it is known
   bool comparable = true;                ///< lanes differ in how they are solved alone
-  bool disturbed = false;                ///< somebody pulled or pinned since the start
+  bool disturbed = false;                ///< they are no longer held against it, until they start anew
   Lane& lane() { return lanes[chosen]; }
   Sim& sim() { return lane().sim; }
   const Sim& sim() const { return lanes[chosen].sim; }

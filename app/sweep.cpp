@@ -153,8 +153,8 @@ ordered_json run_or_merge(Sweep& sweep, const Shards& shards, const std::filesys
   make_output_folder(out);
   std::optional<HeadlessContext> context;
   if (shards.merge.empty()) {
-    add();
     context.emplace(gpu);
+    add();
     sweep.facts["device"] = device_json(context->capabilities());
   }
   return run_sweep(sweep, shards);

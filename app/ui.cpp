@@ -110,10 +110,10 @@ void draw_lane_plot(const Session& s, const char* title, const char* unit, Histo
     const glm::vec3 c = lane_colour(i) * 0.8f;
     const ImU32 colour = ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1));
     std::vector<ImVec2> points;
+    const float at = against ? (cost(lane) - left) / (right - left) : 0;
     for (std::size_t k = 0; k < all.size(); ++k)
-      points.push_back(place(against ? (cost(lane) - left) / (right - left)
-                                     : float(k) / float(std::max<std::size_t>(all.size() - 1, 1)),
-                             height(all[k])));
+      points.push_back(
+          place(against ? at : float(k) / float(std::max<std::size_t>(all.size() - 1, 1)), height(all[k])));
     lines.AddPolyline(points.data(), int(points.size()), colour, 0, 1.6f * s.ui.scale);
     lines.AddCircleFilled(points.back(), 3.5f * s.ui.scale, colour);
     values += fmt::format("{}{}: {:.3g} {}", values.empty() ? "" : "\n", describe(lane), all.back(), unit);

@@ -117,6 +117,7 @@ bool restore_checkpoint(Sim& sim) {
   sim.positions.write(0, sim.positions.bytes(), positions.data());
   sim.velocities.write(0, sim.velocities.bytes(), velocities.data());
   sim.needs_predict = true;
+  forget_answers(sim);
   start_check(sim, nullptr);
   return true;
 }

@@ -150,12 +150,6 @@ double stiffest(const Sim& sim, const Settings& settings, const std::vector<glm:
                          : 0;
 }
 
-// What is noted of other settings or another state.
-void forget_answers(Sim& sim) {
-  sim.watch.asked = {};
-  if (sim.watch.answer) sim.watch.nothing.copy_to(sim.check.words, 8, 0, 8);
-}
-
 // Of a state that is given, before its first step.
 void start_watch(Sim& sim, const std::vector<glm::dvec3>& positions) {
   forget_answers(sim);
@@ -164,7 +158,8 @@ void start_watch(Sim& sim, const std::vector<glm::dvec3>& positions) {
   w.residual = w.largest_residual = 0, w.health = w.least_health = 1;
   if (!(w.at_rest > 0)) return;
   const double now = stiffest(sim, sim.settings, positions) / w.at_rest;
-  w.stiffening = std::isfinite(now) ? stiffening_for(now, sim.settings.stability) : 1;
+  w.stiffer = std::isfinite(now) ? now : 1;
+  w.stiffening = stiffening_for(w.stiffer, sim.settings.stability);
   sim.settings = fitted(sim.settings, sim.longest_substep, w.stiffening);
 }
 
@@ -300,6 +295,11 @@ double explicit_substeps(const Model& model, const Settings& s) {
   const ReferenceInput input{model, system, s, model.inverse_masses};
   const double longest = stable_step(input, s.compliance, model.rest.positions, 12);
   return std::max(1.0, std::ceil(s.dt / (s.stability * longest)));
+}
+
+void forget_answers(Sim& sim) {
+  sim.watch.asked = {};
+  if (sim.watch.answer) sim.watch.nothing.copy_to(sim.check.words, 8, 0, 8);
 }
 
 void forget_contacts(Sim& sim) {

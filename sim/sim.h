@@ -100,6 +100,8 @@ const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
 /// Phases of the step's first substep.
 unsigned watch(Sim& sim);
 void set_stiffening(Sim& sim, double stiffening);
+/// What kernels noted of other settings or another state.
+void forget_answers(Sim& sim);
 /// As of the last step. Waits.
 const Watch& watched(Sim& sim);
 

@@ -35,7 +35,8 @@ void watch_stiffness(Sim& sim) {
   const double h = sim.settings.dt / sim.settings.substeps;
   const auto answer = look(sim, true);
   const double asked_h = std::exchange(w.asked_h, h);
-  if (!answer || !std::isfinite(answer->front())) return;
+  if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front()))
+    return;  // 0: nothing was noted yet
   const double stiffer = answer->front() / (asked_h * asked_h * w.at_rest);
   const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next answer, if it goes on so
   w.stiffer = stiffer;
@@ -61,11 +62,11 @@ unsigned watch(Sim& sim) {
   Watch& w = sim.watch;
   if (!w.answer) return 0;
   const bool now = sim.steps % Watch::every == 0;
-  if (!(w.at_rest > 0)) {
+  if (is_implicit(sim.settings)) {
     if (now) watch_convergence(sim, false);
     return 0;
   }
-  if (now) watch_stiffness(sim);
+  if (now && w.at_rest > 0) watch_stiffness(sim);
   w.most_substeps = std::max(w.most_substeps, sim.settings.substeps);
   return PHASE_WATCH | (std::exchange(w.changed, false) ? PHASE_CHANGED : 0u);
 }

@@ -160,6 +160,12 @@ TEST_CASE("explicit: a body that becomes stiffer takes more substeps before it b
     if (run == 1) bits = state_hash(sim);
     CHECK(state_hash(sim) == bits);
   }
+  // At rest it stays as it is.
+  settings.stability = 0.6, settings.gravity = 0;
+  Sim still = create_sim(irregular_block(5, false, {0, 0, 0}, {0, 0, 0}), settings);
+  const int first = still.settings.substeps;
+  for (int s = 0; s < 20; ++s) step(still);
+  CHECK(still.watch.most_substeps == first);
   // Also from a start that is deformed already.
   Sim large = create_sim(deformed_block(glm::dvec3(3)), settings), small = create_sim(model, settings);
   CHECK(large.settings.substeps > 2 * small.settings.substeps);

@@ -56,6 +56,22 @@ TEST_CASE("map: a cell for each pair of values, in the order given, held against
     CHECK(outcome.err.find(said) != std::string::npos);
   }
   CHECK_FALSE(std::filesystem::exists(folder.path / "bad/map.csv"));
+  // By the rule, in a mode that does not go as far as the last value.
+  REQUIRE(
+      program("map --scene beam --set bodies.0.block.cells=[4,2,2] --set duration=0.02 --material springs "
+              "--stability 0.01 --mode explicit --x young_modulus=1e4,1e12 --y damping=0,1 --out far",
+              folder)
+          .status == 0);
+  const auto far = nlohmann::json::parse(std::ifstream(folder.path / "far/map.json"))["rows"];
+  CHECK(far[0]["finite"] == true);
+  CHECK(far[1]["finite"] == false);
+  CHECK(std::string(far[1]["refused"]).find("too stiff for mode explicit") != std::string::npos);
+  CHECK(
+      program(
+          "map --scene soft-beam --set bodies.0.block.cells=[4,2,2] --set duration=0.01 --x damping=0,1 --y "
+          "dt=0.005 --out rule",
+          folder)
+          .status == 0);
 }
 
 TEST_CASE("map: its picture has a cell of the error's colour each, and says where one fails") {

@@ -6,9 +6,9 @@ void main() {
   if (phases > 0u) l = lengths(phases);
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (i == 0u && phases > 0u) {
-    float first = phases == 1u ? l.rz : sums[FIRST_AT];
-    if (first > 0.0) atomicMax(largest, floatBitsToUint(sqrt(l.rz / first)));
-    if (phases == 1u) atomicMin(least, floatBitsToUint(l.alpha));
+    float first = phases > 1u && sums[FIRST_AT] > 0.0 ? sums[FIRST_AT] : l.rz;
+    if (sums[DOTS_AT] > 0.0) atomicMax(largest, floatBitsToUint(first > 0.0 ? sqrt(l.rz / first) : 1.0));
+    if (phases == 1u && sums[DOTS_AT] > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
   }
   if (i >= VERTICES) return;
   Position own = positions[i];

@@ -53,10 +53,9 @@ void main() {
     sums[k] = l.rz;
     sums[k + 1u] = l.alpha;
     sums[k + 2u] = l.coarse ? 1.0 : 0.0;
-    if (phases == 1u) {
-      sums[FIRST_AT] = l.rz;
-      atomicMin(least, floatBitsToUint(l.alpha));
-    }
+    if (phases == 0u) sums[FIRST_AT] = 0.0;
+    else if (!(sums[FIRST_AT] > 0.0)) sums[FIRST_AT] = l.rz;  // of the first that was healthy
+    if (phases == 1u && sums[DOTS_AT] > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
   }
   if (group < AGGREGATES) {
     restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, l);

@@ -79,12 +79,13 @@ std::uint64_t key_of(const Lane& lane) {
 // What lanes are held against, if one answer is right for all; found again only where it is another.
 void find_right(Session& s) {
   const auto& lanes = s.loaded.lanes;
+  auto& right = s.loaded.right;
+  if (lanes.size() == 1) return right.reset();
   const Sim& first = lanes[0].sim;
   const std::uint64_t key = key_of(lanes[0]);
   s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& lane) { return key_of(lane) == key; });
-  auto& right = s.loaded.right;
   const long steps = std::max(1l, std::lround(s.loaded.scene.duration / first.settings.dt));
-  if (lanes.size() == 1 || !s.loaded.comparable) return right.reset();
+  if (!s.loaded.comparable) return right.reset();
   if (right && right->scene == key && right->kept.back() >= steps) return;
   right = right_motion(*first.model, first.settings);
   if (!right) right = rigid_motion(*first.model, first.settings, steps);
@@ -210,9 +211,9 @@ void change_settings(Session& s, const Settings& wanted) {
     for (std::size_t i = 0; i < of_lanes.size(); ++i) {
       Lane& lane = s.loaded.lanes[i];
       if (of_lanes[i] == lane.sim.settings) continue;
-      const std::uint64_t before = key_of(lane);
+      const std::uint64_t before = of_lanes.size() > 1 ? key_of(lane) : 0;  // it reads the whole mesh
       apply_settings(lane.sim, of_lanes[i]);
-      if (key_of(lane) == before) continue;
+      if (of_lanes.size() == 1 || key_of(lane) == before) continue;
       disturb(s);
       s.loaded.comparable = std::ranges::all_of(
           s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });

@@ -49,6 +49,7 @@ struct Sim {
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
+  bool kernels_timed = false;  ///< each dispatch by the timer of its pass
   GuardCounts guards{};  ///< since the last reset; ask guard_counts()
   FiniteCheck check;     ///< ask check_finite()
   Watch watch;           ///< ask watched()
@@ -116,7 +117,6 @@ bool is_pinned(const Sim& sim, std::uint32_t vertex);
 /// Puts a pinned vertex somewhere, in metres.
 void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position);
 
-/// What the simulation allocates and dispatches.
 struct Explanation {
   struct Item {
     std::string name;
@@ -127,13 +127,16 @@ struct Explanation {
     std::size_t work_groups;
     long per_step;      ///< 0: only after a change from outside
     std::size_t bytes;  ///< of one dispatch
+    std::optional<double> ms;  ///< of one, the mean of those that were timed
   };
   std::vector<Item> buffers;
   std::vector<Kernel> dispatches;
   std::size_t bytes = 0;
   long dispatches_per_step = 0;
+  double ms_per_step = 0;
   std::size_t bytes_per_step = 0;  ///< read and written by all dispatches; caches may serve part of it
 };
-Explanation explain(const Sim& sim);
+/// What the simulation allocates and dispatches. Waits for what is timed.
+Explanation explain(Sim& sim);
 
 }  // namespace tetpbd

@@ -27,6 +27,7 @@ struct Pass {
   /// step.cpp.
   std::array<GLint, 2> locations{};
   std::array<unsigned, 2> parameters{~0u, ~0u};
+  Timer timer{};  ///< of its dispatches, while they are timed
 };
 
 /// How often each guard of layout.glsl triggered, in its order. A projection counts once where each

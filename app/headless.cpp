@@ -91,7 +91,9 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   if (leaps(sim.settings))
     j["watch"] = {{"longest_substep_at_rest", sim.longest_substep}, {"most_substeps", watch.most_substeps}};
   if (is_implicit(sim.settings))
-    j["watch"] = {{"largest_residual", watch.largest_residual}, {"least_health", watch.least_health}};
+    j["watch"] = {{"largest_residual", watch.largest_residual},
+                  {"least_health", watch.least_health},
+                  {"most_substeps", watch.most_substeps}};
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);

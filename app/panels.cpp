@@ -217,7 +217,10 @@ void draw_solver(Session& s) {
                            ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
                            : "");
   if (is_implicit(now))
-    ImGui::TextWrapped("residual %.1e of the start's, health %.2f", watch.residual, watch.health);
+    ImGui::TextWrapped(
+        "residual %.1e of the start's, health %.2f%s", watch.residual, watch.health,
+        watch.finer > 1 ? fmt::format("; {} times the substeps until no tet is inverted", watch.finer).c_str()
+                        : "");
   if (!automatic) return;
   slider(s, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
          "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);

@@ -97,10 +97,12 @@ void check_step(Sim& sim);
 /// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
 /// ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
-/// Before a step: asks what kernels noted; in mode explicit takes as many substeps as the last answer needs.
+/// Before a step: asks what kernels noted; in modes explicit and newton takes as many substeps as the last
+/// answer needs.
 /// Phases of the step's first substep.
 unsigned watch(Sim& sim);
 void set_stiffening(Sim& sim, double stiffening);
+void set_finer(Sim& sim, int times);
 /// What kernels noted of other settings or another state.
 void forget_answers(Sim& sim);
 /// As of the last step. Waits.

@@ -76,7 +76,7 @@ void step_on_gpu(Sim& sim) {
   }
   dispatcher.bind_quantized();
   sim.needs_predict = false;
-  for (int substep = 0; substep < sim.settings.substeps; ++substep) {
+  for (int substep = 0; substep < sim.settings.substeps * sim.watch.finer; ++substep) {
     if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
     for (const Dispatch& dispatch : sim.substep)
       if (dispatch.pass + 1 == sim.solver.iteration.size())

@@ -369,6 +369,31 @@ TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no t
   CHECK(sim.watch.most_substeps == 1);
 }
 
+TEST_CASE("newton: a body that is pulled comes to where it rests in mode explicit, and lets go") {
+  GlTest gl;
+  const auto model = deformed("none");
+  const std::uint32_t held = 0, pulled = std::uint32_t(model->positions.size()) - 1;
+  std::vector<std::vector<glm::dvec3>> ends;
+  for (const char* mode : {"newton", "explicit"}) {
+    Settings settings = soft("neo-hookean");
+    settings.mode = mode, settings.iterations = 8, settings.gravity = 0, settings.damping = 8;
+    Sim sim = create_sim(model, settings);
+    pin(sim, held), pin(sim, pulled);
+    const glm::dvec3 from = model->positions[pulled], way(0.1, 0.2, 0.05);
+    for (int s = 1; s <= 40; ++s) move_pinned(sim, pulled, from + way * (s / 40.0)), step(sim);
+    for (int s = 0; s < 400; ++s) step(sim);
+    CHECK_FALSE(check_finite(sim, true));
+    ends.push_back(read_state(sim).positions);
+    CHECK(glm::distance(ends.back()[pulled], from + way) < 1e-6);
+    unpin(sim, pulled);
+    for (int s = 0; s < 40; ++s) step(sim);
+    CHECK(glm::distance(read_state(sim).positions[pulled], from + way) > 0.01);
+    CHECK(sim.watch.finer == 1);
+  }
+  CHECK(distance(ends[0], ends[1]) < 2e-4);
+  CHECK(distance(ends[0], model->positions) > 0.02);
+}
+
 TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraints fall as all else") {
   GlTest gl;
   TetMesh one;

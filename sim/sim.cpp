@@ -268,21 +268,16 @@ void write_velocities(const Sim& sim, const State& state) {
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
-// What fits; `before`: half_substep_fall() of the velocities.
-void put_settings(Sim& sim, const Settings& settings, double before) {
-  sim.settings = settings;
-  const double upwards = half_substep_fall(settings) - before;
-  schedule(sim);
-  write_step_block(sim);
+}  // namespace
+
+void retime_velocities(Sim& sim, const Settings& then) {
+  const double upwards = half_substep_fall(sim.settings) - half_substep_fall(then);
   if (upwards == 0) return;
-  // Velocities are half a substep old: with another substep or gravity they are those of another time.
   State state = read_state(sim);
   add_upwards(sim, state, upwards);
   write_velocities(sim, state);
   if (on_cpu(sim)) sim.host = std::move(state);
 }
-
-}  // namespace
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
   check_settings(settings, "settings");
@@ -350,7 +345,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
                       coarse.constraint_damping, coarse.dt / coarse.substeps);
   };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
-  const double before = half_substep_fall(sim.settings);
+  const Settings before = sim.settings;
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
   const bool same = forces(settings) == forces(sim.settings);
   const double longest = same ? sim.longest_substep : longest_substep(sim, settings);
@@ -358,7 +353,10 @@ void apply_settings(Sim& sim, const Settings& settings) {
   if (!same) sim.watch.at_rest = stiffest(sim, settings, sim.model->rest.positions);
   sim.longest_substep = longest;
   forget_answers(sim);
-  put_settings(sim, now, before);
+  sim.settings = now;
+  schedule(sim);
+  write_step_block(sim);
+  retime_velocities(sim, before);
 }
 
 void set_stiffening(Sim& sim, double stiffening) {

@@ -77,6 +77,8 @@ inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
 
 /// What is known of hard bodies in contact, before something else moves them.
 void forget_contacts(Sim& sim);
+/// Velocities of mid-substep with the settings `then` become those with the settings of now.
+void retime_velocities(Sim& sim, const Settings& then);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 /// A state that is not finite is taken, and found by check_finite() at once.

@@ -9,12 +9,7 @@
 
 namespace tetpbd {
 
-/// Part of a Sim (sim.h), whose steps keep it up to date.
-struct Watch {
-  static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
-  Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
-  Fence asked;
-
+struct WatchNumbers {
   // Mode explicit.
   double at_rest = 0;     ///< 1/s^2, the stiffest constraint there; 0: not in mode explicit
   double stiffening = 1;  ///< by how much shorter than at rest a substep is, because the body is stiffer
@@ -30,6 +25,13 @@ struct Watch {
   double residual = 0, largest_residual = 0, health = 1, least_health = 1;
   int finer = 1;    ///< substeps for each one of the settings
   int mending = 0;  ///< answers since they are more; too many: it does not help
+};
+
+/// Part of a Sim (sim.h), whose steps keep it up to date.
+struct Watch : WatchNumbers {
+  static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
+  Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
+  Fence asked;
 };
 
 /// By how much shorter a substep is, of `stability` times the longest stable at rest, where the stiffest

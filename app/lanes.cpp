@@ -92,6 +92,12 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
   return settings;
 }
 
+long steps_of(const std::vector<Lane>& lanes) {
+  long steps = 0;
+  for (const Lane& lane : lanes) steps = std::max(steps, lane.sim.steps);
+  return steps;
+}
+
 std::size_t yardstick(const std::vector<Lane>& lanes) {
   const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane.sim.settings); };
   return std::size_t(std::ranges::max_element(lanes, {}, worth) - lanes.begin());
@@ -106,8 +112,7 @@ std::size_t best_lane(const std::vector<Lane>& lanes) {
 
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   const Model& model = *lanes.front().sim.model;
-  long now = 0;
-  for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  const long now = steps_of(lanes);
   const long every = compared_every(model);
   State answer;
   if (right) {

@@ -52,6 +52,8 @@ bool shared_by_lanes(const Parameter& row);
 /// Throws Error naming `where` for words that are neither, or that all lanes share.
 Settings lane_settings(Settings settings, const std::string& words, const std::string& where);
 
+/// That lanes have taken, but for stopped ones.
+long steps_of(const std::vector<Lane>& lanes);
 /// The lane that others are held against where the right motion is not known: mode explicit, else the one
 /// with most iterations.
 std::size_t yardstick(const std::vector<Lane>& lanes);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "app/reference_command.h"
@@ -38,8 +39,15 @@ void disturb(Session& s) {
     for (Lane& lane : s.loaded.lanes) lane.distance = {};
 }
 
-void one_step(Session& s) {
-  if (s.grab) lead(*s.grab, s.loaded.sim());
+}  // namespace
+
+void step_lanes(Session& s) {
+  if (s.grab) {
+    lead(*s.grab, s.loaded.sim());
+    const glm::dvec3& to = s.grab->position;
+    note(s, {{"move", {s.grab->vertex, to.x, to.y, to.z}}});
+  }
+  note_moment(s);
   auto& lanes = s.loaded.lanes;
   for (Lane& lane : lanes) {
     if (lanes.size() > 1 && check_finite(lane.sim)) continue;
@@ -53,9 +61,10 @@ void one_step(Session& s) {
     hold_lanes(lanes, s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr);
   }
   s.clock.simulated += s.loaded.sim().settings.dt;
+  keep_moment(s);
+  note_step(s);
 }
 
-// For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& s) {
   if (!s.log.file.is_open()) return;
   for (std::size_t i = 0; s.loaded.lanes.size() > 1 && i < s.loaded.lanes.size(); ++i) {
@@ -64,6 +73,8 @@ void log_state(Session& s) {
   }
   s.log("state {} {:016x}", s.loaded.sim().steps, state_hash(s.loaded.sim()));
 }
+
+namespace {
 
 void say_choice(Session& s) {
   s.budget_ms = s.loaded.choice->budget_ms;
@@ -89,12 +100,6 @@ void find_right(Session& s) {
   if (right && right->scene == key && right->kept.back() >= steps) return;
   right = right_motion(*first.model, first.settings);
   if (!right) right = rigid_motion(*first.model, first.settings, steps);
-}
-
-// From a common start.
-void start_lanes(Session& s) {
-  restart(s);
-  for (const Lane& lane : s.loaded.lanes) s.log("lane {}", describe(lane));
 }
 
 bool is_fixed(Session& s, std::uint32_t vertex) {
@@ -149,11 +154,19 @@ void play(Session& s, bool playing) {
 void single_step(Session& s) {
   play(s, false);
   attempt(s, [&] {
-    one_step(s);
+    step_lanes(s);
     measure_frame(s, true);
   });
   s.log("step {}", s.loaded.sim().steps);
   log_state(s);
+}
+
+void change_speed(Session& s, int halvings) {
+  if (s.clock.halvings == std::clamp(halvings, 0, most_halvings)) return;
+  s.clock.halvings = std::clamp(halvings, 0, most_halvings);
+  s.clock.owed = 0;
+  note(s, {{"speed", s.clock.speed()}});
+  s.log("speed {}", s.clock.speed());
 }
 
 void restart(Session& s) {
@@ -163,11 +176,13 @@ void restart(Session& s) {
   };
   if (std::ranges::any_of(parameters(), made_with_another))
     return load_soon(s, s.loaded.name, s.loaded.overrides, true, true);
+  note(s, {{"reset", true}});
   attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) reset(lane.sim);
     find_right(s);
   });
   start_afresh(s);
+  begin_timeline(s);
   s.log("reset");
 }
 
@@ -175,8 +190,10 @@ void go_back(Session& s) {
   let_go(s);
   attempt(s, [&] {
     if (!check_finite(s.loaded.sim(), true)) return;
+    note(s, {{"back", true}});
     if (!restore_checkpoint(s.loaded.sim())) return say(s, "no good state is kept: reset (R)");
     start_afresh(s);
+    note_step(s);
     s.log("back {}", s.loaded.sim().steps);
   });
 }
@@ -187,6 +204,7 @@ void watch_state(Session& s) {
   if (!found || (!s.playing && std::ranges::any_of(s.messages, &Message::non_finite))) return;
   let_go(s);
   play(s, false);
+  forget_from(s, found->step);
   say(s, error_of(*found).what(), true, true);
 }
 
@@ -212,7 +230,9 @@ void change_settings(Session& s, const Settings& wanted) {
       Lane& lane = s.loaded.lanes[i];
       if (of_lanes[i] == lane.sim.settings) continue;
       const std::uint64_t before = of_lanes.size() > 1 ? key_of(lane) : 0;  // it reads the whole mesh
+      const Settings own = lane.sim.settings;
       apply_settings(lane.sim, of_lanes[i]);
+      note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
       if (of_lanes.size() == 1 || key_of(lane) == before) continue;
       disturb(s);
       s.loaded.comparable = std::ranges::all_of(
@@ -242,6 +262,7 @@ void choose_soon(Session& s) {
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset();
   s.loaded = std::move(loaded);
+  note_scene(s);
   if (!keep_camera) {
     s.camera = scene_camera(s.loaded.scene, *s.loaded.sim().model, s.aspect);
     s.beside = glm::vec3(0);
@@ -249,6 +270,7 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.centre.reset();
   s.loaded.lane().step_ms = {};
   start_afresh(s);
+  begin_timeline(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }
@@ -314,6 +336,14 @@ void draw_lanes(Session& s, const Target& target) {
   }
 }
 
+void start_lanes(Session& s) {
+  ordered_json lanes;
+  for (const Lane& lane : s.loaded.lanes) lanes.push_back(settings_text(lane.sim.settings));
+  note(s, {{"lanes", lanes}});
+  restart(s);
+  for (const Lane& lane : s.loaded.lanes) s.log("lane {}", describe(lane));
+}
+
 void add_lane(Session& s, const std::string& words) {
   attempt(s, [&] {
     auto& lanes = s.loaded.lanes;
@@ -364,6 +394,7 @@ void frame_body(Session& s) {
   const Bounds box = bounds(read_state(s.loaded.sim()).positions);
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
+  note_camera(s);
   s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
 }
 
@@ -382,7 +413,10 @@ bool follow_bodies(Session& s, double elapsed) {
 void toggle_pin(Session& s, std::uint32_t vertex) {
   if (is_fixed(s, vertex)) return;
   disturb(s);
+  s.timeline.looping = false;
+  s.timeline.touched.insert(vertex);
   const bool pinned = is_pinned(s.loaded.sim(), vertex);
+  note(s, {{pinned ? "unpin" : "pin", vertex}});
   for (Lane& lane : s.loaded.lanes) (pinned ? unpin : pin)(lane.sim, vertex);
   s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
@@ -390,7 +424,11 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
 void catch_vertex(Session& s, const Pick& pick) {
   if (is_fixed(s, pick.vertex)) return;
   disturb(s);
+  s.timeline.looping = false;
+  s.timeline.touched.insert(pick.vertex);
+  note(s, {{"grab", pick.vertex}});
   s.grab = begin_grab(s.loaded.sim(), pick);
+  if (!s.grab->was_pinned) s.timeline.held = pick.vertex;
   for (Lane& lane : s.loaded.lanes)
     if (&lane != &s.loaded.lane()) pin(lane.sim, pick.vertex);
   s.log("grab {}", pick.vertex);
@@ -398,6 +436,8 @@ void catch_vertex(Session& s, const Pick& pick) {
 
 void let_go(Session& s) {
   if (!s.grab) return;
+  note(s, {{"release", s.grab->vertex}});
+  s.timeline.held.reset();
   for (Lane& lane : s.loaded.lanes)
     if (!s.grab->was_pinned) unpin(lane.sim, s.grab->vertex);
   s.log("release {} moved {:.4f}", s.grab->vertex, glm::length(s.grab->position - s.grab->start));
@@ -414,7 +454,8 @@ void advance(Session& s, double elapsed) {
   }
   if (!s.playing) return;
   const double dt = s.loaded.sim().settings.dt;
-  clock.owed += std::min(elapsed, 0.25);
+  clock.owed += std::min(elapsed, 0.25) * clock.speed();
+  if (s.timeline.looping) return loop_on(s);
   // A driver that queues work hides what a step costs until the frame is late: then the number of steps a
   // frame is halved, and doubled while there is room. Where a step returns when it is done (CPU modes,
   // software GL) the time spent here says it all.
@@ -424,7 +465,7 @@ void advance(Session& s, double elapsed) {
   const auto begin = Steady::now();
   int taken = 0;
   while ((clock.fast || clock.owed >= dt) && (!queued || taken < clock.most_steps)) {
-    one_step(s);
+    step_lanes(s);
     clock.owed -= dt;
     ++taken;
     if (seconds_since(begin) > patience) break;
@@ -454,6 +495,7 @@ void follow_shaders(Session& s) {
   if (version == s.loaded.sim().shader_version) return;
   const bool done = attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) rebuild_shaders(lane.sim), lane.metrics.reset();
+    note(s, {{"shaders", "edited"}});
     reload_shaders(s.loaded.renderer);
     s.loaded.picker = make_picker(s.loaded.sim().model->rest);
   });

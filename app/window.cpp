@@ -96,8 +96,8 @@ void release(Input& in, int button) {
   Session& s = in.session;
   const Camera& c = s.camera;
   if (in.drag == Drag::orbit || in.drag == Drag::pan)
-    s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation, c.distance,
-          c.target.x, c.target.y, c.target.z);
+    note_camera(s), s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation,
+                          c.distance, c.target.x, c.target.y, c.target.z);
   // A press that the picker has not answered yet is a click: it may still pin a vertex, but catches none.
   if (in.drag == Drag::grab) let_go(s);
   in.drag = Drag::none;
@@ -107,6 +107,7 @@ void release(Input& in, int button) {
 void wheel(Input& in, double turned) {
   if (!on_view(in)) return;
   zoom(in.session.camera, std::pow(0.9f, float(turned)));
+  note_camera(in.session);
   in.session.log("zoom {:.4f}", in.session.camera.distance);
 }
 
@@ -139,8 +140,9 @@ void listen(GLFWwindow* window, Input& input) {
   static const auto of = [](GLFWwindow* w) { return static_cast<Input*>(glfwGetWindowUserPointer(w)); };
   glfwSetWindowUserPointer(window, &input);
   glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
-    // Held down, only the key that steps goes on.
-    const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT);
+    // Held down, only the keys that step go on.
+    const bool again =
+        action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT || code == GLFW_KEY_LEFT);
     if (action == GLFW_PRESS || again)
       of(w)->events.push_back([in = of(w), code, modifiers] { key(*in, code, modifiers); });
   });
@@ -337,6 +339,8 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.view = options.view;
   s.view.follow = true;
   s.ui.mesh = overrides.mesh.string();
+  s.timeline.budget = std::size_t(options.history_mb) << 20;
+  if (!options.record.empty()) s.record = std::make_unique<Record>(options.record);
   Input input{s};
   listen(desktop.window, input);
   ImGui::CreateContext();
@@ -389,6 +393,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     }
     draw_frame(s, view, input, desktop);
   }
+  end_record(s);
   s.log("closed");
   return 0;
 }

@@ -24,9 +24,8 @@ std::size_t snapshot_bytes(const Sim& sim);
 std::size_t snapshot_memory(const Sim& sim);
 /// Queued; `to` has room from `at` on.
 Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at);
-/// Of the same model, in any mode; with other settings than then, the state alone, which goes on with those
-/// of now. Pins are those of then in the GPU's masses: whoever changed them since does it again. Does not
-/// wait but where another mode wants the state as another type.
+/// Of the same model, in any mode, with the same vertices pinned; with other settings than then, the state
+/// alone, which goes on with those of now. Does not wait but where the mode wants it as another type.
 void restore_snapshot(Sim& sim, const Snapshot& snapshot, const Buffer& from);
 
 }  // namespace tetpbd

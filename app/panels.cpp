@@ -392,9 +392,9 @@ void draw_timeline(Session& s) {
   const long first = t.moments.empty() ? 0 : t.moments.front()->step;
   long now = steps_of(s.loaded.lanes),
        last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
-  const std::string text = t.moments.empty() ? "nothing is kept"
-                                             : fmt::format("{:.3f} s of {:.3f} .. {:.3f} s", double(now) * dt,
-                                                           double(first) * dt, double(last) * dt);
+  std::string text = t.moments.empty() ? "nothing is kept" : fmt::format("{:.3f} s", double(now) * dt);
+  if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
+    text += fmt::format(" of {:.3f} .. {:.3f} s", double(first) * dt, double(last) * dt);
   if (ImGui::SliderScalar("##time", ImGuiDataType_S64, &now, &first, &last, text.c_str(),
                           ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
     show_step(s, now);

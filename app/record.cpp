@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"
@@ -82,28 +81,6 @@ void set_all(Settings& settings, const ordered_json& values, const std::string& 
   }
 }
 
-struct Line {
-  std::string where;  // file:number
-  ordered_json action;
-};
-
-std::vector<Line> read_record(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw Error("cannot be read", file.string(), "give a file that tetpbd view --record wrote");
-  std::vector<Line> lines;
-  std::string text;
-  for (long number = 1; std::getline(in, text); ++number) {
-    if (text.empty()) continue;
-    Line& line = lines.emplace_back(fmt::format("{}:{}", file.string(), number));
-    line.action = ordered_json::parse(text, nullptr, false);
-    if (!line.action.is_object() || !line.action.value("step", ordered_json()).is_number_integer())
-      throw Error("no line of a record", line.where, "write one JSON object with \"step\" a line");
-  }
-  if (lines.empty() || !lines[0].action.contains("load"))
-    throw Error("a record begins with a scene", file.string(), "its first line has \"load\"");
-  return lines;
-}
-
 void load_scene_of(Session& s, const ordered_json& scene, const std::string& where) {
   SceneOverrides overrides{.mesh = scene.value("mesh", ""),
                            .tetgen = scene.value("tetgen", ""),
@@ -127,14 +104,14 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
   if (a.contains("load")) {
     load_scene_of(s, a["load"], where);
   } else if (a.contains("lanes")) {
+    if (a["lanes"].empty() || a["lanes"].size() > most_lanes)
+      throw Error(fmt::format("{} lanes", a["lanes"].size()), where, fmt::format("give 1 to {}", most_lanes));
     std::vector<Lane> made;
     for (const ordered_json& values : a["lanes"]) {
       Settings settings = s.loaded.scene.settings;
       set_all(settings, values, where);
       made.push_back({create_sim(s.loaded.sim().model, settings)});
     }
-    if (made.empty() || made.size() > most_lanes)
-      throw Error(fmt::format("{} lanes", made.size()), where, fmt::format("give 1 to {}", most_lanes));
     lanes = std::move(made);
     s.loaded.chosen = 0;
     start_lanes(s);
@@ -172,7 +149,7 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
   } else if (a.contains("back")) {
     go_back(s);
   } else if (a.contains("speed")) {
-    change_speed(s, int(std::lround(-std::log2(a["speed"].get<double>()))));
+    change_speed(s, int(std::lround(-std::log2(std::clamp(a["speed"].get<double>(), 1e-3, 1.0)))));
   } else if (a.contains("camera")) {
     const ordered_json& c = a["camera"];
     s.camera.target = {c.at(0), c.at(1), c.at(2)};
@@ -191,8 +168,27 @@ void end_record(Session& s) {
   s.record.reset();
 }
 
+std::vector<RecordLine> read_record(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw Error("cannot be read", file.string(), "give a file that tetpbd view --record wrote");
+  std::vector<RecordLine> lines;
+  std::string text;
+  for (long number = 1; std::getline(in, text); ++number) {
+    if (text.empty()) continue;
+    bool deep = false;  // printing and copying JSON is recursive
+    const auto watch_depth = [&](int depth, auto, auto&) { return !(deep = deep || depth > 8); };
+    RecordLine& line = lines.emplace_back(fmt::format("{}:{}", file.string(), number));
+    line.action = ordered_json::parse(text, watch_depth, false);
+    if (deep || !line.action.is_object() || !line.action.value("step", ordered_json()).is_number_integer())
+      throw Error("no line of a record", line.where, "write one JSON object with \"step\" a line");
+  }
+  if (lines.empty() || !lines[0].action.contains("load"))
+    throw Error("a record begins with a scene", file.string(), "its first line has \"load\"");
+  return lines;
+}
+
 int run_replay(const RunOptions& options) {
-  const std::vector<Line> lines = read_record(options.replay);
+  const std::vector<RecordLine> lines = read_record(options.replay);
   make_output_folder(options.out);
   HeadlessContext context(options.gpu);
   Session s;
@@ -200,9 +196,9 @@ int run_replay(const RunOptions& options) {
   s.playing = s.measuring = false;
   s.view = options.view;
   s.aspect = float(options.size[0]) / float(options.size[1]);
-  s.timeline.budget = std::numeric_limits<std::size_t>::max();
+  s.timeline.budget = std::size_t(4) << 30;
   s.timeline.wanted.emplace();
-  for (const Line& line : lines)
+  for (const RecordLine& line : lines)
     if (line.action.contains("go")) s.timeline.wanted->insert(line.action["go"].get<long>());
 
   const Target target = make_target(options.size[0], options.size[1], options.samples);

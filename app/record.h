@@ -3,7 +3,7 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 
 #include "sim/files.h"
 #include "sim/settings.h"
@@ -36,6 +36,12 @@ void note_step(Session& session);
 /// Where it ends: the last step and the lanes' states. Throws Error.
 void end_record(Session& session);
 
+struct RecordLine {
+  std::string where{};  ///< file:number
+  ordered_json action{};
+};
+/// Throws Error for what is no record; what each line asks for is not checked.
+std::vector<RecordLine> read_record(const std::filesystem::path& file);
 /// `tetpbd run --replay`: does what a record says, and draws it. Throws Error (status 1) where states are
 /// other than recorded.
 int run_replay(const RunOptions& options);

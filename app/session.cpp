@@ -153,6 +153,7 @@ void play(Session& s, bool playing) {
 
 void single_step(Session& s) {
   play(s, false);
+  s.timeline.looping = false;
   attempt(s, [&] {
     step_lanes(s);
     measure_frame(s, true);

@@ -98,7 +98,8 @@ void keep_moment(Session& s) {
                        double(bytes) / 1e6));
   t.off = bytes > t.budget / 4 || !attempt(s, [&] {
             Buffer states;
-            while (!t.moments.empty() && (t.bytes + bytes > t.budget || t.moments.size() >= most_moments)) {
+            while (!t.moments.empty() &&
+                   (t.bytes + bytes > t.budget || (t.moments.size() >= most_moments && !t.wanted))) {
               Buffer freed = drop(t, least_missed(t, now));
               if (freed.bytes() == on_gpu) states = std::move(freed);
             }

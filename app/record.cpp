@@ -121,10 +121,11 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
     const std::size_t lane = a.value("lane", 0u);
     if (lane >= lanes.size())
       throw Error(fmt::format("there is no lane {}", lane + 1), where, "the first is 0");
-    Sim& sim = lanes[lane].sim;
-    Settings settings = sim.settings;
+    Settings settings = lanes[lane].sim.settings;
     set_all(settings, a["set"], where);
-    apply_settings(sim, settings);
+    const std::size_t chosen = std::exchange(s.loaded.chosen, lane);
+    change_settings(s, settings);
+    s.loaded.chosen = chosen;
   } else if (a.contains("pin") || a.contains("grab")) {
     const std::uint32_t pinned = vertex(a.contains("pin") ? a["pin"] : a["grab"]);
     if (a.contains("grab") && !is_pinned(s.loaded.sim(), pinned)) s.timeline.held = pinned;
@@ -199,7 +200,8 @@ int run_replay(const RunOptions& options) {
   s.timeline.budget = std::size_t(4) << 30;
   s.timeline.wanted.emplace();
   for (const RecordLine& line : lines)
-    if (line.action.contains("go")) s.timeline.wanted->insert(line.action["go"].get<long>());
+    if (const auto go = line.action.value("go", ordered_json()); go.is_number_integer())
+      s.timeline.wanted->insert(go.get<long>());
 
   const Target target = make_target(options.size[0], options.size[1], options.samples);
   std::optional<Video> video;

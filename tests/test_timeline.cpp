@@ -216,6 +216,7 @@ TEST_CASE("record: what cannot be done again is said, with its line") {
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"jump\": 3}", "nothing known"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"pin\": 100000}", "no vertex 100000"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"pin\": \"a\"}", "session.jsonl:2"},
+      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"go\": \"a\"}", "session.jsonl:2"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 1, \"go\": 5}", "step 5 is not known"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"set\": {\"omega\": 9}}", "omega"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"lane\": 2, \"set\": {}}",

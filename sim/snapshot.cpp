@@ -73,6 +73,7 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   sim.needs_predict = true;
   const bool same_kind = on_cpu(sim) == then.host.has_value();
   if (same_kind && sim.watch.at_rest > 0) set_stiffening(sim, then.watch.stiffening);
+  if (is_implicit(sim.settings)) set_finer(sim, is_implicit(then.settings) ? then.watch.finer : 1);
   const bool exact = same_kind && then.settings == sim.settings;
   if (std::exchange(sim.quantum, then.quantum) != then.quantum) apply_settings(sim, sim.settings);
   sim.read_index = then.read_index, sim.rigid_side = then.rigid_side;

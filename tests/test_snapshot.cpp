@@ -1,6 +1,8 @@
 // A snapshot is all that a step hands on to the next: whoever goes back to one takes the same steps again.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "sim/material.h"
 #include "sim/snapshot.h"
 #include "tests/gl_test.h"
@@ -86,5 +88,30 @@ TEST_CASE("snapshot: with other settings the state goes on with those") {
     step(sim);
     CHECK(!check_finite(sim, true));
     CHECK(sim.steps == 21);
+  }
+}
+
+TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of them") {
+  GlTest gl;
+  Settings settings{.iterations = 4, .substeps = 1};
+  settings.mode = "newton", settings.material = "neo-hookean";
+  settings.young_modulus = 1e8, settings.poisson_ratio = 0.495;
+  Sim sim = create_sim(thrown_block(), settings);
+  std::vector<Kept> kept;
+  std::vector<std::uint64_t> hashes;
+  std::vector<int> finer;
+  for (int s = 0; s < 60; ++s) {
+    kept.push_back(keep(sim)), hashes.push_back(state_hash(sim)), finer.push_back(sim.watch.finer);
+    step(sim);
+  }
+  CHECK(finer.front() == 1);
+  const auto first = std::size_t(std::ranges::find(finer, 4) - finer.begin());
+  REQUIRE(first < finer.size());
+  for (const std::size_t back : {first, std::size_t(0), first + 3, first - 1}) {
+    CAPTURE(back);
+    restore_snapshot(sim, kept[back].snapshot, kept[back].buffer);
+    CHECK(sim.watch.finer == finer[back]);
+    for (std::size_t s = back + 1; s < hashes.size(); ++s) step(sim);
+    CHECK(state_hash(sim) == hashes.back());
   }
 }

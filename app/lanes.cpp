@@ -127,4 +127,27 @@ void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   }
 }
 
+bool send_answers(const Motion& right, long step, Buffer& answers) {
+  const auto kept = std::ranges::find(right.kept, step);
+  if (kept == right.kept.end()) return false;
+  std::vector<Position> positions;
+  for (const glm::dvec3& p : right.positions[std::size_t(kept - right.kept.begin())]) {
+    const glm::vec3 high(p);
+    positions.push_back({high, 0, glm::vec3(p - glm::dvec3(high)), 0});
+  }
+  if (!answers) answers = Buffer("right motion", positions, GL_STREAM_DRAW);
+  answers.write(0, answers.bytes(), positions.data());
+  return true;
+}
+
+void hold_vertices(std::vector<Lane>& lanes, const Motion* right, Renderer& renderer, Buffer& answers) {
+  long now = 0;
+  for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  if (right && !send_answers(*right, now, answers)) return;
+  const Buffer& answer = right ? answers : lanes[yardstick(lanes)].sim.positions;
+  for (Lane& lane : lanes)
+    if (!lane.stopped() && lane.sim.steps == now)
+      measure_distances(renderer, lane.sim.positions.id(), answer.id(), lane.sim.model->size, lane.apart);
+}
+
 }  // namespace tetpbd

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "app/scene.h"
-#include "render/frame.h"
+#include "render/renderer.h"
 #include "sim/metrics.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -29,6 +29,8 @@ struct Lane {
   std::optional<Metrics> metrics{};  ///< made when first shown
   History step_ms{}, volume_error{};
   History distance{};  ///< from what is right, % of the size
+  Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
+                   ///< known
   /// Steps no more, since its state is not finite, while others go on.
   bool stopped() const { return sim.check.found.has_value(); }
 };
@@ -60,5 +62,9 @@ std::size_t best_lane(const std::vector<Lane>& lanes);
 /// After a step of all lanes: adds each one's distance from the right motion, where this has that step, or
 /// from the yardstick; every fourth step, of large bodies more rarely. Waits for the GPU then.
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right);
+/// Sends where `right` has the vertices at this step; false where it is not kept.
+bool send_answers(const Motion& right, long step, Buffer& answers);
+/// The same of each vertex, by the GPU: fills Lane::apart, where `right` has this step.
+void hold_vertices(std::vector<Lane>& lanes, const Motion* right, Renderer& renderer, Buffer& answers);
 
 }  // namespace tetpbd

@@ -24,8 +24,10 @@ void start_afresh(Session& s) {
     while (lane.metrics && collect(*lane.metrics, true)) {
     }
     lane.volume_error = lane.distance = {};
+    lane.apart = {};
   }
   s.loaded.disturbed = false;
+  s.loaded.held = -1;
 }
 
 bool differs(const Settings& a, const Settings& b, const Parameter& row) {
@@ -35,7 +37,21 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
 // The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
 void disturb(Session& s) {
   if (!std::exchange(s.loaded.disturbed, true))
-    for (Lane& lane : s.loaded.lanes) lane.distance = {};
+    for (Lane& lane : s.loaded.lanes) lane.distance = {}, lane.apart = {};
+}
+
+const Motion* right_now(const Session& s) {
+  return s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr;
+}
+
+// Of each vertex, if somebody looks at it.
+void hold_vertices(Session& s) {
+  Loaded& l = s.loaded;
+  const bool known = right_now(s) || (l.lanes.size() > 1 && l.comparable);
+  if (!known || l.held == l.sim().steps || (s.view.colour != Colour::motion && !l.probe.reading)) return;
+  if (right_now(s) && !is_kept(*l.right, l.sim().steps)) return;
+  hold_vertices(l.lanes, right_now(s), l.renderer, l.answers);
+  l.held = l.sim().steps;
 }
 
 void one_step(Session& s) {
@@ -48,10 +64,9 @@ void one_step(Session& s) {
     step(lane.sim);
     if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3);
   }
-  if (lanes.size() > 1 && s.loaded.comparable) {
-    if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
-    hold_lanes(lanes, s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr);
-  }
+  if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
+  if (lanes.size() > 1 && s.loaded.comparable) hold_lanes(lanes, right_now(s));
+  if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
 }
 
@@ -80,7 +95,7 @@ std::uint64_t key_of(const Lane& lane) {
 void find_right(Session& s) {
   const auto& lanes = s.loaded.lanes;
   auto& right = s.loaded.right;
-  if (lanes.size() == 1) return right.reset();
+  if (lanes.size() == 1 && s.view.colour != Colour::motion) return right.reset();
   const Sim& first = lanes[0].sim;
   const std::uint64_t key = key_of(lanes[0]);
   s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& lane) { return key_of(lane) == key; });
@@ -211,9 +226,11 @@ void change_settings(Session& s, const Settings& wanted) {
     for (std::size_t i = 0; i < of_lanes.size(); ++i) {
       Lane& lane = s.loaded.lanes[i];
       if (of_lanes[i] == lane.sim.settings) continue;
-      const std::uint64_t before = of_lanes.size() > 1 ? key_of(lane) : 0;  // it reads the whole mesh
+      const bool alone = of_lanes.size() == 1 && !s.loaded.right;
+      const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
       apply_settings(lane.sim, of_lanes[i]);
-      if (of_lanes.size() == 1 || key_of(lane) == before) continue;
+      if (alone && lane.sim.steps > 0) disturb(s);
+      if (alone || key_of(lane) == before) continue;
       disturb(s);
       s.loaded.comparable = std::ranges::all_of(
           s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
@@ -248,7 +265,9 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   }
   s.centre.reset();
   s.loaded.lane().step_ms = {};
+  s.worst.clear();
   start_afresh(s);
+  if (s.view.colour == Colour::motion) attempt(s, [&] { find_right(s); });
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }
@@ -284,15 +303,85 @@ Rect lane_place(const Session& s, std::size_t lane, const Rect& view) {
           float(tile.height)};
 }
 
+bool has_colour(const Session& s, Colour colour) {
+  return colour != Colour::energy || s.loaded.sim().settings.material != "none";
+}
+
+void choose_colour(Session& s, Colour colour) {
+  s.view.colour = colour;
+  s.log("colour {}", colour_names[std::size_t(colour)]);
+  s.worst.clear();
+  s.loaded.renderer.values_copied = {};  // of another colour
+  s.fit_range = colour == Colour::energy || colour == Colour::motion;
+  if (!has_colour(s, colour)) say(s, "this needs a material");
+  if (colour != Colour::motion) return;
+  attempt(s, [&] { find_right(s); });
+  if (s.loaded.disturbed)
+    say(s, "the motion is no longer that of the scene: reset (R)");
+  else if (!s.loaded.right && s.loaded.lanes.size() == 1)
+    say(s, "no right motion is known: tetpbd reference finds it, or hold lanes against each other (K)");
+}
+
+void move_cut(Session& s, double by) { s.view.cut = std::clamp(s.view.cut + by, 0.0, 1.0); }
+
+void next_cut(Session& s) {
+  ViewOptions& view = s.view;
+  view.cut_axis = view.is_cut() ? (view.cut_axis + 1) % 5 : 0;
+  view.cut = view.cut_axis < 4 ? 0.5 : 1;
+  if (view.cut_axis == 4) view.cut_axis = 0;
+  view.cut_normal = glm::normalize(eye(s.camera) - s.camera.target);
+  s.log("cut {:.4f} along {}", view.cut, cut_names[std::size_t(view.cut_axis)]);
+}
+
+void find_worst(Session& s) {
+  std::optional<std::vector<float>> values;
+  attempt(s, [&] { values = poll_values(s.loaded.renderer); });
+  if (!values) return;
+  const auto& places = s.loaded.renderer.mesh.positions;
+  const auto size = [&](std::uint32_t v) {
+    return std::isfinite((*values)[v]) ? std::abs((*values)[v]) : -1.0f;
+  };
+  constexpr std::size_t most = 5, looked_at = 4096;
+  std::vector<std::uint32_t> order(values->size());
+  for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = v;
+  const auto end = order.begin() + std::ptrdiff_t(std::min(order.size(), looked_at));
+  std::ranges::partial_sort(order, end, std::ranges::greater(), size);
+  s.worst.clear();
+  for (auto v = order.begin(); v != end && s.worst.size() < most && size(*v) > 0; ++v) {
+    const auto close = [&](const auto& other) {
+      return glm::distance(places[other.first], places[*v]) < 0.06 * s.loaded.sim().model->size;
+    };
+    if (std::ranges::none_of(s.worst, close)) s.worst.emplace_back(*v, (*values)[*v]);
+  }
+  if (!std::exchange(s.fit_range, false) || s.worst.empty()) return;
+  const double largest = double(size(s.worst.front().first)),
+               power = std::pow(10, std::floor(std::log10(largest)));
+  double high = 10 * power;
+  for (const double step : {5.0, 2.0, 1.0})
+    if (largest <= step * power) high = step * power;
+  s.view.range() = {s.view.scale().is_signed ? -high : 0, high};
+}
+
 void draw_lanes(Session& s, const Target& target) {
+  hold_vertices(s);
   const auto& lanes = s.loaded.lanes;
   const bool several = lanes.size() > 1;
   const std::size_t right = best_lane(lanes);
+  // Whose values come back: a range is to fit the lane that is farthest off, too.
+  const auto off = [](const Lane& l) { return l.distance.values.empty() ? 0.0f : l.distance.values.back(); };
+  const bool farthest = s.fit_range && s.view.colour == Colour::motion;
+  const std::size_t valued =
+      farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     Frame frame = frame_of(lanes[i].sim, s.camera, s.view, target);
     frame.viewport = tile_in(s, i, target.width, target.height);
     if (s.grab) frame.grabbed.push_back(s.grab->vertex);
     frame.options.follow = s.view.follow && i == s.loaded.chosen;
+    frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
+    if (s.view.worst && i == s.loaded.chosen)
+      for (const auto& [vertex, value] : s.worst) frame.worst.push_back(vertex);
+    if (s.loaded.comparable) frame.distances = lanes[i].apart.id();
+    if (s.view.colour == Colour::motion && !frame.distances) frame.options.colour = Colour::plain;
     if (several) {
       frame.options.body_colour = lane_colour(i);
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
@@ -307,9 +396,9 @@ void draw_lanes(Session& s, const Target& target) {
     if (!several || s.overlaid || !s.ghost || i == right) continue;
     frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
     frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
-    frame.pinned.clear(), frame.grabbed.clear();
+    frame.pinned.clear(), frame.grabbed.clear(), frame.worst.clear();
     frame.options.colour = Colour::plain, frame.options.body_colour = glm::vec3(0.25f);
-    frame.options.shadow = frame.options.follow = frame.options.legend = false;
+    frame.options.worst = frame.options.shadow = frame.options.follow = frame.options.legend = false;
     draw(s.loaded.renderer, frame);
   }
 }
@@ -339,6 +428,7 @@ void choose_lane(Session& s, std::size_t lane) {
   if (lane >= s.loaded.lanes.size() || lane == s.loaded.chosen) return;
   let_go(s);
   s.loaded.chosen = lane;
+  s.loaded.renderer.values_copied = {};
   s.log("lane {} chosen", lane + 1);
 }
 
@@ -456,6 +546,7 @@ void follow_shaders(Session& s) {
     for (Lane& lane : s.loaded.lanes) rebuild_shaders(lane.sim), lane.metrics.reset();
     reload_shaders(s.loaded.renderer);
     s.loaded.picker = make_picker(s.loaded.sim().model->rest);
+    s.loaded.probe = {};
   });
   for (Lane& lane : s.loaded.lanes)
     lane.sim.shader_version = version;  // also after an error: said once an edit

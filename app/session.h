@@ -13,6 +13,7 @@
 #include "app/auto_solver.h"
 #include "app/grab.h"
 #include "app/lanes.h"
+#include "app/probe.h"
 #include "app/scene.h"
 #include "render/picking.h"
 #include "render/renderer.h"
@@ -31,9 +32,12 @@ struct Loaded {
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
   std::size_t chosen = 0;                ///< the lane that the panel is of
-  std::optional<Motion> right{};         ///< of several lanes, where it is known
+  std::optional<Motion> right{};         ///< where it is known, of several lanes or for its colours
   bool comparable = true;                ///< lanes differ in how they are solved alone
   bool disturbed = false;                ///< they are no longer held against it, until they start anew
+  Buffer answers{};                      ///< where the right motion has the vertices
+  long held = -1;                        ///< step at which vertices were last held against it
+  Probe probe{};
   Lane& lane() { return lanes[chosen]; }
   Sim& sim() { return lane().sim; }
   const Sim& sim() const { return lanes[chosen].sim; }
@@ -108,9 +112,12 @@ struct Session {
   std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago
   glm::vec3 beside{0};              ///< from there to what a following camera looks at, by moving the view
   History frames_per_second;
-  bool overlaid = false;  ///< lanes are drawn in one place
-  bool ghost = true;      ///< beside the others stands the one they are held against
-  double now = 0;         ///< s since the start
+  bool probing = true;                                 ///< the cursor at rest on a body says what is there
+  bool fit_range = false;                              ///< of the colours, once to the values of now
+  std::vector<std::pair<std::uint32_t, float>> worst;  ///< vertices and their values, the largest first
+  bool overlaid = false;                               ///< lanes are drawn in one place
+  bool ghost = true;  ///< beside the others stands the one they are held against
+  double now = 0;     ///< s since the start
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);
@@ -130,6 +137,14 @@ void load_soon(Session& session, const std::string& name, const SceneOverrides& 
 void choose_soon(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
+/// Finds what it needs, or says what is missing.
+void choose_colour(Session& session, Colour colour);
+/// Whether there is something to colour by.
+bool has_colour(const Session& session, Colour colour);
+/// By a part of the bodies' extent.
+void move_cut(Session& session, double by);
+/// None, along x, y, z, facing the eye.
+void next_cut(Session& session);
 /// Where a lane is drawn: pixels, from the lower left.
 Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
 /// The same within a view, in window coordinates.
@@ -157,6 +172,8 @@ void watch_state(Session& session);
 void advance(Session& session, double elapsed);
 /// Takes in measurements and timings that have arrived, and asks for the next.
 void measure_frame(Session& session, bool stepped);
+/// The vertices with the largest values of the colour, apart from each other, once values have arrived.
+void find_worst(Session& session);
 /// Compiles again what changed in the shader folder.
 void follow_shaders(Session& session);
 

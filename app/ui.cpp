@@ -19,8 +19,10 @@ void set_look(Session& s, Look look) {
 }
 
 void next_colour(Session& s) {
-  s.view.colour = Colour((std::size_t(s.view.colour) + 1) % colour_names.size());
-  s.log("colour {}", colour_names[std::size_t(s.view.colour)]);
+  auto next = std::size_t(s.view.colour);
+  do next = (next + 1) % colour_names.size();
+  while (!has_colour(s, Colour(next)));
+  choose_colour(s, Colour(next));
 }
 
 void flip(Session& s, const char* name, bool& value) { s.log("{} {}", name, value = !value); }
@@ -201,6 +203,32 @@ void draw_messages(Session& s, const Rect& view) {
   if (pressed) pressed();
 }
 
+// What the cursor points at, beside it.
+void draw_reading(const Session& s, const Reading& r) {
+  const Lane& lane = s.loaded.lanes[s.loaded.probe.lane];
+  ImGui::BeginTooltip();
+  const bool held = !(lane.sim.inverse_masses[r.vertex] > 0);
+  ImGui::Text("vertex %u%s, tet %u", lane.sim.model->original[r.vertex], held ? " (held)" : "", r.tet);
+  if (ImGui::BeginTable("reading", 2, ImGuiTableFlags_SizingFixedFit)) {
+    const auto row = [](const char* name, const std::string& value) {
+      ImGui::TableNextColumn();
+      ImGui::TextDisabled("%s", name);
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(value.c_str());
+    };
+    row("position", fmt::format("{:.4f}, {:.4f}, {:.4f} m", r.position.x, r.position.y, r.position.z));
+    row("speed", fmt::format("{:.4g} m/s", r.speed));
+    row("volume", fmt::format("{:.4f} of rest", 1 + r.volume));
+    row("edge strain", fmt::format("{:+.3g} %", 100 * r.strain));
+    if (r.energy) row("elastic energy", fmt::format("{:.4g} J/m\u00b3", *r.energy));
+    if (r.distance)
+      row(s.loaded.right && !s.loaded.disturbed ? "from the right motion" : "from the finest lane",
+          fmt::format("{:.3g} % of size", 100 * *r.distance));
+    ImGui::EndTable();
+  }
+  ImGui::EndTooltip();
+}
+
 void draw_help(const Ui& ui) {
   const ImVec2 whole = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos(ImVec2(whole.x / 2, whole.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
@@ -212,9 +240,10 @@ void draw_help(const Ui& ui) {
       {"Right drag", "turn the view"},
       {"Middle drag", "move the view (or Shift + drag)"},
       {"Wheel", "closer, farther"},
+      {"Alt + drag, Alt + wheel", "moves the plane of a cut"},
       {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
       {"Ctrl + click on a slider", "type a value"},
-      {"Hover", "what a setting means"}};
+      {"Hover", "what a setting means; what a body measures there"}};
   if (ImGui::BeginTable("help", 2)) {
     ImGui::TableNextColumn();
     ImGui::TextDisabled("Keys");
@@ -249,6 +278,8 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_2, "2", "with edges", [](Session& s) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
       {GLFW_KEY_3, "3", "tetrahedra", [](Session& s) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
       {GLFW_KEY_C, "C", "next colour", [](Session& s) { next_colour(s); }},
+      {GLFW_KEY_W, "W", "mark the worst vertices", [](Session& s) { flip(s, "worst", s.view.worst); }},
+      {GLFW_KEY_X, "X", "cut: none, along x, y, z, the view", [](Session& s) { next_cut(s); }},
       {GLFW_KEY_N, "N", "flat normals", [](Session& s) { flip(s, "normals", s.view.smooth_normals); }},
       {GLFW_KEY_G, "G", "grid", [](Session& s) { flip(s, "grid", s.view.grid); }},
       {GLFW_KEY_L, "L", "follow the bodies", [](Session& s) { flip(s, "follow", s.view.follow); }},
@@ -297,6 +328,7 @@ void draw_ui(Session& s, const Layout& layout) {
     draw_status(s, layout.status);
   }
   draw_messages(s, layout.view);
+  if (s.loaded.probe.reading) draw_reading(s, *s.loaded.probe.reading);
   if (s.ui.help) draw_help(s.ui);
 }
 

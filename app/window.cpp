@@ -27,19 +27,31 @@ namespace {
 
 // Mouse and keyboard on the view: what a drag does is decided once the GPU has said what is under the cursor.
 
+/// What a picture under the cursor depends on.
+struct Seen {
+  glm::vec3 origin{0}, direction{0};
+  long step = -1, held = -1;
+  std::size_t lane = 0;
+  bool operator==(const Seen&) const = default;
+};
+
 struct Input {
   Session& session;
   Rect view{};
   /// `asking`: pressed, and the picker has not answered yet.
-  enum class Drag { none, asking, grab, orbit, pan } drag = Drag::none;
+  enum class Drag { none, asking, grab, orbit, pan, cut } drag = Drag::none;
   bool pinning = false;                              ///< the question is for a vertex to pin
   int button = -1;                                   ///< that holds the drag
   double x = 0, y = 0;                               ///< cursor, as far as events have been handled
   double last_press = -1, press_x = 0, press_y = 0;  ///< s, and where: for double clicks
+  Seen seen{};                                       ///< by the probe
+  double rested = 0;                                 ///< s, since when the cursor is where it is
   std::vector<std::function<void()>> events{};       ///< since the last frame, in order
 
   /// Something is under way that a frame must follow.
-  bool busy() const { return drag != Drag::none || pinning || !events.empty(); }
+  bool busy() const {
+    return drag != Drag::none || pinning || !events.empty() || session.loaded.probe.asked();
+  }
 };
 
 using Drag = Input::Drag;
@@ -47,21 +59,52 @@ using Drag = Input::Drag;
 constexpr double double_click = 0.35;  // s, the usual setting of desktops
 constexpr double same_place = 6;       // window coordinates between the clicks of a double click
 
-Ray ray_at_cursor(const Input& in) {
+Ray ray_at_cursor(const Input& in, std::size_t lane) {
   // Only ratios count, so window coordinates do as well as pixels.
-  const Rect tile = lane_place(in.session, in.session.loaded.chosen, in.view);
+  const Rect tile = lane_place(in.session, lane, in.view);
   return pixel_ray(in.session.camera, float(in.x) - tile.x, float(in.y) - tile.y, int(tile.width),
                    int(tile.height));
 }
 
+Ray ray_at_cursor(const Input& in) { return ray_at_cursor(in, in.session.loaded.chosen); }
+
+std::size_t lane_at_cursor(const Input& in) {
+  const Session& s = in.session;
+  for (std::size_t lane = 0; lane < s.loaded.lanes.size() && !s.overlaid; ++lane)
+    if (lane_place(s, lane, in.view).contains(in.x, in.y)) return lane;
+  return s.loaded.chosen;
+}
+
 bool on_view(const Input& in) { return in.view.contains(in.x, in.y) && !ImGui::GetIO().WantCaptureMouse; }
+
+// How far a drag takes the plane of the cut along its normal, as a part of the extent there.
+double cut_moved(const Session& s, float dx, float dy, const Rect& place) {
+  const Renderer& r = s.loaded.renderer;
+  const glm::vec3 n = s.view.cut_direction();
+  const glm::mat4 seen = projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera);
+  const auto pixels = [&](const glm::vec3& p) {
+    const glm::vec4 clip = seen * glm::vec4(p, 1);
+    return glm::vec2(clip.x, -clip.y) / clip.w * 0.5f * glm::vec2(place.width, place.height);
+  };
+  const float extent = glm::dot(glm::abs(n), r.rest_high - r.rest_low);
+  const glm::vec2 way =
+      pixels(s.camera.target + 0.5f * extent * n) - pixels(s.camera.target - 0.5f * extent * n);
+  // Where the normal points at the eye, up is into the picture.
+  if (glm::length(way) < 0.1f * place.height) return double(dy / place.height);
+  return double(glm::dot(glm::vec2(dx, dy), way) / glm::dot(way, way));
+}
 
 void move(Input& in, double x, double y) {
   Session& s = in.session;
   const float dx = float(x - in.x), dy = float(y - in.y);
+  if (dx != 0 || dy != 0) in.rested = s.now;
   in.x = x, in.y = y;
   constexpr float degrees = 0.35f;  // a window coordinate: a turn of the wrist is half a turn of the view
   if (in.drag == Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees);
+  if (in.drag == Drag::cut) {
+    const Rect place = lane_place(s, s.loaded.chosen, in.view);
+    move_cut(s, cut_moved(s, dx, dy, place));
+  }
   if (in.drag != Drag::pan) return;
   const glm::vec3 before = s.camera.target;
   const Rect place = lane_place(s, s.loaded.chosen, in.view);
@@ -74,9 +117,10 @@ void press(Input& in, int button, int modifiers) {
   Session& s = in.session;
   const bool left = button == GLFW_MOUSE_BUTTON_LEFT;
   in.button = button;
-  for (std::size_t lane = 0; lane < s.loaded.lanes.size() && !s.overlaid; ++lane)
-    if (lane_place(s, lane, in.view).contains(in.x, in.y)) choose_lane(s, lane);
-  if (button == GLFW_MOUSE_BUTTON_MIDDLE || (left && (modifiers & GLFW_MOD_SHIFT))) {
+  choose_lane(s, lane_at_cursor(in));
+  if (left && (modifiers & GLFW_MOD_ALT)) {
+    in.drag = Drag::cut;
+  } else if (button == GLFW_MOUSE_BUTTON_MIDDLE || (left && (modifiers & GLFW_MOD_SHIFT))) {
     in.drag = Drag::pan;
   } else if (button == GLFW_MOUSE_BUTTON_RIGHT) {
     in.drag = Drag::orbit;
@@ -95,6 +139,7 @@ void release(Input& in, int button) {
   if (button != in.button) return;
   Session& s = in.session;
   const Camera& c = s.camera;
+  if (in.drag == Drag::cut) s.log("cut {:.4f}", s.view.cut);
   if (in.drag == Drag::orbit || in.drag == Drag::pan)
     s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation, c.distance,
           c.target.x, c.target.y, c.target.z);
@@ -106,6 +151,10 @@ void release(Input& in, int button) {
 
 void wheel(Input& in, double turned) {
   if (!on_view(in)) return;
+  if (ImGui::GetIO().KeyAlt || ImGui::GetIO().KeyCtrl) {
+    move_cut(in.session, 0.02 * turned);
+    return in.session.log("cut {:.4f}", in.session.view.cut);
+  }
   zoom(in.session.camera, std::pow(0.9f, float(turned)));
   in.session.log("zoom {:.4f}", in.session.camera.distance);
 }
@@ -131,6 +180,28 @@ void take_answer(Input& in) {
     if (pick->hit) catch_vertex(s, *pick);
     in.drag = s.grab ? Drag::grab : Drag::orbit;
   }
+}
+
+// Asks what is under a cursor that has come to rest, and again when the picture there may have changed.
+void hover(Input& in) {
+  Session& s = in.session;
+  Probe& probe = s.loaded.probe;
+  constexpr double rest = 0.25;  // s
+  if (!s.probing || in.drag != Drag::none || !on_view(in) || s.now - in.rested < rest || s.ui.help) {
+    probe.reading.reset(), probe.copied = {}, probe.picker.answered = {};
+    in.seen = {};
+    return;
+  }
+  const bool had = probe.reading.has_value();
+  if (take_reading(probe, s.loaded.lanes) && probe.reading && !had)
+    s.log("probe {} {} {:.4f} {:.4f} {:.4f}", probe.reading->vertex, probe.reading->tet,
+          probe.reading->position.x, probe.reading->position.y, probe.reading->position.z);
+  const std::size_t lane = lane_at_cursor(in);
+  const Ray ray = ray_at_cursor(in, lane);
+  const Seen now{ray.origin, ray.direction, s.loaded.sim().steps, s.loaded.held, lane};
+  if (probe.asked() || in.seen == now) return;
+  in.seen = now;
+  ask(probe, s.loaded.lanes, lane, ray);
 }
 
 // Before Dear ImGui is started, which calls on what was installed. A queue of our own, since Dear ImGui
@@ -165,7 +236,7 @@ void handle_input(Input& in, const Rect& view) {
   in.view = view;
   for (const auto& event : std::exchange(in.events, {})) event();
   Session& s = in.session;
-  attempt(s, [&] { take_answer(in); });
+  attempt(s, [&] { take_answer(in), hover(in); });
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
   const Sim& sim = s.loaded.sim();
@@ -316,6 +387,7 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   const int width = pixels(layout.view.width), height = pixels(layout.view.height);
   const Viewport tile = tile_in(s, 0, width, height);
   s.aspect = float(tile.width) / float(tile.height);
+  find_worst(s);
   draw_view(s, view, width, height);
   take_screenshots(s, view);
   const bool named = s.task.has_value();

@@ -14,7 +14,8 @@
 
 namespace tetpbd {
 
-/// What each vertex of the surface gathers, in fixed order: items[offsets[v] .. offsets[v + 1]).
+/// What each vertex gathers, in fixed order: items[offsets[v] .. offsets[v + 1]); nothing where it has a
+/// value alone.
 struct VertexGather {
   Buffer offsets, items;
   Buffer values;  ///< by vertex: vec4 of a normal, float of others
@@ -42,7 +43,10 @@ struct Renderer {
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer rest;             ///< vec4: rest position and body
-  VertexGather normals, volume_errors, stretch_errors;
+  VertexGather normals;
+  std::map<Colour, VertexGather> values;
+  Buffer values_copy;  ///< on its way back
+  Fence values_copied;
   Shadow shadow;
   Legend legend;
 };
@@ -53,6 +57,11 @@ Renderer make_renderer(const Model& model);
 void draw(Renderer& renderer, const Frame& frame);
 /// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
+/// The values by vertex that a frame drawn with `worst` coloured, once, some frames later (`wait`: now).
+std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait = false);
+/// How far vertices are from where `answers` has them, over `size` (m): both buffers of Position;
+/// `distances`, floats, is made.
+void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, double size, Buffer& distances);
 /// Compiles what is in use again. Throws Error and keeps the old ones if one does not compile.
 void reload_shaders(Renderer& renderer);
 

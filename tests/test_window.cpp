@@ -149,3 +149,64 @@ TEST_CASE("window: lanes step together from a common start, and are held against
   compare_lanes(s, {});
   CHECK(s.loaded.lanes.size() == 1);
 }
+
+TEST_CASE("window: the probe says what a vertex and its tet measure, colours how far each is from right") {
+  GlTest gl;
+  Scene scene = load_scene("beam", {.solver = "hard"});
+  scene.bodies[0].fixed.clear();
+  scene.bodies[0].block->cells = {3, 2, 2};
+  Session s;
+  s.playing = false;
+  take_over(s, load("beam", {}, scene), false);
+  CHECK_FALSE(s.loaded.right);  // one alone is held against nothing
+  choose_colour(s, Colour::energy);
+  CHECK(s.messages.back().text == "this needs a material");
+  choose_colour(s, Colour::motion);
+  REQUIRE(s.loaded.right);
+  const Target target = make_target(64, 48);
+  draw_lanes(s, target);
+  CHECK(s.loaded.held == 0);
+  while (s.loaded.held < 40) single_step(s);
+  const Sim& sim = s.loaded.sim();
+  const Model& model = *sim.model;
+  const auto kept = std::ranges::find(s.loaded.right->kept, s.loaded.held) - s.loaded.right->kept.begin();
+  const State state = read_state(sim);
+  const auto apart = s.loaded.lane().apart.read_all<float>();
+  for (std::size_t v = 0; v < apart.size(); ++v)
+    CHECK(double(apart[v]) ==
+          doctest::Approx(glm::distance(state.positions[v], s.loaded.right->positions[std::size_t(kept)][v]) /
+                          model.size)
+              .epsilon(1e-3)
+              .scale(1e-4));
+  s.view.worst = true;
+  for (int i = 0; i < 2; ++i) {  // what was asked for at the start arrives first
+    draw_lanes(s, target);
+    glFinish();
+    find_worst(s);
+  }
+  REQUIRE(!s.worst.empty());
+  CHECK(s.worst[0].second == std::ranges::max(apart));
+
+  const glm::dvec3 aim = 0.5 * (bounds(state.positions).low + bounds(state.positions).high);
+  ask(s.loaded.probe, s.loaded.lanes, 0, {glm::vec3(aim) + glm::vec3(0, 5, 0.01f), {0, -1, 0}});
+  CHECK(s.loaded.probe.asked());
+  CHECK(take_reading(s.loaded.probe, s.loaded.lanes, true));
+  REQUIRE(s.loaded.probe.reading);
+  const Reading& r = *s.loaded.probe.reading;
+  CHECK(std::ranges::count(model.rest.tets[r.tet], r.vertex) == 1);
+  CHECK(glm::distance(r.position, state.positions[r.vertex]) < 1e-9);
+  CHECK(r.speed == doctest::Approx(glm::length(state.velocities[r.vertex])).epsilon(1e-6));
+  const std::vector<Tet> tet{model.rest.tets[r.tet]};
+  const double ratio =
+      tet_volumes({state.positions, tet, {}})[0] / tet_volumes({model.rest.positions, tet, {}})[0];
+  CHECK(r.volume == doctest::Approx(ratio - 1).epsilon(1e-2).scale(1e-4));
+  CHECK(*r.distance == doctest::Approx(double(apart[r.vertex])));
+  CHECK_FALSE(r.energy);
+  ask(s.loaded.probe, s.loaded.lanes, 0, {glm::vec3(0, 50, 0), {0, 1, 0}});  // beside it
+  CHECK(take_reading(s.loaded.probe, s.loaded.lanes, true));
+  CHECK_FALSE(s.loaded.probe.reading);
+  toggle_pin(s, 0);  // no longer the scene's motion
+  draw_lanes(s, target);
+  CHECK_FALSE(s.loaded.lane().apart);
+  CHECK(gl_error_count() == 0);
+}

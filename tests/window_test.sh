@@ -147,7 +147,11 @@ shot panels.png
 
 # ---------------------------------------------------------------------------------------------------------------- view
 for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
-for colour in volume stretch velocity plain; do key c; await "^colour $colour"; done
+for colour in volume stretch velocity motion; do key c; await "^colour $colour"; done
+shot plain.png; key w; await '^worst true'
+forget; xdotool mousemove $cx $cy; await '^probe [0-9]+ [0-9]+ '; pause_for_frame; shot probe.png
+differ plain.png probe.png 5000 "the tooltip"
+key w; await '^worst false'; key c; await '^colour plain'
 key n; await '^normals false'
 key n; await '^normals true'
 key g; await '^grid false'

@@ -35,5 +35,5 @@ vec3 sequential_colour(float t) {
 // What `value` looks like on a scale from `low` to `high`; kinds 1 (volume) and 2 (stretch) are signed.
 vec3 scale_colour(int kind, float value, float low, float high) {
   float t = (value - low) / (high - low);
-  return kind == 3 ? sequential_colour(t) : diverging_colour(2.0f * t - 1.0f);
+  return kind >= 3 ? sequential_colour(t) : diverging_colour(2.0f * t - 1.0f);
 }

@@ -55,7 +55,7 @@ struct FrameWriter {
     // Of the last step that is kept up to this one.
     if (frame.options.colour == Colour::motion && send_answers(*right, s, answers)) {
       measure_distances(renderer, frame.positions, answers.id(), size, distances);
-      frame.distances = distances.id();
+      frame.values = distances.id();
     }
     if (!png && !film) return;
     draw(renderer, frame);

@@ -35,6 +35,34 @@ std::string describe(const Lane& lane) {
   return text;
 }
 
+namespace {
+
+GLuint patch_words(const Sim& sim) {
+  for (const auto& [binding, buffer] : sim.solver.bindings)
+    if (binding == BIND_PATCHES && sim.solver.double_buffered) return buffer;
+  return 0;
+}
+
+}  // namespace
+
+bool has_patches(const Lane& lane) { return patch_words(lane.sim) != 0; }
+
+GLuint patch_numbers(Lane& lane) {
+  const GLuint words = patch_words(lane.sim);
+  if (!words || lane.patches) return lane.patches.id();
+  const auto& present = lane.sim.system.present;
+  const std::size_t patches = lane.sim.solver.iteration[0].work_groups,
+                    each = 4 + 2 * std::size_t(std::ranges::count(present, true));
+  std::vector<std::uint32_t> chunks(patches * each);
+  glBindBuffer(GL_COPY_READ_BUFFER, words);
+  glGetBufferSubData(GL_COPY_READ_BUFFER, 0, GLsizeiptr(chunks.size() * 4), chunks.data());
+  std::vector<float> numbers(lane.sim.model->positions.size());
+  for (std::size_t p = 0; p < patches; ++p)  // patches.h: how many are owned, the first of them
+    for (std::uint32_t k = 0; k < chunks[p * each + 1]; ++k) numbers.at(chunks[p * each + 2] + k) = float(p);
+  lane.patches = Buffer("vertex values, patch", numbers);
+  return lane.patches.id();
+}
+
 glm::vec3 lane_colour(std::size_t lane) {
   // Clay, and three of like lightness that also those tell apart who see few hues.
   constexpr std::array<glm::vec3, most_lanes> colours{

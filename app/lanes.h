@@ -31,10 +31,15 @@ struct Lane {
   History distance{};  ///< from what is right, % of the size
   Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                    ///< known
+  Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
   /// Steps no more, since its state is not finite, while others go on.
   bool stopped() const { return sim.check.found.has_value(); }
 };
 
+/// Whether the solver's work-groups have vertices of their own.
+bool has_patches(const Lane& lane);
+/// A buffer of floats, made when first asked for: waits for the GPU then. 0 where there are no patches.
+GLuint patch_numbers(Lane& lane);
 /// "node, 25 iterations": what sets it apart from others.
 std::string describe(const Lane& lane);
 /// Body colour, sRGB.

@@ -196,7 +196,8 @@ void add_scene(CLI::App& command, Arguments& a) {
   add_samples(command, a.run.samples);
   CLI::App& view = *command.add_option_group("View");
   ViewOptions& look = a.run.view;
-  view.add_option("--look", look.look, "surface, wire, tets")->transform(one_of(look_names));
+  view.add_option("--look", look.look, fmt::format("{}", fmt::join(look_names, ", ")))
+      ->transform(one_of(look_names));
   view.add_option("--colour", look.colour, fmt::format("{}", fmt::join(colour_names, ", ")))
       ->transform(one_of(colour_names));
   add(view, "--range", a.run.range, 1e-12, 1e12, "end of the colour scale, in its unit");

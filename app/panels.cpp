@@ -300,6 +300,7 @@ void draw_colour_range(Session& s) {
     mark(s, "body colour");
     return;
   }
+  if (s.view.colour == Colour::patch) return;
   ColourRange& range = s.view.range();
   const ColourScale& scale = s.view.scale();
   double high = range.high * scale.factor;
@@ -342,11 +343,16 @@ void draw_view(Session& s) {
       {"sky and ground", "also walls; without: one colour", view.backdrop},
       {"legend", "with every colour but plain", view.legend},
       {"follow", "the camera goes where the bodies go\nL", view.follow},
+      {"contacts", "dots where vertices touch the ground or walls", view.contacts},
+      {"arrows", "where velocities take some of the vertices", view.arrows},
       {"probe", "the cursor at rest on a body says what is there", s.probing}};
   for (int i = 0; const auto& [name, help, value] : switches) {
     if (i++ % 2) ImGui::SameLine(label_width());
     check_box(s, name, value, help);
   }
+  if (view.arrows)
+    slider(s, "arrow length", view.arrow_seconds, 1e-3, 1, "%.3g s",
+           "the time a vertex would take along its arrow", true);
   int doublings = std::bit_width(unsigned(s.samples) / 2);
   enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, doublings);
   s.samples = doublings ? 1 << doublings : 0;

@@ -61,12 +61,13 @@ Reading reading_of(Reading reading, const Lane& lane, const std::vector<float>& 
 
 }  // namespace
 
-void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, const Ray& ray) {
+void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer,
+         const Frame& frame, const Ray& ray) {
   const Sim& sim = lanes[lane].sim;
   if (!probe.picker.kernel) probe.picker = make_picker(sim.model->rest);
   probe.copied = {};
   probe.lane = lane;
-  request(probe.picker, sim.positions.id(), ray);
+  request(probe.picker, renderer, frame, ray);
 }
 
 bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait) {
@@ -74,8 +75,9 @@ bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait) {
   const Lane& lane = lanes[probe.lane];
   if (const auto pick = poll(probe.picker, wait)) {
     if (!pick->hit) return probe.reading.reset(), true;
+    const TetMesh& mesh = lane.sim.model->rest;
     probe.next = {.vertex = pick->vertex,
-                  .tet = tet_behind(lane.sim.model->rest, lane.sim.model->rest.surface[pick->triangle])};
+                  .tet = pick->inside ? pick->element : tet_behind(mesh, mesh.surface[pick->element])};
     copy_values(probe, lane);
   }
   const auto values = take<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);

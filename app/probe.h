@@ -29,7 +29,8 @@ struct Probe {
 };
 
 /// Replaces a question that has not been answered.
-void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, const Ray& ray);
+void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer,
+         const Frame& frame, const Ray& ray);
 /// Takes in what has arrived; whether there is a new reading, or none now. With `wait`: waits for it.
 bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait = false);
 

@@ -229,6 +229,7 @@ void change_settings(Session& s, const Settings& wanted) {
       const bool alone = of_lanes.size() == 1 && !s.loaded.right;
       const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
       apply_settings(lane.sim, of_lanes[i]);
+      lane.patches = {};
       if (alone && lane.sim.steps > 0) disturb(s);
       if (alone || key_of(lane) == before) continue;
       disturb(s);
@@ -304,6 +305,7 @@ Rect lane_place(const Session& s, std::size_t lane, const Rect& view) {
 }
 
 bool has_colour(const Session& s, Colour colour) {
+  if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
   return colour != Colour::energy || s.loaded.sim().settings.material != "none";
 }
 
@@ -313,7 +315,8 @@ void choose_colour(Session& s, Colour colour) {
   s.worst.clear();
   s.loaded.renderer.values_copied = {};  // of another colour
   s.fit_range = colour == Colour::energy || colour == Colour::motion;
-  if (!has_colour(s, colour)) say(s, "this needs a material");
+  if (!has_colour(s, colour))
+    say(s, colour == Colour::energy ? "this needs a material" : "patches of vertices are those of mode node");
   if (colour != Colour::motion) return;
   attempt(s, [&] { find_right(s); });
   if (s.loaded.disturbed)
@@ -362,9 +365,16 @@ void find_worst(Session& s) {
   s.view.range() = {s.view.scale().is_signed ? -high : 0, high};
 }
 
+Frame shown_frame(const Session& s, std::size_t lane) {
+  Frame frame = frame_of(s.loaded.lanes[lane].sim, s.camera, s.view, {});
+  frame.viewport = {};
+  frame.options.follow = false;
+  return frame;
+}
+
 void draw_lanes(Session& s, const Target& target) {
   hold_vertices(s);
-  const auto& lanes = s.loaded.lanes;
+  auto& lanes = s.loaded.lanes;
   const bool several = lanes.size() > 1;
   const std::size_t right = best_lane(lanes);
   // Whose values come back: a range is to fit the lane that is farthest off, too.
@@ -380,8 +390,10 @@ void draw_lanes(Session& s, const Target& target) {
     frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
     if (s.view.worst && i == s.loaded.chosen)
       for (const auto& [vertex, value] : s.worst) frame.worst.push_back(vertex);
-    if (s.loaded.comparable) frame.distances = lanes[i].apart.id();
-    if (s.view.colour == Colour::motion && !frame.distances) frame.options.colour = Colour::plain;
+    if (s.view.colour == Colour::motion && s.loaded.comparable) frame.values = lanes[i].apart.id();
+    if (s.view.colour == Colour::patch) frame.values = patch_numbers(lanes[i]);
+    if ((s.view.colour == Colour::motion || s.view.colour == Colour::patch) && !frame.values)
+      frame.options.colour = Colour::plain;
     if (several) {
       frame.options.body_colour = lane_colour(i);
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
@@ -397,6 +409,7 @@ void draw_lanes(Session& s, const Target& target) {
     frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
     frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
     frame.pinned.clear(), frame.grabbed.clear(), frame.worst.clear();
+    frame.options.arrows = frame.options.contacts = false;
     frame.options.colour = Colour::plain, frame.options.body_colour = glm::vec3(0.25f);
     frame.options.worst = frame.options.shadow = frame.options.follow = frame.options.legend = false;
     draw(s.loaded.renderer, frame);

@@ -149,6 +149,8 @@ void next_cut(Session& session);
 Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
 /// The same within a view, in window coordinates.
 Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
+/// What is to be picked of a lane: as it is drawn, but for size and marks.
+Frame shown_frame(const Session& session, std::size_t lane);
 /// All of them, and the ghost of the one that others are held against.
 void draw_lanes(Session& session, const Target& target);
 /// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.

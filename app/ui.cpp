@@ -277,6 +277,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_1, "1", "surface", [](Session& s) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
       {GLFW_KEY_2, "2", "with edges", [](Session& s) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
       {GLFW_KEY_3, "3", "tetrahedra", [](Session& s) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
+      {GLFW_KEY_4, "4", "constraint graph", [](Session& s) { set_look(s, Look::graph); }, GLFW_KEY_KP_4},
       {GLFW_KEY_C, "C", "next colour", [](Session& s) { next_colour(s); }},
       {GLFW_KEY_W, "W", "mark the worst vertices", [](Session& s) { flip(s, "worst", s.view.worst); }},
       {GLFW_KEY_X, "X", "cut: none, along x, y, z, the view", [](Session& s) { next_cut(s); }},

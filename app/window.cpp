@@ -131,7 +131,7 @@ void press(Input& in, int button, int modifiers) {
     in.drag = Drag::asking;
     in.last_press = twice ? -1 : s.now;
     in.press_x = in.x, in.press_y = in.y;
-    request(s.loaded.picker, s.loaded.sim().positions.id(), ray_at_cursor(in));
+    request(s.loaded.picker, s.loaded.renderer, shown_frame(s, s.loaded.chosen), ray_at_cursor(in));
   }
 }
 
@@ -201,7 +201,7 @@ void hover(Input& in) {
   const Seen now{ray.origin, ray.direction, s.loaded.sim().steps, s.loaded.held, lane};
   if (probe.asked() || in.seen == now) return;
   in.seen = now;
-  ask(probe, s.loaded.lanes, lane, ray);
+  ask(probe, s.loaded.lanes, lane, s.loaded.renderer, shown_frame(s, lane), ray);
 }
 
 // Before Dear ImGui is started, which calls on what was installed. A queue of our own, since Dear ImGui

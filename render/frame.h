@@ -16,11 +16,12 @@
 
 namespace tetpbd {
 
-enum class Look { surface, wire, tets };
-inline constexpr std::array look_names{"surface", "wire", "tets"};
+enum class Look { surface, wire, tets, graph };
+inline constexpr std::array look_names{"surface", "wire", "tets", "graph"};
 /// COLOUR_... of shaders/render/layout.glsl.
-enum class Colour { plain, volume, stretch, velocity, energy, motion };
-inline constexpr std::array colour_names{"plain", "volume", "stretch", "velocity", "energy", "motion"};
+enum class Colour { plain, volume, stretch, velocity, energy, motion, patch };
+inline constexpr std::array colour_names{"plain",  "volume", "stretch", "velocity",
+                                         "energy", "motion", "patch"};
 
 inline constexpr std::array cut_names{"x", "y", "z", "the view"};
 
@@ -41,7 +42,8 @@ inline constexpr std::array<ColourScale, colour_names.size()> colour_scales{
      {"Edge strain", "% of rest", 100, {-0.2, 0.2}, 1, true},
      {"Speed", "m/s", 1, {0, 5}, 50},
      {"Elastic energy", "J/m\u00b3", 1, {0, 1e3}, 1e7},
-     {"Error of motion", "% of size", 100, {0, 0.05}, 1}}};
+     {"Error of motion", "% of size", 100, {0, 0.05}, 1},
+     {"", ""}}};
 
 struct ViewOptions {
   Look look = Look::surface;
@@ -64,7 +66,10 @@ struct ViewOptions {
     for (std::size_t i = 0; i < start.size(); ++i) start[i] = colour_scales[i].range;
     return start;
   }();
-  bool worst = false;  ///< values of all vertices come back: poll_values()
+  bool contacts = false;       ///< dots where vertices touch the ground or walls
+  bool arrows = false;         ///< where velocities take some of the vertices ...
+  double arrow_seconds = 0.1;  ///< ... in this time
+  bool worst = false;          ///< values of all vertices come back: poll_values()
 
   ColourRange& range() { return ranges[std::size_t(colour)]; }
   const ColourRange& range() const { return ranges[std::size_t(colour)]; }
@@ -73,7 +78,7 @@ struct ViewOptions {
     return cut_axis > 2 ? cut_normal : glm::vec3(cut_axis == 0, cut_axis == 1, cut_axis == 2);
   }
   const ColourScale& scale() const { return colour_scales[std::size_t(colour)]; }
-  bool has_scale() const { return legend && colour != Colour::plain; }
+  bool has_scale() const { return legend && *scale().title; }
 };
 
 /// The cheapest picture: flat faces on one colour, and nothing else.
@@ -89,8 +94,9 @@ struct Viewport {
 
 struct Frame {
   GLuint positions = 0;   ///< buffer of Position; nothing but its current state is read
-  GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity alone
-  GLuint distances = 0;   ///< buffer of floats (measure_distances); needed for Colour::motion alone
+  GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity and arrows alone
+  GLuint values =
+      0;  ///< buffer of floats by vertex; needed for Colour::motion (measure_distances) and patch alone
   glm::vec4 material{0};  ///< as tet_energy of values.glsl has it; needed for Colour::energy alone
   Camera camera;
   Viewport viewport;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "render/layout.h"
+#include "render/marks.h"
 #include "sim/layout.h"
 #include "sim/material.h"
 #include "sim/parallel.h"
@@ -29,6 +30,9 @@ const std::map<std::string, Recipe> recipes = {
     {"caps shadow", {{"render/body.vert", "render/caps.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"background", {{"render/background.vert", "render/background.frag"}, {}}},
     {"plane", {{"render/plane.vert", "render/plane.frag"}, {}}},
+    {"graph", {{"render/body.vert", "render/graph.geom", "render/graph.frag"}, {}}},
+    {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
+    {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},
     {"dots", {{"render/dots.vert", "render/dots.frag"}, {}}},
     {"normals", {{"render/gather.comp"}, {"NORMAL"}}},
     {"tet values", {{"render/gather.comp"}, {"TETS"}}},
@@ -40,23 +44,6 @@ const std::map<std::string, Recipe> recipes = {
 Program compile(const std::string& name) {
   const auto& [files, defines] = recipes.at(name);
   return Program(name, files, {}, defines);
-}
-
-const Program& use(Renderer& renderer, const std::string& name) {
-  if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
-  const Program& program = renderer.programs.at(name);
-  program.use();
-  return program;
-}
-
-Buffer rest_buffer(const Renderer& renderer) {
-  std::vector<glm::vec4> rest;
-  std::size_t next = 1;  // body
-  for (const glm::dvec3& p : renderer.mesh.positions) {
-    while (next < renderer.bodies.size() && rest.size() >= renderer.bodies[next]) ++next;
-    rest.emplace_back(glm::vec3(p), float(next - 1));
-  }
-  return Buffer("render rest", rest);
 }
 
 // What the corners of elements gather: the other corners of each, in the order of `others`.
@@ -100,7 +87,7 @@ GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, co
 GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   const Colour colour = frame.options.colour;
   if (colour == Colour::plain) return 0;
-  if (colour == Colour::motion) return frame.distances;
+  if (colour == Colour::motion || colour == Colour::patch) return frame.values;
   VertexGather& values = renderer.values[colour];
   const std::string label = std::string("vertex values, ") + colour_names[std::size_t(colour)];
   if (colour == Colour::velocity) {
@@ -174,9 +161,9 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
   };
   const ViewOptions& options = frame.options;
   const bool tets = options.look == Look::tets, coloured = options.colour != Colour::plain;
-  const bool of_vertices = options.colour == Colour::velocity || options.colour == Colour::motion;
-  if (!renderer.rest && (tets || coloured || options.is_cut() || renderer.bodies.size() > 1))
-    renderer.rest = rest_buffer(renderer);
+  const bool of_vertices = options.colour == Colour::velocity || options.colour == Colour::motion ||
+                           options.colour == Colour::patch;
+  if (tets || coloured || options.is_cut() || renderer.bodies.size() > 1) rest_of(renderer);
   GLuint normal = 0, value = 0;
   if (!tets && options.smooth_normals)  // the geometry shader of tets has the whole tetrahedron
     normal = gathered(renderer, frame, renderer.normals, use(renderer, "normals"), [](const TetMesh& mesh) {
@@ -203,22 +190,30 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
 
 // To the image or, with `shadow`, to the map.
 void draw_bodies(Renderer& renderer, const Frame& frame, bool shadow) {
-  const auto elements = [&](const char* program, bool tets) {
+  const auto elements = [&](const char* program, GLenum kind, const Buffer& indices) {
     use(renderer, std::string(program) + (shadow ? " shadow" : ""));
-    Buffer& indices = tets ? renderer.tets : renderer.triangles;
-    if (!indices)
-      indices =
-          tets ? Buffer("tet indices", renderer.mesh.tets) : Buffer("surface indices", renderer.mesh.surface);
     glBindVertexArray(renderer.vertex_array.id());
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.id());
-    glDrawElements(tets ? GL_LINES_ADJACENCY : GL_TRIANGLES, GLsizei(indices.bytes() / sizeof(std::uint32_t)),
-                   GL_UNSIGNED_INT, nullptr);
+    glDrawElements(kind, GLsizei(indices.bytes() / sizeof(std::uint32_t)), GL_UNSIGNED_INT, nullptr);
   };
-  if (frame.options.is_cut()) glEnable(GL_CLIP_DISTANCE0);
-  const bool tets = frame.options.look == Look::tets;
-  elements(tets ? "tets" : "surface", tets);
+  const Look look = frame.options.look;
+  const bool cut = frame.options.is_cut(), graph = look == Look::graph && !shadow;
+  if (look != Look::tets && !graph && !renderer.triangles)
+    renderer.triangles = Buffer("surface indices", renderer.mesh.surface);
+  if (graph && !renderer.graph) renderer.graph = Buffer("graph indices", tet_edges(renderer.mesh));
+  if (cut) glEnable(GL_CLIP_DISTANCE0);
+  if (graph) {  // all of it, mixed
+    glEnable(GL_BLEND);
+    glDepthMask(GL_FALSE);
+    elements("graph", GL_LINES, renderer.graph);
+    glDepthMask(GL_TRUE);
+  } else if (look == Look::tets) {
+    elements("tets", GL_LINES_ADJACENCY, tets_of(renderer));
+  } else {
+    elements("surface", GL_TRIANGLES, renderer.triangles);
+  }
   glDisable(GL_CLIP_DISTANCE0);
-  if (frame.options.is_cut()) elements("caps", true);
+  if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, tets_of(renderer));
 }
 
 // The projection of the light, as far as something of this frame needs it, fitted by the GPU itself.
@@ -313,27 +308,6 @@ void draw_plane(Renderer& renderer, const Frame& frame, const glm::vec4& plane, 
   glDepthMask(GL_TRUE);
 }
 
-void draw_dots(Renderer& renderer, const Frame& frame) {
-  if (frame.pinned.empty() && frame.grabbed.empty() && frame.worst.empty()) return;
-  glBindVertexArray(renderer.vertex_array.id());
-  glEnable(GL_PROGRAM_POINT_SIZE);
-  const Program& program = use(renderer, "dots");
-  const auto batch = [&](const std::vector<std::uint32_t>& vertices, const glm::vec3& colour, float size,
-                         float hole = 0) {
-    program.set("colour", colour);
-    program.set("hole", hole);
-    program.set("size", size * std::max(1.0f, float(frame.viewport.height) / 720.0f));
-    const std::vector<GLint> first(vertices.begin(), vertices.end());
-    const std::vector<GLsizei> ones(vertices.size(), 1);
-    glMultiDrawArrays(GL_POINTS, first.data(), ones.data(), GLsizei(first.size()));
-  };
-  batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
-  batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
-  glDisable(GL_DEPTH_TEST);
-  batch(frame.worst, glm::vec3(0.70f, 0.0f, 0.30f), 18.0f, 0.68f);
-  glDisable(GL_PROGRAM_POINT_SIZE);
-}
-
 // However drawing ends, by a shader that does not compile, too.
 struct Afterwards {
   ~Afterwards() {
@@ -347,6 +321,38 @@ struct Afterwards {
 };
 
 }  // namespace
+
+const Program& use(Renderer& renderer, const std::string& name) {
+  if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
+  const Program& program = renderer.programs.at(name);
+  program.use();
+  return program;
+}
+
+const Buffer& tets_of(Renderer& renderer) {
+  if (!renderer.tets) renderer.tets = Buffer("tet indices", renderer.mesh.tets);
+  return renderer.tets;
+}
+
+const Buffer& rest_of(Renderer& renderer) {
+  if (renderer.rest) return renderer.rest;
+  std::vector<glm::vec4> rest;
+  std::size_t next = 1;  // body
+  for (const glm::dvec3& p : renderer.mesh.positions) {
+    while (next < renderer.bodies.size() && rest.size() >= renderer.bodies[next]) ++next;
+    rest.emplace_back(glm::vec3(p), float(next - 1));
+  }
+  return renderer.rest = Buffer("render rest", rest);
+}
+
+void bind_view(Renderer& renderer, const Frame& frame) {
+  const View view = view_block(renderer, frame);
+  renderer.view.write(0, sizeof view, &view);
+  renderer.view.bind_uniform(BIND_RENDER_VIEW);
+  fit_light(renderer, frame);
+  // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
+  (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
+}
 
 Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies) {
   Renderer renderer;
@@ -393,14 +399,9 @@ void draw(Renderer& renderer, const Frame& frame) {
   if (frame.viewport.width < 1 || frame.viewport.height < 1) return;  // a minimised window
   const Afterwards afterwards;
   const ViewOptions& options = frame.options;
-  const View view = view_block(renderer, frame);
-  renderer.view.write(0, sizeof view, &view);
-  renderer.view.bind_uniform(BIND_RENDER_VIEW);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
-  fit_light(renderer, frame);
-  // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
-  (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
+  bind_view(renderer, frame);
   bind_attributes(renderer, frame);
   if (options.shadow) draw_shadow_map(renderer, frame);
 
@@ -444,7 +445,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   draw_bodies(renderer, frame, false);
   glDisable(GL_POLYGON_OFFSET_FILL);
   glEnable(GL_BLEND);
-  draw_dots(renderer, frame);
+  draw_marks(renderer, frame);
   if (!options.has_scale() && frame.caption.empty()) return;
   glDisable(GL_FRAMEBUFFER_SRGB);
   draw_legend(renderer.legend, viewport, options, frame.caption);

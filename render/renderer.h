@@ -42,7 +42,9 @@ struct Renderer {
   VertexArray vertex_array, empty_array;
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
-  Buffer rest;             ///< vec4: rest position and body
+  Buffer graph;            ///< edges' vertices
+  Buffer arrow_vertices;
+  Buffer rest;  ///< vec4: rest position and body
   VertexGather normals;
   std::map<Colour, VertexGather> values;
   Buffer values_copy;  ///< on its way back
@@ -55,6 +57,13 @@ Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies = {});
 Renderer make_renderer(const Model& model);
 /// Leaves framebuffer, viewport and scissor at the frame's; depth test, blending and sRGB encoding off.
 void draw(Renderer& renderer, const Frame& frame);
+/// Puts what shaders know of the view in place, without which nothing is drawn.
+void bind_view(Renderer& renderer, const Frame& frame);
+/// The program of that name, made when first asked for, in use.
+const Program& use(Renderer& renderer, const std::string& name);
+/// The tetrahedra's vertices, rest positions with bodies: made when first asked for.
+const Buffer& tets_of(Renderer& renderer);
+const Buffer& rest_of(Renderer& renderer);
 /// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
 /// The values by vertex that a frame drawn with `worst` coloured, once, some frames later (`wait`: now).

@@ -292,7 +292,7 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
   for (const float apart : distances.read_all<float>()) CHECK(apart == doctest::Approx(0.125));
   stage.frame.options = {.look = Look::surface, .colour = Colour::motion, .shadow = false, .legend = false};
   const Image unknown = stage.image();
-  stage.frame.distances = distances.id();
+  stage.frame.values = distances.id();
   const glm::vec3 far = pixel(stage.image(), width / 2, height / 2);
   CHECK(brightness(far) > brightness(pixel(unknown, width / 2, height / 2)) + 30);
   const Image without = stage.image();
@@ -306,6 +306,57 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
   CHECK(ring.count > 40);
   CHECK(std::abs(float(ring.low.x + ring.high.x) * 0.5f - at.x) < 2);
   CHECK(difference(without, unknown).count > 500);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: the graph's edges, dots where vertices touch, arrows of velocity, numbers as colours") {
+  Stage stage;
+  const Image solid = stage.image(), empty = stage.empty();
+  stage.frame.options.look = Look::graph;
+  const Difference lines = difference(stage.image(), empty);
+  CHECK(lines.count > 500);
+  CHECK(lines.count < difference(solid, empty).count);
+  stage.frame.options.cut = 0.5;
+  CHECK(difference(stage.image(), empty).count < 0.8 * lines.count);
+
+  stage.frame.options = {.shadow = false, .grid = false, .contacts = true};
+  stage.frame.camera.elevation = -30;  // from below
+  stage.frame.ground = -0.5f;
+  const Image touching = stage.image();
+  stage.frame.ground = -0.51f;
+  stage.frame.options.contacts = false;
+  const Image above = stage.image();
+  stage.frame.options.contacts = true;
+  CHECK(difference(stage.image(), above).count == 0);
+  const glm::vec3 dot =
+      pixel(touching, project(stage.frame.camera, {0.5f / 3, -0.5f, 0.5f / 3}, width, height));
+  CHECK(dot.x > 2 * dot.z);
+
+  stage.frame.camera.elevation = 18;
+  stage.frame.ground.reset();
+  std::vector<Velocity> velocities(stage.mesh.positions.size());
+  for (Velocity& v : velocities) v.high = {0, 3, 0};
+  const Buffer buffer("velocities", velocities);
+  stage.frame.velocities = buffer.id();
+  const Difference before = difference(stage.image(), empty);
+  stage.frame.options.arrows = true;  // 0.3 m up
+  const Difference with = difference(stage.image(), empty);
+  const float raised = project(stage.frame.camera, {0, 0.5f, 0}, width, height).y -
+                       project(stage.frame.camera, {0, 0.8f, 0}, width, height).y;
+  CHECK(std::abs(float(before.low.y - with.low.y) - raised) < 0.3f * raised);
+
+  stage.frame.options = {.colour = Colour::patch, .shadow = false};
+  std::vector<float> numbers(stage.mesh.positions.size());
+  stage.frame.camera.azimuth = 0;
+  for (std::size_t v = 0; v < numbers.size(); ++v) numbers[v] = float(stage.mesh.positions[v].x > 0);
+  const Buffer values("numbers", numbers);
+  stage.frame.values = values.id();
+  const Image patches = stage.image();
+  const auto hue = [&](float x) {
+    return glm::normalize(pixel(patches, project(stage.frame.camera, {x, 0, 0.5f}, width, height)));
+  };
+  CHECK(glm::distance(hue(-0.4f), hue(0.4f)) > 0.1f);
+  CHECK(glm::distance(hue(0.3f), hue(0.4f)) < 0.05f);
   CHECK(gl_error_count() == 0);
 }
 

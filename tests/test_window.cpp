@@ -188,7 +188,8 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK(s.worst[0].second == std::ranges::max(apart));
 
   const glm::dvec3 aim = 0.5 * (bounds(state.positions).low + bounds(state.positions).high);
-  ask(s.loaded.probe, s.loaded.lanes, 0, {glm::vec3(aim) + glm::vec3(0, 5, 0.01f), {0, -1, 0}});
+  ask(s.loaded.probe, s.loaded.lanes, 0, s.loaded.renderer, shown_frame(s, 0),
+      {glm::vec3(aim) + glm::vec3(0, 5, 0.01f), {0, -1, 0}});
   CHECK(s.loaded.probe.asked());
   CHECK(take_reading(s.loaded.probe, s.loaded.lanes, true));
   REQUIRE(s.loaded.probe.reading);
@@ -202,9 +203,17 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK(r.volume == doctest::Approx(ratio - 1).epsilon(1e-2).scale(1e-4));
   CHECK(*r.distance == doctest::Approx(double(apart[r.vertex])));
   CHECK_FALSE(r.energy);
-  ask(s.loaded.probe, s.loaded.lanes, 0, {glm::vec3(0, 50, 0), {0, 1, 0}});  // beside it
+  ask(s.loaded.probe, s.loaded.lanes, 0, s.loaded.renderer, shown_frame(s, 0),
+      {glm::vec3(0, 50, 0), {0, 1, 0}});  // beside it
   CHECK(take_reading(s.loaded.probe, s.loaded.lanes, true));
   CHECK_FALSE(s.loaded.probe.reading);
+  choose_colour(s, Colour::patch);
+  CHECK(has_colour(s, Colour::patch));
+  draw_lanes(s, target);
+  const auto patches = s.loaded.lane().patches.read_all<float>();
+  CHECK(std::ranges::is_sorted(patches));  // of neighbours in number
+  CHECK(patches.back() + 1 == float(sim.solver.iteration[0].work_groups));
+  choose_colour(s, Colour::motion);
   toggle_pin(s, 0);  // no longer the scene's motion
   draw_lanes(s, target);
   CHECK_FALSE(s.loaded.lane().apart);

@@ -16,6 +16,9 @@ out Point {
   flat vec3 albedo;
 } point;
 
+// Numbers are not mixed: an element has the colour of its first corner.
+float shown_value(int i) { return corner[int(view.colour.x) == COLOUR_PATCH ? 0 : i].value; }
+
 void emit(vec3 edge, vec3 position, vec3 normal, float value, vec3 albedo) {
 #ifdef SHADOW
   gl_Position = light.matrix * vec4(position, 1.0);

@@ -11,6 +11,7 @@
 #define BIND_RENDER_FIT 7
 #define BIND_PICK_TRIANGLES 1
 #define BIND_PICK_RESULT 2
+#define BIND_PICK_REST 3
 // Uniform blocks; 0 is the simulation's step.
 #define BIND_RENDER_VIEW 1
 #define BIND_RENDER_LIGHT 2
@@ -23,6 +24,7 @@
 #define ATTRIBUTE_NORMAL 2
 #define ATTRIBUTE_VALUE 3
 #define ATTRIBUTE_REST 4
+#define ATTRIBUTE_VELOCITY 5
 
 #define COLOUR_PLAIN 0
 #define COLOUR_VOLUME 1
@@ -30,6 +32,7 @@
 #define COLOUR_VELOCITY 3
 #define COLOUR_ENERGY 4
 #define COLOUR_MOTION 5
+#define COLOUR_PATCH 6
 
 #define PALETTE_SIZE 16
 

@@ -14,7 +14,7 @@ bool place_tet(out vec3 p[4], out float value[4]) {
   for (int i = 0; i < 4; ++i) {
     p[i] = corner[i].position;
     r[i] = corner[i].rest.xyz;
-    value[i] = corner[i].value;
+    value[i] = shown_value(i);
     if (!finite(p[i])) return false;
   }
   int kind = int(view.colour.x);

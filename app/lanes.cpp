@@ -22,7 +22,7 @@ double effort(const Settings& s) { return leaps(s) ? 1e9 / s.stability : double(
 
 }  // namespace
 
-std::string describe(const Lane& lane) {
+std::string describe(const Lane& lane, bool material) {
   const Settings& s = lane.sim.settings;
   std::string text = s.mode;
   const auto add = [&](int count, const char* what) {
@@ -30,9 +30,20 @@ std::string describe(const Lane& lane) {
   };
   add(s.substeps, "substep");
   add(s.iterations, "iteration");
-  if (s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
+  if (material && s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
   if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
   return text;
+}
+
+void History::add(double value, double time) {
+  if (!values.empty() && (added - 1) % every != 0)
+    values.pop_back(), times.pop_back();  // stood for the newest alone
+  values.push_back(float(value)), times.push_back(time);
+  ++added;
+  if (values.size() <= most) return;
+  for (std::size_t i = 0; 2 * i < values.size(); ++i) values[i] = values[2 * i], times[i] = times[2 * i];
+  values.resize((values.size() + 1) / 2), times.resize(values.size());
+  every *= 2;
 }
 
 namespace {
@@ -151,7 +162,7 @@ void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   for (Lane& lane : lanes) {
     if (lane.stopped() || lane.sim.steps != now) continue;
     const double distance = error_to(model, answer, read_state(lane.sim));
-    if (std::isfinite(distance)) lane.distance.add(100 * distance);
+    if (std::isfinite(distance)) lane.distance.add(100 * distance, double(now) * lane.sim.settings.dt);
   }
 }
 

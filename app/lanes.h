@@ -15,20 +15,20 @@ namespace tetpbd {
 
 inline constexpr std::size_t most_lanes = 4;
 
-/// The last values of something that changes from frame to frame.
+/// Something over time: all of it, in even steps that grow with its length, and the newest value.
 struct History {
+  static constexpr std::size_t most = 4096;
   std::vector<float> values;
-  void add(double value) {
-    if (values.size() >= 240) values.erase(values.begin());
-    values.push_back(float(value));
-  }
+  std::vector<double> times;  ///< s
+  long added = 0, every = 1;
+  void add(double value, double time);
 };
 
 struct Lane {
   Sim sim;
-  std::optional<Metrics> metrics{};  ///< made when first shown
-  History step_ms{}, volume_error{};
-  History distance{};  ///< from what is right, % of the size
+  std::optional<Metrics> metrics{};             ///< made when first shown
+  History step_ms{}, volume_error{}, energy{};  ///< J, kinetic and of gravity
+  History distance{};                           ///< from what is right, % of the size
   Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                    ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
@@ -41,7 +41,7 @@ bool has_patches(const Lane& lane);
 /// A buffer of floats, made when first asked for: waits for the GPU then. 0 where there are no patches.
 GLuint patch_numbers(Lane& lane);
 /// "node, 25 iterations": what sets it apart from others.
-std::string describe(const Lane& lane);
+std::string describe(const Lane& lane, bool material = true);
 /// Body colour, sRGB.
 glm::vec3 lane_colour(std::size_t lane);
 /// Where it is drawn among `count`: side by side, four in two rows.

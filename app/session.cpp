@@ -16,6 +16,8 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
+double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }
+
 // After the state was put back: measurements under way belong to what was before.
 void start_afresh(Session& s) {
   s.clock.owed = 0;
@@ -23,7 +25,7 @@ void start_afresh(Session& s) {
   for (Lane& lane : s.loaded.lanes) {
     while (lane.metrics && collect(*lane.metrics, true)) {
     }
-    lane.volume_error = lane.distance = {};
+    lane.step_ms = lane.volume_error = lane.energy = lane.distance = {};
     lane.apart = {};
   }
   s.loaded.disturbed = false;
@@ -62,10 +64,10 @@ void one_step(Session& s) {
     if (s.grab && &lane != &s.loaded.lane()) move_pinned(lane.sim, s.grab->vertex, s.grab->position);
     const auto begin = Steady::now();
     step(lane.sim);
-    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3);
+    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, time_of(lane.sim));
   }
   if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
-  if (lanes.size() > 1 && s.loaded.comparable) hold_lanes(lanes, right_now(s));
+  if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
   if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
 }
@@ -265,7 +267,6 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
     s.beside = glm::vec3(0);
   }
   s.centre.reset();
-  s.loaded.lane().step_ms = {};
   s.worst.clear();
   start_afresh(s);
   if (s.view.colour == Colour::motion) attempt(s, [&] { find_right(s); });
@@ -541,12 +542,14 @@ void advance(Session& s, double elapsed) {
 
 void measure_frame(Session& s, bool stepped) {
   for (Lane& lane : s.loaded.lanes) {
-    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms);
+    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, time_of(lane.sim));
     lane.sim.timed = s.measuring;
     if (!s.measuring) continue;
     if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
-    while (const auto measurement = collect(*lane.metrics))
-      lane.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
+    while (const auto now = collect(*lane.metrics)) {
+      lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
+      lane.energy.add(now->finite() ? now->energy() : 0.0, now->time);
+    }
     // Half the ring of results: with more under way, asking again would wait for the oldest.
     if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim);
   }

@@ -84,12 +84,21 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
+/// What of a plot's axis is seen.
+struct PlotView {
+  bool zoomed = false;
+  double low = 0, high = 1;
+};
+
 /// What is shown of the panels.
 struct Ui {
   bool panels = true, plots = true, help = false;
   float scale = 1;                     ///< of the display: 2 on a dense one
   std::string mesh;                    ///< path being typed
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
+  std::array<PlotView, 3> plot_views;
+  std::array<std::array<std::size_t, 3>, 2> plot_choice{
+      {{0, 1, 2}, {1, 4, 5}}};  ///< plot_rows(): of one lane, of several
 };
 
 struct Session {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <functional>
 #include <string_view>
 #include <utility>
@@ -336,9 +335,7 @@ void take_screenshots(Session& s, View& view) {
   attempt(s, [&] {
     const auto image = view.read_back.poll();
     if (!image) return;
-    std::string name;
-    for (int i = 0; name.empty() || std::filesystem::exists(name); ++i)
-      name = fmt::format("screenshot_{:03}.png", i);
+    const std::string name = free_name("screenshot", "png");
     write_png(name, *image);
     s.log("screenshot {}", name);
     say(s, "saved " + name);
@@ -440,7 +437,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     const double elapsed = s.now - std::exchange(before, s.now);
     if (!desktop.visible) continue;
     if (!idle && ++frames > 2)
-      s.frames_per_second.add(1 / std::max(elapsed, 1e-6));  // the first compile shaders
+      s.frames_per_second.add(1 / std::max(elapsed, 1e-6), s.now);  // the first compile shaders
     if (desktop.width != last_width || desktop.height != last_height)
       s.log("size {} {}", last_width = desktop.width, last_height = desktop.height);
     if (s.loaded.scene.name != title)

@@ -219,3 +219,40 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK_FALSE(s.loaded.lane().apart);
   CHECK(gl_error_count() == 0);
 }
+
+TEST_CASE("window: a history is all of it in even steps, and the newest; plots are copied and saved") {
+  History history;
+  for (int i = 0; i < 30000; ++i) {
+    history.add(i, 0.5 * i);
+    REQUIRE(history.values.size() <= History::most);
+    REQUIRE(history.values.back() == float(i));
+  }
+  CHECK(history.values.size() > History::most / 2);
+  for (std::size_t k = 0; k + 1 < history.values.size(); ++k) {
+    CHECK(history.values[k] == float(8 * k));
+    CHECK(history.times[k] == 4.0 * double(k));
+  }
+
+  GlTest gl;
+  Scene scene = load_scene("beam", {.solver = "hard"});
+  scene.bodies[0].fixed.clear();
+  scene.bodies[0].block->cells = {3, 2, 2};
+  Session s;
+  s.playing = false;
+  take_over(s, load("beam", {}, scene), false);
+  compare_lanes(s, {"hard", "mode=cpu,iterations=3"});
+  for (int i = 0; i < 40; ++i) single_step(s);
+  const PlotRow& distance = plot_rows()[4];
+  const Chart chart = plot_chart(s, distance);
+  REQUIRE(chart.series.size() == 2);
+  CHECK(chart.series[0].points.size() == s.loaded.lanes[0].distance.values.size());
+  CHECK(chart.series[1].points.back().x == doctest::Approx(s.loaded.lanes[1].distance.times.back()));
+  CHECK(to_svg(chart).find("distance from the right motion") != std::string::npos);
+  const std::string csv = plot_csv(s, distance);
+  CHECK(csv.starts_with("lane,time [s],distance from the right motion [%]\n\"node, 5 substeps\",0"));
+  CHECK(std::ranges::count(csv, '\n') == 1 + 2 * std::ssize(chart.series[0].points));
+  const Measurement now = measure_now(*s.loaded.lanes[0].metrics, s.loaded.lanes[0].sim);
+  CHECK(double(s.loaded.lanes[0].energy.values.back()) == doctest::Approx(now.energy()).epsilon(0.2));
+  restart(s);
+  CHECK(plot_chart(s, distance).series.empty());
+}

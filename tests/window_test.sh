@@ -232,6 +232,12 @@ for lane in "1 node paper" "2 node hard" "3 cpu-fast hard"; do  # in lock-step, 
   grep -q "\"state_hash\": \"$hash\"" lane/stats.json || fail "lane $number has another state than a run without a window"
 done
 forget; shot lanes.png
+to "plot 2" 0.5 0.5; forget; xdotool click 4; await '^plot 2 [-0-9.e]+ \.\. '; shot zoomed.png
+forget; xdotool click --repeat 2 --delay 60 1; await '^plot 2 whole'
+click "csv 2"; await '^message copied [0-9]+ rows'
+click "svg 1"; await '^message saved plot_000.svg'; grep -q "time per step, ms" plot_000.svg || fail "the saved plot has no axis"
+choose "plotted 3" "energy but for elastic"; await '^plotted 3 energy'
+xdotool mousemove $((vx + 20)) $((vy + 20)); sleep 4.5; shot lanes.png  # messages go
 key o; await '^overlaid true'; pause_for_frame; shot overlaid.png
 differ lanes.png overlaid.png 20000 "lanes in one place"
 key o; await '^overlaid false'

@@ -358,8 +358,9 @@ void draw_view(Session& s) {
   s.samples = doublings ? 1 << doublings : 0;
 }
 
-bool section(Session& s, const char* name) {
-  const bool shown = ImGui::CollapsingHeader(name, ImGuiTreeNodeFlags_DefaultOpen);
+bool section(Session& s, const char* name, bool open = true) {
+  const bool shown =
+      ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
   mark(s, std::string("section ") + name);
   return shown;
 }
@@ -392,6 +393,7 @@ void draw_panel(Session& s) {
   draw_run(s);
   if (section(s, "Scene")) draw_scene(s);
   if (section(s, "Side by side")) draw_lane_rows(s);
+  if (section(s, "Stability map", false)) draw_map(s);
   if (section(s, "Solver")) draw_solver(s), draw_material(s), draw_parameters(s, "solver");
   if (section(s, "View")) draw_view(s);
   if (section(s, "World")) draw_parameters(s, "world");

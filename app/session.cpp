@@ -555,6 +555,16 @@ void measure_frame(Session& s, bool stepped) {
   }
 }
 
+bool is_filling(const Session& s) { return s.loaded.map && !s.loaded.map->is_done(); }
+
+void fill_map(Session& s) {
+  if (!is_filling(s)) return;
+  const std::size_t before = s.loaded.map->done;
+  const double budget = s.playing ? 0.008 : 0.03;  // s of a frame
+  if (!attempt(s, [&] { fill_map(*s.loaded.map, budget); })) return s.loaded.map.reset();
+  if (s.loaded.map->done > before && s.loaded.map->is_done()) s.log("map done");
+}
+
 void follow_shaders(Session& s) {
   const auto version = shader_folder_version();
   if (version == s.loaded.sim().shader_version) return;

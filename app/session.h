@@ -13,6 +13,7 @@
 #include "app/auto_solver.h"
 #include "app/grab.h"
 #include "app/lanes.h"
+#include "app/live_map.h"
 #include "app/probe.h"
 #include "app/scene.h"
 #include "render/picking.h"
@@ -38,6 +39,7 @@ struct Loaded {
   Buffer answers{};                      ///< where the right motion has the vertices
   long held = -1;                        ///< step at which vertices were last held against it
   Probe probe{};
+  std::optional<LiveMap> map{};
   Lane& lane() { return lanes[chosen]; }
   Sim& sim() { return lane().sim; }
   const Sim& sim() const { return lanes[chosen].sim; }
@@ -90,10 +92,17 @@ struct PlotView {
   double low = 0, high = 1;
 };
 
+/// The axes of the map, as they are typed.
+struct MapWords {
+  std::string x{}, y{};
+  bool typed = false;
+};
+
 /// What is shown of the panels.
 struct Ui {
   bool panels = true, plots = true, help = false;
-  float scale = 1;                     ///< of the display: 2 on a dense one
+  float scale = 1;  ///< of the display: 2 on a dense one
+  MapWords map;
   std::string mesh;                    ///< path being typed
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
   std::array<PlotView, 3> plot_views;
@@ -185,6 +194,9 @@ void advance(Session& session, double elapsed);
 void measure_frame(Session& session, bool stepped);
 /// The vertices with the largest values of the colour, apart from each other, once values have arrived.
 void find_worst(Session& session);
+/// Goes on with the map, if there is one that is not done.
+void fill_map(Session& session);
+bool is_filling(const Session& session);
 /// Compiles again what changed in the shader folder.
 void follow_shaders(Session& session);
 

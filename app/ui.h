@@ -51,6 +51,7 @@ void begin_part(const char* name, const Rect& place);
 
 /// The panel at the right, and the part of its width that a widget's label takes.
 void draw_panel(Session& session);
+void draw_map(Session& session);
 float label_width();
 std::string label_of(const char* parameter);
 /// Notes where the last widget is, so that a test can find it: "at NAME x y width height".

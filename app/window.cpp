@@ -148,9 +148,9 @@ void release(Input& in, int button) {
   in.button = -1;
 }
 
-void wheel(Input& in, double turned) {
+void wheel(Input& in, double turned, bool of_cut) {
   if (!on_view(in)) return;
-  if (ImGui::GetIO().KeyAlt || ImGui::GetIO().KeyCtrl) {
+  if (of_cut) {
     move_cut(in.session, 0.02 * turned);
     return in.session.log("cut {:.4f}", in.session.view.cut);
   }
@@ -226,7 +226,11 @@ void listen(GLFWwindow* window, Input& input) {
     of(w)->events.push_back([=, in = of(w)] { move(*in, x, y); });
   });
   glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turned) {
-    of(w)->events.push_back([=, in = of(w)] { wheel(*in, turned); });
+    bool of_cut = false;  // as it is now, not in the next frame
+    for (const int held :
+         {GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL})
+      of_cut = of_cut || glfwGetKey(w, held) == GLFW_PRESS;
+    of(w)->events.push_back([=, in = of(w)] { wheel(*in, turned, of_cut); });
   });
 }
 
@@ -425,8 +429,8 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.log("ready");
   while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !moving && !input.busy() && !s.task && view.read_back.pending() == 0 &&
-                      glfwGetTime() - last_event > 0.5;
+    const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task &&
+                      view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
     if (!desktop.visible || idle)
       glfwWaitEventsTimeout(0.1);
     else
@@ -451,6 +455,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
           measure_frame(s, s.clock.simulated != simulated);
         }))
       s.ui.plots = false, play(s, false);  // said once, not every frame
+    fill_map(s);
     moving = follow_bodies(s, elapsed);
     if (s.now - last_check > 0.5) {
       last_check = s.now;

@@ -2,7 +2,9 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <thread>
 
+#include "app/reference_command.h"
 #include "app/run_loop.h"
 #include "app/session.h"
 #include "app/ui.h"
@@ -255,4 +257,57 @@ TEST_CASE("window: a history is all of it in even steps, and the newest; plots a
   CHECK(double(s.loaded.lanes[0].energy.values.back()) == doctest::Approx(now.energy()).epsilon(0.2));
   restart(s);
   CHECK(plot_chart(s, distance).series.empty());
+}
+
+TEST_CASE("window: a map is filled a little in every frame, each cell as a run of its own comes out") {
+  GlTest gl;
+  Scene scene = load_scene("beam", {.solver = "hard"});
+  scene.bodies[0].fixed.clear();
+  scene.bodies[0].block->cells = {3, 2, 2};
+  scene.duration = 0.2;
+  Session s;
+  s.playing = false;
+  take_over(s, load("beam", {}, scene), false);
+  const auto fill = [&](const Settings& base, const char* x, const char* y) {
+    s.loaded.map = start_map(s.loaded.sim().model, base, x, y, scene.duration);
+    int frames = 0;
+    for (; is_filling(s); ++frames) {
+      fill_map(s);
+      glFinish();
+      if (s.loaded.map->search) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    CHECK(frames > 1);
+    CHECK(s.messages.empty());
+    return s.loaded.map->cells;
+  };
+  const Settings own = s.loaded.sim().settings;
+  for (const MapCell& cell : fill(own, "substeps=1,5", "dt=0.005,0.02")) {
+    REQUIRE(cell.state == MapCell::finished);
+    const long steps = std::lround(scene.duration / cell.settings.dt);
+    const auto right = rigid_motion(*s.loaded.sim().model, cell.settings, steps);
+    Sim sim = create_sim(s.loaded.sim().model, cell.settings);
+    MotionError error;
+    for (long i = 1; i <= steps; ++i) {
+      step(sim);
+      if (i == steps || i % std::max(1l, steps / 16) == 0)
+        add_state(error, *right, *sim.model, i, read_state(sim));
+    }
+    CHECK(cell.percent == doctest::Approx(100 * error.rms).epsilon(1e-6));
+  }
+  CHECK_FALSE(s.loaded.map->sim);  // done: it holds nothing
+  // A material's right motion is found meanwhile; what a mode does not take is said.
+  Settings soft = lane_settings(own, "foam,mode=explicit", "");
+  soft.stability = 0.01;
+  const auto cells = fill(soft, "young_modulus=1e5,1e12", "omega=1,1.5");
+  CHECK(s.loaded.map->order == std::vector<std::size_t>{0, 2, 1, 3});
+  CHECK(cells[0].state == MapCell::finished);
+  CHECK(cells[0].percent < 0.1);
+  CHECK(cells[1].state == MapCell::refused);
+  CHECK(cells[1].why.find("too stiff") != std::string::npos);
+  CHECK_THROWS_WITH_AS(start_map(s.loaded.sim().model, own, "mode=1,2", "dt=0.01", 1),
+                       doctest::Contains("is no setting with a number"), Error);
+  s.loaded.map = start_map(s.loaded.sim().model, soft, "young_modulus=1e5,1e6", "damping=0,1", 5);
+  fill_map(s);  // and left while its motion is being found
+  s.loaded.map.reset();
+  CHECK(gl_error_count() == 0);
 }

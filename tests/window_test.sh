@@ -232,9 +232,9 @@ for lane in "1 node paper" "2 node hard" "3 cpu-fast hard"; do  # in lock-step, 
   grep -q "\"state_hash\": \"$hash\"" lane/stats.json || fail "lane $number has another state than a run without a window"
 done
 forget; shot lanes.png
-to "plot 2" 0.5 0.5; forget; xdotool click 4; await '^plot 2 [-0-9.e]+ \.\. '; shot zoomed.png
-forget; xdotool click --repeat 2 --delay 60 1; await '^plot 2 whole'
-click "csv 2"; await '^message copied [0-9]+ rows'
+to "plot 1" 0.5 0.5; forget; xdotool click 4; await '^plot 1 [-0-9.e]+ \.\. '; shot zoomed.png
+forget; for _ in 1 2 3; do xdotool click 5; pause_for_frame; done; await '^plot 1 whole'
+click "csv 1"; await '^message copied [0-9]+ rows'
 click "svg 1"; await '^message saved plot_000.svg'; grep -q "time per step, ms" plot_000.svg || fail "the saved plot has no axis"
 choose "plotted 3" "energy but for elastic"; await '^plotted 3 energy'
 xdotool mousemove $((vx + 20)) $((vy + 20)); sleep 4.5; shot lanes.png  # messages go
@@ -249,6 +249,14 @@ key space; await '^pause'
 forget; key j; await '^reset'; key k; await '^reset'
 [[ $(new_events | grep -c '^lane cpu-fast') -eq 2 ]] || fail "a lane more is not as the chosen one"
 choose "side by side" "one way"; await '^reset'
+
+# --------------------------------------------------------------------------------------------------- stability map
+click "section Stability map" 0.1; sleep 0.5
+click "map across"; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "substeps=1,4"; pause_for_frame
+click "map up"; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "omega=1,1.5"; pause_for_frame
+click "fill map"; await '^map of 4 cells'; await '^map done'; sleep 0.5; shot map.png
+click "map 2 1"; await '^map chose 4 1'; await '^set substeps 4'
+click "section Stability map" 0.1; sleep 0.5
 
 # ------------------------------------------------------------------------------------------------- errors, other scenes
 type_mesh() {

@@ -108,7 +108,8 @@ void draw_map(Session& s) {
     ImGui::TextUnformatted(label);
     ImGui::SameLine(ImGui::GetFontSize() * 4);
     ImGui::SetNextItemWidth(-1);
-    words.typed |= ImGui::InputText(fmt::format("##{}", label).c_str(), text);
+    words.typed |=
+        ImGui::InputText(fmt::format("##{}", label).c_str(), text, ImGuiInputTextFlags_AutoSelectAll);
     mark(s, std::string("map ") + label);
     if (ImGui::IsItemHovered() && !ImGui::IsItemActive())
       ImGui::SetTooltip("PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT, as tetpbd map takes them");

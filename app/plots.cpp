@@ -44,7 +44,7 @@ std::string lane_name(const Session& s, const Curve& curve) {
 }
 
 std::string title_of(const Session& s, const PlotRow& row) {
-  const bool right = s.loaded.right && !s.loaded.disturbed;
+  const bool right = right_now(s);
   const std::string from = right ? "distance from the right motion" : "distance from the finest lane";
   return row.of != &Lane::distance ? row.title : row.over_cost ? "distance over time per step" : from;
 }

@@ -42,20 +42,6 @@ void disturb(Session& s) {
     for (Lane& lane : s.loaded.lanes) lane.distance = {}, lane.apart = {};
 }
 
-const Motion* right_now(const Session& s) {
-  return s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr;
-}
-
-// Of each vertex, if somebody looks at it.
-void hold_vertices(Session& s) {
-  Loaded& l = s.loaded;
-  const bool known = right_now(s) || (l.lanes.size() > 1 && l.comparable);
-  if (!known || l.held == l.sim().steps || (s.view.colour != Colour::motion && !l.probe.reading)) return;
-  if (right_now(s) && !is_kept(*l.right, l.sim().steps)) return;
-  hold_vertices(l.lanes, right_now(s), l.renderer, l.answers);
-  l.held = l.sim().steps;
-}
-
 void one_step(Session& s) {
   if (s.grab) lead(*s.grab, s.loaded.sim());
   auto& lanes = s.loaded.lanes;
@@ -294,17 +280,6 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                 }};
 }
 
-Viewport tile_in(const Session& s, std::size_t lane, int width, int height) {
-  if (s.overlaid) return {0, 0, width, height};
-  return tile_of(lane, s.loaded.lanes.size(), width, height);
-}
-
-Rect lane_place(const Session& s, std::size_t lane, const Rect& view) {
-  const Viewport tile = tile_in(s, lane, int(view.width), int(view.height));
-  return {view.x + float(tile.x), view.y + view.height - float(tile.y + tile.height), float(tile.width),
-          float(tile.height)};
-}
-
 bool has_colour(const Session& s, Colour colour) {
   if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
   return colour != Colour::energy || s.loaded.sim().settings.material != "none";
@@ -324,17 +299,6 @@ void choose_colour(Session& s, Colour colour) {
     say(s, "the motion is no longer that of the scene: reset (R)");
   else if (!s.loaded.right && s.loaded.lanes.size() == 1)
     say(s, "no right motion is known: tetpbd reference finds it, or hold lanes against each other (K)");
-}
-
-void move_cut(Session& s, double by) { s.view.cut = std::clamp(s.view.cut + by, 0.0, 1.0); }
-
-void next_cut(Session& s) {
-  ViewOptions& view = s.view;
-  view.cut_axis = view.is_cut() ? (view.cut_axis + 1) % 5 : 0;
-  view.cut = view.cut_axis < 4 ? 0.5 : 1;
-  if (view.cut_axis == 4) view.cut_axis = 0;
-  view.cut_normal = glm::normalize(eye(s.camera) - s.camera.target);
-  s.log("cut {:.4f} along {}", view.cut, cut_names[std::size_t(view.cut_axis)]);
 }
 
 void find_worst(Session& s) {
@@ -366,55 +330,17 @@ void find_worst(Session& s) {
   s.view.range() = {s.view.scale().is_signed ? -high : 0, high};
 }
 
-Frame shown_frame(const Session& s, std::size_t lane) {
-  Frame frame = frame_of(s.loaded.lanes[lane].sim, s.camera, s.view, {});
-  frame.viewport = {};
-  frame.options.follow = false;
-  return frame;
+const Motion* right_now(const Session& s) {
+  return s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr;
 }
 
-void draw_lanes(Session& s, const Target& target) {
-  hold_vertices(s);
-  auto& lanes = s.loaded.lanes;
-  const bool several = lanes.size() > 1;
-  const std::size_t right = best_lane(lanes);
-  // Whose values come back: a range is to fit the lane that is farthest off, too.
-  const auto off = [](const Lane& l) { return l.distance.values.empty() ? 0.0f : l.distance.values.back(); };
-  const bool farthest = s.fit_range && s.view.colour == Colour::motion;
-  const std::size_t valued =
-      farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
-  for (std::size_t i = 0; i < lanes.size(); ++i) {
-    Frame frame = frame_of(lanes[i].sim, s.camera, s.view, target);
-    frame.viewport = tile_in(s, i, target.width, target.height);
-    if (s.grab) frame.grabbed.push_back(s.grab->vertex);
-    frame.options.follow = s.view.follow && i == s.loaded.chosen;
-    frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
-    if (s.view.worst && i == s.loaded.chosen)
-      for (const auto& [vertex, value] : s.worst) frame.worst.push_back(vertex);
-    if (s.view.colour == Colour::motion && s.loaded.comparable) frame.values = lanes[i].apart.id();
-    if (s.view.colour == Colour::patch) frame.values = patch_numbers(lanes[i]);
-    if ((s.view.colour == Colour::motion || s.view.colour == Colour::patch) && !frame.values)
-      frame.options.colour = Colour::plain;
-    if (several) {
-      frame.options.body_colour = lane_colour(i);
-      frame.options.legend = s.view.legend && i + 1 == lanes.size();
-      frame.caption = describe(lanes[i]);
-      if (const auto& far = lanes[i].distance.values; !far.empty() && !lanes[i].stopped())
-        frame.caption +=
-            far.back() < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", far.back());
-    }
-    if (s.overlaid) frame.caption.clear();
-    if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;
-    draw(s.loaded.renderer, frame);
-    if (!several || s.overlaid || !s.ghost || i == right) continue;
-    frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
-    frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
-    frame.pinned.clear(), frame.grabbed.clear(), frame.worst.clear();
-    frame.options.arrows = frame.options.contacts = false;
-    frame.options.colour = Colour::plain, frame.options.body_colour = glm::vec3(0.25f);
-    frame.options.worst = frame.options.shadow = frame.options.follow = frame.options.legend = false;
-    draw(s.loaded.renderer, frame);
-  }
+void hold_vertices(Session& s) {
+  Loaded& l = s.loaded;
+  const bool known = right_now(s) || (l.lanes.size() > 1 && l.comparable);
+  if (!known || l.held == l.sim().steps || (s.view.colour != Colour::motion && !l.probe.reading)) return;
+  if (right_now(s) && !is_kept(*l.right, l.sim().steps)) return;
+  hold_vertices(l.lanes, right_now(s), l.renderer, l.answers);
+  l.held = l.sim().steps;
 }
 
 void add_lane(Session& s, const std::string& words) {
@@ -461,26 +387,6 @@ void compare_lanes(Session& s, const std::vector<std::string>& words) {
     s.loaded.chosen = 0;
     start_lanes(s);
   });
-}
-
-// Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
-void frame_body(Session& s) {
-  const Bounds box = bounds(read_state(s.loaded.sim()).positions);
-  frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
-  s.beside = glm::vec3(0);
-  s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
-}
-
-bool follow_bodies(Session& s, double elapsed) {
-  if (!s.view.follow) return false;
-  attempt(s, [&] {
-    if (const auto now = poll_centre(s.loaded.renderer)) s.centre = now;
-  });
-  // While the mouse pulls a vertex it aims by the camera, which therefore keeps still.
-  if (!s.centre || s.grab) return false;
-  const glm::vec3 goal = *s.centre + s.beside;
-  follow(s.camera, goal, float(elapsed));
-  return glm::distance(s.camera.target, goal) > 1e-3f * s.camera.distance;
 }
 
 void toggle_pin(Session& s, std::uint32_t vertex) {

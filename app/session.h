@@ -159,6 +159,10 @@ void frame_body(Session& session);
 void choose_colour(Session& session, Colour colour);
 /// Whether there is something to colour by.
 bool has_colour(const Session& session, Colour colour);
+/// What lanes are held against now, where the right motion is known.
+const Motion* right_now(const Session& session);
+/// How far each vertex is from it, if somebody looks at that.
+void hold_vertices(Session& session);
 /// By a part of the bodies' extent.
 void move_cut(Session& session, double by);
 /// None, along x, y, z, facing the eye.

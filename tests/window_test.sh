@@ -252,8 +252,8 @@ choose "side by side" "one way"; await '^reset'
 
 # --------------------------------------------------------------------------------------------------- stability map
 click "section Stability map" 0.1; sleep 0.5
-click "map across"; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "substeps=1,4"; pause_for_frame
-click "map up"; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "omega=1,1.5"; pause_for_frame
+click "map across"; sleep 0.5; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "substeps=1,4"; pause_for_frame
+click "map up"; sleep 0.5; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "omega=1,1.5"; pause_for_frame
 click "fill map"; await '^map of 4 cells'; await '^map done'; sleep 0.5; shot map.png
 click "map 2 1"; await '^map chose 4 1'; await '^set substeps 4'
 click "section Stability map" 0.1; sleep 0.5

@@ -27,7 +27,7 @@ struct History {
 struct Lane {
   Sim sim;
   std::optional<Metrics> metrics{};             ///< made when first shown
-  History step_ms{}, volume_error{}, energy{};  ///< J, kinetic and of gravity
+  History step_ms{}, volume_error{}, energy{};  ///< J, with the elastic one of a material
   History distance{};                           ///< from what is right, % of the size
   Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                    ///< known

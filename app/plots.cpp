@@ -46,6 +46,8 @@ std::string lane_name(const Session& s, const Curve& curve) {
 std::string title_of(const Session& s, const PlotRow& row) {
   const bool right = right_now(s);
   const std::string from = right ? "distance from the right motion" : "distance from the finest lane";
+  const Settings& own = s.loaded.sim().settings;
+  if (row.of == &Lane::energy && own.material == "none" && !hard(own)) return "energy but for elastic";
   return row.of != &Lane::distance ? row.title : row.over_cost ? "distance over time per step" : from;
 }
 
@@ -181,6 +183,7 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
     return fmt::format("{:.3g}", powers ? std::pow(10.0, v) : v);
   };
   label(false, true, number(axes.high, axes.powers_y) + " " + row.unit);
+  if (curves.size() == 1) label(true, true, value_text(s, row, curves[0], curves[0].points.back()));
   label(false, false, number(axes.low, axes.powers_y) + " " + row.unit);
   label(true, false,
         number(axes.left, axes.powers_x) + " .. " + number(axes.right, axes.powers_x) +
@@ -196,9 +199,7 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
   ImGui::BeginGroup();
   const ImGuiStyle& style = ImGui::GetStyle();
   const float buttons = 2 * (ImGui::CalcTextSize("CSV").x + 2 * style.FramePadding.x + style.ItemSpacing.x);
-  std::string title = title_of(s, plot_rows()[chosen]);
-  if (const auto curves = curves_of(s, plot_rows()[chosen]); curves.size() == 1)
-    title += "  " + value_text(s, plot_rows()[chosen], curves[0], curves[0].points.back());
+  const std::string title = title_of(s, plot_rows()[chosen]);
   ImGui::SetNextItemWidth(width - buttons);
   const std::string name = fmt::format("plotted {}", slot + 1);
   if (ImGui::BeginCombo("##plotted", title.c_str(), ImGuiComboFlags_HeightLarge)) {
@@ -242,7 +243,7 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
 const std::vector<PlotRow>& plot_rows() {
   static const std::vector<PlotRow> rows = {
       {"frames per second", "fps", nullptr},      {"time per step", "ms", &Lane::step_ms, true},
-      {"volume error", "%", &Lane::volume_error}, {"energy but for elastic", "J", &Lane::energy},
+      {"volume error", "%", &Lane::volume_error}, {"energy", "J", &Lane::energy},
       {"distance", "%", &Lane::distance, true},   {"distance", "%", &Lane::distance, true, true}};
   return rows;
 }

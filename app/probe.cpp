@@ -5,6 +5,7 @@
 
 #include "render/frame.h"
 #include "render/layout.h"
+#include "sim/material.h"
 
 namespace tetpbd {
 
@@ -12,7 +13,10 @@ namespace {
 
 namespace measures {
 using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, glm::vec4, std::log;
+// clang-format off: in this order
+#include "shaders/energy.glsl"
 #include "shaders/render/values.glsl"
+// clang-format on
 }  // namespace measures
 
 // Floats of the copy: the tet's positions, the vertex's velocity, its distance.
@@ -51,7 +55,7 @@ Reading reading_of(Reading reading, const Lane& lane, const std::vector<float>& 
     if (tet[i] == reading.vertex) reading.position = pair(8 * i);
   }
   reading.speed = glm::length(pair(of_velocity));
-  const glm::vec4 material = material_of(lane.sim.settings);
+  const glm::vec4 material = energy_material(lane.sim.settings);
   reading.volume = double(measures::tet_value(COLOUR_VOLUME, now, rest, material));
   reading.strain = double(measures::tet_value(COLOUR_STRETCH, now, rest, material));
   if (material.z > 0) reading.energy = double(measures::tet_value(COLOUR_ENERGY, now, rest, material));

@@ -454,7 +454,7 @@ void measure_frame(Session& s, bool stepped) {
     if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
     while (const auto now = collect(*lane.metrics)) {
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
-      lane.energy.add(now->finite() ? now->energy() : 0.0, now->time);
+      lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
     }
     // Half the ring of results: with more under way, asking again would wait for the oldest.
     if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim);

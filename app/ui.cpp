@@ -139,7 +139,7 @@ void draw_help(const Ui& ui) {
       {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
       {"Ctrl + click on a slider", "type a value"},
       {"Wheel, drag, double click on a plot", "closer, along, all"},
-      {"Hover", "what a setting means; what a body measures there"}};
+      {"Hover", "what a setting means, what is there"}};
   if (ImGui::BeginTable("help", 2)) {
     ImGui::TableNextColumn();
     ImGui::TextDisabled("Keys");

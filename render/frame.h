@@ -111,8 +111,6 @@ struct Frame {
   GLuint target = 0;  ///< framebuffer with an sRGB colour format (Target has it) and depth
 };
 
-/// The frame's `material` of a simulation with these settings.
-glm::vec4 material_of(const Settings& settings);
 /// A picture of a simulation with its ground, walls and pinned vertices (infinite mass), all of the target.
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target);
 

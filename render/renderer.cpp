@@ -373,12 +373,6 @@ Renderer make_renderer(const Model& model) {
   return make_renderer(model.rest, std::move(bodies));
 }
 
-glm::vec4 material_of(const Settings& settings) {
-  if (settings.material == "none") return glm::vec4(0);
-  const Lame own = lame(settings.young_modulus, settings.poisson_ratio);
-  return glm::vec4(own.mu, own.lambda, settings.material == "springs" ? 2 : 1, 0);
-}
-
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target) {
   Frame frame;
   frame.positions = sim.positions.id();
@@ -387,7 +381,7 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   frame.viewport = {0, 0, target.width, target.height};
   frame.options = options;
   if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
-  frame.material = material_of(sim.settings);
+  frame.material = energy_material(sim.settings);
   frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
   for (std::uint32_t v = 0; v < sim.inverse_masses.size(); ++v)
     if (!(sim.inverse_masses[v] > 0)) frame.pinned.push_back(v);

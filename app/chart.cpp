@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "app/map.h"
 #include "app/run_loop.h"
 #include "app/sweep.h"
 #include "sim/error.h"
@@ -162,18 +163,28 @@ void write_svg(const std::filesystem::path& name, const std::string& picture) {
                           printable(png.file.string())));
 }
 
-// From right to wrong: dark blue, green, yellow, red; grey for what is not known.
-std::string heat(double part) {
-  constexpr std::array<glm::dvec3, 4> stops{
-      {{0.19, 0.31, 0.58}, {0.20, 0.62, 0.49}, {0.95, 0.86, 0.35}, {0.84, 0.27, 0.20}}};
-  if (!std::isfinite(part)) return "#bbbbbb";
-  const double at = std::clamp(part, 0.0, 1.0) * 3;
-  const std::size_t first = std::min<std::size_t>(std::size_t(at), 2);
-  const glm::dvec3 c = 255.0 * glm::mix(stops[first], stops[first + 1], at - double(first));
+constexpr double least_percent = 1e-4, decades = 6;
+
+std::string heat_code(double part) {
+  const glm::dvec3 c = 255.0 * heat(part);
   return fmt::format("#{:02x}{:02x}{:02x}", std::lround(c.x), std::lround(c.y), std::lround(c.z));
 }
 
 }  // namespace
+
+// Dark blue, green, yellow, red.
+glm::dvec3 heat(double part) {
+  constexpr std::array<glm::dvec3, 4> stops{
+      {{0.19, 0.31, 0.58}, {0.20, 0.62, 0.49}, {0.95, 0.86, 0.35}, {0.84, 0.27, 0.20}}};
+  if (!std::isfinite(part)) return glm::dvec3(0.733);
+  const double at = std::clamp(part, 0.0, 1.0) * 3;
+  const std::size_t first = std::min<std::size_t>(std::size_t(at), 2);
+  return glm::mix(stops[first], stops[first + 1], at - double(first));
+}
+
+double heat_part(double percent) {
+  return std::log10(std::max(percent, least_percent) / least_percent) / decades;
+}
 
 void write_chart(const std::filesystem::path& name, const Chart& chart) { write_svg(name, to_svg(chart)); }
 
@@ -189,7 +200,6 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
     note(xs, row["x"]), note(ys, row["y"]);
     motion = motion || std::isfinite(number(row, "motion_rms"));
   }
-  const double most_percent = 100, least_percent = 1e-4, decades = std::log10(most_percent / least_percent);
   const double wide = (right - left) / double(xs.size()), high = (bottom - top) / double(ys.size());
   std::string svg = head(fmt::format("{}: {} against {}", document["scene"].get<std::string>(),
                                      document["y"].get<std::string>(), document["x"].get<std::string>()),
@@ -203,7 +213,7 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
                  y = bottom - double(note(ys, row["y"]) + 1) * high;
     const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
     const bool failed = !row["finite"].get<bool>();
-    const double part = std::log10(std::max(percent, least_percent) / least_percent) / decades;
+    const double part = heat_part(percent);
     const std::string said = row.contains("refused") ? "refused"
                              : failed ? fmt::format("fails at {}", text_of(row["failed_at_step"]))
                              : std::isfinite(percent)
@@ -211,7 +221,7 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
                                  : "";
     svg += fmt::format(
         "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" stroke=\"white\"/>\n",
-        x, y, wide, high, failed ? "#333333" : heat(part));
+        x, y, wide, high, failed ? "#333333" : heat_code(part));
     svg += text(x + wide / 2, y + high / 2 + 4, said, "middle", std::min(11.0, wide / 5),
                 failed || part < 0.45 || part > 0.93 ? "style=\"fill:white\"" : "");
   }
@@ -222,7 +232,7 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
   for (int decade = 0; decade <= int(decades); ++decade) {
     const double y = bottom - 20 - 22 * decade;
     svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"18\" height=\"22\" fill=\"{}\"/>\n", right + 26,
-                       y - 15, heat(decade / decades));
+                       y - 15, heat_code(decade / decades));
     svg += text(right + 52, y, fmt::format("{:g} %", least_percent * std::pow(10.0, decade)));
   }
   write_svg(name, svg + "</svg>\n");

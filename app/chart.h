@@ -32,6 +32,11 @@ std::string to_svg(const Chart& chart);
 std::string palette_colour(std::size_t index);
 std::string mode_colour(const std::string& mode);
 
+/// From right (0) to wrong (1), linear in between decades from 10^-4 % to 100 %: sRGB; grey for what is not
+/// known.
+glm::dvec3 heat(double part);
+double heat_part(double percent);
+
 /// Cells of two settings as `tetpbd map` found them, coloured by decades of the error of the motion (of the
 /// largest volume loss where no right motion is known); those that failed say at which step.
 void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& document);

@@ -36,6 +36,7 @@ struct RunOptions {
   std::array<int, 2> size{1280, 720};  ///< pixels
   int samples = 4;
   ViewOptions view;
+  double range = 0;  ///< end of the colour scale, in its unit; 0: as it is
   std::vector<std::string>
       lanes;                     ///< of the window: what each puts in place of the scene's settings (lanes.h)
   long history_mb = 256;         ///< of the window: for states to go back to; 0: none

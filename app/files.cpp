@@ -39,6 +39,11 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
+std::string free_name(const std::string& name, const std::string& ending) {
+  for (int i = 0;; ++i)
+    if (const auto file = fmt::format("{}_{:03}.{}", name, i, ending); !fs::exists(file)) return file;
+}
+
 void make_output_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);

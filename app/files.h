@@ -20,6 +20,8 @@ template <class Json>
 std::string json_text(const Json& document, int indent) {
   return document.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
+/// "NAME_000.ENDING", or the next number that no file in the current folder has.
+std::string free_name(const std::string& name, const std::string& ending);
 void write_png(const std::filesystem::path& file, const Image& image);
 /// numpy arrays: float32 N x 3 (throws Error for numbers that are not finite), uint32 T x 4.
 void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);

@@ -6,6 +6,7 @@
 #include "app/auto_solver.h"
 #include "app/commands.h"
 #include "app/files.h"
+#include "app/lanes.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -19,29 +20,43 @@ namespace {
 /// Draws what a run asked for and writes it.
 struct FrameWriter {
   const RunOptions& options;
-  double dt;         ///< s
+  double dt;    ///< s
+  double size;  ///< m, of the bodies
+  const Motion* right;
   long video_every;  ///< steps
   Target target;
   Renderer renderer;
   Frame frame;
   std::optional<Video> video{};
-  long drawn = 0;  ///< step of the last frame
+  long drawn = 0;                 ///< step of the last frame
+  Buffer answers{}, distances{};  ///< of the colour motion
 
-  FrameWriter(const Scene& scene, const Sim& sim, const RunOptions& run)
+  FrameWriter(const Scene& scene, const Sim& sim, const RunOptions& run, const Motion* motion)
       : options(run),
         dt(scene.settings.dt),
+        size(sim.model->size),
+        right(motion),
         video_every(run.video_every > 0 ? run.video_every : std::max(1L, std::lround(1.0 / 30 / dt))),
         target(make_target(run.size[0], run.size[1], run.samples)),
         renderer(make_renderer(*sim.model)),
         frame(frame_of(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
                        run.view, target)) {
     const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
+    if (run.view.colour == Colour::motion && !right)
+      throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
+    if (run.view.colour == Colour::energy && scene.settings.material == "none")
+      throw Error("there is no material", "--colour energy", "give one, as in --material neo-hookean");
     if (!run.video.empty()) video.emplace(run.video, run.size[0], run.size[1], rate);
   }
 
   void draw_frame(long s) {
     const bool png = options.png_every > 0 && s % options.png_every == 0;
     const bool film = video && s % video_every == 0;
+    // Of the last step that is kept up to this one.
+    if (frame.options.colour == Colour::motion && send_answers(*right, s, answers)) {
+      measure_distances(renderer, frame.positions, answers.id(), size, distances);
+      frame.values = distances.id();
+    }
     if (!png && !film) return;
     draw(renderer, frame);
     if (const auto centre = poll_centre(renderer, true))  // for the next frame
@@ -138,7 +153,8 @@ int run_headless(Scene scene, const RunOptions& options) {
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
   std::optional<FrameWriter> frames;
-  if (options.png_every > 0 || !options.video.empty()) frames.emplace(scene, sim, options);
+  if (options.png_every > 0 || !options.video.empty())
+    frames.emplace(scene, sim, options, right ? &*right : nullptr);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
 

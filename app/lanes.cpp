@@ -22,7 +22,7 @@ double effort(const Settings& s) { return leaps(s) ? 1e9 / s.stability : double(
 
 }  // namespace
 
-std::string describe(const Lane& lane) {
+std::string describe(const Lane& lane, bool material) {
   const Settings& s = lane.sim.settings;
   std::string text = s.mode;
   const auto add = [&](int count, const char* what) {
@@ -30,9 +30,58 @@ std::string describe(const Lane& lane) {
   };
   add(s.substeps, "substep");
   add(s.iterations, "iteration");
-  if (s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
+  if (material && s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
   if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
   return text;
+}
+
+void History::add(double value, double time) {
+  if (!times.empty() && times.back() > time) {
+    const auto kept = std::ranges::upper_bound(times, time) - times.begin();
+    times.resize(std::size_t(kept)), values.resize(std::size_t(kept));
+    added = kept ? (kept - 1) * every + 1 : 0;
+  }
+  if (!values.empty() && (added - 1) % every != 0)
+    values.pop_back(), times.pop_back();  // stood for the newest alone
+  values.push_back(float(value)), times.push_back(time);
+  ++added;
+  if (values.size() <= most) return;
+  for (std::size_t i = 0; 2 * i < values.size(); ++i) values[i] = values[2 * i], times[i] = times[2 * i];
+  values.resize((values.size() + 1) / 2), times.resize(values.size());
+  every *= 2;
+}
+
+std::optional<float> History::at(double time) const {
+  const auto after = std::ranges::upper_bound(times, time) - times.begin();
+  return after > 0 ? std::optional(values[std::size_t(after) - 1]) : std::nullopt;
+}
+
+namespace {
+
+GLuint patch_words(const Sim& sim) {
+  for (const auto& [binding, buffer] : sim.solver.bindings)
+    if (binding == BIND_PATCHES && sim.solver.double_buffered) return buffer;
+  return 0;
+}
+
+}  // namespace
+
+bool has_patches(const Lane& lane) { return patch_words(lane.sim) != 0; }
+
+GLuint patch_numbers(Lane& lane) {
+  const GLuint words = patch_words(lane.sim);
+  if (!words || lane.patches) return lane.patches.id();
+  const auto& present = lane.sim.system.present;
+  const std::size_t patches = lane.sim.solver.iteration[0].work_groups,
+                    each = 4 + 2 * std::size_t(std::ranges::count(present, true));
+  std::vector<std::uint32_t> chunks(patches * each);
+  glBindBuffer(GL_COPY_READ_BUFFER, words);
+  glGetBufferSubData(GL_COPY_READ_BUFFER, 0, GLsizeiptr(chunks.size() * 4), chunks.data());
+  std::vector<float> numbers(lane.sim.model->positions.size());
+  for (std::size_t p = 0; p < patches; ++p)  // patches.h: how many are owned, the first of them
+    for (std::uint32_t k = 0; k < chunks[p * each + 1]; ++k) numbers.at(chunks[p * each + 2] + k) = float(p);
+  lane.patches = Buffer("vertex values, patch", numbers);
+  return lane.patches.id();
 }
 
 glm::vec3 lane_colour(std::size_t lane) {
@@ -104,9 +153,10 @@ std::size_t yardstick(const std::vector<Lane>& lanes) {
 }
 
 std::size_t best_lane(const std::vector<Lane>& lanes) {
-  const auto known = [](const Lane& lane) { return !lane.stopped() && !lane.distance.values.empty(); };
+  const auto now = [](const Lane& lane) { return lane.distance.at(time_of(lane.sim)); };
+  const auto known = [&](const Lane& lane) { return !lane.stopped() && now(lane); };
   if (std::ranges::none_of(lanes, known)) return yardstick(lanes);
-  const auto far = [&](const Lane& lane) { return known(lane) ? lane.distance.values.back() : 1e9f; };
+  const auto far = [&](const Lane& lane) { return known(lane) ? *now(lane) : 1e9f; };
   return std::size_t(std::ranges::min_element(lanes, {}, far) - lanes.begin());
 }
 
@@ -128,8 +178,31 @@ void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   for (Lane& lane : lanes) {
     if (lane.stopped() || lane.sim.steps != now) continue;
     const double distance = error_to(model, answer, read_state(lane.sim));
-    if (std::isfinite(distance)) lane.distance.add(100 * distance);
+    if (std::isfinite(distance)) lane.distance.add(100 * distance, double(now) * lane.sim.settings.dt);
   }
+}
+
+bool send_answers(const Motion& right, long step, Buffer& answers) {
+  const auto kept = std::ranges::find(right.kept, step);
+  if (kept == right.kept.end()) return false;
+  std::vector<Position> positions;
+  for (const glm::dvec3& p : right.positions[std::size_t(kept - right.kept.begin())]) {
+    const glm::vec3 high(p);
+    positions.push_back({high, 0, glm::vec3(p - glm::dvec3(high)), 0});
+  }
+  if (!answers) answers = Buffer("right motion", positions, GL_STREAM_DRAW);
+  answers.write(0, answers.bytes(), positions.data());
+  return true;
+}
+
+void hold_vertices(std::vector<Lane>& lanes, const Motion* right, Renderer& renderer, Buffer& answers) {
+  long now = 0;
+  for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  if (right && !send_answers(*right, now, answers)) return;
+  const Buffer& answer = right ? answers : lanes[yardstick(lanes)].sim.positions;
+  for (Lane& lane : lanes)
+    if (!lane.stopped() && lane.sim.steps == now)
+      measure_distances(renderer, lane.sim.positions.id(), answer.id(), lane.sim.model->size, lane.apart);
 }
 
 }  // namespace tetpbd

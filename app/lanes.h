@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "app/scene.h"
-#include "render/frame.h"
+#include "render/renderer.h"
 #include "sim/metrics.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -15,26 +15,36 @@ namespace tetpbd {
 
 inline constexpr std::size_t most_lanes = 4;
 
-/// The last values of something that changes from frame to frame.
+/// Something over time: all of it, in even steps that grow with its length, and the newest value.
 struct History {
+  static constexpr std::size_t most = 4096;
   std::vector<float> values;
-  void add(double value) {
-    if (values.size() >= 240) values.erase(values.begin());
-    values.push_back(float(value));
-  }
+  std::vector<double> times;  ///< s
+  long added = 0, every = 1;
+  void add(double value, double time);         ///< what is later is forgotten
+  std::optional<float> at(double time) const;  ///< the last one until then
 };
+
+inline double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }
 
 struct Lane {
   Sim sim;
-  std::optional<Metrics> metrics{};  ///< made when first shown
-  History step_ms{}, volume_error{};
-  History distance{};  ///< from what is right, % of the size
+  std::optional<Metrics> metrics{};             ///< made when first shown
+  History step_ms{}, volume_error{}, energy{};  ///< J, with the elastic one of a material
+  History distance{};                           ///< from what is right, % of the size
+  Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
+                   ///< known
+  Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
   /// Steps no more, since its state is not finite, while others go on.
   bool stopped() const { return sim.check.found.has_value(); }
 };
 
+/// Whether the solver's work-groups have vertices of their own.
+bool has_patches(const Lane& lane);
+/// A buffer of floats, made when first asked for: waits for the GPU then. 0 where there are no patches.
+GLuint patch_numbers(Lane& lane);
 /// "node, 25 iterations": what sets it apart from others.
-std::string describe(const Lane& lane);
+std::string describe(const Lane& lane, bool material = true);
 /// Body colour, sRGB.
 glm::vec3 lane_colour(std::size_t lane);
 /// Where it is drawn among `count`: side by side, four in two rows.
@@ -62,5 +72,9 @@ std::size_t best_lane(const std::vector<Lane>& lanes);
 /// After a step of all lanes: adds each one's distance from the right motion, where this has that step, or
 /// from the yardstick; every fourth step, of large bodies more rarely. Waits for the GPU then.
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right);
+/// Sends where `right` has the vertices at this step; false where it is not kept.
+bool send_answers(const Motion& right, long step, Buffer& answers);
+/// The same of each vertex, by the GPU: fills Lane::apart, where `right` has this step.
+void hold_vertices(std::vector<Lane>& lanes, const Motion* right, Renderer& renderer, Buffer& answers);
 
 }  // namespace tetpbd

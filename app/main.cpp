@@ -169,6 +169,9 @@ void add_axes(CLI::App& command, Axes& axes) {
 void open_scene(Arguments& a) {
   a.run.size = a.sizes[0];
   a.soak.gpu = a.run.gpu;
+  const ColourScale& scale = a.run.view.scale();
+  if (const double end = a.run.range / scale.factor; end > 0)
+    a.run.view.range() = {scale.is_signed ? -end : 0, end};
   if (a.run.replay.empty()) a.opened = load_scene(a.scene, a.overrides);
 }
 
@@ -194,10 +197,12 @@ void add_scene(CLI::App& command, Arguments& a) {
   add_samples(command, a.run.samples);
   CLI::App& view = *command.add_option_group("View");
   ViewOptions& look = a.run.view;
-  view.add_option("--look", look.look, "surface, wire, tets")->transform(one_of(look_names));
-  view.add_option("--colour", look.colour, "plain, volume, stretch, velocity")
+  view.add_option("--look", look.look, fmt::format("{}", fmt::join(look_names, ", ")))
+      ->transform(one_of(look_names));
+  view.add_option("--colour", look.colour, fmt::format("{}", fmt::join(colour_names, ", ")))
       ->transform(one_of(colour_names));
-  add(view, "--cut", look.cut, 0.0, 1.0, "tets: show those below this part of the body");
+  add(view, "--range", a.run.range, 1e-12, 1e12, "end of the colour scale, in its unit");
+  add(view, "--cut", look.cut, 0.0, 1.0, "shows what is below this part of the body alone");
   add(view, "--cut-axis", look.cut_axis, 0, 2, "0: x, 1: y, 2: z");
   view.add_flag("!--flat", look.smooth_normals, "flat normals");
   view.add_flag("!--no-shadow", look.shadow, "no shadow");

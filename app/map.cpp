@@ -1,4 +1,6 @@
 // `tetpbd map`: over two settings at once, how right a scene comes out, and where it fails.
+#include "app/map.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,12 +20,6 @@ namespace {
 const char* results =
     "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step";
 
-struct Axis {
-  const Parameter* row;
-  std::vector<std::string> values;
-  bool logarithmic = false;
-};
-
 double to_number(const std::string& text, const std::string& where) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -33,8 +29,9 @@ double to_number(const std::string& text, const std::string& where) {
   return value;
 }
 
-// "omega=0.5,1,1.5", or "young_modulus=1e4:1e7:7": evenly, or by equal factors where the slider goes so.
-Axis axis_of(const std::string& text, const std::string& flag) {
+}  // namespace
+
+MapAxis map_axis(const std::string& text, const std::string& flag) {
   const std::size_t equals = text.find('=');
   const std::string where = flag + " " + text, name = text.substr(0, equals);
   const Parameter* row = find_parameter(name);
@@ -42,12 +39,12 @@ Axis axis_of(const std::string& text, const std::string& flag) {
       std::holds_alternative<bool Settings::*>(row->member) || row->effect == Effect::restart)
     throw Error(fmt::format("'{}' is no setting with a number", name), where,
                 "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
-  Axis axis{row, split(text.substr(equals + 1), ','), row->logarithmic};
+  MapAxis axis{row, split(text.substr(equals + 1), ',')};
   const auto range = split(text.substr(equals + 1), ':');
   if (range.size() == 3) {
     const double from = to_number(range[0], where), to = to_number(range[1], where),
                  count = to_number(range[2], where);
-    const bool factors = axis.logarithmic && from > 0 && to > 0;
+    const bool factors = row->logarithmic && from > 0 && to > 0;
     if (!(count >= 2 && count <= 100)) throw Error("bad number of values", where, "give 2 to 100");
     axis.values.clear();
     for (int i = 0; i < int(count); ++i) {
@@ -65,14 +62,16 @@ Axis axis_of(const std::string& text, const std::string& flag) {
   return axis;
 }
 
-// What the cell is held against: found here, since it can differ from cell to cell.
-std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps) {
+std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps,
+                                 const std::function<void(long)>& progress) {
   if (auto known = right_motion(model, settings); known && known->kept.back() >= steps) return known;
   if (!compliant(settings)) return rigid_motion(model, settings, steps);
   if (kind_without_force(settings)) return std::nullopt;
   const ConstraintSystem system = build_constraints(model.rest, settings);
-  return find_motion({model, system, settings, model.inverse_masses}, steps);
+  return find_motion({model, system, settings, model.inverse_masses}, steps, {}, {}, progress);
 }
+
+namespace {
 
 ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
                      const std::string& x, const std::string& y, std::optional<Motion>& last) {
@@ -107,7 +106,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
 }  // namespace
 
 int run_map(const MapOptions& options) {
-  const Axis x = axis_of(options.x, "--x"), y = axis_of(options.y, "--y");
+  const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");
   Sweep sweep{"map",
               "cell",
               split(std::string("x,y,") + results, ','),

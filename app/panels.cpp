@@ -298,47 +298,72 @@ void draw_lane_rows(Session& s) {
 }
 
 void draw_colour_range(Session& s) {
-  ColourRange& range = s.view.range();
   if (s.view.colour == Colour::plain) {
     ImGui::ColorEdit3(begin_row("body colour").c_str(), &s.view.body_colour.x, ImGuiColorEditFlags_NoInputs);
     mark(s, "body colour");
-  } else if (s.view.colour == Colour::velocity) {
-    slider(s, "colour range", range.high, 0.1, 50, "0 .. %.2f m/s", "", true);
-  } else if (double percent = range.high * 100;
-             slider(s, "colour range", percent, 0.1, 100, "+/- %.1f %%", "", true)) {
-    range = {-percent / 100, percent / 100};
+    return;
   }
+  if (s.view.colour == Colour::patch) return;
+  ColourRange& range = s.view.range();
+  const ColourScale& scale = s.view.scale();
+  double high = range.high * scale.factor;
+  const std::string unit = scale.factor == 100 ? "%%" : scale.unit;
+  if (slider(s, "colour range", high, 1e-4 * scale.most * scale.factor, scale.most * scale.factor,
+             ((scale.is_signed ? "+/- %.3g " : "0 .. %.3g ") + unit).c_str(), scale.unit, true))
+    range = {scale.is_signed ? -high / scale.factor : 0, high / scale.factor};
+  if (button(s, "Fit", "fit", "the range to the largest value of now")) s.fit_range = true;
+  ImGui::SameLine(label_width());
+  check_box(s, "mark worst", s.view.worst,
+            "rings around the vertices with the largest values, inside bodies too\nW");
+  if (!s.view.worst) return;
+  for (const auto& [vertex, value] : s.worst)
+    ImGui::TextDisabled(
+        "%s", fmt::format(fmt::runtime(scale.is_signed ? "vertex {}: {:+.3g} {}" : "vertex {}: {:.3g} {}"),
+                          s.loaded.sim().model->original[vertex], double(value) * scale.factor, scale.unit)
+                  .c_str());
 }
 
 void draw_view(Session& s) {
   ViewOptions& view = s.view;
   enum_combo(s, "look", look_names, view.look);
-  enum_combo(s, "colour", colour_names, view.colour);
+  const Words colours(colour_names.begin(), colour_names.end());
+  if (const auto name = combo(s, "colour", colour_names[std::size_t(view.colour)], colours))
+    choose_colour(s, Colour(std::ranges::find(colour_names, *name) - colour_names.begin()));
   draw_colour_range(s);
   if (view.look == Look::tets) {
     slider(s, "shrink", view.shrink, 0, 1, "%.2f", "each tetrahedron, towards its centre");
     slider(s, "explode", view.explode, 0, 3, "%.2f", "tetrahedra away from the bodies' centre");
-    slider(s, "cut", view.cut, 0, 1, "%.2f", "show tetrahedra below this part of the body; 1 shows all");
-    enum_combo(s, "cut along", std::array{"x", "y", "z"}, view.cut_axis);
   }
+  slider(s, "cut", view.cut, 0, 1, "%.2f",
+         "what is below this part of the bodies at rest is shown; 1: all\nAlt+drag, Alt+wheel on the view");
+  const int before = view.cut_axis;
+  enum_combo(s, "cut along", cut_names, view.cut_axis);
+  if (view.cut_axis != before) view.cut_normal = glm::normalize(eye(s.camera) - s.camera.target);
   const std::tuple<const char*, const char*, bool&> switches[] = {
       {"smooth normals", "N", view.smooth_normals},
       {"shadow", "", view.shadow},
       {"grid", "lines on the ground and on walls\nG", view.grid},
       {"sky and ground", "also walls; without: one colour", view.backdrop},
       {"legend", "with every colour but plain", view.legend},
-      {"follow", "the camera goes where the bodies go\nL", view.follow}};
+      {"follow", "the camera goes where the bodies go\nL", view.follow},
+      {"contacts", "dots where vertices touch the ground or walls", view.contacts},
+      {"arrows", "where velocities take some of the vertices", view.arrows},
+      {"probe", "the cursor at rest on a body says what is there", s.probing}};
   for (int i = 0; const auto& [name, help, value] : switches) {
     if (i++ % 2) ImGui::SameLine(label_width());
     check_box(s, name, value, help);
   }
+  if (view.arrows)
+    slider(s, "arrow length", view.arrow_seconds, 1e-3, 1, "%.3g s",
+           "the time a vertex would take along its arrow", true);
   int doublings = std::bit_width(unsigned(s.samples) / 2);
   enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, doublings);
   s.samples = doublings ? 1 << doublings : 0;
 }
 
-bool section(Session& s, const char* name) {
-  const bool shown = ImGui::CollapsingHeader(name, ImGuiTreeNodeFlags_DefaultOpen);
+bool section(Session& s, const char* name, bool open = true) {
+  const bool shown =
+      ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
   mark(s, std::string("section ") + name);
   return shown;
 }
@@ -410,6 +435,7 @@ void draw_panel(Session& s) {
   draw_run(s);
   if (section(s, "Scene")) draw_scene(s);
   if (section(s, "Side by side")) draw_lane_rows(s);
+  if (section(s, "Stability map", false)) draw_map(s);
   if (section(s, "Solver")) draw_solver(s), draw_material(s), draw_parameters(s, "solver");
   if (section(s, "View")) draw_view(s);
   if (section(s, "World")) draw_parameters(s, "world");

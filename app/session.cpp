@@ -24,9 +24,11 @@ void start_afresh(Session& s) {
   for (Lane& lane : s.loaded.lanes) {
     while (lane.metrics && collect(*lane.metrics, true)) {
     }
-    lane.volume_error = lane.distance = {};
+    lane.step_ms = lane.volume_error = lane.energy = lane.distance = {};
+    lane.apart = {};
   }
   s.loaded.disturbed = false;
+  s.loaded.held = -1;
 }
 
 bool differs(const Settings& a, const Settings& b, const Parameter& row) {
@@ -36,7 +38,7 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
 // The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
 void disturb(Session& s) {
   if (!std::exchange(s.loaded.disturbed, true))
-    for (Lane& lane : s.loaded.lanes) lane.distance = {};
+    for (Lane& lane : s.loaded.lanes) lane.distance = {}, lane.apart = {};
 }
 
 }  // namespace
@@ -54,12 +56,11 @@ void step_lanes(Session& s) {
     if (s.grab && &lane != &s.loaded.lane()) move_pinned(lane.sim, s.grab->vertex, s.grab->position);
     const auto begin = Steady::now();
     step(lane.sim);
-    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3);
+    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, time_of(lane.sim));
   }
-  if (lanes.size() > 1 && s.loaded.comparable) {
-    if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
-    hold_lanes(lanes, s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr);
-  }
+  if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
+  if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
+  if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
   keep_moment(s);
   note_step(s);
@@ -91,7 +92,7 @@ std::uint64_t key_of(const Lane& lane) {
 void find_right(Session& s) {
   const auto& lanes = s.loaded.lanes;
   auto& right = s.loaded.right;
-  if (lanes.size() == 1) return right.reset();
+  if (lanes.size() == 1 && s.view.colour != Colour::motion) return right.reset();
   const Sim& first = lanes[0].sim;
   const std::uint64_t key = key_of(lanes[0]);
   s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& lane) { return key_of(lane) == key; });
@@ -230,11 +231,14 @@ void change_settings(Session& s, const Settings& wanted) {
     for (std::size_t i = 0; i < of_lanes.size(); ++i) {
       Lane& lane = s.loaded.lanes[i];
       if (of_lanes[i] == lane.sim.settings) continue;
-      const std::uint64_t before = of_lanes.size() > 1 ? key_of(lane) : 0;  // it reads the whole mesh
+      const bool alone = of_lanes.size() == 1 && !s.loaded.right;
+      const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
       const Settings own = lane.sim.settings;
       apply_settings(lane.sim, of_lanes[i]);
       note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
-      if (of_lanes.size() == 1 || key_of(lane) == before) continue;
+      lane.patches = {};
+      if (alone && lane.sim.steps > 0) disturb(s);
+      if (alone || key_of(lane) == before) continue;
       disturb(s);
       s.loaded.comparable = std::ranges::all_of(
           s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
@@ -269,9 +273,10 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
     s.beside = glm::vec3(0);
   }
   s.centre.reset();
-  s.loaded.lane().step_ms = {};
+  s.worst.clear();
   start_afresh(s);
   begin_timeline(s);
+  if (s.view.colour == Colour::motion) attempt(s, [&] { find_right(s); });
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }
@@ -296,45 +301,67 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                 }};
 }
 
-Viewport tile_in(const Session& s, std::size_t lane, int width, int height) {
-  if (s.overlaid) return {0, 0, width, height};
-  return tile_of(lane, s.loaded.lanes.size(), width, height);
+bool has_colour(const Session& s, Colour colour) {
+  if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
+  return colour != Colour::energy || s.loaded.sim().settings.material != "none";
 }
 
-Rect lane_place(const Session& s, std::size_t lane, const Rect& view) {
-  const Viewport tile = tile_in(s, lane, int(view.width), int(view.height));
-  return {view.x + float(tile.x), view.y + view.height - float(tile.y + tile.height), float(tile.width),
-          float(tile.height)};
+void choose_colour(Session& s, Colour colour) {
+  s.view.colour = colour;
+  s.log("colour {}", colour_names[std::size_t(colour)]);
+  s.worst.clear();
+  s.loaded.renderer.values_copied = {};  // of another colour
+  s.fit_range = colour == Colour::energy || colour == Colour::motion;
+  if (!has_colour(s, colour))
+    say(s, colour == Colour::energy ? "this needs a material" : "patches of vertices are those of mode node");
+  if (colour != Colour::motion) return;
+  attempt(s, [&] { find_right(s); });
+  if (s.loaded.disturbed)
+    say(s, "the motion is no longer that of the scene: reset (R)");
+  else if (!s.loaded.right && s.loaded.lanes.size() == 1)
+    say(s, "no right motion is known: tetpbd reference finds it, or hold lanes against each other (K)");
 }
 
-void draw_lanes(Session& s, const Target& target) {
-  const auto& lanes = s.loaded.lanes;
-  const bool several = lanes.size() > 1;
-  const std::size_t right = best_lane(lanes);
-  for (std::size_t i = 0; i < lanes.size(); ++i) {
-    Frame frame = frame_of(lanes[i].sim, s.camera, s.view, target);
-    frame.viewport = tile_in(s, i, target.width, target.height);
-    if (s.grab) frame.grabbed.push_back(s.grab->vertex);
-    frame.options.follow = s.view.follow && i == s.loaded.chosen;
-    if (several) {
-      frame.options.body_colour = lane_colour(i);
-      frame.options.legend = s.view.legend && i + 1 == lanes.size();
-      frame.caption = describe(lanes[i]);
-      if (const auto& far = lanes[i].distance.values; !far.empty() && !lanes[i].stopped())
-        frame.caption +=
-            far.back() < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", far.back());
-    }
-    if (s.overlaid) frame.caption.clear();
-    if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;
-    draw(s.loaded.renderer, frame);
-    if (!several || s.overlaid || !s.ghost || i == right) continue;
-    frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
-    frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
-    frame.pinned.clear(), frame.grabbed.clear();
-    frame.options.colour = Colour::plain, frame.options.body_colour = glm::vec3(0.25f);
-    frame.options.shadow = frame.options.follow = frame.options.legend = false;
-    draw(s.loaded.renderer, frame);
+void find_worst(Session& s) {
+  std::optional<std::vector<float>> values;
+  attempt(s, [&] { values = poll_values(s.loaded.renderer); });
+  if (!values) return;
+  const auto& places = s.loaded.renderer.mesh.positions;
+  const auto size = [&](std::uint32_t v) {
+    return std::isfinite((*values)[v]) ? std::abs((*values)[v]) : -1.0f;
+  };
+  constexpr std::size_t most = 5, looked_at = 4096;
+  std::vector<std::uint32_t> order(values->size());
+  for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = v;
+  const auto end = order.begin() + std::ptrdiff_t(std::min(order.size(), looked_at));
+  std::ranges::partial_sort(order, end, std::ranges::greater(), size);
+  s.worst.clear();
+  for (auto v = order.begin(); v != end && s.worst.size() < most && size(*v) > 0; ++v) {
+    const auto close = [&](const auto& other) {
+      return glm::distance(places[other.first], places[*v]) < 0.06 * s.loaded.sim().model->size;
+    };
+    if (std::ranges::none_of(s.worst, close)) s.worst.emplace_back(*v, (*values)[*v]);
   }
+  if (!std::exchange(s.fit_range, false) || s.worst.empty()) return;
+  const double largest = double(size(s.worst.front().first)),
+               power = std::pow(10, std::floor(std::log10(largest)));
+  double high = 10 * power;
+  for (const double step : {5.0, 2.0, 1.0})
+    if (largest <= step * power) high = step * power;
+  s.view.range() = {s.view.scale().is_signed ? -high : 0, high};
+}
+
+const Motion* right_now(const Session& s) {
+  return s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr;
+}
+
+void hold_vertices(Session& s) {
+  Loaded& l = s.loaded;
+  const bool known = right_now(s) || (l.lanes.size() > 1 && l.comparable);
+  if (!known || l.held == l.sim().steps || (s.view.colour != Colour::motion && !l.probe.reading)) return;
+  if (right_now(s) && !is_kept(*l.right, l.sim().steps)) return;
+  hold_vertices(l.lanes, right_now(s), l.renderer, l.answers);
+  l.held = l.sim().steps;
 }
 
 void start_lanes(Session& s) {
@@ -370,6 +397,7 @@ void choose_lane(Session& s, std::size_t lane) {
   if (lane >= s.loaded.lanes.size() || lane == s.loaded.chosen) return;
   let_go(s);
   s.loaded.chosen = lane;
+  s.loaded.renderer.values_copied = {};
   s.log("lane {} chosen", lane + 1);
 }
 
@@ -388,27 +416,6 @@ void compare_lanes(Session& s, const std::vector<std::string>& words) {
     s.loaded.chosen = 0;
     start_lanes(s);
   });
-}
-
-// Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
-void frame_body(Session& s) {
-  const Bounds box = bounds(read_state(s.loaded.sim()).positions);
-  frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
-  s.beside = glm::vec3(0);
-  note_camera(s);
-  s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
-}
-
-bool follow_bodies(Session& s, double elapsed) {
-  if (!s.view.follow) return false;
-  attempt(s, [&] {
-    if (const auto now = poll_centre(s.loaded.renderer)) s.centre = now;
-  });
-  // While the mouse pulls a vertex it aims by the camera, which therefore keeps still.
-  if (!s.centre || s.grab) return false;
-  const glm::vec3 goal = *s.centre + s.beside;
-  follow(s.camera, goal, float(elapsed));
-  return glm::distance(s.camera.target, goal) > 1e-3f * s.camera.distance;
 }
 
 void toggle_pin(Session& s, std::uint32_t vertex) {
@@ -480,15 +487,27 @@ void advance(Session& s, double elapsed) {
 
 void measure_frame(Session& s, bool stepped) {
   for (Lane& lane : s.loaded.lanes) {
-    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms);
+    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, time_of(lane.sim));
     lane.sim.timed = s.measuring;
     if (!s.measuring) continue;
     if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
-    while (const auto measurement = collect(*lane.metrics))
-      lane.volume_error.add(measurement->finite() ? measurement->volume_error_percent : 0.0);
+    while (const auto now = collect(*lane.metrics)) {
+      lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
+      lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
+    }
     // Half the ring of results: with more under way, asking again would wait for the oldest.
     if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim);
   }
+}
+
+bool is_filling(const Session& s) { return s.loaded.map && !s.loaded.map->is_done(); }
+
+void fill_map(Session& s) {
+  if (!is_filling(s)) return;
+  const std::size_t before = s.loaded.map->done;
+  const double budget = s.playing ? 0.008 : 0.03;  // s of a frame
+  if (!attempt(s, [&] { fill_map(*s.loaded.map, budget); })) return s.loaded.map.reset();
+  if (s.loaded.map->done > before && s.loaded.map->is_done()) s.log("map done");
 }
 
 void follow_shaders(Session& s) {
@@ -499,6 +518,7 @@ void follow_shaders(Session& s) {
     note(s, {{"shaders", "edited"}});
     reload_shaders(s.loaded.renderer);
     s.loaded.picker = make_picker(s.loaded.sim().model->rest);
+    s.loaded.probe = {};
   });
   for (Lane& lane : s.loaded.lanes)
     lane.sim.shader_version = version;  // also after an error: said once an edit

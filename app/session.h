@@ -14,6 +14,8 @@
 #include "app/auto_solver.h"
 #include "app/grab.h"
 #include "app/lanes.h"
+#include "app/live_map.h"
+#include "app/probe.h"
 #include "app/record.h"
 #include "app/scene.h"
 #include "app/timeline.h"
@@ -34,9 +36,13 @@ struct Loaded {
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
   std::size_t chosen = 0;                ///< the lane that the panel is of
-  std::optional<Motion> right{};         ///< of several lanes, where it is known
+  std::optional<Motion> right{};         ///< where it is known, of several lanes or for its colours
   bool comparable = true;                ///< lanes differ in how they are solved alone
   bool disturbed = false;                ///< they are no longer held against it, until they start anew
+  Buffer answers{};                      ///< where the right motion has the vertices
+  long held = -1;                        ///< step at which vertices were last held against it
+  Probe probe{};
+  std::optional<LiveMap> map{};
   Lane& lane() { return lanes[chosen]; }
   Sim& sim() { return lane().sim; }
   const Sim& sim() const { return lanes[chosen].sim; }
@@ -85,12 +91,28 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
+/// What of a plot's axis is seen.
+struct PlotView {
+  bool zoomed = false;
+  double low = 0, high = 1;
+};
+
+/// The axes of the map, as they are typed.
+struct MapWords {
+  std::string x{}, y{};
+  bool typed = false;
+};
+
 /// What is shown of the panels.
 struct Ui {
   bool panels = true, plots = true, help = false;
-  float scale = 1;                     ///< of the display: 2 on a dense one
+  float scale = 1;  ///< of the display: 2 on a dense one
+  MapWords map;
   std::string mesh;                    ///< path being typed
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
+  std::array<PlotView, 3> plot_views;
+  std::array<std::array<std::size_t, 3>, 2> plot_choice{
+      {{0, 1, 2}, {1, 4, 5}}};  ///< plot_rows(): of one lane, of several
 };
 
 struct Session {
@@ -115,9 +137,12 @@ struct Session {
   std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago
   glm::vec3 beside{0};              ///< from there to what a following camera looks at, by moving the view
   History frames_per_second;
-  bool overlaid = false;  ///< lanes are drawn in one place
-  bool ghost = true;      ///< beside the others stands the one they are held against
-  double now = 0;         ///< s since the start
+  bool probing = true;                                 ///< the cursor at rest on a body says what is there
+  bool fit_range = false;                              ///< of the colours, once to the values of now
+  std::vector<std::pair<std::uint32_t, float>> worst;  ///< vertices and their values, the largest first
+  bool overlaid = false;                               ///< lanes are drawn in one place
+  bool ghost = true;  ///< beside the others stands the one they are held against
+  double now = 0;     ///< s since the start
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);
@@ -143,10 +168,24 @@ void load_soon(Session& session, const std::string& name, const SceneOverrides& 
 void choose_soon(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
+/// Finds what it needs, or says what is missing.
+void choose_colour(Session& session, Colour colour);
+/// Whether there is something to colour by.
+bool has_colour(const Session& session, Colour colour);
+/// What lanes are held against now, where the right motion is known.
+const Motion* right_now(const Session& session);
+/// How far each vertex is from it, if somebody looks at that.
+void hold_vertices(Session& session);
+/// By a part of the bodies' extent.
+void move_cut(Session& session, double by);
+/// None, along x, y, z, facing the eye.
+void next_cut(Session& session);
 /// Where a lane is drawn: pixels, from the lower left.
 Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
 /// The same within a view, in window coordinates.
 Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
+/// What is to be picked of a lane: as it is drawn, but for size and marks.
+Frame shown_frame(const Session& session, std::size_t lane);
 /// All of them, and the ghost of the one that others are held against.
 void draw_lanes(Session& session, const Target& target);
 /// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
@@ -172,6 +211,11 @@ void watch_state(Session& session);
 void advance(Session& session, double elapsed);
 /// Takes in measurements and timings that have arrived, and asks for the next.
 void measure_frame(Session& session, bool stepped);
+/// The vertices with the largest values of the colour, apart from each other, once values have arrived.
+void find_worst(Session& session);
+/// Goes on with the map, if there is one that is not done.
+void fill_map(Session& session);
+bool is_filling(const Session& session);
 /// Compiles again what changed in the shader folder.
 void follow_shaders(Session& session);
 

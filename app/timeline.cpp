@@ -50,7 +50,10 @@ void show(Session& s, std::size_t index) {
         (pinned ? unpin : pin)(lane.sim, vertex);
     restore_snapshot(lane.sim, then.lanes[i], then.states);
     if (then.held) unpin(lane.sim, *then.held);
-    lane.distance = then.distances[i];
+    if (then.disturbed != s.loaded.disturbed) {
+      lane.distance = {};  // from something else
+      if (then.distances[i]) lane.distance.add(*then.distances[i], time_of(lane.sim));
+    }
   }
   s.loaded.disturbed = then.disturbed;
   if (s.record) s.record->shown = true;
@@ -109,8 +112,7 @@ void keep_moment(Session& s) {
             for (const Lane& lane : lanes) {
               moment->lanes.push_back(take_snapshot(lane.sim, states, at));
               at += snapshot_bytes(lane.sim);
-              History& last = moment->distances.emplace_back();
-              if (const auto& values = lane.distance.values; !values.empty()) last.add(double(values.back()));
+              moment->distances.push_back(lane.distance.at(time_of(lane.sim)));
             }
             moment->disturbed = s.loaded.disturbed;
             for (const std::uint32_t vertex : t.touched)

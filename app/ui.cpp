@@ -19,8 +19,10 @@ void set_look(Session& s, Look look) {
 }
 
 void next_colour(Session& s) {
-  s.view.colour = Colour((std::size_t(s.view.colour) + 1) % colour_names.size());
-  s.log("colour {}", colour_names[std::size_t(s.view.colour)]);
+  auto next = std::size_t(s.view.colour);
+  do next = (next + 1) % colour_names.size();
+  while (!has_colour(s, Colour(next)));
+  choose_colour(s, Colour(next));
 }
 
 void flip(Session& s, const char* name, bool& value) { s.log("{} {}", name, value = !value); }
@@ -37,111 +39,6 @@ void escape(Session& s) {
 constexpr ImGuiWindowFlags plain_window =
     ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
     ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
-
-// A part of the window's layout.
-void begin_part(const char* name, const Rect& place) {
-  ImGui::SetNextWindowPos(ImVec2(place.x, place.y));
-  ImGui::SetNextWindowSize(ImVec2(place.width, place.height));
-  ImGui::Begin(name, nullptr, plain_window | ImGuiWindowFlags_NoBringToFrontOnFocus);
-}
-
-void draw_plot(const char* title, const char* unit, const History& history, float x, float width) {
-  const auto& values = history.values;
-  ImGui::SetCursorPos(ImVec2(x, ImGui::GetStyle().WindowPadding.y));
-  ImGui::BeginGroup();
-  ImGui::Text("%s  %.3g %s", title, values.empty() ? 0.0 : double(values.back()), unit);
-  // From 0 on, so that a plot does not magnify what hardly changes.
-  float least = 0, most = 1e-3f;
-  for (const float v : values) least = std::min(least, v), most = std::max(most, v);
-  ImGui::PlotLines(fmt::format("##{}", title).c_str(), values.data(), int(values.size()), 0,
-                   fmt::format("{:.3g} .. {:.3g}", least, most).c_str(), least, most,
-                   ImVec2(width, ImGui::GetContentRegionAvail().y));
-  ImGui::EndGroup();
-}
-
-// Lines, or with `against` the last value over what it costs and the trail there, by lane; powers of ten up,
-// and across where there is a cost.
-void draw_lane_plot(const Session& s, const char* title, const char* unit, History Lane::*of,
-                    const History Lane::*against, float x, float width) {
-  const ImGuiStyle& style = ImGui::GetStyle();
-  ImGui::SetCursorPos(ImVec2(x, style.WindowPadding.y));
-  ImGui::BeginGroup();
-  ImGui::Text("%s, %s", title, unit);
-  const ImVec2 low = ImGui::GetCursorScreenPos(), size(width, ImGui::GetContentRegionAvail().y);
-  ImGui::InvisibleButton(title, size);
-  ImDrawList& lines = *ImGui::GetWindowDrawList();
-  lines.AddRectFilled(low, ImVec2(low.x + size.x, low.y + size.y), ImGui::GetColorU32(ImGuiCol_FrameBg));
-  const auto height = [](float v) { return std::log10(std::max(v, 1e-4f)); };
-  const auto cost = [&](const Lane& lane) {
-    return height(float(median({(lane.*against).values.begin(), (lane.*against).values.end()})));
-  };
-  float least = 1e9f, most = -1e9f, left = 1e9f, right = -1e9f;
-  for (const Lane& lane : s.loaded.lanes) {
-    for (const float v : (lane.*of).values)
-      least = std::min(least, height(v)), most = std::max(most, height(v));
-    if (against && !(lane.*against).values.empty())
-      left = std::min(left, cost(lane)), right = std::max(right, cost(lane));
-  }
-  if (least > most) return ImGui::EndGroup();  // nothing yet
-  least = std::floor(least), most = std::max(std::ceil(most), least + 1);
-  left = std::floor(left), right = std::max(std::ceil(right), left + 1);
-  const auto place = [&](float across, float up) {
-    return ImVec2(low.x + across * size.x, low.y + (1 - (up - least) / (most - least)) * size.y);
-  };
-  for (float decade = least; decade <= most; ++decade)
-    lines.AddLine(place(0, decade), place(1, decade), ImGui::GetColorU32(ImGuiCol_Text, 0.15f));
-  const auto label = [&](const ImVec2& at, float power, const char* what) {
-    lines.AddText(at, ImGui::GetColorU32(ImGuiCol_Text, 0.6f),
-                  fmt::format("{:g} {}", std::pow(10.0, double(power)), what).c_str());
-  };
-  label(ImVec2(low.x + 2, low.y), most, unit);
-  label(ImVec2(low.x + 2, low.y + size.y - ImGui::GetFontSize()), least, unit);
-  if (against) {
-    const std::string end = fmt::format("{:g} ms", std::pow(10.0, double(right)));
-    lines.AddText(ImVec2(low.x + size.x - ImGui::CalcTextSize(end.c_str()).x - 2,
-                         low.y + size.y - ImGui::GetFontSize()),
-                  ImGui::GetColorU32(ImGuiCol_Text, 0.6f), end.c_str());
-  }
-  std::string values;
-  for (std::size_t i = 0; i < s.loaded.lanes.size(); ++i) {
-    const Lane& lane = s.loaded.lanes[i];
-    const auto& all = (lane.*of).values;
-    if (all.empty() || (against && (lane.*against).values.empty())) continue;
-    const glm::vec3 c = lane_colour(i) * 0.8f;
-    const ImU32 colour = ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1));
-    std::vector<ImVec2> points;
-    const float at = against ? (cost(lane) - left) / (right - left) : 0;
-    for (std::size_t k = 0; k < all.size(); ++k)
-      points.push_back(
-          place(against ? at : float(k) / float(std::max<std::size_t>(all.size() - 1, 1)), height(all[k])));
-    lines.AddPolyline(points.data(), int(points.size()), colour, 0, 1.6f * s.ui.scale);
-    lines.AddCircleFilled(points.back(), 3.5f * s.ui.scale, colour);
-    values += fmt::format("{}{}: {:.3g} {}", values.empty() ? "" : "\n", describe(lane), all.back(), unit);
-    if (against) values += fmt::format(" in {:.3g} ms", std::pow(10.0, double(cost(lane))));
-  }
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", values.c_str());
-  ImGui::EndGroup();
-}
-
-void draw_plots(const Session& s, const Rect& place) {
-  begin_part("plots", place);
-  const float pad = ImGui::GetStyle().WindowPadding.x, width = (place.width - 4 * pad) / 3;
-  const Lane& lane = s.loaded.lanes[s.loaded.chosen];
-  if (s.loaded.lanes.size() > 1) {
-    const char* from = s.loaded.right && !s.loaded.disturbed ? "distance from the right motion"
-                                                             : "distance from the finest lane";
-    draw_lane_plot(s, "time per step", "ms", &Lane::step_ms, nullptr, pad, width);
-    draw_lane_plot(s, from, "%", &Lane::distance, nullptr, 2 * pad + width, width);
-    draw_lane_plot(s, "the same over time per step", "%", &Lane::distance, &Lane::step_ms,
-                   3 * pad + 2 * width, width);
-  } else {
-    draw_plot("frames per second", "fps", s.frames_per_second, pad, width);
-    draw_plot(on_cpu(lane.sim) ? "CPU time per step" : "GPU time per step", "ms", lane.step_ms,
-              2 * pad + width, width);
-    draw_plot("volume error", "%", lane.volume_error, 3 * pad + 2 * width, width);
-  }
-  ImGui::End();
-}
 
 // What is cut off first in a narrow window stands last.
 void draw_status(const Session& s, const Rect& place) {
@@ -204,6 +101,32 @@ void draw_messages(Session& s, const Rect& view) {
   if (pressed) pressed();
 }
 
+// What the cursor points at, beside it.
+void draw_reading(const Session& s, const Reading& r) {
+  const Lane& lane = s.loaded.lanes[s.loaded.probe.lane];
+  ImGui::BeginTooltip();
+  const bool held = !(lane.sim.inverse_masses[r.vertex] > 0);
+  ImGui::Text("vertex %u%s, tet %u", lane.sim.model->original[r.vertex], held ? " (held)" : "", r.tet);
+  if (ImGui::BeginTable("reading", 2, ImGuiTableFlags_SizingFixedFit)) {
+    const auto row = [](const char* name, const std::string& value) {
+      ImGui::TableNextColumn();
+      ImGui::TextDisabled("%s", name);
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(value.c_str());
+    };
+    row("position", fmt::format("{:.4f}, {:.4f}, {:.4f} m", r.position.x, r.position.y, r.position.z));
+    row("speed", fmt::format("{:.4g} m/s", r.speed));
+    row("volume", fmt::format("{:.4f} of rest", 1 + r.volume));
+    row("edge strain", fmt::format("{:+.3g} %", 100 * r.strain));
+    if (r.energy) row("elastic energy", fmt::format("{:.4g} J/m\u00b3", *r.energy));
+    if (r.distance)
+      row(right_now(s) ? "from the right motion" : "from the finest lane",
+          fmt::format("{:.3g} % of size", 100 * *r.distance));
+    ImGui::EndTable();
+  }
+  ImGui::EndTooltip();
+}
+
 void draw_help(const Ui& ui) {
   const ImVec2 whole = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos(ImVec2(whole.x / 2, whole.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
@@ -215,9 +138,11 @@ void draw_help(const Ui& ui) {
       {"Right drag", "turn the view"},
       {"Middle drag", "move the view (or Shift + drag)"},
       {"Wheel", "closer, farther"},
+      {"Alt + drag, Alt + wheel", "moves the plane of a cut"},
       {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
       {"Ctrl + click on a slider", "type a value"},
-      {"Hover", "what a setting means"}};
+      {"Wheel, drag, double click on a plot", "closer, along, all"},
+      {"Hover", "what a setting means, what is there"}};
   if (ImGui::BeginTable("help", 2)) {
     ImGui::TableNextColumn();
     ImGui::TextDisabled("Keys");
@@ -232,6 +157,12 @@ void draw_help(const Ui& ui) {
 }
 
 }  // namespace
+
+void begin_part(const char* name, const Rect& place) {
+  ImGui::SetNextWindowPos(ImVec2(place.x, place.y));
+  ImGui::SetNextWindowSize(ImVec2(place.width, place.height));
+  ImGui::Begin(name, nullptr, plain_window | ImGuiWindowFlags_NoBringToFrontOnFocus);
+}
 
 void set_style(float scale, float density) {
   ImGui::GetIO().IniFilename = nullptr;  // no file is left behind
@@ -256,7 +187,10 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_1, "1", "surface", [](Session& s) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
       {GLFW_KEY_2, "2", "with edges", [](Session& s) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
       {GLFW_KEY_3, "3", "tetrahedra", [](Session& s) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
+      {GLFW_KEY_4, "4", "constraint graph", [](Session& s) { set_look(s, Look::graph); }, GLFW_KEY_KP_4},
       {GLFW_KEY_C, "C", "next colour", [](Session& s) { next_colour(s); }},
+      {GLFW_KEY_W, "W", "mark the worst vertices", [](Session& s) { flip(s, "worst", s.view.worst); }},
+      {GLFW_KEY_X, "X", "cut: none, along x, y, z, the view", [](Session& s) { next_cut(s); }},
       {GLFW_KEY_N, "N", "flat normals", [](Session& s) { flip(s, "normals", s.view.smooth_normals); }},
       {GLFW_KEY_G, "G", "grid", [](Session& s) { flip(s, "grid", s.view.grid); }},
       {GLFW_KEY_L, "L", "follow the bodies", [](Session& s) { flip(s, "follow", s.view.follow); }},
@@ -277,7 +211,7 @@ Layout make_layout(const Ui& ui, float width, float height) {
   Layout layout;
   const float status = std::round(32 * ui.scale);
   const float panel = ui.panels ? std::min(std::round(320 * ui.scale), width * 0.6f) : 0;
-  const float plots = ui.panels && ui.plots && height > 360 * ui.scale ? std::round(104 * ui.scale) : 0;
+  const float plots = ui.panels && ui.plots && height > 360 * ui.scale ? std::round(128 * ui.scale) : 0;
   const float timeline = ui.panels && height > 240 * ui.scale ? std::round(38 * ui.scale) : 0;
   const float bottom = ui.panels ? std::max(height - status, 1.0f) : height;
   layout.view = {0, 0, std::max(width - panel, 1.0f), std::max(bottom - plots - timeline, 1.0f)};
@@ -312,6 +246,7 @@ void draw_ui(Session& s, const Layout& layout) {
     draw_status(s, layout.status);
   }
   draw_messages(s, layout.view);
+  if (s.loaded.probe.reading) draw_reading(s, *s.loaded.probe.reading);
   if (s.ui.help) draw_help(s.ui);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/chart.h"
 #include "app/session.h"
 
 namespace tetpbd {
@@ -34,8 +35,24 @@ void draw_busy(const Layout& layout, const std::string& what);
 /// Sizes and font for a display of this scale. `density`: framebuffer pixels a window coordinate.
 void set_style(float scale, float density);
 
+/// A plot: of which history of each lane (none: frames per second), by powers of ten where that helps, over
+/// time or over the time of a step.
+struct PlotRow {
+  const char *title, *unit;
+  History Lane::*of;
+  bool powers = false, over_cost = false;
+};
+const std::vector<PlotRow>& plot_rows();
+/// Of all lanes, a line a value.
+std::string plot_csv(const Session& session, const PlotRow& row);
+Chart plot_chart(const Session& session, const PlotRow& row);
+void draw_plots(Session& session, const Rect& place);
+/// Begins a part of the window's layout, until ImGui::End().
+void begin_part(const char* name, const Rect& place);
+
 /// The panel at the right, and the part of its width that a widget's label takes.
 void draw_panel(Session& session);
+void draw_map(Session& session);
 float label_width();
 /// The bar below the view: speed, loop, what can be gone back to.
 void draw_timeline(Session& session);

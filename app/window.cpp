@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <functional>
 #include <string_view>
 #include <utility>
@@ -27,19 +26,31 @@ namespace {
 
 // Mouse and keyboard on the view: what a drag does is decided once the GPU has said what is under the cursor.
 
+/// What a picture under the cursor depends on.
+struct Seen {
+  glm::vec3 origin{0}, direction{0};
+  long step = -1, held = -1;
+  std::size_t lane = 0;
+  bool operator==(const Seen&) const = default;
+};
+
 struct Input {
   Session& session;
   Rect view{};
   /// `asking`: pressed, and the picker has not answered yet.
-  enum class Drag { none, asking, grab, orbit, pan } drag = Drag::none;
+  enum class Drag { none, asking, grab, orbit, pan, cut } drag = Drag::none;
   bool pinning = false;                              ///< the question is for a vertex to pin
   int button = -1;                                   ///< that holds the drag
   double x = 0, y = 0;                               ///< cursor, as far as events have been handled
   double last_press = -1, press_x = 0, press_y = 0;  ///< s, and where: for double clicks
+  Seen seen{};                                       ///< by the probe
+  double rested = 0;                                 ///< s, since when the cursor is where it is
   std::vector<std::function<void()>> events{};       ///< since the last frame, in order
 
   /// Something is under way that a frame must follow.
-  bool busy() const { return drag != Drag::none || pinning || !events.empty(); }
+  bool busy() const {
+    return drag != Drag::none || pinning || !events.empty() || session.loaded.probe.asked();
+  }
 };
 
 using Drag = Input::Drag;
@@ -47,21 +58,52 @@ using Drag = Input::Drag;
 constexpr double double_click = 0.35;  // s, the usual setting of desktops
 constexpr double same_place = 6;       // window coordinates between the clicks of a double click
 
-Ray ray_at_cursor(const Input& in) {
+Ray ray_at_cursor(const Input& in, std::size_t lane) {
   // Only ratios count, so window coordinates do as well as pixels.
-  const Rect tile = lane_place(in.session, in.session.loaded.chosen, in.view);
+  const Rect tile = lane_place(in.session, lane, in.view);
   return pixel_ray(in.session.camera, float(in.x) - tile.x, float(in.y) - tile.y, int(tile.width),
                    int(tile.height));
 }
 
+Ray ray_at_cursor(const Input& in) { return ray_at_cursor(in, in.session.loaded.chosen); }
+
+std::size_t lane_at_cursor(const Input& in) {
+  const Session& s = in.session;
+  for (std::size_t lane = 0; lane < s.loaded.lanes.size() && !s.overlaid; ++lane)
+    if (lane_place(s, lane, in.view).contains(in.x, in.y)) return lane;
+  return s.loaded.chosen;
+}
+
 bool on_view(const Input& in) { return in.view.contains(in.x, in.y) && !ImGui::GetIO().WantCaptureMouse; }
+
+// How far a drag takes the plane of the cut along its normal, as a part of the extent there.
+double cut_moved(const Session& s, float dx, float dy, const Rect& place) {
+  const Renderer& r = s.loaded.renderer;
+  const glm::vec3 n = s.view.cut_direction();
+  const glm::mat4 seen = projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera);
+  const auto pixels = [&](const glm::vec3& p) {
+    const glm::vec4 clip = seen * glm::vec4(p, 1);
+    return glm::vec2(clip.x, -clip.y) / clip.w * 0.5f * glm::vec2(place.width, place.height);
+  };
+  const float extent = glm::dot(glm::abs(n), r.rest_high - r.rest_low);
+  const glm::vec2 way =
+      pixels(s.camera.target + 0.5f * extent * n) - pixels(s.camera.target - 0.5f * extent * n);
+  // Where the normal points at the eye, up is into the picture.
+  if (glm::length(way) < 0.1f * place.height) return double(dy / place.height);
+  return double(glm::dot(glm::vec2(dx, dy), way) / glm::dot(way, way));
+}
 
 void move(Input& in, double x, double y) {
   Session& s = in.session;
   const float dx = float(x - in.x), dy = float(y - in.y);
+  if (dx != 0 || dy != 0) in.rested = s.now;
   in.x = x, in.y = y;
   constexpr float degrees = 0.35f;  // a window coordinate: a turn of the wrist is half a turn of the view
   if (in.drag == Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees);
+  if (in.drag == Drag::cut) {
+    const Rect place = lane_place(s, s.loaded.chosen, in.view);
+    move_cut(s, cut_moved(s, dx, dy, place));
+  }
   if (in.drag != Drag::pan) return;
   const glm::vec3 before = s.camera.target;
   const Rect place = lane_place(s, s.loaded.chosen, in.view);
@@ -74,9 +116,10 @@ void press(Input& in, int button, int modifiers) {
   Session& s = in.session;
   const bool left = button == GLFW_MOUSE_BUTTON_LEFT;
   in.button = button;
-  for (std::size_t lane = 0; lane < s.loaded.lanes.size() && !s.overlaid; ++lane)
-    if (lane_place(s, lane, in.view).contains(in.x, in.y)) choose_lane(s, lane);
-  if (button == GLFW_MOUSE_BUTTON_MIDDLE || (left && (modifiers & GLFW_MOD_SHIFT))) {
+  choose_lane(s, lane_at_cursor(in));
+  if (left && (modifiers & GLFW_MOD_ALT)) {
+    in.drag = Drag::cut;
+  } else if (button == GLFW_MOUSE_BUTTON_MIDDLE || (left && (modifiers & GLFW_MOD_SHIFT))) {
     in.drag = Drag::pan;
   } else if (button == GLFW_MOUSE_BUTTON_RIGHT) {
     in.drag = Drag::orbit;
@@ -87,7 +130,7 @@ void press(Input& in, int button, int modifiers) {
     in.drag = Drag::asking;
     in.last_press = twice ? -1 : s.now;
     in.press_x = in.x, in.press_y = in.y;
-    request(s.loaded.picker, s.loaded.sim().positions.id(), ray_at_cursor(in));
+    request(s.loaded.picker, s.loaded.renderer, shown_frame(s, s.loaded.chosen), ray_at_cursor(in));
   }
 }
 
@@ -95,6 +138,7 @@ void release(Input& in, int button) {
   if (button != in.button) return;
   Session& s = in.session;
   const Camera& c = s.camera;
+  if (in.drag == Drag::cut) s.log("cut {:.4f}", s.view.cut);
   if (in.drag == Drag::orbit || in.drag == Drag::pan)
     note_camera(s), s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation,
                           c.distance, c.target.x, c.target.y, c.target.z);
@@ -104,8 +148,12 @@ void release(Input& in, int button) {
   in.button = -1;
 }
 
-void wheel(Input& in, double turned) {
+void wheel(Input& in, double turned, bool of_cut) {
   if (!on_view(in)) return;
+  if (of_cut) {
+    move_cut(in.session, 0.02 * turned);
+    return in.session.log("cut {:.4f}", in.session.view.cut);
+  }
   zoom(in.session.camera, std::pow(0.9f, float(turned)));
   note_camera(in.session);
   in.session.log("zoom {:.4f}", in.session.camera.distance);
@@ -134,6 +182,28 @@ void take_answer(Input& in) {
   }
 }
 
+// Asks what is under a cursor that has come to rest, and again when the picture there may have changed.
+void hover(Input& in) {
+  Session& s = in.session;
+  Probe& probe = s.loaded.probe;
+  constexpr double rest = 0.25;  // s
+  if (!s.probing || in.drag != Drag::none || !on_view(in) || s.now - in.rested < rest || s.ui.help) {
+    probe.reading.reset(), probe.copied = {}, probe.picker.answered = {};
+    in.seen = {};
+    return;
+  }
+  const bool had = probe.reading.has_value();
+  if (take_reading(probe, s.loaded.lanes) && probe.reading && !had)
+    s.log("probe {} {} {:.4f} {:.4f} {:.4f}", probe.reading->vertex, probe.reading->tet,
+          probe.reading->position.x, probe.reading->position.y, probe.reading->position.z);
+  const std::size_t lane = lane_at_cursor(in);
+  const Ray ray = ray_at_cursor(in, lane);
+  const Seen now{ray.origin, ray.direction, s.loaded.sim().steps, s.loaded.held, lane};
+  if (probe.asked() || in.seen == now) return;
+  in.seen = now;
+  ask(probe, s.loaded.lanes, lane, s.loaded.renderer, shown_frame(s, lane), ray);
+}
+
 // Before Dear ImGui is started, which calls on what was installed. A queue of our own, since Dear ImGui
 // forgets what came and went within a frame, and frames of a software renderer are long.
 void listen(GLFWwindow* window, Input& input) {
@@ -158,7 +228,11 @@ void listen(GLFWwindow* window, Input& input) {
     of(w)->events.push_back([=, in = of(w)] { move(*in, x, y); });
   });
   glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turned) {
-    of(w)->events.push_back([=, in = of(w)] { wheel(*in, turned); });
+    bool of_cut = false;  // as it is now, not in the next frame
+    for (const int held :
+         {GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL})
+      of_cut = of_cut || glfwGetKey(w, held) == GLFW_PRESS;
+    of(w)->events.push_back([=, in = of(w)] { wheel(*in, turned, of_cut); });
   });
 }
 
@@ -167,7 +241,7 @@ void handle_input(Input& in, const Rect& view) {
   in.view = view;
   for (const auto& event : std::exchange(in.events, {})) event();
   Session& s = in.session;
-  attempt(s, [&] { take_answer(in); });
+  attempt(s, [&] { take_answer(in), hover(in); });
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
   const Sim& sim = s.loaded.sim();
@@ -267,9 +341,7 @@ void take_screenshots(Session& s, View& view) {
   attempt(s, [&] {
     const auto image = view.read_back.poll();
     if (!image) return;
-    std::string name;
-    for (int i = 0; name.empty() || std::filesystem::exists(name); ++i)
-      name = fmt::format("screenshot_{:03}.png", i);
+    const std::string name = free_name("screenshot", "png");
     write_png(name, *image);
     s.log("screenshot {}", name);
     say(s, "saved " + name);
@@ -318,6 +390,7 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   const int width = pixels(layout.view.width), height = pixels(layout.view.height);
   const Viewport tile = tile_in(s, 0, width, height);
   s.aspect = float(tile.width) / float(tile.height);
+  find_worst(s);
   draw_view(s, view, width, height);
   take_screenshots(s, view);
   const bool named = s.task.has_value();
@@ -360,8 +433,8 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.log("ready");
   while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !moving && !input.busy() && !s.task && view.read_back.pending() == 0 &&
-                      glfwGetTime() - last_event > 0.5;
+    const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task &&
+                      view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
     if (!desktop.visible || idle)
       glfwWaitEventsTimeout(0.1);
     else
@@ -372,7 +445,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     const double elapsed = s.now - std::exchange(before, s.now);
     if (!desktop.visible) continue;
     if (!idle && ++frames > 2)
-      s.frames_per_second.add(1 / std::max(elapsed, 1e-6));  // the first compile shaders
+      s.frames_per_second.add(1 / std::max(elapsed, 1e-6), s.now);  // the first compile shaders
     if (desktop.width != last_width || desktop.height != last_height)
       s.log("size {} {}", last_width = desktop.width, last_height = desktop.height);
     if (s.loaded.scene.name != title)
@@ -386,6 +459,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
           measure_frame(s, s.clock.simulated != simulated);
         }))
       s.ui.plots = false, play(s, false);  // said once, not every frame
+    fill_map(s);
     moving = follow_bodies(s, elapsed);
     if (s.now - last_check > 0.5) {
       last_check = s.now;

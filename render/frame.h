@@ -16,14 +16,34 @@
 
 namespace tetpbd {
 
-enum class Look { surface, wire, tets };
-enum class Colour { plain, volume, stretch, velocity };  // COLOUR_... of shaders/render/layout.glsl
-inline constexpr std::array look_names{"surface", "wire", "tets"};
-inline constexpr std::array colour_names{"plain", "volume", "stretch", "velocity"};
+enum class Look { surface, wire, tets, graph };
+inline constexpr std::array look_names{"surface", "wire", "tets", "graph"};
+/// COLOUR_... of shaders/render/layout.glsl.
+enum class Colour { plain, volume, stretch, velocity, energy, motion, patch };
+inline constexpr std::array colour_names{"plain",  "volume", "stretch", "velocity",
+                                         "energy", "motion", "patch"};
+
+inline constexpr std::array cut_names{"x", "y", "z", "the view"};
 
 struct ColourRange {
   double low = 0, high = 1;
 };
+/// Of each Colour: how its scale is labelled, and how many of the unit a value of 1 is.
+struct ColourScale {
+  const char *title, *unit;
+  double factor = 1;
+  ColourRange range{};     ///< at first
+  double most = 1;         ///< a slider's end, from a part in 10^4 of it
+  bool is_signed = false;  ///< 0 in the middle
+};
+inline constexpr std::array<ColourScale, colour_names.size()> colour_scales{
+    {{"", ""},
+     {"Volume error", "% of rest", 100, {-0.2, 0.2}, 1, true},
+     {"Edge strain", "% of rest", 100, {-0.2, 0.2}, 1, true},
+     {"Speed", "m/s", 1, {0, 5}, 50},
+     {"Elastic energy", "J/m\u00b3", 1, {0, 1e3}, 1e7},
+     {"Error of motion", "% of size", 100, {0, 0.05}, 1},
+     {"", ""}}};
 
 struct ViewOptions {
   Look look = Look::surface;
@@ -36,15 +56,29 @@ struct ViewOptions {
   bool follow = false;   ///< the camera goes where the bodies go: poll_centre() says where they are
   double shrink = 0.15;  ///< tets: each towards its centre, 0..1
   double explode = 0;    ///< tets: away from the bodies' centre, as a part of their distance from it
-  double cut = 1;    ///< tets: those whose centre at rest is below this part of the rest shape's extent ...
-  int cut_axis = 0;  ///< ... along x, y, z (0, 1, 2)
-  glm::vec3 body_colour{0.74f, 0.50f, 0.41f};  ///< sRGB; further bodies turn its hue
-  /// Of each Colour: none, V/V0 - 1, L/L0 - 1, m/s.
-  std::array<ColourRange, 4> ranges{{{}, {-0.2, 0.2}, {-0.2, 0.2}, {0, 5}}};
+  double cut = 1;        ///< what is below this part of the rest shape's extent ...
+  int cut_axis =
+      0;  ///< ... along x, y, z (0, 1, 2) or `cut_normal` (3) is shown, and where it ends a flat face
+  glm::vec3 cut_normal{0, 0, 1};
+  glm::vec3 body_colour{0.74f, 0.50f, 0.41f};                 ///< sRGB; further bodies turn its hue
+  std::array<ColourRange, colour_names.size()> ranges = [] {  ///< of each Colour
+    std::array<ColourRange, colour_names.size()> start;
+    for (std::size_t i = 0; i < start.size(); ++i) start[i] = colour_scales[i].range;
+    return start;
+  }();
+  bool contacts = false;       ///< dots where vertices touch the ground or walls
+  bool arrows = false;         ///< where velocities take some of the vertices ...
+  double arrow_seconds = 0.1;  ///< ... in this time
+  bool worst = false;          ///< values of all vertices come back: poll_values()
 
   ColourRange& range() { return ranges[std::size_t(colour)]; }
   const ColourRange& range() const { return ranges[std::size_t(colour)]; }
-  bool has_scale() const { return legend && colour != Colour::plain; }
+  bool is_cut() const { return cut < 1; }
+  glm::vec3 cut_direction() const {
+    return cut_axis > 2 ? cut_normal : glm::vec3(cut_axis == 0, cut_axis == 1, cut_axis == 2);
+  }
+  const ColourScale& scale() const { return colour_scales[std::size_t(colour)]; }
+  bool has_scale() const { return legend && *scale().title; }
 };
 
 /// The cheapest picture: flat faces on one colour, and nothing else.
@@ -60,16 +94,20 @@ struct Viewport {
 
 struct Frame {
   GLuint positions = 0;   ///< buffer of Position; nothing but its current state is read
-  GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity alone
+  GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity and arrows alone
+  GLuint values =
+      0;  ///< buffer of floats by vertex; needed for Colour::motion (measure_distances) and patch alone
+  glm::vec4 material{0};  ///< as tet_energy of values.glsl has it; needed for Colour::energy alone
   Camera camera;
   Viewport viewport;
   ViewOptions options;
   std::optional<float> ground;    ///< height, metres
   std::vector<glm::vec4> planes;  ///< walls: dot(xyz, x) = w, xyz of unit length towards the bodies
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
+  std::vector<std::uint32_t> worst;            ///< as rings, also through the body
   std::string caption;                         ///< upper left
-  bool over = false;  ///< the bodies alone, into what is drawn already
-  float opacity = 1;  ///< of the bodies
+  bool over = false;                           ///< the bodies alone, into what is drawn already
+  float opacity = 1;                           ///< of the bodies
   GLuint target = 0;  ///< framebuffer with an sRGB colour format (Target has it) and depth
 };
 

@@ -36,9 +36,7 @@ ImU32 scale_colour(const ViewOptions& options, double value) {
 }
 
 void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, float height, float line) {
-  const bool speed = options.colour == Colour::velocity;
-  const char* title = speed ? "Speed" : options.colour == Colour::volume ? "Volume error" : "Edge strain";
-  const char* unit = speed ? "m/s" : "% of rest";
+  const auto [title, unit, factor, start, most, is_signed] = options.scale();
   constexpr int ticks = 5;
   const float pad = 0.75f * line, bar_height = std::round(std::min(14.5f * line, 0.42f * height));
   const auto value = [&, range = options.range()](float part) {
@@ -47,8 +45,9 @@ void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, flo
   std::string labels[ticks];
   float width = std::max(ImGui::CalcTextSize(title).x, ImGui::CalcTextSize(unit).x);
   for (int i = 0; i < ticks; ++i) {
-    const double shown = value(float(i) / (ticks - 1)) * (speed ? 1 : 100);
-    labels[i] = std::abs(shown) < 1e-9 ? "0" : fmt::format(fmt::runtime(speed ? "{:.3g}" : "{:+.3g}"), shown);
+    const double shown = value(float(i) / (ticks - 1)) * factor;
+    labels[i] =
+        std::abs(shown) < 1e-9 ? "0" : fmt::format(fmt::runtime(is_signed ? "{:+.3g}" : "{:.3g}"), shown);
     width = std::max(width, line + pad + ImGui::CalcTextSize(labels[i].c_str()).x);
   }
   const ImVec2 low(std::round(corner.x - width - 2 * pad),

@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "render/layout.h"
+#include "render/marks.h"
 #include "sim/layout.h"
+#include "sim/material.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -24,12 +26,19 @@ const std::map<std::string, Recipe> recipes = {
     {"surface shadow", {{"render/body.vert", "render/surface.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"tets", {{"render/body.vert", "render/tets.geom", "render/body.frag"}, {}}},
     {"tets shadow", {{"render/body.vert", "render/tets.geom", "render/depth.frag"}, {"SHADOW"}}},
+    {"caps", {{"render/body.vert", "render/caps.geom", "render/body.frag"}, {}}},
+    {"caps shadow", {{"render/body.vert", "render/caps.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"background", {{"render/background.vert", "render/background.frag"}, {}}},
     {"plane", {{"render/plane.vert", "render/plane.frag"}, {}}},
+    {"graph", {{"render/body.vert", "render/graph.geom", "render/graph.frag"}, {}}},
+    {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
+    {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},
     {"dots", {{"render/dots.vert", "render/dots.frag"}, {}}},
     {"normals", {{"render/gather.comp"}, {"NORMAL"}}},
-    {"volume errors", {{"render/gather.comp"}, {"VOLUME"}}},
-    {"stretch errors", {{"render/gather.comp"}, {}}},
+    {"tet values", {{"render/gather.comp"}, {"TETS"}}},
+    {"edge strains", {{"render/gather.comp"}, {}}},
+    {"speeds", {{"render/vertex_values.comp"}, {"SPEED"}}},
+    {"distances", {{"render/vertex_values.comp"}, {}}},
     {"shadow fit", {{"render/shadow_fit.comp"}, {}}}};
 
 Program compile(const std::string& name) {
@@ -37,34 +46,13 @@ Program compile(const std::string& name) {
   return Program(name, files, {}, defines);
 }
 
-const Program& use(Renderer& renderer, const std::string& name) {
-  if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
-  const Program& program = renderer.programs.at(name);
-  program.use();
-  return program;
-}
-
-Buffer rest_buffer(const Renderer& renderer) {
-  std::vector<glm::vec4> rest;
-  std::size_t next = 1;  // body
-  for (const glm::dvec3& p : renderer.mesh.positions) {
-    while (next < renderer.bodies.size() && rest.size() >= renderer.bodies[next]) ++next;
-    rest.emplace_back(glm::vec3(p), float(next - 1));
-  }
-  return Buffer("render rest", rest);
-}
-
 // What the corners of elements gather: the other corners of each, in the order of `others`.
 template <std::size_t N>
 VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint32_t, N>>& elements,
                     const std::array<std::array<std::size_t, N - 1>, N>& others, const std::string& label,
                     std::size_t value_bytes) {
-  std::vector<char> on_surface(mesh.positions.size());
-  for (const Triangle& triangle : mesh.surface)
-    for (const std::uint32_t v : triangle) on_surface[v] = true;
   const auto corners = [&](std::size_t e, const auto& emit) {
-    for (std::size_t k = 0; k < N; ++k)
-      if (on_surface[elements[e][k]]) emit(elements[e][k], std::uint32_t(e * N + k));
+    for (std::size_t k = 0; k < N; ++k) emit(elements[e][k], std::uint32_t(e * N + k));
   };
   const Grouped grouped = group_by_key(elements.size(), mesh.positions.size(), corners);
   std::vector<std::uint32_t> items;
@@ -74,26 +62,65 @@ VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint3
           Buffer(label, mesh.positions.size() * value_bytes)};
 }
 
-// The name of the buffer of values, made when first asked for and filled by their program.
-GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, const char* program,
-                const auto& make) {
-  if (!values) values = make(renderer.mesh);
+// Dispatches the program in use over all vertices; `values` by vertex.
+void fill(const Renderer& renderer, const Program& program, GLuint positions, const Buffer& values) {
   const std::size_t count = renderer.mesh.positions.size();
-  use(renderer, program).set("count", unsigned(count));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
-  if (renderer.rest) renderer.rest.bind_storage(BIND_RENDER_REST);  // normals do without
-  values.offsets.bind_storage(BIND_RENDER_OFFSETS);
-  values.items.bind_storage(BIND_RENDER_ITEMS);
-  values.values.bind_storage(BIND_RENDER_VALUES);
+  program.set("count", unsigned(count));
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
+  if (renderer.rest) renderer.rest.bind_storage(BIND_RENDER_REST);  // not all need it
+  values.bind_storage(BIND_RENDER_VALUES);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
+}
+
+// The name of the buffer of values, made when first asked for and filled by their program.
+GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, const Program& program,
+                const auto& make) {
+  if (!values) values = make(renderer.mesh);
+  values.offsets.bind_storage(BIND_RENDER_OFFSETS);
+  values.items.bind_storage(BIND_RENDER_ITEMS);
+  fill(renderer, program, frame.positions, values.values);
   return values.values.id();
+}
+
+// Of the frame's colour; 0 where there are none.
+GLuint vertex_values(Renderer& renderer, const Frame& frame) {
+  const Colour colour = frame.options.colour;
+  if (colour == Colour::plain) return 0;
+  if (colour == Colour::motion || colour == Colour::patch) return frame.values;
+  VertexGather& values = renderer.values[colour];
+  const std::string label = std::string("vertex values, ") + colour_names[std::size_t(colour)];
+  if (colour == Colour::velocity) {
+    if (!values) values.values = Buffer(label, renderer.mesh.positions.size() * sizeof(float));
+    const Program& program = use(renderer, "speeds");
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_ANSWERS, frame.velocities);
+    fill(renderer, program, frame.positions, values.values);
+    return values.values.id();
+  }
+  if (colour == Colour::stretch)
+    return gathered(renderer, frame, values, use(renderer, "edge strains"), [&](const TetMesh& mesh) {
+      return gather<2>(mesh, tet_edges(mesh), {{{1}, {0}}}, label, sizeof(float));
+    });
+  const Program& program = use(renderer, "tet values");
+  program.set("kind", int(colour));
+  program.set("material", frame.material);
+  // Even permutations, which keep the sign of the volume.
+  return gathered(renderer, frame, values, program, [&](const TetMesh& mesh) {
+    return gather<4>(mesh, mesh.tets, {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}}, label, sizeof(float));
+  });
 }
 
 // Turns the hue about the grey axis: clay, then teal, ochre, plum and so on, of like lightness.
 glm::vec3 turned(const glm::vec3& colour, float degrees) {
   const glm::mat3 turn(glm::rotate(glm::mat4(1.0f), glm::radians(degrees), glm::vec3(1.0f)));
   return glm::clamp(turn * colour, 0.02f, 1.0f);
+}
+
+// n.x <= w of what is shown of the rest shape.
+glm::vec4 cut_plane(const Renderer& renderer, const ViewOptions& options) {
+  const glm::vec3 n = options.cut_direction(), middle = 0.5f * (renderer.rest_low + renderer.rest_high);
+  const float half = glm::dot(glm::abs(n), 0.5f * (renderer.rest_high - renderer.rest_low));
+  return glm::vec4(n, options.is_cut() ? glm::dot(n, middle) + half * float(2 * options.cut - 1) : 1e30f);
 }
 
 View view_block(const Renderer& renderer, const Frame& frame) {
@@ -106,10 +133,10 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   view.right = glm::vec4(seen[0][0], seen[1][0], seen[2][0], options.shadow ? 1.0f : 0.0f);
   view.colour = glm::vec4(float(options.colour), float(options.range().low), float(options.range().high),
                           options.look == Look::wire ? 0.85f : 0.0f);
-  view.tets = glm::vec4(float(options.shrink), options.look == Look::tets ? float(options.explode) : 0.0f,
-                        float(options.cut), float(options.cut_axis));
-  view.rest_low = glm::vec4(renderer.rest_low, frame.opacity);
-  view.rest_high = glm::vec4(renderer.rest_high, 0.0f);
+  const bool tets = options.look == Look::tets;
+  view.tets = tets ? glm::vec4(options.shrink, options.explode, 1, 0) : glm::vec4(0);
+  view.cut = cut_plane(renderer, options);
+  view.material = glm::vec4(glm::vec3(frame.material), frame.opacity);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {
     const glm::vec3 colour = glm::convertSRGBToLinear(turned(options.body_colour, turns[i % turns.size()]));
@@ -133,49 +160,60 @@ void bind_attributes(Renderer& renderer, const Frame& frame) {
                           reinterpret_cast<const void*>(offset));
   };
   const ViewOptions& options = frame.options;
-  const bool tets = options.look == Look::tets, volume = options.colour == Colour::volume,
-             stretch = options.colour == Colour::stretch;
-  if (!renderer.rest && (tets || volume || stretch || renderer.bodies.size() > 1))
-    renderer.rest = rest_buffer(renderer);
+  const bool tets = options.look == Look::tets, coloured = options.colour != Colour::plain;
+  const bool of_vertices = options.colour == Colour::velocity || options.colour == Colour::motion ||
+                           options.colour == Colour::patch;
+  if (tets || coloured || options.is_cut() || renderer.bodies.size() > 1) rest_of(renderer);
   GLuint normal = 0, value = 0;
-  if (!tets) {  // the geometry shader of these has the whole tetrahedron
-    if (options.smooth_normals)
-      normal = gathered(renderer, frame, renderer.normals, "normals", [](const TetMesh& mesh) {
-        return gather<3>(mesh, mesh.surface, {{{1, 2}, {2, 0}, {0, 1}}}, "vertex normals", sizeof(glm::vec4));
-      });
-    if (volume)  // even permutations, which keep the sign of the volume
-      value = gathered(renderer, frame, renderer.volume_errors, "volume errors", [](const TetMesh& mesh) {
-        return gather<4>(mesh, mesh.tets, {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}},
-                         "vertex volume errors", sizeof(float));
-      });
-    if (stretch)
-      value = gathered(renderer, frame, renderer.stretch_errors, "stretch errors", [](const TetMesh& mesh) {
-        return gather<2>(mesh, tet_edges(mesh), {{{1}, {0}}}, "vertex stretch errors", sizeof(float));
-      });
+  if (!tets && options.smooth_normals)  // the geometry shader of tets has the whole tetrahedron
+    normal = gathered(renderer, frame, renderer.normals, use(renderer, "normals"), [](const TetMesh& mesh) {
+      return gather<3>(mesh, mesh.surface, {{{1, 2}, {2, 0}, {0, 1}}}, "vertex normals", sizeof(glm::vec4));
+    });
+  if (!tets || of_vertices || options.worst) value = vertex_values(renderer, frame);
+  if (options.worst && value && !renderer.values_copied) {
+    const std::size_t bytes = renderer.mesh.positions.size() * sizeof(float);
+    if (!renderer.values_copy) renderer.values_copy = Buffer("values' copy", bytes, nullptr, GL_STREAM_READ);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    glBindBuffer(GL_COPY_READ_BUFFER, value);
+    glBindBuffer(GL_COPY_WRITE_BUFFER, renderer.values_copy.id());
+    glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, GLsizeiptr(bytes));
+    renderer.values_copied = Fence::here();
   }
   glBindVertexArray(renderer.vertex_array.id());
   attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
   attribute(ATTRIBUTE_LOW, frame.positions, 3, sizeof(Position), offsetof(Position, low));
   attribute(ATTRIBUTE_NORMAL, normal, 3, sizeof(glm::vec4), 0);
   attribute(ATTRIBUTE_VALUE, value, 1, sizeof(float), 0);
-  attribute(ATTRIBUTE_VELOCITY, options.colour == Colour::velocity ? frame.velocities : 0, 3,
-            sizeof(Velocity), offsetof(Velocity, high));
   attribute(ATTRIBUTE_REST, renderer.rest.id(), 4, sizeof(glm::vec4), 0);
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);  // the step's and the kernels'
 }
 
 // To the image or, with `shadow`, to the map.
 void draw_bodies(Renderer& renderer, const Frame& frame, bool shadow) {
-  const bool tets = frame.options.look == Look::tets;
-  use(renderer, std::string(tets ? "tets" : "surface") + (shadow ? " shadow" : ""));
-  Buffer& indices = tets ? renderer.tets : renderer.triangles;
-  if (!indices)
-    indices =
-        tets ? Buffer("tet indices", renderer.mesh.tets) : Buffer("surface indices", renderer.mesh.surface);
-  glBindVertexArray(renderer.vertex_array.id());
-  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.id());
-  glDrawElements(tets ? GL_LINES_ADJACENCY : GL_TRIANGLES, GLsizei(indices.bytes() / sizeof(std::uint32_t)),
-                 GL_UNSIGNED_INT, nullptr);
+  const auto elements = [&](const char* program, GLenum kind, const Buffer& indices) {
+    use(renderer, std::string(program) + (shadow ? " shadow" : ""));
+    glBindVertexArray(renderer.vertex_array.id());
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.id());
+    glDrawElements(kind, GLsizei(indices.bytes() / sizeof(std::uint32_t)), GL_UNSIGNED_INT, nullptr);
+  };
+  const Look look = frame.options.look;
+  const bool cut = frame.options.is_cut(), graph = look == Look::graph && !shadow;
+  if (look != Look::tets && !graph && !renderer.triangles)
+    renderer.triangles = Buffer("surface indices", renderer.mesh.surface);
+  if (graph && !renderer.graph) renderer.graph = Buffer("graph indices", tet_edges(renderer.mesh));
+  if (cut) glEnable(GL_CLIP_DISTANCE0);
+  if (graph) {  // all of it, mixed
+    glEnable(GL_BLEND);
+    glDepthMask(GL_FALSE);
+    elements("graph", GL_LINES, renderer.graph);
+    glDepthMask(GL_TRUE);
+  } else if (look == Look::tets) {
+    elements("tets", GL_LINES_ADJACENCY, tets_of(renderer));
+  } else {
+    elements("surface", GL_TRIANGLES, renderer.triangles);
+  }
+  glDisable(GL_CLIP_DISTANCE0);
+  if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, tets_of(renderer));
 }
 
 // The projection of the light, as far as something of this frame needs it, fitted by the GPU itself.
@@ -270,23 +308,6 @@ void draw_plane(Renderer& renderer, const Frame& frame, const glm::vec4& plane, 
   glDepthMask(GL_TRUE);
 }
 
-void draw_dots(Renderer& renderer, const Frame& frame) {
-  if (frame.pinned.empty() && frame.grabbed.empty()) return;
-  glBindVertexArray(renderer.vertex_array.id());
-  glEnable(GL_PROGRAM_POINT_SIZE);
-  const Program& program = use(renderer, "dots");
-  const auto batch = [&](const std::vector<std::uint32_t>& vertices, const glm::vec3& colour, float size) {
-    program.set("colour", colour);
-    program.set("size", size * std::max(1.0f, float(frame.viewport.height) / 720.0f));
-    const std::vector<GLint> first(vertices.begin(), vertices.end());
-    const std::vector<GLsizei> ones(vertices.size(), 1);
-    glMultiDrawArrays(GL_POINTS, first.data(), ones.data(), GLsizei(first.size()));
-  };
-  batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
-  batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
-  glDisable(GL_PROGRAM_POINT_SIZE);
-}
-
 // However drawing ends, by a shader that does not compile, too.
 struct Afterwards {
   ~Afterwards() {
@@ -300,6 +321,38 @@ struct Afterwards {
 };
 
 }  // namespace
+
+const Program& use(Renderer& renderer, const std::string& name) {
+  if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
+  const Program& program = renderer.programs.at(name);
+  program.use();
+  return program;
+}
+
+const Buffer& tets_of(Renderer& renderer) {
+  if (!renderer.tets) renderer.tets = Buffer("tet indices", renderer.mesh.tets);
+  return renderer.tets;
+}
+
+const Buffer& rest_of(Renderer& renderer) {
+  if (renderer.rest) return renderer.rest;
+  std::vector<glm::vec4> rest;
+  std::size_t next = 1;  // body
+  for (const glm::dvec3& p : renderer.mesh.positions) {
+    while (next < renderer.bodies.size() && rest.size() >= renderer.bodies[next]) ++next;
+    rest.emplace_back(glm::vec3(p), float(next - 1));
+  }
+  return renderer.rest = Buffer("render rest", rest);
+}
+
+void bind_view(Renderer& renderer, const Frame& frame) {
+  const View view = view_block(renderer, frame);
+  renderer.view.write(0, sizeof view, &view);
+  renderer.view.bind_uniform(BIND_RENDER_VIEW);
+  fit_light(renderer, frame);
+  // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
+  (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
+}
 
 Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies) {
   Renderer renderer;
@@ -328,6 +381,7 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   frame.viewport = {0, 0, target.width, target.height};
   frame.options = options;
   if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
+  frame.material = energy_material(sim.settings);
   frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
   for (std::uint32_t v = 0; v < sim.inverse_masses.size(); ++v)
     if (!(sim.inverse_masses[v] > 0)) frame.pinned.push_back(v);
@@ -339,14 +393,9 @@ void draw(Renderer& renderer, const Frame& frame) {
   if (frame.viewport.width < 1 || frame.viewport.height < 1) return;  // a minimised window
   const Afterwards afterwards;
   const ViewOptions& options = frame.options;
-  const View view = view_block(renderer, frame);
-  renderer.view.write(0, sizeof view, &view);
-  renderer.view.bind_uniform(BIND_RENDER_VIEW);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
-  fit_light(renderer, frame);
-  // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
-  (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
+  bind_view(renderer, frame);
   bind_attributes(renderer, frame);
   if (options.shadow) draw_shadow_map(renderer, frame);
 
@@ -390,7 +439,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   draw_bodies(renderer, frame, false);
   glDisable(GL_POLYGON_OFFSET_FILL);
   glEnable(GL_BLEND);
-  draw_dots(renderer, frame);
+  draw_marks(renderer, frame);
   if (!options.has_scale() && frame.caption.empty()) return;
   glDisable(GL_FRAMEBUFFER_SRGB);
   draw_legend(renderer.legend, viewport, options, frame.caption);
@@ -401,6 +450,18 @@ std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait) {
   const auto centre =
       take<glm::vec4>(shadow.centre_copied, shadow.centre, "reading the bodies' middle", wait);
   return centre ? std::optional(glm::vec3(centre->front())) : std::nullopt;
+}
+
+std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait) {
+  return take<float>(renderer.values_copied, renderer.values_copy, "reading values", wait);
+}
+
+void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, double size, Buffer& distances) {
+  if (!distances) distances = Buffer("vertex values, motion", renderer.mesh.positions.size() * sizeof(float));
+  const Program& program = use(renderer, "distances");
+  program.set("scale", float(1 / size));
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_ANSWERS, answers);
+  fill(renderer, program, positions, distances);
 }
 
 void reload_shaders(Renderer& renderer) {

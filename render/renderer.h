@@ -14,7 +14,8 @@
 
 namespace tetpbd {
 
-/// What each vertex of the surface gathers, in fixed order: items[offsets[v] .. offsets[v + 1]).
+/// What each vertex gathers, in fixed order: items[offsets[v] .. offsets[v + 1]); nothing where it has a
+/// value alone.
 struct VertexGather {
   Buffer offsets, items;
   Buffer values;  ///< by vertex: vec4 of a normal, float of others
@@ -41,8 +42,13 @@ struct Renderer {
   VertexArray vertex_array, empty_array;
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
-  Buffer rest;             ///< vec4: rest position and body
-  VertexGather normals, volume_errors, stretch_errors;
+  Buffer graph;            ///< edges' vertices
+  Buffer arrow_vertices;
+  Buffer rest;  ///< vec4: rest position and body
+  VertexGather normals;
+  std::map<Colour, VertexGather> values;
+  Buffer values_copy;  ///< on its way back
+  Fence values_copied;
   Shadow shadow;
   Legend legend;
 };
@@ -51,8 +57,20 @@ Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies = {});
 Renderer make_renderer(const Model& model);
 /// Leaves framebuffer, viewport and scissor at the frame's; depth test, blending and sRGB encoding off.
 void draw(Renderer& renderer, const Frame& frame);
+/// Puts what shaders know of the view in place, without which nothing is drawn.
+void bind_view(Renderer& renderer, const Frame& frame);
+/// The program of that name, made when first asked for, in use.
+const Program& use(Renderer& renderer, const std::string& name);
+/// The tetrahedra's vertices, rest positions with bodies: made when first asked for.
+const Buffer& tets_of(Renderer& renderer);
+const Buffer& rest_of(Renderer& renderer);
 /// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
+/// The values by vertex that a frame drawn with `worst` coloured, once, some frames later (`wait`: now).
+std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait = false);
+/// How far vertices are from where `answers` has them, over `size` (m): both buffers of Position;
+/// `distances`, floats, is made.
+void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, double size, Buffer& distances);
 /// Compiles what is in use again. Throws Error and keeps the old ones if one does not compile.
 void reload_shaders(Renderer& renderer);
 

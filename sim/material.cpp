@@ -10,6 +10,12 @@ Lame lame(double young_modulus, double poisson_ratio) {
           young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))};
 }
 
+glm::vec4 energy_material(const Settings& settings) {
+  if (settings.material == "none") return glm::vec4(0);
+  const Lame own = lame(settings.young_modulus, settings.poisson_ratio);
+  return glm::vec4(own.mu, own.lambda, settings.material == "springs" ? 2 : 1, 0);
+}
+
 namespace {
 
 // Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest: mu = 4/3 mu_Lame,

@@ -15,6 +15,9 @@ struct Lame {
 };
 Lame lame(double young_modulus, double poisson_ratio);
 
+/// What tet_energy of shaders/energy.glsl is told of it.
+glm::vec4 energy_material(const Settings& settings);
+
 /// The constraints of a mesh of the kinds that settings use, with their material's compliances if they have
 /// one.
 ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings);

@@ -9,6 +9,7 @@
 #include <ranges>
 
 #include "shaders/metrics/layout.glsl"
+#include "sim/material.h"
 
 namespace tetpbd {
 
@@ -109,6 +110,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.centre /= m.mass;
   result.kinetic = sums[M_KINETIC];
   result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
+  result.elastic = sums[M_ELASTIC];
   result.contacts = sums[M_CONTACTS];
   result.non_finite = sums[M_NON_FINITE];
   return true;
@@ -139,6 +141,7 @@ void measure(Metrics& m, const Sim& sim) {
       kernel.set("edge_range", body.edges), kernel.set("hinge_range", body.hinges);
       kernel.set("tet_range", body.tets);
       kernel.set("mass", float(body.mass));
+      if (&kernel == &m.kernels[0]) kernel.set("material", energy_material(sim.settings));
       kernel.set("touching", float(1e-5 * body.size));
       const bool one_group =
           &kernel == &m.kernels[2] || &kernel == &m.kernels[4];  // these add the groups' sums
@@ -173,7 +176,7 @@ Measurement nothing_measured() {
   Measurement m;
   for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max,
                         &m.inverted_tets, &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance,
-                        &m.speed, &m.kinetic, &m.potential, &m.contacts})
+                        &m.speed, &m.kinetic, &m.potential, &m.elastic, &m.contacts})
     *value = nan;
   m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
   return m;

@@ -31,6 +31,7 @@ struct Measurement {
   double speed = 0;                   ///< sum m |v|, kg m/s: what drift is relative to
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
+  double elastic = 0;                 ///< J, of a material
   double contacts = 0;    ///< pairs of a vertex and a half space (ground, obstacle) that it touches
   double non_finite = 0;  ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }

@@ -179,7 +179,7 @@ action() {
   elif ((a < 44)); then what=combo; combo
   elif ((a < 58)); then
     what=key
-    one_of space s r f 1 2 3 c n g m p h F1 Escape Left Left Right comma period space s r KP_1 k k j o w Up Delete BackSpace ctrl+a ctrl+z alt+s shift+r
+    one_of space s r f 1 2 3 4 c x n g m p h F1 Escape Left Left Right comma period space s r KP_1 k k j o w Up Delete BackSpace ctrl+a ctrl+z alt+s shift+r
     key "$r"
   elif ((a < 61)); then what="key held"; one_of s Left Right; send "keydown $r"; send "sleep 0.3"; send "keyup $r"
   elif ((a < 73)); then what="drag anywhere"; anywhere; move; pause; one_of 1 1 1 2 3; drag_somewhere "$r"
@@ -188,7 +188,7 @@ action() {
   elif ((a < 80)); then
     what="pin"; anywhere; move; pause; one_of "click --repeat 2 --delay 30 1" "keydown ctrl"
     if [[ $r == click* ]]; then send "$r"; else send "$r"; click; send "keyup ctrl"; fi
-  elif ((a < 86)); then what=wheel; anywhere; move; one_of 4 5 6 7; send "click --repeat $((RANDOM % 8 + 1)) --delay 5 $r"
+  elif ((a < 86)); then what=wheel; anywhere; move; pick 3; ((r)) || send "keydown alt"; one_of 4 5 6 7; send "click --repeat $((RANDOM % 8 + 1)) --delay 5 $r"; send "keyup alt"
   elif ((a < 89)); then
     what="two buttons"; anywhere; move; send "mousedown 1"; pause; send "mousedown 3"; anywhere; move; pause
     one_of "1 3" "3 1"; send "mouseup ${r% *}"; pause; one_of space r Escape p; key "$r"; send "mouseup 1"; send "mouseup 3"

@@ -191,7 +191,7 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
       request(picker, sim.positions.id(), pixel_ray(camera, x, 60, 160, 120));
       const auto pick = poll(picker, true);
       hits += pick->hit;
-      answers.numbers.insert(answers.numbers.end(), {double(pick->hit), double(pick->triangle),
+      answers.numbers.insert(answers.numbers.end(), {double(pick->hit), double(pick->element),
                                                      double(pick->vertex), double(pick->distance)});
     }
     CHECK(hits > 0);

@@ -79,7 +79,7 @@ TEST_CASE("picking: the first triangle along a ray and its nearest corner") {
       if (!pick->hit) continue;
       ++hits;
       CHECK(pick->distance == doctest::Approx(enter).epsilon(1e-5));
-      const Triangle& triangle = stage.mesh.surface[pick->triangle];
+      const Triangle& triangle = stage.mesh.surface[pick->element];
       const glm::vec3 point = ray.origin + pick->distance * ray.direction;
       const glm::vec3 normal =
           glm::normalize(glm::cross(x(triangle[1]) - x(triangle[0]), x(triangle[2]) - x(triangle[0])));
@@ -95,5 +95,48 @@ TEST_CASE("picking: the first triangle along a ray and its nearest corner") {
   request(picker, stage.positions.id(), {{0, 0, 4}, {0, 0, 1}});
   CHECK_FALSE(poll(picker, true)->hit);
   CHECK_FALSE(poll(picker, true));
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("picking: what a cut shows, and tetrahedra shrunk and apart") {
+  Stage stage;
+  Picker picker = make_picker(stage.mesh);
+  Frame& frame = stage.frame;
+  const auto pick = [&](const Ray& ray) {
+    request(picker, stage.renderer, frame, ray);
+    return *poll(picker, true);
+  };
+  const auto holds = [&](std::uint32_t tet, const glm::vec3& p) {  // whether it is in it, as it is at rest
+    const auto x = [&](int i) {
+      return glm::vec3(stage.mesh.positions[stage.mesh.tets[tet][std::size_t(i)]]);
+    };
+    const glm::vec3 c = glm::inverse(glm::mat3(x(1) - x(0), x(2) - x(0), x(3) - x(0))) * (p - x(0));
+    return std::min({c.x, c.y, c.z, 1 - c.x - c.y - c.z}) > -1e-4f;
+  };
+  const Ray down{{0.12f, 3, 0.21f}, {0, -1, 0}};
+  CHECK_FALSE(pick(down).inside);
+  for (const Look look : {Look::surface, Look::tets})
+    for (const double cut : {0.2, 0.5, 0.77}) {
+      frame.options = {.look = look, .shadow = false, .shrink = 0, .cut = cut, .cut_axis = 1};
+      const Pick found = pick(down);
+      REQUIRE(found.hit);
+      CHECK(found.inside);
+      const float height = float(cut) - 0.5f;
+      CHECK(3 - found.distance == doctest::Approx(height).epsilon(1e-4).scale(1e-3));
+      CHECK(holds(found.element, {0.12f, height, 0.21f}));
+      CHECK(std::ranges::count(stage.mesh.tets[found.element], found.vertex) == 1);
+    }
+  frame.options = {.look = Look::tets, .shadow = false, .shrink = 0};
+  CHECK(pick(down).distance == doctest::Approx(2.5));
+  frame.options.shrink = 0.9;  // between them
+  int hits = 0, all = 0;
+  for (float x = -0.45f; x < 0.5f; x += 0.07f)
+    for (float z = -0.43f; z < 0.5f; z += 0.07f) hits += pick({{x, 3, z}, {0, -1, 0}}).hit, ++all;
+  CHECK(hits > 0);
+  CHECK(hits < all / 2);
+  frame.options.shrink = 0, frame.options.explode = 1;
+  hits = 0;
+  for (float x = 0.6f; x < 1; x += 0.03f) hits += pick({{x, 3, 0.2f}, {0, -1, 0}}).hit;
+  CHECK(hits > 0);
   CHECK(gl_error_count() == 0);
 }

@@ -120,7 +120,7 @@ TEST_CASE("render: wire shows edges, tets show gaps, flat differs from smooth") 
   const Image smooth = stage.image();
   CHECK_FALSE(stage.renderer.tets);  // only what is drawn exists
   CHECK_FALSE(stage.renderer.shadow.depth);
-  CHECK_FALSE(stage.renderer.volume_errors);
+  CHECK(stage.renderer.values.empty());
   stage.frame.options.smooth_normals = false;
   const Image flat = stage.image(), empty = stage.empty();
   CHECK(difference(smooth, flat).count > 500);
@@ -145,6 +145,25 @@ TEST_CASE("render: wire shows edges, tets show gaps, flat differs from smooth") 
   const int half = difference(stage.image(), empty).count;
   CHECK(half < difference(tets, empty).count);
   CHECK(half > 0);
+  // Of a block's half a flat face is left, along any axis, in every look.
+  for (const Look look : {Look::surface, Look::wire, Look::tets})
+    for (const int axis : {0, 1, 2, 3}) {
+      stage.frame.options = {.look = look, .shadow = false, .shrink = 0, .cut = 0.5, .cut_axis = axis};
+      const glm::vec3 n = stage.frame.options.cut_normal = glm::normalize(glm::vec3(1, 2, 3));
+      const glm::vec3 normal = axis == 3 ? n : glm::vec3(axis == 0, axis == 1, axis == 2);
+      stage.frame.camera.azimuth = axis == 0 ? 60 : 20;
+      stage.frame.camera.elevation = axis == 1 ? 60 : 20;
+      const Image cut = stage.image();
+      const glm::vec3 side = glm::normalize(glm::cross(normal, glm::vec3(0.3f, 0.4f, -0.2f)));
+      for (const float at : {-0.31f, -0.07f, 0.02f, 0.29f}) {
+        const glm::vec3 seen = project(stage.frame.camera, at * side, width, height);
+        CHECK(glm::distance(pixel(cut, seen), pixel(empty, seen)) > 12);
+      }
+      stage.frame.options.cut = 1;
+      CHECK(difference(stage.image(), cut).count > 500);
+    }
+  stage.frame.options = {.look = Look::tets, .smooth_normals = false, .shadow = false};
+  stage.frame.camera = Camera{.distance = 4};
   stage.frame.options.cut = -0.1;
   CHECK(difference(stage.image(), empty).count == 0);
   stage.frame.options.cut = 1;
@@ -180,8 +199,8 @@ TEST_CASE("render: volume and stretch errors reach the ends of their scales") {
   stage.image();
   stage.frame.options.colour = Colour::stretch;
   stage.image();
-  const auto volume = stage.renderer.volume_errors.values.read_all<float>();
-  const auto stretch = stage.renderer.stretch_errors.values.read_all<float>();
+  const auto volume = stage.renderer.values.at(Colour::volume).values.read_all<float>();
+  const auto stretch = stage.renderer.values.at(Colour::stretch).values.read_all<float>();
   for (const Triangle& triangle : stage.mesh.surface)
     for (std::uint32_t v : triangle) {
       CHECK(volume[v] == doctest::Approx(0.331).epsilon(1e-4));
@@ -234,6 +253,110 @@ TEST_CASE("render: velocity colours, and the legend's bar is the colour map") {
   CHECK(caption.count > 60);
   CHECK(caption.high.y < 40);
   CHECK(caption.low.x < 30);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: energy, distances, values that come back, rings around vertices") {
+  Stage stage;
+  const double mu = 3e4, lambda = 5e4;
+  const auto neo_hookean = [&](double stretch) {  // Smith's, less its value at rest
+    const double m = 4.0 / 3 * mu, l = lambda + 5.0 / 6 * mu, alpha = 1 + 0.75 * m / l;
+    const auto energy = [&](double s) {
+      const double I = 3 * s * s, J = s * s * s;
+      return 0.5 * (m * (I - 3) + l * (J - alpha) * (J - alpha) - m * std::log(I + 1));
+    };
+    return energy(stretch) - energy(1);
+  };
+  const auto springs = [&](double s) {
+    return 1.25 * mu * 6 * (s - 1) * (s - 1) + 0.5 * (lambda - mu) * (s * s * s - 1) * (s * s * s - 1);
+  };
+  stage.frame.options.worst = true;
+  stage.frame.options.colour = Colour::energy;
+  for (const Look look : {Look::surface, Look::tets})
+    for (const double stretch : {1.1, 0.8, 1.0})
+      for (const int kind : {1, 2}) {
+        stage.frame.options.look = look;
+        stage.frame.material = glm::vec4(mu, lambda, kind, 0);
+        stage.move(stretch);
+        stage.image();
+        const auto values = poll_values(stage.renderer, true);
+        REQUIRE(values);
+        for (const float value : *values)  // inside, too
+          CHECK(double(value) ==
+                doctest::Approx(kind == 1 ? neo_hookean(stretch) : springs(stretch)).epsilon(1e-3).scale(10));
+        CHECK_FALSE(poll_values(stage.renderer, true));
+      }
+  const Buffer answers("answers", positions_of(stage.mesh, 1.0, {0.25, 0, 0}));
+  Buffer distances;
+  measure_distances(stage.renderer, stage.positions.id(), answers.id(), 2.0, distances);
+  for (const float apart : distances.read_all<float>()) CHECK(apart == doctest::Approx(0.125));
+  stage.frame.options = {.look = Look::surface, .colour = Colour::motion, .shadow = false, .legend = false};
+  const Image unknown = stage.image();
+  stage.frame.values = distances.id();
+  const glm::vec3 far = pixel(stage.image(), width / 2, height / 2);
+  CHECK(brightness(far) > brightness(pixel(unknown, width / 2, height / 2)) + 30);
+  const Image without = stage.image();
+  stage.frame.worst = {0};  // behind: seen all the same
+  stage.frame.camera.azimuth = 45;
+  stage.frame.worst.clear();
+  const Image turned = stage.image();
+  stage.frame.worst = {0};
+  const Difference ring = difference(stage.image(), turned);
+  const glm::vec3 at = project(stage.frame.camera, glm::vec3(stage.mesh.positions[0]), width, height);
+  CHECK(ring.count > 40);
+  CHECK(std::abs(float(ring.low.x + ring.high.x) * 0.5f - at.x) < 2);
+  CHECK(difference(without, unknown).count > 500);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: the graph's edges, dots where vertices touch, arrows of velocity, numbers as colours") {
+  Stage stage;
+  const Image solid = stage.image(), empty = stage.empty();
+  stage.frame.options.look = Look::graph;
+  const Difference lines = difference(stage.image(), empty);
+  CHECK(lines.count > 500);
+  CHECK(lines.count < difference(solid, empty).count);
+  stage.frame.options.cut = 0.5;
+  CHECK(difference(stage.image(), empty).count < 0.8 * lines.count);
+
+  stage.frame.options = {.shadow = false, .grid = false, .contacts = true};
+  stage.frame.camera.elevation = -30;  // from below
+  stage.frame.ground = -0.5f;
+  const Image touching = stage.image();
+  stage.frame.ground = -0.51f;
+  stage.frame.options.contacts = false;
+  const Image above = stage.image();
+  stage.frame.options.contacts = true;
+  CHECK(difference(stage.image(), above).count == 0);
+  const glm::vec3 dot =
+      pixel(touching, project(stage.frame.camera, {0.5f / 3, -0.5f, 0.5f / 3}, width, height));
+  CHECK(dot.x > 2 * dot.z);
+
+  stage.frame.camera.elevation = 18;
+  stage.frame.ground.reset();
+  std::vector<Velocity> velocities(stage.mesh.positions.size());
+  for (Velocity& v : velocities) v.high = {0, 3, 0};
+  const Buffer buffer("velocities", velocities);
+  stage.frame.velocities = buffer.id();
+  const Difference before = difference(stage.image(), empty);
+  stage.frame.options.arrows = true;  // 0.3 m up
+  const Difference with = difference(stage.image(), empty);
+  const float raised = project(stage.frame.camera, {0, 0.5f, 0}, width, height).y -
+                       project(stage.frame.camera, {0, 0.8f, 0}, width, height).y;
+  CHECK(std::abs(float(before.low.y - with.low.y) - raised) < 0.3f * raised);
+
+  stage.frame.options = {.colour = Colour::patch, .shadow = false};
+  std::vector<float> numbers(stage.mesh.positions.size());
+  stage.frame.camera.azimuth = 0;
+  for (std::size_t v = 0; v < numbers.size(); ++v) numbers[v] = float(stage.mesh.positions[v].x > 0);
+  const Buffer values("numbers", numbers);
+  stage.frame.values = values.id();
+  const Image patches = stage.image();
+  const auto hue = [&](float x) {
+    return glm::normalize(pixel(patches, project(stage.frame.camera, {x, 0, 0.5f}, width, height)));
+  };
+  CHECK(glm::distance(hue(-0.4f), hue(0.4f)) > 0.1f);
+  CHECK(glm::distance(hue(0.3f), hue(0.4f)) < 0.05f);
   CHECK(gl_error_count() == 0);
 }
 

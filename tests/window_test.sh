@@ -67,7 +67,17 @@ shot panels.png
 
 # ---------------------------------------------------------------------------------------------------------------- view
 for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
-for colour in volume stretch velocity plain; do key c; await "^colour $colour"; done
+for colour in volume stretch velocity motion; do key c; await "^colour $colour"; done
+shot plain.png; key w; await '^worst true'
+forget; xdotool mousemove $cx $cy; await '^probe [0-9]+ [0-9]+ '; pause_for_frame; shot probe.png
+differ plain.png probe.png 5000 "the tooltip"
+key w; await '^worst false'; key c; await '^colour patch'; key c; await '^colour plain'
+for axis in x y z "the view"; do key x; await "^cut 0.5000 along $axis"; done
+shot cut.png; differ plain.png cut.png 5000 "a cut"
+forget; xdotool keydown alt; xdotool click 5; xdotool keyup alt; await '^cut 0.4800'
+forget; xdotool keydown alt; sleep 0.2; drag 1 $cx $cy 0 40; release 1; xdotool keyup alt; await '^cut 0'
+key x; await '^cut 1.0000'
+key 4; await '^look graph'; key 1; await '^look surface'
 key n; await '^normals false'
 key n; await '^normals true'
 key g; await '^grid false'
@@ -142,6 +152,12 @@ for lane in "1 node paper" "2 node hard" "3 cpu-fast hard"; do  # in lock-step, 
   grep -q "\"state_hash\": \"$hash\"" lane/stats.json || fail "lane $number has another state than a run without a window"
 done
 forget; shot lanes.png
+to "plot 1" 0.5 0.5; forget; xdotool click 4; await '^plot 1 [-0-9.e]+ \.\. '; shot zoomed.png
+forget; for _ in 1 2 3; do xdotool click 5; pause_for_frame; done; await '^plot 1 whole'
+click "csv 1"; await '^message copied [0-9]+ rows'
+click "svg 1"; await '^message saved plot_000.svg'; grep -q "time per step, ms" plot_000.svg || fail "the saved plot has no axis"
+choose "plotted 3" "energy"; await '^plotted 3 energy'
+xdotool mousemove $((vx + 20)) $((vy + 20)); sleep 4.5; shot lanes.png  # messages go
 key o; await '^overlaid true'; pause_for_frame; shot overlaid.png
 differ lanes.png overlaid.png 20000 "lanes in one place"
 key o; await '^overlaid false'
@@ -153,6 +169,14 @@ key space; await '^pause'
 forget; key j; await '^reset'; key k; await '^reset'
 [[ $(new_events | grep -c '^lane cpu-fast') -eq 2 ]] || fail "a lane more is not as the chosen one"
 choose "side by side" "one way"; await '^reset'
+
+# --------------------------------------------------------------------------------------------------- stability map
+click "section Stability map" 0.1; sleep 0.5
+click "map across"; sleep 0.5; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "substeps=1,4"; pause_for_frame
+click "map up"; sleep 0.5; xdotool key ctrl+a; pause_for_frame; xdotool type --delay 60 "omega=1,1.5"; pause_for_frame
+click "fill map"; await '^map of 4 cells'; await '^map done'; sleep 0.5; shot map.png
+click "map 2 1"; await '^map chose 4 1'; await '^set substeps 4'
+click "section Stability map" 0.1; sleep 0.5
 
 # ------------------------------------------------------------------------------------------------- errors, other scenes
 type_mesh() {

@@ -4,6 +4,9 @@
 uint id_of(Ids ids, int j) { return 0u; }
 #include "constraints/types.glsl"
 #include "constraints/bend.glsl"
+#include "energy.glsl"
+layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
+uniform vec4 material;  // energy.glsl
 layout(std430, binding = BIND_M_STRETCH) readonly buffer Stretch { Record2 edges[]; };
 layout(std430, binding = BIND_M_BEND) readonly buffer Bend { Record4 hinges[]; };
 layout(std430, binding = BIND_M_VOLUME) readonly buffer Volume { Record4 tets[]; };
@@ -34,7 +37,7 @@ void main() {
   }
   store_partial(M_BEND_SQUARES, squares, false);
 
-  float change = 0.0, inverted = 0.0;
+  float change = 0.0, inverted = 0.0, elastic = 0.0;
   squares = 0.0, largest = 0.0;
   for (uint i = tet_range.x + start; i < tet_range.y; i += stride) {
     Record4 r = tets[i];
@@ -48,9 +51,15 @@ void main() {
     squares += (error / r.rest) * (error / r.rest);
     largest = max(largest, abs(error / r.rest));
     if (volume <= 0.0) inverted += 1.0;
+    if (material.z > 0.0) {
+      vec3 now[4] = vec3[](vec3(0.0), a, b, c), at_rest[4];
+      for (int j = 0; j < 4; ++j) at_rest[j] = rest[r.vertices[j]].xyz;
+      elastic += r.rest * tet_energy(now, at_rest, material);
+    }
   }
   store_partial(M_VOLUME_CHANGE, change, false);
   store_partial(M_TET_SQUARES, squares, false);
   store_partial(M_TET_MAX, largest, true);
   store_partial(M_INVERTED, inverted, false);
+  store_partial(M_ELASTIC, elastic, false);
 }

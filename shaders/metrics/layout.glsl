@@ -20,18 +20,19 @@
 #define M_STRETCH_SQUARES 4    // sum ((l - d)/d)^2
 #define M_STRETCH_MAX 5
 #define M_BEND_SQUARES 6       // sum of squared angle errors, rad^2
-#define M_MOMENT 7             // 3: sum m (x - x0), x0 the body's first vertex
-#define M_MOMENTUM 10          // 3: sum m v
-#define M_SPEED 13             // sum m |v|
-#define M_KINETIC 14           // J
-#define M_HEIGHT 15            // sum m y
-#define M_COVARIANCE 16        // 9: sum m (x - x0) X^T, column by column
-#define M_CONTACTS 25          // pairs of a vertex and a half space that it touches
-#define M_NON_FINITE 26        // vertices with a position or velocity that is not finite
-#define M_ANGULAR 27           // 3: sum m r x u about the centre of mass
-#define M_RIGID_SQUARES 30     // sum m |x - c - R X|^2
-#define M_CENTRE 31            // 3: c - x0
-#define M_ROTATION 34          // 4: quaternion w, x, y, z
-#define M_ORIGIN 38            // 3: x0
-#define M_ROW 41
+#define M_ELASTIC 7            // J, of a material
+#define M_MOMENT 8             // 3: sum m (x - x0), x0 the body's first vertex
+#define M_MOMENTUM 11          // 3: sum m v
+#define M_SPEED 14             // sum m |v|
+#define M_KINETIC 15           // J
+#define M_HEIGHT 16            // sum m y
+#define M_COVARIANCE 17        // 9: sum m (x - x0) X^T, column by column
+#define M_CONTACTS 26          // pairs of a vertex and a half space that it touches
+#define M_NON_FINITE 27        // vertices with a position or velocity that is not finite
+#define M_ANGULAR 28           // 3: sum m r x u about the centre of mass
+#define M_RIGID_SQUARES 31     // sum m |x - c - R X|^2
+#define M_CENTRE 32            // 3: c - x0
+#define M_ROTATION 35          // 4: quaternion w, x, y, z
+#define M_ORIGIN 39            // 3: x0
+#define M_ROW 42
 #define M_STRIDE 64            // floats from one body's row to the next: a multiple of any driver's binding alignment

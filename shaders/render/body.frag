@@ -35,5 +35,5 @@ void main() {
     vec3 ink = kind == COLOUR_PLAIN ? point.albedo * 0.22 : vec3(0.03);
     colour = mix(colour, ink, view.colour.w * edge_cover(point.edge));
   }
-  result = vec4(colour, view.rest_low.w);
+  result = vec4(colour, view.material.w);
 }

@@ -4,7 +4,6 @@ layout(location = ATTRIBUTE_HIGH) in vec3 high;
 layout(location = ATTRIBUTE_LOW) in vec3 low;
 layout(location = ATTRIBUTE_NORMAL) in vec3 normal;
 layout(location = ATTRIBUTE_VALUE) in float value;
-layout(location = ATTRIBUTE_VELOCITY) in vec3 velocity;
 layout(location = ATTRIBUTE_REST) in vec4 rest;  // w: body
 
 out Corner {
@@ -17,8 +16,8 @@ out Corner {
 void main() {
   corner.position = high + low;
   corner.normal = normal;
-  // A speed that is no number has no colour: such a corner goes the way of one without a place, and takes its faces along.
-  if (int(view.colour.x) == COLOUR_VELOCITY && !finite(velocity)) corner.position = vec3(uintBitsToFloat(0x7f800000u));
-  corner.value = int(view.colour.x) == COLOUR_VELOCITY ? length(velocity) : value;
+  // A value that is no number has no colour: such a corner goes the way of one without a place, and takes its faces along.
+  if (!finite(vec3(value * 1e-30))) corner.position = vec3(uintBitsToFloat(0x7f800000u));
+  corner.value = value;
   corner.rest = rest;
 }

@@ -32,8 +32,15 @@ vec3 sequential_colour(float t) {
   return clamp(oklab_to_linear(vec3(lightness, chroma * cos(hue), chroma * sin(hue))), vec3(0.0f), vec3(1.0f));
 }
 
-// What `value` looks like on a scale from `low` to `high`; kinds 1 (volume) and 2 (stretch) are signed.
+// The number of something: neighbours in number are far apart in hue.
+vec3 number_colour(float number) {
+  float hue = 2.399963f * number, lightness = 0.62f + 0.06f * sin(1.7f * number);  // radians, the golden angle
+  return clamp(oklab_to_linear(vec3(lightness, 0.11f * cos(hue), 0.11f * sin(hue))), vec3(0.0f), vec3(1.0f));
+}
+
+// What `value` looks like on a scale from `low` to `high`; kinds 1 (volume) and 2 (stretch) are signed, 6 (patch) counts.
 vec3 scale_colour(int kind, float value, float low, float high) {
+  if (kind == 6) return number_colour(value);
   float t = (value - low) / (high - low);
-  return kind == 3 ? sequential_colour(t) : diverging_colour(2.0f * t - 1.0f);
+  return kind >= 3 ? sequential_colour(t) : diverging_colour(2.0f * t - 1.0f);
 }

@@ -2,11 +2,23 @@
 #include "render/view.glsl"
 layout(location = ATTRIBUTE_HIGH) in vec3 high;
 layout(location = ATTRIBUTE_LOW) in vec3 low;
+layout(location = ATTRIBUTE_REST) in vec4 rest;
 uniform float size;  // pixels
+#ifdef CONTACTS
+uniform vec4 planes[8];
+uniform float touching;  // metres
+bool is_marked(vec3 p) {
+  bool any_plane = false;
+  for (int i = 0; i < 8; ++i) any_plane = any_plane || dot(planes[i].xyz, p) - planes[i].w <= touching;
+  return any_plane;
+}
+#else
+bool is_marked(vec3 p) { return true; }
+#endif
 
 void main() {
   vec3 p = high + low;
-  if (!finite(p)) {
+  if (!finite(p) || !is_marked(p) || dot(view.cut.xyz, rest.xyz) > view.cut.w) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // outside
     gl_PointSize = 1.0;
     return;

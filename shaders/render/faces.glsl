@@ -16,15 +16,17 @@ out Point {
   flat vec3 albedo;
 } point;
 
-/// Corner `i` of a triangle.
-void emit(int i, vec3 position, vec3 normal, float value, vec3 albedo) {
+// Numbers are not mixed: an element has the colour of its first corner.
+float shown_value(int i) { return corner[int(view.colour.x) == COLOUR_PATCH ? 0 : i].value; }
+
+void emit(vec3 edge, vec3 position, vec3 normal, float value, vec3 albedo) {
 #ifdef SHADOW
   gl_Position = light.matrix * vec4(position, 1.0);
 #else
   gl_Position = view.camera * vec4(position, 1.0);
   point.position = position;
   point.normal = normal;
-  point.edge = vec3(float(i == 0), float(i == 1), float(i == 2));
+  point.edge = edge;
   point.value = value;
   point.albedo = albedo;
 #endif

@@ -1,6 +1,6 @@
-// Values of the surface's vertices, each gathered from its items in fixed order, so the same every time. NORMAL: the sum
-// of the adjacent triangles' normals weighted by their angle there. VOLUME: the mean over its tetrahedra of V/V0 - 1.
-// Otherwise the mean over its edges of L/L0 - 1. Other vertices have no items.
+// Values of vertices, each gathered from its items in fixed order, so the same every time. NORMAL: the sum of the adjacent
+// triangles' normals weighted by their angle there. TETS: the mean over its tetrahedra of what values.glsl has of `kind`.
+// Otherwise the mean over its edges of L/L0 - 1.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"
@@ -33,12 +33,18 @@ Value gathered(uint v) {
   return vec4(size > 0.0 ? sum / size : vec3(0.0), 0.0);
 }
 #else
-#ifdef VOLUME
+#ifdef TETS
+#include "render/values.glsl"
+uniform int kind;
+uniform vec4 material;
 float error(uint v, uint k) {
-  uint a = items[3u * k], b = items[3u * k + 1u], c = items[3u * k + 2u];
-  vec3 x = position(v), x0 = rest[v].xyz;
-  float now = dot(cross(position(a) - x, position(b) - x), position(c) - x);
-  return now / dot(cross(rest[a].xyz - x0, rest[b].xyz - x0), rest[c].xyz - x0) - 1.0;
+  uvec4 at = uvec4(v, items[3u * k], items[3u * k + 1u], items[3u * k + 2u]);
+  vec3 p[4], r[4];
+  for (int i = 0; i < 4; ++i) {
+    p[i] = position(at[i]);
+    r[i] = rest[at[i]].xyz;
+  }
+  return tet_value(kind, p, r, material);
 }
 #else
 float error(uint v, uint k) {
@@ -51,7 +57,7 @@ Value gathered(uint v) {
   uint n = 0u;
   for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
     float e = error(v, k);
-    if (!finite(vec3(e))) continue;
+    if (!finite(vec3(e * 1e-25))) continue;  // energies are large numbers
     sum += e;
     ++n;
   }

@@ -1,8 +1,8 @@
-// The first triangle along a ray. Stage 0: the least distance, as float bits (positive floats sort like their bits).
+// The first triangle, or of TETS the first tetrahedron as it is shown, along a ray. Stage 0: the least distance, as float bits (positive floats sort like their bits).
 // Stage 1: the least triangle at exactly that distance. Stage 2, one thread: its corner nearest to the hit.
 #include "layout.glsl"
 #include "render/layout.glsl"
-#include "render/finite.glsl"
+#include "render/view.glsl"
 layout(local_size_x = 128) in;
 layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_PICK_TRIANGLES) readonly buffer Triangles { uint triangles[]; };
@@ -18,6 +18,40 @@ uniform vec3 direction;
 
 vec3 position(uint v) { return positions[v].high + positions[v].low; }
 
+#ifdef TETS
+#define CORNERS 4u
+layout(std430, binding = BIND_PICK_REST) readonly buffer Rest { vec4 rest[]; };
+
+// Where the ray comes into what the cut leaves of the tetrahedron, or a negative number. All that bounds it is a + b t >= 0: its
+// coordinates, and the cut's plane, which is one of the rest shape and so one of these.
+float hit(uint t) {
+  vec3 p[4];
+  float kept[4];
+  for (uint k = 0u; k < 4u; ++k) {
+    uint v = triangles[4u * t + k];
+    p[k] = position(v);
+    kept[k] = view.cut.w - dot(view.cut.xyz, rest[v].xyz);
+    if (!finite(p[k])) return -1.0;
+  }
+  shrink_tet(p);
+  mat3 sides = mat3(p[1] - p[0], p[2] - p[0], p[3] - p[0]);
+  if (determinant(sides) == 0.0) return -1.0;
+  mat3 to_coordinates = inverse(sides);
+  vec3 a = to_coordinates * (origin - p[0]), b = to_coordinates * direction;
+  vec3 slope = vec3(kept[1], kept[2], kept[3]) - kept[0];
+  float start[5] = float[](a.x, a.y, a.z, 1.0 - a.x - a.y - a.z, kept[0] + dot(slope, a));
+  float rise[5] = float[](b.x, b.y, b.z, -b.x - b.y - b.z, dot(slope, b));
+  float low = 0.0, high = 1e8;
+  for (int k = 0; k < (view.cut.w < 1e29 ? 5 : 4); ++k) {
+    float s = start[k] + (k < 4 ? 1e-6 : 0.0);
+    if (rise[k] > 0.0) low = max(low, -s / rise[k]);
+    else if (rise[k] < 0.0) high = min(high, -s / rise[k]);
+    else if (s < 0.0) return -1.0;
+  }
+  return low <= high ? low : -1.0;
+}
+#else
+#define CORNERS 3u
 // Distance to the triangle (Moeller, Trumbore 1997), or a negative number. Edges are a hair wider than they are, so that no ray
 // slips between two triangles.
 float hit(uint t) {
@@ -31,6 +65,7 @@ float hit(uint t) {
   const float slack = 1e-6;
   return u >= -slack && v >= -slack && u + v <= 1.0 + slack ? dot(e2, q) / determinant : -1.0;
 }
+#endif
 
 void main() {
   uint i = gl_GlobalInvocationID.x;
@@ -38,8 +73,8 @@ void main() {
     if (i != 0u || triangle == 0xffffffffu) return;
     vec3 x = origin + uintBitsToFloat(distance_bits) * direction;
     float best = 3e38;
-    for (uint k = 0u; k < 3u; ++k) {
-      uint v = triangles[3u * triangle + k];
+    for (uint k = 0u; k < CORNERS; ++k) {
+      uint v = triangles[CORNERS * triangle + k];
       float d = distance(position(v), x);
       if (d < best) {
         best = d;

@@ -11,7 +11,8 @@ void main() {
   vec3 albedo = view.palette[int(corner[0].rest.w) % PALETTE_SIZE].rgb;
   for (int i = 0; i < 3; ++i) {
     bool smooth_one = view.eye.w > 0.0 && dot(corner[i].normal, corner[i].normal) > 0.0;
-    emit(i, p[i], smooth_one ? corner[i].normal : flat_normal, corner[i].value, albedo);
+    gl_ClipDistance[0] = view.cut.w - dot(view.cut.xyz, corner[i].rest.xyz);
+    emit(vec3(float(i == 0), float(i == 1), float(i == 2)), p[i], smooth_one ? corner[i].normal : flat_normal, shown_value(i), albedo);
   }
   EndPrimitive();
 }

@@ -1,0 +1,37 @@
+// What is under the cursor: a vertex, its tetrahedron and what they measure, read back without waiting.
+#pragma once
+
+#include <optional>
+
+#include "app/lanes.h"
+#include "render/picking.h"
+
+namespace tetpbd {
+
+struct Reading {
+  std::uint32_t vertex = 0, tet = 0;
+  glm::dvec3 position{0};         ///< m
+  double speed = 0;               ///< m/s
+  double volume = 0, strain = 0;  ///< V/V0 - 1 and the mean L/L0 - 1 of the tet
+  std::optional<double> energy{},
+      distance{};  ///< J/m^3, where there is a material; from what is right, over the size
+};
+
+/// One question at a time: first which, then what.
+struct Probe {
+  Picker picker;  ///< made when first asked
+  Buffer copy;    ///< of what the vertices have, on its way back
+  Fence copied;
+  Reading next;
+  std::size_t lane = 0;
+  std::optional<Reading> reading;  ///< the last; none beside the bodies
+  bool asked() const { return bool(picker.answered) || bool(copied); }
+};
+
+/// Replaces a question that has not been answered.
+void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer,
+         const Frame& frame, const Ray& ray);
+/// Takes in what has arrived; whether there is a new reading, or none now. With `wait`: waits for it.
+bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait = false);
+
+}  // namespace tetpbd

@@ -1,0 +1,95 @@
+#include "render/marks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+
+#include "render/layout.h"
+#include "sim/layout.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Pixels of marks of this size at 720 lines.
+float scaled(const Frame& frame, float size) {
+  return size * std::max(1.0f, float(frame.viewport.height) / 720.0f);
+}
+
+// Seen through the bodies, which hide where they stand. Vertices within 10^-5 of the size of the ground or a
+// wall, as metrics count them.
+void draw_contacts(Renderer& renderer, const Frame& frame) {
+  const Program& program = use(renderer, "contacts");
+  program.set("colour", glm::vec3(0.95f, 0.35f, 0.0f));
+  program.set("hole", 0.0f);
+  program.set("size", scaled(frame, 7));
+  program.set("touching", 1e-5f * glm::length(renderer.rest_high - renderer.rest_low));
+  std::vector<glm::vec4> planes = frame.planes;
+  if (frame.ground) planes.insert(planes.begin(), glm::vec4(0, 1, 0, *frame.ground));
+  for (std::size_t i = 0; i < MAX_PLANES; ++i)  // no body is below -1e30 m
+    program.set(fmt::format("planes[{}]", i).c_str(),
+                i < planes.size() ? planes[i] : glm::vec4(0, 0, 0, -1e30f));
+  glDisable(GL_DEPTH_TEST);
+  glDrawArrays(GL_POINTS, 0, GLsizei(renderer.mesh.positions.size()));
+  glEnable(GL_DEPTH_TEST);
+}
+
+// Of a few hundred vertices of the surface.
+void draw_arrows(Renderer& renderer, const Frame& frame) {
+  constexpr std::size_t about = 300;
+  if (!renderer.arrow_vertices) {
+    std::vector<std::uint32_t> vertices;
+    for (const Triangle& triangle : renderer.mesh.surface)
+      vertices.insert(vertices.end(), triangle.begin(), triangle.end());
+    std::ranges::sort(vertices);
+    const auto [again, end] = std::ranges::unique(vertices);
+    vertices.erase(again, end);
+    const std::size_t every = vertices.size() / about + 1;  // neighbours in number are neighbours in space
+    std::vector<std::uint32_t> some;
+    for (std::size_t i = 0; i < vertices.size(); i += every) some.push_back(vertices[i]);
+    renderer.arrow_vertices = Buffer("arrow vertices", some);
+  }
+  glBindBuffer(GL_ARRAY_BUFFER, frame.velocities);
+  glEnableVertexAttribArray(ATTRIBUTE_VELOCITY);
+  glVertexAttribPointer(ATTRIBUTE_VELOCITY, 3, GL_FLOAT, GL_FALSE, sizeof(Velocity),
+                        reinterpret_cast<const void*>(offsetof(Velocity, high)));
+  const Program& program = use(renderer, "arrows");
+  program.set("seconds", float(frame.options.arrow_seconds));
+  program.set("viewport", glm::vec3(frame.viewport.width, frame.viewport.height, 0));
+  program.set("width", scaled(frame, 1.4f));
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.arrow_vertices.id());
+  glDrawElements(GL_POINTS, GLsizei(renderer.arrow_vertices.bytes() / 4), GL_UNSIGNED_INT, nullptr);
+  glDisableVertexAttribArray(ATTRIBUTE_VELOCITY);
+}
+
+void draw_dots(Renderer& renderer, const Frame& frame) {
+  if (frame.pinned.empty() && frame.grabbed.empty() && frame.worst.empty()) return;
+  const Program& program = use(renderer, "dots");
+  const auto batch = [&](const std::vector<std::uint32_t>& vertices, const glm::vec3& colour, float size,
+                         float hole = 0) {
+    program.set("colour", colour);
+    program.set("hole", hole);
+    program.set("size", scaled(frame, size));
+    const std::vector<GLint> first(vertices.begin(), vertices.end());
+    const std::vector<GLsizei> ones(vertices.size(), 1);
+    glMultiDrawArrays(GL_POINTS, first.data(), ones.data(), GLsizei(first.size()));
+  };
+  batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
+  batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
+  glDisable(GL_DEPTH_TEST);
+  batch(frame.worst, glm::vec3(0.70f, 0.0f, 0.30f), 18.0f, 0.68f);
+}
+
+}  // namespace
+
+void draw_marks(Renderer& renderer, const Frame& frame) {
+  glBindVertexArray(renderer.vertex_array.id());
+  glEnable(GL_PROGRAM_POINT_SIZE);
+  if (frame.options.contacts) draw_contacts(renderer, frame);
+  if (frame.options.arrows) draw_arrows(renderer, frame);
+  draw_dots(renderer, frame);
+  glDisable(GL_PROGRAM_POINT_SIZE);
+}
+
+}  // namespace tetpbd

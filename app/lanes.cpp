@@ -35,11 +35,17 @@ std::string describe(const Lane& lane, bool material) {
   return text;
 }
 
+std::optional<float> History::at(double time) const {
+  const auto after = std::ranges::upper_bound(times, time);
+  return after == times.begin() ? std::nullopt
+                                : std::optional(values[std::size_t(after - times.begin()) - 1]);
+}
+
 void History::add(double value, double time) {
   if (!times.empty() && times.back() > time) {
-    const auto kept = std::ranges::upper_bound(times, time) - times.begin();
-    times.resize(std::size_t(kept)), values.resize(std::size_t(kept));
-    added = kept ? (kept - 1) * every + 1 : 0;
+    const auto kept = std::size_t(std::ranges::upper_bound(times, time) - times.begin());
+    values.resize(kept), times.resize(kept);
+    added = kept ? long(kept - 1) * every + 1 : 0;
   }
   if (!values.empty() && (added - 1) % every != 0)
     values.pop_back(), times.pop_back();  // stood for the newest alone
@@ -49,11 +55,6 @@ void History::add(double value, double time) {
   for (std::size_t i = 0; 2 * i < values.size(); ++i) values[i] = values[2 * i], times[i] = times[2 * i];
   values.resize((values.size() + 1) / 2), times.resize(values.size());
   every *= 2;
-}
-
-std::optional<float> History::at(double time) const {
-  const auto after = std::ranges::upper_bound(times, time) - times.begin();
-  return after > 0 ? std::optional(values[std::size_t(after) - 1]) : std::nullopt;
 }
 
 namespace {
@@ -153,10 +154,9 @@ std::size_t yardstick(const std::vector<Lane>& lanes) {
 }
 
 std::size_t best_lane(const std::vector<Lane>& lanes) {
-  const auto now = [](const Lane& lane) { return lane.distance.at(time_of(lane.sim)); };
-  const auto known = [&](const Lane& lane) { return !lane.stopped() && now(lane); };
+  const auto known = [](const Lane& lane) { return !lane.stopped() && lane.far().has_value(); };
   if (std::ranges::none_of(lanes, known)) return yardstick(lanes);
-  const auto far = [&](const Lane& lane) { return known(lane) ? *now(lane) : 1e9f; };
+  const auto far = [&](const Lane& lane) { return known(lane) ? *lane.far() : 1e9f; };
   return std::size_t(std::ranges::min_element(lanes, {}, far) - lanes.begin());
 }
 

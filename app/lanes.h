@@ -21,11 +21,12 @@ struct History {
   std::vector<float> values;
   std::vector<double> times;  ///< s
   long added = 0, every = 1;
-  void add(double value, double time);         ///< what is later is forgotten
-  std::optional<float> at(double time) const;  ///< the last one until then
+  /// What it has of later times is forgotten: somebody went back.
+  void add(double value, double time);
+  std::optional<float> at(double time) const;  ///< the last value until then
 };
 
-inline double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }
+inline double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }  ///< s
 
 struct Lane {
   Sim sim;
@@ -35,6 +36,7 @@ struct Lane {
   Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                    ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
+  std::optional<float> far() const { return distance.at(time_of(sim)); }  ///< now
   /// Steps no more, since its state is not finite, while others go on.
   bool stopped() const { return sim.check.found.has_value(); }
 };

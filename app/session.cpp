@@ -275,8 +275,8 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.centre.reset();
   s.worst.clear();
   start_afresh(s);
-  begin_timeline(s);
   if (s.view.colour == Colour::motion) attempt(s, [&] { find_right(s); });
+  begin_timeline(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }

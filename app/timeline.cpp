@@ -50,12 +50,12 @@ void show(Session& s, std::size_t index) {
         (pinned ? unpin : pin)(lane.sim, vertex);
     restore_snapshot(lane.sim, then.lanes[i], then.states);
     if (then.held) unpin(lane.sim, *then.held);
-    if (then.disturbed != s.loaded.disturbed) {
-      lane.distance = {};  // from something else
-      if (then.distances[i]) lane.distance.add(*then.distances[i], time_of(lane.sim));
-    }
+    lane.apart = {};
+    if (s.loaded.disturbed != then.disturbed)
+      lane.distance = then.distances[i];  // held against something else
   }
   s.loaded.disturbed = then.disturbed;
+  s.loaded.held = -1;
   if (s.record) s.record->shown = true;
 }
 
@@ -112,7 +112,8 @@ void keep_moment(Session& s) {
             for (const Lane& lane : lanes) {
               moment->lanes.push_back(take_snapshot(lane.sim, states, at));
               at += snapshot_bytes(lane.sim);
-              moment->distances.push_back(lane.distance.at(time_of(lane.sim)));
+              History& last = moment->distances.emplace_back();
+              if (const auto far = lane.far()) last.add(double(*far), time_of(lane.sim));
             }
             moment->disturbed = s.loaded.disturbed;
             for (const std::uint32_t vertex : t.touched)

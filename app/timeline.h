@@ -17,7 +17,7 @@ struct Session;
 struct Moment {
   long step = 0;
   std::vector<Snapshot> lanes;
-  std::vector<std::optional<float>> distances;  ///< of each lane, as shown
+  std::vector<History> distances;     ///< the last of each lane, if any
   bool disturbed = false;             ///< as in Loaded
   std::vector<std::uint32_t> pinned;  ///< by the user, or
   std::optional<std::uint32_t> held;  ///< as long as the mouse held it

@@ -41,7 +41,7 @@ void draw_lanes(Session& s, const Target& target) {
   const bool several = lanes.size() > 1;
   const std::size_t right = best_lane(lanes);
   // Whose values come back: a range is to fit the lane that is farthest off, too.
-  const auto off = [](const Lane& l) { return l.distance.at(time_of(l.sim)).value_or(0); };
+  const auto off = [](const Lane& l) { return l.far().value_or(0.0f); };
   const bool farthest = s.fit_range && s.view.colour == Colour::motion;
   const std::size_t valued =
       farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
@@ -61,7 +61,7 @@ void draw_lanes(Session& s, const Target& target) {
       frame.options.body_colour = lane_colour(i);
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
       frame.caption = describe(lanes[i]);
-      if (const auto far = lanes[i].distance.at(time_of(lanes[i].sim)); far && !lanes[i].stopped())
+      if (const auto far = lanes[i].far(); far && !lanes[i].stopped())
         frame.caption += *far < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", *far);
     }
     if (s.overlaid) frame.caption.clear();

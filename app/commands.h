@@ -38,8 +38,11 @@ struct RunOptions {
   ViewOptions view;
   double range = 0;  ///< end of the colour scale, in its unit; 0: as it is
   std::vector<std::string>
-      lanes;              ///< of the window: what each puts in place of the scene's settings (lanes.h)
-  bool progress = false;  ///< show it even if standard error is no terminal
+      lanes;                     ///< of the window: what each puts in place of the scene's settings (lanes.h)
+  long history_mb = 256;         ///< of the window: for states to go back to; 0: none
+  std::filesystem::path record;  ///< of the window: what is done there (record.h); empty: nowhere
+  std::filesystem::path replay;  ///< what `run` does in place of a scene's steps
+  bool progress = false;         ///< show it even if standard error is no terminal
 };
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
 int run_headless(Scene scene, const RunOptions& options);

@@ -106,7 +106,9 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   if (leaps(sim.settings))
     j["watch"] = {{"longest_substep_at_rest", sim.longest_substep}, {"most_substeps", watch.most_substeps}};
   if (is_implicit(sim.settings))
-    j["watch"] = {{"largest_residual", watch.largest_residual}, {"least_health", watch.least_health}};
+    j["watch"] = {{"largest_residual", watch.largest_residual},
+                  {"least_health", watch.least_health},
+                  {"most_substeps", watch.most_substeps}};
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);
@@ -146,6 +148,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   Tuning tuning = tuning_from_environment();
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
+  warm_up(sim);
   Metrics metrics = create_metrics(*model, sim.system);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
@@ -192,7 +195,13 @@ int print_explanation(Scene scene, int gpu) {
   const auto model = build_model(scene);
   HeadlessContext context(gpu);
   choose_and_say(scene, model);
-  const Sim sim = create_sim(model, scene.settings);
+  Sim sim = create_sim(model, scene.settings);
+  warm_up(sim);
+  if (!on_cpu(sim)) {
+    run_loop(sim, nullptr, 3);
+    sim.kernels_timed = true;
+    run_loop(sim, nullptr, 10, {.most_seconds = 10});
+  }
   const Explanation e = explain(sim);
   fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),
              model->rest.tets.size());
@@ -202,11 +211,14 @@ int print_explanation(Scene scene, int gpu) {
   for (const auto& buffer : e.buffers) fmt::print("{:<52}{:>14}\n", buffer.name, buffer.bytes);
   fmt::print("{:<52}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
              double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
-  fmt::print("{:<52}{:>14}{:>14}{:>16}\n", "kernel", "work-groups", "a step", "bytes a step");
-  for (const auto& dispatch : e.dispatches)
-    fmt::print("{:<52}{:>14}{:>14}{:>16}\n", dispatch.name, dispatch.work_groups, dispatch.per_step,
-               dispatch.bytes * std::size_t(dispatch.per_step));
-  fmt::print("{:<52}{:>14}{:>14}{:>16}\n", "all", "", e.dispatches_per_step, e.bytes_per_step);
+  fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10}{:>8}\n", "kernel", "work-groups", "per step", "bytes each",
+             "µs each", "GB/s");
+  for (const auto& d : e.dispatches)
+    fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10}{:>8}\n", d.name, d.work_groups, d.per_step, d.bytes,
+               d.ms ? fmt::format("{:.1f}", 1e3 * *d.ms) : "",
+               d.ms ? fmt::format("{:.0f}", 1e-6 * double(d.bytes) / *d.ms) : "");
+  fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10.1f}\n", "all, in a step", "", e.dispatches_per_step,
+             e.bytes_per_step, 1e3 * e.ms_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);
   return 0;
 }

@@ -35,7 +35,18 @@ std::string describe(const Lane& lane, bool material) {
   return text;
 }
 
+std::optional<float> History::at(double time) const {
+  const auto after = std::ranges::upper_bound(times, time);
+  return after == times.begin() ? std::nullopt
+                                : std::optional(values[std::size_t(after - times.begin()) - 1]);
+}
+
 void History::add(double value, double time) {
+  if (!times.empty() && times.back() > time) {
+    const auto kept = std::size_t(std::ranges::upper_bound(times, time) - times.begin());
+    values.resize(kept), times.resize(kept);
+    added = kept ? long(kept - 1) * every + 1 : 0;
+  }
   if (!values.empty() && (added - 1) % every != 0)
     values.pop_back(), times.pop_back();  // stood for the newest alone
   values.push_back(float(value)), times.push_back(time);
@@ -131,22 +142,27 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
   return settings;
 }
 
+long steps_of(const std::vector<Lane>& lanes) {
+  long steps = 0;
+  for (const Lane& lane : lanes) steps = std::max(steps, lane.sim.steps);
+  return steps;
+}
+
 std::size_t yardstick(const std::vector<Lane>& lanes) {
   const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane.sim.settings); };
   return std::size_t(std::ranges::max_element(lanes, {}, worth) - lanes.begin());
 }
 
 std::size_t best_lane(const std::vector<Lane>& lanes) {
-  const auto known = [](const Lane& lane) { return !lane.stopped() && !lane.distance.values.empty(); };
+  const auto known = [](const Lane& lane) { return !lane.stopped() && lane.far().has_value(); };
   if (std::ranges::none_of(lanes, known)) return yardstick(lanes);
-  const auto far = [&](const Lane& lane) { return known(lane) ? lane.distance.values.back() : 1e9f; };
+  const auto far = [&](const Lane& lane) { return known(lane) ? *lane.far() : 1e9f; };
   return std::size_t(std::ranges::min_element(lanes, {}, far) - lanes.begin());
 }
 
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   const Model& model = *lanes.front().sim.model;
-  long now = 0;
-  for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  const long now = steps_of(lanes);
   const long every = compared_every(model);
   State answer;
   if (right) {

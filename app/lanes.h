@@ -21,8 +21,12 @@ struct History {
   std::vector<float> values;
   std::vector<double> times;  ///< s
   long added = 0, every = 1;
+  /// What it has of later times is forgotten: somebody went back.
   void add(double value, double time);
+  std::optional<float> at(double time) const;  ///< the last value until then
 };
+
+inline double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }  ///< s
 
 struct Lane {
   Sim sim;
@@ -32,6 +36,7 @@ struct Lane {
   Buffer apart{};  ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                    ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
+  std::optional<float> far() const { return distance.at(time_of(sim)); }  ///< now
   /// Steps no more, since its state is not finite, while others go on.
   bool stopped() const { return sim.check.found.has_value(); }
 };
@@ -59,6 +64,8 @@ bool shared_by_lanes(const Parameter& row);
 /// Throws Error naming `where` for words that are neither, or that all lanes share.
 Settings lane_settings(Settings settings, const std::string& words, const std::string& where);
 
+/// That lanes have taken, but for stopped ones.
+long steps_of(const std::vector<Lane>& lanes);
 /// The lane that others are held against where the right motion is not known: mode explicit, else the one
 /// with most iterations.
 std::size_t yardstick(const std::vector<Lane>& lanes);

@@ -11,6 +11,7 @@
 
 #include "app/commands.h"
 #include "app/lanes.h"
+#include "app/record.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
@@ -171,7 +172,7 @@ void open_scene(Arguments& a) {
   const ColourScale& scale = a.run.view.scale();
   if (const double end = a.run.range / scale.factor; end > 0)
     a.run.view.range() = {scale.is_signed ? -end : 0, end};
-  a.opened = load_scene(a.scene, a.overrides);
+  if (a.run.replay.empty()) a.opened = load_scene(a.scene, a.overrides);
 }
 
 // Options that mean the same in every command that opens a scene.
@@ -236,9 +237,14 @@ void add_commands(CLI::App& app, Arguments& a) {
                   "PARAMETER=VALUE, separated by commas")
       ->type_name("WORDS")
       ->expected(1, int(most_lanes));
+  add(view, "--history-mb", a.run.history_mb, 0L, 1000000L,
+      "memory for states to go back to, on the GPU and of CPU modes; 0: none");
+  add(view, "--record", a.run.record, "write what is done into this file, for tetpbd run --replay");
 
-  CLI::App& run = command("run", "headless: steps a scene, writes frames, video, statistics",
-                          [](const Arguments& a) { return run_headless(*a.opened, a.run); });
+  CLI::App& run =
+      command("run", "headless: steps a scene, writes frames, video, statistics", [](const Arguments& a) {
+        return a.run.replay.empty() ? run_headless(*a.opened, a.run) : run_replay(a.run);
+      });
   add_scene(run, a);
   add(run, "--steps", a.run.steps, 1L, most_steps, "steps to take (default: the scene's duration)");
   add(run, "--out", a.run.out, "folder for stats.json, stats.csv, frames");
@@ -252,6 +258,10 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(run, "--measure-every", a.run.measure_every, 1L, most_steps,
       "measure errors every K steps and at the end");
   run.add_flag("--positions", a.run.positions, "write positions.npy and tets.npy");
+  add(run, "--replay", a.run.replay,
+      "instead: what a record of tetpbd view --record says, lanes and all; "
+      "with --video, drawn at the speed it was played")
+      ->excludes("--scene", "--steps", "--png-every", "--positions");
   add_progress(run, a.run.progress);
 
   CLI::App& reference =

@@ -217,7 +217,10 @@ void draw_solver(Session& s) {
                            ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
                            : "");
   if (is_implicit(now))
-    ImGui::TextWrapped("residual %.1e of the start's, health %.2f", watch.residual, watch.health);
+    ImGui::TextWrapped(
+        "residual %.1e of the start's, health %.2f%s", watch.residual, watch.health,
+        watch.finer > 1 ? fmt::format("; {} times the substeps until no tet is inverted", watch.finer).c_str()
+                        : "");
   if (!automatic) return;
   slider(s, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
          "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);
@@ -236,7 +239,7 @@ void draw_run(Session& s) {
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
   if (button(s, s.playing ? "Pause##play" : "Play##play", "play", "Space", width)) play(s, !s.playing);
   ImGui::SameLine();
-  if (button(s, "Step", "step", "S or Right", width)) single_step(s);
+  if (button(s, "Step", "step", "S", width)) single_step(s);
   ImGui::SameLine();
   if (button(s, "Reset", "reset", "R", width)) restart(s);
   check_box(s, "fast", s.clock.fast, "steps as often as the machine can, instead of in real time");
@@ -387,6 +390,45 @@ void mark(Session& s, const std::string& name) {
   if (!s.log.file.is_open() || !ImGui::IsItemVisible()) return;
   const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
   mark(s, name, {low.x, low.y, high.x - low.x, high.y - low.y});
+}
+
+void draw_timeline(Session& s) {
+  Timeline& t = s.timeline;
+  const auto name = [](int halvings) {
+    return halvings ? fmt::format("1/{}x", 1 << halvings) : std::string("1x");
+  };
+  ImGui::SetNextItemWidth(ImGui::GetFontSize() * 4);
+  if (ImGui::BeginCombo("##speed", name(s.clock.halvings).c_str())) {
+    for (int halvings = 0; halvings <= most_halvings; ++halvings) {
+      if (ImGui::Selectable(name(halvings).c_str(), halvings == s.clock.halvings)) change_speed(s, halvings);
+      mark(s, "speed=" + name(halvings));
+    }
+    ImGui::EndCombo();
+  }
+  describe_item(s, "speed", "of the clock: slow motion\n, and .");
+  ImGui::SameLine();
+  ImGui::BeginDisabled(t.moments.size() < 2);
+  bool looping = t.looping;
+  if (ImGui::Checkbox("loop", &looping)) set_looping(s, looping);
+  describe_item(s, "loop", "play what is kept again and again");
+  ImGui::SameLine();
+  ImGui::SetNextItemWidth(-1);
+  const double dt = s.loaded.sim().settings.dt;
+  const long first = t.moments.empty() ? 0 : t.moments.front()->step;
+  long now = steps_of(s.loaded.lanes),
+       last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
+  std::string text = t.moments.empty() ? "nothing is kept" : fmt::format("{:.3f} s", double(now) * dt);
+  if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
+    text += fmt::format(" of {:.3f} .. {:.3f} s", double(first) * dt, double(last) * dt);
+  if (ImGui::SliderScalar("##time", ImGuiDataType_S64, &now, &first, &last, text.c_str(),
+                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
+    show_step(s, now);
+  describe_item(s, "time",
+                fmt::format("back and forth in time, of all lanes; to play on from there forgets what came "
+                            "after\nLeft and Right: state by state\n{} states are kept, {:.3g} of {} MB: all "
+                            "of late, fewer of long ago\n--history-mb",
+                            t.moments.size(), double(t.bytes) / 1048576, t.budget >> 20));
+  ImGui::EndDisabled();
 }
 
 void draw_panel(Session& s) {

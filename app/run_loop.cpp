@@ -98,13 +98,15 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
                       const Motion* right) {
   Sim sim = create_sim(model, settings);
+  warm_up(sim);
   Metrics metrics = create_metrics(*model, sim.system);
   return run_loop(sim, &metrics, steps, {.right = right});
 }
 
 void warm_up(Sim& sim) {
-  if (!is_software_renderer())
-    run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = 0.3});
+  if (is_software_renderer() || on_cpu(sim)) return;
+  run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = 0.5});
+  reset(sim);
 }
 
 }  // namespace tetpbd

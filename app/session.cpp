@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "app/reference_command.h"
@@ -15,8 +16,6 @@ namespace tetpbd {
 namespace {
 
 using Steady = std::chrono::steady_clock;
-
-double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }
 
 // After the state was put back: measurements under way belong to what was before.
 void start_afresh(Session& s) {
@@ -42,8 +41,15 @@ void disturb(Session& s) {
     for (Lane& lane : s.loaded.lanes) lane.distance = {}, lane.apart = {};
 }
 
-void one_step(Session& s) {
-  if (s.grab) lead(*s.grab, s.loaded.sim());
+}  // namespace
+
+void step_lanes(Session& s) {
+  if (s.grab) {
+    lead(*s.grab, s.loaded.sim());
+    const glm::dvec3& to = s.grab->position;
+    note(s, {{"move", {s.grab->vertex, to.x, to.y, to.z}}});
+  }
+  note_moment(s);
   auto& lanes = s.loaded.lanes;
   for (Lane& lane : lanes) {
     if (lanes.size() > 1 && check_finite(lane.sim)) continue;
@@ -56,9 +62,10 @@ void one_step(Session& s) {
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
   if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
+  keep_moment(s);
+  note_step(s);
 }
 
-// For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& s) {
   if (!s.log.file.is_open()) return;
   for (std::size_t i = 0; s.loaded.lanes.size() > 1 && i < s.loaded.lanes.size(); ++i) {
@@ -67,6 +74,8 @@ void log_state(Session& s) {
   }
   s.log("state {} {:016x}", s.loaded.sim().steps, state_hash(s.loaded.sim()));
 }
+
+namespace {
 
 void say_choice(Session& s) {
   s.budget_ms = s.loaded.choice->budget_ms;
@@ -92,12 +101,6 @@ void find_right(Session& s) {
   if (right && right->scene == key && right->kept.back() >= steps) return;
   right = right_motion(*first.model, first.settings);
   if (!right) right = rigid_motion(*first.model, first.settings, steps);
-}
-
-// From a common start.
-void start_lanes(Session& s) {
-  restart(s);
-  for (const Lane& lane : s.loaded.lanes) s.log("lane {}", describe(lane));
 }
 
 bool is_fixed(Session& s, std::uint32_t vertex) {
@@ -151,12 +154,21 @@ void play(Session& s, bool playing) {
 
 void single_step(Session& s) {
   play(s, false);
+  s.timeline.looping = false;
   attempt(s, [&] {
-    one_step(s);
+    step_lanes(s);
     measure_frame(s, true);
   });
   s.log("step {}", s.loaded.sim().steps);
   log_state(s);
+}
+
+void change_speed(Session& s, int halvings) {
+  if (s.clock.halvings == std::clamp(halvings, 0, most_halvings)) return;
+  s.clock.halvings = std::clamp(halvings, 0, most_halvings);
+  s.clock.owed = 0;
+  note(s, {{"speed", s.clock.speed()}});
+  s.log("speed {}", s.clock.speed());
 }
 
 void restart(Session& s) {
@@ -166,11 +178,13 @@ void restart(Session& s) {
   };
   if (std::ranges::any_of(parameters(), made_with_another))
     return load_soon(s, s.loaded.name, s.loaded.overrides, true, true);
+  note(s, {{"reset", true}});
   attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) reset(lane.sim);
     find_right(s);
   });
   start_afresh(s);
+  begin_timeline(s);
   s.log("reset");
 }
 
@@ -178,8 +192,10 @@ void go_back(Session& s) {
   let_go(s);
   attempt(s, [&] {
     if (!check_finite(s.loaded.sim(), true)) return;
+    note(s, {{"back", true}});
     if (!restore_checkpoint(s.loaded.sim())) return say(s, "no good state is kept: reset (R)");
     start_afresh(s);
+    note_step(s);
     s.log("back {}", s.loaded.sim().steps);
   });
 }
@@ -190,6 +206,7 @@ void watch_state(Session& s) {
   if (!found || (!s.playing && std::ranges::any_of(s.messages, &Message::non_finite))) return;
   let_go(s);
   play(s, false);
+  forget_from(s, found->step);
   say(s, error_of(*found).what(), true, true);
 }
 
@@ -216,7 +233,9 @@ void change_settings(Session& s, const Settings& wanted) {
       if (of_lanes[i] == lane.sim.settings) continue;
       const bool alone = of_lanes.size() == 1 && !s.loaded.right;
       const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
+      const Settings own = lane.sim.settings;
       apply_settings(lane.sim, of_lanes[i]);
+      note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
       lane.patches = {};
       if (alone && lane.sim.steps > 0) disturb(s);
       if (alone || key_of(lane) == before) continue;
@@ -248,6 +267,7 @@ void choose_soon(Session& s) {
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset();
   s.loaded = std::move(loaded);
+  note_scene(s);
   if (!keep_camera) {
     s.camera = scene_camera(s.loaded.scene, *s.loaded.sim().model, s.aspect);
     s.beside = glm::vec3(0);
@@ -256,6 +276,7 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.worst.clear();
   start_afresh(s);
   if (s.view.colour == Colour::motion) attempt(s, [&] { find_right(s); });
+  begin_timeline(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
 }
@@ -343,6 +364,14 @@ void hold_vertices(Session& s) {
   l.held = l.sim().steps;
 }
 
+void start_lanes(Session& s) {
+  ordered_json lanes;
+  for (const Lane& lane : s.loaded.lanes) lanes.push_back(settings_text(lane.sim.settings));
+  note(s, {{"lanes", lanes}});
+  restart(s);
+  for (const Lane& lane : s.loaded.lanes) s.log("lane {}", describe(lane));
+}
+
 void add_lane(Session& s, const std::string& words) {
   attempt(s, [&] {
     auto& lanes = s.loaded.lanes;
@@ -392,7 +421,10 @@ void compare_lanes(Session& s, const std::vector<std::string>& words) {
 void toggle_pin(Session& s, std::uint32_t vertex) {
   if (is_fixed(s, vertex)) return;
   disturb(s);
+  s.timeline.looping = false;
+  s.timeline.touched.insert(vertex);
   const bool pinned = is_pinned(s.loaded.sim(), vertex);
+  note(s, {{pinned ? "unpin" : "pin", vertex}});
   for (Lane& lane : s.loaded.lanes) (pinned ? unpin : pin)(lane.sim, vertex);
   s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
@@ -400,7 +432,11 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
 void catch_vertex(Session& s, const Pick& pick) {
   if (is_fixed(s, pick.vertex)) return;
   disturb(s);
+  s.timeline.looping = false;
+  s.timeline.touched.insert(pick.vertex);
+  note(s, {{"grab", pick.vertex}});
   s.grab = begin_grab(s.loaded.sim(), pick);
+  if (!s.grab->was_pinned) s.timeline.held = pick.vertex;
   for (Lane& lane : s.loaded.lanes)
     if (&lane != &s.loaded.lane()) pin(lane.sim, pick.vertex);
   s.log("grab {}", pick.vertex);
@@ -408,6 +444,8 @@ void catch_vertex(Session& s, const Pick& pick) {
 
 void let_go(Session& s) {
   if (!s.grab) return;
+  note(s, {{"release", s.grab->vertex}});
+  s.timeline.held.reset();
   for (Lane& lane : s.loaded.lanes)
     if (!s.grab->was_pinned) unpin(lane.sim, s.grab->vertex);
   s.log("release {} moved {:.4f}", s.grab->vertex, glm::length(s.grab->position - s.grab->start));
@@ -424,7 +462,8 @@ void advance(Session& s, double elapsed) {
   }
   if (!s.playing) return;
   const double dt = s.loaded.sim().settings.dt;
-  clock.owed += std::min(elapsed, 0.25);
+  clock.owed += std::min(elapsed, 0.25) * clock.speed();
+  if (s.timeline.looping) return loop_on(s);
   // A driver that queues work hides what a step costs until the frame is late: then the number of steps a
   // frame is halved, and doubled while there is room. Where a step returns when it is done (CPU modes,
   // software GL) the time spent here says it all.
@@ -434,7 +473,7 @@ void advance(Session& s, double elapsed) {
   const auto begin = Steady::now();
   int taken = 0;
   while ((clock.fast || clock.owed >= dt) && (!queued || taken < clock.most_steps)) {
-    one_step(s);
+    step_lanes(s);
     clock.owed -= dt;
     ++taken;
     if (seconds_since(begin) > patience) break;
@@ -476,6 +515,7 @@ void follow_shaders(Session& s) {
   if (version == s.loaded.sim().shader_version) return;
   const bool done = attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) rebuild_shaders(lane.sim), lane.metrics.reset();
+    note(s, {{"shaders", "edited"}});
     reload_shaders(s.loaded.renderer);
     s.loaded.picker = make_picker(s.loaded.sim().model->rest);
     s.loaded.probe = {};

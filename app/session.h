@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -15,7 +16,9 @@
 #include "app/lanes.h"
 #include "app/live_map.h"
 #include "app/probe.h"
+#include "app/record.h"
 #include "app/scene.h"
+#include "app/timeline.h"
 #include "render/picking.h"
 #include "render/renderer.h"
 #include "sim/metrics.h"
@@ -65,10 +68,12 @@ struct EventLog {
 /// Simulated against real time.
 struct Clock {
   bool fast = false;               ///< as fast as possible instead of real time
-  double owed = 0;                 ///< s of real time not yet simulated
+  int halvings = 0;                ///< of the speed: slow motion
+  double owed = 0;                 ///< s of real time, so slowed down, not yet simulated
   int most_steps = 4;              ///< a frame; follows what the GPU can do
   double real = 0, simulated = 0;  ///< s, since the factor was last worked out
   double factor = 0;               ///< simulated seconds a real one
+  double speed() const { return std::ldexp(1.0, -halvings); }
 };
 
 /// Something that stops the window for a while: done once its name has been on the screen.
@@ -122,6 +127,8 @@ struct Session {
   bool playing = true, vsync = true;
   bool take_screenshot = false, quit = false;
   Clock clock;
+  Timeline timeline;
+  std::unique_ptr<Record> record{};  ///< if anybody wants it
   std::optional<Grab> grab;
   std::vector<Message> messages;
   std::optional<Task> task;
@@ -144,6 +151,12 @@ bool attempt(Session& session, const std::function<void()>& action);
 
 void play(Session& session, bool playing);
 void single_step(Session& session);
+/// All lanes; throws what a step throws.
+void step_lanes(Session& session);
+/// For tests: a run of as many steps must give the same. Waits for the GPU.
+void log_state(Session& session);
+inline constexpr int most_halvings = 5;
+void change_speed(Session& session, int halvings);
 /// To the start; with a parameter changed that needs it, the bodies are made again.
 void restart(Session& session);
 /// Refuses those whose steps would stop the window for minutes.
@@ -180,6 +193,8 @@ void add_lane(Session& session, const std::string& words = {});
 /// The chosen one; the last stays.
 void remove_lane(Session& session);
 void choose_lane(Session& session, std::size_t lane);
+/// From a common start, of lanes that are others than before.
+void start_lanes(Session& session);
 /// In place of all lanes; the first keeps the scene's settings where there is no word for it.
 void compare_lanes(Session& session, const std::vector<std::string>& words);
 /// Leads the camera after the bodies; whether it is still on its way.

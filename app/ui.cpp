@@ -44,8 +44,11 @@ constexpr ImGuiWindowFlags plain_window =
 void draw_status(const Session& s, const Rect& place) {
   const Sim& sim = s.loaded.sim();
   begin_part("status", place);
-  const bool slow = s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95;
-  const std::string speed = s.playing ? fmt::format("{:.2g}x real time", s.clock.factor) : "paused";
+  const bool slow =
+      s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95 * s.clock.speed();
+  const std::string speed = s.timeline.looping ? "looping"
+                            : s.playing        ? fmt::format("{:.2g}x real time", s.clock.factor)
+                                               : "paused";
   ImGui::TextColored(slow ? ImVec4(0.72f, 0.33f, 0.05f, 1) : ImGui::GetStyleColorVec4(ImGuiCol_Text), "%s",
                      speed.c_str());
   ImGui::SameLine();
@@ -143,7 +146,8 @@ void draw_help(const Ui& ui) {
   if (ImGui::BeginTable("help", 2)) {
     ImGui::TableNextColumn();
     ImGui::TextDisabled("Keys");
-    for (const Shortcut& shortcut : shortcuts()) ImGui::BulletText("%s: %s", shortcut.shown, shortcut.help);
+    for (const Shortcut& shortcut : shortcuts())
+      if (*shortcut.shown) ImGui::BulletText("%s: %s", shortcut.shown, shortcut.help);
     ImGui::TableNextColumn();
     ImGui::TextDisabled("Mouse");
     for (const auto& [action, help] : mouse) ImGui::BulletText("%s: %s", action, help);
@@ -173,7 +177,11 @@ void set_style(float scale, float density) {
 const std::vector<Shortcut>& shortcuts() {
   static const std::vector<Shortcut> rows = {
       {GLFW_KEY_SPACE, "Space", "play, pause", [](Session& s) { play(s, !s.playing); }},
-      {GLFW_KEY_S, "S, Right", "one step", [](Session& s) { single_step(s); }, GLFW_KEY_RIGHT},
+      {GLFW_KEY_S, "S", "one step", [](Session& s) { single_step(s); }},
+      {GLFW_KEY_LEFT, "Left, Right", "back, forward in time", go_backward},
+      {GLFW_KEY_RIGHT, "", "", go_forward},
+      {GLFW_KEY_COMMA, ", .", "slower, faster", [](Session& s) { change_speed(s, s.clock.halvings + 1); }},
+      {GLFW_KEY_PERIOD, "", "", [](Session& s) { change_speed(s, s.clock.halvings - 1); }},
       {GLFW_KEY_R, "R", "reset", [](Session& s) { restart(s); }},
       {GLFW_KEY_F, "F", "show all of the body", [](Session& s) { frame_body(s); }},
       {GLFW_KEY_1, "1", "surface", [](Session& s) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
@@ -204,10 +212,12 @@ Layout make_layout(const Ui& ui, float width, float height) {
   const float status = std::round(32 * ui.scale);
   const float panel = ui.panels ? std::min(std::round(320 * ui.scale), width * 0.6f) : 0;
   const float plots = ui.panels && ui.plots && height > 360 * ui.scale ? std::round(128 * ui.scale) : 0;
+  const float timeline = ui.panels && height > 240 * ui.scale ? std::round(38 * ui.scale) : 0;
   const float bottom = ui.panels ? std::max(height - status, 1.0f) : height;
-  layout.view = {0, 0, std::max(width - panel, 1.0f), std::max(bottom - plots, 1.0f)};
+  layout.view = {0, 0, std::max(width - panel, 1.0f), std::max(bottom - plots - timeline, 1.0f)};
   layout.panel = {width - panel, 0, panel, bottom};
-  layout.plots = {0, layout.view.height, layout.view.width, plots};
+  layout.timeline = {0, layout.view.height, layout.view.width, timeline};
+  layout.plots = {0, layout.view.height + timeline, layout.view.width, plots};
   layout.status = {0, bottom, width, height - bottom};
   return layout;
 }
@@ -227,6 +237,11 @@ void draw_ui(Session& s, const Layout& layout) {
     begin_part("panel", layout.panel);
     draw_panel(s);
     ImGui::End();
+    if (layout.timeline.height > 0) {
+      begin_part("timeline", layout.timeline);
+      draw_timeline(s);
+      ImGui::End();
+    }
     if (layout.plots.height > 0) draw_plots(s, layout.plots);
     draw_status(s, layout.status);
   }

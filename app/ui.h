@@ -11,9 +11,10 @@
 
 namespace tetpbd {
 
-/// The window, cut up: the panel at the right, plots and status line below, the view in what is left.
+/// The window, cut up: the panel at the right, timeline, plots and status line below, the view in what is
+/// left.
 struct Layout {
-  Rect view, panel, plots, status;
+  Rect view, panel, timeline, plots, status;
 };
 
 /// A key and what it does: the help overlay and the keyboard read the same table.
@@ -53,6 +54,8 @@ void begin_part(const char* name, const Rect& place);
 void draw_panel(Session& session);
 void draw_map(Session& session);
 float label_width();
+/// The bar below the view: speed, loop, what can be gone back to.
+void draw_timeline(Session& session);
 std::string label_of(const char* parameter);
 /// Notes where the last widget is, so that a test can find it: "at NAME x y width height".
 void mark(Session& session, const std::string& name);

@@ -41,7 +41,7 @@ void draw_lanes(Session& s, const Target& target) {
   const bool several = lanes.size() > 1;
   const std::size_t right = best_lane(lanes);
   // Whose values come back: a range is to fit the lane that is farthest off, too.
-  const auto off = [](const Lane& l) { return l.distance.values.empty() ? 0.0f : l.distance.values.back(); };
+  const auto off = [](const Lane& l) { return l.far().value_or(0.0f); };
   const bool farthest = s.fit_range && s.view.colour == Colour::motion;
   const std::size_t valued =
       farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
@@ -61,9 +61,8 @@ void draw_lanes(Session& s, const Target& target) {
       frame.options.body_colour = lane_colour(i);
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
       frame.caption = describe(lanes[i]);
-      if (const auto& far = lanes[i].distance.values; !far.empty() && !lanes[i].stopped())
-        frame.caption +=
-            far.back() < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", far.back());
+      if (const auto far = lanes[i].far(); far && !lanes[i].stopped())
+        frame.caption += *far < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", *far);
     }
     if (s.overlaid) frame.caption.clear();
     if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;
@@ -84,6 +83,7 @@ void frame_body(Session& s) {
   const Bounds box = bounds(read_state(s.loaded.sim()).positions);
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
+  note_camera(s);
   s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
 }
 

@@ -140,8 +140,8 @@ void release(Input& in, int button) {
   const Camera& c = s.camera;
   if (in.drag == Drag::cut) s.log("cut {:.4f}", s.view.cut);
   if (in.drag == Drag::orbit || in.drag == Drag::pan)
-    s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation, c.distance,
-          c.target.x, c.target.y, c.target.z);
+    note_camera(s), s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation,
+                          c.distance, c.target.x, c.target.y, c.target.z);
   // A press that the picker has not answered yet is a click: it may still pin a vertex, but catches none.
   if (in.drag == Drag::grab) let_go(s);
   in.drag = Drag::none;
@@ -155,6 +155,7 @@ void wheel(Input& in, double turned, bool of_cut) {
     return in.session.log("cut {:.4f}", in.session.view.cut);
   }
   zoom(in.session.camera, std::pow(0.9f, float(turned)));
+  note_camera(in.session);
   in.session.log("zoom {:.4f}", in.session.camera.distance);
 }
 
@@ -209,8 +210,9 @@ void listen(GLFWwindow* window, Input& input) {
   static const auto of = [](GLFWwindow* w) { return static_cast<Input*>(glfwGetWindowUserPointer(w)); };
   glfwSetWindowUserPointer(window, &input);
   glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
-    // Held down, only the key that steps goes on.
-    const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT);
+    // Held down, only the keys that step go on.
+    const bool again =
+        action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT || code == GLFW_KEY_LEFT);
     if (action == GLFW_PRESS || again)
       of(w)->events.push_back([in = of(w), code, modifiers] { key(*in, code, modifiers); });
   });
@@ -410,6 +412,8 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.view = options.view;
   s.view.follow = true;
   s.ui.mesh = overrides.mesh.string();
+  s.timeline.budget = std::size_t(options.history_mb) << 20;
+  if (!options.record.empty()) s.record = std::make_unique<Record>(options.record);
   Input input{s};
   listen(desktop.window, input);
   ImGui::CreateContext();
@@ -463,6 +467,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     }
     draw_frame(s, view, input, desktop);
   }
+  end_record(s);
   s.log("closed");
   return 0;
 }

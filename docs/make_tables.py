@@ -135,7 +135,7 @@ def performance(*files):
 
 
 def stability(note, *folders):
-    modes = ["cpu-double", "cpu", "cpu-fast", "node", "constraint", "node-substeps"]
+    modes = ["cpu-double", "cpu", "cpu-fast", "node", "constraint", "node-substeps", "paper"]
     rows = {}
     for folder in folders:
         for r in json.load(open(pathlib.Path(folder) / "stability.json"))["rows"]:

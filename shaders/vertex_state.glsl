@@ -3,7 +3,7 @@ layout(std430, binding = BIND_POSITIONS) buffer Positions { Position positions[]
 layout(std430, binding = BIND_VELOCITIES) buffer Velocities { Velocity velocities[]; };
 // The first step whose state is not finite, and the lowest vertex that is not; ~0: none. Then what sim/watch.h asks for, bits of floats: the
 // largest h^2 b (method.md eq. 39b) in mode explicit; the largest residual over that of Newton's start, before the last iteration, and
-// the least length of a first step in mode newton.
+// the least length of a first step, 0 where a tet is inverted, in mode newton.
 layout(std430, binding = BIND_CHECK) buffer Check { uint bad_step, bad_vertex, largest, least; };
 // Dispatch parameters: what this one does (PHASE_ bits; mode newton: which iteration), and the number of the step, for the check.
 uniform uint phases;

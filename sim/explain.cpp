@@ -5,7 +5,7 @@
 
 namespace tetpbd {
 
-Explanation explain(const Sim& sim) {
+Explanation explain(Sim& sim) {
   Explanation result;
   const auto add = [&](const Buffer& buffer) {
     if (!buffer) return;
@@ -20,8 +20,19 @@ Explanation explain(const Sim& sim) {
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 
-  const auto kernel = [&](const Pass& pass, const std::string& what, long per_step, std::size_t more) {
-    result.dispatches.push_back({pass.program.label() + what, pass.work_groups, per_step, pass.bytes + more});
+  std::map<Pass*, std::optional<double>> times_of;
+  const auto time_of = [&](Pass& pass) {
+    if (const auto known = times_of.find(&pass); known != times_of.end()) return known->second;
+    double sum = 0;
+    int count = 0;
+    for (; const auto ms = pass.timer.poll(true); ++count) sum += *ms;
+    return times_of[&pass] = count > 0 ? std::optional(sum / count) : std::nullopt;
+  };
+  const auto kernel = [&](Pass& pass, const std::string& what, long per_step, std::size_t more) {
+    const auto ms = time_of(pass);
+    result.dispatches.push_back(
+        {pass.program.label() + what, pass.work_groups, per_step, pass.bytes + more, ms});
+    result.ms_per_step += ms.value_or(0) * double(per_step);
     result.dispatches_per_step += per_step;
     result.bytes_per_step += (pass.bytes + more) * std::size_t(per_step);
   };

@@ -65,7 +65,7 @@ Settings fitted(Settings settings, double longest, double stiffening) {
 // `before`: substeps of the last step, if others.
 void write_step_block(Sim& sim, int before = 0) {
   const Settings& s = sim.settings;
-  const double h = s.dt / s.substeps;
+  const double h = s.dt / (s.substeps * sim.watch.finer);
   const bool soft = compliant(s);
   Step block{};
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
@@ -156,11 +156,18 @@ void start_watch(Sim& sim, const std::vector<glm::dvec3>& positions) {
   Watch& w = sim.watch;
   w.most_substeps = 0, w.stiffer = 1, w.calm = 0;
   w.residual = w.largest_residual = 0, w.health = w.least_health = 1;
+  w.mending = 0;
+  set_finer(sim, 1);
   if (!(w.at_rest > 0)) return;
   const double now = stiffest(sim, sim.settings, positions) / w.at_rest;
   w.stiffer = std::isfinite(now) ? now : 1;
   w.stiffening = stiffening_for(w.stiffer, sim.settings.stability);
   sim.settings = fitted(sim.settings, sim.longest_substep, w.stiffening);
+}
+
+SolverInput solver_input(const Sim& sim, const Settings& s) {
+  return {*sim.model,   sim.system, s, sim.tuning, is_software_renderer(),
+          compliant(s), touches_rigidly(*sim.model, s), leaps(s)};
 }
 
 // Everything but the state.
@@ -173,10 +180,8 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
-  const bool soft = compliant(settings), rigid = touches_rigidly(*sim.model, settings);
   const std::size_t count = sim.model->positions.size();
-  const SolverInput input{*sim.model, sim.system, settings,       sim.tuning, is_software_renderer(),
-                          soft,       rigid,      leaps(settings)};
+  const SolverInput input = solver_input(sim, settings);
   const auto defines = vertex_defines(input);
   sim.solver = find_solver_mode(settings.mode)->create(input);
   if (sim.solver.schedule)
@@ -197,11 +202,11 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   if (on_cpu(sim)) return sim;
   if (!sim.solver.schedule) {
     if (!leaps(settings)) sim.predicted = buffer("predicted", count * sizeof(Velocity));
-    sim.quantized[0] = buffer("quantized positions", count * 16 * (soft ? 2 : 1));
+    sim.quantized[0] = buffer("quantized positions", count * 16 * (input.compliant ? 2 : 1));
   }
   if (sim.solver.double_buffered)
     sim.quantized[1] = buffer("quantized positions, other side", sim.quantized[0].bytes());
-  if (rigid) {
+  if (input.rigid) {
     sim.rigid_bodies =
         buffer("hard bodies", rigid_records(*sim.model).size() * sizeof(RigidRecord) + 8 * count);
     sim.rigid_contact = {Program::compute("rigid_contact.comp", {}, defines), work_groups(count, group_size),
@@ -263,21 +268,16 @@ void write_velocities(const Sim& sim, const State& state) {
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
-// What fits; `before`: half_substep_fall() of the velocities.
-void put_settings(Sim& sim, const Settings& settings, double before) {
-  sim.settings = settings;
-  const double upwards = half_substep_fall(settings) - before;
-  schedule(sim);
-  write_step_block(sim);
+}  // namespace
+
+void retime_velocities(Sim& sim, const Settings& then) {
+  const double upwards = half_substep_fall(sim.settings) - half_substep_fall(then);
   if (upwards == 0) return;
-  // Velocities are half a substep old: with another substep or gravity they are those of another time.
   State state = read_state(sim);
   add_upwards(sim, state, upwards);
   write_velocities(sim, state);
   if (on_cpu(sim)) sim.host = std::move(state);
 }
-
-}  // namespace
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
   check_settings(settings, "settings");
@@ -345,7 +345,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
                       coarse.constraint_damping, coarse.dt / coarse.substeps);
   };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
-  const double before = half_substep_fall(sim.settings);
+  const Settings before = sim.settings;
   if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
   const bool same = forces(settings) == forces(sim.settings);
   const double longest = same ? sim.longest_substep : longest_substep(sim, settings);
@@ -353,7 +353,10 @@ void apply_settings(Sim& sim, const Settings& settings) {
   if (!same) sim.watch.at_rest = stiffest(sim, settings, sim.model->rest.positions);
   sim.longest_substep = longest;
   forget_answers(sim);
-  put_settings(sim, now, before);
+  sim.settings = now;
+  schedule(sim);
+  write_step_block(sim);
+  retime_velocities(sim, before);
 }
 
 void set_stiffening(Sim& sim, double stiffening) {
@@ -363,6 +366,15 @@ void set_stiffening(Sim& sim, double stiffening) {
   if (sim.settings.substeps == before) return;
   sim.watch.changed = true;
   write_step_block(sim, before);
+}
+
+void set_finer(Sim& sim, int times) {
+  if (std::exchange(sim.watch.finer, times) == times) return;
+  Settings finer = sim.settings;
+  finer.substeps *= times;
+  sim.solver = find_solver_mode(finer.mode)->create(solver_input(sim, finer));
+  sim.predict = std::move(sim.solver.begin);
+  write_step_block(sim);
 }
 
 void rebuild_shaders(Sim& sim) { remake(sim, sim.settings); }

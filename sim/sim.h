@@ -49,6 +49,7 @@ struct Sim {
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
+  bool kernels_timed = false;  ///< each dispatch by the timer of its pass
   GuardCounts guards{};  ///< since the last reset; ask guard_counts()
   FiniteCheck check;     ///< ask check_finite()
   Watch watch;           ///< ask watched()
@@ -76,6 +77,8 @@ inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
 
 /// What is known of hard bodies in contact, before something else moves them.
 void forget_contacts(Sim& sim);
+/// Velocities of mid-substep with the settings `then` become those with the settings of now.
+void retime_velocities(Sim& sim, const Settings& then);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 /// A state that is not finite is taken, and found by check_finite() at once.
@@ -96,10 +99,12 @@ void check_step(Sim& sim);
 /// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
 /// ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
-/// Before a step: asks what kernels noted; in mode explicit takes as many substeps as the last answer needs.
+/// Before a step: asks what kernels noted; in modes explicit and newton takes as many substeps as the last
+/// answer needs.
 /// Phases of the step's first substep.
 unsigned watch(Sim& sim);
 void set_stiffening(Sim& sim, double stiffening);
+void set_finer(Sim& sim, int times);
 /// What kernels noted of other settings or another state.
 void forget_answers(Sim& sim);
 /// As of the last step. Waits.
@@ -116,7 +121,6 @@ bool is_pinned(const Sim& sim, std::uint32_t vertex);
 /// Puts a pinned vertex somewhere, in metres.
 void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position);
 
-/// What the simulation allocates and dispatches.
 struct Explanation {
   struct Item {
     std::string name;
@@ -127,13 +131,16 @@ struct Explanation {
     std::size_t work_groups;
     long per_step;      ///< 0: only after a change from outside
     std::size_t bytes;  ///< of one dispatch
+    std::optional<double> ms;  ///< of one, the mean of those that were timed
   };
   std::vector<Item> buffers;
   std::vector<Kernel> dispatches;
   std::size_t bytes = 0;
   long dispatches_per_step = 0;
+  double ms_per_step = 0;
   std::size_t bytes_per_step = 0;  ///< read and written by all dispatches; caches may serve part of it
 };
-Explanation explain(const Sim& sim);
+/// What the simulation allocates and dispatches. Waits for what is timed.
+Explanation explain(Sim& sim);
 
 }  // namespace tetpbd

@@ -32,10 +32,12 @@ struct Dispatcher {
     pass.parameters = parameters;
     if (pass.records) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RECORDS, pass.records);
     const std::size_t row = std::min<std::size_t>(pass.work_groups, sim.tuning.row);
+    if (sim.kernels_timed) pass.timer.begin();
     glDispatchCompute(GLuint(row), GLuint((pass.work_groups + row - 1) / row), 1);
     // The next dispatch reads what this one wrote, and overwrites what it read (the other quantized
     // positions, the sums of corrections that average.comp clears).
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    if (sim.kernels_timed) pass.timer.end();
   }
   // The pass that moves the vertices: what it wrote is read from then on.
   void move(unsigned phases) {
@@ -74,7 +76,7 @@ void step_on_gpu(Sim& sim) {
   }
   dispatcher.bind_quantized();
   sim.needs_predict = false;
-  for (int substep = 0; substep < sim.settings.substeps; ++substep) {
+  for (int substep = 0; substep < sim.settings.substeps * sim.watch.finer; ++substep) {
     if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
     for (const Dispatch& dispatch : sim.substep)
       if (dispatch.pass + 1 == sim.solver.iteration.size())

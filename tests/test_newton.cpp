@@ -299,30 +299,99 @@ TEST_CASE("newton: a block that slides stops where friction stops it") {
   CHECK(way == doctest::Approx(1.5 * 1.5 / (2 * 0.5 * 9.81)).epsilon(0.07));
 }
 
+namespace {
+
+std::shared_ptr<const Model> deformed(const char* how) {
+  TetMesh mesh = make_block({0.8, 1, 0.6}, {4, 5, 3});
+  finish_tets(mesh, "block");
+  auto start = mesh.positions;
+  for (auto& p : start) p.y += 2;
+  deform(start, mesh, how, 1);
+  auto model = std::make_shared<Model>();
+  add_body(*model, "block", mesh, 1000, start, {}, {}, {});
+  return model;
+}
+
+int inverted_tets(const Sim& sim) {
+  const auto x = read_state(sim).positions;
+  int inverted = 0;
+  for (const Tet& t : sim.model->rest.tets)
+    inverted += glm::dot(glm::cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]), x[t[3]] - x[t[0]]) <= 0;
+  return inverted;
+}
+
+}  // namespace
+
 TEST_CASE("newton: hostile starts end whole") {
   GlTest gl;
-  for (const char* how : {"squash:0.1", "mirror", "random", "invert-one", "stretch:4", "plane"}) {
+  for (const char* how : {"squash:0.1", "mirror", "random", "invert-one", "stretch:4", "flatten"}) {
     CAPTURE(how);
-    TetMesh mesh = make_block({0.8, 1, 0.6}, {4, 5, 3});
-    finish_tets(mesh, "block");
-    auto start = mesh.positions;
-    for (auto& p : start) p.y += 2;
-    deform(start, mesh, how == std::string("plane") ? "flatten" : how, 1);
-    auto model = std::make_shared<Model>();
-    add_body(*model, "block", mesh, 1000, start, {}, {}, {});
     Settings settings = soft("neo-hookean", 2e-3);
     settings.young_modulus = 1e6, settings.poisson_ratio = 0.45, settings.iterations = 8;
-    Sim sim = create_sim(model, settings);
+    Sim sim = create_sim(deformed(how), settings);
     for (int s = 0; s < 200; ++s) step(sim);
     CHECK_FALSE(check_finite(sim, true));
-    const State state = read_state(sim);
-    int inverted = 0;
-    for (const Tet& t : mesh.tets) {
-      const auto& x = state.positions;
-      inverted += glm::dot(glm::cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]), x[t[3]] - x[t[0]]) <= 0;
-    }
-    CHECK(inverted == 0);
+    CHECK(inverted_tets(sim) == 0);
   }
+}
+
+TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no tet is inverted") {
+  GlTest gl;
+  Settings stiff = soft("neo-hookean");
+  stiff.young_modulus = 1e8, stiff.poisson_ratio = 0.495, stiff.iterations = 8;
+  for (const char* how : {"none", "invert-one"}) {  // both fall on the ground
+    CAPTURE(how);
+    std::uint64_t bits = 0;
+    for (const int run : {0, 1, 2}) {
+      CAPTURE(run);
+      Sim sim = create_sim(deformed(how), stiff);
+      if (run == 0) sim.watch.answer = {};  // not watched
+      int steps_with_inverted = 0;
+      for (int s = 0; s < 400; ++s) {
+        step(sim);
+        steps_with_inverted += inverted_tets(sim) > 0;
+      }
+      CHECK((steps_with_inverted > 0) == (run == 0));
+      CHECK(sim.watch.finer == 1);
+      if (run == 0) continue;
+      CHECK(sim.watch.most_substeps == 4);
+      CHECK(watched(sim).least_health < 0.1);
+      if (run == 1) bits = state_hash(sim);
+      CHECK(state_hash(sim) == bits);
+      reset(sim);
+      CHECK(sim.watch.most_substeps == 0);
+    }
+  }
+  Settings healthy = soft("neo-hookean");
+  healthy.iterations = 8;
+  Sim sim = create_sim(deformed("none"), healthy);
+  for (int s = 0; s < 200; ++s) step(sim);
+  CHECK(sim.watch.most_substeps == 1);
+}
+
+TEST_CASE("newton: a body that is pulled comes to where it rests in mode explicit, and lets go") {
+  GlTest gl;
+  const auto model = deformed("none");
+  const std::uint32_t held = 0, pulled = std::uint32_t(model->positions.size()) - 1;
+  std::vector<std::vector<glm::dvec3>> ends;
+  for (const char* mode : {"newton", "explicit"}) {
+    Settings settings = soft("neo-hookean");
+    settings.mode = mode, settings.iterations = 8, settings.gravity = 0, settings.damping = 8;
+    Sim sim = create_sim(model, settings);
+    pin(sim, held), pin(sim, pulled);
+    const glm::dvec3 from = model->positions[pulled], way(0.1, 0.2, 0.05);
+    for (int s = 1; s <= 40; ++s) move_pinned(sim, pulled, from + way * (s / 40.0)), step(sim);
+    for (int s = 0; s < 400; ++s) step(sim);
+    CHECK_FALSE(check_finite(sim, true));
+    ends.push_back(read_state(sim).positions);
+    CHECK(glm::distance(ends.back()[pulled], from + way) < 1e-6);
+    unpin(sim, pulled);
+    for (int s = 0; s < 40; ++s) step(sim);
+    CHECK(glm::distance(read_state(sim).positions[pulled], from + way) > 0.01);
+    CHECK(sim.watch.finer == 1);
+  }
+  CHECK(distance(ends[0], ends[1]) < 2e-4);
+  CHECK(distance(ends[0], model->positions) > 0.02);
 }
 
 TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraints fall as all else") {

@@ -185,6 +185,16 @@ TEST_CASE("help, version, info and explain answer") {
   CHECK(explained.status == 0);
   CHECK(explained.out.find("solve_constraint stretch") != std::string::npos);
   CHECK(explained.out.find("volume") == std::string::npos);
+  // A line of a kernel: work-groups, how often, bytes, microseconds, gigabytes per second.
+  std::istringstream line(explained.out.substr(explained.out.find("solve_constraint stretch")));
+  std::string word;
+  for (double number = 0; line >> word && number == 0;) number = std::atof(word.c_str());
+  double often = 0, bytes = 0, us = 0, rate = 0;
+  line >> often >> bytes >> us >> rate;
+  CAPTURE(explained.out);
+  CHECK(often > 0);
+  CHECK(us > 0);
+  CHECK(rate == doctest::Approx(1e-3 * bytes / us).epsilon(0.2));
   const Outcome view = program("view", folder, "env -u DISPLAY -u WAYLAND_DISPLAY");
   CHECK(view.status == 2);
   CHECK(view.err.find("display") != std::string::npos);

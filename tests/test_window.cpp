@@ -235,6 +235,16 @@ TEST_CASE("window: a history is all of it in even steps, and the newest; plots a
     CHECK(history.times[k] == 4.0 * double(k));
   }
 
+  CHECK(history.at(400.0) == 800.0f);
+  CHECK_FALSE(history.at(-1).has_value());
+  history.add(7, 402);  // somebody went back
+  CHECK(history.values.back() == 7);
+  CHECK(history.values.size() == 102);
+  for (int i = 1; i < 9; ++i) history.add(7 + i, 402 + i);
+  CHECK(history.times[history.times.size() - 2] ==
+        409);  // eight steps on from 400, of which each eighth is kept
+  CHECK(history.values.back() == 15);
+
   GlTest gl;
   Scene scene = load_scene("beam", {.solver = "hard"});
   scene.bodies[0].fixed.clear();

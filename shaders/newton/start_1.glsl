@@ -8,7 +8,9 @@ void start_$KIND(uint c, inout uint bad) {
     ivec4 first = start_at(part, mesh[record]);
     for (uint j = 0u; j < $ARITY; ++j) x[j] = between(start_at(part, mesh[record + j]), first);
     float now = $KIND_jacobian(x, rest_$KIND(record));
-    if (part == 3u) before = now;
-    else if (!(now >= 0.3 * min(1.0, max(before, 0.0)) && now <= 2.0 * max(1.0, before))) bad |= 1u << part;
+    if (part == 3u) {
+      before = now;
+      if (!(now > 0.0)) atomicMin(least, 0u);
+    } else if (!(now >= 0.3 * min(1.0, max(before, 0.0)) && now <= 2.0 * max(1.0, before))) bad |= 1u << part;
   }
 }

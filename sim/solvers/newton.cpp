@@ -233,6 +233,8 @@ Solver create_newton_solver(const SolverInput& input) {
   add_buffer(
       solver, input.tuning, BIND_NEWTON_SUMS,
       Buffer("sums", std::vector<float>(4 + 2 * turns + 8 + 3 * unknowns + 5 * count + 1), GL_DYNAMIC_COPY));
+  solver.handed_on = {{0, 2 * 16 * vertices, 2 * 16 * vertices},  // WAY and GAIN (newton.glsl)
+                      {4, 0, solver.buffers[4].bytes()}};         // rotations, among others
   std::vector<std::string> defines = std::move(mesh.defines);
   for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"GROUP_SIZE", group},
                                     {"LANES", lanes},

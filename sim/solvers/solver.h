@@ -27,6 +27,7 @@ struct Pass {
   /// step.cpp.
   std::array<GLint, 2> locations{};
   std::array<unsigned, 2> parameters{~0u, ~0u};
+  Timer timer{};  ///< of its dispatches, while they are timed
 };
 
 /// How often each guard of layout.glsl triggered, in its order. A projection counts once where each
@@ -52,6 +53,8 @@ struct Solver {
   /// place of predict.comp.
   std::vector<Dispatch> (*schedule)(int iterations) = nullptr;
   Pass begin;
+  /// What a step hands on to the next beside what every mode has: of these `buffers`, first byte and bytes.
+  std::vector<std::array<std::size_t, 3>> handed_on{};
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
   std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };

@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "app/commands.h"
+#include "app/record.h"
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/hash.h"
@@ -250,6 +251,13 @@ void read_overrides(std::string_view bytes) {
   });
 }
 
+void read_record_file(std::string_view bytes) {
+  const fs::path file = write("session.jsonl", bytes);
+  expect_errors_only([&] {
+    for (const RecordLine& line : read_record(file)) line.action.dump();
+  });
+}
+
 // A word a line. What the words ask for is checked, not done.
 void read_words(std::string_view bytes) {
   static const fs::path file = write("words.json", small_scene);
@@ -279,6 +287,7 @@ const std::vector<Reader>& readers() {
       {"scene", "scene", read_scene, false},
       {"overrides", "overrides", read_overrides, false},
       {"words", "words", read_words, false},
+      {"record", "record", read_record_file, false},
   };
   return rows;
 }

@@ -1,0 +1,104 @@
+#include "sim/snapshot.h"
+
+#include <utility>
+
+namespace tetpbd {
+
+namespace {
+
+struct Part {
+  const Buffer* buffer;
+  std::size_t first, bytes;
+};
+
+// Of a GPU mode: the state, then what goes with the settings.
+std::vector<Part> parts_of(const Sim& sim) {
+  std::vector<Part> parts;
+  const auto add = [&](const Buffer& buffer) { parts.push_back({&buffer, 0, buffer.bytes()}); };
+  if (on_cpu(sim)) return parts;
+  add(sim.positions), add(sim.velocities);
+  if (sim.quantized[0]) add(sim.quantized[sim.read_index]);
+  if (sim.rigid_bodies) add(sim.rigid_bodies);
+  for (const auto& [buffer, first, bytes] : sim.solver.handed_on)
+    parts.push_back({&sim.solver.buffers[buffer], first, bytes});
+  if (sim.watch.answer) add(sim.watch.answer), parts.push_back({&sim.check.words, 8, 8});
+  return parts;
+}
+
+State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
+  std::vector<Position> positions(vertices);
+  std::vector<Velocity> velocities(vertices);
+  from.read(at, vertices * sizeof(Position), positions.data());
+  from.read(at + vertices * sizeof(Position), vertices * sizeof(Velocity), velocities.data());
+  State state;
+  for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
+  for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
+  return state;
+}
+
+}  // namespace
+
+std::size_t snapshot_bytes(const Sim& sim) {
+  std::size_t bytes = 0;
+  for (const Part& part : parts_of(sim)) bytes += part.bytes;
+  return bytes;
+}
+
+std::size_t snapshot_memory(const Sim& sim) {
+  return sizeof(Snapshot) + (on_cpu(sim) ? sim.model->positions.size() * 2 * sizeof(glm::dvec3) : 0);
+}
+
+Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
+  Snapshot taken{sim.steps,
+                 sim.settings,
+                 sim.quantum,
+                 sim.needs_predict,
+                 sim.read_index,
+                 sim.rigid_side,
+                 sim.watch,
+                 bool(sim.watch.asked),
+                 sim.check.found,
+                 {},
+                 at};
+  if (on_cpu(sim)) taken.host = sim.host;
+  for (const Part& part : parts_of(sim)) {
+    part.buffer->copy_to(to, at, part.first, part.bytes);
+    at += part.bytes;
+  }
+  return taken;
+}
+
+void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
+  sim.steps = then.steps;
+  sim.needs_predict = true;
+  const bool same_kind = on_cpu(sim) == then.host.has_value();
+  if (same_kind && sim.watch.at_rest > 0) set_stiffening(sim, then.watch.stiffening);
+  const bool exact = same_kind && then.settings == sim.settings;
+  if (std::exchange(sim.quantum, then.quantum) != then.quantum) apply_settings(sim, sim.settings);
+  sim.read_index = then.read_index, sim.rigid_side = then.rigid_side;
+  if (on_cpu(sim) || then.host) {
+    const State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
+    if (on_cpu(sim)) sim.host = state;
+    upload(sim, state);
+  } else {
+    std::size_t at = then.at, copied = 0;
+    for (const Part& part : parts_of(sim)) {
+      if (!exact && ++copied > 2) break;
+      from.copy_to(*part.buffer, part.first, at, part.bytes);
+      at += part.bytes;
+    }
+  }
+  if (exact) {
+    static_cast<WatchNumbers&>(sim.watch) = then.watch;
+    sim.watch.asked = then.asked ? Fence::here() : Fence();
+    sim.needs_predict = then.needs_predict;
+  } else {
+    forget_answers(sim);
+    sim.watch.stiffer = 1, sim.watch.calm = 0;
+    retime_velocities(sim, then.settings);
+  }
+  start_check(sim, nullptr);
+  sim.check.found = then.found;
+}
+
+}  // namespace tetpbd

@@ -455,9 +455,12 @@ void let_go(Session& s) {
 void advance(Session& s, double elapsed) {
   Clock& clock = s.clock;
   clock.real += elapsed;
+  ++clock.frames;
   if (clock.real >= 0.5) {
     clock.factor = clock.simulated / clock.real;
-    if (s.playing) s.log("running {} {:.3f}x", s.loaded.sim().steps, clock.factor);
+    if (s.playing)
+      s.log("running {} {:.3f}x {:.0f} fps", s.loaded.sim().steps, clock.factor, clock.frames / clock.real);
+    clock.frames = 0;
     clock.real = clock.simulated = 0;
   }
   if (!s.playing) return;

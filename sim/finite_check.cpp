@@ -16,6 +16,23 @@ Error error_of(const NonFinite& found, const std::string& where) {
       "use a smaller dt, more substeps or a lower stiffness", 1);
 }
 
+void copy_parts(const FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only) {
+  check.copy.use();
+  check.copy.set("good_only", unsigned(good_only));
+  check.words.bind_storage(BIND_CHECK);
+  for (const auto& [from, first, to, at, bytes] : parts) {
+    const std::size_t words = bytes / 4;
+    check.copy.set("count", unsigned(words));
+    check.copy.set("from_at", unsigned(first / 4));
+    check.copy.set("to_at", unsigned(at / 4));
+    from->bind_storage(BIND_CHECKPOINT_FROM);
+    to->bind_storage(BIND_CHECKPOINT_TO);
+    glDispatchCompute(GLuint(std::min<std::size_t>(work_groups(words, 256), 1024)), 1, 1);
+  }
+  // The next step overwrites what was read; restoring reads what was written.
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
 namespace {
 
 // As floats, which is what the GPU and all files get.
@@ -35,18 +52,9 @@ void keep_checkpoint(Sim& sim) {
     check.host = sim.host;
     return;
   }
-  check.copy.use();
-  check.words.bind_storage(BIND_CHECK);
-  for (const auto& [from, to] :
-       {std::pair(&sim.positions, &check.positions), std::pair(&sim.velocities, &check.velocities)}) {
-    const std::size_t words = from->bytes() / 4;
-    check.copy.set("count", unsigned(words));
-    from->bind_storage(BIND_CHECKPOINT_FROM);
-    to->bind_storage(BIND_CHECKPOINT_TO);
-    glDispatchCompute(GLuint(std::min<std::size_t>(work_groups(words, 256), 1024)), 1, 1);
-  }
-  // The next step overwrites what was read; restoring reads what was written.
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  const Buffer &x = sim.positions, &v = sim.velocities;
+  copy_parts(check, {{&x, 0, &check.positions, 0, x.bytes()}, {&v, 0, &check.velocities, 0, v.bytes()}},
+             true);
 }
 
 void take_answer(FiniteCheck& check, bool wait) {

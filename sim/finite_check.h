@@ -34,4 +34,14 @@ struct FiniteCheck {
   std::optional<NonFinite> found;
 };
 
+/// Bytes, multiples of four.
+struct CopiedPart {
+  const Buffer* from;
+  std::size_t first;
+  const Buffer* to;
+  std::size_t at, bytes;
+};
+/// Of what kernels wrote, by a kernel; `good_only`: unless a state was not finite. Queued.
+void copy_parts(const FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only);
+
 }  // namespace tetpbd

@@ -61,10 +61,12 @@ Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
                  {},
                  at};
   if (on_cpu(sim)) taken.host = sim.host;
+  std::vector<CopiedPart> copied;
   for (const Part& part : parts_of(sim)) {
-    part.buffer->copy_to(to, at, part.first, part.bytes);
+    copied.push_back({part.buffer, part.first, &to, at, part.bytes});
     at += part.bytes;
   }
+  if (!copied.empty()) copy_parts(sim.check, copied, false);
   return taken;
 }
 

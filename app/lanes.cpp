@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <string_view>
 
+#include "app/auto_solver.h"
 #include "sim/error.h"
 #include "sim/material.h"
 
@@ -123,8 +125,18 @@ bool shared_by_lanes(const Parameter& row) {
   return row.section == std::string_view("world") || row.name == "dt" || row.effect == Effect::restart;
 }
 
-Settings lane_settings(Settings settings, const std::string& words, const std::string& where) {
+Settings lane_settings(Settings settings, const std::string& words, const std::string& where,
+                       const std::shared_ptr<const Model>& model) {
+  double budget_ms = 0;
   for (const std::string& word : split(words, ',')) {
+    if (const std::string budget = "budget_ms="; word.starts_with(budget)) {
+      char* end = nullptr;
+      budget_ms = std::strtod(word.c_str() + budget.size(), &end);
+      if (*end || !(budget_ms > 0) || !std::isfinite(budget_ms))
+        throw Error(fmt::format("'{}' is no time", word.substr(budget.size())), where,
+                    "give milliseconds per step, as in budget_ms=0.5");
+      continue;
+    }
     const std::size_t equals = word.find('=');
     const Parameter* row = find_parameter(word.substr(0, equals));
     if (row && shared_by_lanes(*row))
@@ -134,11 +146,12 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
       set_parameter(settings, *row, word.substr(equals + 1), where);
     else if (!apply_preset(settings, solver_presets(), word) &&
              !apply_preset(settings, material_presets(), word))
-      throw Error(
-          fmt::format("'{}' is no way to solve", word), where,
-          fmt::format("write PARAMETER=VALUE or one of {}", fmt::join(names_of(solver_presets()), ", ")));
+      throw Error(fmt::format("'{}' is no way to solve", word), where,
+                  fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
+                              fmt::join(names_of(solver_presets()), ", ")));
   }
   check_settings(settings, where);
+  if (budget_ms > 0 && model) settings = choose_solver(model, settings, budget_ms, 400).settings();
   return settings;
 }
 

@@ -61,8 +61,10 @@ struct Comparison {
 const std::vector<Comparison>& comparisons();
 /// The world, the clock and the start are those of all lanes.
 bool shared_by_lanes(const Parameter& row);
-/// Throws Error naming `where` for words that are neither, or that all lanes share.
-Settings lane_settings(Settings settings, const std::string& words, const std::string& where);
+/// Words "budget_ms=X" take what auto chooses within that time per step, for this model; without one nothing.
+/// Throws Error naming `where` for words that are none of these, or that all lanes share.
+Settings lane_settings(Settings settings, const std::string& words, const std::string& where,
+                       const std::shared_ptr<const Model>& model = nullptr);
 
 /// That lanes have taken, but for stopped ones.
 long steps_of(const std::vector<Lane>& lanes);

@@ -234,7 +234,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_scene(view, a);
   view.add_option("--lane", a.run.lanes,
                   "solve the scene side by side in up to 4 ways: of each, solvers by name or "
-                  "PARAMETER=VALUE, separated by commas")
+                  "PARAMETER=VALUE, or budget_ms=MILLISECONDS for what auto chooses, separated by commas")
       ->type_name("WORDS")
       ->expected(1, int(most_lanes));
   add(view, "--history-mb", a.run.history_mb, 0L, 1000000L,

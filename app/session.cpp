@@ -378,7 +378,8 @@ void add_lane(Session& s, const std::string& words) {
     if (lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
     const Sim& own = s.loaded.sim();
     let_go(s);
-    lanes.push_back({create_sim(own.model, lane_settings(own.settings, words, "--lane " + words))});
+    lanes.push_back(
+        {create_sim(own.model, lane_settings(own.settings, words, "--lane " + words, own.model))});
     s.loaded.chosen = lanes.size() - 1;
     start_lanes(s);
   });
@@ -407,7 +408,7 @@ void compare_lanes(Session& s, const std::vector<std::string>& words) {
     const Settings base = words.empty() ? first.settings : s.loaded.scene.settings;
     std::vector<Lane> lanes;
     for (const std::string& own : words)
-      lanes.push_back({create_sim(first.model, lane_settings(base, own, "--lane " + own))});
+      lanes.push_back({create_sim(first.model, lane_settings(base, own, "--lane " + own, first.model))});
     let_go(s);
     if (words.empty())
       s.loaded.lanes.resize(1);

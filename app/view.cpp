@@ -60,7 +60,7 @@ void draw_lanes(Session& s, const Target& target) {
     if (several) {
       frame.options.body_colour = lane_colour(i);
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
-      frame.caption = describe(lanes[i]);
+      frame.caption = describe(lanes[i], !s.loaded.comparable);
       if (const auto far = lanes[i].far(); far && !lanes[i].stopped())
         frame.caption += *far < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", *far);
     }

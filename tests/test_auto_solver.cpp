@@ -5,12 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "app/auto_solver.h"
+#include "app/lanes.h"
 #include "app/run_loop.h"
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/material.h"
 #include "tests/gl_test.h"
+#include "tests/sim_samples.h"
 
 using namespace tetpbd;
 
@@ -117,4 +119,13 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     CHECK_THROWS_WITH_AS(choose_solver(model, own, 1e-6, 2), doctest::Contains("nothing fits the budget"),
                          Error);
   }
+}
+
+TEST_CASE("auto: a lane with a budget takes what fits it") {
+  GlTest gl;
+  Settings paper;
+  paper.iterations = 400, paper.substeps = 1;
+  const auto model = samples::block_model({2, 1, 1}, 0.01);
+  const Settings chosen = lane_settings(paper, "budget_ms=5", "--lane", model);
+  CHECK(chosen.iterations * chosen.substeps < paper.iterations);
 }

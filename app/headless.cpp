@@ -216,7 +216,7 @@ int print_explanation(Scene scene, int gpu) {
   for (const auto& d : e.dispatches)
     fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10}{:>8}\n", d.name, d.work_groups, d.per_step, d.bytes,
                d.ms ? fmt::format("{:.1f}", 1e3 * *d.ms) : "",
-               d.ms ? fmt::format("{:.0f}", 1e-6 * double(d.bytes) / *d.ms) : "");
+               d.ms ? fmt::format("{:.3g}", 1e-6 * double(d.bytes) / *d.ms) : "");
   fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10.1f}\n", "all, in a step", "", e.dispatches_per_step,
              e.bytes_per_step, 1e3 * e.ms_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);

@@ -188,7 +188,7 @@ TEST_CASE("help, version, info and explain answer") {
   // A line of a kernel: work-groups, how often, bytes, microseconds, gigabytes per second.
   std::istringstream line(explained.out.substr(explained.out.find("solve_constraint stretch")));
   std::string word;
-  for (double number = 0; line >> word && number == 0;) number = std::atof(word.c_str());
+  for (double number = 0; number == 0 && line >> word;) number = std::atof(word.c_str());
   double often = 0, bytes = 0, us = 0, rate = 0;
   line >> often >> bytes >> us >> rate;
   CAPTURE(explained.out);

@@ -372,8 +372,7 @@ void set_finer(Sim& sim, int times) {
   if (std::exchange(sim.watch.finer, times) == times) return;
   Settings finer = sim.settings;
   finer.substeps *= times;
-  sim.solver = find_solver_mode(finer.mode)->create(solver_input(sim, finer));
-  sim.predict = std::move(sim.solver.begin);
+  sim.solver.retime(sim.solver, solver_input(sim, finer));
   write_step_block(sim);
 }
 

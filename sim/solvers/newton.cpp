@@ -192,8 +192,20 @@ Words mesh_words(const ConstraintSystem& system, const Graph& graph, const Aggre
   return words;
 }
 
-std::vector<glm::vec4> coarse_words(const Model& model, const Aggregates& aggregates, const BlockRows& rows) {
-  const std::vector<float> inverse = coarse_inverse(model, aggregates, rows);
+// What stays when the length of a substep changes.
+struct Levels {
+  Graph graph;
+  Aggregates aggregates;
+};
+
+std::vector<glm::vec4> coarse_words(const SolverInput& input, const Levels& levels) {
+  const auto& [graph, aggregates] = levels;
+  const double h = input.settings.dt / input.settings.substeps * 2 / 3;  // BDF2's
+  std::vector<double> inertia;
+  for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
+  const std::vector<glm::dmat3> blocks = blocks_at_rest(input, graph, h);
+  const std::vector<float> inverse =
+      coarse_inverse(input.model, aggregates, {graph.neighbours, inertia, blocks});
   std::vector<glm::vec4> words(inverse.size() / 4);
   for (std::size_t k = 0; k < inverse.size(); ++k) words[k / 4][glm::length_t(k % 4)] = inverse[k];
   for (const Aggregate& a : aggregates.all) words.emplace_back(glm::vec3(a.centre), float(a.reach));
@@ -204,15 +216,11 @@ std::vector<glm::vec4> coarse_words(const Model& model, const Aggregates& aggreg
 
 Solver create_newton_solver(const SolverInput& input) {
   const std::size_t vertices = input.model.positions.size();
-  const Settings& settings = input.settings;
-  const double h = settings.dt / settings.substeps * 2 / 3;  // BDF2's
-  const Graph graph = graph_of(input.system, vertices);
-  const Aggregates aggregates = make_aggregates(input.model, graph.neighbours, aggregates_for(vertices));
-  std::vector<double> inertia;
-  for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
-  const std::vector<glm::dmat3> blocks = blocks_at_rest(input, graph, h);
-  const std::vector<glm::vec4> second =
-      coarse_words(input.model, aggregates, {graph.neighbours, inertia, blocks});
+  Graph edges = graph_of(input.system, vertices);
+  Aggregates parts = make_aggregates(input.model, edges.neighbours, aggregates_for(vertices));
+  const auto levels = std::make_shared<const Levels>(std::move(edges), std::move(parts));
+  const auto& [graph, aggregates] = *levels;
+  const std::vector<glm::vec4> second = coarse_words(input, *levels);
   Words mesh = mesh_words(input.system, graph, aggregates);
 
   std::vector<glm::vec4> vectors(slots * vertices, glm::vec4(0));
@@ -267,6 +275,9 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.iteration.push_back(pass("product", turns, matrix + 4 * vector));
   solver.iteration.push_back(pass("finish", groups(vertices), 14 * vector));
   solver.schedule = schedule;
+  solver.retime = [levels](Solver& made, const SolverInput& now) {
+    made.buffers[3].write(0, made.buffers[3].bytes(), coarse_words(now, *levels).data());
+  };
   return solver;
 }
 

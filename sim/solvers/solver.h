@@ -42,6 +42,8 @@ struct Dispatch {
   unsigned phases;
 };
 
+struct SolverInput;
+
 /// Passes or a function, never both.
 struct Solver {
   std::vector<Buffer> buffers;
@@ -55,6 +57,8 @@ struct Solver {
   Pass begin;
   /// What a step hands on to the next beside what every mode has: of these `buffers`, first byte and bytes.
   std::vector<std::array<std::size_t, 3>> handed_on{};
+  /// Makes what depends on the length of a substep again; nothing where nothing does.
+  std::function<void(Solver&, const SolverInput&)> retime{};
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
   std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };

@@ -166,8 +166,19 @@ void start_watch(Sim& sim, const std::vector<glm::dvec3>& positions) {
 }
 
 SolverInput solver_input(const Sim& sim, const Settings& s) {
-  return {*sim.model,   sim.system, s, sim.tuning, is_software_renderer(),
-          compliant(s), touches_rigidly(*sim.model, s), leaps(s)};
+  return {*sim.model,
+          sim.system,
+          s,
+          sim.tuning,
+          is_software_renderer(),
+          compliant(s),
+          touches_rigidly(*sim.model, s),
+          leaps(s)};
+}
+
+void retime(Sim& sim, Settings settings) {
+  settings.substeps *= sim.watch.finer;
+  sim.solver.retime(sim.solver, solver_input(sim, settings));
 }
 
 // Everything but the state.
@@ -342,11 +353,16 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const auto made_for = [&](const Settings& s) {
     const Settings coarse = is_implicit(s) ? s : Settings{};  // what implicit steps' second level is made for
     return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), coarse.compliance,
-                      coarse.constraint_damping, coarse.dt / coarse.substeps);
+                      coarse.constraint_damping);
   };
+  const auto substep = [](const Settings& s) { return s.dt / s.substeps; };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
   const Settings before = sim.settings;
-  if (made_for(settings) != made_for(sim.settings)) remake(sim, settings);
+  if (made_for(settings) != made_for(sim.settings)) {
+    remake(sim, settings);
+  } else if (sim.solver.retime && substep(settings) != substep(sim.settings)) {
+    retime(sim, settings);
+  }
   const bool same = forces(settings) == forces(sim.settings);
   const double longest = same ? sim.longest_substep : longest_substep(sim, settings);
   const Settings now = fitted(settings, longest, sim.watch.stiffening);
@@ -370,9 +386,7 @@ void set_stiffening(Sim& sim, double stiffening) {
 
 void set_finer(Sim& sim, int times) {
   if (std::exchange(sim.watch.finer, times) == times) return;
-  Settings finer = sim.settings;
-  finer.substeps *= times;
-  sim.solver.retime(sim.solver, solver_input(sim, finer));
+  retime(sim, sim.settings);
   write_step_block(sim);
 }
 

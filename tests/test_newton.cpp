@@ -394,6 +394,26 @@ TEST_CASE("newton: a body that is pulled comes to where it rests in mode explici
   CHECK(distance(ends[0], model->positions) > 0.02);
 }
 
+TEST_CASE("newton: with other steps while running it is as if made for them") {
+  GlTest gl;
+  Settings settings = soft("neo-hookean");
+  settings.iterations = 6;
+  Sim sim = create_sim(deformed("stretch:1.2"), settings);
+  for (int s = 0; s < 8; ++s) step(sim);
+  for (const auto& [dt, substeps] : {std::pair(0.01, 1), std::pair(0.01, 3), std::pair(0.002, 1)}) {
+    CAPTURE(dt);
+    settings.dt = dt, settings.substeps = substeps;
+    const State state = read_state(sim);
+    apply_settings(sim, settings);
+    Sim fresh = create_sim(sim.model, settings);
+    write_state(fresh, state);
+    for (int s = 0; s < 4; ++s) step(sim), step(fresh);
+    const double apart = distance(read_state(sim).positions, read_state(fresh).positions);
+    CHECK(apart < 1e-7);
+    CHECK(distance(read_state(sim).positions, state.positions) > 1e-4);
+  }
+}
+
 TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraints fall as all else") {
   GlTest gl;
   TetMesh one;

@@ -71,7 +71,7 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   stretched->obstacles.clear();
   settings.gravity = 0;
   settings.ground = false;
-  const MeasuredRun run = run_model(stretched, settings, 1);
+  const MeasuredRun run = run_model(stretched, settings, 1, nullptr, false);
   if (!run.errors.finite || interrupted()) return std::nan("");
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }

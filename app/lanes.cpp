@@ -209,8 +209,7 @@ bool send_answers(const Motion& right, long step, Buffer& answers) {
 }
 
 void hold_vertices(std::vector<Lane>& lanes, const Motion* right, Renderer& renderer, Buffer& answers) {
-  long now = 0;
-  for (const Lane& lane : lanes) now = std::max(now, lane.sim.steps);
+  const long now = steps_of(lanes);
   if (right && !send_answers(*right, now, answers)) return;
   const Buffer& answer = right ? answers : lanes[yardstick(lanes)].sim.positions;
   for (Lane& lane : lanes)

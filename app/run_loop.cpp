@@ -96,9 +96,9 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
 }
 
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
-                      const Motion* right) {
+                      const Motion* right, bool timed) {
   Sim sim = create_sim(model, settings);
-  warm_up(sim);
+  if (timed) warm_up(sim);
   Metrics metrics = create_metrics(*model, sim.system);
   return run_loop(sim, &metrics, steps, {.right = right});
 }

@@ -65,9 +65,9 @@ void hold_against(MeasuredRun& run, const Motion* right, const Model& model, lon
 /// Steps `steps` times. Ends early when the state is not finite (its errors then say so) or when
 /// interrupted() says so: ask it before making anything of the result. No metrics: nothing is measured.
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});
-/// The same with a simulation of its own, warmed up, every step measured.
+/// The same with a simulation of its own, every step measured; warmed up if it is for its times.
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
-                      const Motion* right = nullptr);
+                      const Motion* right = nullptr, bool timed = true);
 /// Steps until a GPU that has rested runs at its full clock (an H200 idles at 345 MHz of 1980 after four
 /// seconds, and takes a quarter of a second to rise), then goes back to the start. Nothing where a CPU steps.
 void warm_up(Sim& sim);

@@ -15,6 +15,19 @@
 
 using namespace tetpbd;
 
+namespace {
+
+// A small hard beam that falls, paused at its start.
+void show_beam(Session& s) {
+  Scene scene = load_scene("beam", {.solver = "hard"});
+  scene.bodies[0].fixed.clear();
+  scene.bodies[0].block->cells = {3, 2, 2};
+  s.playing = false;
+  take_over(s, load("beam", {}, scene), false);
+}
+
+}  // namespace
+
 TEST_CASE("window: every setting's label fits its column, whatever fonts the machine has") {
   ImGui::CreateContext();
   for (const float scale : {1.0f, 1.5f, 2.0f}) {
@@ -107,12 +120,8 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
 
 TEST_CASE("window: lanes step together from a common start, and are held against the right motion") {
   GlTest gl;
-  Scene scene = load_scene("beam", {.solver = "hard"});
-  scene.bodies[0].fixed.clear();
-  scene.bodies[0].block->cells = {3, 2, 2};
   Session s;
-  s.playing = false;
-  take_over(s, load("beam", {}, scene), false);
+  show_beam(s);
   single_step(s);
   compare_lanes(s, {"paper,substeps=1,iterations=1", "hard", "cpu-fast"});
   CHECK(s.messages.size() == 1);  // no such word: nothing changed
@@ -157,12 +166,8 @@ TEST_CASE("window: lanes step together from a common start, and are held against
 
 TEST_CASE("window: the probe says what a vertex and its tet measure, colours how far each is from right") {
   GlTest gl;
-  Scene scene = load_scene("beam", {.solver = "hard"});
-  scene.bodies[0].fixed.clear();
-  scene.bodies[0].block->cells = {3, 2, 2};
   Session s;
-  s.playing = false;
-  take_over(s, load("beam", {}, scene), false);
+  show_beam(s);
   CHECK_FALSE(s.loaded.right);  // one alone is held against nothing
   choose_colour(s, Colour::energy);
   CHECK(s.messages.back().text == "this needs a material");
@@ -249,12 +254,8 @@ TEST_CASE("window: a history is all of it in even steps, and the newest; plots a
   CHECK(history.values.back() == 15);
 
   GlTest gl;
-  Scene scene = load_scene("beam", {.solver = "hard"});
-  scene.bodies[0].fixed.clear();
-  scene.bodies[0].block->cells = {3, 2, 2};
   Session s;
-  s.playing = false;
-  take_over(s, load("beam", {}, scene), false);
+  show_beam(s);
   compare_lanes(s, {"hard", "mode=cpu,iterations=3"});
   for (int i = 0; i < 40; ++i) single_step(s);
   const PlotRow& distance = plot_rows()[4];

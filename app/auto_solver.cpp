@@ -35,7 +35,7 @@ std::vector<Settings> candidates(const Settings& own) {
   set_mode(base, "node", "auto");
   std::vector<Settings> all;
   if (compliant(own)) {
-    all = {base};  // over-relaxation does not apply, and masses are split
+    all = {base};  // masses are split; over-relaxation leaves their compliance alone and gains little
   } else {
     base.omega = 1.5, base.mass_splitting = true;
     all.push_back(base);
@@ -157,8 +157,8 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     }
     // Errors that agree to a hundredth are the same: then the plainer one.
     const SolverTrial& best = choice.trials[choice.best];
-    if (trial.fits && (!best.fits || trial.error < 0.99 * std::max(best.error, no_error)))
-      choice.best = choice.trials.size() - 1;
+    const bool righter = best.error > no_error && trial.error < 0.99 * best.error;
+    if (trial.fits && (!best.fits || righter)) choice.best = choice.trials.size() - 1;
   }
   if (!choice.trials[choice.best].fits) {
     const auto& quickest = *std::ranges::min_element(choice.trials, {}, &SolverTrial::ms);

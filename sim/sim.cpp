@@ -176,9 +176,24 @@ SolverInput solver_input(const Sim& sim, const Settings& s) {
           leaps(s)};
 }
 
-void retime(Sim& sim, Settings settings) {
+void renew(Sim& sim) {
+  if (!sim.solver.renewed) return;
+  Renewal& r = sim.renewal;
+  r.again = r.words.valid();
+  if (r.again) return;
+  Settings settings = sim.settings;
   settings.substeps *= sim.watch.finer;
-  sim.solver.retime(sim.solver, solver_input(sim, settings));
+  r.words = std::async(
+      std::launch::async,
+      [model = sim.model, job = sim.solver.renewed(solver_input(sim, settings))] { return job(); });
+  r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as it takes, at real time
+}
+
+void take_renewal(Sim& sim) {
+  const std::vector<glm::vec4> words = sim.renewal.words.get();
+  const Buffer& to = sim.solver.buffers[sim.solver.renewable];
+  to.write(0, to.bytes(), words.data());
+  if (sim.renewal.again) renew(sim);
 }
 
 // Everything but the state.
@@ -242,6 +257,20 @@ auto kinds_of(const Settings& s) {
   const bool dashpots = s.material == "neo-hookean";
   return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio,
                     dashpots ? s.constraint_damping : 0);
+}
+
+// The constraints of other settings, if the solver needs only be told their numbers.
+bool take_constraints(Sim& sim, const Settings& settings) {
+  if (kinds_of(settings) == kinds_of(sim.settings)) return true;
+  if (!sim.solver.take_numbers) return false;
+  ConstraintSystem system = build_constraints(sim.model->rest, settings);
+  const auto like = [](const ConstraintList& a, const ConstraintList& b) {
+    return a.count() == b.count() && a.compliance.size() == b.compliance.size();
+  };
+  if (!std::ranges::equal(system.lists, sim.system.lists, like)) return false;
+  sim.solver.take_numbers(sim.solver, system);
+  sim.system = std::move(system);
+  return true;
 }
 
 // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
@@ -324,6 +353,7 @@ void reset(Sim& sim) {
   if (sim.guard_counts) sim.guard_counts.clear();
   sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
+  finish_renewal(sim);
   start_watch(sim, sim.model->positions);
   State state{sim.model->positions, sim.model->velocities};
   add_upwards(sim, state, half_substep_fall(sim.settings));
@@ -351,18 +381,14 @@ void write_state(Sim& sim, const State& state) {
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
   const auto made_for = [&](const Settings& s) {
-    const Settings coarse = is_implicit(s) ? s : Settings{};  // what implicit steps' second level is made for
-    return std::tuple(s.mode, kinds_of(s), compliant(s), touches_rigidly(*sim.model, s), coarse.compliance,
-                      coarse.constraint_damping);
+    return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s));
   };
   const auto substep = [](const Settings& s) { return s.dt / s.substeps; };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
+  const auto renewed_for = [&](const Settings& s) { return std::tuple(kinds_of(s), forces(s), substep(s)); };
   const Settings before = sim.settings;
-  if (made_for(settings) != made_for(sim.settings)) {
-    remake(sim, settings);
-  } else if (sim.solver.retime && substep(settings) != substep(sim.settings)) {
-    retime(sim, settings);
-  }
+  const bool anew = made_for(settings) != made_for(before) || !take_constraints(sim, settings);
+  if (anew) remake(sim, settings);
   const bool same = forces(settings) == forces(sim.settings);
   const double longest = same ? sim.longest_substep : longest_substep(sim, settings);
   const Settings now = fitted(settings, longest, sim.watch.stiffening);
@@ -370,6 +396,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   sim.longest_substep = longest;
   forget_answers(sim);
   sim.settings = now;
+  if (!anew && renewed_for(now) != renewed_for(before)) renew(sim);
   schedule(sim);
   write_step_block(sim);
   retime_velocities(sim, before);
@@ -386,8 +413,16 @@ void set_stiffening(Sim& sim, double stiffening) {
 
 void set_finer(Sim& sim, int times) {
   if (std::exchange(sim.watch.finer, times) == times) return;
-  retime(sim, sim.settings);
+  renew(sim), finish_renewal(sim);
   write_step_block(sim);
+}
+
+void count_down_renewal(Sim& sim) {
+  if (sim.renewal.words.valid() && --sim.renewal.steps == 0) take_renewal(sim);
+}
+
+void finish_renewal(Sim& sim) {
+  while (sim.renewal.words.valid()) take_renewal(sim);
 }
 
 void rebuild_shaders(Sim& sim) { remake(sim, sim.settings); }

@@ -4,6 +4,7 @@
 // write them.
 #pragma once
 
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,15 @@
 #include "sim/watch.h"
 
 namespace tetpbd {
+
+/// Of what the solver makes for certain forces and substeps, for those of now, in a thread; what it had
+/// serves meanwhile. Taken over so many steps later, waiting if need be: runs are the same whatever the
+/// machine does.
+struct Renewal {
+  std::future<std::vector<glm::vec4>> words;
+  long steps = 0;      ///< until then
+  bool again = false;  ///< settings have changed since
+};
 
 struct Sim {
   std::shared_ptr<const Model> model;
@@ -50,9 +60,10 @@ struct Sim {
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
   bool kernels_timed = false;  ///< each dispatch by the timer of its pass
-  GuardCounts guards{};  ///< since the last reset; ask guard_counts()
-  FiniteCheck check;     ///< ask check_finite()
-  Watch watch;           ///< ask watched()
+  GuardCounts guards{};        ///< since the last reset; ask guard_counts()
+  FiniteCheck check;           ///< ask check_finite()
+  Watch watch;                 ///< ask watched()
+  Renewal renewal;
 };
 
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
@@ -107,6 +118,9 @@ void set_stiffening(Sim& sim, double stiffening);
 void set_finer(Sim& sim, int times);
 /// What kernels noted of other settings or another state.
 void forget_answers(Sim& sim);
+/// Before a step; and at once, waiting.
+void count_down_renewal(Sim& sim);
+void finish_renewal(Sim& sim);
 /// As of the last step. Waits.
 const Watch& watched(Sim& sim);
 
@@ -129,8 +143,8 @@ struct Explanation {
   struct Kernel {
     std::string name;
     std::size_t work_groups;
-    long per_step;      ///< 0: only after a change from outside
-    std::size_t bytes;  ///< of one dispatch
+    long per_step;             ///< 0: only after a change from outside
+    std::size_t bytes;         ///< of one dispatch
     std::optional<double> ms;  ///< of one, the mean of those that were timed
   };
   std::vector<Item> buffers;

@@ -71,6 +71,7 @@ Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
 }
 
 void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
+  finish_renewal(sim);
   sim.steps = then.steps;
   sim.needs_predict = true;
   const bool same_kind = on_cpu(sim) == then.host.has_value();

@@ -64,6 +64,7 @@ void bind(Sim& sim) {
 }
 
 void step_on_gpu(Sim& sim) {
+  count_down_renewal(sim);
   const unsigned watched = watch(sim);
   bind(sim);
   if (sim.timed) sim.timer.begin();

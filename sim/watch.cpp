@@ -75,7 +75,7 @@ unsigned watch(Sim& sim) {
   if (!w.answer) return 0;
   const bool now = sim.steps % Watch::every == 0;
   if (is_implicit(sim.settings)) {
-    if (now && watch_convergence(sim)) mend(sim);
+    if (now && watch_convergence(sim) && !sim.renewal.words.valid()) mend(sim);
     w.most_substeps = std::max(w.most_substeps, sim.settings.substeps * w.finer);
     return 0;
   }

@@ -161,7 +161,13 @@ std::vector<std::uint32_t> records_of(const ConstraintList& list, std::size_t wo
   return records;
 }
 
-Words mesh_words(const ConstraintSystem& system, const Graph& graph, const Aggregates& aggregates) {
+// Where a kind's records begin, and how long each is.
+struct Records {
+  std::size_t kind, at, words;
+};
+
+Words mesh_words(const ConstraintSystem& system, const Graph& graph, const Aggregates& aggregates,
+                 std::vector<Records>& found) {
   Words words;
   std::vector<std::uint32_t> entries, neighbours, weights;
   for (const Use& use : graph.uses) entries.push_back(use.entry);
@@ -185,6 +191,7 @@ Words mesh_words(const ConstraintSystem& system, const Graph& graph, const Aggre
     const std::string name = constraint_kinds[k].name;
     const std::size_t each = std::size_t(list.arity + constraint_kinds[k].values +
                                          (list.compliance.empty() ? 0 : constraint_kinds[k].components));
+    found.push_back({k, words.all.size(), each});
     words.add("RECORDS_" + name, records_of(list, each));
     words.defines.push_back(fmt::format("WORDS_{} {}u", name, each));
     words.defines.push_back(fmt::format("COUNT_{} {}u", name, list.count()));
@@ -192,7 +199,7 @@ Words mesh_words(const ConstraintSystem& system, const Graph& graph, const Aggre
   return words;
 }
 
-// What stays when the length of a substep changes.
+// What stays when forces or the length of a substep change.
 struct Levels {
   Graph graph;
   Aggregates aggregates;
@@ -221,7 +228,8 @@ Solver create_newton_solver(const SolverInput& input) {
   const auto levels = std::make_shared<const Levels>(std::move(edges), std::move(parts));
   const auto& [graph, aggregates] = *levels;
   const std::vector<glm::vec4> second = coarse_words(input, *levels);
-  Words mesh = mesh_words(input.system, graph, aggregates);
+  std::vector<Records> records;
+  Words mesh = mesh_words(input.system, graph, aggregates, records);
 
   std::vector<glm::vec4> vectors(slots * vertices, glm::vec4(0));
   for (std::size_t v = 0; v < vertices; ++v)
@@ -275,8 +283,17 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.iteration.push_back(pass("product", turns, matrix + 4 * vector));
   solver.iteration.push_back(pass("finish", groups(vertices), 14 * vector));
   solver.schedule = schedule;
-  solver.retime = [levels](Solver& made, const SolverInput& now) {
-    made.buffers[3].write(0, made.buffers[3].bytes(), coarse_words(now, *levels).data());
+  solver.renewable = 3;
+  solver.renewed = [levels](const SolverInput& now) -> MakeWords {
+    return [levels, &model = now.model, system = now.system, settings = now.settings] {
+      return coarse_words({model, system, settings, {}}, *levels);
+    };
+  };
+  solver.take_numbers = [records](const Solver& made, const ConstraintSystem& system) {
+    for (const auto& [kind, at, words] : records) {
+      const std::vector<std::uint32_t> now = records_of(system.lists[kind], words);
+      made.buffers[2].write(4 * at, 4 * now.size(), now.data());
+    }
   };
   return solver;
 }

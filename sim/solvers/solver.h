@@ -43,6 +43,7 @@ struct Dispatch {
 };
 
 struct SolverInput;
+using MakeWords = std::function<std::vector<glm::vec4>()>;
 
 /// Passes or a function, never both.
 struct Solver {
@@ -57,8 +58,12 @@ struct Solver {
   Pass begin;
   /// What a step hands on to the next beside what every mode has: of these `buffers`, first byte and bytes.
   std::vector<std::array<std::size_t, 3>> handed_on{};
-  /// Makes what depends on the length of a substep again; nothing where nothing does.
-  std::function<void(Solver&, const SolverInput&)> retime{};
+  /// What is made for certain forces and a certain length of a substep (mode newton's second level): a job for
+  /// others, to run in any thread while the model lives, and the number of the buffer that is to hold it.
+  std::function<MakeWords(const SolverInput&)> renewed{};
+  std::size_t renewable = 0;
+  /// With it: takes over other numbers of the same constraints.
+  std::function<void(const Solver&, const ConstraintSystem&)> take_numbers{};
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
   std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
 };

@@ -173,7 +173,11 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
 std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   if (!std::exchange(scene.mode_open, false) || !has_forces(scene.settings)) return std::nullopt;
   Settings& s = scene.settings;
-  const double wanted = explicit_substeps(model, s), most = is_software_renderer() ? 20 : 40;
+  double spin = 0;
+  for (const BodyDescription& body : scene.bodies) spin = std::max(spin, glm::length(body.spin));
+  // Four times as many where newton would take four times its own (sim/watch.h).
+  const double wanted = explicit_substeps(model, s),
+               most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > 0.15 ? 4 : 1);
   if (wanted <= most) {
     set_mode(s, "explicit", scene.name);
     return fmt::format("explicit, about {:g} substeps", wanted);

@@ -57,8 +57,54 @@ void note_camera(Session& s) {
   note(s, {{"camera", {c.target.x, c.target.y, c.target.z, c.distance, c.azimuth, c.elevation}}});
 }
 
+namespace {
+
+ordered_json view_json(const Session& s) {
+  const ViewOptions& v = s.view;
+  return {{"look", look_names[std::size_t(v.look)]},
+          {"colour", colour_names[std::size_t(v.colour)]},
+          {"range", {v.range().low, v.range().high}},
+          {"cut", {v.cut, v.cut_axis, v.cut_normal.x, v.cut_normal.y, v.cut_normal.z}},
+          {"shrink", v.shrink},
+          {"explode", v.explode},
+          {"contacts", v.contacts},
+          {"arrows", v.arrows},
+          {"overlay", s.overlaid},
+          {"ghost", s.ghost}};
+}
+
+void set_view(Session& s, const ordered_json& given, const std::string& where) {
+  ordered_json view = view_json(s);
+  view.update(given);
+  const auto number_of = [&](const auto& names, const char* key) {
+    const auto found = std::ranges::find(names, view.at(key).template get<std::string>());
+    if (found == names.end())
+      throw Error(fmt::format("there is no {} {}", key, view[key].dump()), where, "see --help");
+    return int(found - names.begin());
+  };
+  ViewOptions& v = s.view;
+  v.look = Look(number_of(look_names, "look"));
+  const Colour colour = Colour(number_of(colour_names, "colour"));
+  if (colour != v.colour) choose_colour(s, colour);
+  s.fit_range = false;
+  v.range() = {view.at("range").at(0), view["range"].at(1)};
+  const ordered_json& cut = view.at("cut");
+  v.cut = cut.at(0), v.cut_axis = std::clamp(cut.at(1).get<int>(), 0, 3);
+  v.cut_normal = {cut.at(2), cut.at(3), cut.at(4)};
+  v.shrink = view.at("shrink"), v.explode = view.at("explode");
+  v.contacts = view.at("contacts"), v.arrows = view.at("arrows");
+  s.overlaid = view.at("overlay"), s.ghost = view.at("ghost");
+}
+
+}  // namespace
+
 void note_step(Session& s) {
-  if (s.record) s.record->step = steps_of(s.loaded.lanes), s.record->shown = false;
+  if (!s.record) return;
+  s.record->step = steps_of(s.loaded.lanes), s.record->shown = false;
+  if (ordered_json view = view_json(s); view != s.record->view) {
+    s.record->view = view;
+    note(s, {{"view", std::move(view)}});
+  }
 }
 
 namespace {
@@ -151,6 +197,8 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
     go_back(s);
   } else if (a.contains("speed")) {
     change_speed(s, int(std::lround(-std::log2(std::clamp(a["speed"].get<double>(), 1e-3, 1.0)))));
+  } else if (a.contains("view")) {
+    set_view(s, a["view"], where);
   } else if (a.contains("camera")) {
     const ordered_json& c = a["camera"];
     s.camera.target = {c.at(0), c.at(1), c.at(2)};

@@ -18,6 +18,7 @@ struct Record {
   GrowingFile file;
   long step = 0;       ///< of the lanes, as whoever reads the lines so far knows it
   bool shown = false;  ///< another moment is shown than the lines say
+  ordered_json view{};  ///< how bodies look, as the lines say
   explicit Record(const std::filesystem::path& name) : file(name) {}
 };
 
@@ -31,7 +32,7 @@ void note_scene(Session& session);
 /// That another moment is shown, once something goes on from it.
 void note_moment(Session& session);
 void note_camera(Session& session);
-/// The lanes have taken a step, or are somewhere else.
+/// The lanes have taken a step, or are somewhere else; and how they look, where that is new.
 void note_step(Session& session);
 /// Where it ends: the last step and the lanes' states. Throws Error.
 void end_record(Session& session);

@@ -28,6 +28,9 @@ struct Record4 {
 #define RIGID_SPEED 1024.0  // m/s, the fastest that sums hold
 #define RIGID_PARTS 256.0  // of a quantum: of 2^23 vertices they do not overflow
 #define MOST_TOUCHES 16  // contacts of a hard body that carry it
+#define LEAST_HEALTH 0.1  // of a step of mode newton; an inverted tet: 0 (method.md, "Implicit steps")
+#define HEALTH_TURNING 0.05  // at most, where a part of a body turns further in a substep than ...
+#define TURN_LIMIT 0.15  // ... rad
 // Everything of a step that does not change within it (a uniform block, std140).
 struct Step {
   vec3 gravity;             // m/s^2
@@ -50,7 +53,8 @@ struct Step {
   float restitution;        // of hard bodies
   float drag;               // 1/s, rate at which velocity decays (mode newton)
   float kick;               // of a substep after longer or shorter ones: accelerations times this (mode explicit)
-  float _0, _1;
+  float turn_limit;         // rad; what turns further in a substep is noted (mode newton)
+  float _0;
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind

@@ -87,6 +87,7 @@ void write_step_block(Sim& sim, int before = 0) {
   block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
   block.vertex_count = unsigned(sim.model->positions.size());
   block.damping = float(s.constraint_damping / h);
+  block.turn_limit = float(TURN_LIMIT / sim.watch.finer);
   for (const glm::dvec4& plane : planes_of(*sim.model, s))
     block.planes[block.plane_count++] = glm::vec4(plane);
   for (std::size_t k = 0; k < kind_count; ++k) {
@@ -150,16 +151,42 @@ double stiffest(const Sim& sim, const Settings& settings, const std::vector<glm:
                          : 0;
 }
 
+// rad/s, of the body that spins the fastest.
+double fastest_spin(const Model& model, const State& state) {
+  double fastest = 0;
+  for (const Body& body : model.bodies) {
+    double mass = 0;
+    glm::dvec3 centre(0), angular(0);
+    glm::dmat3 inertia(0);
+    const auto each = [&](auto&& f) {
+      for (std::size_t i = body.first_vertex; i < body.first_vertex + body.vertices; ++i)
+        f(model.masses[i], state.positions[i], state.velocities[i]);
+    };
+    each([&](double m, const glm::dvec3& x, const glm::dvec3&) { mass += m, centre += m * x; });
+    each([&](double m, const glm::dvec3& x, const glm::dvec3& v) {
+      const glm::dvec3 r = x - centre / mass;
+      angular += m * glm::cross(r, v);
+      inertia += m * (glm::dmat3(glm::dot(r, r)) - glm::outerProduct(r, r));
+    });
+    const double spin = glm::length(glm::inverse(inertia) * angular);
+    if (std::isfinite(spin)) fastest = std::max(fastest, spin);
+  }
+  return fastest;
+}
+
 // Of a state that is given, before its first step.
-void start_watch(Sim& sim, const std::vector<glm::dvec3>& positions) {
+void start_watch(Sim& sim, const State& state) {
   forget_answers(sim);
   Watch& w = sim.watch;
   w.most_substeps = 0, w.stiffer = 1, w.calm = 0;
   w.residual = w.largest_residual = 0, w.health = w.least_health = 1;
   w.mending = 0;
-  set_finer(sim, 1);
+  if (is_implicit(sim.settings)) {
+    const double turn = fastest_spin(*sim.model, state) * sim.settings.dt / sim.settings.substeps;
+    set_finer(sim, turn > TURN_LIMIT ? finer_times : 1);
+  }
   if (!(w.at_rest > 0)) return;
-  const double now = stiffest(sim, sim.settings, positions) / w.at_rest;
+  const double now = stiffest(sim, sim.settings, state.positions) / w.at_rest;
   w.stiffer = std::isfinite(now) ? now : 1;
   w.stiffening = stiffening_for(w.stiffer, sim.settings.stability);
   sim.settings = fitted(sim.settings, sim.longest_substep, w.stiffening);
@@ -284,7 +311,7 @@ void remake(Sim& sim, const Settings& settings) {
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps;
   fresh.timed = sim.timed;
-  start_watch(fresh, state.positions);
+  start_watch(fresh, state);
   write_state(fresh, state);
   sim = std::move(fresh);
 }
@@ -354,8 +381,8 @@ void reset(Sim& sim) {
   sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
   finish_renewal(sim);
-  start_watch(sim, sim.model->positions);
   State state{sim.model->positions, sim.model->velocities};
+  start_watch(sim, state);
   add_upwards(sim, state, half_substep_fall(sim.settings));
   write_state(sim, state);
 }

@@ -1,8 +1,8 @@
 // Modes explicit and newton, watched while they run. A body that deforms becomes stiffer than it is at rest,
 // and a substep of mode explicit that was stable is too long then: kernels note the stiffest constraint of a
 // step; the answer comes back some steps later, always as many, so that a run is the same every time. Of mode
-// newton they note how far it converges and whether a tet is inverted: then it takes shorter substeps for a
-// while.
+// newton they note how far it converges, and whether a tet is inverted or the body spins fast: then it takes
+// shorter substeps for a while.
 #pragma once
 
 #include "sim/gl/gpu.h"
@@ -21,11 +21,14 @@ struct WatchNumbers {
 
   // Mode newton: the residual before the last iteration over that of Newton's start, and the length of the
   // first step of conjugate gradients, which is near 1 where the second level knows the body, small where it
-  // is left out, and taken for 0 where a tet is inverted; the last answer, and the worst since the start.
+  // is left out, and taken for 0 where a tet is inverted and for 0.05 where a part of a body turns by more
+  // than 0.15 rad in a substep of the settings; the last answer, and the worst since the start.
   double residual = 0, largest_residual = 0, health = 1, least_health = 1;
   int finer = 1;    ///< substeps for each one of the settings
   int mending = 0;  ///< answers since they are more; too many: it does not help
 };
+
+constexpr int finer_times = 4;  ///< as many substeps
 
 /// Part of a Sim (sim.h), whose steps keep it up to date.
 struct Watch : WatchNumbers {

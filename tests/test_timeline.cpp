@@ -184,6 +184,8 @@ TEST_CASE("record: what is done is done again without a window, to the same stat
     show_step(s, 12);
     show_step(s, 8);
     change_speed(s, 2);
+    s.view.look = Look::tets, s.view.cut = 0.5, s.overlaid = true;
+    choose_colour(s, Colour::velocity);
     step_to(s, 14);
     show_step(s, 9);
     toggle_pin(s, vertex(s, 4));
@@ -193,6 +195,14 @@ TEST_CASE("record: what is done is done again without a window, to the same stat
   }
   RunOptions options = small(folder.path / "again");
   options.replay = file;
+  const auto looks = [](const std::filesystem::path& record) {
+    std::vector<std::string> all;
+    for (const auto& [where, action] : read_record(record))
+      if (action.contains("view")) all.push_back(action.dump());
+    return all;
+  };
+  REQUIRE(looks(file).size() == 2);
+  CHECK(looks(file)[1].find(R"("look":"tets","colour":"velocity")") != std::string::npos);
   CHECK(run_replay(options) == 0);
   const auto result = nlohmann::json::parse(run_program::read(options.out / "replay.json"));
   CHECK(result["as_recorded"] == true);
@@ -219,6 +229,9 @@ TEST_CASE("record: what cannot be done again is said, with its line") {
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"go\": \"a\"}", "session.jsonl:2"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 1, \"go\": 5}", "step 5 is not known"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"set\": {\"omega\": 9}}", "omega"},
+      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"view\": {\"look\": \"x\"}}",
+       "no look"},
+      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"view\": {\"cut\": 1}}", "no line of"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"lane\": 2, \"set\": {}}",
        "no lane 3"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"end\": [\"0\"]}",

@@ -125,9 +125,8 @@ struct Lengths {
   float rz;
   bool coarse;  // whether the second level takes part
 };
-// The first iteration of a healthy step has alpha near 1: below `least_alpha` the second level knows nothing of this body, and is left out
+// The first iteration of a healthy step has alpha near 1: below LEAST_HEALTH the second level knows nothing of this body, and is left out
 // of the rest of the step.
-const float least_alpha = 0.1;
 Lengths lengths(uint iteration) {
   vec2 dots = vec2(sums[DOTS_AT], sums[DOTS_AT + 1u]);
   uint last = SCALARS_AT + 3u * ((iteration - 1u) & 1u);
@@ -139,7 +138,7 @@ Lengths lengths(uint iteration) {
     curvature -= l.beta * dots.x / alpha_before;
   }
   if (dots.x > 0.0 && curvature > 0.0) l.alpha = dots.x / curvature;
-  if (l.coarse && iteration == 1u && !(l.alpha >= least_alpha)) {
+  if (l.coarse && iteration == 1u && !(l.alpha >= LEAST_HEALTH)) {
     l.coarse = false;
     l.alpha = 0.0;
   }

@@ -31,11 +31,11 @@ void turn(uint aggregate) {
     barrier();
   }
   if (lane != 0u) return;
-  vec4 q = rotation_of(aggregate);
-  float least = 0.02 * columns[0][0].w * centre.w * centre.w;  // where points lie on a line, as it was
+  vec4 before = rotation_of(aggregate), q = before;
+  float small = 0.02 * columns[0][0].w * centre.w * centre.w;  // where points lie on a line, as it was
   for (int c = 0; c < 3; ++c) {
     vec3 axis = vec3(0.0);
-    axis[c] = least;
+    axis[c] = small;
     A[c] = columns[c][0].xyz + turned(q, axis);
   }
   for (int round = 0; round < 12; ++round) {
@@ -48,7 +48,7 @@ void turn(uint aggregate) {
       across += cross(axis, A[c]);
       along += dot(axis, A[c]);
     }
-    vec3 w = across / (abs(along) + 1e-9 * least);
+    vec3 w = across / (abs(along) + 1e-9 * small);
     float angle = length(w);
     if (!(angle > 1e-5)) break;
     vec3 n = w * (sin(0.5 * angle) / angle);
@@ -56,6 +56,8 @@ void turn(uint aggregate) {
     q = normalize(vec4(r * q.xyz + q.w * n + cross(n, q.xyz), r * q.w - dot(n, q.xyz)));
   }
   for (uint k = 0u; k < 4u; ++k) sums[ROTATIONS_AT + 4u * aggregate + k] = q[k];
+  bool known = (floatBitsToUint(at(WAY, mesh[MEMBERS_AT + 2u * first]).w) & KNOWN) != 0u;
+  if (known && abs(dot(before, q)) < cos(0.5 * params.turn_limit)) atomicMin(least, floatBitsToUint(HEALTH_TURNING));
 }
 
 void main() {

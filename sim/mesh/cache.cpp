@@ -18,7 +18,7 @@ namespace {
 // Change it whenever the file's layout or what is done with TetGen's result changes.
 constexpr std::string_view version = "tetpbd cache 4";
 
-fs::path mesh_file(std::uint64_t key) { return cache_file(fmt::format("{:016x}.tets", key)); }
+std::string mesh_file(std::uint64_t key) { return fmt::format("{:016x}.tets", key); }
 
 }  // namespace
 
@@ -62,25 +62,31 @@ std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try
   return {};
 }
 
-std::optional<TetMesh> read_mesh(std::uint64_t key) {
-  const fs::path file = mesh_file(key);
+std::string read_cached(const std::string& name) {
+  const fs::path file = cache_file(name);
   std::error_code failed;
   const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
   if (failed) return {};
   std::string bytes(size, '\0');
   std::ifstream(file, std::ios::binary).read(bytes.data(), std::streamsize(bytes.size()));
-  return parse_mesh(bytes, key);
+  return bytes;
 }
 
-void keep_mesh(std::uint64_t key, const TetMesh& mesh) try {
-  const fs::path file = mesh_file(key);
+void keep_cached(const std::string& name, std::string bytes, std::uint64_t key) try {
+  const fs::path file = cache_file(name);
   if (file.empty()) return;
   fs::create_directories(file.parent_path());
-  std::string bytes;
-  put_array(bytes, mesh.positions), put_array(bytes, mesh.tets);
   seal(bytes, key);
   write_file(file, bytes);
 } catch (const std::exception&) {  // read-only or full
+}
+
+std::optional<TetMesh> read_mesh(std::uint64_t key) { return parse_mesh(read_cached(mesh_file(key)), key); }
+
+void keep_mesh(std::uint64_t key, const TetMesh& mesh) {
+  std::string bytes;
+  put_array(bytes, mesh.positions), put_array(bytes, mesh.tets);
+  keep_cached(mesh_file(key), std::move(bytes), key);
 }
 
 }  // namespace tetpbd

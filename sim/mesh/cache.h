@@ -1,4 +1,5 @@
-// The user's cache folder, and in it what TetGen made. What cannot be read or written costs time, no error.
+// The user's cache folder, and in it what takes long to make: TetGen's meshes, mode newton's aggregates. What
+// cannot be read or written costs time, no error.
 #pragma once
 
 #include <algorithm>
@@ -43,6 +44,10 @@ bool take_array(std::string_view& bytes, std::vector<T>& values) {
 /// match.
 void seal(std::string& bytes, std::uint64_t key);
 bool unseal(std::string_view& bytes, std::uint64_t key);
+/// A file of the folder; empty when it is not there.
+std::string read_cached(const std::string& name);
+/// With a seal.
+void keep_cached(const std::string& name, std::string bytes, std::uint64_t key);
 
 /// Of the surface's bits, the switches and the program that fills it.
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches,

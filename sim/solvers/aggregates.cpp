@@ -1,10 +1,14 @@
 #include "sim/solvers/aggregates.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <limits>
 #include <queue>
 
+#include "sim/hash.h"
+#include "sim/mesh/cache.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -141,20 +145,53 @@ Modes modes(const Model& model, const Aggregates& aggregates, std::size_t v, con
   return m * (double(share.weight) / 65535);
 }
 
+// Change it whenever what is made of the same mesh changes.
+constexpr std::uint64_t cache_version = 1;
+
+std::uint64_t cache_key(const Model& model, const Grouped& neighbours, std::size_t wanted) {
+  std::uint64_t key = hash_values(std::array{cache_version, std::uint64_t(wanted)});
+  key = hash_values(model.rest.positions, key);
+  key = hash_values(model.masses, hash_values(model.inverse_masses, key));
+  return hash_values(neighbours.values, hash_values(neighbours.first, key));
+}
+
+bool take_aggregates(std::string_view bytes, std::uint64_t key, std::size_t vertices, Aggregates& result) {
+  const auto sound = [&](const std::array<Share, 4>& shares) {
+    return std::ranges::all_of(
+        shares, [&](const Share& s) { return s.weight == 0 || s.aggregate < result.all.size(); });
+  };
+  return unseal(bytes, key) && take_array(bytes, result.all) && take_array(bytes, result.of_vertex) &&
+         bytes.empty() && result.of_vertex.size() == vertices && std::ranges::all_of(result.of_vertex, sound);
+}
+
+void list_members(Aggregates& result) {
+  const auto& shares = result.of_vertex;
+  result.members = group_by_key(shares.size(), result.all.size(), [&](std::size_t v, auto&& emit) {
+    for (std::size_t k = 0; k < 4; ++k)
+      if (shares[v][k].weight > 0) emit(shares[v][k].aggregate, std::uint32_t(4 * v + k));
+  });
+}
+
 }  // namespace
 
 Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::size_t wanted) {
+  // Below, making them is as quick as reading them.
+  const bool large = model.positions.size() >= 10000;
+  const std::uint64_t key = large ? cache_key(model, neighbours, wanted) : 0;
+  const std::string file = fmt::format("{:016x}.aggregates", key);
+  Aggregates result;
+  if (large && take_aggregates(read_cached(file), key, model.positions.size(), result)) {
+    list_members(result);
+    return result;
+  }
+  result = {};
   std::vector<std::uint32_t> seeds;
   const Nearest nearest = cluster(model, neighbours, wanted, seeds);
   const auto weights = smoothed(model, neighbours, nearest);
-  Aggregates result;
   result.of_vertex.resize(weights.size());
   parallel_for(weights.size(), [&](std::size_t v) { result.of_vertex[v] = shares_of(weights[v]); });
-  result.members = group_by_key(weights.size(), seeds.size(), [&](std::size_t v, auto&& emit) {
-    for (std::size_t k = 0; k < 4; ++k)
-      if (const Share& share = result.of_vertex[v][k]; share.weight > 0)
-        emit(share.aggregate, std::uint32_t(4 * v + k));
-  });
+  result.all.resize(seeds.size());
+  list_members(result);
   for (std::size_t a = 0; a < seeds.size(); ++a) {
     glm::dvec4 centre(0);
     double squares = 0;
@@ -167,7 +204,12 @@ Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::s
     each([&](const glm::dvec3& x, double m) { centre += m * glm::dvec4(x, 1); });
     const glm::dvec3 middle = centre.w > 0 ? glm::dvec3(centre) / centre.w : model.rest.positions[seeds[a]];
     each([&](const glm::dvec3& x, double m) { squares += m * glm::dot(x - middle, x - middle); });
-    result.all.push_back({middle, centre.w > 0 && squares > 0 ? std::sqrt(squares / centre.w) : model.size});
+    result.all[a] = {middle, centre.w > 0 && squares > 0 ? std::sqrt(squares / centre.w) : model.size};
+  }
+  if (large) {
+    std::string bytes;
+    put_array(bytes, result.all), put_array(bytes, result.of_vertex);
+    keep_cached(file, std::move(bytes), key);
   }
   return result;
 }

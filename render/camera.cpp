@@ -36,6 +36,34 @@ void follow(Camera& camera, const glm::vec3& goal, float seconds) {
   camera.target += (goal - camera.target) * (1.0f - std::exp(-seconds / 0.3f));
 }
 
+void keep_in_view(Camera& camera, const glm::vec3& point, float aspect) {
+  const glm::mat3 rotation(view_matrix(camera));
+  const float tan_y = half_height(camera, aspect);
+  const glm::vec3 off = rotation * (point - camera.target);  // z towards the eye
+  const float nearer = 0.5f * camera.distance, depth = camera.distance - std::clamp(off.z, -nearer, nearer);
+  const glm::vec3 most{0.55f * depth * tan_y * aspect, 0.55f * depth * tan_y, nearer};
+  camera.target += glm::transpose(rotation) * (off - glm::clamp(off, -most, most));
+}
+
+Camera camera_at(const std::vector<CameraKey>& path, double time) {
+  const auto next = std::ranges::upper_bound(path, time, {}, &CameraKey::time);
+  if (next == path.begin()) return path.front().camera;
+  if (next == path.end()) return path.back().camera;
+  const CameraKey &b = next[-1], &c = *next, &a = next - 1 == path.begin() ? b : next[-2],
+                  &d = next + 1 == path.end() ? c : next[1];
+  const float u = float((time - b.time) / (c.time - b.time)), v = 1 - u;
+  const float before = float((c.time - b.time) / (c.time - a.time)),
+              after = float((c.time - b.time) / (d.time - b.time));
+  // The cubic whose slope at a key is that between its neighbours.
+  const auto mixed = [&](auto part) {
+    return v * v * (1 + 2 * u) * (b.camera.*part) + u * u * (1 + 2 * v) * (c.camera.*part) +
+           u * v * v * before * (c.camera.*part - a.camera.*part) -
+           u * u * v * after * (d.camera.*part - b.camera.*part);
+  };
+  return {mixed(&Camera::target), std::max(mixed(&Camera::distance), 1e-4f), mixed(&Camera::azimuth),
+          std::clamp(mixed(&Camera::elevation), -89.0f, 89.0f), mixed(&Camera::fov)};
+}
+
 void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect, float margin) {
   camera.target = 0.5f * (low + high);
   const glm::mat3 rotation(view_matrix(camera));

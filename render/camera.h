@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <vector>
 
 namespace tetpbd {
 
@@ -11,6 +12,12 @@ struct Camera {
   float azimuth = 30.0f;    ///< about +y; 0 looks from +z, 90 from +x
   float elevation = 18.0f;  ///< above the horizon, -89..89
   float fov = 35.0f;        ///< of the shorter side of the picture
+};
+
+/// Of a path.
+struct CameraKey {
+  double time = 0;  ///< s
+  Camera camera;
 };
 
 struct Ray {
@@ -26,6 +33,11 @@ void pan(Camera& camera, float dx, float dy, int shorter_side);
 void zoom(Camera& camera, float factor);
 /// Moves the target towards `goal`, two thirds of the way in 0.3 s, in steps of any length.
 void follow(Camera& camera, const glm::vec3& goal, float seconds);
+/// Moves the target, by no more than it has to, until a point is in the middle half of the view.
+void keep_in_view(Camera& camera, const glm::vec3& point, float aspect);
+/// Smoothly through all keys, of which there is one at least, in order of time; before the first and after
+/// the last it stands still.
+Camera camera_at(const std::vector<CameraKey>& path, double time);
 /// Looks at the middle of a box and goes back until all of it is in view, with `margin` around it (1: none).
 void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect,
                float margin = 1.15f);

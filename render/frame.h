@@ -71,6 +71,8 @@ struct ViewOptions {
   double arrow_seconds = 0.1;  ///< ... in this time
   bool worst = false;          ///< values of all vertices come back: poll_values()
 
+  bool hold_range = false;  ///< else ranges follow the values of now (fitted_range)
+
   ColourRange& range() { return ranges[std::size_t(colour)]; }
   const ColourRange& range() const { return ranges[std::size_t(colour)]; }
   bool is_cut() const { return cut < 1; }

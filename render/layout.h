@@ -3,8 +3,12 @@
 
 #include <glm/glm.hpp>
 
+#include "sim/layout.h"
+
 namespace tetpbd {
 using glm::mat4;
+using glm::uint;
+using glm::vec3;
 using glm::vec4;
 #include "shaders/render/layout.glsl"
 }  // namespace tetpbd

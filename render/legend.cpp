@@ -77,6 +77,21 @@ void set_font(ImFontAtlas& atlas, float size) {
                              int(_binary_font_ttf_end - _binary_font_ttf_start), size, &config);
 }
 
+ColourRange fitted_range(const ColourScale& scale, std::vector<float> values) {
+  std::erase_if(values, [](float value) { return !std::isfinite(value); });
+  if (values.empty()) return scale.range;
+  for (float& value : values) value = std::abs(value);
+  const auto largest = values.begin() + std::ptrdiff_t(values.size() * 99 / 100);
+  std::ranges::nth_element(values, largest);
+  const double least = std::max(double(*largest), 1e-3 * scale.range.high) * scale.factor * (1 - 1e-6);
+  const double power = std::pow(10, std::floor(std::log10(least)));
+  double high = 10 * power;
+  for (const double step : {5.0, 2.0, 1.0})
+    if (least <= step * power) high = step * power;
+  high /= scale.factor;
+  return {scale.is_signed ? -high : 0, high};
+}
+
 void CloseLegend::operator()(ImGuiContext* context) const {
   {
     const Current current(context);

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "render/frame.h"
 
@@ -13,6 +14,10 @@ namespace tetpbd {
 
 /// DejaVu Sans, which travels inside the program, in place of what fonts there are; `size` in pixels.
 void set_font(ImFontAtlas& atlas, float size);
+
+/// What shows all but the largest hundredth of the values: 1, 2 or 5 times a power of ten of the unit, and no
+/// less than a thousandth of the scale's first, which would be noise.
+ColourRange fitted_range(const ColourScale& scale, std::vector<float> values);
 
 struct CloseLegend {
   void operator()(ImGuiContext* context) const;

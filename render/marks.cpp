@@ -1,7 +1,5 @@
 #include "render/marks.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstddef>
 
@@ -25,11 +23,6 @@ void draw_contacts(Renderer& renderer, const Frame& frame) {
   program.set("hole", 0.0f);
   program.set("size", scaled(frame, 7));
   program.set("touching", 1e-5f * glm::length(renderer.rest_high - renderer.rest_low));
-  std::vector<glm::vec4> planes = frame.planes;
-  if (frame.ground) planes.insert(planes.begin(), glm::vec4(0, 1, 0, *frame.ground));
-  for (std::size_t i = 0; i < MAX_PLANES; ++i)  // no body is below -1e30 m
-    program.set(fmt::format("planes[{}]", i).c_str(),
-                i < planes.size() ? planes[i] : glm::vec4(0, 0, 0, -1e30f));
   glDisable(GL_DEPTH_TEST);
   glDrawArrays(GL_POINTS, 0, GLsizei(renderer.mesh.positions.size()));
   glEnable(GL_DEPTH_TEST);
@@ -64,7 +57,6 @@ void draw_arrows(Renderer& renderer, const Frame& frame) {
 }
 
 void draw_dots(Renderer& renderer, const Frame& frame) {
-  if (frame.pinned.empty() && frame.grabbed.empty() && frame.worst.empty()) return;
   const Program& program = use(renderer, "dots");
   const auto batch = [&](const std::vector<std::uint32_t>& vertices, const glm::vec3& colour, float size,
                          float hole = 0) {
@@ -84,7 +76,10 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
 }  // namespace
 
 void draw_marks(Renderer& renderer, const Frame& frame) {
-  glBindVertexArray(renderer.vertex_array.id());
+  if (!frame.options.contacts && !frame.options.arrows && frame.pinned.empty() && frame.grabbed.empty() &&
+      frame.worst.empty())
+    return;
+  bind_vertices(renderer, frame);
   glEnable(GL_PROGRAM_POINT_SIZE);
   if (frame.options.contacts) draw_contacts(renderer, frame);
   if (frame.options.arrows) draw_arrows(renderer, frame);

@@ -1,9 +1,11 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <glm/gtc/color_space.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <tuple>
 #include <utility>
 
 #include "render/layout.h"
@@ -22,8 +24,8 @@ struct Recipe {
 };
 
 const std::map<std::string, Recipe> recipes = {
-    {"surface", {{"render/body.vert", "render/surface.geom", "render/body.frag"}, {}}},
-    {"surface shadow", {{"render/body.vert", "render/surface.geom", "render/depth.frag"}, {"SHADOW"}}},
+    {"surface", {{"render/surface.vert", "render/body.frag"}, {}}},
+    {"surface shadow", {{"render/surface.vert", "render/depth.frag"}, {"SHADOW"}}},
     {"tets", {{"render/body.vert", "render/tets.geom", "render/body.frag"}, {}}},
     {"tets shadow", {{"render/body.vert", "render/tets.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"caps", {{"render/body.vert", "render/caps.geom", "render/body.frag"}, {}}},
@@ -34,7 +36,8 @@ const std::map<std::string, Recipe> recipes = {
     {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
     {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},
     {"dots", {{"render/dots.vert", "render/dots.frag"}, {}}},
-    {"normals", {{"render/gather.comp"}, {"NORMAL"}}},
+    {"corners", {{"render/corners.comp"}, {}}},
+    {"plane light", {{"render/plane_light.comp"}, {}}},
     {"tet values", {{"render/gather.comp"}, {"TETS"}}},
     {"edge strains", {{"render/gather.comp"}, {}}},
     {"speeds", {{"render/vertex_values.comp"}, {"SPEED"}}},
@@ -50,7 +53,7 @@ Program compile(const std::string& name) {
 template <std::size_t N>
 VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint32_t, N>>& elements,
                     const std::array<std::array<std::size_t, N - 1>, N>& others, const std::string& label,
-                    std::size_t value_bytes) {
+                    std::size_t bytes) {
   const auto corners = [&](std::size_t e, const auto& emit) {
     for (std::size_t k = 0; k < N; ++k) emit(elements[e][k], std::uint32_t(e * N + k));
   };
@@ -58,18 +61,16 @@ VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint3
   std::vector<std::uint32_t> items;
   for (const std::uint32_t corner : grouped.values)
     for (const std::size_t other : others[corner % N]) items.push_back(elements[corner / N][other]);
-  return {Buffer(label + " offsets", grouped.first), Buffer(label + " items", items),
-          Buffer(label, mesh.positions.size() * value_bytes)};
+  return {Buffer(label + " offsets", grouped.first), Buffer(label + " items", items), Buffer(label, bytes)};
 }
 
-// Dispatches the program in use over all vertices; `values` by vertex.
+// Dispatches the program in use over all vertices; `values` by vertex. What it reads is behind a barrier.
 void fill(const Renderer& renderer, const Program& program, GLuint positions, const Buffer& values) {
   const std::size_t count = renderer.mesh.positions.size();
   program.set("count", unsigned(count));
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
   if (renderer.rest) renderer.rest.bind_storage(BIND_RENDER_REST);  // not all need it
   values.bind_storage(BIND_RENDER_VALUES);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
 }
 
@@ -88,10 +89,12 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   const Colour colour = frame.options.colour;
   if (colour == Colour::plain) return 0;
   if (colour == Colour::motion || colour == Colour::patch) return frame.values;
+  rest_of(renderer);
   VertexGather& values = renderer.values[colour];
+  const std::size_t bytes = renderer.mesh.positions.size() * sizeof(float);
   const std::string label = std::string("vertex values, ") + colour_names[std::size_t(colour)];
   if (colour == Colour::velocity) {
-    if (!values) values.values = Buffer(label, renderer.mesh.positions.size() * sizeof(float));
+    if (!values) values.values = Buffer(label, bytes);
     const Program& program = use(renderer, "speeds");
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_ANSWERS, frame.velocities);
     fill(renderer, program, frame.positions, values.values);
@@ -99,14 +102,14 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   }
   if (colour == Colour::stretch)
     return gathered(renderer, frame, values, use(renderer, "edge strains"), [&](const TetMesh& mesh) {
-      return gather<2>(mesh, tet_edges(mesh), {{{1}, {0}}}, label, sizeof(float));
+      return gather<2>(mesh, tet_edges(mesh), {{{1}, {0}}}, label, bytes);
     });
   const Program& program = use(renderer, "tet values");
   program.set("kind", int(colour));
   program.set("material", frame.material);
   // Even permutations, which keep the sign of the volume.
   return gathered(renderer, frame, values, program, [&](const TetMesh& mesh) {
-    return gather<4>(mesh, mesh.tets, {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}}, label, sizeof(float));
+    return gather<4>(mesh, mesh.tets, {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}}, label, bytes);
   });
 }
 
@@ -123,20 +126,34 @@ glm::vec4 cut_plane(const Renderer& renderer, const ViewOptions& options) {
   return glm::vec4(n, options.is_cut() ? glm::dot(n, middle) + half * float(2 * options.cut - 1) : 1e30f);
 }
 
+std::vector<glm::vec4> planes_of(const Frame& frame) {
+  std::vector<glm::vec4> planes = frame.planes;
+  if (frame.ground) planes.insert(planes.begin(), glm::vec4(0, 1, 0, *frame.ground));
+  planes.resize(std::min<std::size_t>(planes.size(), MAX_PLANES));
+  return planes;
+}
+
 View view_block(const Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   View view{};
   const glm::mat4 seen = view_matrix(frame.camera);
   view.camera =
       projection_matrix(frame.camera, float(frame.viewport.width) / float(frame.viewport.height)) * seen;
-  view.eye = glm::vec4(eye(frame.camera), options.smooth_normals && options.look != Look::tets ? 1.0f : 0.0f);
+  // 55 degrees: the shipped meshes have folds of 50 that ought to look round, and would show as saw teeth.
+  view.eye = glm::vec4(eye(frame.camera), options.smooth_normals ? 0.574f : 2.0f);
   view.right = glm::vec4(seen[0][0], seen[1][0], seen[2][0], options.shadow ? 1.0f : 0.0f);
   view.colour = glm::vec4(float(options.colour), float(options.range().low), float(options.range().high),
-                          options.look == Look::wire ? 0.85f : 0.0f);
+                          options.look == Look::wire ? 0.8f : 0.0f);
   const bool tets = options.look == Look::tets;
   view.tets = tets ? glm::vec4(options.shrink, options.explode, 1, 0) : glm::vec4(0);
   view.cut = cut_plane(renderer, options);
   view.material = glm::vec4(glm::vec3(frame.material), frame.opacity);
+  const Viewport& window = frame.viewport;
+  view.window = glm::vec4(window.x, window.y, window.width, window.height);
+  const std::vector<glm::vec4> planes = planes_of(frame);
+  view.scene = glm::vec4(planes.size(), frame.ground ? 1 : 0, 0, 0);
+  for (std::size_t i = 0; i < MAX_PLANES; ++i)  // no body is below -1e30 m
+    view.planes[i] = i < planes.size() ? planes[i] : glm::vec4(0, 0, 0, -1e30f);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {
     const glm::vec3 colour = glm::convertSRGBToLinear(turned(options.body_colour, turns[i % turns.size()]));
@@ -145,61 +162,80 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   return view;
 }
 
-// The vertex attributes of this frame, computed where they have to be, or the constants that stand for them.
-void bind_attributes(Renderer& renderer, const Frame& frame) {
-  const auto attribute = [](GLuint index, GLuint buffer, GLint count, std::size_t stride,
-                            std::size_t offset) {
-    if (!buffer) {
-      glDisableVertexAttribArray(index);
-      glVertexAttrib4f(index, 0, 0, 0, 0);
-      return;
-    }
-    glBindBuffer(GL_ARRAY_BUFFER, buffer);
-    glEnableVertexAttribArray(index);
-    glVertexAttribPointer(index, count, GL_FLOAT, GL_FALSE, GLsizei(stride),
-                          reinterpret_cast<const void*>(offset));
-  };
+// Of a buffer, or zeros where there is none.
+void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset,
+               GLenum type = GL_FLOAT) {
+  if (!buffer) {
+    glDisableVertexAttribArray(index);
+    glVertexAttrib4f(index, 0, 0, 0, 0);
+    return;
+  }
+  glBindBuffer(GL_ARRAY_BUFFER, buffer);
+  glEnableVertexAttribArray(index);
+  glVertexAttribPointer(index, count, type, type != GL_FLOAT, GLsizei(stride),
+                        reinterpret_cast<const void*>(offset));
+}
+
+// The values of this frame by vertex, found where they have to be, and their copy on its way back.
+GLuint find_values(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
-  const bool tets = options.look == Look::tets, coloured = options.colour != Colour::plain;
   const bool of_vertices = options.colour == Colour::velocity || options.colour == Colour::motion ||
                            options.colour == Colour::patch;
-  if (tets || coloured || options.is_cut() || renderer.bodies.size() > 1) rest_of(renderer);
-  GLuint normal = 0, value = 0;
-  if (!tets && options.smooth_normals)  // the geometry shader of tets has the whole tetrahedron
-    normal = gathered(renderer, frame, renderer.normals, use(renderer, "normals"), [](const TetMesh& mesh) {
-      return gather<3>(mesh, mesh.surface, {{{1, 2}, {2, 0}, {0, 1}}}, "vertex normals", sizeof(glm::vec4));
-    });
-  if (!tets || of_vertices || options.worst) value = vertex_values(renderer, frame);
+  if (options.look == Look::tets && !of_vertices && !options.worst) return 0;
+  const GLuint value = vertex_values(renderer, frame);
+  if (value) glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   if (options.worst && value && !renderer.values_copied) {
     const std::size_t bytes = renderer.mesh.positions.size() * sizeof(float);
     if (!renderer.values_copy) renderer.values_copy = Buffer("values' copy", bytes, nullptr, GL_STREAM_READ);
-    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glBindBuffer(GL_COPY_READ_BUFFER, value);
     glBindBuffer(GL_COPY_WRITE_BUFFER, renderer.values_copy.id());
     glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, GLsizeiptr(bytes));
     renderer.values_copied = Fence::here();
   }
-  glBindVertexArray(renderer.vertex_array.id());
-  attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
-  attribute(ATTRIBUTE_LOW, frame.positions, 3, sizeof(Position), offsetof(Position, low));
-  attribute(ATTRIBUTE_NORMAL, normal, 3, sizeof(glm::vec4), 0);
-  attribute(ATTRIBUTE_VALUE, value, 1, sizeof(float), 0);
-  attribute(ATTRIBUTE_REST, renderer.rest.id(), 4, sizeof(glm::vec4), 0);
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);  // the step's and the kernels'
+  return value;
+}
+
+void fill_corners(Renderer& renderer, const Frame& frame, GLuint values) {
+  const std::size_t count = 3 * renderer.mesh.surface.size();
+  VertexGather& corners = renderer.corners;
+  if (!corners) {
+    renderer.triangles = Buffer("surface indices", renderer.mesh.surface);
+    corners = gather<3>(renderer.mesh, renderer.mesh.surface, {{{1, 2}, {2, 0}, {0, 1}}}, "surface corners",
+                        count * sizeof(SurfaceCorner));
+    renderer.surface_array = VertexArray("surface");
+    const auto part = [&](GLuint index, GLint size, std::size_t offset, GLenum type = GL_FLOAT) {
+      attribute(index, corners.values.id(), size, sizeof(SurfaceCorner), offset, type);
+    };
+    part(ATTRIBUTE_HIGH, 3, offsetof(SurfaceCorner, position));
+    part(ATTRIBUTE_LOW, 1, offsetof(SurfaceCorner, kept));
+    part(ATTRIBUTE_NORMAL, 4, offsetof(SurfaceCorner, normal_xy), GL_SHORT);
+    part(ATTRIBUTE_VALUE, 1, offsetof(SurfaceCorner, value));
+  }
+  const bool rested = frame.options.is_cut() || renderer.bodies.size() > 1;
+  const Program& program = use(renderer, "corners");
+  program.set("count", unsigned(count));
+  program.set("valued", values ? 1 : 0);
+  program.set("rested", rested ? 1 : 0);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
+  if (rested) rest_of(renderer).bind_storage(BIND_RENDER_REST);
+  if (values) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_VALUES, values);
+  renderer.triangles.bind_storage(BIND_RENDER_TRIANGLES);
+  corners.offsets.bind_storage(BIND_RENDER_OFFSETS);
+  corners.items.bind_storage(BIND_RENDER_ITEMS);
+  corners.values.bind_storage(BIND_RENDER_CORNERS);
+  glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
 }
 
 // To the image or, with `shadow`, to the map.
-void draw_bodies(Renderer& renderer, const Frame& frame, bool shadow) {
+void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool shadow) {
   const auto elements = [&](const char* program, GLenum kind, const Buffer& indices) {
     use(renderer, std::string(program) + (shadow ? " shadow" : ""));
-    glBindVertexArray(renderer.vertex_array.id());
+    bind_vertices(renderer, frame, values);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.id());
     glDrawElements(kind, GLsizei(indices.bytes() / sizeof(std::uint32_t)), GL_UNSIGNED_INT, nullptr);
   };
   const Look look = frame.options.look;
   const bool cut = frame.options.is_cut(), graph = look == Look::graph && !shadow;
-  if (look != Look::tets && !graph && !renderer.triangles)
-    renderer.triangles = Buffer("surface indices", renderer.mesh.surface);
   if (graph && !renderer.graph) renderer.graph = Buffer("graph indices", tet_edges(renderer.mesh));
   if (cut) glEnable(GL_CLIP_DISTANCE0);
   if (graph) {  // all of it, mixed
@@ -210,7 +246,9 @@ void draw_bodies(Renderer& renderer, const Frame& frame, bool shadow) {
   } else if (look == Look::tets) {
     elements("tets", GL_LINES_ADJACENCY, tets_of(renderer));
   } else {
-    elements("surface", GL_TRIANGLES, renderer.triangles);
+    use(renderer, shadow ? "surface shadow" : "surface");
+    glBindVertexArray(renderer.surface_array.id());
+    glDrawArrays(GL_TRIANGLES, 0, GLsizei(3 * renderer.mesh.surface.size()));
   }
   glDisable(GL_CLIP_DISTANCE0);
   if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, tets_of(renderer));
@@ -222,7 +260,7 @@ void fit_light(Renderer& renderer, const Frame& frame) {
   if (!options.shadow && !options.follow && !(options.look == Look::tets && options.explode > 0)) return;
   Shadow& shadow = renderer.shadow;
   if (!shadow.light) {
-    shadow.bounds = Buffer("bounds", std::vector<std::uint32_t>{~0u, ~0u, ~0u, 0, 0, 0});
+    shadow.bounds = Buffer("bounds", std::vector<std::uint32_t>{~0u, ~0u, ~0u, 0, 0, 0, 0});
     shadow.light = Buffer("light", sizeof(Light));
     shadow.centre = Buffer("centre", sizeof(glm::vec4), nullptr, GL_STREAM_READ);
   }
@@ -236,12 +274,8 @@ void fit_light(Renderer& renderer, const Frame& frame) {
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
   shadow.bounds.bind_storage(BIND_RENDER_BOUNDS);
   shadow.light.bind_storage(BIND_RENDER_FIT);
-  for (int stage = 0; stage < 2; ++stage) {
-    kernel.set("stage", stage);
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the bounds
-    glDispatchCompute(stage == 0 ? unsigned(work_groups(count, 128)) : 1, 1, 1);
-  }
-  glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+  glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
+  glMemoryBarrier(GL_UNIFORM_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   if (!options.follow || shadow.centre_copied) return;
   shadow.light.copy_to(shadow.centre, 0, offsetof(Light, centre), sizeof(glm::vec4));
   shadow.centre_copied = Fence::here();
@@ -274,7 +308,7 @@ void make_map(Shadow& shadow) {
   glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
 }
 
-void draw_shadow_map(Renderer& renderer, const Frame& frame) {
+void draw_shadow_map(Renderer& renderer, const Frame& frame, GLuint values) {
   if (!renderer.shadow.depth) make_map(renderer.shadow);
   glBindFramebuffer(GL_FRAMEBUFFER, renderer.shadow.framebuffer.id());
   glViewport(0, 0, Shadow::size, Shadow::size);
@@ -285,18 +319,59 @@ void draw_shadow_map(Renderer& renderer, const Frame& frame) {
   glDepthFunc(GL_LESS);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
-  draw_bodies(renderer, frame, true);
+  draw_bodies(renderer, frame, values, true);
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-void draw_plane(Renderer& renderer, const Frame& frame, const glm::vec4& plane, bool wall) {
-  const bool behind = glm::dot(glm::vec3(plane), eye(frame.camera)) < plane.w;
+void bind_shadows(const Shadow& shadow) {
+  const std::tuple<int, GLuint, GLuint> units[] = {{UNIT_SHADOW, shadow.depth.id(), shadow.compared.id()},
+                                                   {UNIT_SHADOW_DEPTH, shadow.depth.id(), shadow.plain.id()},
+                                                   {UNIT_PLANES, shadow.planes.id(), 0}};
+  for (const auto& [unit, texture, sampler] : units) {
+    glActiveTexture(GL_TEXTURE0 + GLenum(unit));
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glBindSampler(GLuint(unit), sampler);
+  }
+  glActiveTexture(GL_TEXTURE0);
+}
+
+// As fine as the picture needs it.
+void light_planes(Renderer& renderer, const Frame& frame, int count) {
+  Shadow& shadow = renderer.shadow;
+  const int size = std::clamp(int(std::bit_ceil(unsigned(frame.viewport.height / 2 + 1))), 128, 512);
+  if (shadow.planes_size != size || shadow.planes_count != count) {
+    shadow.planes = Texture("light on planes");
+    clear_errors();
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RG8, size * count, size, 0, GL_RG, GL_UNSIGNED_BYTE, nullptr);
+    check_memory("the light on planes", std::size_t(size) * std::size_t(size * count) * 2);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+      glTexParameteri(GL_TEXTURE_2D, wrap, GL_CLAMP_TO_EDGE);
+    shadow.planes_size = size, shadow.planes_count = count;
+  }
+  bind_shadows(shadow);
+  const Program& program = use(renderer, "plane light");
+  program.set("triangles", unsigned(renderer.mesh.surface.size()));
+  program.set("map_size", size);
+  renderer.corners.values.bind_storage(BIND_RENDER_CORNERS);
+  glBindImageTexture(IMAGE_PLANES, shadow.planes.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG8);
+  glDispatchCompute(unsigned(size) / 16, unsigned(size) / 16, unsigned(count));
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
+bool is_behind(const glm::vec4& plane, const Camera& camera) {
+  return glm::dot(glm::vec3(plane), eye(camera)) < plane.w;
+}
+
+void draw_plane(Renderer& renderer, const Frame& frame, int number, const glm::vec4& plane) {
+  const bool behind = is_behind(plane, frame.camera), wall = number > 0 || !frame.ground;
   const float rest_size = glm::length(renderer.rest_high - renderer.rest_low);
   const Program& program = use(renderer, "plane");
-  program.set("plane", plane);
+  program.set("plane", number);
   program.set("centre", frame.camera.target);
   program.set("extent", wall ? 2.0f * rest_size : std::max(5.0f * frame.camera.distance, 4.0f * rest_size));
-  program.set("opacity", (wall ? 0.45f : 1.0f) * (behind ? 0.2f : 1.0f));
+  program.set("opacity", behind ? 0.25f : wall ? 0.85f : 1.0f);
   program.set("grid", frame.options.grid ? 1.0f : 0.0f);
   // What lies on the plane, or penetrates it a little, shall be neither flickering nor hidden from behind.
   glDepthMask(behind || wall ? GL_FALSE : GL_TRUE);
@@ -308,13 +383,29 @@ void draw_plane(Renderer& renderer, const Frame& frame, const glm::vec4& plane, 
   glDepthMask(GL_TRUE);
 }
 
+// The ground hides the background, and both are hidden by bodies drawn before. Walls, and a ground seen from
+// below, let what is behind them through.
+void draw_surroundings(Renderer& renderer, const Frame& frame) {
+  const std::vector<glm::vec4> planes = planes_of(frame);
+  const bool solid = frame.ground && !is_behind(planes[0], frame.camera);
+  glDisable(GL_BLEND);
+  if (solid) draw_plane(renderer, frame, 0, planes[0]);
+  glDepthFunc(GL_LEQUAL);
+  glBindVertexArray(renderer.empty_array.id());
+  use(renderer, "background");
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDepthFunc(GL_LESS);
+  glEnable(GL_BLEND);
+  for (std::size_t i = solid; i < planes.size(); ++i) draw_plane(renderer, frame, int(i), planes[i]);
+}
+
 // However drawing ends, by a shader that does not compile, too.
 struct Afterwards {
   ~Afterwards() {
     for (GLenum what :
          {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL})
       glDisable(what);
-    for (int unit : {UNIT_SHADOW, UNIT_SHADOW_DEPTH}) glBindSampler(GLuint(unit), 0);
+    for (int unit : {UNIT_SHADOW, UNIT_SHADOW_DEPTH, UNIT_PLANES}) glBindSampler(GLuint(unit), 0);
     glBindVertexArray(0);
     glUseProgram(0);
   }
@@ -327,6 +418,14 @@ const Program& use(Renderer& renderer, const std::string& name) {
   const Program& program = renderer.programs.at(name);
   program.use();
   return program;
+}
+
+void bind_vertices(Renderer& renderer, const Frame& frame, GLuint values) {
+  glBindVertexArray(renderer.vertex_array.id());
+  attribute(ATTRIBUTE_HIGH, frame.positions, 3, sizeof(Position), offsetof(Position, high));
+  attribute(ATTRIBUTE_LOW, frame.positions, 3, sizeof(Position), offsetof(Position, low));
+  attribute(ATTRIBUTE_VALUE, values, 1, sizeof(float), 0);
+  attribute(ATTRIBUTE_REST, renderer.rest.id(), 4, sizeof(glm::vec4), 0);
 }
 
 const Buffer& tets_of(Renderer& renderer) {
@@ -349,6 +448,7 @@ void bind_view(Renderer& renderer, const Frame& frame) {
   const View view = view_block(renderer, frame);
   renderer.view.write(0, sizeof view, &view);
   renderer.view.bind_uniform(BIND_RENDER_VIEW);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   fit_light(renderer, frame);
   // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
   (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
@@ -395,9 +495,16 @@ void draw(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
+  const int planes = options.backdrop && !frame.over ? int(planes_of(frame).size()) : 0;
+  const bool lit_planes = options.shadow && planes > 0, tets = options.look == Look::tets;
+  if (tets || options.look == Look::graph || options.is_cut() || renderer.bodies.size() > 1)
+    rest_of(renderer);
   bind_view(renderer, frame);
-  bind_attributes(renderer, frame);
-  if (options.shadow) draw_shadow_map(renderer, frame);
+  const GLuint values = find_values(renderer, frame);
+  if (!tets || lit_planes) fill_corners(renderer, frame, values);
+  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  if (options.shadow) draw_shadow_map(renderer, frame, values);
+  if (lit_planes) light_planes(renderer, frame, planes);
 
   const Viewport& viewport = frame.viewport;
   glBindFramebuffer(GL_FRAMEBUFFER, frame.target);
@@ -409,35 +516,23 @@ void draw(Renderer& renderer, const Frame& frame) {
   glClearColor(0.7f, 0.73f, 0.76f, 1.0f);
   if (!frame.over)
     glClear(options.backdrop ? GL_DEPTH_BUFFER_BIT : GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
-  glDisable(GL_DEPTH_TEST);
-  glBindVertexArray(renderer.empty_array.id());
-  if (options.backdrop && !frame.over) {
-    use(renderer, "background");
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-  }
-
-  for (const auto& [unit, sampler] :
-       {std::pair{UNIT_SHADOW, &renderer.shadow.compared}, {UNIT_SHADOW_DEPTH, &renderer.shadow.plain}}) {
-    glActiveTexture(GL_TEXTURE0 + GLenum(unit));
-    glBindTexture(GL_TEXTURE_2D, options.shadow ? renderer.shadow.depth.id() : 0);
-    glBindSampler(GLuint(unit), options.shadow ? sampler->id() : 0);
-  }
-  glActiveTexture(GL_TEXTURE0);
+  if (options.shadow) bind_shadows(renderer.shadow);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
-  if (options.backdrop && !frame.over) {
-    if (frame.ground) draw_plane(renderer, frame, glm::vec4(0.0f, 1.0f, 0.0f, *frame.ground), false);
-    for (const glm::vec4& plane : frame.planes) draw_plane(renderer, frame, plane, true);
-  }
-  if (frame.opacity == 1) glDisable(GL_BLEND);
+  const bool surroundings = options.backdrop && !frame.over, mixed = options.look == Look::graph;
+  if (surroundings && mixed) draw_surroundings(renderer, frame);
+  if (frame.opacity == 1)
+    glDisable(GL_BLEND);
+  else
+    glEnable(GL_BLEND);
   if (frame.over) {  // behind what is there already in the same place, or the two would flicker
     glEnable(GL_POLYGON_OFFSET_FILL);
     glPolygonOffset(2.0f, 16.0f);
   }
-  draw_bodies(renderer, frame, false);
+  draw_bodies(renderer, frame, values, false);
   glDisable(GL_POLYGON_OFFSET_FILL);
+  if (surroundings && !mixed) draw_surroundings(renderer, frame);
   glEnable(GL_BLEND);
   draw_marks(renderer, frame);
   if (!options.has_scale() && frame.caption.empty()) return;
@@ -452,6 +547,17 @@ std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait) {
   return centre ? std::optional(glm::vec3(centre->front())) : std::nullopt;
 }
 
+std::vector<float> read_values(Renderer& renderer, const Frame& frame) {
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  const GLuint values = vertex_values(renderer, frame);
+  std::vector<float> result(values ? renderer.mesh.positions.size() : 0);
+  if (!values) return result;
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glBindBuffer(GL_COPY_READ_BUFFER, values);
+  glGetBufferSubData(GL_COPY_READ_BUFFER, 0, GLsizeiptr(result.size() * sizeof(float)), result.data());
+  return result;
+}
+
 std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait) {
   return take<float>(renderer.values_copied, renderer.values_copy, "reading values", wait);
 }
@@ -461,6 +567,7 @@ void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, dou
   const Program& program = use(renderer, "distances");
   program.set("scale", float(1 / size));
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_ANSWERS, answers);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   fill(renderer, program, positions, distances);
 }
 

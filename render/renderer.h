@@ -18,17 +18,19 @@ namespace tetpbd {
 /// value alone.
 struct VertexGather {
   Buffer offsets, items;
-  Buffer values;  ///< by vertex: vec4 of a normal, float of others
+  Buffer values;  ///< a float by vertex; or all SurfaceCorner
   explicit operator bool() const { return bool(values); }
 };
 
 /// The key light's depth image of the bodies, fitted to where they are by the GPU (no read-back).
 struct Shadow {
-  static constexpr int size = 1024;  ///< texels a side
-  Buffer bounds, light;              ///< light: the uniform block
-  Buffer centre;                     ///< a copy of its `centre`, on its way back
+  static constexpr int size = 512;  ///< texels a side
+  Buffer bounds, light;             ///< light: the uniform block
+  Buffer centre;                    ///< a copy of its `centre`, on its way back
   Fence centre_copied;
   Texture depth;
+  Texture planes;  ///< what light arrives on each: maps beside each other
+  int planes_size = 0, planes_count = 0;
   Framebuffer framebuffer;
   Sampler compared, plain;
 };
@@ -39,13 +41,13 @@ struct Renderer {
   std::vector<std::size_t> bodies;  ///< the first vertex of each
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
   std::map<std::string, Program> programs;
-  VertexArray vertex_array, empty_array;
+  VertexArray vertex_array, surface_array, empty_array;
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer graph;            ///< edges' vertices
   Buffer arrow_vertices;
-  Buffer rest;  ///< vec4: rest position and body
-  VertexGather normals;
+  Buffer rest;           ///< vec4: rest position and body
+  VertexGather corners;  ///< of the surface, three a triangle; values: corners.comp
   std::map<Colour, VertexGather> values;
   Buffer values_copy;  ///< on its way back
   Fence values_copied;
@@ -59,6 +61,8 @@ Renderer make_renderer(const Model& model);
 void draw(Renderer& renderer, const Frame& frame);
 /// Puts what shaders know of the view in place, without which nothing is drawn.
 void bind_view(Renderer& renderer, const Frame& frame);
+/// The vertex attributes of all but the surface; `values` by vertex, 0: none.
+void bind_vertices(Renderer& renderer, const Frame& frame, GLuint values = 0);
 /// The program of that name, made when first asked for, in use.
 const Program& use(Renderer& renderer, const std::string& name);
 /// The tetrahedra's vertices, rest positions with bodies: made when first asked for.
@@ -66,6 +70,8 @@ const Buffer& tets_of(Renderer& renderer);
 const Buffer& rest_of(Renderer& renderer);
 /// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
+/// What colours show of each vertex, now; empty where they show nothing. Waits for the GPU.
+std::vector<float> read_values(Renderer& renderer, const Frame& frame);
 /// The values by vertex that a frame drawn with `worst` coloured, once, some frames later (`wait`: now).
 std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait = false);
 /// How far vertices are from where `answers` has them, over `size` (m): both buffers of Position;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <glm/gtc/packing.hpp>
 #include <limits>
 
 #include "render/layout.h"
@@ -123,7 +124,7 @@ TEST_CASE("render: wire shows edges, tets show gaps, flat differs from smooth") 
   CHECK(stage.renderer.values.empty());
   stage.frame.options.smooth_normals = false;
   const Image flat = stage.image(), empty = stage.empty();
-  CHECK(difference(smooth, flat).count > 500);
+  CHECK(difference(smooth, flat).count == 0);  // a block is all edges
   const int solid = difference(flat, empty).count;
 
   stage.frame.options.look = Look::wire;
@@ -369,6 +370,82 @@ TEST_CASE("render: colour maps are even") {
       CHECK(luminance(colour_maps::diverging_colour(sign * t)) >
             luminance(colour_maps::diverging_colour(sign * next)));
   }
+}
+
+TEST_CASE("render: edges stay sharp, and only they") {
+  Stage stage;
+  stage.image();
+  const auto corners = stage.renderer.corners.values.read_all<SurfaceCorner>();
+  REQUIRE(corners.size() == 3 * stage.mesh.surface.size());
+  const auto normal = [](const SurfaceCorner& c) {
+    return glm::vec3(glm::unpackSnorm2x16(c.normal_xy), glm::unpackSnorm2x16(c.normal_z_body).x);
+  };
+  for (std::size_t c = 0; c < corners.size(); ++c) {  // of a block: a face's own
+    const std::size_t t = c - c % 3;
+    const glm::vec3 face = glm::normalize(glm::cross(corners[t + 1].position - corners[t].position,
+                                                     corners[t + 2].position - corners[t].position));
+    CHECK(glm::distance(normal(corners[c]), face) < 1e-3f);
+    CHECK(corners[c].position == glm::vec3(stage.mesh.positions[stage.mesh.surface[c / 3][c % 3]]));
+  }
+  // Bent by 30 degrees, a flat piece is round: both sides have one normal where they meet.
+  auto bent = stage.positions.read_all<Position>();
+  for (Position& p : bent)
+    if (p.high.x + p.low.x > 0.2f) p.high.y += std::tan(0.52f) * (p.high.x + p.low.x - 1.0f / 6);
+  stage.positions.write(0, stage.positions.bytes(), bent.data());
+  const Image smooth = stage.image();
+  const auto round = stage.renderer.corners.values.read_all<SurfaceCorner>();
+  for (std::size_t c = 0; c < round.size(); ++c) {
+    const glm::vec3 p = round[c].position, n = normal(round[c]);
+    if (std::abs(p.x - 1.0f / 6) < 1e-3f && std::abs(p.z) < 0.4f && p.y > 0.4f && n.y > 0.8f)
+      CHECK(n.x == doctest::Approx(-std::sin(0.26f)).epsilon(0.15));
+  }
+  stage.frame.options.smooth_normals = false;
+  CHECK(difference(stage.image(), smooth, 2).count > 100);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: ranges follow the values, but for a few, to round numbers") {
+  const ColourScale& volume = colour_scales[std::size_t(Colour::volume)];
+  std::vector<float> values(1000, -0.013f);
+  values[3] = 0.9f, values[4] = std::numeric_limits<float>::quiet_NaN();
+  const ColourRange fitted = fitted_range(volume, values);
+  CHECK(fitted.high == doctest::Approx(0.02));
+  CHECK(fitted.low == doctest::Approx(-0.02));
+  CHECK(fitted_range(volume, std::vector<float>(10, 1e-7f)).high == doctest::Approx(2e-4));  // noise
+  const ColourRange speed = fitted_range(colour_scales[std::size_t(Colour::velocity)], {0, 3, 5});
+  CHECK(speed.low == 0);
+  CHECK(speed.high == doctest::Approx(5));
+  Stage stage;
+  stage.frame.options.colour = Colour::stretch;
+  stage.move(1.1);
+  for (const float value : read_values(stage.renderer, stage.frame)) CHECK(value == doctest::Approx(0.1f));
+  stage.frame.options.colour = Colour::plain;
+  CHECK(read_values(stage.renderer, stage.frame).empty());
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("camera: keeps a point in view, goes through its keys") {
+  Camera camera;
+  const glm::vec3 target = camera.target;
+  keep_in_view(camera, {0.1f, 0.2f, 0.1f}, 1.5f);
+  CHECK(camera.target == target);
+  keep_in_view(camera, {40, -7, 12}, 1.5f);
+  const glm::vec3 seen = project(camera, {40, -7, 12}, 300, 200);
+  CHECK(std::min(seen.x, 300 - seen.x) > 30);
+  CHECK(std::min(seen.y, 200 - seen.y) > 20);
+  CHECK(glm::distance(eye(camera), glm::vec3(40, -7, 12)) > 0.4f * camera.distance);
+  const std::vector<CameraKey> path{
+      {1, {}}, {2, {{1, 0, 0}, 4, 90, 20, 35}}, {4, {{3, 0, 0}, 4, 270, 20, 35}}};
+  for (const CameraKey& key : path) {
+    CHECK(camera_at(path, key.time).azimuth == doctest::Approx(key.camera.azimuth));
+    CHECK(camera_at(path, key.time).target == key.camera.target);
+  }
+  CHECK(camera_at(path, 0).target == path[0].camera.target);
+  CHECK(camera_at(path, 9).target == path[2].camera.target);
+  CHECK(camera_at(path, 3).azimuth == doctest::Approx(180).epsilon(0.1));
+  // No jerk: as fast before a key as after it.
+  const auto x = [&](double time) { return double(camera_at(path, time).target.x); };
+  CHECK(x(2) - x(1.999) == doctest::Approx(x(2.001) - x(2)).epsilon(0.02));
 }
 
 TEST_CASE("render: several bodies have hues of their own, marked vertices dots") {

@@ -1,21 +1,18 @@
-// A vertex of a body straight from the simulation's buffer.
+// A vertex of tetrahedra and edges straight from the simulation's buffer.
 #include "render/view.glsl"
 layout(location = ATTRIBUTE_HIGH) in vec3 high;
 layout(location = ATTRIBUTE_LOW) in vec3 low;
-layout(location = ATTRIBUTE_NORMAL) in vec3 normal;
 layout(location = ATTRIBUTE_VALUE) in float value;
 layout(location = ATTRIBUTE_REST) in vec4 rest;  // w: body
 
 out Corner {
   vec3 position;
-  vec3 normal;
   float value;
   vec4 rest;
 } corner;
 
 void main() {
   corner.position = high + low;
-  corner.normal = normal;
   // A value that is no number has no colour: such a corner goes the way of one without a place, and takes its faces along.
   if (!finite(vec3(value * 1e-30))) corner.position = vec3(uintBitsToFloat(0x7f800000u));
   corner.value = value;

@@ -5,11 +5,10 @@ layout(location = ATTRIBUTE_LOW) in vec3 low;
 layout(location = ATTRIBUTE_REST) in vec4 rest;
 uniform float size;  // pixels
 #ifdef CONTACTS
-uniform vec4 planes[8];
 uniform float touching;  // metres
 bool is_marked(vec3 p) {
   bool any_plane = false;
-  for (int i = 0; i < 8; ++i) any_plane = any_plane || dot(planes[i].xyz, p) - planes[i].w <= touching;
+  for (int i = 0; i < MAX_PLANES; ++i) any_plane = any_plane || dot(view.planes[i].xyz, p) - view.planes[i].w <= touching;
   return any_plane;
 }
 #else

@@ -3,7 +3,6 @@
 
 in Corner {
   vec3 position;
-  vec3 normal;
   float value;
   vec4 rest;
 } corner[];

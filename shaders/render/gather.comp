@@ -1,6 +1,5 @@
-// Values of vertices, each gathered from its items in fixed order, so the same every time. NORMAL: the sum of the adjacent
-// triangles' normals weighted by their angle there. TETS: the mean over its tetrahedra of what values.glsl has of `kind`.
-// Otherwise the mean over its edges of L/L0 - 1.
+// Values of vertices, each gathered from its items in fixed order, so the same every time. TETS: the mean over its tetrahedra
+// of what values.glsl has of `kind`. Otherwise the mean over its edges of L/L0 - 1.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"
@@ -9,30 +8,11 @@ layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Posi
 layout(std430, binding = BIND_RENDER_REST) readonly buffer Rest { vec4 rest[]; };
 layout(std430, binding = BIND_RENDER_OFFSETS) readonly buffer Offsets { uint offsets[]; };
 layout(std430, binding = BIND_RENDER_ITEMS) readonly buffer Items { uint items[]; };  // the other corners
-#ifdef NORMAL
-#define Value vec4
-#else
-#define Value float
-#endif
-layout(std430, binding = BIND_RENDER_VALUES) writeonly buffer Values { Value values[]; };
+layout(std430, binding = BIND_RENDER_VALUES) writeonly buffer Values { float values[]; };
 uniform uint count;
 
 vec3 position(uint v) { return positions[v].high + positions[v].low; }
 
-#ifdef NORMAL
-Value gathered(uint v) {
-  vec3 x = position(v), sum = vec3(0.0);
-  for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
-    vec3 a = position(items[2u * k]) - x, b = position(items[2u * k + 1u]) - x;
-    vec3 area = cross(a, b);
-    float size = length(area);
-    if (!finite(a) || !finite(b) || !(size > 0.0)) continue;
-    sum += area / size * atan(size, dot(a, b));
-  }
-  float size = length(sum);
-  return vec4(size > 0.0 ? sum / size : vec3(0.0), 0.0);
-}
-#else
 #ifdef TETS
 #include "render/values.glsl"
 uniform int kind;
@@ -52,7 +32,7 @@ float error(uint v, uint k) {
 }
 #endif
 
-Value gathered(uint v) {
+float gathered(uint v) {
   float sum = 0.0;
   uint n = 0u;
   for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
@@ -63,7 +43,6 @@ Value gathered(uint v) {
   }
   return n > 0u ? sum / float(n) : 0.0;
 }
-#endif
 
 void main() {
   uint v = gl_GlobalInvocationID.x;

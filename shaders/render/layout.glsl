@@ -3,10 +3,12 @@
 // own buffers before it dispatches.
 #define BIND_RENDER_POSITIONS 0
 #define BIND_RENDER_REST 1
+#define BIND_RENDER_TRIANGLES 2
 #define BIND_RENDER_OFFSETS 3  // where a vertex's items begin; one more at the end
 #define BIND_RENDER_ITEMS 4
 #define BIND_RENDER_ANSWERS 4  // where vertices should be, or their velocities
 #define BIND_RENDER_VALUES 5
+#define BIND_RENDER_CORNERS 6
 #define BIND_RENDER_BOUNDS 6
 #define BIND_RENDER_FIT 7
 #define BIND_PICK_TRIANGLES 1
@@ -18,7 +20,9 @@
 // Texture units.
 #define UNIT_SHADOW 0        // compared by the sampler
 #define UNIT_SHADOW_DEPTH 1  // the same texture as plain depth
-// Vertex attributes.
+#define UNIT_PLANES 2        // what light arrives on planes
+#define IMAGE_PLANES 0       // the same, as it is made
+// Vertex attributes; of the surface HIGH is a corner's place and LOW what is left of it by the cut.
 #define ATTRIBUTE_HIGH 0
 #define ATTRIBUTE_LOW 1
 #define ATTRIBUTE_NORMAL 2
@@ -38,13 +42,25 @@
 
 struct View {
   mat4 camera;                  // world to clip space
-  vec4 eye;                     // w: 1 with smooth normals, 0 with flat ones
+  vec4 eye;                     // w: cosine of the angle between triangles that is an edge; above 1: any is
   vec4 right;                   // of the camera, for the light beside it; w: 1 with shadows
   vec4 colour;                  // COLOUR_..., low and high end of the range; w: edge opacity of the wire view
   vec4 tets;                    // shrink 0..1, explode >= 0; z: 1 where tetrahedra are drawn
   vec4 cut;                     // only the part of the rest shape where dot(xyz, x) <= w is shown
   vec4 material;                // Lame's mu and lambda, Pa; z: which (values.glsl); w: opacity
+  vec4 window;                  // the viewport in pixels: lower left, width, height
+  vec4 scene;                   // how many planes there are; y: 1 if the first is the ground, on which light bounces
+  vec4 planes[MAX_PLANES];      // dot(xyz, x) = w
   vec4 palette[PALETTE_SIZE];   // body colours
+};
+
+// Of a triangle of the surface, as it is drawn.
+struct SurfaceCorner {
+  vec3 position;  // of a triangle that has no place all in one point
+  float value;
+  uint normal_xy, normal_z_body;  // as 16-bit parts of 1; the body's number over 32767
+  float kept;                     // distance from the cut, negative where nothing is left
+  float _0;
 };
 
 struct Light {

@@ -1,72 +1,73 @@
-// Lighting and shadows. All colours linear.
+// Material, lights and shadows. All colours linear; irradiances over pi, so that a white face under all of them is about 1.
 layout(binding = UNIT_SHADOW) uniform sampler2DShadow shadow_map;
 layout(binding = UNIT_SHADOW_DEPTH) uniform sampler2D shadow_depth;
+layout(binding = UNIT_PLANES) uniform sampler2D plane_light;
 
-const vec3 key_colour = vec3(2.20, 2.10, 1.95);
-const vec3 sky_colour = vec3(0.62, 0.68, 0.76);
-const vec3 bounce_colour = vec3(0.36, 0.33, 0.30);
+const vec3 key_colour = vec3(0.75, 0.715, 0.665);
+const vec3 sky_colour = vec3(0.425, 0.45, 0.485);
+const float bounced = 0.34;       // by what lies below
+const float roughness = 0.3;      // of the bodies, GGX's alpha
+const float mirrored = 0.04;      // by a plastic, seen head on
 
-// Point i of n on a disk, evenly spread (sunflower).
-vec2 disk_point(int i, int n) {
-  float radius = sqrt((float(i) + 0.5) / float(n));
-  float angle = 2.399963 * float(i);
-  return radius * vec2(cos(angle), sin(angle));
+// How far the maps of planes reach beyond the bodies' shadows.
+const float plane_reach = 1.5;
+
+vec3 background_colour(float y) {
+  const vec3 low = vec3(0.815, 0.810, 0.800), high = vec3(0.620, 0.670, 0.720);
+  return mix(low, high, smoothstep(0.0, 1.0, (y - view.window.y) / view.window.w));
 }
 
-vec3 shadow_coordinates(vec3 position) { return (light.matrix * vec4(position, 1.0)).xyz * 0.5 + 0.5; }
+vec3 light_space(vec3 position) { return (light.matrix * vec4(position, 1.0)).xyz; }
 
-bool outside_map(vec3 s) { return any(lessThan(s.xy, vec2(0.0))) || any(greaterThan(s.xy, vec2(1.0))); }
-
-float filtered(vec3 s, float radius, int n) {
-  float lit = 0.0;
-  for (int i = 0; i < n; ++i) lit += texture(shadow_map, vec3(s.xy + radius * disk_point(i, n), s.z));
-  return lit / float(n);
+// Parts of the key light and of the sky that arrive at a point of a plane (plane_light.comp): one look.
+vec2 arriving(vec3 position, float plane) {
+  if (view.right.w == 0.0) return vec2(1.0);
+  vec2 at = light_space(position).xy / plane_reach;
+  if (any(greaterThan(abs(at), vec2(1.0)))) return vec2(1.0);
+  return textureLod(plane_light, vec2((at.x * 0.5 + 0.5 + plane) / view.scene.x, at.y * 0.5 + 0.5), 0.0).rg;
 }
 
-// Part of the key light that arrives on a body. The point compared is moved off the surface by more than the filter is
-// wide, which is what keeps a surface from shadowing itself.
-float body_shadow(vec3 position, vec3 normal) {
+// Part of the key light that arrives on a body, from four looks that the sampler filters. The point compared is moved off the surface
+// by more than they are apart, which is what keeps a surface from shadowing itself.
+float body_shadow(vec3 position, vec3 normal, float facing) {
   if (view.right.w == 0.0) return 1.0;
-  float slope = 1.0 - clamp(dot(normal, key_direction), 0.0, 1.0);
-  vec3 s = shadow_coordinates(position + normal * light.centre.w * (1.0 + 2.5 * slope));
-  if (outside_map(s)) return 1.0;
-  return filtered(vec3(s.xy, s.z - 0.5 * light.centre.w / light.extent.x), 2.5 * 0.5 * light.centre.w / light.extent.y, 16);
+  vec3 s = light_space(position + normal * light.centre.w * (1.0 + 1.5 * (1.0 - facing))) * 0.5 + 0.5;
+  s.z -= 0.5 * light.centre.w / light.extent.x;
+  const vec2 around[4] = vec2[](vec2(-0.4, -1.0), vec2(1.0, -0.4), vec2(0.4, 1.0), vec2(-1.0, 0.4));
+  float texel = 0.5 * light.centre.w / light.extent.y, lit = 0.0;
+  for (int i = 0; i < 4; ++i) lit += texture(shadow_map, vec3(s.xy + texel * around[i], s.z));
+  return 0.25 * lit;
 }
 
-// The same on a plane that casts no shadow itself, so it needs no bias: sharp at the contact, softer with the distance
-// from what casts it (R. Fernando, Percentage-Closer Soft Shadows, 2005).
-float plane_shadow(vec3 position) {
-  if (view.right.w == 0.0) return 1.0;
-  vec3 s = shadow_coordinates(position);
-  float texel = 0.5 * light.centre.w / light.extent.y;
-  const float light_size = 0.16;  // widening of the penumbra in metres for each metre
-  float search = min(light_size * max(s.z, 0.0) * light.extent.x * 0.5 / light.extent.y, 28.0 * texel);
-  if (any(lessThan(s.xy, vec2(-search))) || any(greaterThan(s.xy, vec2(1.0 + search)))) return 1.0;
-  float blockers = 0.0, depth = 0.0;
-  for (int i = 0; i < 24; ++i) {
-    float d = texture(shadow_depth, s.xy + max(search, 2.0 * texel) * disk_point(i, 24)).r;
-    if (d < min(s.z, 1.0)) {
-      depth += d;
-      blockers += 1.0;
-    }
-  }
-  if (blockers == 0.0) return 1.0;
-  float gap = max(s.z - depth / blockers, 0.0) * light.extent.x;
-  float radius = clamp(light_size * gap * 0.5 / light.extent.y, 1.5 * texel, 28.0 * texel);
-  return filtered(vec3(s.xy, min(s.z, 1.0)), radius, 48);
+// What arrives on the ground below: from far above, the foot is a small part of what is seen.
+vec2 below(vec3 position) {
+  if (view.scene.y == 0.0 || view.right.w == 0.0) return vec2(1.0);
+  vec4 ground = view.planes[0];
+  float height = max(dot(ground.xyz, position) - ground.w, 0.0);
+  return mix(arriving(position - height * ground.xyz, 0.0), vec2(1.0), height / (height + 0.35 * light.extent.y + 1e-6));
 }
 
-vec3 shade(vec3 albedo, vec3 position, vec3 normal, float key_light) {
+// From the sky as a part of all, and else from the ground.
+vec3 surroundings(float sky, vec2 on_ground) {
+  return mix(bounced * (key_direction.y * key_colour * on_ground.x + sky_colour * on_ground.y), sky_colour, sky);
+}
+
+// Of the bodies, a dull plastic: GGX in the form of B. Karis and others for small machines, under the key light, sky and ground, and a little
+// light beside the camera. Where colours mean something they keep their hue: not `shiny`, under light that has none.
+vec3 shade(vec3 albedo, vec3 position, vec3 normal, bool shiny) {
   vec3 to_eye = normalize(view.eye.xyz - position);
-  float facing = dot(normal, key_direction);
-  // Wrapped a little past the terminator: the soft look of a large lamp.
-  float key = max((facing + 0.15) / 1.15, 0.0);
-  key *= mix(smoothstep(-0.15, 0.25, facing), 1.0, 0.35) * key_light;
-  vec3 ambient = mix(bounce_colour, sky_colour, 0.5 + 0.5 * normal.y);
-  vec3 beside = normalize(to_eye - 0.7 * view.right.xyz + vec3(0.0, 0.25, 0.0));
-  float fill = 0.22 * max(dot(normal, beside), 0.0);
-  vec3 colour = albedo * (key_colour * key * 0.36 + ambient * 0.62 + fill);
-  float highlight = pow(max(dot(normal, normalize(key_direction + to_eye)), 0.0), 36.0);
-  float rim = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 4.0);
-  return colour + 0.10 * highlight * key_light * step(0.0, facing) * key_colour + 0.10 * rim * sky_colour;
+  float facing = dot(normal, key_direction), key = max(facing, 0.0);
+  if (key > 0.0) key *= body_shadow(position, normal, key);
+  vec2 on_ground = below(position);
+  float beside = 0.16 * max(dot(normal, normalize(to_eye - 0.7 * view.right.xyz + vec3(0.0, 0.25, 0.0))), 0.0);
+  // The sky is brighter where the key light is.
+  vec3 received = key_colour * key + (1.0 + 0.25 * facing) * surroundings(0.5 + 0.5 * normal.y, on_ground) + beside;
+  if (!shiny) return 0.88 * albedo * dot(received, vec3(0.30, 0.59, 0.11));
+  vec3 middle = normalize(key_direction + to_eye);
+  float at = max(dot(normal, middle), 0.0), across = dot(key_direction, middle), a2 = roughness * roughness;
+  float lobe = 1.0 + (a2 - 1.0) * at * at;
+  float highlight = mirrored * a2 / (4.0 * lobe * lobe * max(0.1, across * across) * (roughness + 0.5));
+  float grazing = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 5.0);
+  vec3 around = surroundings(smoothstep(-0.4, 0.4, reflect(-to_eye, normal).y), on_ground);
+  return albedo * received + key_colour * key * highlight + (mirrored + 0.3 * grazing) * around;
 }

@@ -1,15 +1,17 @@
-// The shadow map's projection around the bodies' bounds. Stage 0: least and greatest x, y, z of all finite positions, as
-// integers of the same order, since minimum and maximum of integers are atomic and do not depend on the order of
-// threads. Stage 1, one thread: the projection. Its size goes in steps and its centre by whole texels, so that shadow
-// edges do not crawl while a body moves.
+// The shadow map's projection around the bodies' bounds: least and greatest x, y, z of all finite positions, as integers of the
+// same order, since minimum and maximum of integers are atomic and do not depend on the order of threads; then, by the
+// work-group that ends last, the projection. Its size goes in steps and its centre by whole texels, so that shadow edges
+// do not crawl while a body moves.
 #include "layout.glsl"
 #include "render/view.glsl"
 layout(local_size_x = 128) in;
 layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_RENDER_BOUNDS) buffer Bounds { uint bounds[6]; };
+layout(std430, binding = BIND_RENDER_BOUNDS) coherent buffer Bounds {
+  uint bounds[6];
+  uint done;  // work-groups
+};
 layout(std430, binding = BIND_RENDER_FIT) writeonly buffer Fit { Light fitted; };
 uniform uint count;
-uniform int stage;
 uniform float map_size;  // texels
 uniform vec4 limit;      // centre and radius of what is worth a shadow
 
@@ -43,12 +45,14 @@ void find_bounds(uint i, uint lane) {
 }
 
 void fit_light() {
+  memoryBarrierBuffer();
   vec3 low = limit.xyz, high = limit.xyz;
   if (bounds[0] <= bounds[3]) {
     low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w, limit.xyz + limit.w);
     high = clamp(vec3(decoded(bounds[3]), decoded(bounds[4]), decoded(bounds[5])), limit.xyz - limit.w, limit.xyz + limit.w);
   }
   for (int a = 0; a < 3; ++a) bounds[a] = ~0u, bounds[3 + a] = 0u;  // for the next picture
+  done = 0u;
   vec3 centre = 0.5 * (low + high);
   vec3 half_size = max(0.5 * (high - low) * (1.0 + view.tets.y), vec3(1e-4 * limit.w));
   vec3 z = key_direction;
@@ -68,6 +72,9 @@ void fit_light() {
 }
 
 void main() {
-  if (stage == 0) find_bounds(gl_GlobalInvocationID.x, gl_LocalInvocationIndex);
-  else if (gl_GlobalInvocationID.x == 0u) fit_light();
+  uint lane = gl_LocalInvocationIndex;
+  find_bounds(gl_GlobalInvocationID.x, lane);
+  memoryBarrierBuffer();
+  barrier();
+  if (lane == 0u && atomicAdd(done, 1u) == gl_NumWorkGroups.x - 1u) fit_light();
 }

@@ -1,3 +1,4 @@
+#include "layout.glsl"
 #include "render/layout.glsl"
 layout(std140, binding = BIND_RENDER_VIEW) uniform ViewBlock { View view; };
 layout(std140, binding = BIND_RENDER_LIGHT) uniform LightBlock { Light light; };

@@ -115,7 +115,8 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
     const Target target = make_target(width, height, options.samples);
     const Camera camera = scene_camera(scene, *model, float(width) / float(height));
     for (const std::string& picture : options.pictures) {
-      const Frame frame = frame_of(sim, camera, picture == "plain" ? plain_view({}) : ViewOptions{}, target);
+      const auto kind = std::ranges::find(picture_kinds, picture, &PictureKind::name);
+      const Frame frame = frame_of(sim, camera, kind->view, target);
       row["size"] = fmt::format("{}x{}", width, height);
       row["picture"] = picture;
       rows.push_back(row);

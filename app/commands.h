@@ -36,7 +36,9 @@ struct RunOptions {
   std::array<int, 2> size{1280, 720};  ///< pixels
   int samples = 4;
   ViewOptions view;
-  double range = 0;  ///< end of the colour scale, in its unit; 0: as it is
+  double range = 0;                   ///< end of the colour scale, in its unit; 0: as it is
+  double turntable = 0;               ///< s a turn of the camera about the bodies; 0: none
+  std::filesystem::path camera_path;  ///< empty: none
   std::vector<std::string>
       lanes;                     ///< of the window: what each puts in place of the scene's settings (lanes.h)
   long history_mb = 256;         ///< of the window: for states to go back to; 0: none
@@ -73,11 +75,23 @@ struct BenchOptions {
   int repeats = 3;
   double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)
   std::vector<std::array<int, 2>> sizes{{1280, 720}};     ///< of rendered frames, pixels; none: no rendering
-  std::vector<std::string> pictures = {"plain", "full"};  ///< rendered at each size
+  std::vector<std::string> pictures = {"plain", "full"};  ///< of picture_kinds, rendered at each size
   int samples = 0;
   int gpu = -1;
   std::filesystem::path out = "bench";
 };
+/// The full picture, and it without a part or with another, to tell what each costs.
+struct PictureKind {
+  const char* name;
+  ViewOptions view;
+};
+inline const std::array<PictureKind, 7> picture_kinds{{{"full", {}},
+                                                       {"plain", plain_view({})},
+                                                       {"flat", {.smooth_normals = false}},
+                                                       {"no-shadow", {.shadow = false}},
+                                                       {"no-grid", {.grid = false}},
+                                                       {"no-ground", {.backdrop = false}},
+                                                       {"wire", {.look = Look::wire}}}};
 /// `tetpbd bench`: frames a second and ms a step, by the paper's protocol, beside the error of the setting.
 int run_bench(const BenchOptions& options);
 /// Its rows, to be made in the current context.

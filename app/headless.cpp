@@ -27,6 +27,8 @@ struct FrameWriter {
   Target target;
   Renderer renderer;
   Frame frame;
+  float azimuth = frame.camera.azimuth;  ///< at the start
+  std::vector<CameraKey> path{};
   std::optional<Video> video{};
   long drawn = 0;                 ///< step of the last frame
   Buffer answers{}, distances{};  ///< of the colour motion
@@ -46,7 +48,25 @@ struct FrameWriter {
       throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
     if (run.view.colour == Colour::energy && scene.settings.material == "none")
       throw Error("there is no material", "--colour energy", "give one, as in --material neo-hookean");
+    if (!run.camera_path.empty()) path = read_camera_path(run.camera_path);
     if (!run.video.empty()) video.emplace(run.video, run.size[0], run.size[1], rate);
+  }
+
+  void move_camera(long s) {
+    Camera& camera = frame.camera;
+    if (!path.empty()) {
+      camera = camera_at(path, double(s) * dt);
+      return;
+    }
+    if (options.turntable > 0) camera.azimuth = azimuth + float(360 * double(s) * dt / options.turntable);
+    frame.options.follow = true;  // where the bodies are is found with the light's view of them
+    bind_view(renderer, frame);
+    frame.options.follow = false;
+    const auto centre = poll_centre(renderer, true);
+    if (centre && options.view.follow) follow(camera, *centre, float(double(s - drawn) * dt));
+    if (centre && !options.view.follow)
+      keep_in_view(camera, *centre, float(target.width) / float(target.height));
+    drawn = s;
   }
 
   void draw_frame(long s) {
@@ -58,10 +78,10 @@ struct FrameWriter {
       frame.values = distances.id();
     }
     if (!png && !film) return;
+    move_camera(s);
+    if (*frame.options.scale().title && !frame.options.hold_range)
+      frame.options.range() = fitted_range(frame.options.scale(), read_values(renderer, frame));
     draw(renderer, frame);
-    if (const auto centre = poll_centre(renderer, true))  // for the next frame
-      follow(frame.camera, *centre, float(double(s - drawn) * dt));
-    drawn = s;
     const Image image = read_rgba(target);
     if (png) write_png(options.out / fmt::format("frame_{:05}.png", s), image);
     if (film) video->add(image);

@@ -171,7 +171,7 @@ void open_scene(Arguments& a) {
   a.soak.gpu = a.run.gpu;
   const ColourScale& scale = a.run.view.scale();
   if (const double end = a.run.range / scale.factor; end > 0)
-    a.run.view.range() = {scale.is_signed ? -end : 0, end};
+    a.run.view.range() = {scale.is_signed ? -end : 0, end}, a.run.view.hold_range = true;
   if (a.run.replay.empty()) a.opened = load_scene(a.scene, a.overrides);
 }
 
@@ -201,14 +201,17 @@ void add_scene(CLI::App& command, Arguments& a) {
       ->transform(one_of(look_names));
   view.add_option("--colour", look.colour, fmt::format("{}", fmt::join(colour_names, ", ")))
       ->transform(one_of(colour_names));
-  add(view, "--range", a.run.range, 1e-12, 1e12, "end of the colour scale, in its unit");
+  add(view, "--range", a.run.range, 1e-12, 1e12,
+      "end of the colour scale, in its unit (default: as the values ask)");
   add(view, "--cut", look.cut, 0.0, 1.0, "shows what is below this part of the body alone");
   add(view, "--cut-axis", look.cut_axis, 0, 2, "0: x, 1: y, 2: z");
   view.add_flag("!--flat", look.smooth_normals, "flat normals");
   view.add_flag("!--no-shadow", look.shadow, "no shadow");
   view.add_flag("!--no-grid", look.grid, "no lines on the ground");
   view.add_flag("!--no-legend", look.legend, "no colour bar");
-  view.add_flag("--follow", look.follow, "the camera goes where the bodies go (the window: from the start)");
+  view.add_flag("--follow", look.follow,
+                "the camera goes where the bodies go (the window: from the start; else only as they would "
+                "leave the picture)");
   view.add_flag_callback(
       "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
   command.parse_complete_callback([&] { open_scene(a); });
@@ -252,6 +255,10 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(run, "--video", a.run.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
   add(run, "--video-every", a.run.video_every, 1L, most_steps,
       "steps per video frame (default: those of 1/30 s)");
+  add(run, "--turntable", a.run.turntable, 1e-3, 1e9, "the camera turns about the bodies once in so many s");
+  add(run, "--camera-path", a.run.camera_path,
+      "a JSON list of cameras as in a scene, each with its \"time\" in s, which it goes through")
+      ->excludes("--turntable", "--follow");
   add(run, "--csv-every", a.run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
   add(run, "--reference", a.run.reference,
       "the right motion, made by tetpbd reference (default: the cache's of this scene)");
@@ -261,7 +268,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(run, "--replay", a.run.replay,
       "instead: what a record of tetpbd view --record says, lanes and all; "
       "with --video, drawn at the speed it was played")
-      ->excludes("--scene", "--steps", "--png-every", "--positions");
+      ->excludes("--scene", "--steps", "--png-every", "--positions", "--turntable", "--camera-path");
   add_progress(run, a.run.progress);
 
   CLI::App& reference =
@@ -296,8 +303,11 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(bench, "--most-seconds", a.bench.most_seconds, 0.01, 1e6,
       "a repetition ends there with fewer frames; 12 times that bounds the error run");
   add_sizes(bench, "--sizes,--size", a.bench.sizes, "of the rendered frames, WxH, separated by commas");
-  add(bench, "--pictures", a.bench.pictures, "plain (flat faces on one colour), full (as run draws it)")
-      ->check(one_of(std::array{"plain", "full"}));
+  std::vector<std::string> kinds;
+  for (const PictureKind& kind : picture_kinds) kinds.emplace_back(kind.name);
+  add(bench, "--pictures", a.bench.pictures,
+      fmt::format("{}: full is as run draws it, the others go without a part", fmt::join(kinds, ", ")))
+      ->check(one_of(kinds));
   add_samples(bench, a.bench.samples);
   bench.add_flag_callback(
       "--no-render", [&] { a.bench.sizes.clear(); }, "simulation alone");

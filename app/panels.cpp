@@ -310,8 +310,8 @@ void draw_colour_range(Session& s) {
   const std::string unit = scale.factor == 100 ? "%%" : scale.unit;
   if (slider(s, "colour range", high, 1e-4 * scale.most * scale.factor, scale.most * scale.factor,
              ((scale.is_signed ? "+/- %.3g " : "0 .. %.3g ") + unit).c_str(), scale.unit, true))
-    range = {scale.is_signed ? -high / scale.factor : 0, high / scale.factor};
-  if (button(s, "Fit", "fit", "the range to the largest value of now")) s.fit_range = true;
+    range = {scale.is_signed ? -high / scale.factor : 0, high / scale.factor}, s.view.hold_range = true;
+  check_box(s, "hold range", s.view.hold_range, "else it follows the values of now");
   ImGui::SameLine(label_width());
   check_box(s, "mark worst", s.view.worst,
             "rings around the vertices with the largest values, inside bodies too\nW");

@@ -221,6 +221,18 @@ std::string said(const json::exception& problem) {
   return text.substr(text.find("] ") == std::string::npos ? 0 : text.find("] ") + 2);
 }
 
+json read_json(const fs::path& file, const char* what) {
+  std::error_code error;
+  if (fs::file_size(file, error) > most_bytes)
+    throw Error(fmt::format("{} file is too large", what), file.string(),
+                fmt::format("a {} is a few kilobytes of JSON", what));
+  try {
+    return parsed(std::ifstream(file, std::ios::binary));
+  } catch (const json::exception& problem) {
+    throw Error("not valid JSON", file.string(), said(problem));
+  }
+}
+
 // "bodies.0.density=500": the value is JSON, or text where it is none.
 void set_path(json& document, const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
@@ -271,6 +283,25 @@ TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
 
 }  // namespace
 
+std::vector<CameraKey> read_camera_path(const fs::path& file) {
+  if (!fs::is_regular_file(file))
+    throw Error("no such camera path", file.string(), "give a file: a list of cameras in JSON");
+  json allowed = schema()["camera"];
+  allowed.update({{"time", {0, 1e9}}, {"azimuth", {-1e6, 1e6}}});
+  json keys = read_json(file, "camera path");
+  check(keys, {{"least", 1}, {"most", 10000}, {"of", "cameras with their time"}, {"each", allowed}}, "path",
+        file.string());
+  std::vector<CameraKey> path;
+  for (json whole = Camera(); const json& key : keys) {
+    whole.update(key);
+    if (!key.contains("time") || (!path.empty() && !(key["time"] > path.back().time)))
+      refuse(fmt::format("'path.{}.time' must be there, and later than the one before", path.size()),
+             file.string());
+    path.push_back({key["time"], whole.get<Camera>()});
+  }
+  return path;
+}
+
 std::vector<std::string> scene_names(const std::string& folder) {
   std::vector<std::string> names;
   std::error_code error;
@@ -289,14 +320,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     throw Error("no such scene", name_or_file,
                 fmt::format("give a .json file or one of {} in {}", fmt::join(scene_names(), ", "),
                             (models_folder() / "scenes").string()));
-  if (fs::file_size(file, error) > most_bytes)
-    throw Error("scene file is too large", file.string(), "a scene is a few kilobytes of JSON");
-  json document;
-  try {
-    document = parsed(std::ifstream(file, std::ios::binary));
-  } catch (const json::exception& problem) {
-    throw Error("not valid JSON", file.string(), said(problem));
-  }
+  json document = read_json(file, "scene");
   for (const std::string& assignment : overrides.set) set_path(document, assignment);
   std::string where = file.string();
   if (!overrides.set.empty()) where += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));

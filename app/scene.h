@@ -68,6 +68,8 @@ struct SceneOverrides {
 
 /// A name in models/scenes, or a file. Throws Error naming file, key and allowed range.
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides = {});
+/// `run --camera-path`. What a camera does not say is as in the one before. Throws Error.
+std::vector<CameraKey> read_camera_path(const std::filesystem::path& file);
 std::vector<std::string> scene_names(const std::string& folder = "scenes");
 
 /// One at least.

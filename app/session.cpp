@@ -312,6 +312,7 @@ void choose_colour(Session& s, Colour colour) {
   s.worst.clear();
   s.loaded.renderer.values_copied = {};  // of another colour
   s.fit_range = colour == Colour::energy || colour == Colour::motion;
+  s.fitted = -1;
   if (!has_colour(s, colour))
     say(s, colour == Colour::energy ? "this needs a material" : "patches of vertices are those of mode node");
   if (colour != Colour::motion) return;
@@ -323,6 +324,8 @@ void choose_colour(Session& s, Colour colour) {
 }
 
 void find_worst(Session& s) {
+  if (!s.view.hold_range && s.view.colour != Colour::plain && s.now - s.fitted > 0.25)
+    s.fit_range = true, s.fitted = s.now;
   std::optional<std::vector<float>> values;
   attempt(s, [&] { values = poll_values(s.loaded.renderer); });
   if (!values) return;
@@ -342,13 +345,7 @@ void find_worst(Session& s) {
     };
     if (std::ranges::none_of(s.worst, close)) s.worst.emplace_back(*v, (*values)[*v]);
   }
-  if (!std::exchange(s.fit_range, false) || s.worst.empty()) return;
-  const double largest = double(size(s.worst.front().first)),
-               power = std::pow(10, std::floor(std::log10(largest)));
-  double high = 10 * power;
-  for (const double step : {5.0, 2.0, 1.0})
-    if (largest <= step * power) high = step * power;
-  s.view.range() = {s.view.scale().is_signed ? -high : 0, high};
+  if (std::exchange(s.fit_range, false)) s.view.range() = fitted_range(s.view.scale(), std::move(*values));
 }
 
 const Motion* right_now(const Session& s) {

@@ -140,6 +140,7 @@ struct Session {
   History frames_per_second;
   bool probing = true;                                 ///< the cursor at rest on a body says what is there
   bool fit_range = false;                              ///< of the colours, once to the values of now
+  double fitted = -1;                                  ///< when they were last
   std::vector<std::pair<std::uint32_t, float>> worst;  ///< vertices and their values, the largest first
   bool overlaid = false;                               ///< lanes are drawn in one place
   bool ghost = true;  ///< beside the others stands the one they are held against

@@ -345,7 +345,10 @@ void find_worst(Session& s) {
     };
     if (std::ranges::none_of(s.worst, close)) s.worst.emplace_back(*v, (*values)[*v]);
   }
-  if (std::exchange(s.fit_range, false)) s.view.range() = fitted_range(s.view.scale(), std::move(*values));
+  if (!std::exchange(s.fit_range, false)) return;
+  const ColourRange fitted = fitted_range(s.view.scale(), std::move(*values));
+  // What swings shall not take its scale along.
+  if (fitted.high > s.view.range().high || fitted.high < 0.3 * s.view.range().high) s.view.range() = fitted;
 }
 
 const Motion* right_now(const Session& s) {

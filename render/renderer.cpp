@@ -1,7 +1,6 @@
 #include "render/renderer.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <glm/gtc/color_space.hpp>
 #include <glm/gtc/matrix_transform.hpp>
@@ -338,7 +337,7 @@ void bind_shadows(const Shadow& shadow) {
 // As fine as the picture needs it.
 void light_planes(Renderer& renderer, const Frame& frame, int count) {
   Shadow& shadow = renderer.shadow;
-  const int size = std::clamp(int(std::bit_ceil(unsigned(frame.viewport.height / 2 + 1))), 128, 512);
+  const int size = std::clamp(frame.viewport.height / 32 * 16, 128, 512);  // whole work-groups
   if (shadow.planes_size != size || shadow.planes_count != count) {
     shadow.planes = Texture("light on planes");
     clear_errors();

@@ -30,7 +30,7 @@ vec2 disk_point(int i, int n) {
 // casts none itself, so there is no bias.
 float key_light(vec3 position) {
   const float light_size = 0.16;  // widening of the penumbra in metres for each metre
-  const float widest = 0.03;      // of the shadow map
+  const float widest = 0.024;     // of the shadow map
   vec3 s = light_space(position) * 0.5 + 0.5;
   float metre = 0.5 / light.extent.y, depth = min(s.z, 1.0);
   float narrowest = plane_reach / float(map_size), search = clamp(light_size * s.z * light.extent.x * metre, narrowest, widest);
@@ -43,9 +43,10 @@ float key_light(vec3 position) {
     blockers += 1.0;
   }
   if (blockers == 0.0) return 1.0;
-  float gap = max(s.z - sum / blockers, 0.0) * light.extent.x, radius = clamp(light_size * gap * metre, narrowest, widest);
-  for (int i = 0; i < 32; ++i) lit += textureLod(shadow_map, vec3(s.xy + radius * disk_point(i, 32), depth), 0.0);
-  return lit / 32.0;
+  if (blockers == 16.0) return 0.0;  // for no penumbra is wider than the search
+  float gap = max(s.z - sum / blockers, 0.0) * light.extent.x, radius = clamp(light_size * gap * metre, narrowest, search);
+  for (int i = 0; i < 40; ++i) lit += textureLod(shadow_map, vec3(s.xy + radius * disk_point(i, 40), depth), 0.0);
+  return lit / 40.0;
 }
 
 // The part of the hemisphere that is hidden by disks, each for a share of the bodies' triangles; a ray that meets a body meets two.

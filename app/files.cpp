@@ -64,6 +64,20 @@ void write_png(const fs::path& file, const Image& image) {
   whole.finish();
 }
 
+std::optional<Image> read_png(const fs::path& file) {
+  constexpr png_uint_32 most = 1024;  // pixels a side
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  if (!png_image_begin_read_from_file(&png, file.c_str())) return {};
+  png.format = PNG_FORMAT_RGBA;
+  Image image{int(png.width), int(png.height), {}};
+  const bool fits = png.width <= most && png.height <= most;
+  if (fits) image.rgba.resize(std::size_t(4) * png.width * png.height);
+  if (fits && png_image_finish_read(&png, nullptr, image.rgba.data(), 0, nullptr)) return image;
+  png_image_free(&png);
+  return {};
+}
+
 void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (!std::isfinite(rows[i].x) || !std::isfinite(rows[i].y) || !std::isfinite(rows[i].z))

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ std::string json_text(const Json& document, int indent) {
 /// "NAME_000.ENDING", or the next number that no file in the current folder has.
 std::string free_name(const std::string& name, const std::string& ending);
 void write_png(const std::filesystem::path& file, const Image& image);
+/// A small one; none where there is no such picture.
+std::optional<Image> read_png(const std::filesystem::path& file);
 /// numpy arrays: float32 N x 3 (throws Error for numbers that are not finite), uint32 T x 4.
 void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);
 void write_npy(const std::filesystem::path& file, const std::vector<Tet>& rows);

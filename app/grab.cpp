@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace tetpbd {
 
 namespace {
 
 constexpr std::size_t most_neighbours = 32;
+constexpr std::size_t most_held = 128;  // each is a write into the GPU's buffers, before every step
+
+// A hold falls behind by so much of its radius: with more its own tets are sheared by more than a half.
+constexpr double slack_of_radius = 0.3;
 
 // The vertex may go this part of an edge in one step. A tet turns inside out when a vertex passes its
 // opposite face, about 0.8 of an edge away; a quarter leaves the solver several steps to answer, also while
@@ -36,31 +41,101 @@ void watch(Grab& grab, const Sim& sim, bool wait = false) {
   grab.copied = Fence::here();
 }
 
-double apart(const Grab& grab) { return glm::distance(grab.seen, grab.neighbours); }
+// How much farther than when it was caught.
+double apart(const Grab& grab) { return glm::distance(grab.seen - grab.neighbours, grab.resting); }
+
+// Those within the radius (m) at rest and joined to the vertex there, for another limb may be as near; the
+// nearest first.
+std::vector<std::uint32_t> around(const TetMesh& rest, std::uint32_t vertex, double radius) {
+  const auto far = [&](std::uint32_t v) { return glm::distance(rest.positions[v], rest.positions[vertex]); };
+  const auto within = [&](std::uint32_t v) { return far(v) < radius; };
+  std::set<std::uint32_t> found{vertex};
+  std::vector<Tet> near;
+  for (const Tet& tet : rest.tets)
+    if (std::ranges::any_of(tet, within)) near.push_back(tet);
+  for (std::size_t before = 0; before < found.size();) {
+    before = found.size();
+    for (const Tet& tet : near)
+      if (std::ranges::any_of(tet, [&](std::uint32_t v) { return found.contains(v); }))
+        std::ranges::copy_if(tet, std::inserter(found, found.end()), within);
+  }
+  std::vector<std::uint32_t> order(found.begin(), found.end());
+  std::ranges::stable_sort(order, {}, far);
+  std::iter_swap(order.begin(), std::ranges::find(order, vertex));  // others may coincide with it
+  order.resize(std::min(order.size(), most_held));
+  return order;
+}
 
 }  // namespace
 
-Grab begin_grab(Sim& sim, const Pick& pick) {
+bool Hold::has(std::uint32_t vertex) const { return std::ranges::find(vertices, vertex) != vertices.end(); }
+
+Hold take_hold(const Sim& sim, std::uint32_t vertex, double radius) {
+  Hold hold;
+  hold.was_pinned = is_pinned(sim, vertex);
+  const TetMesh& rest = sim.model->rest;
+  const double metres = hold.was_pinned ? 0 : radius * sim.model->size;
+  hold.slack = slack_of_radius * metres;
+  const State state = read_state(sim);
+  for (const std::uint32_t v : around(rest, vertex, metres)) {
+    if (v != vertex && is_pinned(sim, v)) continue;  // somebody wants it where it is
+    const double far = glm::distance(rest.positions[v], rest.positions[vertex]);
+    const double near = v == vertex ? 1 : 1 - far * far / (metres * metres);
+    hold.vertices.push_back(v);
+    hold.starts.push_back(state.positions[v]);
+    hold.behind.push_back(1 - near * near);
+  }
+  return hold;
+}
+
+void pin_held(Sim& sim, const Hold& hold) {
+  for (const std::uint32_t v : hold.vertices) pin(sim, v);
+}
+
+void unpin_held(Sim& sim, const Hold& hold) {
+  for (const std::uint32_t v : hold.vertices)
+    if (!hold.was_pinned) unpin(sim, v);
+}
+
+void move_held(Sim& sim, const Hold& hold, const glm::dvec3& to) {
+  move_pinned(sim, hold.caught(), to);
+  const glm::dvec3 moved = to - hold.starts.front();
+  const double distance = glm::length(moved), slack = std::min(hold.slack, distance);
+  const auto planes = planes_of(*sim.model, sim.settings);
+  for (std::size_t i = 1; i < hold.vertices.size(); ++i) {
+    glm::dvec3 place = hold.starts[i];
+    if (distance > 0) place += moved * (1 - hold.behind[i] * slack / distance);
+    for (const glm::dvec4& plane : planes)
+      place += glm::dvec3(plane) * std::max(0.0, plane.w - glm::dot(glm::dvec3(plane), place));
+    move_pinned(sim, hold.vertices[i], place);
+  }
+}
+
+Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick) {
   Grab grab;
-  grab.vertex = pick.vertex;
-  grab.was_pinned = is_pinned(sim, pick.vertex);
+  grab.slack = hold.slack;
   grab.hit = glm::dvec3(pick.ray.origin) + double(pick.distance) * glm::dvec3(pick.ray.direction);
   const TetMesh& rest = sim.model->rest;
+  const std::set<std::uint32_t> held(hold.vertices.begin(), hold.vertices.end());
+  int edges = 0;
   for (const Tet& tet : rest.tets) {
-    if (std::ranges::count(tet, pick.vertex) == 0) continue;
-    for (const std::uint32_t v : tet)
-      if (v != pick.vertex && grab.watched.size() < most_neighbours && !std::ranges::count(grab.watched, v))
+    if (std::ranges::none_of(tet, [&](std::uint32_t v) { return held.contains(v); })) continue;
+    const bool own = std::ranges::count(tet, hold.caught()) > 0;
+    for (const std::uint32_t v : tet) {
+      if (own && v != hold.caught())
+        grab.edge += glm::distance(rest.positions[v], rest.positions[hold.caught()]), ++edges;
+      if (!held.contains(v) && grab.watched.size() < most_neighbours && !std::ranges::count(grab.watched, v))
         grab.watched.push_back(v);
+    }
   }
-  for (const std::uint32_t v : grab.watched)
-    grab.edge += glm::distance(rest.positions[v], rest.positions[pick.vertex]) / double(grab.watched.size());
-  grab.watched.push_back(pick.vertex);
+  grab.edge /= std::max(edges, 1);
+  if (grab.watched.empty()) grab.watched.push_back(hold.vertices.back());  // all of the body is held
+  grab.watched.push_back(hold.caught());
   grab.copy = Buffer("watched positions", grab.watched.size() * sizeof(Position), nullptr, GL_STREAM_READ);
   watch(grab, sim);
   watch(grab, sim, true);
   grab.start = grab.position = grab.seen;
-  grab.resting = apart(grab);
-  pin(sim, pick.vertex);
+  grab.resting = grab.seen - grab.neighbours;
   return grab;
 }
 
@@ -78,15 +153,13 @@ void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
   }
 }
 
-void lead(Grab& grab, Sim& sim) {
-  const double limit = edges_at_most * grab.edge;
+void lead(Grab& grab) {
+  const double limit = edges_at_most * grab.edge + grab.slack;
   // Part of the full speed that the body can follow now, below 0 backwards.
-  const double pace =
-      std::clamp((limit - apart(grab)) / std::max(limit - grab.resting, 0.1 * limit), -1.0, 1.0);
-  const glm::dvec3 way = (pace < 0 ? grab.neighbours : grab.target) - grab.position;
+  const double pace = std::clamp((limit - apart(grab)) / limit, -1.0, 1.0);
+  const glm::dvec3 way = (pace < 0 ? grab.neighbours + grab.resting : grab.target) - grab.position;
   const double distance = glm::length(way), most = edges_a_step * grab.edge * std::abs(pace);
   grab.position += distance > most ? way * (most / distance) : way;
-  move_pinned(sim, grab.vertex, grab.position);
 }
 
 }  // namespace tetpbd

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "app/ui.h"
+#include "app/widgets.h"
 
 namespace tetpbd {
 
@@ -68,7 +69,7 @@ void draw_grid(Session& s, const LiveMap& map) {
       const double part = heat_part(cell.percent);
       const glm::vec3 c(bad                               ? glm::dvec3(0.2)
                         : cell.state == MapCell::finished ? heat(part)
-                                                          : glm::dvec3(0.86));
+                                                          : glm::dvec3(0.8));
       draw.AddRectFilled(low, end, ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1)));
       const bool dark = bad || (cell.state == MapCell::finished && (part < 0.45 || part > 0.93));
       const std::string said =
@@ -78,7 +79,8 @@ void draw_grid(Session& s, const LiveMap& map) {
           : cell.state == MapCell::failed  ? fmt::format("@{}", cell.failed_at)
           : cell.state == MapCell::refused ? "no"
                                            : "";
-      write(said, (low.x + end.x) / 2, (low.y + end.y) / 2, dark ? IM_COL32_WHITE : ink, wide);
+      write(said, (low.x + end.x) / 2, (low.y + end.y) / 2, dark ? IM_COL32_WHITE : IM_COL32(30, 30, 30, 255),
+            wide);
       if (parameter_text(own, *map.x.row) == parameter_text(cell.settings, *map.x.row) &&
           parameter_text(own, *map.y.row) == parameter_text(cell.settings, *map.y.row))
         draw.AddRect(low, end, ink, 0, 0, 2 * s.ui.scale);  // the lane's own

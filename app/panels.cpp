@@ -1,7 +1,7 @@
-// The panel at the right: run, scene, solver, world, view. Widgets of parameters are made from their rows.
+// The panel at the right: run, scene, material, solver, contact, view. Widgets of settings are made from
+// their rows.
 #include <fmt/ranges.h>
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <bit>
@@ -12,80 +12,13 @@
 #include <tuple>
 
 #include "app/ui.h"
+#include "app/widgets.h"
+#include "sim/error.h"
 #include "sim/material.h"
 
 namespace tetpbd {
 
 namespace {
-
-using Words = std::vector<std::string>;
-
-// What a widget means, while the cursor is over it, and where it is, for tests.
-void describe_item(Session& s, const std::string& name, const std::string& help = "") {
-  mark(s, name);
-  if (help.empty() || ImGui::IsItemActive() || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled))
-    return;
-  ImGui::BeginTooltip();
-  ImGui::PushTextWrapPos(ImGui::GetFontSize() * 24);
-  ImGui::TextUnformatted(help.c_str());
-  ImGui::PopTextWrapPos();
-  ImGui::EndTooltip();
-}
-
-// Label at the left, the widget, whose id this gives, in the rest of the line.
-std::string begin_row(const std::string& label) {
-  ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(label.c_str());
-  ImGui::SameLine(label_width());
-  ImGui::SetNextItemWidth(-1);
-  return "##" + label;
-}
-
-bool button(Session& s, const char* label, const char* name, const char* help, float width = 0) {
-  const bool pressed = ImGui::Button(label, ImVec2(width, 0));
-  describe_item(s, name, help);
-  return pressed;
-}
-
-bool check_box(Session& s, const char* label, bool& value, const std::string& help = "") {
-  const bool changed = ImGui::Checkbox(label, &value);
-  if (changed) s.log("{} {}", label, value);
-  describe_item(s, label, help);
-  return changed;
-}
-
-// The word chosen, once.
-std::optional<std::string> combo(Session& s, const std::string& label, const std::string& now,
-                                 const Words& words, const std::string& help = "") {
-  std::optional<std::string> chosen;
-  if (ImGui::BeginCombo(begin_row(label).c_str(), now.c_str(), ImGuiComboFlags_HeightLarge)) {
-    for (const std::string& word : words) {
-      if (ImGui::Selectable(word.c_str(), word == now)) chosen = word;
-      mark(s, label + "=" + word);
-    }
-    ImGui::EndCombo();
-  }
-  describe_item(s, label, help);
-  return chosen;
-}
-
-// For an enumeration whose names are in its order.
-template <class Enum, class Names>
-void enum_combo(Session& s, const char* label, const Names& names, Enum& value) {
-  const auto chosen = combo(s, label, names[std::size_t(value)], Words(std::begin(names), std::end(names)));
-  if (!chosen) return;
-  value = Enum(std::ranges::find(names, *chosen) - std::begin(names));
-  s.log("{} {}", label, *chosen);
-}
-
-bool slider(Session& s, const char* label, double& value, double low, double high, const char* format,
-            const char* help, bool logarithmic = false) {
-  const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
-  const bool changed =
-      ImGui::SliderScalar(begin_row(label).c_str(), ImGuiDataType_Double, &value, &low, &high, format, flags);
-  describe_item(s, label, help);
-  return changed;
-}
 
 template <class T>
 bool number_widget(const Parameter& row, const std::string& id, T& value) {
@@ -111,22 +44,25 @@ bool number_widget(const Parameter& row, const std::string& id, T& value) {
 
 std::string help_text(const Parameter& row) {
   std::string text = row.help;
+  if (row.name == "mode")
+    for (const SolverMode& mode : solver_modes()) text += fmt::format("\n{}: {}", mode.name, mode.help);
   if (choices(row).empty() && !std::holds_alternative<bool Settings::*>(row.member))
     text += fmt::format("\n{:g} to {:g}{}{}; Ctrl+click to type", row.low, row.high, *row.unit ? " " : "",
                         row.unit);
   if (row.effect == Effect::restart) text += "\ntakes effect at the next reset";
-  return text + fmt::format("\n{}", flag_name(row));
+  return text + fmt::format("\non the command line: {}", flag_name(row));
 }
 
 // A row of check boxes for a list of words.
-bool words_widget(Session& s, const Parameter& row, std::string& value) {
+bool words_widget(Session& s, const Parameter& row, std::string& value, const std::string& usual) {
   Words chosen = split(value, ',');
+  const Words first = split(usual, ',');
   bool changed = false;
   int place = 0;
   for (const std::string& word : choices(row)) {
     if (place++ % 3) ImGui::SameLine();
     bool on = std::ranges::count(chosen, word) > 0;
-    if (!check_box(s, word.c_str(), on, help_text(row))) continue;
+    if (!check_box(s, word.c_str(), on, help_text(row), std::ranges::count(first, word) > 0)) continue;
     changed = true;
     on ? chosen.push_back(word) : void(std::erase(chosen, word));
   }
@@ -134,51 +70,114 @@ bool words_widget(Session& s, const Parameter& row, std::string& value) {
   return changed;
 }
 
-// What has no effect, as the stiffness of a kind that is switched off.
-bool is_idle(const Settings& settings, const Parameter& row) {
-  if (row.name == "mass_splitting") return compliant(settings);  // brings it with it
-  if (row.name == "stability") return !leaps(settings);
-  if (row.name == "omega" && is_implicit(settings)) return true;
-  if (leaps(settings) && (row.name == "substeps" || row.name == "iterations" || row.name == "omega"))
-    return true;
-  if (row.name == "rigid_contact") {
+// What has no effect, as the stiffness of a kind that is switched off, is not shown.
+bool has_effect(const Session& s, const Settings& settings, const Parameter& row) {
+  const std::string_view name = row.name;
+  const bool material = settings.material != "none", averaged = settings.mode.substr(0, 3) != "cpu";
+  if (name == "mass_splitting") return averaged && !compliant(settings);  // which brings it with it
+  if (name == "omega") return averaged && !leaps(settings) && !is_implicit(settings);
+  if (name == "stability") return leaps(settings);
+  if (name == "substeps" || name == "iterations") return !leaps(settings);
+  if (name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;
-    return !rigid_in_contact(on);
+    return rigid_in_contact(on);
   }
-  if (row.name == "restitution") return settings.restitution == 0 && !rigid_in_contact(settings);
-  const bool material = settings.material != "none";
-  if (row.name == "young_modulus" || row.name == "poisson_ratio") return !material;
+  if (name == "restitution") return settings.restitution != 0 || rigid_in_contact(settings);
+  if (name == "ground_height") return settings.ground;
+  if (name == "friction") return settings.ground || !s.loaded.scene.obstacles.empty();
+  if (name == "young_modulus" || name == "poisson_ratio") return material;
+  if (name == "constraints") return !material;
   const auto* of = std::get_if<KindMember>(&row.member);
-  return of && (material || !uses(settings, constraint_kinds[of->kind]));
+  return !of || (!material && uses(settings, constraint_kinds[of->kind]));
 }
 
 bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
+  const std::string usual = parameter_text(s.loaded.own, row),
+                    back = parameter_text(settings, row) == usual ? "" : usual;
+  const std::string before = parameter_text(settings, row);
   if (const auto* word = std::get_if<std::string Settings::*>(&row.member)) {
-    if (std::string_view(row.name) == "constraints") return words_widget(s, row, settings.**word);
-    const auto chosen = combo(s, row.name, settings.**word, choices(row), help_text(row));
-    if (chosen) settings.** word = *chosen;
-    return chosen.has_value();
+    std::string& value = settings.**word;
+    if (row.name == "constraints") return words_widget(s, row, value, s.loaded.own.**word);
+    const auto chosen = combo(s, row.name, value, choices(row), help_text(row), usual);
+    return chosen && value != std::exchange(value, *chosen);
   }
-  ImGui::BeginDisabled(is_idle(settings, row));
-  const std::string id = begin_row(label_of(row.name.c_str()));
-  bool changed = false;
+  const std::string id = begin_row(s, label_of(row.name.c_str()), !back.empty());
   with_value(settings, row, [&]<class T>(T& value) {
     if constexpr (std::is_same_v<T, bool>)
-      changed = ImGui::Checkbox(id.c_str(), &value);
+      ImGui::Checkbox(id.c_str(), &value);
     else if constexpr (!std::is_same_v<T, std::string>)
-      changed = number_widget(row, id, value);
+      number_widget(row, id, value);
   });
-  describe_item(s, row.name, help_text(row));
-  ImGui::EndDisabled();
-  return changed;
+  const std::string unit = *row.unit ? std::string(" ") + row.unit : "";
+  if (end_row(s, row.name, help_text(row), back.empty() ? "" : back + unit))
+    set_parameter(settings, row, back, row.name);
+  return parameter_text(settings, row) != before;
 }
 
-void draw_parameters(Session& s, std::string_view section) {
-  Settings wanted = s.loaded.sim().settings;
+/// Where settings have their widgets: those that matter at once, others under "more". A * stands for kinds of
+/// constraint. What is named nowhere is under the solver's.
+struct Group {
+  const char* name;
+  bool open;
+  Words shown, more;
+};
+const std::vector<Group>& groups() {
+  static const std::vector<Group> rows = [] {
+    std::vector<Group> all = {
+        {"Material",
+         true,
+         {"material", "young_modulus", "poisson_ratio", "constraints", "k_*"},
+         {"compliance_*", "constraint_damping", "damping"}},
+        {"Solver", true, {"mode", "substeps", "iterations", "stability", "dt"}, {"omega", "mass_splitting"}},
+        {"Contact",
+         false,
+         {"gravity", "ground", "friction", "restitution"},
+         {"ground_height", "rigid_contact"}},
+    };
+    const auto names = [](const std::string& pattern, const std::string& name) {
+      return pattern == name ||
+             (pattern.back() == '*' && name.starts_with(pattern.substr(0, pattern.size() - 1)));
+    };
+    for (const Parameter& row : parameters())
+      if (std::ranges::none_of(all, [&](const Group& group) {
+            return std::ranges::any_of(group.shown, [&](const auto& p) { return names(p, row.name); }) ||
+                   std::ranges::any_of(group.more, [&](const auto& p) { return names(p, row.name); });
+          }))
+        all[1].more.push_back(row.name);
+    for (Group& group : all)
+      for (Words* list : {&group.shown, &group.more}) {
+        Words found;
+        for (const std::string& pattern : *list)
+          for (const Parameter& row : parameters())
+            if (names(pattern, row.name)) found.push_back(row.name);
+        *list = std::move(found);
+      }
+    return all;
+  }();
+  return rows;
+}
+
+void draw_settings(Session& s, const Group& group) {
+  const Settings now = s.loaded.sim().settings;
+  const auto& own = s.loaded.own;
+  Settings wanted = now;
+  const auto differs = [](const Settings& a, const Settings& b, const Parameter& row) {
+    return parameter_text(a, row) != parameter_text(b, row);
+  };
+  std::vector<const Parameter*> shown, rest;
+  for (const auto* list : {&group.shown, &group.more})
+    for (const std::string& name : *list) {
+      const Parameter& row = *find_parameter(name);
+      // What the scene itself sets matters there.
+      const bool matters = list == &group.shown || differs(own, Settings(), row);
+      if (has_effect(s, now, row)) (matters ? shown : rest).push_back(&row);
+    }
   bool changed = false;
-  for (const Parameter& row : parameters())
-    if (section == row.section) changed |= parameter_widget(s, row, wanted);
+  for (const Parameter* row : shown) changed |= parameter_widget(s, *row, wanted);
+  const bool unusual = std::ranges::any_of(rest, [&](const auto* row) { return differs(now, own, *row); });
+  if (!rest.empty() && more(s, group.name, unusual))
+    for (const Parameter* row : rest) changed |= parameter_widget(s, *row, wanted);
   if (changed) change_settings(s, wanted);
 }
 
@@ -204,8 +203,10 @@ void draw_solver(Session& s) {
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
   Ways ways = ways_of(now, solver_presets(),
-                      "--solver\nauto: tries ways to solve this scene and takes the one whose motion is "
+                      "a whole way to solve, which sets mode, substeps and iterations\nauto: tries ways to "
+                      "solve this scene and takes the one whose motion is "
                       "nearest to the right one within the budget");
+  ways.help += "\non the command line: --solver";
   if (automatic) ways.current = "auto";
   ways.words.push_back("auto");
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
@@ -222,47 +223,31 @@ void draw_solver(Session& s) {
         watch.finer > 1 ? fmt::format("; {} times the substeps until no tet is inverted", watch.finer).c_str()
                         : "");
   if (!automatic) return;
-  slider(s, "budget", s.budget_ms, 0.01, 100, "%.3g ms per step",
-         "GPU time that a step may take; choosing again takes a second or so\n--budget-ms", true);
-  if (ImGui::IsItemDeactivatedAfterEdit()) choose_soon(s);
+  if (slider(s, "budget", s.budget_ms, 0.5, 0.01, 100, "%.3g ms per step",
+             "time that a step may take: auto chooses again when you let go, which takes a second or "
+             "so\non the command line: --budget-ms",
+             true))
+    s.ui.rebudget = true;
+  if (s.ui.rebudget && !ImGui::IsAnyItemActive()) s.ui.rebudget = false, choose_soon(s);
   ImGui::TextWrapped("%s", describe(*choice).c_str());
 }
 
 // What the body is made of, by name; its numbers are below.
 void draw_material(Session& s) {
-  Ways ways = ways_of(s.loaded.sim().settings, material_presets(), "a material by name");
+  Ways ways = ways_of(s.loaded.sim().settings, material_presets(),
+                      "a material by name, with its stiffness; for bodies that are to be soft");
   if (const auto chosen = combo(s, "made of", ways.current, ways.words, ways.help))
     change_settings(s, ways.to[*chosen]);
 }
 
 void draw_run(Session& s) {
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
-  if (button(s, s.playing ? "Pause##play" : "Play##play", "play", "Space", width)) play(s, !s.playing);
+  if (button(s, s.playing ? "Pause##play" : "Play##play", "play", "start and stop the clock\nSpace", width))
+    play(s, !s.playing);
   ImGui::SameLine();
-  if (button(s, "Step", "step", "S", width)) single_step(s);
+  if (button(s, "Step", "step", "one step of dt, then stop\nS", width)) single_step(s);
   ImGui::SameLine();
-  if (button(s, "Reset", "reset", "R", width)) restart(s);
-  check_box(s, "fast", s.clock.fast, "steps as often as the machine can, instead of in real time");
-  ImGui::SameLine(label_width());
-  check_box(s, "vsync", s.vsync, "draw as often as the display shows");
-}
-
-void draw_scene(Session& s) {
-  if (const auto name = combo(s, "scene", s.loaded.scene.name, scene_names(), s.loaded.scene.description))
-    load_soon(s, *name, {}, false, false);
-  begin_row("mesh file");
-  ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
-  bool load_it =
-      ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
-  describe_item(
-      s, "mesh",
-      "in place of the scene's first body: .ply .obj .stl .off surfaces, .node/.ele .msh tetrahedra");
-  ImGui::SameLine();
-  load_it |= button(s, "Load", "load", "");
-  if (!load_it || s.ui.mesh.empty()) return;
-  SceneOverrides overrides = s.loaded.overrides;
-  overrides.mesh = s.ui.mesh;
-  load_soon(s, s.loaded.name, overrides, true, false);
+  if (button(s, "Reset", "reset", "all bodies to where they began; settings stay\nR", width)) restart(s);
 }
 
 void draw_lane_rows(Session& s) {
@@ -277,12 +262,13 @@ void draw_lane_rows(Session& s) {
           combo(s, "side by side", lanes.size() > 1 ? "as below" : "one way", ways.words, ways.help))
     compare_lanes(s, std::ranges::find(comparisons(), *name, &Comparison::name)->lanes);
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
-  if (button(s, "Add a lane", "add lane", "K", width)) add_lane(s);
+  if (button(s, "Add a lane", "add lane",
+             "the same bodies once more, with the settings of this lane to change\nK", width))
+    add_lane(s);
   ImGui::SameLine();
-  ImGui::BeginDisabled(lanes.size() < 2);
-  if (button(s, "Remove this one", "remove lane", "J", width)) remove_lane(s);
-  ImGui::EndDisabled();
-  if (lanes.size() < 2) return;
+  if (lanes.size() < 2) return ImGui::NewLine();
+  if (button(s, "Remove this one", "remove lane", "the chosen lane goes, the others start anew\nJ", width))
+    return remove_lane(s);
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const glm::vec3 colour = lane_colour(i);
     ImGui::ColorButton(fmt::format("##colour {}", i).c_str(), ImVec4(colour.x, colour.y, colour.z, 1),
@@ -290,31 +276,38 @@ void draw_lane_rows(Session& s) {
     ImGui::SameLine();
     if (ImGui::Selectable(fmt::format("{}##lane {}", describe(lanes[i]), i).c_str(), i == s.loaded.chosen))
       choose_lane(s, i);
-    mark(s, fmt::format("lane {}", i + 1));
+    describe_item(s, fmt::format("lane {}", i + 1),
+                  "settings, time per step and colours are those of the lane that is chosen");
   }
-  check_box(s, "overlaid", s.overlaid, "all lanes in one place, in their colours");
+  check_box(s, "overlaid", s.overlaid, "all lanes in one place, in their colours\nO", false);
   ImGui::SameLine(label_width());
-  check_box(s, "ghost", s.ghost, "beside each lane the one that is nearest to the right motion");
+  check_box(s, "ghost", s.ghost, "in each lane, grey, the one that is nearest to the right motion", true);
 }
 
 void draw_colour_range(Session& s) {
   if (s.view.colour == Colour::plain) {
-    ImGui::ColorEdit3(begin_row("body colour").c_str(), &s.view.body_colour.x, ImGuiColorEditFlags_NoInputs);
-    mark(s, "body colour");
+    const bool unusual = s.view.body_colour != s.first_view.body_colour;
+    ImGui::ColorEdit3(begin_row(s, "body colour", unusual).c_str(), &s.view.body_colour.x,
+                      ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions);
+    if (end_row(s, "body colour", "of the first body; others are turned in hue", unusual ? "clay" : ""))
+      s.view.body_colour = s.first_view.body_colour;
     return;
   }
   if (s.view.colour == Colour::patch) return;
   ColourRange& range = s.view.range();
   const ColourScale& scale = s.view.scale();
   double high = range.high * scale.factor;
+  const double usual = s.first_view.ranges[std::size_t(s.view.colour)].high * scale.factor;
   const std::string unit = scale.factor == 100 ? "%%" : scale.unit;
-  if (slider(s, "colour range", high, 1e-4 * scale.most * scale.factor, scale.most * scale.factor,
-             ((scale.is_signed ? "+/- %.3g " : "0 .. %.3g ") + unit).c_str(), scale.unit, true))
+  if (slider(s, "colour range", high, usual, 1e-4 * scale.most * scale.factor, scale.most * scale.factor,
+             ((scale.is_signed ? "+/- %.3g " : "0 .. %.3g ") + unit).c_str(),
+             "the value at the end of the colour scale: lower it to see small differences", true))
     range = {scale.is_signed ? -high / scale.factor : 0, high / scale.factor}, s.view.hold_range = true;
-  check_box(s, "hold range", s.view.hold_range, "else it follows the values of now");
+  check_box(s, "hold range", s.view.hold_range, "keeps the scale as it is; else it follows the values of now",
+            s.first_view.hold_range);
   ImGui::SameLine(label_width());
   check_box(s, "mark worst", s.view.worst,
-            "rings around the vertices with the largest values, inside bodies too\nW");
+            "rings around the vertices with the largest values, inside bodies too\nW", s.first_view.worst);
   if (!s.view.worst) return;
   for (const auto& [vertex, value] : s.worst)
     ImGui::TextDisabled(
@@ -325,72 +318,76 @@ void draw_colour_range(Session& s) {
 
 void draw_view(Session& s) {
   ViewOptions& view = s.view;
-  enum_combo(s, "look", look_names, view.look);
-  const Words colours(colour_names.begin(), colour_names.end());
-  if (const auto name = combo(s, "colour", colour_names[std::size_t(view.colour)], colours))
+  const ViewOptions& first = s.first_view;
+  enum_combo(
+      s, "look", look_names, view.look, first.look,
+      "surface; with its edges; the tetrahedra, to see inside; the constraints between vertices\n1 2 3 4");
+  Words colours;
+  for (std::size_t i = 0; i < colour_names.size(); ++i)
+    if (has_colour(s, Colour(i)) || view.colour == Colour(i)) colours.push_back(colour_names[i]);
+  if (const auto name =
+          combo(s, "colour", colour_names[std::size_t(view.colour)], colours,
+                "what the surface shows: nothing, or by how much volume, lengths of edges, speed, "
+                "elastic energy or the motion are off; patch: what is solved together\nC",
+                colour_names[std::size_t(first.colour)]))
     choose_colour(s, Colour(std::ranges::find(colour_names, *name) - colour_names.begin()));
   draw_colour_range(s);
   if (view.look == Look::tets) {
-    slider(s, "shrink", view.shrink, 0, 1, "%.2f", "each tetrahedron, towards its centre");
-    slider(s, "explode", view.explode, 0, 3, "%.2f", "tetrahedra away from the bodies' centre");
+    slider(s, "shrink", view.shrink, first.shrink, 0, 1, "%.2f of its size",
+           "each tetrahedron, towards its centre: gaps show the inside");
+    slider(s, "explode", view.explode, first.explode, 0, 3, "%.2f of the way",
+           "tetrahedra away from the bodies' centre");
   }
-  slider(s, "cut", view.cut, 0, 1, "%.2f",
-         "what is below this part of the bodies at rest is shown; 1: all\nAlt+drag, Alt+wheel on the view");
-  const int before = view.cut_axis;
-  enum_combo(s, "cut along", cut_names, view.cut_axis);
-  if (view.cut_axis != before) view.cut_normal = glm::normalize(eye(s.camera) - s.camera.target);
-  const std::tuple<const char*, const char*, bool&> switches[] = {
-      {"smooth normals", "N", view.smooth_normals},
-      {"shadow", "", view.shadow},
-      {"grid", "lines on the ground and on walls\nG", view.grid},
-      {"sky and ground", "also walls; without: one colour", view.backdrop},
-      {"legend", "with every colour but plain", view.legend},
-      {"follow", "the camera goes where the bodies go\nL", view.follow},
-      {"contacts", "dots where vertices touch the ground or walls", view.contacts},
-      {"arrows", "where velocities take some of the vertices", view.arrows},
-      {"probe", "the cursor at rest on a body says what is there", s.probing}};
-  for (int i = 0; const auto& [name, help, value] : switches) {
-    if (i++ % 2) ImGui::SameLine(label_width());
-    check_box(s, name, value, help);
+  slider(
+      s, "cut", view.cut, first.cut, 0, 1, "%.2f of the body",
+      "what is below this part of the bodies at rest is shown; 1: all\nX; Alt+drag, Alt+wheel on the view");
+  if (view.is_cut()) {
+    const int before = view.cut_axis;
+    enum_combo(s, "cut along", cut_names, view.cut_axis, first.cut_axis,
+               "the direction in which a cut goes; the view: from the eye of now");
+    if (view.cut_axis != before) view.cut_normal = glm::normalize(eye(s.camera) - s.camera.target);
   }
+  const std::tuple<const char*, const char*, bool&, bool> switches[] = {
+      {"follow", "the camera goes where the bodies go\nL", view.follow, first.follow},
+      {"probe", "the cursor at rest on a body says what is there", s.probing, true},
+      {"contacts", "dots where vertices touch the ground or walls", view.contacts, first.contacts},
+      {"arrows", "velocities of some of the vertices", view.arrows, first.arrows},
+      {"shadow", "of the bodies, on the ground and on each other", view.shadow, first.shadow},
+      {"smooth normals", "round shading; without, each triangle is flat\nN", view.smooth_normals,
+       first.smooth_normals},
+      {"grid", "lines on the ground and on walls\nG", view.grid, first.grid},
+      {"sky and ground", "also walls; without: one colour", view.backdrop, first.backdrop},
+      {"legend", "the colour scale, with every colour but plain", view.legend, first.legend},
+      {"vsync", "draw as often as the display shows; without, as often as can be: to measure", s.vsync, true},
+      {"fast", "steps as often as the machine can, instead of in real time", s.clock.fast, false}};
   if (view.arrows)
-    slider(s, "arrow length", view.arrow_seconds, 1e-3, 1, "%.3g s",
+    slider(s, "arrow length", view.arrow_seconds, first.arrow_seconds, 1e-3, 1, "%.3g s",
            "the time a vertex would take along its arrow", true);
-  int doublings = std::bit_width(unsigned(s.samples) / 2);
-  enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, doublings);
-  s.samples = doublings ? 1 << doublings : 0;
-}
-
-bool section(Session& s, const char* name, bool open = true) {
-  const bool shown =
-      ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
-  mark(s, std::string("section ") + name);
-  return shown;
+  bool unusual = s.samples != s.first_samples || s.grab_radius != usual_grab_radius;
+  for (const auto& [name, help, value, usual] : switches) unusual |= value != usual;
+  if (!more(s, "View", unusual)) return;
+  for (int i = 0; const auto& [name, help, value, usual] : switches) {
+    if (i++ % 2) ImGui::SameLine(label_width());
+    check_box(s, name, value, help, usual);
+  }
+  ImGui::NewLine();
+  const auto doublings = [](int samples) { return int(std::bit_width(unsigned(samples) / 2)); };
+  int now = doublings(s.samples);
+  enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, now, doublings(s.first_samples),
+             "samples of a pixel: smoother edges, and more work for the GPU");
+  s.samples = now ? 1 << now : 0;
+  slider(s, "grab radius", s.grab_radius, usual_grab_radius, 0, 0.3, "%.2f of the size",
+         "how much of a body the mouse takes hold of; 0: a single vertex, which can draw out a spike");
+  Preferences& kept = s.ui.kept;
+  enum_combo(s, "theme", std::array{"light", "dark"}, kept.dark, false, "colours of the panels; it is kept");
+  const Words sizes{"75 %", "100 %", "125 %", "150 %", "200 %", "300 %"};
+  if (const auto size =
+          combo(s, "text size", fmt::format("{:.0f} %", 100 * kept.text), sizes,
+                "of all text and widgets, on top of the display's own scale; it is kept", "100 %"))
+    kept.text = std::atof(size->c_str()) / 100;
 }
 
 }  // namespace
-
-std::string label_of(const char* name) {
-  std::string label = name;
-  std::ranges::replace(label, '_', ' ');
-  return label;
-}
-
-float label_width() { return ImGui::GetFontSize() * 9.4f; }
-
-void mark(Session& s, const std::string& name, const Rect& place) {
-  if (!s.log.file.is_open()) return;
-  Rect& last = s.ui.places[name];
-  if (last == place) return;
-  last = place;
-  s.log("at {} {:.0f} {:.0f} {:.0f} {:.0f}", name, place.x, place.y, place.width, place.height);
-}
-
-void mark(Session& s, const std::string& name) {
-  if (!s.log.file.is_open() || !ImGui::IsItemVisible()) return;
-  const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
-  mark(s, name, {low.x, low.y, high.x - low.x, high.y - low.y});
-}
 
 void draw_timeline(Session& s) {
   Timeline& t = s.timeline;
@@ -434,11 +431,15 @@ void draw_timeline(Session& s) {
 void draw_panel(Session& s) {
   draw_run(s);
   if (section(s, "Scene")) draw_scene(s);
-  if (section(s, "Side by side")) draw_lane_rows(s);
-  if (section(s, "Stability map", false)) draw_map(s);
-  if (section(s, "Solver")) draw_solver(s), draw_material(s), draw_parameters(s, "solver");
+  for (const Group& group : groups()) {
+    if (!section(s, group.name, group.open)) continue;
+    if (group.name == std::string_view("Material")) draw_material(s);
+    if (group.name == std::string_view("Solver")) draw_solver(s);
+    draw_settings(s, group);
+  }
   if (section(s, "View")) draw_view(s);
-  if (section(s, "World")) draw_parameters(s, "world");
+  if (section(s, "Side by side", false)) draw_lane_rows(s);
+  if (section(s, "Stability map", false)) draw_map(s);
 }
 
 }  // namespace tetpbd

@@ -7,6 +7,7 @@
 #include "app/files.h"
 #include "app/run_loop.h"
 #include "app/ui.h"
+#include "app/widgets.h"
 
 namespace tetpbd {
 
@@ -164,8 +165,9 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
   std::string values = row.over_cost ? "" : fmt::format("{:.4g} s", there);
   if (hovered && !row.over_cost) draw.AddLine(ImVec2(mouse, corner.y), ImVec2(mouse, end.y), faint, 1.5f);
   for (const Curve& curve : curves) {
-    const glm::vec3 c = s.loaded.lanes.size() > 1 ? lane_colour(curve.lane) * 0.8f : glm::vec3(0.25f);
-    const ImU32 colour = ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1));
+    const glm::vec3 c = lane_colour(curve.lane) * (s.ui.kept.dark ? 1.2f : 0.8f);
+    const ImU32 colour = s.loaded.lanes.size() > 1 ? ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1))
+                                                   : ImGui::GetColorU32(ImGuiCol_Text, 0.85f);
     const auto line = thinned(axes, curve.points);
     draw.AddPolyline(line.data(), int(line.size()), colour, 0,
                      (s.loaded.lanes.size() > 1 ? 1.6f : 1.2f) * s.ui.scale);

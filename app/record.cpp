@@ -147,6 +147,12 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
       throw Error(fmt::format("there is no vertex {}", number), where, "is it another mesh?");
     return number;
   };
+  const auto lane_of = [&] {
+    const std::size_t lane = a.value("lane", 0u);
+    if (lane >= lanes.size())
+      throw Error(fmt::format("there is no lane {}", lane + 1), where, "the first is 0");
+    return lane;
+  };
   if (a.contains("load")) {
     load_scene_of(s, a["load"], where);
   } else if (a.contains("lanes")) {
@@ -164,17 +170,16 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
   } else if (a.contains("reset")) {
     restart(s);
   } else if (a.contains("set")) {
-    const std::size_t lane = a.value("lane", 0u);
-    if (lane >= lanes.size())
-      throw Error(fmt::format("there is no lane {}", lane + 1), where, "the first is 0");
+    const std::size_t lane = lane_of();
     Settings settings = lanes[lane].sim.settings;
     set_all(settings, a["set"], where);
     const std::size_t chosen = std::exchange(s.loaded.chosen, lane);
     change_settings(s, settings);
     s.loaded.chosen = chosen;
-  } else if (a.contains("pin") || a.contains("grab")) {
-    const std::uint32_t pinned = vertex(a.contains("pin") ? a["pin"] : a["grab"]);
-    if (a.contains("grab") && !is_pinned(s.loaded.sim(), pinned)) s.timeline.held = pinned;
+  } else if (a.contains("grab")) {
+    hold_vertex(s, vertex(a["grab"]), lane_of(), a.value("radius", 0.0));
+  } else if (a.contains("pin")) {
+    const std::uint32_t pinned = vertex(a["pin"]);
     s.timeline.touched.insert(pinned);
     for (Lane& lane : lanes) pin(lane.sim, pinned);
     s.loaded.disturbed = true;
@@ -182,13 +187,13 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
     const std::uint32_t freed = vertex(a["unpin"]);
     for (Lane& lane : lanes) unpin(lane.sim, freed);
   } else if (a.contains("release")) {
-    if (s.timeline.held)
-      for (Lane& lane : lanes) unpin(lane.sim, *s.timeline.held);
-    s.timeline.held.reset();
+    let_go(s);
   } else if (a.contains("move")) {
     const ordered_json& to = a["move"];
     const std::uint32_t moved = vertex(to.at(0));
-    for (Lane& lane : lanes) move_pinned(lane.sim, moved, {to.at(1), to.at(2), to.at(3)});
+    const glm::dvec3 place(to.at(1), to.at(2), to.at(3));
+    const bool held = s.hold && s.hold->caught() == moved;
+    for (Lane& lane : lanes) held ? move_held(lane.sim, *s.hold, place) : move_pinned(lane.sim, moved, place);
   } else if (a.contains("go")) {
     show_step(s, a["go"]);
     if (steps_of(lanes) != a["go"])

@@ -366,6 +366,27 @@ json body_json(const BodyDescription& body) {
   return result;
 }
 
+json scene_json(const Scene& scene) {
+  json result{{"name", scene.name}, {"description", scene.description}, {"duration", scene.duration}};
+  for (const BodyDescription& body : scene.bodies) {
+    json& written = result["bodies"].emplace_back(body_json(body));
+    if (body.mesh.empty()) continue;
+    const fs::path shipped = body.mesh.lexically_relative(models_folder());
+    const bool inside = !shipped.empty() && *shipped.begin() != "..";
+    written["mesh"] = (inside ? shipped : fs::absolute(body.mesh)).string();
+  }
+  for (const Parameter& row : parameters())
+    with_value(scene.settings, row, [&]<class T>(const T& value) {
+      json& written = result[row.section][row.name] = value;
+      if constexpr (std::is_same_v<T, std::string>) written = parameter_text(scene.settings, row);  // none
+    });
+  for (const glm::dvec4& plane : scene.obstacles)
+    result["world"]["obstacles"].push_back(
+        {{"point", glm::dvec3(plane) * plane.w}, {"normal", glm::dvec3(plane)}});
+  if (scene.camera) result["camera"] = *scene.camera;
+  return result;
+}
+
 std::shared_ptr<const Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   for (const BodyDescription& body : scene.bodies) {

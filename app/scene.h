@@ -78,6 +78,7 @@ inline long duration_in_steps(const Scene& scene) {
 }
 /// As a scene file says it.
 nlohmann::json body_json(const BodyDescription& body);
+nlohmann::json scene_json(const Scene& scene);
 /// Meshes loaded and tetrahedralised, placed, deformed.
 std::shared_ptr<const Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.

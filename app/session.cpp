@@ -7,11 +7,14 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "app/files.h"
 #include "app/reference_command.h"
 #include "app/run_loop.h"
 #include "sim/error.h"
 
 namespace tetpbd {
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -35,6 +38,12 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
   return parameter_text(a, row) != parameter_text(b, row);
 }
 
+// What went wrong before, once something went well; of shaders and states as long as they are not mended.
+void forget_errors(Session& s) {
+  std::erase_if(s.messages,
+                [](const Message& m) { return m.error && !m.non_finite && !m.text.starts_with("shader "); });
+}
+
 // The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
 void disturb(Session& s) {
   if (!std::exchange(s.loaded.disturbed, true))
@@ -45,15 +54,15 @@ void disturb(Session& s) {
 
 void step_lanes(Session& s) {
   if (s.grab) {
-    lead(*s.grab, s.loaded.sim());
+    lead(*s.grab);
     const glm::dvec3& to = s.grab->position;
-    note(s, {{"move", {s.grab->vertex, to.x, to.y, to.z}}});
+    note(s, {{"move", {s.hold->caught(), to.x, to.y, to.z}}});
   }
   note_moment(s);
   auto& lanes = s.loaded.lanes;
   for (Lane& lane : lanes) {
     if (lanes.size() > 1 && check_finite(lane.sim)) continue;
-    if (s.grab && &lane != &s.loaded.lane()) move_pinned(lane.sim, s.grab->vertex, s.grab->position);
+    if (s.grab) move_held(lane.sim, *s.hold, s.grab->position);
     const auto begin = Steady::now();
     step(lane.sim);
     if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, time_of(lane.sim));
@@ -115,7 +124,7 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
   const auto model = build_model(scene);
   choose_by_rule(scene, *model);
   auto choice = choose_for(scene, model);
-  Loaded loaded{name, overrides, scene, {}, {}, {}, choice};
+  Loaded loaded{name, overrides, scene, scene.settings, {}, {}, {}, choice};
   loaded.lanes.push_back({create_sim(model, scene.settings)});
   loaded.renderer = make_renderer(*model);
   loaded.picker = make_picker(model->rest);
@@ -210,6 +219,43 @@ void watch_state(Session& s) {
   say(s, error_of(*found).what(), true, true);
 }
 
+namespace {
+
+std::vector<Settings> settings_of_lanes(const Session& s) {
+  std::vector<Settings> settings;
+  for (const Lane& lane : s.loaded.lanes) settings.push_back(lane.sim.settings);
+  return settings;
+}
+
+void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
+  const Settings old = s.loaded.sim().settings;
+  for (std::size_t i = 0; i < of_lanes.size(); ++i) {
+    Lane& lane = s.loaded.lanes[i];
+    if (of_lanes[i] == lane.sim.settings) continue;
+    const bool alone = of_lanes.size() == 1 && !s.loaded.right;
+    const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
+    const Settings own = lane.sim.settings;
+    apply_settings(lane.sim, of_lanes[i]);
+    note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
+    lane.patches = {};
+    if (alone && lane.sim.steps > 0) disturb(s);
+    if (alone || key_of(lane) == before) continue;
+    disturb(s);
+    s.loaded.comparable =
+        std::ranges::all_of(s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
+  }
+  forget_errors(s);  // such as that of a setting that did not go with the others
+  for (const Parameter& row : parameters()) {
+    const Settings& now = s.loaded.sim().settings;
+    if (!differs(now, old, row)) continue;
+    s.log("set {} {}", row.name, parameter_text(now, row));
+    if (row.effect == Effect::restart) say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
+    if (row.effect == Effect::rebuild) s.loaded.lane().step_ms = {};
+  }
+}
+
+}  // namespace
+
 void change_settings(Session& s, const Settings& wanted) {
   const Settings old = s.loaded.sim().settings;
   // Nothing ends a step early, so a slider does not go where one takes minutes.
@@ -220,38 +266,40 @@ void change_settings(Session& s, const Settings& wanted) {
                               most));
   attempt(s, [&] {
     // Of all lanes, before any is changed.
-    std::vector<Settings> of_lanes;
-    for (const Lane& lane : s.loaded.lanes) {
-      Settings& own = of_lanes.emplace_back(&lane == &s.loaded.lane() ? wanted : lane.sim.settings);
+    const std::vector<Settings> before = settings_of_lanes(s);
+    std::vector<Settings> of_lanes = before;
+    of_lanes[s.loaded.chosen] = wanted;
+    for (Settings& own : of_lanes) {
       for (const Parameter& row : parameters())
         if (shared_by_lanes(row) && differs(wanted, old, row))
           set_parameter(own, row, parameter_text(wanted, row), row.name);
       check_settings(own, "settings");
     }
-    for (std::size_t i = 0; i < of_lanes.size(); ++i) {
-      Lane& lane = s.loaded.lanes[i];
-      if (of_lanes[i] == lane.sim.settings) continue;
-      const bool alone = of_lanes.size() == 1 && !s.loaded.right;
-      const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
-      const Settings own = lane.sim.settings;
-      apply_settings(lane.sim, of_lanes[i]);
-      note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
-      lane.patches = {};
-      if (alone && lane.sim.steps > 0) disturb(s);
-      if (alone || key_of(lane) == before) continue;
-      disturb(s);
-      s.loaded.comparable = std::ranges::all_of(
-          s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
-    }
-    for (const Parameter& row : parameters()) {
-      if (!differs(wanted, old, row)) continue;
-      s.log("set {} {}", row.name, parameter_text(wanted, row));
-      if (row.effect == Effect::restart)
-        say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
-      if (row.effect == Effect::rebuild) s.loaded.lane().step_ms = {};
-    }
+    if (of_lanes == before) return;
+    put_settings(s, of_lanes);
+    auto& [past, future, open] = s.changes;
+    if (!std::exchange(open, true)) past.push_back(before);
+    if (constexpr std::size_t most_kept = 200; past.size() > most_kept) past.erase(past.begin());
+    future.clear();
   });
 }
+
+namespace {
+
+void take_back(Session& s, const char* word, std::vector<std::vector<Settings>>& from,
+               std::vector<std::vector<Settings>>& to) {
+  if (from.empty()) return say(s, fmt::format("nothing to {}", word));
+  s.log("{}", word);
+  const std::vector<Settings> now = settings_of_lanes(s);
+  if (attempt(s, [&] { put_settings(s, from.back()); })) to.push_back(now);
+  from.pop_back();
+  s.changes.open = false;
+}
+
+}  // namespace
+
+void undo(Session& s) { take_back(s, "undo", s.changes.past, s.changes.future); }
+void redo(Session& s) { take_back(s, "redo", s.changes.future, s.changes.past); }
 
 void choose_soon(Session& s) {
   s.task = Task{"trying ways to solve", [&s] {
@@ -265,7 +313,8 @@ void choose_soon(Session& s) {
 }
 
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
-  s.grab.reset();
+  s.grab.reset(), s.hold.reset();
+  s.changes = {};
   s.loaded = std::move(loaded);
   note_scene(s);
   if (!keep_camera) {
@@ -292,13 +341,48 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                     others.erase(others.begin());
                     scene.mode_open = false, scene.budget_ms.reset();
                   }
-                  take_over(s, load(name, overrides, scene), keep_camera);
+                  Loaded loaded = load(name, overrides, scene);
+                  if (keep_settings) loaded.own = s.loaded.own;
+                  take_over(s, std::move(loaded), keep_camera);
+                  const fs::path file = overrides.mesh.empty() ? fs::path(name) : overrides.mesh;
+                  if (std::error_code error; fs::is_regular_file(file, error)) remember(s.ui.kept, file);
                   for (const Settings& own : others)
                     s.loaded.lanes.push_back({create_sim(s.loaded.sim().model, own)});
                   if (!others.empty()) start_lanes(s);
                   // What was there before is gone.
                   s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);
                 }};
+}
+
+void open_file(Session& s, const fs::path& file) {
+  if (file.extension() == ".json") return load_soon(s, file.string(), {}, false, false);
+  SceneOverrides overrides = s.loaded.overrides;
+  overrides.mesh = file;
+  load_soon(s, s.loaded.name, overrides, true, false);
+}
+
+void save_scene(Session& s) {
+  attempt(s, [&] {
+    const Model& model = *s.loaded.sim().model;
+    Scene scene = s.loaded.scene;
+    scene.settings = s.loaded.sim().settings;
+    scene.camera = s.camera;
+    if (s.view.follow && s.centre)  // seen from where it starts
+      scene.camera->target += glm::vec3(bounds(model.positions).centre()) - *s.centre;
+    std::string name = scene.name;
+    std::ranges::replace_if(
+        name, [](unsigned char c) { return !std::isalnum(c) && c != '-'; }, '_');
+    const fs::path file = free_name(name, "json");
+    write_file(file, json_text(scene_json(scene), 2) + "\n");
+    const Target target = make_target(picture_width, picture_height, 4);
+    const ViewOptions view = std::exchange(s.view, s.first_view);
+    s.view.follow = s.view.legend = false;
+    draw_lanes(s, target);
+    s.view = view;
+    write_png(fs::path(file).replace_extension("png"), read_rgba(target));
+    remember(s.ui.kept, file);
+    say(s, fmt::format("saved {0}: tetpbd --scene {0} opens it", file.string()));
+  });
 }
 
 bool has_colour(const Session& s, Colour colour) {
@@ -365,6 +449,7 @@ void hold_vertices(Session& s) {
 }
 
 void start_lanes(Session& s) {
+  s.changes = {};
   ordered_json lanes;
   for (const Lane& lane : s.loaded.lanes) lanes.push_back(settings_text(lane.sim.settings));
   note(s, {{"lanes", lanes}});
@@ -430,27 +515,44 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
   s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
 
-void catch_vertex(Session& s, const Pick& pick) {
-  if (is_fixed(s, pick.vertex)) return;
+void hold_vertex(Session& s, std::uint32_t vertex, std::size_t lane, double radius) {
   disturb(s);
   s.timeline.looping = false;
-  s.timeline.touched.insert(pick.vertex);
-  note(s, {{"grab", pick.vertex}});
-  s.grab = begin_grab(s.loaded.sim(), pick);
-  if (!s.grab->was_pinned) s.timeline.held = pick.vertex;
-  for (Lane& lane : s.loaded.lanes)
-    if (&lane != &s.loaded.lane()) pin(lane.sim, pick.vertex);
+  note(s, {{"grab", vertex}, {"lane", lane}, {"radius", radius}});
+  s.hold = take_hold(s.loaded.lanes[lane].sim, vertex, radius);
+  s.timeline.touched.insert(s.hold->vertices.begin(), s.hold->vertices.end());
+  for (Lane& each : s.loaded.lanes) pin_held(each.sim, *s.hold);
+}
+
+void catch_vertex(Session& s, const Pick& pick) {
+  if (is_fixed(s, pick.vertex)) return;
+  hold_vertex(s, pick.vertex, s.loaded.chosen, s.grab_radius);
+  s.grab = begin_grab(s.loaded.sim(), *s.hold, pick);
   s.log("grab {}", pick.vertex);
 }
 
 void let_go(Session& s) {
-  if (!s.grab) return;
-  note(s, {{"release", s.grab->vertex}});
-  s.timeline.held.reset();
-  for (Lane& lane : s.loaded.lanes)
-    if (!s.grab->was_pinned) unpin(lane.sim, s.grab->vertex);
-  s.log("release {} moved {:.4f}", s.grab->vertex, glm::length(s.grab->position - s.grab->start));
-  s.grab.reset();
+  if (!s.hold) return;
+  note(s, {{"release", s.hold->caught()}});
+  for (Lane& lane : s.loaded.lanes) unpin_held(lane.sim, *s.hold);
+  if (s.grab)
+    s.log("release {} moved {:.4f}", s.hold->caught(), glm::length(s.grab->position - s.grab->start));
+  s.grab.reset(), s.hold.reset();
+}
+
+std::optional<Advice> faster_way(const Session& s) {
+  const Clock& clock = s.clock;
+  const Settings& own = s.loaded.sim().settings;
+  if (!s.playing || clock.fast || !(clock.factor > 0) || clock.factor > 0.5 * clock.speed()) return {};
+  if (s.loaded.lanes.size() > 1) return Advice{"fewer lanes", ""};
+  const auto& ms = s.loaded.lanes[s.loaded.chosen].step_ms.values;
+  // Less than half of the time goes into steps.
+  if (!ms.empty() && double(ms.back()) * clock.factor / own.dt < 500) return Advice{"a smaller window", ""};
+  const bool with_forces = leaps(own) || is_implicit(own);
+  if (own.mode != "cpu-fast" && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
+    return Advice{"mode cpu-fast", "mode=cpu-fast"};
+  if (hard(own) && own.iterations * own.substeps > 5) return Advice{"solver hard", "hard,mode=" + own.mode};
+  return Advice{"a smaller scene", ""};
 }
 
 void advance(Session& s, double elapsed) {

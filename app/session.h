@@ -15,12 +15,14 @@
 #include "app/grab.h"
 #include "app/lanes.h"
 #include "app/live_map.h"
+#include "app/preferences.h"
 #include "app/probe.h"
 #include "app/record.h"
 #include "app/scene.h"
 #include "app/timeline.h"
 #include "render/picking.h"
 #include "render/renderer.h"
+#include "render/target.h"
 #include "sim/metrics.h"
 #include "sim/sim.h"
 
@@ -31,6 +33,7 @@ struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
   Scene scene;
+  Settings own{};           ///< of the scene as it was asked for: what a setting goes back to
   std::vector<Lane> lanes;  ///< one, or several side by side
   Renderer renderer;
   Picker picker;
@@ -104,10 +107,20 @@ struct MapWords {
   bool typed = false;
 };
 
+/// What the list of scenes shows of one.
+struct SceneCard {
+  std::string description{};
+  Texture picture{};
+};
+inline constexpr int picture_width = 192, picture_height = 144;  // pixels
+
 /// What is shown of the panels.
 struct Ui {
   bool panels = true, plots = true, help = false;
-  float scale = 1;  ///< of the display: 2 on a dense one
+  float scale = 1;  ///< of the display, 2 on a dense one, times that of the text
+  Preferences kept;
+  bool rebudget = false;                   ///< once the slider is let go
+  std::map<std::string, SceneCard> cards;  ///< by file, once shown
   MapWords map;
   std::string mesh;                    ///< path being typed
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
@@ -116,21 +129,32 @@ struct Ui {
       {{0, 1, 2}, {1, 4, 5}}};  ///< plot_rows(): of one lane, of several
 };
 
+/// Settings of all lanes: before each change, and after those that were taken back.
+struct Changes {
+  std::vector<std::vector<Settings>> past, future;
+  bool open = false;  ///< what changes now belongs to the last change, as long as a slider is held
+};
+
+inline constexpr double usual_grab_radius = 0.04;
+
 struct Session {
   Capabilities gl;
   EventLog log;
   Ui ui;
   Loaded loaded;
   Camera camera;
-  ViewOptions view;
-  int samples = 4;
+  ViewOptions view, first_view;  ///< of now, and as the window began
+  int samples = 4, first_samples = 4;
   float aspect = 1;  ///< of the viewport
   bool playing = true, vsync = true;
   bool take_screenshot = false, quit = false;
   Clock clock;
   Timeline timeline;
-  std::unique_ptr<Record> record{};  ///< if anybody wants it
-  std::optional<Grab> grab;
+  std::unique_ptr<Record> record{};        ///< if anybody wants it
+  std::optional<Hold> hold;                ///< what is led by the mouse, or by a record
+  std::optional<Grab> grab;                ///< by the mouse
+  double grab_radius = usual_grab_radius;  ///< part of the size
+  Changes changes;
   std::vector<Message> messages;
   std::optional<Task> task;
   double budget_ms = 0.5;           ///< for the solver auto
@@ -163,6 +187,14 @@ void change_speed(Session& session, int halvings);
 void restart(Session& session);
 /// Refuses those whose steps would stop the window for minutes.
 void change_settings(Session& session, const Settings& wanted);
+/// Settings as they were before the last change, or again as they were after it.
+void undo(Session& session);
+void redo(Session& session);
+/// The scene with the settings and the camera of now, into a file of its own, with a picture beside it.
+void save_scene(Session& session);
+/// Makes it the task to load what was dropped, typed or opened before: a scene, or a mesh for this scene's
+/// first body.
+void open_file(Session& session, const std::filesystem::path& file);
 /// Makes it the task to load a scene; where that fails all stays. `keep_settings`: those of now.
 void load_soon(Session& session, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
                bool keep_camera);
@@ -203,12 +235,20 @@ void compare_lanes(Session& session, const std::vector<std::string>& words);
 bool follow_bodies(Session& session, double elapsed);
 void toggle_pin(Session& session, std::uint32_t vertex);
 void catch_vertex(Session& session, const Pick& pick);
+/// In all lanes, as it is in this one.
+void hold_vertex(Session& session, std::uint32_t vertex, std::size_t lane, double radius);
 void let_go(Session& session);
 
 /// To the last good state, once the state is not finite.
 void go_back(Session& session);
 /// Pauses and says so when the state is found not to be finite.
 void watch_state(Session& session);
+/// A way to come nearer to real time, and its words (lane_settings), if it is one of settings.
+struct Advice {
+  std::string said, words;
+};
+/// Where steps take more than twice the time that they simulate.
+std::optional<Advice> faster_way(const Session& session);
 /// Steps as many times as `elapsed` seconds ask for and the machine allows.
 void advance(Session& session, double elapsed);
 /// Takes in measurements and timings that have arrived, and asks for the next.

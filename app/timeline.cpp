@@ -49,7 +49,7 @@ void show(Session& s, std::size_t index) {
           pinned != bool(std::ranges::count(then.pinned, vertex)))
         (pinned ? unpin : pin)(lane.sim, vertex);
     restore_snapshot(lane.sim, then.lanes[i], then.states);
-    if (then.held) unpin(lane.sim, *then.held);
+    for (const std::uint32_t vertex : then.held) unpin(lane.sim, vertex);
     lane.apart = {};
     if (s.loaded.disturbed != then.disturbed)
       lane.distance = then.distances[i];  // held against something else
@@ -75,7 +75,7 @@ void go(Session& s, std::size_t index) {
 
 void begin_timeline(Session& s) {
   Timeline& t = s.timeline;
-  t.moments.clear(), t.touched.clear(), t.held.reset();
+  t.moments.clear(), t.touched.clear();
   t.bytes = 0;
   t.looping = t.off = false;
   keep_moment(s);
@@ -118,7 +118,7 @@ void keep_moment(Session& s) {
             moment->disturbed = s.loaded.disturbed;
             for (const std::uint32_t vertex : t.touched)
               if (is_pinned(lanes.front().sim, vertex)) moment->pinned.push_back(vertex);
-            moment->held = t.held;
+            if (s.hold && !s.hold->was_pinned) moment->held = s.hold->vertices;
             moment->bytes = bytes;
             moment->states = std::move(states);
             t.moments.push_back(std::move(moment));

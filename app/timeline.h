@@ -20,7 +20,7 @@ struct Moment {
   std::vector<History> distances;     ///< the last of each lane, if any
   bool disturbed = false;             ///< as in Loaded
   std::vector<std::uint32_t> pinned;  ///< by the user, or
-  std::optional<std::uint32_t> held;  ///< as long as the mouse held it
+  std::vector<std::uint32_t> held;    ///< as long as the mouse held them
   std::size_t bytes = 0;
   Buffer states{};
 };
@@ -30,7 +30,6 @@ struct Timeline {
   std::vector<std::unique_ptr<Moment>> moments;  ///< in order of their steps
   std::size_t bytes = 0;                         ///< of all
   std::set<std::uint32_t> touched;               ///< vertices pinned at some time
-  std::optional<std::uint32_t> held{};           ///< pinned only as long as the mouse holds it
   std::optional<std::set<long>> wanted{};        ///< only these steps are kept
   bool looping = false;                          ///< played again and again, in place of steps
   bool off = false;                              ///< until the next start: there is no room

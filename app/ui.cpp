@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "app/run_loop.h"
+#include "app/widgets.h"
 #include "render/legend.h"
 
 namespace tetpbd {
@@ -40,25 +41,43 @@ constexpr ImGuiWindowFlags plain_window =
     ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
     ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
 
-// What is cut off first in a narrow window stands last.
-void draw_status(const Session& s, const Rect& place) {
+// What is cut off first in a narrow window stands last, but for the way to the help.
+void draw_status(Session& s, const Rect& place) {
   const Sim& sim = s.loaded.sim();
   begin_part("status", place);
-  const bool slow =
-      s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95 * s.clock.speed();
   const std::string speed = s.timeline.looping ? "looping"
                             : s.playing        ? fmt::format("{:.2g}x real time", s.clock.factor)
                                                : "paused";
-  ImGui::TextColored(slow ? ImVec4(0.72f, 0.33f, 0.05f, 1) : ImGui::GetStyleColorVec4(ImGuiCol_Text), "%s",
-                     speed.c_str());
-  ImGui::SameLine();
   const char* dot = "\xC2\xB7";
+  const bool slow =
+      s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95 * s.clock.speed();
+  const float help = ImGui::CalcTextSize("H: help").x + 3 * ImGui::GetStyle().WindowPadding.x;
+  ImGui::PushClipRect(ImVec2(place.x, place.y),
+                      ImVec2(place.x + place.width - 1.5f * help, place.y + place.height), true);
+  ImGui::TextColored(slow ? alarm(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text), "%s", speed.c_str());
+  if (const auto faster = faster_way(s)) {
+    ImGui::SameLine();
+    ImGui::TextColored(alarm(s), "%sfaster:", s.gl.software ? "(software renderer) " : "");
+    ImGui::SameLine();
+    if (faster->words.empty()) {
+      ImGui::TextColored(alarm(s), "%s", faster->said.c_str());
+    } else {
+      if (ImGui::SmallButton(faster->said.c_str()))
+        attempt(s, [&] { change_settings(s, lane_settings(sim.settings, faster->words, faster->said)); });
+      mark(s, "faster");
+    }
+  }
+  ImGui::SameLine();
   const std::string rest = fmt::format(
       "{0}  step {1}  {0}  {2:.3f} s  {0}  mode {3}  {0}  {4} tets  {0}  {5} vertices  {0}  {6} constraints  "
       "{0}  {7}",
       dot, sim.steps, double(sim.steps) * sim.settings.dt, sim.settings.mode, sim.model->rest.tets.size(),
       sim.model->positions.size(), sim.system.count(), s.gl.renderer);
   ImGui::TextUnformatted(rest.c_str());
+  ImGui::PopClipRect();
+  ImGui::SameLine(place.width - help);
+  if (ImGui::SmallButton("H: help")) flip(s, "help", s.ui.help);
+  describe_item(s, "help", "all keys, and what the mouse does, in place of the panel");
   ImGui::End();
 }
 
@@ -76,8 +95,7 @@ void draw_messages(Session& s, const Rect& view) {
     const Message& message = s.messages[i];
     ImGui::SetNextWindowPos(ImVec2(view.x + margin, top));
     ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(width, view.height));
-    ImGui::PushStyleColor(ImGuiCol_Text, message.error ? ImVec4(0.65f, 0.1f, 0.05f, 1)
-                                                       : ImGui::GetStyleColorVec4(ImGuiCol_Text));
+    ImGui::PushStyleColor(ImGuiCol_Text, message.error ? alarm(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text));
     // By place, not by text: Dear ImGui keeps every window it has ever been told of.
     ImGui::Begin(fmt::format("message {}", i).c_str(), nullptr,
                  plain_window | ImGuiWindowFlags_AlwaysAutoResize);
@@ -127,33 +145,77 @@ void draw_reading(const Session& s, const Reading& r) {
   ImGui::EndTooltip();
 }
 
-void draw_help(const Ui& ui) {
-  const ImVec2 whole = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos(ImVec2(whole.x / 2, whole.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
-  ImGui::SetNextWindowSize(ImVec2(std::min(760 * ui.scale, whole.x), 0));
-  ImGui::SetNextWindowFocus();
-  ImGui::Begin("help", nullptr, plain_window);
+// In place of the panel, so that the bodies stay in sight, and the mouse can be tried.
+void draw_help(Session& s) {
   constexpr std::pair<const char*, const char*> mouse[] = {
       {"Left drag", "pull the body, or turn the view beside it"},
       {"Right drag", "turn the view"},
       {"Middle drag", "move the view (or Shift + drag)"},
       {"Wheel", "closer, farther"},
-      {"Alt + drag, Alt + wheel", "moves the plane of a cut"},
       {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
-      {"Ctrl + click on a slider", "type a value"},
-      {"Wheel, drag, double click on a plot", "closer, along, all"},
-      {"Hover", "what a setting means, what is there"}};
-  if (ImGui::BeginTable("help", 2)) {
-    ImGui::TableNextColumn();
-    ImGui::TextDisabled("Keys");
-    for (const Shortcut& shortcut : shortcuts())
-      if (*shortcut.shown) ImGui::BulletText("%s: %s", shortcut.shown, shortcut.help);
-    ImGui::TableNextColumn();
-    ImGui::TextDisabled("Mouse");
-    for (const auto& [action, help] : mouse) ImGui::BulletText("%s: %s", action, help);
+      {"Alt + drag", "move the plane of a cut (or Alt + wheel)"},
+      {"Rest", "what a setting means, what is there on a body"},
+      {"Right click", "on a setting: back to the scene's"},
+      {"Ctrl + click", "on a slider: type a value"},
+      {"Plots", "wheel: closer, drag: along, double click: all"},
+      {"Drop a file", "a scene or a mesh, to open it"}};
+  if (button(s, "Back to the settings", "close help", "H or Esc", -1)) flip(s, "help", s.ui.help);
+  const auto list = [&](const char* title, auto rows) {
+    ImGui::Spacing();
+    ImGui::TextColored(accent(s), "%s", title);
+    if (!ImGui::BeginTable(title, 2)) return;
+    ImGui::TableSetupColumn("", ImGuiTableColumnFlags_WidthFixed, 6.6f * ImGui::GetFontSize());
+    rows([](const char* shown, const char* help) {
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(shown);
+      ImGui::TableNextColumn();
+      ImGui::TextWrapped("%s", help);
+    });
     ImGui::EndTable();
-  }
+  };
+  list("Mouse", [&](auto row) {
+    for (const auto& [action, help] : mouse) row(action, help);
+  });
+  list("Keys", [&](auto row) {
+    for (const Shortcut& shortcut : shortcuts())
+      if (*shortcut.shown) row(shortcut.shown, shortcut.help);
+  });
+}
+
+// Between view and panel: dragged, it makes the panel wider.
+void draw_edge(Session& s, const Rect& panel) {
+  const float wide = 6 * s.ui.scale;
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+  ImGui::SetNextWindowBgAlpha(0);
+  begin_part("edge", {panel.x - wide / 2, panel.y, wide, panel.height});
+  ImGui::InvisibleButton("edge", ImVec2(wide, panel.height));
+  mark(s, "edge");
+  if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
+  if (ImGui::IsItemActive())
+    s.ui.kept.panel = std::clamp(double((panel.x + panel.width - ImGui::GetIO().MousePos.x) / s.ui.scale),
+                                 least_panel, most_panel);
   ImGui::End();
+  ImGui::PopStyleVar(3);
+}
+
+// From what is held to the cursor: how far it lags says how hard it is pulled.
+void draw_pull(const Session& s, const Rect& view) {
+  const Rect place = lane_place(s, s.loaded.chosen, view);
+  const glm::vec4 seen = projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) *
+                         glm::vec4(glm::vec3(s.grab->position), 1);
+  const ImVec2 from(place.x + place.width * (0.5f + 0.5f * seen.x / seen.w),
+                    place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)),
+      to = ImGui::GetIO().MousePos;
+  ImDrawList& draw = *ImGui::GetBackgroundDrawList();
+  draw.PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y + place.height));
+  for (const auto& [colour, width] :
+       {std::pair(IM_COL32(255, 255, 255, 200), 5.0f), {IM_COL32(200, 70, 0, 255), 2.5f}}) {
+    draw.AddLine(from, to, colour, width * s.ui.scale);
+    draw.AddCircle(from, 9 * s.ui.scale, colour, 0, width * s.ui.scale);
+  }
+  draw.PopClipRect();
 }
 
 }  // namespace
@@ -164,10 +226,11 @@ void begin_part(const char* name, const Rect& place) {
   ImGui::Begin(name, nullptr, plain_window | ImGuiWindowFlags_NoBringToFrontOnFocus);
 }
 
-void set_style(float scale, float density) {
+void set_style(float scale, float density, bool dark) {
   ImGui::GetIO().IniFilename = nullptr;  // no file is left behind
   ImGuiStyle& style = ImGui::GetStyle() = ImGuiStyle();
-  ImGui::StyleColorsLight(&style);
+  dark ? ImGui::StyleColorsDark(&style) : ImGui::StyleColorsLight(&style);
+  style.Colors[ImGuiCol_WindowBg].w = style.Colors[ImGuiCol_PopupBg].w = 1;
   style.FrameRounding = style.GrabRounding = 3;
   style.ScaleAllSizes(scale);
   set_font(*ImGui::GetIO().Fonts, std::floor(14.0f * scale * density));
@@ -201,6 +264,10 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_K, "K", "a lane more", [](Session& s) { add_lane(s); }},
       {GLFW_KEY_J, "J", "a lane less", [](Session& s) { remove_lane(s); }},
       {GLFW_KEY_O, "O", "lanes overlaid", [](Session& s) { flip(s, "overlaid", s.overlaid); }},
+      {GLFW_KEY_Z, "Ctrl + Z", "undo a change of settings", undo, 0, GLFW_MOD_CONTROL},
+      {GLFW_KEY_Y, "Ctrl + Y", "redo (or Ctrl + Shift + Z)", redo, 0, GLFW_MOD_CONTROL},
+      {GLFW_KEY_Z, "", "", redo, 0, GLFW_MOD_CONTROL | GLFW_MOD_SHIFT},
+      {GLFW_KEY_S, "Ctrl + S", "save the scene with its settings", save_scene, 0, GLFW_MOD_CONTROL},
       {GLFW_KEY_ESCAPE, "Esc", "close help; let go; close messages", escape},
       {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
   };
@@ -210,7 +277,8 @@ const std::vector<Shortcut>& shortcuts() {
 Layout make_layout(const Ui& ui, float width, float height) {
   Layout layout;
   const float status = std::round(32 * ui.scale);
-  const float panel = ui.panels ? std::min(std::round(320 * ui.scale), width * 0.6f) : 0;
+  const bool shown = ui.panels || ui.help;
+  const float panel = shown ? std::min(std::round(float(ui.kept.panel) * ui.scale), width * 0.6f) : 0;
   const float plots = ui.panels && ui.plots && height > 360 * ui.scale ? std::round(128 * ui.scale) : 0;
   const float timeline = ui.panels && height > 240 * ui.scale ? std::round(38 * ui.scale) : 0;
   const float bottom = ui.panels ? std::max(height - status, 1.0f) : height;
@@ -233,10 +301,14 @@ void draw_ui(Session& s, const Layout& layout) {
         ImGui::GetColorU32(ImVec4(colour.x, colour.y, colour.z, chosen ? 1.0f : 0.5f)), 0, 0,
         (chosen ? 3.0f : 1.0f) * s.ui.scale);
   }
-  if (s.ui.panels) {
-    begin_part("panel", layout.panel);
-    draw_panel(s);
+  if (s.grab) draw_pull(s, layout.view);
+  if (layout.panel.width > 0) {
+    begin_part(s.ui.help ? "help" : "panel", layout.panel);
+    s.ui.help ? draw_help(s) : draw_panel(s);
     ImGui::End();
+    draw_edge(s, layout.panel);
+  }
+  if (s.ui.panels) {
     if (layout.timeline.height > 0) {
       begin_part("timeline", layout.timeline);
       draw_timeline(s);
@@ -247,7 +319,7 @@ void draw_ui(Session& s, const Layout& layout) {
   }
   draw_messages(s, layout.view);
   if (s.loaded.probe.reading) draw_reading(s, *s.loaded.probe.reading);
-  if (s.ui.help) draw_help(s.ui);
+  s.changes.open = s.changes.open && ImGui::IsAnyItemActive();
 }
 
 void draw_busy(const Layout& layout, const std::string& what) {

@@ -32,8 +32,8 @@ void draw_ui(Session& session, const Layout& layout);
 /// Over the view while the window stands still: "loading bunny-drop".
 void draw_busy(const Layout& layout, const std::string& what);
 
-/// Sizes and font for a display of this scale. `density`: framebuffer pixels a window coordinate.
-void set_style(float scale, float density);
+/// Sizes, font and colours for a display of this scale. `density`: framebuffer pixels a window coordinate.
+void set_style(float scale, float density, bool dark = false);
 
 /// A plot: of which history of each lane (none: frames per second), by powers of ten where that helps, over
 /// time or over the time of a step.
@@ -50,15 +50,11 @@ void draw_plots(Session& session, const Rect& place);
 /// Begins a part of the window's layout, until ImGui::End().
 void begin_part(const char* name, const Rect& place);
 
-/// The panel at the right, and the part of its width that a widget's label takes.
+/// The panel at the right, and parts of it.
 void draw_panel(Session& session);
+void draw_scene(Session& session);
 void draw_map(Session& session);
-float label_width();
 /// The bar below the view: speed, loop, what can be gone back to.
 void draw_timeline(Session& session);
-std::string label_of(const char* parameter);
-/// Notes where the last widget is, so that a test can find it: "at NAME x y width height".
-void mark(Session& session, const std::string& name);
-void mark(Session& session, const std::string& name, const Rect& place);
 
 }  // namespace tetpbd

@@ -48,7 +48,13 @@ void draw_lanes(Session& s, const Target& target) {
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     Frame frame = frame_of(lanes[i].sim, s.camera, s.view, target);
     frame.viewport = tile_in(s, i, target.width, target.height);
-    if (s.grab) frame.grabbed.push_back(s.grab->vertex);
+    // The hand's are larger than those of the scene.
+    for (const std::uint32_t v : s.timeline.touched)
+      if (is_pinned(lanes[i].sim, v) && !(s.hold && s.hold->has(v))) frame.grabbed.push_back(v);
+    if (s.hold) {
+      frame.grabbed.push_back(s.hold->caught());
+      std::erase_if(frame.pinned, [&](std::uint32_t v) { return s.hold->has(v); });
+    }
     frame.options.follow = s.view.follow && i == s.loaded.chosen;
     frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
     if (s.view.worst && i == s.loaded.chosen)

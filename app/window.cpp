@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <functional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "app/ui.h"
 #include "render/target.h"
 #include "sim/error.h"
+#include "sim/mesh/cache.h"
 
 namespace tetpbd {
 
@@ -161,7 +163,8 @@ void wheel(Input& in, double turned, bool of_cut) {
 
 void key(Input& in, int code, int modifiers) {
   if (ImGui::GetIO().WantTextInput || ImGui::GetIO().WantCaptureKeyboard) return;
-  modifiers &= GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER;
+  modifiers &= GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER | GLFW_MOD_SHIFT;
+  if (modifiers == GLFW_MOD_SHIFT) modifiers = 0;
   for (const Shortcut& row : shortcuts())
     if ((code == row.key || code == row.alternative) && modifiers == row.modifiers)
       return row.act(in.session);
@@ -187,7 +190,7 @@ void hover(Input& in) {
   Session& s = in.session;
   Probe& probe = s.loaded.probe;
   constexpr double rest = 0.25;  // s
-  if (!s.probing || in.drag != Drag::none || !on_view(in) || s.now - in.rested < rest || s.ui.help) {
+  if (!s.probing || in.drag != Drag::none || !on_view(in) || s.now - in.rested < rest) {
     probe.reading.reset(), probe.copied = {}, probe.picker.answered = {};
     in.seen = {};
     return;
@@ -227,6 +230,10 @@ void listen(GLFWwindow* window, Input& input) {
   glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
     of(w)->events.push_back([=, in = of(w)] { move(*in, x, y); });
   });
+  glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** files) {
+    if (count > 0)
+      of(w)->events.push_back([in = of(w), file = std::string(files[0])] { open_file(in->session, file); });
+  });
   glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turned) {
     bool of_cut = false;  // as it is now, not in the next frame
     for (const int held :
@@ -259,6 +266,7 @@ struct Desktop {
   GLFWwindow* window = nullptr;
   int width = 0, height = 0;  ///< of this frame, in window coordinates
   float density = 0;          ///< framebuffer pixels a window coordinate: more on some dense displays
+  bool dark = false;          ///< the theme, as far as it is set
   bool visible = false;       ///< not minimised
 
   Desktop(int wanted_width, int wanted_height, const std::string& title) {
@@ -301,13 +309,15 @@ void measure_window(Desktop& d, Session& s) {
   d.visible = pixels_x > 0 && pixels_y > 0 && d.width > 0 && d.height > 0 &&
               !glfwGetWindowAttrib(d.window, GLFW_ICONIFIED);
   if (!d.visible) return;
-  const std::pair before(s.ui.scale, d.density);
+  const std::tuple before(s.ui.scale, d.density, d.dark);
   d.density = float(pixels_x) / float(d.width);
   float content = 1;
   glfwGetWindowContentScale(d.window, &content, nullptr);
-  s.ui.scale = std::clamp(content / d.density, 0.5f, 4.0f);
-  if (before == std::pair(s.ui.scale, d.density)) return;
-  set_style(s.ui.scale, d.density);
+  s.ui.scale = std::clamp(content / d.density, 0.5f, 4.0f) * float(s.ui.kept.text);
+  d.dark = s.ui.kept.dark;
+  if (before == std::tuple(s.ui.scale, d.density, d.dark)) return;
+  s.log("scale {} {}", s.ui.scale, d.dark ? "dark" : "light");
+  set_style(s.ui.scale, d.density, d.dark);
   ImGui_ImplOpenGL3_DestroyFontsTexture();
   ImGui_ImplOpenGL3_CreateFontsTexture();
 }
@@ -360,7 +370,7 @@ void end_imgui_frame(const Desktop& d, const Target& target) {
   const int width = int(float(d.width) * d.density), height = int(float(d.height) * d.density);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glDisable(GL_SCISSOR_TEST);
-  glClearColor(0.93f, 0.935f, 0.94f, 1);
+  d.dark ? glClearColor(0.06f, 0.06f, 0.06f, 1) : glClearColor(0.93f, 0.935f, 0.94f, 1);
   glClear(GL_COLOR_BUFFER_BIT);
   if (target.framebuffer) present(target, 0, 0, height - target.height);
   glViewport(0, 0, width, height);
@@ -409,8 +419,21 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.gl = load_gl();
   if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);
   s.samples = options.samples;
+  s.first_samples = options.samples;
   s.view = options.view;
   s.view.follow = true;
+  s.first_view = s.view;
+  const std::filesystem::path kept = cache_file("window.json");
+  Preferences written = s.ui.kept = read_preferences(kept);
+  // What cannot be kept is not worth a word.
+  const auto keep = [&] {
+    if (written == s.ui.kept || kept.empty()) return;
+    written = s.ui.kept;
+    try {
+      write_preferences(kept, written);
+    } catch (const std::exception&) {
+    }
+  };
   s.ui.mesh = overrides.mesh.string();
   s.timeline.budget = std::size_t(options.history_mb) << 20;
   if (!options.record.empty()) s.record = std::make_unique<Record>(options.record);
@@ -464,10 +487,12 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     if (s.now - last_check > 0.5) {
       last_check = s.now;
       follow_shaders(s);
+      keep();
     }
     draw_frame(s, view, input, desktop);
   }
   end_record(s);
+  keep();
   s.log("closed");
   return 0;
 }

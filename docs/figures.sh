@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README in docs/figures (the window's, lanes.png, is a screenshot of
+# Makes the pictures of the README in docs/figures, and those of the window's list of scenes beside these (the window's, lanes.png, is a screenshot of
 # tetpbd view --scene soft-beam --material neo-hookean --young-modulus 1e6 --lane mode=explicit
 #   --lane mode=newton,substeps=1,iterations=4 --lane mode=node,substeps=20,iterations=1 --lane mode=node,substeps=5,iterations=1).
 # Usage: docs/figures.sh; TETPBD names the program. Needs ffmpeg; some minutes on a software renderer.
@@ -27,6 +27,11 @@ jelly=(--material neo-hookean --young-modulus 2e5 --poisson-ratio 0.4 --constrai
 still tets 65 --scene bunny-drop "${near[@]}" "${jelly[@]}" --set camera.target=[0,0.4,0] --look tets --cut 0.55 --cut-axis 2
 still armadillo 65 --scene armadillo-drop "${near[@]}" "${jelly[@]}" --set camera.target=[0,0.45,0]
 still jelly 64 --scene jelly-beam --set camera.target=[0,0.45,0] --set camera.distance=1.9 --set camera.azimuth=20 --look wire --colour stretch
+
+for scene in models/scenes/*.json; do
+  "$program" run --scene "$scene" --steps 60 --png-every 60 --size 192x144 --samples 8 --out "$out"
+  mv "$out"/frame_00060.png "${scene%.json}.png"
+done
 
 # A beam's end is led up and around and let go, by four solvers.
 awk >"$out/lanes.jsonl" '

@@ -17,59 +17,81 @@ const std::vector<Parameter>& parameters() {
   using S = Settings;
   static const std::vector<Parameter> rows = [] {
     std::vector<Parameter> all = {
-        {"mode", "solver", &S::mode, "solver mode", 0, 0, "", false, Effect::rebuild},
-        {"constraints", "solver", &S::constraints, "constraint kinds, separated by commas", 0, 0, "", false,
-         Effect::rebuild},
+        {"mode", "solver", &S::mode,
+         "how constraints are solved, and where: hard bodies on the GPU by node, soft ones by explicit "
+         "or newton, without a GPU by cpu-fast",
+         0, 0, "", false, Effect::rebuild},
+        {"constraints", "solver", &S::constraints,
+         "kinds of constraint that hold a body together, separated by commas: lengths of edges, angles "
+         "of the surface, volumes of tets",
+         0, 0, "", false, Effect::rebuild},
     };
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
-        all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
-                       fmt::format("stiffness of {}", constraint_kinds[k].noun)});
+        all.push_back(
+            {std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
+             fmt::format("part of a correction that is applied to {} in an iteration: 1 is hard; less is "
+                         "softer, but depends on iterations and mesh",
+                         constraint_kinds[k].noun)});
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
-        all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
-                       KindMember{&S::compliance, k},
-                       fmt::format("softness of {}; 0: as hard as iterations make it. Any compliance or "
-                                   "constraint_damping above 0 brings mass_splitting with it",
-                                   constraint_kinds[k].noun),
-                       0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
+        all.push_back(
+            {std::string("compliance_") + constraint_kinds[k].name, "solver", KindMember{&S::compliance, k},
+             fmt::format("softness of {}, of a spring 1 over its stiffness; 0: as hard as iterations "
+                         "make it. Above 0 it brings mass_splitting with it",
+                         constraint_kinds[k].noun),
+             0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
     const std::vector<Parameter> others = {
         {"material", "solver", &S::material,
-         "of all bodies, in place of constraints, k and compliance: none, springs along edges and volumes, "
-         "neo-hookean tets",
+         "what bodies are made of, in place of constraints, k and compliance: none; springs along edges "
+         "and volumes; neo-hookean tets, right for large strains",
          0, 0, "", false, Effect::rebuild},
-        {"young_modulus", "solver", &S::young_modulus, "Young's modulus of the material", 1, 1e12, "Pa", true,
+        {"young_modulus", "solver", &S::young_modulus,
+         "stiffness of the material, Young's modulus: jelly 2e4, rubber 1e6, wood 1e10", 1, 1e12, "Pa", true,
          Effect::rebuild},
-        {"poisson_ratio", "solver", &S::poisson_ratio, "Poisson's ratio of the material, springs: from 0.25",
+        {"poisson_ratio", "solver", &S::poisson_ratio,
+         "how much the material thins when it is pulled, Poisson's ratio: near 0.5 it keeps its volume; "
+         "springs: from 0.25",
          0, 0.499, "", false, Effect::rebuild},
         {"constraint_damping", "solver", &S::constraint_damping,
-         "time over which constraints resist their rate: a spring's damping is this times its stiffness", 0,
+         "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0,
          10, "s", true},
         {"omega", "solver", &S::omega,
-         "over-relaxation of averaged corrections, 1 to 2 recommended, with compliance at most 2 (Jacobi "
-         "modes)",
+         "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most "
+         "scenes, above 2 it may not; with compliance at most 2",
          0, 4},
         {"mass_splitting", "solver", &S::mass_splitting,
-         "masses shared out among a vertex's constraints, which keeps momentum; else corrections are "
-         "averaged, as in the paper (modes node, constraint); with compliance always"},
-        {"iterations", "solver", &S::iterations, "iterations per substep", 0, 100000, "", true},
-        {"substeps", "solver", &S::substeps, "substeps per step", 1, 100000, "", true},
+         "a vertex shares its mass out among its constraints, which keeps momentum; off: corrections are "
+         "averaged, as in the paper (modes node, constraint); with compliance always on"},
+        {"iterations", "solver", &S::iterations,
+         "passes over all constraints in each substep; more substeps of one iteration are mostly better. "
+         "Mode newton: of conjugate gradients, 2 to 32 as the material is stiff",
+         0, 100000, "", true},
+        {"substeps", "solver", &S::substeps,
+         "parts into which a step is cut: more are more accurate and stiffer, and cost as much more. 5 "
+         "for hard bodies, 20 to be sure",
+         1, 100000, "", true},
         {"stability", "solver", &S::stability,
-         "a substep of mode explicit, as a part of the longest that is stable at rest", 0.01, 1},
-        {"dt", "solver", &S::dt, "time of one step", 1e-6, 1, "s", true},
-        {"damping", "solver", &S::damping, "rate at which velocity decays, exp(-damping t)", 0, 1000, "1/s"},
-        {"gravity", "world", &S::gravity, "gravity, downwards", -1000, 1000, "m/s^2"},
-        {"ground", "world", &S::ground, "whether there is a ground plane"},
+         "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower "
+         "it if a body that is much deformed fails",
+         0.01, 1},
+        {"dt", "solver", &S::dt, "time that one step simulates; shorter steps are more accurate", 1e-6, 1,
+         "s", true},
+        {"damping", "solver", &S::damping,
+         "slows all motion, also free fall: velocity decays by exp(-damping t)", 0, 1000, "1/s"},
+        {"gravity", "world", &S::gravity, "pull downwards: 9.81 on Earth, 0 in space", -1000, 1000, "m/s^2"},
+        {"ground", "world", &S::ground, "whether there is a ground to fall onto"},
         {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
-        {"friction", "world", &S::friction, "Coulomb friction of ground and obstacles", 0, 10},
+        {"friction", "world", &S::friction,
+         "Coulomb friction of ground and walls: 0 is ice, 0.5 wood, 1 rubber", 0, 10},
         {"restitution", "world", &S::restitution,
-         "normal velocity after an impact over before, of hard bodies (rigid_contact)"},
+         "bounce of hard bodies (rigid_contact): speed after an impact over before; 0: none, 1: all of it"},
         {"rigid_contact", "solver", &S::rigid_contact,
-         "touching bodies move as rigid ones, if all k are 1, stretch among them, and nothing is compliant; "
-         "else corrections of contacts and constraints become velocities, and bodies rebound",
+         "hard bodies (all k 1, stretch among them, no compliance) that touch something move as rigid "
+         "ones; off, as in the paper: they rebound by what the corrections add",
          0, 1, "", false, Effect::rebuild},
-        {"seed", "solver", &S::seed, "seed of random start positions", 0, 2147483647, "", false,
-         Effect::restart},
+        {"seed", "solver", &S::seed, "number that chooses among random starts and masses", 0, 2147483647, "",
+         false, Effect::restart},
     };
     all.insert(all.end(), others.begin(), others.end());
     return all;

@@ -211,6 +211,38 @@ TEST_CASE("record: what is done is done again without a window, to the same stat
     CHECK(result["lanes"][i]["state_hash"] == fmt::format("{:016x}", wanted[i]));
 }
 
+TEST_CASE("record: a grab without a radius, as older ones are, is of one vertex") {
+  const run_program::Folder folder;
+  const auto file = folder.path / "session.jsonl";
+  std::uint64_t wanted = 0;
+  {
+    GlTest gl;
+    Session s;
+    s.record = std::make_unique<Record>(file);
+    open_block(s);
+    s.grab_radius = 0;
+    Pick pick;
+    pick.vertex = vertex(s, 9);
+    catch_vertex(s, pick);
+    s.grab->target = s.grab->start + glm::dvec3(0, 1, 0);
+    step_to(s, 6);
+    let_go(s);
+    step_to(s, 9);
+    wanted = hashes(s)[0];
+    end_record(s);
+  }
+  std::string text = run_program::read(file);
+  const std::string later = ",\"lane\":0,\"radius\":0.0";
+  REQUIRE(text.find(later) != std::string::npos);
+  text.erase(text.find(later), later.size());
+  std::ofstream(file) << text;
+  RunOptions options = small(folder.path / "again");
+  options.replay = file;
+  CHECK(run_replay(options) == 0);
+  CHECK(run_program::read(options.out / "replay.json").find(fmt::format("{:016x}", wanted)) !=
+        std::string::npos);
+}
+
 TEST_CASE("record: what cannot be done again is said, with its line") {
   const run_program::Folder folder;
   RunOptions options = small(folder.path / "out");

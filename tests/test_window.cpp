@@ -2,16 +2,22 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
+#include "app/files.h"
+#include "app/preferences.h"
 #include "app/reference_command.h"
 #include "app/run_loop.h"
 #include "app/session.h"
 #include "app/ui.h"
+#include "app/widgets.h"
 #include "render/target.h"
 #include "sim/error.h"
 #include "sim/material.h"
 #include "tests/gl_test.h"
+#include "tests/run_program.h"
 
 using namespace tetpbd;
 
@@ -324,4 +330,208 @@ TEST_CASE("window: a map is filled a little in every frame, each cell as a run o
   fill_map(s);  // and left while its motion is being found
   s.loaded.map.reset();
   CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("window: changes of settings are taken back and done again, and errors go with what mends them") {
+  GlTest gl;
+  Session s;
+  show_beam(s);
+  const Settings own = s.loaded.own;
+  CHECK(own == s.loaded.sim().settings);
+  const auto set = [&](auto member, auto value) {
+    Settings wanted = s.loaded.sim().settings;
+    wanted.*member = value;
+    change_settings(s, wanted);
+  };
+  const auto now = [&]() -> const Settings& { return s.loaded.sim().settings; };
+  undo(s);
+  CHECK(s.messages.back().text == "nothing to undo");
+  set(&Settings::omega, 1.2);
+  set(&Settings::omega, 1.3);  // the slider is still held
+  s.changes.open = false;
+  set(&Settings::gravity, 5.0);
+  s.changes.open = false;
+  undo(s);
+  CHECK(now().gravity == own.gravity);
+  CHECK(now().omega == 1.3);
+  undo(s);
+  CHECK(now() == own);
+  redo(s);
+  redo(s);
+  CHECK(now().gravity == 5);
+  undo(s);
+  set(&Settings::friction, 0.1);  // what was taken back is forgotten
+  CHECK(s.changes.future.empty());
+  set(&Settings::mode, "newton");
+  CHECK(s.messages.back().error);
+  CHECK(now().mode == "node");
+  set(&Settings::friction, 0.2);
+  CHECK(std::ranges::none_of(s.messages, &Message::error));
+  add_lane(s);
+  CHECK(s.changes.past.empty());  // of other lanes
+  set(&Settings::gravity, 3.0);
+  s.changes.open = false;
+  undo(s);
+  for (const Lane& lane : s.loaded.lanes) CHECK(lane.sim.settings.gravity == own.gravity);
+}
+
+TEST_CASE("window: a saved scene is loaded as it was; a file that fails leaves an error until one works") {
+  GlTest gl;
+  const run_program::Folder folder;
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path);
+  {
+    Session s;
+    show_beam(s);
+    Settings wanted = s.loaded.sim().settings;
+    wanted.gravity = 4, wanted.constraints = "stretch,volume", wanted.dt = 0.003;
+    change_settings(s, wanted);
+    s.camera.azimuth = 12;
+    save_scene(s);
+    REQUIRE(std::filesystem::exists("beam_000.json"));
+    CHECK(read_png("beam_000.png")->width == picture_width);
+    REQUIRE(s.ui.kept.recent.size() == 1);
+    const auto load_now = [&](const char* file) {
+      open_file(s, file);
+      attempt(s, std::exchange(s.task, std::nullopt)->act);
+    };
+    std::ofstream("bad.ply") << "this is no mesh";
+    load_now("bad.ply");
+    CHECK(s.messages.back().error);
+    load_now(s.ui.kept.recent[0].c_str());
+    CHECK(s.messages.empty());
+    CHECK(s.loaded.sim().settings == wanted);
+    CHECK(s.loaded.own == wanted);
+    CHECK(s.camera.azimuth == 12);
+    for (int i = 0; i < 9; ++i) single_step(s);
+    Session again;
+    show_beam(again);
+    change_settings(again, wanted);
+    restart(again);
+    for (int i = 0; i < 9; ++i) single_step(again);
+    CHECK(state_hash(s.loaded.sim()) == state_hash(again.loaded.sim()));
+    CHECK(s.ui.kept.recent.size() == 1);
+  }
+  std::filesystem::current_path(before);
+}
+
+TEST_CASE("scene: every shipped one is written as it is read, and has a picture") {
+  const run_program::Folder folder;
+  for (const std::string& name : scene_names()) {
+    CAPTURE(name);
+    const Scene scene = load_scene(name);
+    const auto file = folder.path / (name + ".json");
+    std::ofstream(file) << scene_json(scene).dump();
+    const Scene again = load_scene(file.string());
+    CHECK(again.settings == scene.settings);
+    CHECK(scene_json(again).dump() == scene_json(scene).dump());
+    const auto picture = read_png(models_folder() / "scenes" / (name + ".png"));
+    REQUIRE(picture);
+    CHECK(picture->width == picture_width);
+  }
+}
+
+TEST_CASE("window: what it keeps is kept; a damaged file is as none") {
+  const run_program::Folder folder;
+  const auto file = folder.path / "new" / "window.json";
+  CHECK(read_preferences(file) == Preferences());
+  Preferences kept{.dark = true, .panel = 400, .text = 1.5, .open = {{"View", false}, {"Contact", true}}};
+  for (int i = 0; i < 12; ++i) remember(kept, fmt::format("/a/{}.ply", i % 10));
+  CHECK(kept.recent.size() == 8);
+  CHECK(kept.recent[0] == "/a/1.ply");
+  write_preferences(file, kept);
+  CHECK(read_preferences(file) == kept);
+  const std::string whole = run_program::read(file);
+  for (std::size_t length = 0; length + 2 < whole.size(); length += 7) {
+    std::ofstream(file) << whole.substr(0, length);
+    CHECK(read_preferences(file) == Preferences());
+  }
+  for (const char* wrong :
+       {"[]", "{\"dark\": 3}", "{\"recent\": [1]}", "{\"open\": {\"a\": \"b\"}}", "null", "\xff"}) {
+    CAPTURE(wrong);
+    std::ofstream(file) << wrong;
+    CHECK(read_preferences(file) == Preferences());
+  }
+  std::ofstream(file) << R"({"panel": 1e300, "text": -1})";
+  CHECK(read_preferences(file).panel == most_panel);
+  CHECK(read_preferences(file).text == least_text);
+}
+
+TEST_CASE("window: what the mouse holds follows it without a spike, in every lane, out of the ground") {
+  GlTest gl;
+  Session s;
+  show_beam(s);
+  add_lane(s);
+  const Sim& sim = s.loaded.sim();
+  const TetMesh& rest = sim.model->rest;
+  Pick pick;  // a corner at the end
+  const auto along = [&](std::uint32_t a, std::uint32_t b) {
+    return glm::dot(rest.positions[a], glm::dvec3(1, 0.1, 0.1)) <
+           glm::dot(rest.positions[b], glm::dvec3(1, 0.1, 0.1));
+  };
+  for (std::uint32_t v = 0; v < rest.positions.size(); ++v)
+    if (along(pick.vertex, v)) pick.vertex = v;
+  const auto close = [&](double radius) { return take_hold(sim, pick.vertex, radius).vertices; };
+  CHECK(close(0) == std::vector{pick.vertex});
+  s.grab_radius = 0.45;
+  catch_vertex(s, pick);
+  REQUIRE(s.hold);
+  CHECK(s.hold->caught() == pick.vertex);
+  CHECK(s.hold->vertices.size() > 8);
+  CHECK(s.hold->vertices.size() < rest.positions.size());
+  for (const Lane& lane : s.loaded.lanes)
+    for (const std::uint32_t v : s.hold->vertices) CHECK(is_pinned(lane.sim, v));
+  const glm::dvec3 up(0, 3, 0);
+  s.grab->target = s.grab->start + up;
+  for (int i = 0; i < 40; ++i) single_step(s);
+  const State state = read_state(sim);
+  for (std::size_t i = 0; i < s.hold->vertices.size(); ++i) {
+    const std::uint32_t v = s.hold->vertices[i];
+    const double moved = state.positions[v].y - s.hold->starts[i].y;
+    const double led = s.grab->position.y - s.grab->start.y;
+    CHECK(moved == doctest::Approx(led - s.hold->behind[i] * s.hold->slack).epsilon(1e-5));
+    CHECK(read_state(s.loaded.lanes[0].sim).positions[v] == state.positions[v]);
+  }
+  CHECK(s.grab->position.y > s.grab->start.y + s.hold->slack);
+  move_held(s.loaded.lane().sim, *s.hold, s.hold->starts[0] - glm::dvec3(0, 9, 0));
+  const State below = read_state(sim);
+  for (std::size_t i = 1; i < s.hold->vertices.size(); ++i)
+    CHECK(below.positions[s.hold->vertices[i]].y > -1e-6);
+  const auto held = s.hold->vertices;
+  let_go(s);
+  for (const Lane& lane : s.loaded.lanes)
+    for (const std::uint32_t v : held) CHECK_FALSE(is_pinned(lane.sim, v));
+  // A pin of the user's stays where it is, and is led alone.
+  toggle_pin(s, held[1]);
+  CHECK(std::ranges::count(close(0.45), held[1]) == 0);
+  CHECK(take_hold(sim, held[1], 0.45).vertices == std::vector{held[1]});
+}
+
+TEST_CASE("window: where it is slow, it says what would be faster") {
+  GlTest gl;
+  Session s;
+  show_beam(s);
+  s.playing = true;
+  const auto said = [&] {
+    const auto advice = faster_way(s);
+    if (advice && !advice->words.empty())
+      CHECK_NOTHROW(lane_settings(s.loaded.sim().settings, advice->words, ""));
+    return advice ? advice->said : "";
+  };
+  CHECK(said() == "");
+  s.clock.factor = 0.9;
+  CHECK(said() == "");
+  s.clock.factor = 0.01;
+  s.gl.software = true;
+  CHECK(said() == "mode cpu-fast");
+  Settings settings = s.loaded.sim().settings;
+  settings.mode = "cpu-fast", settings.substeps = 20;
+  change_settings(s, settings);
+  CHECK(said() == "solver hard");
+  settings.substeps = 5;
+  change_settings(s, settings);
+  CHECK(said() == "a smaller scene");
+  s.clock.halvings = 5;
+  s.clock.factor = 0.03;
+  CHECK(said() == "");
 }

@@ -42,7 +42,7 @@ grep -q "\"state_hash\": \"$hash\"" headless/stats.json || fail "after $steps st
 [[ $steps -gt 3 ]] || fail "only $steps steps were compared"
 
 # ------------------------------------------------------------------------------------------------------------ settings
-forget
+click "section Solver more" 0.1; await '^opened Solver more'; await '^at omega '
 to omega 0.3 0.5; press 1
 xdotool mousemove $(point omega 0.5 0.5); pause_for_frame
 xdotool mousemove $(point omega 0.75 0.5); pause_for_frame
@@ -55,6 +55,16 @@ for k in 1 period 2; do xdotool key $k; pause_for_frame; done
 new_events | grep -qE '^(look|step|colour)' && fail "typing into a slider worked a shortcut"
 xdotool keydown Return; pause_for_frame; xdotool keyup Return
 await '^set omega 1\.2'
+# One drag is one change, which a right click, Ctrl+Z and a button take back.
+key ctrl+z; await '^undo'; await '^set omega (2\.[5-9]|3)'
+key ctrl+z; await '^undo'; await '^set omega 1\.5$'
+key ctrl+shift+z; await '^redo'; await '^set omega (2\.[5-9]|3)'
+key ctrl+y; await '^redo'; await '^set omega 1\.2$'
+to omega 0.5 0.5; sleep 0.3; shot unusual.png
+forget; press 3; release 3; await '^back omega 1.5'; await '^set omega 1.5$'
+click undo; await '^set omega 1.2$'
+click redo; await '^set omega 1.5$'
+click "section Solver more" 0.1; await '^folded Solver more'
 choose mode cpu; await '^set mode cpu'
 key s; await '^step'
 choose mode node; await '^set mode node'
@@ -84,12 +94,24 @@ key g; await '^grid false'
 key g; await '^grid true'
 key l; await '^follow false'
 key l; await '^follow true'
-click "section Solver" 0.1; sleep 0.5  # out of the way
+# Out of the way, which stays so.
+click "section Solver" 0.1; await '^folded Solver'; sleep 0.5
+click "section Material" 0.1; await '^folded Material'; sleep 0.5
+click "section View more" 0.1; await '^opened View more'; sleep 0.5
 click grid 0.1; await '^grid false'
 click grid 0.1; await '^grid true'
 click "sky and ground" 0.1; await '^sky and ground false'
 click "sky and ground" 0.1; await '^sky and ground true'
-click "section Solver" 0.1; sleep 0.5
+shot view.png
+choose theme dark; await '^scale 1 dark'; sleep 0.3; shot dark.png
+differ view.png dark.png 100000 "the dark theme"
+choose theme light; await '^scale 1 light'
+choose "text size" "125 %"; await '^scale 1.25 light'; sleep 0.5; shot larger.png
+to "text size" 0.5 0.5; forget; press 3; release 3; await '^back text size 100 %'; await '^scale 1 light'; sleep 0.5
+drag 1 $((vx + vw)) $cy -60 0; release 1; await '^at edge '
+read -r _ _ now _ < <(place view); [[ $now -eq $((vw - 60)) ]] || fail "the panel is not wider by what its edge was dragged"
+drag 1 $((vx + vw - 60)) $cy 60 0; release 1; await "^at view 0 0 $vw "
+click "section View more" 0.1; await '^folded View more'
 key h; await '^help true'; sleep 1; shot help.png
 differ panels.png help.png 20000 "the help overlay"
 key Escape; await '^help false'; pause_for_frame
@@ -140,6 +162,7 @@ forget; xdotool windowsize "$window" 900 600; await '^size 900 600'; await '^at 
 forget; xdotool windowsize "$window" 1000 760; await '^size 1000 760'; await '^at mesh '; pause_for_frame
 
 # -------------------------------------------------------------------------------------------------------- side by side
+click "section Side by side" 0.1; await '^opened Side by side'; sleep 0.5
 forget; choose "side by side" "paper, node, cpu"
 for lane in "node, 25 iterations" "node, 5 substeps" "cpu-fast, 5 substeps"; do await "^lane $lane\$"; done
 key s; await '^step 1$'; key s; await '^step 2$'; key s; await '^step 3$'
@@ -179,6 +202,7 @@ click "map 2 1"; await '^map chose 4 1'; await '^set substeps 4'
 click "section Stability map" 0.1; sleep 0.5
 
 # ------------------------------------------------------------------------------------------------- errors, other scenes
+click "section Side by side" 0.1; sleep 0.5
 type_mesh() {
   click mesh
   xdotool key ctrl+a; pause_for_frame
@@ -195,6 +219,16 @@ for _ in $(seq 20); do
   for _ in $(seq 10); do new_events | grep -q '^dismissed' && break 2; sleep 0.1; done
 done
 new_events | grep -q '^dismissed' || fail "the message cannot be dismissed"
+# An error goes with the next scene that loads. What was saved is this scene with its settings.
+type_mesh bad.ply; await '^error .*bad.ply'
+key ctrl+s; await '^message saved block_000.json'
+key r; await '^reset'; key s; await '^step 1$'; await '^state 1 '
+hash=$(new_events | sed -n 's/^state 1 //p' | tail -n 1)
+"$program" run --scene block_000.json --shaders shaders --steps 1 --csv-every 0 --out saved >/dev/null || fail "the saved scene does not run"
+grep -q "\"state_hash\": \"$hash\"" saved/stats.json || fail "the saved scene is another"
+choose scene beam; await '^scene beam'
+type_mesh block_000.json; await '^scene block_000.json'; sleep 0.5; shot loaded.png
+click scene; sleep 1; shot scenes.png; key Escape
 choose scene beam; await '^scene beam'
 key s; await '^step 1$'; shot beam.png
 
@@ -225,5 +259,14 @@ key space; await '^running [1-9]'
 new_events | grep -q '^error' && fail "an error after the reset"
 
 # ------------------------------------------------------------------------------------------------------------- the end
+close_window
+# What was folded is so the next time; a damaged file is as none.
+grep -q '"Solver": *false' cache/window.json && grep -q block_000.json cache/window.json || fail "the window keeps nothing"
+open_window --scene block.json --size 1000x760 --samples 0
+grep -q '^at mode ' "$log" && fail "what was folded is open again"
+close_window
+echo '{"dark": ' >cache/window.json
+open_window --scene block.json --size 1000x760 --samples 0
+await '^at mode '
 close_window
 echo "window: passed in $SECONDS s"

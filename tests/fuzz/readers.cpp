@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "app/commands.h"
+#include "app/preferences.h"
 #include "app/record.h"
 #include "app/scene.h"
 #include "sim/error.h"
@@ -258,6 +259,15 @@ void read_record_file(std::string_view bytes) {
   });
 }
 
+void read_preferences_file(std::string_view bytes) {
+  const fs::path file = write("window.json", bytes);
+  expect_errors_only([&] {
+    const Preferences read = read_preferences(file);
+    require(read.panel >= least_panel && read.panel <= most_panel, "a panel that can be used");
+    require(read.text >= least_text && read.text <= most_text, "text that can be read");
+  });
+}
+
 // A word a line. What the words ask for is checked, not done.
 void read_words(std::string_view bytes) {
   static const fs::path file = write("words.json", small_scene);
@@ -288,6 +298,7 @@ const std::vector<Reader>& readers() {
       {"overrides", "overrides", read_overrides, false},
       {"words", "words", read_words, false},
       {"record", "record", read_record_file, false},
+      {"preferences", "preferences", read_preferences_file, false},
   };
   return rows;
 }

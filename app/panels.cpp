@@ -370,7 +370,6 @@ void draw_view(Session& s) {
     if (i++ % 2) ImGui::SameLine(label_width());
     check_box(s, name, value, help, usual);
   }
-  ImGui::NewLine();
   const auto doublings = [](int samples) { return int(std::bit_width(unsigned(samples) / 2)); };
   int now = doublings(s.samples);
   enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, now, doublings(s.first_samples),

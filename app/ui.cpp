@@ -303,10 +303,10 @@ void draw_ui(Session& s, const Layout& layout) {
   }
   if (s.grab) draw_pull(s, layout.view);
   if (layout.panel.width > 0) {
+    draw_edge(s, layout.panel);  // such windows stand before those that come after them
     begin_part(s.ui.help ? "help" : "panel", layout.panel);
     s.ui.help ? draw_help(s) : draw_panel(s);
     ImGui::End();
-    draw_edge(s, layout.panel);
   }
   if (s.ui.panels) {
     if (layout.timeline.height > 0) {

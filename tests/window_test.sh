@@ -205,7 +205,7 @@ click "section Stability map" 0.1; sleep 0.5
 click "section Side by side" 0.1; sleep 0.5
 type_mesh() {
   click mesh
-  xdotool key ctrl+a; pause_for_frame
+  xdotool keydown ctrl keydown a; pause_for_frame; xdotool keyup a keyup ctrl; pause_for_frame
   xdotool type --delay 60 "$1"; pause_for_frame
   new_events | grep -qE '^(look|step|colour|play|panels|follow|screenshot)' && fail "typing a path worked a shortcut"
   xdotool keydown Return; pause_for_frame; xdotool keyup Return
@@ -228,8 +228,8 @@ hash=$(new_events | sed -n 's/^state 1 //p' | tail -n 1)
 grep -q "\"state_hash\": \"$hash\"" saved/stats.json || fail "the saved scene is another"
 choose scene beam; await '^scene beam'
 type_mesh block_000.json; await '^scene block_000.json'; sleep 0.5; shot loaded.png
-click scene; sleep 1; shot scenes.png; key Escape
-choose scene beam; await '^scene beam'
+click scene; sleep 1; shot scenes.png
+click "scene=beam"; await '^scene beam'
 key s; await '^step 1$'; shot beam.png
 
 # -------------------------------------------------------------------------------------------------------- shaders

@@ -221,7 +221,9 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
     }
     ImGui::EndCombo();
   }
-  mark(s, name);
+  describe_item(
+      s, name,
+      "what is plotted, of all lanes; the wheel on a plot zooms, a drag scrolls, a double click shows all");
   const PlotRow& row = plot_rows()[chosen];
   ImGui::SameLine();
   if (ImGui::Button("CSV")) {
@@ -229,7 +231,7 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
     ImGui::SetClipboardText(text.c_str());
     say(s, fmt::format("copied {} rows", std::ranges::count(text, '\n') - 1));
   }
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("copy all values as CSV");
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("copies all values as CSV");
   mark(s, fmt::format("csv {}", slot + 1));
   ImGui::SameLine();
   if (ImGui::Button("SVG"))
@@ -238,7 +240,7 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
       write_file(file, to_svg(plot_chart(s, row)));
       say(s, "saved " + file);
     });
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("save the plot into the current folder");
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("saves the plot into the current folder");
   mark(s, fmt::format("svg {}", slot + 1));
   draw_curves(s, row, slot, ImVec2(width, std::max(ImGui::GetContentRegionAvail().y, 1.0f)));
   ImGui::EndGroup();
@@ -285,8 +287,12 @@ Chart plot_chart(const Session& s, const PlotRow& row) {
 
 void draw_plots(Session& s, const Rect& place) {
   begin_part("plots", place);
-  const float pad = ImGui::GetStyle().WindowPadding.x, width = (place.width - 4 * pad) / 3;
-  for (std::size_t slot = 0; slot < 3; ++slot) draw_slot(s, slot, pad + float(slot) * (pad + width), width);
+  // No more than have room for their titles.
+  const float pad = ImGui::GetStyle().WindowPadding.x, room = place.width / (17 * ImGui::GetFontSize());
+  const auto count = std::clamp(std::size_t(room), std::size_t(1), std::size_t(3));
+  const float width = (place.width - float(count + 1) * pad) / float(count);
+  for (std::size_t slot = 0; slot < count; ++slot)
+    draw_slot(s, slot, pad + float(slot) * (pad + width), width);
   ImGui::End();
 }
 

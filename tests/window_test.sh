@@ -179,7 +179,7 @@ to "plot 1" 0.5 0.5; forget; xdotool click 4; await '^plot 1 [-0-9.e]+ \.\. '; s
 forget; for _ in 1 2 3; do xdotool click 5; pause_for_frame; done; await '^plot 1 whole'
 click "csv 1"; await '^message copied [0-9]+ rows'
 click "svg 1"; await '^message saved plot_000.svg'; grep -q "time per step, ms" plot_000.svg || fail "the saved plot has no axis"
-choose "plotted 3" "energy"; await '^plotted 3 energy'
+choose "plotted 2" "energy"; await '^plotted 2 energy'
 xdotool mousemove $((vx + 20)) $((vy + 20)); sleep 4.5; shot lanes.png  # messages go
 key o; await '^overlaid true'; pause_for_frame; shot overlaid.png
 differ lanes.png overlaid.png 20000 "lanes in one place"

@@ -93,9 +93,8 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
 }
 
 bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
-  const std::string usual = parameter_text(s.loaded.own, row),
-                    back = parameter_text(settings, row) == usual ? "" : usual;
-  const std::string before = parameter_text(settings, row);
+  const std::string usual = parameter_text(s.loaded.own, row), before = parameter_text(settings, row),
+                    back = before == usual ? "" : usual;
   if (const auto* word = std::get_if<std::string Settings::*>(&row.member)) {
     std::string& value = settings.**word;
     if (row.name == "constraints") return words_widget(s, row, value, s.loaded.own.**word);
@@ -122,60 +121,45 @@ struct Group {
   bool open;
   Words shown, more;
 };
-const std::vector<Group>& groups() {
-  static const std::vector<Group> rows = [] {
-    std::vector<Group> all = {
-        {"Material",
-         true,
-         {"material", "young_modulus", "poisson_ratio", "constraints", "k_*"},
-         {"compliance_*", "constraint_damping", "damping"}},
-        {"Solver", true, {"mode", "substeps", "iterations", "stability", "dt"}, {"omega", "mass_splitting"}},
-        {"Contact",
-         false,
-         {"gravity", "ground", "friction", "restitution"},
-         {"ground_height", "rigid_contact"}},
-    };
-    const auto names = [](const std::string& pattern, const std::string& name) {
-      return pattern == name ||
-             (pattern.back() == '*' && name.starts_with(pattern.substr(0, pattern.size() - 1)));
-    };
-    for (const Parameter& row : parameters())
-      if (std::ranges::none_of(all, [&](const Group& group) {
-            return std::ranges::any_of(group.shown, [&](const auto& p) { return names(p, row.name); }) ||
-                   std::ranges::any_of(group.more, [&](const auto& p) { return names(p, row.name); });
-          }))
-        all[1].more.push_back(row.name);
-    for (Group& group : all)
-      for (Words* list : {&group.shown, &group.more}) {
-        Words found;
-        for (const std::string& pattern : *list)
-          for (const Parameter& row : parameters())
-            if (names(pattern, row.name)) found.push_back(row.name);
-        *list = std::move(found);
-      }
-    return all;
-  }();
-  return rows;
+const std::vector<Group> groups = {
+    {"Material",
+     true,
+     {"material", "young_modulus", "poisson_ratio", "constraints", "k_*"},
+     {"compliance_*", "constraint_damping", "damping"}},
+    {"Solver", true, {"mode", "substeps", "iterations", "stability", "dt"}, {"omega", "mass_splitting"}},
+    {"Contact", false, {"gravity", "ground", "friction", "restitution"}, {"ground_height", "rigid_contact"}}};
+
+bool names(const std::string& pattern, const std::string& name) {
+  return pattern.back() == '*' ? name.starts_with(pattern.substr(0, pattern.size() - 1)) : name == pattern;
 }
 
 void draw_settings(Session& s, const Group& group) {
   const Settings now = s.loaded.sim().settings;
-  const auto& own = s.loaded.own;
-  Settings wanted = now;
   const auto differs = [](const Settings& a, const Settings& b, const Parameter& row) {
     return parameter_text(a, row) != parameter_text(b, row);
   };
   std::vector<const Parameter*> shown, rest;
-  for (const auto* list : {&group.shown, &group.more})
-    for (const std::string& name : *list) {
-      const Parameter& row = *find_parameter(name);
-      // What the scene itself sets matters there.
-      const bool matters = list == &group.shown || differs(own, Settings(), row);
-      if (has_effect(s, now, row)) (matters ? shown : rest).push_back(&row);
-    }
+  const auto put = [&](const Parameter& row, bool matters) {
+    // What the scene itself sets matters there.
+    matters = matters || differs(s.loaded.own, Settings(), row);
+    if (has_effect(s, now, row)) (matters ? shown : rest).push_back(&row);
+  };
+  for (const Words* list : {&group.shown, &group.more})
+    for (const std::string& pattern : *list)
+      for (const Parameter& row : parameters())
+        if (names(pattern, row.name)) put(row, list == &group.shown);
+  for (const Parameter& row : parameters()) {
+    const auto named = [&](const std::string& pattern) { return names(pattern, row.name); };
+    if (&group == &groups[1] && std::ranges::none_of(groups, [&](const Group& g) {
+          return std::ranges::any_of(g.shown, named) || std::ranges::any_of(g.more, named);
+        }))
+      put(row, false);
+  }
+  Settings wanted = now;
   bool changed = false;
   for (const Parameter* row : shown) changed |= parameter_widget(s, *row, wanted);
-  const bool unusual = std::ranges::any_of(rest, [&](const auto* row) { return differs(now, own, *row); });
+  const bool unusual =
+      std::ranges::any_of(rest, [&](const auto* row) { return differs(now, s.loaded.own, *row); });
   if (!rest.empty() && more(s, group.name, unusual))
     for (const Parameter* row : rest) changed |= parameter_widget(s, *row, wanted);
   if (changed) change_settings(s, wanted);
@@ -430,7 +414,7 @@ void draw_timeline(Session& s) {
 void draw_panel(Session& s) {
   draw_run(s);
   if (section(s, "Scene")) draw_scene(s);
-  for (const Group& group : groups()) {
+  for (const Group& group : groups) {
     if (!section(s, group.name, group.open)) continue;
     if (group.name == std::string_view("Material")) draw_material(s);
     if (group.name == std::string_view("Solver")) draw_solver(s);

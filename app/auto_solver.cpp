@@ -91,7 +91,8 @@ Sim finer_than(const Settings& settings, const std::shared_ptr<const Model>& mod
   return create_sim(model, fine);
 }
 
-/// Positions of a run, for others to be held against.
+}  // namespace
+
 Motion motion_of_run(Sim& sim, long steps) {
   Motion motion;
   const auto keep = [&](long step) {
@@ -105,8 +106,6 @@ Motion motion_of_run(Sim& sim, long steps) {
            }});
   return motion;
 }
-
-}  // namespace
 
 double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 
@@ -171,13 +170,18 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
 }
 
 std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
-  if (!std::exchange(scene.mode_open, false) || !has_forces(scene.settings)) return std::nullopt;
+  if (!std::exchange(scene.mode_open, false)) return std::nullopt;
   Settings& s = scene.settings;
+  if (!has_forces(s)) {
+    if (!scene.by_device || !hard(s) || !is_software_renderer()) return std::nullopt;
+    set_mode(s, "cpu-fast", scene.name);
+    return "cpu-fast: on a software renderer faster than node and nearer to what is right";
+  }
   double spin = 0;
   for (const BodyDescription& body : scene.bodies) spin = std::max(spin, glm::length(body.spin));
   // Four times as many where newton would take four times its own (sim/watch.h).
   const double wanted = explicit_substeps(model, s),
-               most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > 0.15 ? 4 : 1);
+               most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? finer_times : 1);
   if (wanted <= most) {
     set_mode(s, "explicit", scene.name);
     return fmt::format("explicit, about {:g} substeps", wanted);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/scene.h"
+#include "sim/reference/motion.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -29,6 +30,8 @@ struct SolverChoice {
   const Settings& settings() const { return trials[best].settings; }
 };
 
+/// Positions of a run, some twenty times on its way, for others to be held against.
+Motion motion_of_run(Sim& sim, long steps);
 /// The budget without --budget-ms: a tenth of the time that a step simulates.
 double default_budget_ms(const Settings& settings);
 /// Tries the scene's own setting, and one iteration per substep in mode node, with two over-relaxations and
@@ -40,7 +43,8 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
                            double budget_ms, long steps);
 /// The mode of bodies that have forces, where nobody says one: `explicit` up to 40 substeps, 20 on a software
 /// renderer, else `newton` in two substeps of 4 iterations, 8 from 40 such substeps on, 16 from 128, 32 from
-/// 400. By what was measured (docs/results.md), without a race. What it took; nothing otherwise.
+/// 400. By what was measured (docs/results.md), without a race. Of hard ones `cpu-fast` on a software
+/// renderer, where the scene lets the device choose. What it took; nothing otherwise.
 std::optional<std::string> choose_by_rule(Scene& scene, const Model& model);
 /// For a scene that asks for it: over its first 400 steps at most. The scene then has the settings chosen.
 std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model);

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "app/commands.h"
+#include "sim/did_you_mean.h"
 #include "sim/error.h"
 
 namespace tetpbd {
@@ -79,7 +80,8 @@ void add_cases(Sweep& sweep, const CompareOptions& options) {
   for (const std::string& name : names)
     for (const std::string& mesh : options.meshes) {
       if (mesh != "bunny" && mesh != "block" && mesh != "tet")
-        throw Error("no such mesh", "--meshes " + mesh, "choose from bunny, block, tet");
+        throw Error("no such mesh", "--meshes " + mesh,
+                    did_you_mean(mesh, {"bunny", "block", "tet"}) + "choose from bunny, block, tet");
       const auto scene = scene_of(name, mesh, options.overrides);
       if (!scene || !is_constrained(scene->settings)) continue;  // where nothing acts, nothing recovers
       for (const std::string& mode : options.axes.modes)

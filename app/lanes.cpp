@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "app/auto_solver.h"
+#include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/material.h"
 
@@ -147,8 +148,9 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     else if (!apply_preset(settings, solver_presets(), word) &&
              !apply_preset(settings, material_presets(), word))
       throw Error(fmt::format("'{}' is no way to solve", word), where,
-                  fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
-                              fmt::join(names_of(solver_presets()), ", ")));
+                  did_you_mean(word, names_of(solver_presets())) +
+                      fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
+                                  fmt::join(names_of(solver_presets()), ", ")));
   }
   check_settings(settings, where);
   if (budget_ms > 0 && model) settings = choose_solver(model, settings, budget_ms, 400).settings();

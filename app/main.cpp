@@ -12,9 +12,11 @@
 #include "app/commands.h"
 #include "app/lanes.h"
 #include "app/record.h"
+#include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
+#include "sim/solvers/solver.h"
 
 using namespace tetpbd;
 
@@ -41,6 +43,7 @@ struct Arguments {
   std::filesystem::path mesh_file, mesh_out;
   std::string switches = "pYq1.85o/140";
   bool json = false;
+  std::vector<std::array<const CLI::Option*, 2>> apart;  ///< never together: one would be dropped
 };
 
 // ------------------------------------------------------------------------------------------------------------
@@ -66,7 +69,8 @@ CLI::Validator one_of(const Words& words) {
       [=](std::string& text) {
         const auto found = std::ranges::find(words, text);
         if (found == words.end())
-          return fmt::format("must be one of {}, not '{}'", fmt::join(words, ", "), text);
+          return fmt::format("{}must be one of {}, not '{}'",
+                             did_you_mean(text, {words.begin(), words.end()}), fmt::join(words, ", "), text);
         text = std::to_string(found - words.begin());
         return std::string();
       },
@@ -141,9 +145,13 @@ void add_parameters(CLI::App& command, SceneOverrides& overrides) {
   for (const Parameter& row : parameters()) {
     if (command.get_option_no_throw(flag_name(row))) continue;
     const auto words = choices(row);
-    const std::string allowed =
+    std::string allowed =
         words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
                       : fmt::format(": {}", fmt::join(words, ", "));
+    if (row.name == "mode") {
+      allowed = ":";
+      for (const SolverMode& mode : solver_modes()) allowed += fmt::format("\n{}: {}", mode.name, mode.help);
+    }
     const auto set = [&](const std::string& text) { overrides.parameters.emplace_back(row.name, text); };
     command.add_option_function<std::string>(flag_name(row), set, row.help + allowed)
         ->group("Settings")
@@ -172,12 +180,15 @@ void open_scene(Arguments& a) {
   const ColourScale& scale = a.run.view.scale();
   if (const double end = a.run.range / scale.factor; end > 0)
     a.run.view.range() = {scale.is_signed ? -end : 0, end}, a.run.view.hold_range = true;
-  if (a.run.replay.empty()) a.opened = load_scene(a.scene, a.overrides);
+  if (!a.run.replay.empty()) return;
+  a.opened = load_scene(a.scene, a.overrides);
+  if (a.run.lanes.empty()) note_unused(a.opened->settings, {}, a.overrides);
 }
 
-// Options that mean the same in every command that opens a scene.
-void add_scene(CLI::App& command, Arguments& a) {
-  add(command, "--scene", a.scene, fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")));
+// Options that mean the same in every command that opens a scene. Where nobody says the mode, the device may.
+void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
+  add(command, "--scene,--scenes", a.scene,
+      fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")));
   add_overrides(command, a.overrides);
   command.add_option("--deform", a.overrides.deform,
                      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
@@ -214,7 +225,10 @@ void add_scene(CLI::App& command, Arguments& a) {
                 "leave the picture)");
   view.add_flag_callback(
       "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
-  command.parse_complete_callback([&] { open_scene(a); });
+  command.parse_complete_callback([&a, by_device] {
+    a.overrides.by_device = by_device;
+    open_scene(a);
+  });
 }
 
 int start_view(const Arguments& a) {
@@ -234,7 +248,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   };
 
   CLI::App& view = command("view", "a window (the default where there is a display)", start_view);
-  add_scene(view, a);
+  add_scene(view, a, true);
   view.add_option("--lane", a.run.lanes,
                   "solve the scene side by side in up to 4 ways: of each, solvers by name or "
                   "PARAMETER=VALUE, or budget_ms=MILLISECONDS for what auto chooses, separated by commas")
@@ -248,7 +262,7 @@ void add_commands(CLI::App& app, Arguments& a) {
       command("run", "headless: steps a scene, writes frames, video, statistics", [](const Arguments& a) {
         return a.run.replay.empty() ? run_headless(*a.opened, a.run) : run_replay(a.run);
       });
-  add_scene(run, a);
+  add_scene(run, a, true);
   add(run, "--steps", a.run.steps, 1L, most_steps, "steps to take (default: the scene's duration)");
   add(run, "--out", a.run.out, "folder for stats.json, stats.csv, frames");
   add(run, "--png-every", a.run.png_every, 1L, most_steps, "write frame_NNNNN.png every K steps");
@@ -265,10 +279,15 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(run, "--measure-every", a.run.measure_every, 1L, most_steps,
       "measure errors every K steps and at the end");
   run.add_flag("--positions", a.run.positions, "write positions.npy and tets.npy");
-  add(run, "--replay", a.run.replay,
-      "instead: what a record of tetpbd view --record says, lanes and all; "
-      "with --video, drawn at the speed it was played")
-      ->excludes("--scene", "--steps", "--png-every", "--positions", "--turntable", "--camera-path");
+  CLI::Option* replay = add(run, "--replay", a.run.replay,
+                            "instead: what a record of tetpbd view --record says, lanes and all; "
+                            "with --video, drawn at the speed it was played");
+  for (const char* dropped :
+       {"--scene", "--mesh", "--tetgen", "--set", "--deform", "--solver", "--budget-ms", "--explain", "--steps",
+        "--png-every", "--positions", "--video-every", "--csv-every", "--reference", "--measure-every",
+        "--turntable", "--camera-path"})
+    a.apart.push_back({replay, run.get_option(dropped)});
+  for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   add_progress(run, a.run.progress);
 
   CLI::App& reference =
@@ -317,7 +336,7 @@ void add_commands(CLI::App& app, Arguments& a) {
 
   CLI::App& map = command("map", "how right a scene comes out over two settings, and where it fails",
                           [](const Arguments& a) { return run_map(a.map); });
-  add(map, "--scene", a.map.scene, "a scene");
+  add(map, "--scene,--scenes", a.map.scene, "a scene");
   add(map, "--x", a.map.x, "a setting and its values: PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   add(map, "--y", a.map.y, "another");
   add_overrides(map, a.map.overrides);
@@ -339,7 +358,7 @@ void add_commands(CLI::App& app, Arguments& a) {
       "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 %, no tet "
       "inverted "
       "and hard bodies within 1 % of their shape; scenes in which no constraint acts are left out");
-  add(compare, "--scene", a.compare.scene, "a scene");
+  add(compare, "--scene,--scenes", a.compare.scene, "a scene");
   add_overrides(compare, a.compare.overrides);
   add_axes(compare, a.compare.axes);
   add(compare, "--omegas", a.compare.axes.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
@@ -363,6 +382,9 @@ void add_commands(CLI::App& app, Arguments& a) {
       "i/n: only every n-th combination, from the i-th; merge them afterwards");
   add(compare, "--cases", a.compare.cases, "hard cases to run (default: all)")->needs(hard);
   add(compare, "--meshes", a.compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
+  for (const char* dropped : {"--scene", "--iterations", "--substeps", "--rigid-contact", "--mass-splitting",
+                              "--omegas", "--judge", "--budget-ms", "--error"})
+    a.apart.push_back({hard, compare.get_option(dropped)});
   compare.add_option("--merge", a.compare.shards.merge, "folders of finished shards, instead of running");
   add_gpu(compare, a.compare.gpu);
   add(compare, "--out", a.compare.out, "folder for compare.csv, .json, .svg, .png");
@@ -389,6 +411,33 @@ void add_commands(CLI::App& app, Arguments& a) {
           a.run.gpu);
 }
 
+/// Of these words, which no command took, the first flag, else the first: what it may have been.
+[[noreturn]] void refuse_unknown(const CLI::App& app, const std::vector<std::string>& words) {
+  const auto parsed = app.get_subcommands();
+  const std::string command = parsed.empty() ? "" : " " + parsed[0]->get_name();
+  const auto flag = std::ranges::find_if(words, [](const auto& word) { return word.starts_with("-"); });
+  const std::string word = flag == words.end() ? words.at(0) : flag->substr(0, flag->find('='));
+  std::string mend;
+  std::vector<std::string> known;
+  const auto take = [&](auto& self, const CLI::App& from) -> void {
+    for (const CLI::Option* option : from.get_options())
+      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    for (const CLI::App* group :
+         from.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); }))
+      self(self, *group);
+  };
+  const auto commands = app.get_subcommands([](const CLI::App* one) { return !one->get_name().empty(); });
+  for (const CLI::App* one : commands) {
+    if (parsed.empty()) known.push_back(one->get_name());
+    if (one->get_option_no_throw(word))
+      mend += fmt::format("it is an option of tetpbd {}; ", one->get_name());
+  }
+  for (const CLI::App* one : parsed) take(take, *one);
+  take(take, app);
+  throw Error(fmt::format("not known here: {}", fmt::join(words, " ")), "tetpbd" + command,
+              fmt::format("{}{}see tetpbd{} --help", did_you_mean(word, known), mend, command));
+}
+
 }  // namespace
 
 std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) {
@@ -410,6 +459,8 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   std::reverse(words.begin(), words.end());  // the order CLI11 takes them in
   try {
     app.parse(words);
+  } catch (const CLI::ExtrasError&) {
+    refuse_unknown(app, app.remaining(true));
   } catch (const CLI::ParseError& problem) {
     if (problem.get_exit_code() == 0) {  // --help, --version
       std::ostringstream text;
@@ -420,9 +471,14 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
     throw Error(problem.what(), "command line",
                 fmt::format("see tetpbd {}--help", parsed.empty() ? "" : parsed[0]->get_name() + " "));
   }
+  for (const auto& [one, other] : arguments.apart)
+    if (one->count() > 0 && other->count() > 0)
+      throw Error(fmt::format("{} does not go with {}", other->get_name(), one->get_name()), "command line",
+                  "leave out one of the two");
   if (!shaders.empty()) set_shader_folder(shaders);
   if (!arguments.start) {
     arguments.start = start_view;
+    arguments.overrides.by_device = true;
     open_scene(arguments);
   }
   return [a = std::move(arguments)] {

@@ -14,9 +14,12 @@
 #include <random>
 
 #include "app/auto_solver.h"
+#include "app/run_loop.h"
+#include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/layout.h"
 #include "sim/material.h"
+#include "sim/solvers/solver.h"
 
 namespace glm {
 template <class T>
@@ -120,7 +123,8 @@ void check(const json& value, const json& allowed, const std::string& path, cons
         std::vector<std::string> known;
         for (const auto& item : allowed.items())
           if (item.key() != "or") known.push_back(item.key());
-        refuse(fmt::format("'{}' is not known here; known are {}", inner(key), fmt::join(known, ", ")), file);
+        throw Error(fmt::format("'{}' is not known here; known are {}", inner(key), fmt::join(known, ", ")),
+                    file, did_you_mean(key, known) + "see docs/guide.md");
       }
       check(held, allowed[key], inner(key), file);
     }
@@ -268,7 +272,8 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
                 "leave out one of the two");
   if (!name.empty() && !apply_preset(settings, solver_presets(), name))
     throw Error("no such solver", "--solver " + name,
-                fmt::format("choose from auto, {}", fmt::join(names_of(solver_presets()), ", ")));
+                did_you_mean(name, names_of(solver_presets())) +
+                    fmt::format("choose from auto, {}", fmt::join(names_of(solver_presets()), ", ")));
   return false;
 }
 
@@ -316,10 +321,15 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   std::error_code error;
   if (!fs::is_regular_file(file, error) && file.extension() != ".json")
     file = models_folder() / "scenes" / (name_or_file + ".json");
-  if (!fs::is_regular_file(file, error))
+  if (!fs::is_regular_file(file, error)) {
+    const bool hard = name_or_file.starts_with("hard/");
+    std::vector<std::string> names = scene_names(hard ? "scenes/hard" : "scenes");
+    for (std::string& name : names) name.insert(0, hard ? "hard/" : "");
     throw Error("no such scene", name_or_file,
-                fmt::format("give a .json file or one of {} in {}", fmt::join(scene_names(), ", "),
-                            (models_folder() / "scenes").string()));
+                did_you_mean(name_or_file, names) + fmt::format("give a .json file or one of {} in {}",
+                                                                fmt::join(names, ", "),
+                                                                (models_folder() / "scenes").string()));
+  }
   json document = read_json(file, "scene");
   for (const std::string& assignment : overrides.set) set_path(document, assignment);
   std::string where = file.string();
@@ -349,11 +359,54 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     body.mesh = overrides.mesh;
     body.block.reset(), body.tet.reset();
   }
+  scene.by_device = overrides.by_device;
+  const bool jacobi = flag("mode") || said("mode") || flag("omega") || flag("mass_splitting");
+  scene.mode_open = scene.mode_open || (scene.by_device && !jacobi && overrides.solver.empty() &&
+                                        !overrides.budget_ms && hard(scene.settings));
   for (BodyDescription& body : scene.bodies) {
     if (!overrides.tetgen.empty()) body.tetgen = overrides.tetgen;
     if (!overrides.deform.empty()) body.deform = overrides.deform;
   }
   return scene;
+}
+
+namespace {
+
+// Nothing where it may change something.
+std::string why_unused(const Settings& s, const std::string& name) {
+  const auto is = [&](auto... names) { return ((name == names) || ...); };
+  const bool jacobi = s.mode == "node" || s.mode == "constraint" || s.mode == "paper";
+  if (leaps(s) && is("iterations", "substeps")) return "mode explicit takes as many substeps as stay stable";
+  if (!leaps(s) && is("stability")) return "it is of mode explicit";
+  if (!jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
+  if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
+  if (s.material == "none" && is("young_modulus", "poisson_ratio")) return "there is no material";
+  if (s.material != "none" &&
+      (is("constraints") || name.starts_with("k_") || name.starts_with("compliance_")))
+    return "the material stands in its place";
+  for (const ConstraintKind& kind : constraint_kinds)
+    if (is(std::string("k_") + kind.name, std::string("compliance_") + kind.name) && !uses(s, kind))
+      return fmt::format("{} is not among the constraints", kind.name);
+  if (is("ground_height") && !s.ground) return "there is no ground";
+  if (is("rigid_contact") && !hard(s)) return "the bodies are not hard";
+  return {};
+}
+
+}  // namespace
+
+void note_unused(const Settings& settings, const std::vector<std::string>& modes,
+                 const SceneOverrides& overrides) {
+  for (const auto& [name, text] : overrides.parameters) {
+    const std::string key = find_parameter(name)->name;
+    std::string why = why_unused(settings, key);
+    for (const std::string& mode : modes) {
+      Settings own = settings;
+      own.mode = mode;
+      if (why = find_solver_mode(mode) ? why_unused(own, key) : ""; why.empty()) break;
+    }
+    if (!why.empty())
+      print_error(fmt::format("tetpbd: {} changes nothing: {}\n", flag_name(*find_parameter(key)), why));
+  }
 }
 
 json body_json(const BodyDescription& body) {

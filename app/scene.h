@@ -53,6 +53,7 @@ struct Scene {
   std::optional<Camera> camera;
   double duration = 2;              ///< s
   bool mode_open = false;           ///< nobody says how it is solved: so the bodies do (auto_solver.h)
+  bool by_device = false;           ///< ... and, if they are hard, the device
   std::optional<double> budget_ms;  ///< --solver auto: settings are yet to be chosen (auto_solver.h)
 };
 
@@ -64,6 +65,8 @@ struct SceneOverrides {
   std::optional<double> budget_ms{};                              ///< for auto
   std::vector<std::pair<std::string, std::string>> parameters{};  ///< name, text
   std::vector<std::string> set{};                                 ///< PATH=VALUE
+  bool by_device =
+      false;  ///< hard bodies that nobody says a mode for, or what Jacobi has, may take another than node
 };
 
 /// A name in models/scenes, or a file. Throws Error naming file, key and allowed range.
@@ -71,6 +74,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
 /// `run --camera-path`. What a camera does not say is as in the one before. Throws Error.
 std::vector<CameraKey> read_camera_path(const std::filesystem::path& file);
 std::vector<std::string> scene_names(const std::string& folder = "scenes");
+/// Says on standard error which flags of these change nothing, and why, in any of these modes; none named:
+/// that of the settings.
+void note_unused(const Settings& settings, const std::vector<std::string>& modes,
+                 const SceneOverrides& overrides);
 
 /// One at least.
 inline long duration_in_steps(const Scene& scene) {

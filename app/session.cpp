@@ -122,7 +122,7 @@ bool is_fixed(Session& s, std::uint32_t vertex) {
 
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene) {
   const auto model = build_model(scene);
-  choose_by_rule(scene, *model);
+  if (const auto rule = choose_by_rule(scene, *model)) fmt::print("solver: {}\n", *rule);
   auto choice = choose_for(scene, model);
   Loaded loaded{name, overrides, scene, scene.settings, {}, {}, {}, choice};
   loaded.lanes.push_back({create_sim(model, scene.settings)});

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/solvers/solver.h"
 
@@ -155,7 +156,8 @@ void check_words(const Parameter& row, const std::string& text, const std::strin
   const auto words = list ? split(text, ',') : std::vector<std::string>{text};
   for (const std::string& word : words)
     if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
-      refuse(row, "'" + text + "'", where, fmt::format("choose from {}", fmt::join(allowed, ", ")));
+      refuse(row, "'" + text + "'", where,
+             did_you_mean(word, allowed) + fmt::format("choose from {}", fmt::join(allowed, ", ")));
   for (std::size_t i = 0; i < words.size(); ++i)
     if (std::count(words.begin(), words.end(), words[i]) > 1)
       refuse(row, "'" + text + "'", where, "name each once");
@@ -200,7 +202,8 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
 void set_mode(Settings& settings, const std::string& word, const std::string& where) {
   const Parameter& row = *find_parameter("mode");
   if (!find_solver_mode(word))
-    refuse(row, "'" + word + "'", where, fmt::format("choose from {}", fmt::join(choices(row), ", ")));
+    refuse(row, "'" + word + "'", where,
+           did_you_mean(word, choices(row)) + fmt::format("choose from {}", fmt::join(choices(row), ", ")));
   settings.mode = word;
 }
 

@@ -17,7 +17,7 @@ export TETPBD_WINDOW_LOG=$PWD/events.log
 log=$TETPBD_WINDOW_LOG
 
 scene() {  # NAME BODIES REST
-  echo "{\"name\": \"$1\", \"bodies\": [$2], \"solver\": {\"iterations\": 4, \"dt\": 0.01}$3}" >"models/scenes/$1.json"
+  echo "{\"name\": \"$1\", \"bodies\": [$2], \"solver\": {\"mode\": \"node\", \"iterations\": 4, \"dt\": 0.01}$3}" >"models/scenes/$1.json"
 }
 scene one '{"name": "a", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 0.2, 0]}' ""
 scene held '{"name": "a", "block": {"size": [2, 0.5, 0.5], "cells": [6, 2, 2]}, "position": [0, 1, 0],

@@ -49,7 +49,7 @@ Blob body_of(const Picture& picture) {
 TEST_CASE("run writes what it says, twice the same") {
   const Folder folder;
   const std::string arguments =
-      "run --scene bunny-drop --steps 30 --iterations 3 --substeps 2 --set bodies.0.position=[0,0.02,0] "
+      "run --scene bunny-drop --mode node --steps 30 --iterations 3 --substeps 2 --set bodies.0.position=[0,0.02,0] "
       "--size 320x240 "
       "--samples 0 "
       "--png-every 15 --video fall.mp4 --positions --out ";
@@ -204,7 +204,7 @@ TEST_CASE("a driver that is not there, or too old, gets one line and status 1") 
   const Folder folder;
   const auto fails = [&](const std::string& environment, const std::string& word, int status = 1) {
     CAPTURE(environment);
-    const Outcome outcome = program("run --scene beam --steps 1 --out out", folder, environment);
+    const Outcome outcome = program("run --scene beam --mode node --steps 1 --out out", folder, environment);
     CAPTURE(outcome.err);
     CHECK(outcome.status == status);
     CHECK(outcome.err.starts_with("tetpbd: "));
@@ -230,7 +230,7 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   text.insert(text.find(end),
               "if ((phases & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
   std::ofstream(folder.path / "shaders/vertex.glsl") << text;
-  const std::string common = "--scene beam --iterations 2 --substeps 1 ";
+  const std::string common = "--scene beam --mode node --iterations 2 --substeps 1 ";
   const Outcome bad = program("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
   CAPTURE(bad.err);
   CHECK(bad.status == 1);

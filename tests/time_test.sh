@@ -13,7 +13,7 @@ source "$here/window_driver.sh"
 
 cat >block.json <<'JSON'
 {"name": "block", "bodies": [{"name": "block", "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}, "position": [0, 0.3, 0], "material": "rubber"}],
- "solver": {"substeps": 5, "dt": 0.01}, "camera": {"target": [0, 0.6, 0], "distance": 4, "azimuth": 20, "elevation": 15}}
+ "solver": {"mode": "node", "substeps": 5, "dt": 0.01}, "camera": {"target": [0, 0.6, 0], "distance": 4, "azimuth": 20, "elevation": 15}}
 JSON
 hashes() { new_events | grep -E '^lane [0-9] [a-z-]+ [0-9]+ [0-9a-f]{16}$' | tail -n 4 | cut -d ' ' -f 2,4,5; }  # of lanes, now
 open_window --scene block.json --size 1100x780 --samples 0 --record session.jsonl \

@@ -14,7 +14,7 @@ cp -r "$shaders" shaders
 
 cat >block.json <<'JSON'
 {"name": "block", "bodies": [{"name": "block", "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}, "position": [0, 0, 0]}],
- "solver": {"iterations": 4, "dt": 0.01}, "camera": {"target": [0, 0.5, 0], "distance": 3.2, "azimuth": 20, "elevation": 15}}
+ "solver": {"mode": "node", "iterations": 4, "dt": 0.01}, "camera": {"target": [0, 0.5, 0], "distance": 3.2, "azimuth": 20, "elevation": 15}}
 JSON
 echo "this is no mesh" >bad.ply
 

@@ -26,27 +26,32 @@ namespace {
 
 const std::vector<SolverMode> rows = {
     {.name = "node",
-     .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch",
+     .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch: for hard bodies and k "
+             "below 1",
      .create = create_node_solver},
     {.name = "constraint",
-     .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics",
+     .help =
+         "Jacobi on the GPU, a constraint adds to its vertices with integer atomics: as right, mostly slower",
      .create = create_constraint_solver},
     {.name = "cpu",
-     .help = "non-linear Gauss-Seidel on one CPU core, the paper's baseline",
+     .help = "non-linear Gauss-Seidel on one CPU core: the paper's baseline",
      .create = create_cpu_solver},
     {.name = "cpu-double",
      .help = "the same in double precision: what stability is held against",
      .create = create_cpu_double_solver},
     {.name = "cpu-fast",
-     .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions",
+     .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions: for machines without a GPU",
      .create = create_cpu_fast_solver},
     {.name = "explicit",
-     .help = "leapfrog on the GPU, of what has a material or compliance: as many substeps as stay stable",
+     .help = "leapfrog on the GPU, of what has a material or compliance, in as many substeps as stay stable: "
+             "for what "
+             "is soft",
      .create = create_node_solver,
      .leapfrog = true},
     {.name = "newton",
-     .help =
-         "implicit steps on the GPU, of what has a material or compliance: conjugate gradients on two levels",
+     .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
+             "levels: "
+             "for what is stiff, has small tets or starts badly deformed",
      .create = create_newton_solver,
      .implicit = true},
     {.name = "paper",

@@ -29,9 +29,8 @@ ordered_json spread(std::vector<double> values) {
   return {{"median", median(values)}, {"min", percentile(values, 0)}, {"max", percentile(values, 1)}};
 }
 
-/// What a dispatch and a byte cost on this GPU at least, what speeds are held against: a dispatch of as many
-/// invocations as a small mesh has, and its barrier; bytes read and written by a kernel that copies from
-/// memory, not from a cache. About a tenth of a second.
+}  // namespace
+
 ordered_json launch_and_bandwidth_limits(bool software) {
   const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, work_groups = bytes / 16 / 8 / 256;
   const Buffer from("probe, from", bytes), to("probe, to", bytes);
@@ -56,6 +55,8 @@ ordered_json launch_and_bandwidth_limits(bool software) {
   return {{"dispatch_us", seconds_each("0", 256, software ? 20 : 5000) * 1e6},
           {"copy_gb_s", 2 * double(bytes) / seconds_each("1", work_groups, software ? 2 : 50) * 1e-9}};
 }
+
+namespace {
 
 /// Frames as fast as they come: a step, and a picture of it if there is one. One wait, at the end.
 void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
@@ -157,7 +158,7 @@ int run_bench(const BenchOptions& options) {
       options.frames, options.warm_up, options.repeats, number(limits, "dispatch_us"),
       number(limits, "copy_gb_s"));
   print_table(sweep, sweep.facts);
-  return write_sweep(sweep, options.out, run_sweep(sweep));
+  return write_sweep(sweep, options.out, run_sweep(sweep, {}, options.out));
 }
 
 }  // namespace tetpbd

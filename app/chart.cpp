@@ -146,12 +146,14 @@ std::string to_svg(const Chart& chart) {
   for (const Chart::Note& note : chart.notes)  // below and to the left, where a front leaves room
     if (x.shows(note.at.x) && y.shows(note.at.y))
       svg += text(x.at(note.at.x) - 7, y.at(note.at.y) + 14, note.text, "end", 10.5);
+  for (const Chart::Spot& spot : chart.spots)
+    if (x.shows(spot.at.x) && y.shows(spot.at.y))
+      svg +=
+          fmt::format("<circle data-row=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"8\" fill=\"transparent\"/>\n",
+                      spot.row, x.at(spot.at.x), y.at(spot.at.y));
   return svg + "</svg>\n";
 }
 
-namespace {
-
-// Also as PNG.
 void write_svg(const std::filesystem::path& name, const std::string& picture) {
   // Absolute: a folder whose name begins with a dash is no option of rsvg-convert.
   const std::string whole = std::filesystem::absolute(name).string(), svg = whole + ".svg";
@@ -162,6 +164,8 @@ void write_svg(const std::filesystem::path& name, const std::string& picture) {
   print_error(fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n",
                           printable(png.file.string())));
 }
+
+namespace {
 
 constexpr double least_percent = 1e-4, decades = 6;
 
@@ -186,9 +190,7 @@ double heat_part(double percent) {
   return std::log10(std::max(percent, least_percent) / least_percent) / decades;
 }
 
-void write_chart(const std::filesystem::path& name, const Chart& chart) { write_svg(name, to_svg(chart)); }
-
-void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& document) {
+std::string map_svg(const nlohmann::ordered_json& document) {
   const auto& rows = document["rows"];
   std::vector<std::string> xs, ys;
   bool motion = false;
@@ -208,7 +210,8 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
                                      motion ? "distance from the right motion over the run, % of the size"
                                             : "largest net volume loss, %"),
                          document["x"], document["y"]);
-  for (const auto& row : rows) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto& row = rows[i];
     const double x = left + double(note(xs, row["x"])) * wide,
                  y = bottom - double(note(ys, row["y"]) + 1) * high;
     const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
@@ -220,10 +223,12 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
                                  ? fmt::format(fmt::runtime(percent < 9.95 ? "{:.2g}" : "{:.0f}"), percent)
                                  : "";
     svg += fmt::format(
-        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" stroke=\"white\"/>\n",
-        x, y, wide, high, failed ? "#333333" : heat_code(part));
+        "<rect data-row=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" "
+        "stroke=\"white\"/>\n",
+        i, x, y, wide, high, failed ? "#333333" : heat_code(part));
     svg += text(x + wide / 2, y + high / 2 + 4, said, "middle", std::min(11.0, wide / 5),
-                failed || part < 0.45 || part > 0.93 ? "style=\"fill:white\"" : "");
+                failed || part < 0.45 || part > 0.93 ? "style=\"fill:white\" pointer-events=\"none\""
+                                                     : "pointer-events=\"none\"");
   }
   for (std::size_t i = 0; i < xs.size(); ++i)
     svg += text(left + (double(i) + 0.5) * wide, bottom + 18, xs[i], "middle");
@@ -235,7 +240,7 @@ void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& 
                        y - 15, heat_code(decade / decades));
     svg += text(right + 52, y, fmt::format("{:g} %", least_percent * std::pow(10.0, decade)));
   }
-  write_svg(name, svg + "</svg>\n");
+  return svg + "</svg>\n";
 }
 
 }  // namespace tetpbd

@@ -24,6 +24,12 @@ struct Chart {
     std::string text;
   };
   std::vector<Note> notes{};
+  /// Of pages: what shows a row of their table under the cursor.
+  struct Spot {
+    glm::dvec2 at;
+    std::size_t row;
+  };
+  std::vector<Spot> spots{};
 };
 
 std::string to_svg(const Chart& chart);
@@ -39,9 +45,9 @@ double heat_part(double percent);
 
 /// Cells of two settings as `tetpbd map` found them, coloured by decades of the error of the motion (of the
 /// largest volume loss where no right motion is known); those that failed say at which step.
-void write_map(const std::filesystem::path& name, const nlohmann::ordered_json& document);
+std::string map_svg(const nlohmann::ordered_json& document);
 
 /// Writes NAME.svg and, with rsvg-convert, NAME.png; says on standard error when that is missing.
-void write_chart(const std::filesystem::path& name, const Chart& chart);
+void write_svg(const std::filesystem::path& name, const std::string& svg);
 
 }  // namespace tetpbd

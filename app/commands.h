@@ -51,6 +51,9 @@ int run_headless(Scene scene, const RunOptions& options);
 /// Prints buffers, bytes, kernels and dispatches a step.
 int print_explanation(Scene scene, int gpu);
 int print_info(int gpu);
+/// `tetpbd info --selftest`: whether this device computes what it should, and how fast; ends with a line to
+/// share. Throws Error (status 1) if a check fails.
+int run_selftest(int gpu);
 
 /// `tetpbd view`: until the window is closed. `name` as it was given, a name or a file; `overrides` stay in
 /// force when the same scene is reset. Of the options: size, samples, view.
@@ -96,6 +99,10 @@ inline const std::array<PictureKind, 7> picture_kinds{{{"full", {}},
 int run_bench(const BenchOptions& options);
 /// Its rows, to be made in the current context.
 Sweep bench_sweep(const BenchOptions& options);
+/// What a dispatch and a byte cost on this GPU at least, what speeds are held against: a dispatch of as many
+/// invocations as a small mesh has, and its barrier; bytes read and written by a kernel that copies from
+/// memory, not from a cache. About a tenth of a second.
+ordered_json launch_and_bandwidth_limits(bool software);
 
 struct CompareOptions {
   std::string scene = "bunny-drop";

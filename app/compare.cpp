@@ -10,6 +10,7 @@
 #include "app/commands.h"
 #include "app/files.h"
 #include "app/reference_command.h"
+#include "app/report.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
 
@@ -138,9 +139,11 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
               true,
               true};
   Series front{"Pareto front", "#999999", Series::dashes};
-  for (const auto& row : rows) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto& row = rows[i];
     const glm::dvec2 point(cost_ms(row), error_by(judge, row));
     if (!std::isfinite(point.y)) continue;
+    chart.spots.push_back({point, i});
     if (row["pareto"] == true) {
       front.points.push_back(point);
       chart.notes.push_back({point, label_of(row)});
@@ -200,6 +203,7 @@ int run_compare(const CompareOptions& options) {
   ordered_json document = run_or_merge(sweep, options.shards, options.out, options.gpu, [&] {
     const Scene scene = load_scene(options.scene, options.overrides);
     sweep.facts["dt"] = scene.settings.dt;
+    note_unused(scene.settings, options.axes.modes, options.overrides);
     const auto model = build_model(scene);
     const long steps = options.steps;
     if (options.judge == "motion") require_motion(scene, *model, steps);
@@ -225,9 +229,12 @@ int run_compare(const CompareOptions& options) {
     }
     if (axes.modes.empty() && !options.axes.modes.empty()) return;
     for (const Settings& settings : combinations(scene.settings, axes))
-      sweep.work.push_back([=] {
-        const MeasuredRun run = run_model(model, settings, steps, *right ? &**right : nullptr);
+      sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
+        Film film(scene, *model, out, number, sweep.work.size());
+        const MeasuredRun run =
+            run_model(model, settings, steps, *right ? &**right : nullptr, true, film.of(steps));
         ordered_json row = compared(scene, *model, settings, run);
+        row["film"] = film.write();
         row["reference_distance"] = remaining_after_one_step(model, settings);
         return std::vector{row};
       });
@@ -245,9 +252,15 @@ int run_compare(const CompareOptions& options) {
   print_best(rows, "best within {:g} ms a step", options.budget_ms, judge, cost_ms, error);
   print_best(rows, "cheapest with an error of at most {:g} %", options.error_percent, judge, error, cost_ms);
   write_sweep(sweep, options.out, document);
-  write_chart(options.out / "compare", chart_of(document, judge));
-  if (const Chart course = course_chart(document); !course.series.empty())
-    write_chart(options.out / "motion", course);
+  Chart chart = chart_of(document, judge);
+  std::string figures = to_svg(chart);
+  chart.spots.clear();
+  write_svg(options.out / "compare", to_svg(chart));
+  if (const Chart course = course_chart(document); !course.series.empty()) {
+    write_svg(options.out / "motion", to_svg(course));
+    figures += to_svg(course);
+  }
+  write_report(sweep, options.out, document, figures);
   return 0;
 }
 

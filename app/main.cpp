@@ -42,7 +42,7 @@ struct Arguments {
   ReproduceOptions reproduce;
   std::filesystem::path mesh_file, mesh_out;
   std::string switches = "pYq1.85o/140";
-  bool json = false;
+  bool json = false, selftest = false;
   std::vector<std::array<const CLI::Option*, 2>> apart;  ///< never together: one would be dropped
 };
 
@@ -182,7 +182,9 @@ void open_scene(Arguments& a) {
     a.run.view.range() = {scale.is_signed ? -end : 0, end}, a.run.view.hold_range = true;
   if (!a.run.replay.empty()) return;
   a.opened = load_scene(a.scene, a.overrides);
-  if (a.run.lanes.empty()) note_unused(a.opened->settings, {}, a.overrides);
+  std::vector<std::string> modes;
+  if (a.opened->mode_open && compliant(a.opened->settings)) modes = {"explicit", "newton"};  // what it may be
+  if (a.run.lanes.empty()) note_unused(a.opened->settings, modes, a.overrides);
 }
 
 // Options that mean the same in every command that opens a scene. Where nobody says the mode, the device may.
@@ -342,7 +344,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_overrides(map, a.map.overrides);
   add_parameters(map, a.map.overrides);
   add_gpu(map, a.map.gpu);
-  add(map, "--out", a.map.out, "folder for map.csv, .json, .svg, .png");
+  add(map, "--out", a.map.out, "folder for map.html, .csv, .json, .svg, .png");
 
   CLI::App& compare =
       command("compare", "speed against error over modes x iterations x substeps",
@@ -387,7 +389,7 @@ void add_commands(CLI::App& app, Arguments& a) {
     a.apart.push_back({hard, compare.get_option(dropped)});
   compare.add_option("--merge", a.compare.shards.merge, "folders of finished shards, instead of running");
   add_gpu(compare, a.compare.gpu);
-  add(compare, "--out", a.compare.out, "folder for compare.csv, .json, .svg, .png");
+  add(compare, "--out", a.compare.out, "folder for compare.html, .csv, .json, .svg, .png");
 
   CLI::App& reproduce =
       command("reproduce", "the paper's table and figures, measured here, with plots and one report",
@@ -406,9 +408,12 @@ void add_commands(CLI::App& app, Arguments& a) {
       "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
   mesh.add_flag("--json", a.json, "print the report as JSON");
 
-  add_gpu(command("info", "GL version, devices, limits, extensions used, build, licences",
-                  [](const Arguments& a) { return print_info(a.run.gpu); }),
-          a.run.gpu);
+  CLI::App& info =
+      command("info", "GL version, devices, limits, extensions used, build, licences",
+              [](const Arguments& a) { return (a.selftest ? run_selftest : print_info)(a.run.gpu); });
+  add_gpu(info, a.run.gpu);
+  info.add_flag("--selftest", a.selftest,
+                "check that this device computes what it should, and measure how fast; a minute at most");
 }
 
 /// Of these words, which no command took, the first flag, else the first: what it may have been.

@@ -10,6 +10,8 @@
 #include "app/auto_solver.h"
 #include "app/chart.h"
 #include "app/commands.h"
+#include "app/report.h"
+#include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/material.h"
 
@@ -35,10 +37,12 @@ MapAxis map_axis(const std::string& text, const std::string& flag) {
   const std::size_t equals = text.find('=');
   const std::string where = flag + " " + text, name = text.substr(0, equals);
   const Parameter* row = find_parameter(name);
+  std::vector<std::string> names;
+  for (const Parameter& one : parameters()) names.push_back(one.name);
   if (equals == std::string::npos || !row || std::holds_alternative<std::string Settings::*>(row->member) ||
       std::holds_alternative<bool Settings::*>(row->member) || row->effect == Effect::restart)
     throw Error(fmt::format("'{}' is no setting with a number", name), where,
-                "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+                did_you_mean(name, names) + "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   MapAxis axis{row, split(text.substr(equals + 1), ',')};
   const auto range = split(text.substr(equals + 1), ':');
   if (range.size() == 3) {
@@ -74,7 +78,7 @@ std::optional<Motion> answer_for(const Model& model, const Settings& settings, l
 namespace {
 
 ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
-                     const std::string& x, const std::string& y, std::optional<Motion>& last) {
+                     const std::string& x, const std::string& y, std::optional<Motion>& last, Film& film) {
   ordered_json row = {{"x", x}, {"y", y}};
   Scene own = scene;
   own.settings = settings;
@@ -84,7 +88,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
     last = answer_for(*model, settings, steps);
   MeasuredRun run;
   try {
-    run = run_model(model, settings, steps, last ? &*last : nullptr);
+    run = run_model(model, settings, steps, last ? &*last : nullptr, true, film.of(steps));
   } catch (const Error& error) {  // of this setting: its mode does not go so far
     for (const std::string& key : split(results, ',')) row[key] = nullptr;
     row["finite"] = false, row["refused"] = error.what();
@@ -100,6 +104,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
   row["max_volume_loss_percent"] = run.errors.finite ? run.errors.max_volume_loss_percent : nothing;
   row["tet_volume_max"] = run.errors.finite && run.errors.last ? run.errors.last->tet_volume_max : nothing;
   row["ms_per_step"] = median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms);
+  row["film"] = film.write();
   return row;
 }
 
@@ -107,19 +112,23 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
 
 int run_map(const MapOptions& options) {
   const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");
-  Sweep sweep{"map",
-              "cell",
-              split(std::string("x,y,") + results, ','),
-              2,
-              "x 12, y 12, finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
-              "max_volume_loss_percent:loss-% 10, tet_volume_max:worst-tet 12, ms_per_step:ms 10",
-              {}};
+  Sweep sweep{
+      "map",
+      "cell",
+      split(std::string("x,y,") + results, ','),
+      2,
+      fmt::format("x:{} {}, y:{} {}, ", x.row->name, std::max<std::size_t>(12, x.row->name.size() + 3),
+                  y.row->name, std::max<std::size_t>(12, y.row->name.size() + 3)) +
+          "finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
+          "max_volume_loss_percent:loss-% 10, tet_volume_max:worst-tet 12, ms_per_step:ms 10",
+      {}};
   ordered_json document = run_or_merge(sweep, {}, options.out, options.gpu, [&] {
     Scene scene = load_scene(options.scene, options.overrides);
     const auto model = build_model(scene);
     const auto varied = [&](const char* name) { return x.row->name == name || y.row->name == name; };
     if (varied("substeps") || varied("iterations") || varied("omega")) scene.mode_open = false;
     choose_by_rule(scene, *model);
+    note_unused(scene.settings, {}, options.overrides);
     sweep.facts["scene"] = scene.name, sweep.facts["mode"] = scene.settings.mode;
     sweep.facts["tets"] = model->rest.tets.size();
     sweep.facts["x"] = x.row->name, sweep.facts["y"] = y.row->name, sweep.facts["seconds"] = scene.duration;
@@ -130,13 +139,17 @@ int run_map(const MapOptions& options) {
         set_parameter(settings, *x.row, across, "--x");
         set_parameter(settings, *y.row, down, "--y");
         check_settings(settings, fmt::format("{} {}, {} {}", x.row->name, across, y.row->name, down));
-        sweep.work.push_back(
-            [=] { return std::vector{cell_of(scene, model, settings, across, down, *last)}; });
+        sweep.work.push_back([=, number = sweep.work.size()] {
+          Film film(scene, *model, options.out, number, x.values.size() * y.values.size());
+          return std::vector{cell_of(scene, model, settings, across, down, *last, film)};
+        });
       }
   });
   print_table(sweep, document);
   write_sweep(sweep, options.out, document);
-  write_map(options.out / "map", document);
+  const std::string svg = map_svg(document);
+  write_svg(options.out / "map", svg);
+  write_report(sweep, options.out, document, svg);
   return 0;
 }
 

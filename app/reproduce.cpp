@@ -4,12 +4,12 @@
 
 #include <array>
 #include <ctime>
-#include <fstream>
 #include <span>
 
 #include "app/chart.h"
 #include "app/commands.h"
 #include "app/files.h"
+#include "app/report.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -20,13 +20,7 @@ namespace tetpbd {
 
 namespace {
 
-constexpr const char* head = R"(<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>tetpbd: the paper's experiments</title><style>
-body{{font-family:system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em}}
-table{{border-collapse:collapse}}td,th{{border:1px solid #ccc;padding:.25em .6em;text-align:right}}
-svg{{max-width:100%;height:auto}}img{{width:24%}}
-</style></head><body>
-<h1>The paper's experiments, measured here</h1>
+constexpr const char* head = R"(<h1>The paper's experiments, measured here</h1>
 <p>Va, Choi and Hong, <i>Efficient Simulation of Volumetric Deformable Objects in Unity3D: GPU-Accelerated
 Position-Based Dynamics</i>, Electronics 2023, 12, 2229, measured with tetpbd. Device: <b>{}</b>, OpenGL
 {}. Date: {:%Y-%m-%d}. Command: <code>tetpbd reproduce{}</code>.{}</p>
@@ -45,7 +39,6 @@ constexpr const char* closing =
     R"(<p>The paper measured inside Unity3D, where an empty scene reaches about 300 frames a second,
 so its ratios of GPU to CPU saturate at 8 to 9. Here nothing but the work limits the rate. One Jacobi iteration does far
 less than one Gauss-Seidel iteration: compare the losses in the same row before the rates.</p>
-</body></html>
 )";
 
 // What the paper does not state: of the readings tried, nearest to its 20 largest losses (docs/results.md).
@@ -88,30 +81,16 @@ struct Report {
   /// Rows are lists of as many values as there are columns.
   void table(const std::string& name, const std::string& columns, const ordered_json& rows) {
     std::string csv = columns + "\n";
-    html += fmt::format("<table><tr><th>{}</th></tr>\n", fmt::join(split(columns, ','), "</th><th>"));
+    std::vector<PageRow> shown;
     for (const auto& row : rows) {
-      std::vector<std::string> fields;
-      for (const auto& value : row) fields.push_back(text_of(value, 5));
-      csv += fmt::format("{}\n", fmt::join(fields, ","));
-      html += fmt::format("<tr><td>{}</td></tr>\n", fmt::join(fields, "</td><td>"));
+      PageRow& made = shown.emplace_back();
+      for (const auto& value : row) made.cells.push_back(text_of(value, 5));
+      csv += fmt::format("{}\n", fmt::join(made.cells, ","));
     }
-    html += "</table>\n";
+    html += html_table(split(columns, ','), shown);
     write_file(out / "tables" / (name + ".csv"), csv);
   }
 };
-
-std::string base64(const std::string& bytes) {
-  static constexpr char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string result;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    unsigned value = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      value = value << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      result += i + k > bytes.size() ? '=' : letters[value >> (18 - 6 * k) & 63];
-  }
-  return result;
-}
 
 void check(const MeasuredRun& run, const Scene& scene) {
   if (interrupted()) throw Interrupted();
@@ -143,6 +122,8 @@ void volume_error(Report& report, const Published& paper, Scene scene,
   report.html += fmt::format("<h2>Figure {}: volume error over time, {}</h2>\n", paper.figure, paper.name);
   ordered_json rows;
   Losses losses;
+  Progress progress(fmt::format("figure {}, run", paper.figure), 2 * long(iteration_counts.size()), false, 5);
+  progress.update(0);
   for (const bool all : {false, true}) {
     Chart chart{fmt::format("{}: {}", paper.name, all ? "all constraints" : "stretch and bending"),
                 "volume error over time; dashed: the published maxima. Constraint-centric Jacobi", "time, s",
@@ -152,6 +133,7 @@ void volume_error(Report& report, const Published& paper, Scene scene,
       scene.settings.iterations = iteration_counts[k];
       const MeasuredRun run = run_model(model, scene.settings, report.quick ? 36 : 300);
       check(run, scene);
+      progress.update(long(rows.size()) + 1);
       const double printed = paper.losses[all][k];
       const double lost = losses[all][k] = run.errors.max_volume_loss_percent;
       rows.push_back({all ? "all" : "stretch+bend", iteration_counts[k], printed, lost, lost / printed});
@@ -189,18 +171,19 @@ void snapshots(Report& report, const Published& paper, const Scene& scene,
   Renderer renderer = make_renderer(*model);
   const Target target = make_target(360, 300, 4);
   Frame frame = frame_of(sim, scene_camera(scene, *model, 1.2f), {}, target);
-  report.html += fmt::format("<h2>Figure {}: snapshots, {}</h2>\n<p>All constraints, 25 iterations.</p>\n",
-                             paper.figure + 1, paper.name);
+  report.html += fmt::format(
+      "<h2>Figure {}: snapshots, {}</h2>\n<p>All constraints, 25 iterations.</p>\n"
+      "<div class=\"snapshots\">\n",
+      paper.figure + 1, paper.name);
   for (int s = 0; s <= (report.quick ? 25 : 150); s += 25) {
     if (s > 0) check(run_loop(sim, nullptr, 25), scene);
     frame.caption = fmt::format("t = {:.3f} s", s * scene.settings.dt);
     draw(renderer, frame);
     const auto file = report.out / "figures" / fmt::format("snapshot_{}_{:03}.png", paper.name, s);
     write_png(file, read_rgba(target));
-    std::ifstream stream(file, std::ios::binary);
-    report.html += fmt::format("<img alt=\"{} at step {}\" src=\"data:image/png;base64,{}\">\n", paper.name,
-                               s, base64({std::istreambuf_iterator<char>(stream), {}}));
+    report.html += fmt::format("<img alt=\"{} at step {}\" src=\"{}\">\n", paper.name, s, data_uri(file));
   }
+  report.html += "</div>\n";
 }
 
 void speed(Report& report, const BenchOptions& options, int figure, const std::string& name,
@@ -281,7 +264,7 @@ int run_reproduce(const ReproduceOptions& options) {
   }
   speeds(report);
   const std::filesystem::path file = options.out / "report.html";
-  write_file(file, report.html + closing);
+  write_file(file, page("tetpbd: the paper's experiments", report.html + closing));
   fmt::print("{}\n", file.string());
   if (!report.broken.empty())
     throw Error("a trend of the paper does not show", report.broken, "see " + file.string(), 1);

@@ -26,18 +26,21 @@ void print_error(const std::string& line) {
   std::fflush(stderr);
 }
 
-Progress::Progress(const std::string& of, long steps, bool force)
-    : label(of), total(steps), shown(force || isatty(2)) {}
+Progress::Progress(const std::string& of, long steps, bool force, double lines_every)
+    : label(of), total(steps), bar(force || isatty(2)), every(lines_every) {
+  if (!bar) last = start;
+}
 
 Progress::~Progress() {
-  if (shown) print_error("\r\033[K");
+  if (bar) print_error("\r\033[K");
 }
 
 void Progress::update(long done) {
-  if (!shown || done == 0 || seconds_since(last) < 0.1) return;
+  if (seconds_since(last) < (bar ? 0.1 : every)) return;
   last = steady_clock::now();
-  print_error(fmt::format("\r\033[K{} {} of {}, {:.0f} s left", label, done, total,
-                          seconds_since(start) * double(total - done) / double(done)));
+  const double left = seconds_since(start) * double(total - done) / double(done);
+  print_error(fmt::format("{}{} {} of {}{}{}", bar ? "\r\033[K" : "", label, done, total,
+                          done > 0 ? fmt::format(", {:.0f} s left", left) : "", bar ? "" : "\n"));
 }
 
 void hold_against(MeasuredRun& run, const Motion* right, const Model& model, long step, double time,
@@ -96,11 +99,13 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
 }
 
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
-                      const Motion* right, bool timed) {
+                      const Motion* right, bool timed, const std::function<void(const Sim&, long)>& stepped) {
   Sim sim = create_sim(model, settings);
   if (timed) warm_up(sim);
   Metrics metrics = create_metrics(*model, sim.system);
-  return run_loop(sim, &metrics, steps, {.right = right});
+  RunPlan plan{.right = right};
+  if (stepped) plan.stepped = [&](long s) { stepped(sim, s); }, stepped(sim, 0);
+  return run_loop(sim, &metrics, steps, plan);
 }
 
 void warm_up(Sim& sim) {

@@ -23,14 +23,17 @@ inline double seconds_since(std::chrono::steady_clock::time_point begin) {
 /// On standard error, even where nothing can be written there.
 void print_error(const std::string& line);
 
-/// A line on standard error, on a terminal only unless forced.
+/// A line on standard error that is written over, on a terminal or if forced; elsewhere a new one every so
+/// many seconds.
 struct Progress {
   std::string label;
   long total;
-  bool shown;
-  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now(), last{};
+  bool bar;
+  double every;
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now(), last;
 
-  Progress(const std::string& of, long steps, bool force = false);
+  Progress(const std::string& of, long steps, bool force = false,
+           double lines_every = std::numeric_limits<double>::infinity());
   ~Progress();
   void update(long done);
 };
@@ -65,9 +68,11 @@ void hold_against(MeasuredRun& run, const Motion* right, const Model& model, lon
 /// Steps `steps` times. Ends early when the state is not finite (its errors then say so) or when
 /// interrupted() says so: ask it before making anything of the result. No metrics: nothing is measured.
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan = {});
-/// The same with a simulation of its own, every step measured; warmed up if it is for its times.
+/// The same with a simulation of its own, every step measured; warmed up if it is for its times. `stepped` is
+/// shown the start and every step.
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
-                      const Motion* right = nullptr, bool timed = true);
+                      const Motion* right = nullptr, bool timed = true,
+                      const std::function<void(const Sim&, long)>& stepped = {});
 /// Steps until a GPU that has rested runs at its full clock (an H200 idles at 345 MHz of 1980 after four
 /// seconds, and takes a quarter of a second to rise), then goes back to the start. Nothing where a CPU steps.
 void warm_up(Sim& sim);

@@ -30,13 +30,10 @@ std::string csv_field(const std::string& text) {
 }
 
 // A line of a table; no row: the titles.
-void print_row(const std::string& columns, const ordered_json& row) {
-  std::istringstream words(columns);
-  std::string line, name;
-  for (int width = 0; words >> name >> width; words.ignore(1)) {
-    const std::size_t colon = name.find(':');
-    const std::string field = row.is_null() ? name.substr(colon == name.npos ? 0 : colon + 1)
-                                            : text_of(cell(row, name.substr(0, colon)));
+void print_row(const Sweep& sweep, const ordered_json& row) {
+  std::string line;
+  for (const auto& [key, title, width] : table_columns(sweep)) {
+    const std::string field = row.is_null() ? title : text_of(cell(row, key));
     line += width < 0 ? fmt::format("{:<{}}", field, -width) : fmt::format("{:>{}}", field, width);
   }
   fmt::print("{}\n", line);
@@ -45,7 +42,8 @@ void print_row(const std::string& columns, const ordered_json& row) {
 
 // Shards of one command, or whole sweeps: of other settings, but otherwise the same. Whatever stands in the
 // files, what follows finds the keys and types it looks for.
-ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>& folders) {
+ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>& folders,
+                    const std::filesystem::path& out) {
   ordered_json all;
   std::set<ordered_json> names;
   for (const auto& folder : folders) {
@@ -61,7 +59,9 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
     } catch (const ordered_json::exception&) {
       throw Error("not a finished " + sweep.title, file.string(), "run that shard again");
     }
-    for (const auto& row : part["rows"]) {
+    for (auto& row : part["rows"]) {
+      if (row.contains("film") && row["film"].is_string())
+        row["film"] = std::filesystem::proximate(folder / row["film"].get<std::string>(), out).string();
       ordered_json name;
       for (std::size_t c = 0; c < sweep.identity; ++c) name.push_back(row[sweep.columns[c]]);
       if (!names.insert(name).second)
@@ -86,21 +86,32 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
   return all;
 }
 
-ordered_json measured(const Sweep& sweep, const Shards& part) {
+void write_rows(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document) {
+  write_file(folder / (sweep.name + ".json"), json_text(document, 1) + "\n");
+  write_file(folder / (sweep.name + ".csv"), csv_text(sweep.columns, document["rows"]));
+}
+
+ordered_json measured(const Sweep& sweep, const Shards& part, const std::filesystem::path& out) {
   ordered_json document = sweep.facts;
   document["combinations"] = sweep.work.size();
   document["shard"] = {part.shard};
   document["shards"] = part.shards;
   ordered_json& rows = document["rows"] = ordered_json::array();
-  Progress progress(sweep.title, long(sweep.work.size()));
+  constexpr double some = 5;  // s, between lines, and between files
+  Progress progress(sweep.title, long(sweep.work.size()), false, sweep.print_each ? 1e9 : some);
+  progress.update(0);
+  auto written = progress.start;
   for (auto i = std::size_t(part.shard - 1); i < sweep.work.size(); i += std::size_t(part.shards)) {
     const std::vector<ordered_json> made = sweep.work[i]();
     if (interrupted()) break;  // they are nothing: what they are of is not whole
     for (const ordered_json& row : made) {
       rows.push_back(row);
-      if (sweep.print_each) print_row(sweep.table, row);
+      if (sweep.print_each) print_row(sweep, row);
     }
     progress.update(long(i) + 1);
+    if (out.empty() || seconds_since(written) < some) continue;
+    write_rows(sweep, out, document);
+    written = std::chrono::steady_clock::now();
   }
   return document;
 }
@@ -140,8 +151,9 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   return chosen;
 }
 
-ordered_json run_sweep(const Sweep& sweep, const Shards& shards) {
-  const ordered_json document = shards.merge.empty() ? measured(sweep, shards) : merged(sweep, shards.merge);
+ordered_json run_sweep(const Sweep& sweep, const Shards& shards, const std::filesystem::path& out) {
+  const ordered_json document =
+      shards.merge.empty() ? measured(sweep, shards, out) : merged(sweep, shards.merge, out);
   if (!document["rows"].empty()) return document;
   if (interrupted()) throw Error("interrupted", "before the first row", "nothing was written", 1);
   throw Error("nothing to run", fmt::format("--shard {}/{}", shards.shard, shards.shards),
@@ -157,7 +169,18 @@ ordered_json run_or_merge(Sweep& sweep, const Shards& shards, const std::filesys
     add();
     sweep.facts["device"] = device_json(context->capabilities());
   }
-  return run_sweep(sweep, shards);
+  return run_sweep(sweep, shards, out);
+}
+
+std::vector<TableColumn> table_columns(const Sweep& sweep) {
+  std::vector<TableColumn> columns;
+  std::istringstream words(sweep.table);
+  std::string name;
+  for (int width = 0; words >> name >> width; words.ignore(1)) {
+    const std::size_t colon = name.find(':');
+    columns.push_back({name.substr(0, colon), name.substr(colon == name.npos ? 0 : colon + 1), width});
+  }
+  return columns;
 }
 
 void print_table(const Sweep& sweep, const ordered_json& document) {
@@ -165,9 +188,9 @@ void print_table(const Sweep& sweep, const ordered_json& document) {
   fmt::print("{}{}\n", text_of(device["gl_renderer"]),
              device["software"] == true ? ": a SOFTWARE renderer on the CPU. These are not a GPU's numbers."
                                         : ", OpenGL " + text_of(device["gl_version"]));
-  print_row(sweep.table, nullptr);
+  print_row(sweep, nullptr);
   if (document.contains("rows"))
-    for (const auto& row : document["rows"]) print_row(sweep.table, row);
+    for (const auto& row : document["rows"]) print_row(sweep, row);
 }
 
 std::vector<std::string> keys(const ordered_json& object) {
@@ -187,10 +210,8 @@ std::string csv_text(const std::vector<std::string>& columns, const ordered_json
 }
 
 int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const ordered_json& document) {
-  const std::filesystem::path csv = folder / (sweep.name + ".csv");
-  write_file(folder / (sweep.name + ".json"), json_text(document, 1) + "\n");
-  write_file(csv, csv_text(sweep.columns, document["rows"]));
-  fmt::print("{}\n", csv.string());
+  write_rows(sweep, folder, document);
+  fmt::print("{}\n", (folder / (sweep.name + ".csv")).string());
   if (interrupted())
     throw Error("interrupted", fmt::format("after {} rows", document["rows"].size()),
                 "what was finished is written", 1);

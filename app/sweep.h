@@ -41,12 +41,17 @@ struct Shards {
   std::vector<std::filesystem::path> merge{};  ///< folders of finished shards, instead
 };
 
-/// The facts, "combinations", "shard", "shards" and "rows", those that were finished if interrupted. Throws
-/// Error if there are none.
-ordered_json run_sweep(const Sweep& sweep, const Shards& shards = {});
+/// The facts, "combinations", "shard", "shards" and "rows", those that were finished if interrupted; where
+/// `out` names a folder, NAME.json and NAME.csv are there as rows finish. Throws Error if there are none.
+ordered_json run_sweep(const Sweep& sweep, const Shards& shards = {}, const std::filesystem::path& out = {});
 /// Of what `add` gives the sweep in a context of its own, which is among the facts; or the shards to merge.
 ordered_json run_or_merge(Sweep& sweep, const Shards& shards, const std::filesystem::path& out, int gpu,
                           const std::function<void()>& add);
+struct TableColumn {
+  std::string key, title;
+  int width;
+};
+std::vector<TableColumn> table_columns(const Sweep& sweep);
 /// The device, the table's head, the rows so far.
 void print_table(const Sweep& sweep, const ordered_json& document);
 /// Writes NAME.json and NAME.csv and says where. The exit status: 1 if a row is not finite, else 0. Throws

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "app/commands.h"
 #include "tests/run_program.h"
@@ -188,13 +189,14 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
 TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contained report") {
   const Folder folder;
   const Outcome run = program("reproduce --quick --out r", folder);
-  CHECK(run.err == "");
+  CHECK(run.err.find("tetpbd:") == std::string::npos);  // progress alone
   REQUIRE(run.status == 0);
   const std::string html = read(folder.path / "r/report.html");
   for (const char* part : {"Table 4", "Figure 6", "Figure 7", "Figure 8", "Figure 9", "Figure 12",
                            "data:image/png;base64,iVBOR", "<svg", "drop height"})
     CHECK(html.find(part) != std::string::npos);
   CHECK(html.find("src=\"http") == std::string::npos);
+  CHECK(html.ends_with("</html>\n"));
   for (const char* file : {"tables/table4.csv", "tables/volume_error_bunny.csv",
                            "figures/volume_error_bunny_all.svg", "figures/fps_all_alone.svg"})
     CHECK(fs::exists(folder.path / "r" / file));
@@ -262,4 +264,27 @@ TEST_CASE("hard cases: where no constraint acts there is nothing to recover by")
   CHECK(run.err.find("nothing to run") != std::string::npos);
   CHECK(program("compare --hard-cases --out h", folder, "TETPBD_MODELS=/none")
             .err.find("no hard cases: /none") != std::string::npos);
+}
+
+TEST_CASE(
+    "info --selftest: a formula that a GPU gets wrong by a thousandth fails, what it has no part in does "
+    "not") {
+  const Folder folder;
+  fs::copy(TEST_SHADERS, folder.path / "shaders", fs::copy_options::recursive);
+  const fs::path file = folder.path / "shaders/constraints/volume.glsl";
+  std::string text = read(file);
+  const std::string rest = "d) - rest";
+  REQUIRE(text.find(rest) != std::string::npos);
+  text.insert(text.find(rest) + rest.size(), " * real(1.001)");
+  std::ofstream(file) << text;
+  const Outcome wrong = program("--shaders shaders info --selftest", folder);
+  CAPTURE(wrong.out);
+  CHECK(wrong.status == 1);
+  CHECK(wrong.err.find("a step of node against cpu-double") != std::string::npos);
+  std::istringstream lines(wrong.out);
+  std::string line;
+  for (int failed = 0; std::getline(lines, line);)
+    if (line.starts_with("FAIL")) CHECK_MESSAGE(++failed <= 2, line);
+  CHECK(line.find(" of 25 checks") != std::string::npos);
+  CHECK(line.find("bunny-drop node 20x1") != std::string::npos);
 }

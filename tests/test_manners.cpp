@@ -40,6 +40,7 @@ TEST_CASE("manners: words that are not known get the one that was meant") {
   refused("run --look wires", "did you mean 'wire'?");
   refused("run --solver substep", "did you mean 'substeps'?");
   refused("run --set solver.omga=1", "did you mean 'omega'?");
+  refused("map --x omga=1,2", "did you mean 'omega'?");
   refused("compare --hard-cases --iterations 3", "--iterations");
   refused("run --replay x.jsonl --mode node", "--mode");
   refused("run --replay x.jsonl --explain", "--explain");

@@ -2,7 +2,6 @@
 #include <doctest/doctest.h>
 
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "app/chart.h"
 #include "tests/run_program.h"
@@ -75,7 +74,6 @@ TEST_CASE("map: a cell for each pair of values, in the order given, held against
 }
 
 TEST_CASE("map: its picture has a cell of the error's colour each, and says where one fails") {
-  const Folder folder;
   const auto row = [](const char* x, const char* y, nlohmann::ordered_json error,
                       nlohmann::ordered_json failed) {
     return nlohmann::ordered_json{{"x", x},
@@ -89,18 +87,13 @@ TEST_CASE("map: its picture has a cell of the error's colour each, and says wher
                                      {"seconds", 1.5}, {"x", "omega"},   {"y", "dt"}};
   document["rows"] = {row("1", "0.1", 1e-6, nullptr), row("2", "0.1", 1.0, nullptr),
                       row("1", "0.2", nullptr, 17), row("2", "0.2", 0.01, nullptr)};
-  write_map(folder.path / "map", document);
-  std::stringstream text;
-  text << std::ifstream(folder.path / "map.svg").rdbuf();
-  const std::string svg = text.str();
+  const std::string svg = map_svg(document);
   for (const char* part :
        {"a&lt;b: dt against omega", "distance from the right motion", ">fails at 17<", ">0.0001<", ">100<",
         ">1<", "fill=\"#333333\"", "fill=\"#304f94\"", "fill=\"#d64533\""})
     CHECK_MESSAGE(svg.find(part) != std::string::npos, std::string(part));
   document["rows"] = {row("1", "0.1", nullptr, nullptr)};
-  write_map(folder.path / "map", document);
-  std::stringstream again;
-  again << std::ifstream(folder.path / "map.svg").rdbuf();
-  CHECK(again.str().find("largest net volume loss") != std::string::npos);
-  CHECK(again.str().find(">3<") != std::string::npos);
+  const std::string again = map_svg(document);
+  CHECK(again.find("largest net volume loss") != std::string::npos);
+  CHECK(again.find(">3<") != std::string::npos);
 }

@@ -14,7 +14,10 @@ show() {  # NAME STEPS TEXT OPTIONS...
   convert "$work/frame_$(printf %05d "$2").png" -resize 480x360 -colors 128 "$folder/$1.png"
   rm "$work"/frame_*
   printf '\n## %s\n\n![%s](%s.png)\n\n```\ntetpbd run' "$3" "$3" "$1" >>"$page"
-  printf ' %q' "${@:4}" --steps "$2" >>"$page"
+  for word in "${@:4}" --steps "$2"; do
+    [[ $word == *[* ]] && word="'$word'"
+    printf ' %s' "$word" >>"$page"
+  done
   printf '\n```\n' >>"$page"
 }
 

@@ -158,20 +158,23 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
   return chart;
 }
 
-/// The distance from the right motion over time, of what is on the front.
+/// The distance from the right motion over time: of all where they are few, else of what is on the front.
 Chart course_chart(const ordered_json& document) {
-  Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
-              "what is on the front; labels: mode, iterations x substeps",
-              "time, s",
-              "distance from the right motion, % of the size",
-              false,
-              true};
+  constexpr std::size_t most = 8;
+  const bool all = document["rows"].size() <= most;
+  Chart chart{
+      "Error of the motion: " + text_of(document["rows"][0]["scene"]),
+      all ? "mode, iterations x substeps" : "what is on the front; labels: mode, iterations x substeps",
+      "time, s",
+      "distance from the right motion, % of the size",
+      false,
+      true};
   for (const auto& row : document["rows"]) {
-    if (row["pareto"] != true || chart.series.size() == 8) continue;
+    if ((!all && row["pareto"] != true) || chart.series.size() == most) continue;
     Series series{text_of(row["mode"]) + ", " + label_of(row), palette_colour(chart.series.size()),
                   Series::line};
     for (const auto& point : row["motion_over_time"])
-      series.points.emplace_back(point[0].get<double>(), 100 * point[1].get<double>());
+      if (point[0] > 0) series.points.emplace_back(point[0].get<double>(), 100 * point[1].get<double>());
     if (!series.points.empty()) chart.series.push_back(series);
   }
   return chart;

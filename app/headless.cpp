@@ -7,6 +7,7 @@
 #include "app/commands.h"
 #include "app/files.h"
 #include "app/lanes.h"
+#include "app/probe.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -96,17 +97,13 @@ ordered_json times(const std::vector<double>& ms) {
   return {{"median", median(ms)}, {"p05", percentile(ms, 0.05)}, {"p95", percentile(ms, 0.95)}};
 }
 
-ordered_json settings_json(const Scene& scene, const Settings& settings) {
-  ordered_json result;
-  for (const Parameter& row : parameters())
-    with_value(settings, row, [&](const auto& value) { result[row.name] = value; });
-  for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
-  result["obstacles"] = ordered_json::array();
-  for (const glm::dvec4& plane : scene.obstacles) {
-    const glm::dvec3 normal(plane);
-    result["obstacles"].push_back({{"point", vector(normal * plane.w)}, {"normal", vector(normal)}});
-  }
-  result["duration"] = scene.duration;
+// The scene's own keys, of all sections.
+ordered_json settings_json(Scene scene, const Settings& settings) {
+  scene.settings = settings;
+  const ordered_json whole = scene_json(scene);
+  ordered_json result = whole["solver"];
+  result.update(whole["world"]);
+  for (const char* key : {"bodies", "duration"}) result[key] = whole[key];
   return result;
 }
 
@@ -158,6 +155,20 @@ void write_positions(const Sim& sim, const std::filesystem::path& out) {
   write_npy(out / "tets.npy", original_tets(*sim.model));
 }
 
+// The tet whose volume is farthest from that at rest, now.
+std::string worst_tet(const Sim& sim) {
+  const Model& model = *sim.model;
+  const auto x = read_state(sim).positions;
+  const auto error = [&](std::size_t t) {
+    const auto [a, b, c, d] = model.rest.tets[t];
+    return tet_values(model, t, {x[a], x[b], x[c], x[d]}, {}).volume;
+  };
+  std::pair<float, std::size_t> worst;
+  for (std::size_t t = 0; t < model.rest.tets.size(); ++t)
+    if (const float e = error(t); std::abs(e) > std::abs(worst.first)) worst = {e, t};
+  return fmt::format("worst tet at the end {:+.2f} % (number {})", 100 * worst.first, worst.second);
+}
+
 }  // namespace
 
 int run_headless(Scene scene, const RunOptions& options) {
@@ -165,12 +176,15 @@ int run_headless(Scene scene, const RunOptions& options) {
   const auto model = build_model(scene);
   HeadlessContext context(options.gpu);
   const auto choice = choose_and_say(scene, model);
+  const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
+  scene.duration = double(steps) * scene.settings.dt;
+  scene.camera = scene_camera(scene, *model, float(options.size[0]) / float(options.size[1]));
+  write_file(options.out / "scene.json", json_text(scene_json(scene), 2) + "\n");
   Tuning tuning = tuning_from_environment();
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
   warm_up(sim);
   Metrics metrics = create_metrics(*model, sim.system);
-  const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
   const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
   std::optional<FrameWriter> frames;
   if (options.png_every > 0 || !options.video.empty())
@@ -197,13 +211,15 @@ int run_headless(Scene scene, const RunOptions& options) {
   const bool good = !found || restore_checkpoint(sim);
   while (good && found && sim.steps < found->step - 1) step(sim);  // the last good one: the same bits again
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
-  const auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
+  auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
+  statistics["error"]["measured_every"] = options.measure_every;
   write_file(options.out / "stats.json", json_text(statistics, 2) + "\n");
   if (csv) csv->close();
   if (options.positions && good) write_positions(sim, options.out);
-  fmt::print("{}: {} steps on {}, largest volume loss {:.2f} %, {:.3f} ms a step; {}\n", scene.name,
-             sim.steps, context.capabilities().renderer, run.errors.max_volume_loss_percent,
-             median(run.wall_ms), (options.out / "stats.json").string());
+  fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name,
+             sim.steps, context.capabilities().renderer,
+             options.measure_every > 1 ? "of measured steps " : "", run.errors.max_volume_loss_percent,
+             good ? worst_tet(sim) + ", " : "", median(run.wall_ms), (options.out / "stats.json").string());
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);

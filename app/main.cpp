@@ -134,6 +134,8 @@ void add_tetgen(CLI::App& command, std::string& switches) {
 
 void add_overrides(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--mesh", overrides.mesh, "mesh in place of the scene's first body");
+  add(command, "--height", overrides.height, 0.0, 1e6,
+      "m, of the first body; 0: as its file has it (default: the scene's)");
   add_tetgen(command, overrides.tetgen);
   command.add_option("--set", overrides.set, "PATH=VALUE for anything else, as in bodies.0.density=500")
       ->expected(1)

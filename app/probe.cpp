@@ -48,22 +48,34 @@ Reading reading_of(Reading reading, const Lane& lane, const std::vector<float>& 
     return glm::dvec3(values[at], values[at + 1], values[at + 2]) +
            glm::dvec3(values[at + 4], values[at + 5], values[at + 6]);
   };
-  glm::vec3 now[4], rest[4];
+  std::array<glm::dvec3, 4> now;
   for (std::size_t i = 0; i < 4; ++i) {
-    now[i] = glm::vec3(pair(8 * i) - pair(0));
-    rest[i] = glm::vec3(model.rest.positions[tet[i]] - model.rest.positions[tet[0]]);
-    if (tet[i] == reading.vertex) reading.position = pair(8 * i);
+    now[i] = pair(8 * i);
+    if (tet[i] == reading.vertex) reading.position = now[i];
   }
   reading.speed = glm::length(pair(of_velocity));
   const glm::vec4 material = energy_material(lane.sim.settings);
-  reading.volume = double(measures::tet_value(COLOUR_VOLUME, now, rest, material));
-  reading.strain = double(measures::tet_value(COLOUR_STRETCH, now, rest, material));
-  if (material.z > 0) reading.energy = double(measures::tet_value(COLOUR_ENERGY, now, rest, material));
+  const TetValues measured = tet_values(model, reading.tet, now, material);
+  reading.volume = double(measured.volume), reading.strain = double(measured.strain);
+  if (material.z > 0) reading.energy = double(measured.energy);
   if (lane.apart) reading.distance = double(values[of_distance]);
   return reading;
 }
 
 }  // namespace
+
+TetValues tet_values(const Model& model, std::size_t tet, const std::array<glm::dvec3, 4>& corners,
+                     const glm::vec4& material) {
+  const Tet& ids = model.rest.tets[tet];
+  glm::vec3 now[4], rest[4];
+  for (std::size_t i = 0; i < 4; ++i) {
+    now[i] = glm::vec3(corners[i] - corners[0]);
+    rest[i] = glm::vec3(model.rest.positions[ids[i]] - model.rest.positions[ids[0]]);
+  }
+  return {measures::tet_value(COLOUR_VOLUME, now, rest, material),
+          measures::tet_value(COLOUR_STRETCH, now, rest, material),
+          measures::tet_value(COLOUR_ENERGY, now, rest, material)};
+}
 
 void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer,
          const Frame& frame, const Ray& ray) {

@@ -1,12 +1,20 @@
 // What is under the cursor: a vertex, its tetrahedron and what they measure, read back without waiting.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "app/lanes.h"
 #include "render/picking.h"
 
 namespace tetpbd {
+
+struct TetValues {
+  float volume, strain, energy;  ///< V/V0 - 1, the mean L/L0 - 1, J/m^3 (0 without a material)
+};
+/// Of a tet with these corners (m); `material` as energy_material() gives it.
+TetValues tet_values(const Model& model, std::size_t tet, const std::array<glm::dvec3, 4>& corners,
+                     const glm::vec4& material);
 
 struct Reading {
   std::uint32_t vertex = 0, tet = 0;

@@ -41,6 +41,7 @@ void note_scene(Session& s) {
   if (!o.mesh.empty()) scene["mesh"] = o.mesh.string();
   if (!o.tetgen.empty()) scene["tetgen"] = o.tetgen;
   if (!o.deform.empty()) scene["deform"] = o.deform;
+  if (o.height) scene["height"] = *o.height;
   if (!o.set.empty()) scene["set"] = o.set;
   scene["settings"] = settings_text(s.loaded.scene.settings);
   note(s, {{"load", scene}});
@@ -123,7 +124,7 @@ void set_all(Settings& settings, const ordered_json& values, const std::string& 
   for (const auto& [name, value] : values.items()) {
     const Parameter* row = find_parameter(name);
     if (!row) throw Error(fmt::format("'{}' is no setting", name), where, "see docs/guide.md");
-    set_parameter(settings, *row, value.is_string() ? value.get<std::string>() : value.dump(), where);
+    set_parameter(settings, *row, setting_text(*row, value), where);
   }
 }
 
@@ -132,6 +133,7 @@ void load_scene_of(Session& s, const ordered_json& scene, const std::string& whe
                            .tetgen = scene.value("tetgen", ""),
                            .deform = scene.value("deform", ""),
                            .set = scene.value("set", std::vector<std::string>())};
+  if (scene.contains("height")) overrides.height = scene["height"];
   const std::string name = scene.at("scene");
   Scene opened = load_scene(name, overrides);
   if (scene.contains("settings")) set_all(opened.settings, scene["settings"], where);

@@ -35,7 +35,7 @@ void to_json(nlohmann::json& list, const vec<3, T>& v) {
 namespace tetpbd {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using nlohmann::json, nlohmann::ordered_json;
 
 fs::path models_folder() {
   if (const char* folder = std::getenv("TETPBD_MODELS")) return folder;
@@ -52,6 +52,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, ce
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, tetgen, scale, height, rotation,
                                                 position, density, velocity, spin, fixed, heavy, deform)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Obstacle, point, normal)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
 
 namespace {
@@ -135,12 +136,7 @@ void read_settings(const json& section, Settings& settings, const std::string& f
   for (const auto& [key, value] : section.items()) {
     const Parameter* row = find_parameter(key);
     if (!row) continue;  // obstacles
-    std::string text = value.is_string() ? value.get<std::string>() : value.dump();
-    if (key == "constraints" && value.is_array()) {
-      std::erase_if(text, [](char c) { return c == '[' || c == ']' || c == '"'; });
-      if (text.empty()) text = "none";
-    }
-    set_parameter(settings, *row, text, file);
+    set_parameter(settings, *row, setting_text(*row, value), file);
   }
 }
 
@@ -195,10 +191,9 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
     read_settings(document.value(section, json()), scene.settings, file);
   read_material(document["bodies"], scene.settings, file);
   for (const json& plane : document.value("/world/obstacles"_json_pointer, json())) {
-    const auto normal = plane.value("normal", glm::dvec3(0)), point = plane.value("point", glm::dvec3(0));
-    if (!(glm::length(normal) > 1e-9))
-      refuse(fmt::format("'world.obstacles.{}.normal' must not be zero", scene.obstacles.size()), file);
-    scene.obstacles.emplace_back(glm::normalize(normal), glm::dot(glm::normalize(normal), point));
+    scene.obstacles.push_back(plane.get<Obstacle>());
+    if (!(glm::length(scene.obstacles.back().normal) > 1e-9))
+      refuse(fmt::format("'world.obstacles.{}.normal' must not be zero", scene.obstacles.size() - 1), file);
   }
   if (document.contains("camera")) scene.camera = document["camera"].get<Camera>();
   return scene;
@@ -331,6 +326,9 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
                                                                 (models_folder() / "scenes").string()));
   }
   json document = read_json(file, "scene");
+  if (document.is_object() && document.contains("state_hash"))
+    throw Error("these are the numbers of a run, not its scene", file.string(),
+                fmt::format("give {}", (file.parent_path() / "scene.json").string()));
   for (const std::string& assignment : overrides.set) set_path(document, assignment);
   std::string where = file.string();
   if (!overrides.set.empty()) where += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));
@@ -358,7 +356,11 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     body.name = overrides.mesh.stem().string();
     body.mesh = overrides.mesh;
     body.block.reset(), body.tet.reset();
+    scene.name = printable(fmt::format("{} with {}", scene.name, body.mesh.filename().string()));
+    if (std::ranges::none_of(overrides.set, [](const auto& given) { return given.starts_with("camera"); }))
+      scene.camera.reset();  // it was chosen for another body
   }
+  if (overrides.height) scene.bodies[0].height = *overrides.height;
   scene.by_device = overrides.by_device;
   const bool jacobi = flag("mode") || said("mode") || flag("omega") || flag("mass_splitting");
   scene.mode_open = scene.mode_open || (scene.by_device && !jacobi && overrides.solver.empty() &&
@@ -411,7 +413,13 @@ void note_unused(const Settings& settings, const std::vector<std::string>& modes
 
 json body_json(const BodyDescription& body) {
   json result = body;
-  if (body.mesh.empty()) result.erase("mesh"), result.erase("tetgen");
+  if (body.mesh.empty()) {
+    result.erase("mesh"), result.erase("tetgen");
+  } else {
+    const auto whole = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
+    const fs::path shipped = whole(body.mesh).lexically_relative(whole(models_folder()));
+    result["mesh"] = shipped.empty() || *shipped.begin() == ".." ? whole(body.mesh) : shipped;
+  }
   if (body.height == 0) result.erase("height");
   for (json& box : result["fixed"]) box.erase("ratio"), box.erase("share");
   if (body.block) result["block"] = *body.block;
@@ -419,25 +427,25 @@ json body_json(const BodyDescription& body) {
   return result;
 }
 
-json scene_json(const Scene& scene) {
-  json result{{"name", scene.name}, {"description", scene.description}, {"duration", scene.duration}};
-  for (const BodyDescription& body : scene.bodies) {
-    json& written = result["bodies"].emplace_back(body_json(body));
-    if (body.mesh.empty()) continue;
-    const fs::path shipped = body.mesh.lexically_relative(models_folder());
-    const bool inside = !shipped.empty() && *shipped.begin() != "..";
-    written["mesh"] = (inside ? shipped : fs::absolute(body.mesh)).string();
-  }
+ordered_json scene_json(const Scene& scene) {
+  ordered_json result = {{"name", scene.name}, {"description", scene.description}};
+  for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
   for (const Parameter& row : parameters())
-    with_value(scene.settings, row, [&]<class T>(const T& value) {
-      json& written = result[row.section][row.name] = value;
-      if constexpr (std::is_same_v<T, std::string>) written = parameter_text(scene.settings, row);  // none
-    });
-  for (const glm::dvec4& plane : scene.obstacles)
-    result["world"]["obstacles"].push_back(
-        {{"point", glm::dvec3(plane) * plane.w}, {"normal", glm::dvec3(plane)}});
-  if (scene.camera) result["camera"] = *scene.camera;
+    with_value(scene.settings, row, [&](const auto& value) { result[row.section][row.name] = value; });
+  std::vector<std::string> kinds = split(scene.settings.constraints, ',');
+  if (scene.settings.constraints.empty()) kinds.clear();
+  result["solver"]["constraints"] = kinds;
+  result["world"]["obstacles"] = ordered_json(json(scene.obstacles));
+  if (scene.camera) result["camera"] = ordered_json(json(*scene.camera));
+  result["duration"] = scene.duration;
   return result;
+}
+
+std::string setting_text(const Parameter& row, const json& value) {
+  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  if (row.name != "constraints" || !value.is_array()) return text;
+  std::erase_if(text, [](char c) { return c == '[' || c == ']' || c == '"'; });
+  return text.empty() ? "none" : text;
 }
 
 std::shared_ptr<const Model> build_model(const Scene& scene) {
@@ -477,7 +485,8 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     deform(start, mesh, body.deform, unsigned(scene.settings.seed));
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
-  model->obstacles = scene.obstacles;
+  for (const auto& [point, normal] : scene.obstacles)
+    model->obstacles.emplace_back(glm::normalize(normal), glm::dot(glm::normalize(normal), point));
   renumber(*model);
   return model;
 }

@@ -45,10 +45,15 @@ struct BodyDescription {
   std::string deform = "none";
 };
 
+/// A half space: bodies are on the side to which the normal points.
+struct Obstacle {
+  glm::dvec3 point{0}, normal{0};  ///< m; of any length but 0
+};
+
 struct Scene {
   std::string name, description;
   std::vector<BodyDescription> bodies;
-  std::vector<glm::dvec4> obstacles;  ///< half spaces n.x >= d as (n, d), n of unit length
+  std::vector<Obstacle> obstacles;
   Settings settings;
   std::optional<Camera> camera;
   double duration = 2;              ///< s
@@ -63,6 +68,7 @@ struct SceneOverrides {
   std::string tetgen{}, deform{};
   std::string solver{};                                           ///< one of solver_presets(), or auto
   std::optional<double> budget_ms{};                              ///< for auto
+  std::optional<double> height{};                                 ///< of the first body; 0: its file's
   std::vector<std::pair<std::string, std::string>> parameters{};  ///< name, text
   std::vector<std::string> set{};                                 ///< PATH=VALUE
   bool by_device =
@@ -83,9 +89,12 @@ void note_unused(const Settings& settings, const std::vector<std::string>& modes
 inline long duration_in_steps(const Scene& scene) {
   return std::max(1L, std::lround(scene.duration / scene.settings.dt));
 }
-/// As a scene file says it.
+/// As a scene file says it, wherever it lies: shipped meshes by name, others by their whole path.
 nlohmann::json body_json(const BodyDescription& body);
-nlohmann::json scene_json(const Scene& scene);
+/// A scene file with nothing left to defaults: the same run, to the bit.
+nlohmann::ordered_json scene_json(const Scene& scene);
+/// The text that set_parameter() takes; lists are those of words.
+std::string setting_text(const Parameter& row, const nlohmann::json& value);
 /// Meshes loaded and tetrahedralised, placed, deformed.
 std::shared_ptr<const Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.

@@ -297,7 +297,9 @@ TEST_CASE("a run that measures every tenth step has the same state, rows and end
   const Folder folder;
   const std::string command = "run --scene beam --iterations 2 --steps 25 ";
   REQUIRE(program(command + "--out all", folder).status == 0);
-  REQUIRE(program(command + "--measure-every 10 --out some", folder).status == 0);
+  const Outcome few_measured = program(command + "--measure-every 10 --out some", folder);
+  CHECK(few_measured.out.find("largest volume loss of measured steps ") != std::string::npos);
+  CHECK(few_measured.out.find(", worst tet at the end ") != std::string::npos);
   const json all = json::parse(read(folder.path / "all/stats.json")),
              some = json::parse(read(folder.path / "some/stats.json"));
   CHECK(all["state_hash"] == some["state_hash"]);
@@ -314,6 +316,65 @@ TEST_CASE("a run that measures every tenth step has the same state, rows and end
   CHECK(few[1] == rows[1]);
   CHECK(few[2].substr(0, few[2].find(',')) == "10");
   CHECK(few[4].substr(0, few[4].find(',')) == "25");
+}
+
+TEST_CASE("the scene that a run writes gives the same run wherever it lies") {
+  const Folder folder;
+  const auto stats = [&](const std::string& out) {
+    return json::parse(read(folder.path / out / "stats.json"));
+  };
+  const auto replayed = [&](const std::string& arguments) {
+    CAPTURE(arguments);
+    const Outcome first = program("run " + arguments + " --out a/b", folder);
+    CHECK(first.err == "");
+    fs::create_directories(folder.path / "elsewhere");
+    fs::copy(folder.path / "a/b/scene.json", folder.path / "elsewhere", fs::copy_options::overwrite_existing);
+    REQUIRE(program("run --scene elsewhere/scene.json --out c", folder).status == 0);
+    CHECK(stats("a/b")["state_hash"] == stats("c")["state_hash"]);
+    CHECK(stats("a/b")["settings"] == stats("c")["settings"]);
+    CHECK(stats("a/b")["scene"] == stats("c")["scene"]);
+    CHECK(read(folder.path / "a/b/scene.json") == read(folder.path / "c/scene.json"));
+    return json::parse(read(folder.path / "c/scene.json"));
+  };
+  std::ofstream(folder.path / "slope.json") << R"({"bodies": [
+    {"block": {"size": [0.4, 0.3, 0.2], "cells": [3, 2, 2]}, "position": [0, 0.1, 0], "velocity": [1, -1, 0.3], "rotation": [10, 20, 30],
+     "heavy": [{"low": [0, 0.5, 0], "ratio": 3, "share": 0.5}], "material": "rubber"},
+    {"tet": [[3, 0, 0], [4, 0, 0.1], [3, 1, 0], [3, 0, 1]], "deform": "stretch:1.3", "material": "rubber"}],
+    "world": {"obstacles": [{"point": [0.1, 0, 0.3], "normal": [1, 2.7, 0.9]}], "friction": 0.3}})";
+  const json slope = replayed("--scene slope.json --steps 25 --mode cpu-double --seed 4 --substeps 7");
+  CHECK(slope["solver"]["constraints"] == json({"stretch", "bend", "volume"}));
+  CHECK(slope["world"]["obstacles"][0]["normal"] == json({1, 2.7, 0.9}));
+  CHECK(slope["camera"]["distance"] > 1);
+  CHECK(stats("c")["settings"]["constraints"] == slope["solver"]["constraints"]);
+  CHECK(replayed("--scene slope.json --steps 4")["solver"]["mode"] == "explicit");  // as chosen for it
+  CHECK(replayed("--scene beam --constraints stretch --steps 3")["bodies"][0]["block"].is_object());
+
+  REQUIRE(program("mesh " TEST_MODELS "/bunny.ply --out a/my.obj", folder).status == 0);
+  const json own = replayed("--mesh a/my.obj --height 0.5 --steps 2 --set camera.fov=20");
+  CHECK(own["name"] == "bunny-drop with my.obj");
+  CHECK(own["bodies"][0]["height"] == 0.5);
+  CHECK(own["camera"]["fov"] == 20);
+  CHECK(replayed("--scene bunny-drop --steps 1")["bodies"][0]["mesh"] == "bunny.ply");
+
+  const Outcome numbers = program("run --scene c/stats.json", folder);
+  CHECK(numbers.status == 2);
+  CHECK(numbers.err.find("give c/scene.json") != std::string::npos);
+}
+
+TEST_CASE("a mesh of one's own is in view at any size, and named") {
+  const Folder folder;
+  REQUIRE(program("mesh " TEST_MODELS "/bunny.ply --out my.obj", folder).status == 0);
+  const std::string common = "run --mesh my.obj --steps 1 --png-every 1 --size 160x120 --samples 0 ";
+  for (const char* height : {"", "--height 30", "--height 0"}) {  // 1, as the scene has it; its own 0.15
+    CAPTURE(height);
+    const Outcome run = program(common + height, folder);
+    CHECK(run.out.starts_with("bunny-drop with my.obj: "));
+    const Picture picture = read_png(folder.path / "out/frame_00000.png");
+    CHECK(body_of(picture).count > 150);
+    CHECK(body_of(picture).count < 6000);
+    for (int x = 0; x < picture.width; ++x)
+      CHECK(picture.at(x, 0)[0] <= picture.at(x, 0)[2] + 40);  // nothing is cut off above
+  }
 }
 
 TEST_CASE("a cache folder named from where one is holds meshes itself") {

@@ -31,7 +31,9 @@ struct RunOptions {
   long csv_every = 1;               ///< steps; 0: no stats.csv
   std::filesystem::path reference;  ///< the right motion; empty: the cache's, if any
   long measure_every = 1;           ///< steps between measurements; the last step is measured in any case
-  bool positions = false;           ///< positions.npy and tets.npy
+  bool positions = false;           ///< of the end, as arrays
+  long positions_every = 0;         ///< steps a frame of trajectory.npy and exports; 0: of exports, real time
+  std::vector<std::string> exports;  ///< of export_formats
   int gpu = -1;
   std::array<int, 2> size{1280, 720};  ///< pixels
   int samples = 4;
@@ -46,6 +48,8 @@ struct RunOptions {
   std::filesystem::path replay;  ///< what `run` does in place of a scene's steps
   bool progress = false;         ///< show it even if standard error is no terminal
 };
+/// Of a film in real time.
+inline long steps_per_frame(double dt) { return std::max(1L, std::lround(1.0 / 30 / dt)); }
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
 int run_headless(Scene scene, const RunOptions& options);
 /// Prints buffers, bytes, kernels and dispatches a step.

@@ -1,6 +1,7 @@
 #include "app/files.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <png.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,17 +19,6 @@ namespace tetpbd {
 namespace fs = std::filesystem;
 
 namespace {
-
-void write_npy(const fs::path& file, const char* type, std::size_t rows, std::size_t columns,
-               const void* data) {
-  std::string header =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", type, rows, columns);
-  header.resize((10 + header.size() + 1 + 63) / 64 * 64 - 10 - 1, ' ');
-  header += '\n';
-  const std::string length{char(header.size() & 255), char(header.size() >> 8)};
-  const std::string content(static_cast<const char*>(data), rows * columns * 4);
-  write_file(file, std::string("\x93NUMPY\x01\0", 8) + length + header + content);
-}
 
 // One word of a shell's command line.
 std::string quoted(const std::string& text) {
@@ -78,15 +68,18 @@ std::optional<Image> read_png(const fs::path& file) {
   return {};
 }
 
+std::string npy_header(bool floats, const std::vector<std::size_t>& shape) {
+  return fmt::format("{}{:<117}\n", std::string_view("\x93NUMPY\x01\0\x76\0", 10),
+                     fmt::format("{{'descr': '<{}4', 'fortran_order': False, 'shape': ({},), }}",
+                                 floats ? 'f' : 'u', fmt::join(shape, ", ")));
+}
+
 void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (!std::isfinite(rows[i].x) || !std::isfinite(rows[i].y) || !std::isfinite(rows[i].z))
       throw Error("positions are not finite", fmt::format("{}, vertex {}", file.string(), i),
                   "nothing is written", 1);
-  write_npy(file, "<f4", rows.size(), 3, rows.data());
-}
-void write_npy(const fs::path& file, const std::vector<Tet>& rows) {
-  write_npy(file, "<u4", rows.size(), 4, rows.data());
+  write_file(file, npy_header(true, {rows.size(), 3}) + bytes_of(rows));
 }
 
 Video::Video(const fs::path& file, int width, int height, int frames_per_second)

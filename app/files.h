@@ -26,9 +26,21 @@ std::string free_name(const std::string& name, const std::string& ending);
 void write_png(const std::filesystem::path& file, const Image& image);
 /// A small one; none where there is no such picture.
 std::optional<Image> read_png(const std::filesystem::path& file);
-/// numpy arrays: float32 N x 3 (throws Error for numbers that are not finite), uint32 T x 4.
+template <class T>
+std::string bytes_of(const std::vector<T>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+/// What a numpy array of float32 (else uint32) begins with: as long for every shape.
+std::string npy_header(bool floats, const std::vector<std::size_t>& shape);
+/// A numpy array of float32, N x 3; throws Error for numbers that are not finite.
 void write_npy(const std::filesystem::path& file, const std::vector<glm::vec3>& rows);
-void write_npy(const std::filesystem::path& file, const std::vector<Tet>& rows);
+/// Of uint32: N; T x 4, ...
+template <class Row>
+void write_npy(const std::filesystem::path& file, const std::vector<Row>& rows) {
+  std::vector<std::size_t> shape{rows.size()};
+  if (sizeof(Row) > 4) shape.push_back(sizeof(Row) / 4);
+  write_file(file, npy_header(false, shape) + bytes_of(rows));
+}
 
 /// Frames piped into ffmpeg; the file appears when close() has succeeded.
 class Video {

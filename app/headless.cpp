@@ -5,6 +5,7 @@
 
 #include "app/auto_solver.h"
 #include "app/commands.h"
+#include "app/export.h"
 #include "app/files.h"
 #include "app/lanes.h"
 #include "app/probe.h"
@@ -39,7 +40,7 @@ struct FrameWriter {
         dt(scene.settings.dt),
         size(sim.model->size),
         right(motion),
-        video_every(run.video_every > 0 ? run.video_every : std::max(1L, std::lround(1.0 / 30 / dt))),
+        video_every(run.video_every > 0 ? run.video_every : steps_per_frame(dt)),
         target(make_target(run.size[0], run.size[1], run.samples)),
         renderer(make_renderer(*sim.model)),
         frame(frame_of(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
@@ -147,14 +148,6 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   return j;
 }
 
-void write_positions(const Sim& sim, const std::filesystem::path& out) {
-  std::vector<glm::vec3> positions;
-  for (const glm::dvec3& p : in_original_order(*sim.model, read_state(sim).positions))
-    positions.emplace_back(p);
-  write_npy(out / "positions.npy", positions);
-  write_npy(out / "tets.npy", original_tets(*sim.model));
-}
-
 // The tet whose volume is farthest from that at rest, now.
 std::string worst_tet(const Sim& sim) {
   const Model& model = *sim.model;
@@ -192,6 +185,9 @@ int run_headless(Scene scene, const RunOptions& options) {
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
 
+  std::optional<Export> files;
+  if (options.positions_every > 0 || !options.exports.empty()) files.emplace(sim, options);
+
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
@@ -202,20 +198,26 @@ int run_headless(Scene scene, const RunOptions& options) {
     plan.stepped = [&](long s) {
       progress.update(s);
       if (frames) frames->draw_frame(s);
+      if (files && s % files->every == 0) add_frame(*files, sim);
     };
     if (!check_finite(sim)) plan.stepped(0);
     run = run_loop(sim, &metrics, steps, plan);
   }
   if (frames && frames->video) frames->video->close();
+  if (files) close(*files, sim);
   const auto& found = run.errors.non_finite;
   const bool good = !found || restore_checkpoint(sim);
   while (good && found && sim.steps < found->step - 1) step(sim);  // the last good one: the same bits again
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
   auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
   statistics["error"]["measured_every"] = options.measure_every;
+  if (files)
+    statistics["frames"] = {{"count", files->count},
+                            {"every", files->every},
+                            {"seconds", double(files->every) * scene.settings.dt}};
   write_file(options.out / "stats.json", json_text(statistics, 2) + "\n");
   if (csv) csv->close();
-  if (options.positions && good) write_positions(sim, options.out);
+  if ((options.positions || options.positions_every > 0) && good) write_arrays(sim, options.out);
   fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name,
              sim.steps, context.capabilities().renderer,
              options.measure_every > 1 ? "of measured steps " : "", run.errors.max_volume_loss_percent,

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "app/commands.h"
+#include "app/export.h"
 #include "app/lanes.h"
 #include "app/record.h"
 #include "sim/did_you_mean.h"
@@ -282,14 +283,22 @@ void add_commands(CLI::App& app, Arguments& a) {
       "the right motion, made by tetpbd reference (default: the cache's of this scene)");
   add(run, "--measure-every", a.run.measure_every, 1L, most_steps,
       "measure errors every K steps and at the end");
-  run.add_flag("--positions", a.run.positions, "write positions.npy and tets.npy");
+  run.add_flag("--positions", a.run.positions,
+               "write positions, velocities, rest (positions), tets, faces and bodies (of vertices) as .npy");
+  add(run, "--positions-every", a.run.positions_every, 1L, most_steps,
+      "those, and positions every K steps in trajectory.npy");
+  add(run, "--export", a.run.exports,
+      "frames for other programs, vtk: ParaView; pc2: Blender's mesh cache with its OBJ; ply: surfaces; as "
+      "often as --positions-every says (default: every 1/30 s)")
+      ->check(one_of(export_formats));
   CLI::Option* replay = add(run, "--replay", a.run.replay,
                             "instead: what a record of tetpbd view --record says, lanes and all; "
                             "with --video, drawn at the speed it was played");
   for (const char* dropped :
-       {"--scene", "--mesh", "--tetgen", "--set", "--deform", "--solver", "--budget-ms", "--explain", "--steps",
-        "--png-every", "--positions", "--video-every", "--csv-every", "--reference", "--measure-every",
-        "--turntable", "--camera-path"})
+       {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
+        "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
+        "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
+        "--turntable", "--camera-path", "--positions-every", "--export",    "--height"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   add_progress(run, a.run.progress);

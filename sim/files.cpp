@@ -36,6 +36,11 @@ void GrowingFile::add(const std::string& text) {
   if (!(stream_ << text)) throw Error("cannot be written", part_.file.string(), std::strerror(errno), 1);
 }
 
+void GrowingFile::overwrite_start(const std::string& text) {
+  stream_.seekp(0);
+  add(text);
+}
+
 void GrowingFile::close() {
   stream_.close();
   add("");

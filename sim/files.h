@@ -22,6 +22,7 @@ class GrowingFile {
  public:
   explicit GrowingFile(const std::filesystem::path& file);
   void add(const std::string& text);
+  void overwrite_start(const std::string& text);  ///< what is known at the end only
   void close();
 
  private:

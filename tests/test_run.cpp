@@ -284,22 +284,24 @@ TEST_CASE("an interrupted run leaves whole files") {
   const std::string command =
       "cd " + folder.path.string() +
       " && timeout -s INT 6 " TEST_PROGRAM
-      " run --scene beam --steps 1000000 --iterations 3 --out out 2>stderr >/dev/null";
+      " run --scene beam --steps 1000000 --iterations 3 --positions-every 10 --out out 2>stderr >/dev/null";
   const int status = std::system(command.c_str());
   CHECK(WEXITSTATUS(status) != 0);
   CHECK(read(folder.path / "stderr").find("interrupted") != std::string::npos);
   const json stats = json::parse(read(folder.path / "out/stats.json"));
   CHECK(stats["timing"]["steps"].get<long>() > 0);
   CHECK(stats["timing"]["steps"].get<long>() < 1000000);
+  const std::size_t frames = stats["timing"]["steps"].get<std::size_t>() / 10 + 1,
+                    n = stats["mesh"]["vertices"];
+  CHECK(stats["frames"]["count"] == frames);
+  CHECK(fs::file_size(folder.path / "out/trajectory.npy") == 128 + frames * n * 12);
 }
 
 TEST_CASE("a run that measures every tenth step has the same state, rows and end as one that measures all") {
   const Folder folder;
   const std::string command = "run --scene beam --iterations 2 --steps 25 ";
   REQUIRE(program(command + "--out all", folder).status == 0);
-  const Outcome few_measured = program(command + "--measure-every 10 --out some", folder);
-  CHECK(few_measured.out.find("largest volume loss of measured steps ") != std::string::npos);
-  CHECK(few_measured.out.find(", worst tet at the end ") != std::string::npos);
+  REQUIRE(program(command + "--measure-every 10 --out some", folder).status == 0);
   const json all = json::parse(read(folder.path / "all/stats.json")),
              some = json::parse(read(folder.path / "some/stats.json"));
   CHECK(all["state_hash"] == some["state_hash"]);
@@ -375,6 +377,40 @@ TEST_CASE("a mesh of one's own is in view at any size, and named") {
     for (int x = 0; x < picture.width; ++x)
       CHECK(picture.at(x, 0)[0] <= picture.at(x, 0)[2] + 40);  // nothing is cut off above
   }
+}
+
+TEST_CASE("frames for other programs are of the size that their heads say") {
+  const Folder folder;
+  const Outcome run = program(
+      "run --scene beam --iterations 1 --substeps 1 --steps 7 --positions-every 3 --export vtk,pc2,ply "
+      "--measure-every 5",
+      folder);
+  CHECK(run.err == "");
+  CHECK(run.out.find("largest volume loss of measured steps ") != std::string::npos);
+  CHECK(run.out.find(", worst tet at the end ") != std::string::npos);
+  const fs::path out = folder.path / "out";
+  const json stats = json::parse(read(out / "stats.json"));
+  CHECK(stats["frames"]["count"] == 3);
+  CHECK(stats["error"]["measured_every"] == 5);
+  const std::size_t n = stats["mesh"]["vertices"], surface = stats["mesh"]["surface_vertices"],
+                    faces = stats["mesh"]["surface_triangles"], tets = stats["mesh"]["tets"];
+  const auto bytes = [&](const char* file) { return fs::file_size(out / file); };
+  CHECK(bytes("trajectory.npy") == 128 + 3 * n * 12);
+  CHECK(read(out / "trajectory.npy").find("'shape': (3, " + std::to_string(n) + ", 3,)") == 51);
+  for (const char* file : {"positions.npy", "velocities.npy", "rest.npy"}) CHECK(bytes(file) == 128 + n * 12);
+  CHECK(bytes("bodies.npy") == 128 + n * 4);
+  CHECK(bytes("faces.npy") == 128 + faces * 12);
+  CHECK(bytes("tets.npy") == 128 + tets * 16);
+  CHECK(bytes("surface.pc2") == 32 + 3 * surface * 12);
+  for (const char* file : {"vtk/frame_00000.vtu", "vtk/frame_00006.vtu", "ply/frame_00003.ply"})
+    CHECK(bytes(file) > 1000);
+  CHECK(read(out / "frames.pvd").find("timestep=\"0.015\" file=\"vtk/frame_00003.vtu\"") !=
+        std::string::npos);
+  for (const auto& entry : fs::recursive_directory_iterator(out))
+    CHECK(entry.path().string().find(".part") == std::string::npos);
+  const Outcome unknown = program("run --scene beam --export fbx", folder);
+  CHECK(unknown.status == 2);
+  CHECK(unknown.err.find("vtk, pc2, ply") != std::string::npos);
 }
 
 TEST_CASE("a cache folder named from where one is holds meshes itself") {

@@ -20,7 +20,7 @@ awk 'BEGIN {
   }
 }' >my.obj
 
-mapfile -t commands < <(awk '/^## / { recipes = /^## Recipes/ } /^```/ { code = !code; next } recipes && code' "$guide")
+mapfile -t commands < <(awk '/^## / { recipes = /^## Recipes/ } /^```/ { fence = !fence; code = fence && $0 !~ /json/; next } recipes && code' "$guide")
 for command in "${commands[@]}"; do
   echo "$command"
   eval "$command"

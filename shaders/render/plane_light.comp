@@ -66,9 +66,9 @@ float hidden(vec3 at, vec3 normal, uint begin, uint step_size) {
 }
 
 // The sky changes little over a few centimetres: found at the corners of the work-group's square, mixed between.
-float sky_light(vec4 plane, uint lane) {
+float sky_light(vec4 plane, uvec2 tile, uint lane) {
   uint corner = lane & 3u;
-  vec3 at = on_plane(16.0 * (vec2(gl_WorkGroupID.xy) + vec2(float(corner & 1u), float(corner >> 1u))), plane);
+  vec3 at = on_plane(16.0 * (vec2(tile) + vec2(float(corner & 1u), float(corner >> 1u))), plane);
   parts[lane] = hidden(at, plane.xyz, lane >> 2u, 64u);
   for (uint half_size = 128u; half_size >= 4u; half_size /= 2u) {
     barrier();
@@ -80,12 +80,13 @@ float sky_light(vec4 plane, uint lane) {
 }
 
 void main() {
-  vec4 plane = view.planes[gl_WorkGroupID.z];
-  ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
-  float open = sky_light(plane, gl_LocalInvocationIndex), along = dot(plane.xyz, key_direction);
+  uvec3 tile = gl_WorkGroupID;
+  vec4 plane = view.planes[tile.z];
+  ivec2 texel = ivec2(16u * tile.xy + gl_LocalInvocationID.xy);
+  float open = sky_light(plane, tile.xy, gl_LocalInvocationIndex), along = dot(plane.xyz, key_direction);
   // Nothing at the rim, beyond which nothing is known; and little on planes that the map sees edge-on.
   vec2 rim = abs((vec2(texel) + 0.5) / float(map_size) * 2.0 - 1.0);
   float known = (1.0 - smoothstep(0.7, 0.98, max(rim.x, rim.y))) * smoothstep(0.02, 0.2, abs(along));
   float lit = along > 0.0 ? key_light(on_plane(vec2(texel) + 0.5, plane)) : 1.0;
-  imageStore(arrived, texel + ivec2(int(gl_WorkGroupID.z) * map_size, 0), vec4(lit, mix(1.0, open, known), 0.0, 0.0));
+  imageStore(arrived, texel + ivec2(int(tile.z) * map_size, 0), vec4(lit, mix(1.0, open, known), 0.0, 0.0));
 }

@@ -48,6 +48,9 @@ struct FrameWriter {
     const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
     if (run.view.colour == Colour::motion && !right)
       throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
+    if (run.view.colour == Colour::residual && compliant(scene.settings))
+      throw Error("constraints with compliance give way as they should", "--colour residual",
+                  "take --colour energy or stretch");
     if (run.view.colour == Colour::energy && scene.settings.material == "none")
       throw Error("there is no material", "--colour energy", "give one, as in --material neo-hookean");
     if (!run.camera_path.empty()) path = read_camera_path(run.camera_path);

@@ -12,7 +12,8 @@ namespace tetpbd {
 namespace {
 
 namespace measures {
-using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, glm::vec4, std::log;
+using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, glm::vec4, glm::abs, glm::max,
+    std::log;
 // clang-format off: in this order
 #include "shaders/energy.glsl"
 #include "shaders/render/values.glsl"

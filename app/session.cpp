@@ -387,7 +387,9 @@ void save_scene(Session& s) {
 
 bool has_colour(const Session& s, Colour colour) {
   if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
-  return colour != Colour::energy || s.loaded.sim().settings.material != "none";
+  const Settings& now = s.loaded.sim().settings;
+  if (colour == Colour::residual) return !compliant(now);
+  return colour != Colour::energy || now.material != "none";
 }
 
 void choose_colour(Session& s, Colour colour) {
@@ -398,7 +400,10 @@ void choose_colour(Session& s, Colour colour) {
   s.fit_range = colour == Colour::energy || colour == Colour::motion;
   s.fitted = -1;
   if (!has_colour(s, colour))
-    say(s, colour == Colour::energy ? "this needs a material" : "patches of vertices are those of mode node");
+    say(s, colour == Colour::energy ? "this needs a material"
+           : colour == Colour::residual
+               ? "constraints with compliance give way as they should: energy shows how far"
+               : "patches of vertices are those of mode node");
   if (colour != Colour::motion) return;
   attempt(s, [&] { find_right(s); });
   if (s.loaded.disturbed)

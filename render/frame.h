@@ -19,9 +19,9 @@ namespace tetpbd {
 enum class Look { surface, wire, tets, graph };
 inline constexpr std::array look_names{"surface", "wire", "tets", "graph"};
 /// COLOUR_... of shaders/render/layout.glsl.
-enum class Colour { plain, volume, stretch, velocity, energy, motion, patch };
+enum class Colour { plain, volume, stretch, velocity, energy, motion, patch, residual };
 inline constexpr std::array colour_names{"plain",  "volume", "stretch", "velocity",
-                                         "energy", "motion", "patch"};
+                                         "energy", "motion", "patch",   "residual"};
 
 inline constexpr std::array cut_names{"x", "y", "z", "the view"};
 
@@ -43,7 +43,8 @@ inline constexpr std::array<ColourScale, colour_names.size()> colour_scales{
      {"Speed", "m/s", 1, {0, 5}, 50},
      {"Elastic energy", "J/m\u00b3", 1, {0, 1e3}, 1e7},
      {"Error of motion", "% of size", 100, {0, 0.05}, 1},
-     {"", ""}}};
+     {"", ""},
+     {"Constraint error", "% of rest", 100, {0, 0.1}, 1}}};
 
 struct ViewOptions {
   Look look = Look::surface;
@@ -99,7 +100,7 @@ struct Frame {
   GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity and arrows alone
   GLuint values =
       0;  ///< buffer of floats by vertex; needed for Colour::motion (measure_distances) and patch alone
-  glm::vec4 material{0};  ///< as tet_energy of values.glsl has it; needed for Colour::energy alone
+  glm::vec4 material{0};  ///< as tet_energy of values.glsl has it; needed for energy and residual alone
   Camera camera;
   Viewport viewport;
   ViewOptions options;

@@ -481,6 +481,7 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   frame.options = options;
   if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
   frame.material = energy_material(sim.settings);
+  frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
   frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
   for (std::uint32_t v = 0; v < sim.inverse_masses.size(); ++v)
     if (!(sim.inverse_masses[v] > 0)) frame.pinned.push_back(v);

@@ -287,6 +287,16 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
                 doctest::Approx(kind == 1 ? neo_hookean(stretch) : springs(stretch)).epsilon(1e-3).scale(10));
         CHECK_FALSE(poll_values(stage.renderer, true));
       }
+  stage.frame.options.colour = Colour::residual;
+  for (const auto& [kinds, expected] : {std::pair(1.0f, 0.1), {2.0f, 0.331}, {3.0f, 0.331}}) {
+    stage.frame.material = glm::vec4(0, 0, 0, kinds);
+    stage.move(1.1);
+    stage.image();
+    const auto values = poll_values(stage.renderer, true);
+    REQUIRE(values);
+    for (const float value : *values) CHECK(double(value) == doctest::Approx(expected).epsilon(1e-3));
+  }
+  stage.move(1.0);
   const Buffer answers("answers", positions_of(stage.mesh, 1.0, {0.25, 0, 0}));
   Buffer distances;
   measure_distances(stage.renderer, stage.positions.id(), answers.id(), 2.0, distances);

@@ -177,6 +177,7 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK_FALSE(s.loaded.right);  // one alone is held against nothing
   choose_colour(s, Colour::energy);
   CHECK(s.messages.back().text == "this needs a material");
+  CHECK(has_colour(s, Colour::residual));
   choose_colour(s, Colour::motion);
   REQUIRE(s.loaded.right);
   const Target target = make_target(64, 48);

@@ -37,6 +37,7 @@
 #define COLOUR_ENERGY 4
 #define COLOUR_MOTION 5
 #define COLOUR_PATCH 6
+#define COLOUR_RESIDUAL 7
 
 #define PALETTE_SIZE 16
 

@@ -18,7 +18,7 @@ bool place_tet(out vec3 p[4], out float value[4]) {
     if (!finite(p[i])) return false;
   }
   int kind = int(view.colour.x);
-  if (kind == COLOUR_VOLUME || kind == COLOUR_STRETCH || kind == COLOUR_ENERGY) {
+  if (kind == COLOUR_VOLUME || kind == COLOUR_STRETCH || kind == COLOUR_ENERGY || kind == COLOUR_RESIDUAL) {
     // One for the whole tetrahedron, exact where the surface shows means over a vertex.
     float own = tet_value(kind, p, r, view.material);
     for (int i = 0; i < 4; ++i) value[i] = own;

@@ -111,7 +111,8 @@ ordered_json launch_and_bandwidth_limits(bool software);
 struct CompareOptions {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  Axes axes = {.modes = {"node", "constraint", "cpu"}, .iterations = {1, 5, 10, 25}, .substeps = {1}};
+  Axes axes = {
+      .modes = {}, .iterations = {1, 5, 10, 25}, .substeps = {1}};  ///< no modes: what suits the scene
   long steps = 400;
   int gpu = -1;
   std::filesystem::path out = "compare";

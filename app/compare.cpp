@@ -206,13 +206,16 @@ int run_compare(const CompareOptions& options) {
   ordered_json document = run_or_merge(sweep, options.shards, options.out, options.gpu, [&] {
     const Scene scene = load_scene(options.scene, options.overrides);
     sweep.facts["dt"] = scene.settings.dt;
-    note_unused(scene.settings, options.axes.modes, options.overrides);
+    Axes axes = options.axes;
+    if (axes.modes.empty() && compliant(scene.settings) && !kind_without_force(scene.settings))
+      axes.modes = {"node", "cpu-fast", "explicit", "newton"};
+    if (axes.modes.empty()) axes.modes = {"node", "constraint", "cpu"};
+    note_unused(scene.settings, axes.modes, options.overrides);
     const auto model = build_model(scene);
     const long steps = options.steps;
     if (options.judge == "motion") require_motion(scene, *model, steps);
     // The same for all rows: what is varied decides how the scene is solved, not how it moves.
     const auto right = std::make_shared<const std::optional<Motion>>(right_motion(*model, scene.settings));
-    Axes axes = options.axes;
     for (const Baseline& baseline : baselines()) {
       if (std::erase(axes.modes, baseline.name) == 0) continue;
       if (!baseline.suits(scene.settings))
@@ -230,7 +233,7 @@ int run_compare(const CompareOptions& options) {
         });
       }
     }
-    if (axes.modes.empty() && !options.axes.modes.empty()) return;
+    if (axes.modes.empty()) return;
     for (const Settings& settings : combinations(scene.settings, axes))
       sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
         Film film(scene, *model, out, number, sweep.work.size());

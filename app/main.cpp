@@ -164,7 +164,8 @@ void add_parameters(CLI::App& command, SceneOverrides& overrides) {
 
 /// Lists of modes, iterations and substeps, every combination of which is run.
 void add_axes(CLI::App& command, Axes& axes) {
-  add(command, "--modes,--mode", axes.modes, "solver modes; paper: as published");
+  add(command, "--modes,--mode", axes.modes,
+      "solver modes; paper: as published (default of compare: those that suit the scene)");
   add(command, "--iterations", axes.iterations, 1, 100000, "iterations a substep");
   add(command, "--substeps", axes.substeps, 1, 100000, "substeps a step");
   add(command, "--rigid-contact", axes.rigid_contact, 0, 1,

@@ -81,7 +81,7 @@ ColourRange fitted_range(const ColourScale& scale, std::vector<float> values) {
   std::erase_if(values, [](float value) { return !std::isfinite(value); });
   if (values.empty()) return scale.range;
   for (float& value : values) value = std::abs(value);
-  const auto largest = values.begin() + std::ptrdiff_t(values.size() * 99 / 100);
+  const auto largest = values.begin() + std::ptrdiff_t(values.size() * 95 / 100);
   std::ranges::nth_element(values, largest);
   const double least = std::max(double(*largest), 1e-3 * scale.range.high) * scale.factor * (1 - 1e-6);
   const double power = std::pow(10, std::floor(std::log10(least)));

@@ -15,7 +15,7 @@ namespace tetpbd {
 /// DejaVu Sans, which travels inside the program, in place of what fonts there are; `size` in pixels.
 void set_font(ImFontAtlas& atlas, float size);
 
-/// What shows all but the largest hundredth of the values: 1, 2 or 5 times a power of ten of the unit, and no
+/// What shows all but the largest twentieth of the values: 1, 2 or 5 times a power of ten of the unit, and no
 /// less than a thousandth of the scale's first, which would be noise.
 ColourRange fitted_range(const ColourScale& scale, std::vector<float> values);
 

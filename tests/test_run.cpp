@@ -49,7 +49,8 @@ Blob body_of(const Picture& picture) {
 TEST_CASE("run writes what it says, twice the same") {
   const Folder folder;
   const std::string arguments =
-      "run --scene bunny-drop --mode node --steps 30 --iterations 3 --substeps 2 --set bodies.0.position=[0,0.02,0] "
+      "run --scene bunny-drop --mode node --steps 30 --iterations 3 --substeps 2 --set "
+      "bodies.0.position=[0,0.02,0] "
       "--size 320x240 "
       "--samples 0 "
       "--png-every 15 --video fall.mp4 --positions --out ";
@@ -361,6 +362,31 @@ TEST_CASE("the scene that a run writes gives the same run wherever it lies") {
   const Outcome numbers = program("run --scene c/stats.json", folder);
   CHECK(numbers.status == 2);
   CHECK(numbers.err.find("give c/scene.json") != std::string::npos);
+}
+
+TEST_CASE("the camera of a run turns about the bodies, or goes along a path") {
+  const Folder folder;
+  std::ofstream(folder.path / "path.json")
+      << R"([{"time": 0, "target": [0, 1, 0], "distance": 4, "azimuth": 10, "elevation": 15}, {"time": 0.1, "azimuth": 70}])";
+  const std::string run =
+      "run --scene beam --set bodies.0.block.cells=[4,1,1] --mode cpu-fast --steps 20 --png-every 20 "
+      "--size 96x72 --samples 0 --out ";
+  const std::string still = " --set camera.target=[0,1,0] --set camera.distance=4 --set camera.elevation=15";
+  REQUIRE(program(run + "path --camera-path path.json", folder).status == 0);
+  REQUIRE(program(run + "turned --turntable 0.6 --set camera.azimuth=10" + still, folder).status == 0);
+  for (const int azimuth : {10, 70}) {  // 0.1 s later
+    const std::string out = "at" + std::to_string(azimuth);
+    REQUIRE(program(run + out + " --set camera.azimuth=" + std::to_string(azimuth) + still, folder).status ==
+            0);
+    const auto frame = [&](const std::string& of) {
+      return read_png(folder.path / of / (azimuth == 10 ? "frame_00000.png" : "frame_00020.png")).rgba;
+    };
+    CHECK(frame("path") == frame(out));
+    CHECK(frame("turned") == frame(out));
+  }
+  const Outcome wrong = program(run + "x --camera-path none.json", folder);
+  CHECK(wrong.status == 2);
+  CHECK(wrong.err.find("no such camera path") != std::string::npos);
 }
 
 TEST_CASE("a mesh of one's own is in view at any size, and named") {

@@ -81,7 +81,7 @@ for colour in volume stretch velocity motion; do key c; await "^colour $colour";
 shot plain.png; key w; await '^worst true'
 forget; xdotool mousemove $cx $cy; await '^probe [0-9]+ [0-9]+ '; pause_for_frame; shot probe.png
 differ plain.png probe.png 5000 "the tooltip"
-key w; await '^worst false'; key c; await '^colour patch'; key c; await '^colour plain'
+key w; await '^worst false'; key c; await '^colour patch'; key c; await '^colour residual'; key c; await '^colour plain'
 for axis in x y z "the view"; do key x; await "^cut 0.5000 along $axis"; done
 shot cut.png; differ plain.png cut.png 5000 "a cut"
 forget; xdotool keydown alt; xdotool click 5; xdotool keyup alt; await '^cut 0.4800'

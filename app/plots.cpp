@@ -142,7 +142,8 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
   if (seen.empty()) seen = {0, 1};
   axes.low = std::ranges::min(seen), axes.high = std::ranges::max(seen);
   // A step that compiles a shader is a hundred times as long as the others.
-  if (row.of == &Lane::step_ms) axes.high = std::min(axes.high, 2 * percentile(seen, 0.95));
+  if (const double usual = percentile(seen, 0.95); row.of == &Lane::step_ms)
+    axes.high = std::min(axes.high, axes.powers_y ? usual + 0.3 : 2 * usual);
   if (axes.powers_y) {
     axes.low = std::floor(axes.low), axes.high = std::max(std::ceil(axes.high), axes.low + 1);
   } else {  // from 0 on, so that a plot does not magnify what hardly changes

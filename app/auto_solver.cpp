@@ -184,7 +184,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
                most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? finer_times : 1);
   if (wanted <= most) {
     set_mode(s, "explicit", scene.name);
-    return fmt::format("explicit, about {:g} substeps", wanted);
+    return fmt::format("explicit, about {:g} substep{}", wanted, wanted == 1 ? "" : "s");
   }
   set_mode(s, "newton", scene.name);
   // What truncated iterations leave turns a body that spins: so many keep that to a few percent.

@@ -249,7 +249,8 @@ int run_compare(const CompareOptions& options) {
   const Judge& judge = judge_of(options.judge, rows);
   mark_front(rows, judge);
   print_table(sweep, document);
-  fmt::print("judged by {}: {}\n", judge.name, judge.label);
+  fmt::print("judged by {}: {}{}\n", judge.name, judge.label,
+             judge.name == std::string("motion") ? " in the chart, a part of it in the columns" : "");
   if (options.judge.empty() && std::string(judge.name) == "volume")
     fmt::print("the right motion is not known; --judge motion finds it\n");
   if (std::ranges::all_of(rows, [&](const auto& row) { return error_by(judge, row) == 0; }))

@@ -82,17 +82,20 @@ void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
   write_file(file, npy_header(true, {rows.size(), 3}) + bytes_of(rows));
 }
 
-Video::Video(const fs::path& file, int width, int height, int frames_per_second)
+Video::Video(const fs::path& file, int width, int height, double frames_per_second)
     : video_(file), log_(file.string() + ".log") {
   const std::string extension = file.extension().string();
   if (extension != ".mp4" && extension != ".mkv" && extension != ".webm" && extension != ".gif")
     throw Error("unknown video format", file.string(), "name it .mp4, .mkv, .webm or .gif");
+  if (const fs::path folder = file.parent_path(); !folder.empty() && !fs::is_directory(folder))
+    throw Error("no such folder", folder.string(), "make it first", 1);
   if (width % 2 || height % 2)
     throw Error("video needs an even size", fmt::format("{}x{}", width, height), "change --size");
   std::signal(SIGPIPE, SIG_IGN);  // a dead ffmpeg is an error of writing, not of ours
   // A session of its own: Ctrl-C in a terminal is for us, ffmpeg gets its last frames and ends the file.
   const std::string command = fmt::format(
-      "exec setsid ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgba -s {}x{} -r {} -i - {} {} {} >{} 2>&1",
+      "exec setsid ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgba -s {}x{} -r {:.6g} -i - {} {} {} >{} "
+      "2>&1",
       width, height, frames_per_second, extension == ".gif" ? "" : "-pix_fmt yuv420p",
       extension == ".mp4" ? "-movflags +faststart" : "", quoted("file:" + video_.part.string()),
       quoted(log_.part.string()));

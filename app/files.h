@@ -45,7 +45,7 @@ void write_npy(const std::filesystem::path& file, const std::vector<Row>& rows) 
 /// Frames piped into ffmpeg; the file appears when close() has succeeded.
 class Video {
  public:
-  Video(const std::filesystem::path& file, int width, int height, int frames_per_second);
+  Video(const std::filesystem::path& file, int width, int height, double frames_per_second);
   ~Video();
   void add(const Image& frame);
   void close();

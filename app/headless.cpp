@@ -45,7 +45,7 @@ struct FrameWriter {
         renderer(make_renderer(*sim.model)),
         frame(frame_of(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
                        run.view, target)) {
-    const int rate = std::clamp(int(std::lround(1 / (double(video_every) * dt))), 1, 120);
+    const double rate = std::clamp(1 / (double(video_every) * dt), 1.0, 120.0);  // of real time
     if (run.view.colour == Colour::motion && !right)
       throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
     if (run.view.colour == Colour::residual && compliant(scene.settings))

@@ -499,7 +499,8 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
     open_scene(arguments);
   }
   return [a = std::move(arguments)] {
-    if (a.start != start_view) catch_interrupts();  // the window has no files to finish
+    if (a.start != start_view || !a.run.record.empty())
+      catch_interrupts();  // else there is nothing to finish
     return a.explain ? print_explanation(*a.opened, a.run.gpu) : a.start(a);
   };
 }

@@ -112,6 +112,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
 
 int run_map(const MapOptions& options) {
   const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");
+  if (x.row == y.row) throw Error("both axes are the same setting", x.row->name, "give another to --y");
   Sweep sweep{
       "map",
       "cell",

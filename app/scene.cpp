@@ -348,6 +348,8 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   const bool by_trying = apply_solver(scene.settings, overrides);
   for (const auto& [name, text] : overrides.parameters) {
     const Parameter& row = *find_parameter(name);
+    if (row.name == std::string("material") && apply_preset(scene.settings, material_presets(), text))
+      continue;
     set_parameter(scene.settings, row, text, flag_name(row));
   }
   if (by_trying) scene.budget_ms = overrides.budget_ms.value_or(default_budget_ms(scene.settings));

@@ -20,6 +20,7 @@
 #include "app/ui.h"
 #include "render/target.h"
 #include "sim/error.h"
+#include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
 
 namespace tetpbd {
@@ -454,7 +455,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   long frames = 0;
   double before = glfwGetTime(), last_check = before, last_event = before;
   s.log("ready");
-  while (!glfwWindowShouldClose(desktop.window) && !s.quit) {
+  while (!glfwWindowShouldClose(desktop.window) && !s.quit && !interrupted()) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
     const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task &&
                       view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;

@@ -123,6 +123,7 @@ void draw_map(Session& s) {
       map.reset();
       s.log("map stopped");
     } else {
+      forget_errors(s);
       attempt(s, [&] {
         map.reset();
         map = start_map(s.loaded.sim().model, s.loaded.sim().settings, words.x, words.y,

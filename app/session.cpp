@@ -38,12 +38,6 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
   return parameter_text(a, row) != parameter_text(b, row);
 }
 
-// What went wrong before, once something went well; of shaders and states as long as they are not mended.
-void forget_errors(Session& s) {
-  std::erase_if(s.messages,
-                [](const Message& m) { return m.error && !m.non_finite && !m.text.starts_with("shader "); });
-}
-
 // The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
 void disturb(Session& s) {
   if (!std::exchange(s.loaded.disturbed, true))
@@ -51,6 +45,11 @@ void disturb(Session& s) {
 }
 
 }  // namespace
+
+void forget_errors(Session& s) {
+  std::erase_if(s.messages,
+                [](const Message& m) { return m.error && !m.non_finite && !m.text.starts_with("shader "); });
+}
 
 void step_lanes(Session& s) {
   if (s.grab) {
@@ -332,6 +331,7 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
 
 void load_soon(Session& s, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
                bool keep_camera) {
+  forget_errors(s);
   s.task = Task{"loading " + (overrides.mesh.empty() ? name : overrides.mesh.string()), [=, &s] {
                   Scene scene = load_scene(name, overrides);
                   std::vector<Settings> others;  // of further lanes, which start anew as well

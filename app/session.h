@@ -172,6 +172,9 @@ struct Session {
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);
+/// What went wrong before, once something went well or is tried anew; not of shaders and states, as long as
+/// they are not mended.
+void forget_errors(Session& session);
 /// Does it; what it throws becomes a message, but for ContextLost. Whether it went well.
 bool attempt(Session& session, const std::function<void()>& action);
 

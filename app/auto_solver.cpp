@@ -25,9 +25,6 @@ constexpr double finer = 8;        // times the substeps, of the run that stands
 constexpr double no_error = 1e-3;  // percent: below it settings are equally right
 constexpr double fitting = 1.05;   // of the budget: times differ by as much from run to run
 
-// What modes explicit and newton can take.
-bool has_forces(const Settings& settings) { return compliant(settings) && !kind_without_force(settings); }
-
 // One iteration per substep first, which is on the front wherever it was measured (docs/results.md).
 std::vector<Settings> candidates(const Settings& own) {
   Settings base = own;
@@ -106,6 +103,8 @@ Motion motion_of_run(Sim& sim, long steps) {
            }});
   return motion;
 }
+
+bool has_forces(const Settings& settings) { return compliant(settings) && !kind_without_force(settings); }
 
 double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "app/auto_solver.h"
 #include "app/baselines.h"
 #include "app/chart.h"
 #include "app/commands.h"
@@ -207,9 +208,10 @@ int run_compare(const CompareOptions& options) {
     const Scene scene = load_scene(options.scene, options.overrides);
     sweep.facts["dt"] = scene.settings.dt;
     Axes axes = options.axes;
-    if (axes.modes.empty() && compliant(scene.settings) && !kind_without_force(scene.settings))
+    if (axes.modes.empty() && has_forces(scene.settings))
       axes.modes = {"node", "cpu-fast", "explicit", "newton"};
-    if (axes.modes.empty()) axes.modes = {"node", "constraint", "cpu"};
+    else if (axes.modes.empty())
+      axes.modes = {"node", "constraint", "cpu"};
     note_unused(scene.settings, axes.modes, options.overrides);
     const auto model = build_model(scene);
     const long steps = options.steps;

@@ -1,6 +1,15 @@
 // The last iteration's step, then where each vertex is and how fast (method.md eq. 40). One invocation per vertex.
 #include "newton/newton.glsl"
 #include "newton/advance.glsl"
+vec3 numbers(uint k) { return vec3(sums[k], sums[k + 1u], sums[k + 2u]); }
+// What the correction of its body's momentum moves a vertex by.
+vec3 rigid_way(uint i, Pair x, vec3 u) {
+  uint body = floatBitsToUint(at(REST, i).w);
+  if (body == 0u) return vec3(0.0);
+  uint k = MOTIONS_AT + MOTION_WORDS * (body - 1u);
+  vec3 arm = relative(x, Pair(numbers(k + 7u), numbers(k + 10u))) + u;
+  return numbers(k) + turned(vec4(numbers(k + 3u), sums[k + 6u]), arm) - arm;
+}
 void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);
   if (phases > 0u) l = lengths(phases);
@@ -22,6 +31,7 @@ void main() {
     Advanced last = advanced(i, l);
     vec3 free = start_of(i, x) + last.step;
     u = kept_out(x, free);
+    if (phases > 0u && FREE_BODIES > 0u) u += rigid_way(i, x, u);
     bool known = (floatBitsToUint(at(WAY, i).w) & KNOWN) != 0u;
     v = (u - offset.xyz) / offset.w;
     if (!known) v += (0.5 * params.h) * params.gravity;

@@ -19,7 +19,7 @@ layout(local_size_x = GROUP_SIZE) in;
 #define INVERSE 9  // of A's 3x3 block: xx, xy, xz, yy
 #define INVERSE2 10  // yz, zz; resistance to sliding, N/m; with it of half space, a bit
 #define PRODUCT 11 // A z
-#define REST 12
+#define REST 12    // place; 1 + number among free bodies, or 0
 #define KNOWN 0x80000000u
 layout(std430, binding = BIND_NEWTON_VECTORS) restrict buffer Vectors { vec4 vectors[]; };
 vec4 at(uint slot, uint i) { return vectors[slot * VERTICES + i]; }
@@ -46,11 +46,11 @@ vec4 centre_of(uint aggregate) { return coarse_words[CENTRES_AT + aggregate]; }
 
 // How many tets each part of the way turns over or blows up; then floats: two dot products of every work-group of the matrix's product, their sums, three
 // numbers of this and the last iteration, of coarse unknowns r, q and y, rotations as quaternions, whether an aggregate is free (0 or 1), and
-// another number.
+// what follows.
 #ifndef SUMS_ARE
 #define SUMS_ARE
 #endif
-layout(std430, binding = BIND_NEWTON_SUMS) restrict SUMS_ARE buffer Sums { uint bad_starts[3], products_done; float sums[]; };
+layout(std430, binding = BIND_NEWTON_SUMS) restrict SUMS_ARE buffer Sums { uint bad_starts[3], products_done, parts_done[FREE_BODIES + 1u]; float sums[]; };
 #define DOTS_AT (2 * PRODUCT_GROUPS)
 #define SCALARS_AT (DOTS_AT + 2)
 #define COARSE_R (SCALARS_AT + 6)
@@ -59,6 +59,9 @@ layout(std430, binding = BIND_NEWTON_SUMS) restrict SUMS_ARE buffer Sums { uint 
 #define ROTATIONS_AT (COARSE_Y + UNKNOWNS)
 #define FREE_AT (ROTATIONS_AT + 4 * AGGREGATES)
 #define FIRST_AT (FREE_AT + AGGREGATES)  // r . z of the first iteration
+#define MOTIONS_AT (FIRST_AT + 1u)       // of each free body: way, turn (a quaternion), centre (momentum.comp)
+#define MOTION_WORDS 13u
+#define PARTS_AT (MOTIONS_AT + MOTION_WORDS * FREE_BODIES)
 
 // The largest part that a hundredth of all tets at most bears badly: contact crushes a few at any start, and they recover.
 uint start_part() {

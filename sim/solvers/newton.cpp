@@ -17,7 +17,18 @@ namespace {
 constexpr unsigned lanes = 4;       // of a row of the matrix
 constexpr unsigned row_lanes = 32;  // of one of the coarse matrix
 constexpr unsigned slots = 13;      // vectors by vertex, as newton.glsl lists them
-enum Passes : std::size_t { predict, start, linearise, residual, update, coarse, prolong, product, finish };
+enum Passes : std::size_t {
+  predict,
+  start,
+  linearise,
+  residual,
+  update,
+  coarse,
+  prolong,
+  product,
+  finish,
+  momentum
+};
 
 // A use of a constraint by an edge of the matrix (its vertices' pairs): as shaders have it.
 struct Use {
@@ -127,12 +138,13 @@ std::size_t aggregates_for(std::size_t vertices) {
   return std::size_t(std::clamp(1.3 * std::sqrt(double(vertices)), 1.0, double(most_aggregates)));
 }
 
-std::vector<Dispatch> schedule(int iterations) {
+std::vector<Dispatch> schedule(int iterations, bool free) {
   std::vector<Dispatch> dispatches = {{predict, 0}, {start, 0}, {linearise, 0}, {residual, 0}};
   for (unsigned k = 0; k < unsigned(iterations); ++k) {
     for (const std::size_t pass : {update, coarse, prolong}) dispatches.push_back({pass, k});
     dispatches.push_back({product, k + 1});
   }
+  if (free && iterations > 0) dispatches.push_back({momentum, unsigned(iterations)});
   dispatches.push_back({finish, unsigned(iterations)});
   return dispatches;
 }
@@ -231,11 +243,25 @@ Solver create_newton_solver(const SolverInput& input) {
   std::vector<Records> records;
   Words mesh = mesh_words(input.system, graph, aggregates, records);
 
+  std::vector<std::uint32_t> free;  // first vertex and the end of each body that nothing holds
+  std::vector<float> free_number(vertices, 0);
+  std::size_t largest = 0;
+  for (const Body& body : input.model.bodies) {
+    const auto begin = input.model.inverse_masses.begin() + std::ptrdiff_t(body.first_vertex);
+    if (std::any_of(begin, begin + std::ptrdiff_t(body.vertices), [](double w) { return w == 0; })) continue;
+    largest = std::max(largest, body.vertices);
+    free.insert(free.end(),
+                {std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices)});
+    const float number = std::bit_cast<float>(std::uint32_t(free.size() / 2));
+    std::fill_n(free_number.begin() + std::ptrdiff_t(body.first_vertex), body.vertices, number);
+  }
+  mesh.add("BODIES_AT", free);
   std::vector<glm::vec4> vectors(slots * vertices, glm::vec4(0));
   for (std::size_t v = 0; v < vertices; ++v)
-    vectors[(slots - 1) * vertices + v] = glm::vec4(glm::vec3(input.model.rest.positions[v]), 0);
+    vectors[(slots - 1) * vertices + v] = glm::vec4(glm::vec3(input.model.rest.positions[v]), free_number[v]);
   const unsigned group = std::max(tuned({0, 128}, input.tuning).group, row_lanes), rows = group / lanes;
   const std::size_t count = aggregates.all.size(), unknowns = 6 * count, turns = (vertices + rows - 1) / rows;
+  const std::size_t bodies = free.size() / 2, slices = std::clamp<std::size_t>(largest / 2048, 1, 32);
   std::size_t tests = 0;  // of constraints at Newton's start
   for (std::size_t k = 0; k < kind_count; ++k)
     if (constraint_kinds[k].tet) tests = std::max(tests, input.system.lists[k].count());
@@ -246,9 +272,11 @@ Solver create_newton_solver(const SolverInput& input) {
              Buffer("matrix", std::max<std::size_t>(48 * graph.edge_count(), 48)));
   add_buffer(solver, input.tuning, BIND_NEWTON_MESH, Buffer("constraints and edges", mesh.all));
   add_buffer(solver, input.tuning, BIND_NEWTON_COARSE, Buffer("coarse matrix", second));
-  add_buffer(
-      solver, input.tuning, BIND_NEWTON_SUMS,
-      Buffer("sums", std::vector<float>(4 + 2 * turns + 8 + 3 * unknowns + 5 * count + 1), GL_DYNAMIC_COPY));
+  add_buffer(solver, input.tuning, BIND_NEWTON_SUMS,
+             Buffer("sums",
+                    std::vector<float>(4 + 2 * turns + 8 + 3 * unknowns + 5 * count + 2 +
+                                       (13 + 1 + 20 * slices) * bodies),
+                    GL_DYNAMIC_COPY));
   solver.handed_on = {{0, 2 * 16 * vertices, 2 * 16 * vertices},  // WAY and GAIN (newton.glsl)
                       {4, 0, solver.buffers[4].bytes()}};         // rotations, among others
   std::vector<std::string> defines = std::move(mesh.defines);
@@ -260,6 +288,8 @@ Solver create_newton_solver(const SolverInput& input) {
                                     {"TETS", tests},
                                     {"AGGREGATES", count},
                                     {"PRODUCT_GROUPS", turns},
+                                    {"FREE_BODIES", bodies},
+                                    {"PARTS", slices},
                                     {"COARSE_ROW", (unknowns + 3) / 4},
                                     {"CENTRES_AT", unknowns * ((unknowns + 3) / 4)}})
     defines.push_back(fmt::format("{} {}u", name, value));
@@ -282,7 +312,9 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.iteration.push_back(pass("prolong", groups(vertices), 7 * vector));
   solver.iteration.push_back(pass("product", turns, matrix + 4 * vector));
   solver.iteration.push_back(pass("finish", groups(vertices), 14 * vector));
-  solver.schedule = schedule;
+  if (bodies > 0) solver.iteration.push_back(pass("momentum", slices * bodies, 7 * vector));
+  solver.schedule =
+      bodies > 0 ? +[](int k) { return schedule(k, true); } : +[](int k) { return schedule(k, false); };
   solver.renewable = 3;
   solver.renewed = [levels](const SolverInput& now) -> MakeWords {
     return [levels, &model = now.model, system = now.system, settings = now.settings] {

@@ -101,13 +101,10 @@ void move_held(Sim& sim, const Hold& hold, const glm::dvec3& to) {
   move_pinned(sim, hold.caught(), to);
   const glm::dvec3 moved = to - hold.starts.front();
   const double distance = glm::length(moved), slack = std::min(hold.slack, distance);
-  const auto planes = planes_of(*sim.model, sim.settings);
   for (std::size_t i = 1; i < hold.vertices.size(); ++i) {
     glm::dvec3 place = hold.starts[i];
     if (distance > 0) place += moved * (1 - hold.behind[i] * slack / distance);
-    for (const glm::dvec4& plane : planes)
-      place += glm::dvec3(plane) * std::max(0.0, plane.w - glm::dot(glm::dvec3(plane), place));
-    move_pinned(sim, hold.vertices[i], place);
+    move_pinned(sim, hold.vertices[i], out_of_obstacles(*sim.model, sim.settings, time_of(sim), place));
   }
 }
 
@@ -139,18 +136,14 @@ Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick) {
   return grab;
 }
 
-void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
-         std::span<const glm::dvec4> planes) {
+void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor) {
   watch(grab, sim);
   const glm::dvec3 forward(camera.target - eye(camera)), origin(cursor.origin), along(cursor.direction);
   // At the depth of the hit, and as far beside the cursor as the vertex was: catching it moves nothing.
   const double reach = glm::dot(grab.hit - origin, forward) / glm::dot(along, forward);
   grab.target = origin + along * reach + grab.start - grab.hit;
-  // A pinned vertex has infinite mass and no contact, so it is kept out of the ground and walls here.
-  for (const glm::dvec4& plane : planes) {
-    const glm::dvec3 normal(plane);
-    grab.target += normal * std::max(0.0, plane.w - glm::dot(normal, grab.target));
-  }
+  // A pinned vertex has infinite mass and no contact, so it is kept out of obstacles here.
+  grab.target = out_of_obstacles(*sim.model, sim.settings, time_of(sim), grab.target);
 }
 
 void lead(Grab& grab) {

@@ -1,7 +1,6 @@
 // Vertices held by the mouse: pinned, and led towards the cursor no faster than the body can follow.
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "render/camera.h"
@@ -46,8 +45,7 @@ struct Grab {
 /// Waits for the GPU.
 Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick);
 /// Takes in what has been read back, and aims at the point under the cursor at the depth of the hit.
-void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor,
-         std::span<const glm::dvec4> planes);
+void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor);
 /// Before each step: where it goes next.
 void lead(Grab& grab);
 

@@ -26,8 +26,6 @@ struct History {
   std::optional<float> at(double time) const;  ///< the last value until then
 };
 
-inline double time_of(const Sim& sim) { return double(sim.steps) * sim.settings.dt; }  ///< s
-
 struct Lane {
   Sim sim;
   std::optional<Metrics> metrics{};             ///< made when first shown

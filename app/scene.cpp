@@ -1,7 +1,5 @@
 #include "app/scene.h"
 
-#define GLM_ENABLE_EXPERIMENTAL  // euler_angles
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,28 +7,16 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <glm/gtx/euler_angles.hpp>
-#include <nlohmann/json.hpp>
 #include <random>
 
 #include "app/auto_solver.h"
+#include "app/obstacles.h"
 #include "app/run_loop.h"
 #include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/layout.h"
 #include "sim/material.h"
 #include "sim/solvers/solver.h"
-
-namespace glm {
-template <class T>
-void from_json(const nlohmann::json& list, vec<3, T>& v) {
-  for (int a = 0; a < 3; ++a) list.at(std::size_t(a)).get_to(v[a]);
-}
-template <class T>
-void to_json(nlohmann::json& list, const vec<3, T>& v) {
-  list = {v.x, v.y, v.z};
-}
-}  // namespace glm
 
 namespace tetpbd {
 
@@ -52,7 +38,6 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, ce
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, tetgen, scale, height, rotation,
                                                 position, density, velocity, spin, fixed, heavy, deform)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Obstacle, point, normal)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
 
 namespace {
@@ -75,8 +60,7 @@ json schema() {
       "density": [1e-6, 1e9], "velocity": {"three": [-1e5, 1e5]}, "spin": {"three": [-1e5, 1e5]},
       "fixed": {"least": 0, "most": 100, "of": "at most 100 boxes {\"low\": [x,y,z], \"high\": [x,y,z]}",
         "each": {"low": {"three": [-1, 2]}, "high": {"three": [-1, 2]}}}}},
-    "world": {"obstacles": {"least": 0, "of": "planes, few enough for the GPU",
-      "each": {"point": {"three": [-1e6, 1e6]}, "normal": {"three": [-1e3, 1e3]}}}},
+    "world": {"obstacles": {"least": 0, "of": "obstacles, few enough for the GPU"}},
     "solver": {},
     "camera": {"target": {"three": [-1e6, 1e6]}, "distance": [1e-4, 1e6],
       "azimuth": [-360, 360], "elevation": [-89, 89], "fov": [5, 120]}
@@ -84,7 +68,7 @@ json schema() {
   json& body = result["bodies"]["each"];
   body["heavy"] = body["fixed"];
   body["heavy"]["each"].update({{"ratio", {1e-9, 1e9}}, {"share", {0, 1}}});
-  result["world"]["obstacles"]["most"] = MAX_PLANES - 1;
+  result["world"]["obstacles"].update({{"most", MAX_PLANES - 1 + MAX_SHAPES}, {"each", obstacle_schema()}});
   for (const Parameter& row : parameters()) result[row.section][row.name] = nullptr;
   return result;
 }
@@ -171,8 +155,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
     refuse(fmt::format("'{}.block.cells' must be at most 2 million in all", where), file);
   if (body.name.empty()) body.name = body.block ? "block" : body.tet ? "tet" : body.mesh.stem().string();
   body.name = printable(body.name);
-  // Beside the scene, or one of the shipped meshes.
-  if (!body.mesh.empty()) body.mesh = (fs::exists(folder / body.mesh) ? folder : models_folder()) / body.mesh;
+  if (!body.mesh.empty()) body.mesh = found_file(body.mesh, folder);
   return body;
 }
 
@@ -190,11 +173,9 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
   for (const char* section : {"world", "solver"})
     read_settings(document.value(section, json()), scene.settings, file);
   read_material(document["bodies"], scene.settings, file);
-  for (const json& plane : document.value("/world/obstacles"_json_pointer, json())) {
-    scene.obstacles.push_back(plane.get<Obstacle>());
-    if (!(glm::length(scene.obstacles.back().normal) > 1e-9))
-      refuse(fmt::format("'world.obstacles.{}.normal' must not be zero", scene.obstacles.size() - 1), file);
-  }
+  for (const json& obstacle : document.value("/world/obstacles"_json_pointer, json()))
+    scene.obstacles.push_back(read_obstacle(
+        obstacle, fmt::format("world.obstacles.{}", scene.obstacles.size()), file, path.parent_path()));
   if (document.contains("camera")) scene.camera = document["camera"].get<Camera>();
   return scene;
 }
@@ -418,9 +399,7 @@ json body_json(const BodyDescription& body) {
   if (body.mesh.empty()) {
     result.erase("mesh"), result.erase("tetgen");
   } else {
-    const auto whole = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
-    const fs::path shipped = whole(body.mesh).lexically_relative(whole(models_folder()));
-    result["mesh"] = shipped.empty() || *shipped.begin() == ".." ? whole(body.mesh) : shipped;
+    result["mesh"] = file_name(body.mesh);
   }
   if (body.height == 0) result.erase("height");
   for (json& box : result["fixed"]) box.erase("ratio"), box.erase("share");
@@ -437,7 +416,9 @@ ordered_json scene_json(const Scene& scene) {
   std::vector<std::string> kinds = split(scene.settings.constraints, ',');
   if (scene.settings.constraints.empty()) kinds.clear();
   result["solver"]["constraints"] = kinds;
-  result["world"]["obstacles"] = ordered_json(json(scene.obstacles));
+  result["world"]["obstacles"] = ordered_json::array();
+  for (const Obstacle& obstacle : scene.obstacles)
+    result["world"]["obstacles"].push_back(ordered_json(obstacle_json(obstacle)));
   if (scene.camera) result["camera"] = ordered_json(json(*scene.camera));
   result["duration"] = scene.duration;
   return result;
@@ -458,8 +439,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     if (model->rest.tets.size() + mesh.tets.size() > most_tets)
       throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
                   fmt::format("keep to {} tets in all", most_tets));
-    const glm::dvec3 angle = glm::radians(body.rotation);
-    const glm::dmat4 turn = glm::eulerAngleZYX(angle.z, angle.y, angle.x);
+    const glm::dmat3 turn = rotation_of(body.rotation);
     // Fixed and heavy vertices are chosen in the mesh's own frame, before it is turned.
     const Bounds own = bounds(mesh.positions);
     const auto is_in = [&](std::size_t vertex, const BodyDescription::Box& box) {
@@ -479,7 +459,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
       }
     }
     const double scale = body.height > 0 ? body.height / (own.high.y - own.low.y) : 1.0;
-    for (auto& p : mesh.positions) p = glm::dvec3(turn * glm::dvec4((p - own.centre()) * scale, 0));
+    for (auto& p : mesh.positions) p = turn * ((p - own.centre()) * scale);
     const Bounds placed = bounds(mesh.positions);
     const glm::dvec3 bottom(placed.centre().x, placed.low.y, placed.centre().z);
     for (auto& p : mesh.positions) p += body.position - bottom;
@@ -487,8 +467,10 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     deform(start, mesh, body.deform, unsigned(scene.settings.seed));
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
-  for (const auto& [point, normal] : scene.obstacles)
-    model->obstacles.emplace_back(glm::normalize(normal), glm::dot(glm::normalize(normal), point));
+  for (const Obstacle& obstacle : scene.obstacles) {
+    add_obstacle(*model, obstacle);
+    if (!is_plane(obstacle)) load_field(model->shapes.back());
+  }
   renumber(*model);
   return model;
 }

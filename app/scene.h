@@ -45,11 +45,6 @@ struct BodyDescription {
   std::string deform = "none";
 };
 
-/// A half space: bodies are on the side to which the normal points.
-struct Obstacle {
-  glm::dvec3 point{0}, normal{0};  ///< m; of any length but 0
-};
-
 struct Scene {
   std::string name, description;
   std::vector<BodyDescription> bodies;

@@ -36,6 +36,8 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"centre_y", m.centre.y},
           {"centre_z", m.centre.z},
           {"contacts", count(m.contacts)},
+          {"penetration_max", m.penetration_max},
+          {"penetration_999", m.penetration_999},
           {"finite", int(now.finite())}};
 }
 
@@ -55,6 +57,11 @@ ordered_json error_json(const RunErrors& errors) {
   for (const char* key : {"tet_volume_rms", "tet_volume_max", "inverted_tets", "stretch_rms", "stretch_max",
                           "bend_rms_rad", "rigid_distance"})
     result[key] = all[key];
+  // The largest of all instants; null where there is nothing to get into.
+  const auto over_all = [&](double now, double largest) { return std::isnan(now) ? now : largest; };
+  const Measurement last = errors.last.value_or(nothing_measured());
+  result["penetration_max"] = over_all(last.penetration_max, errors.penetration_max);
+  result["penetration_999"] = over_all(last.penetration_999, errors.penetration_999);
   return result;
 }
 

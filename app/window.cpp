@@ -253,7 +253,7 @@ void handle_input(Input& in, const Rect& view) {
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
   if (!s.grab) return;
   const Sim& sim = s.loaded.sim();
-  aim(*s.grab, sim, s.camera, ray_at_cursor(in), planes_of(*sim.model, sim.settings));
+  aim(*s.grab, sim, s.camera, ray_at_cursor(in));
 }
 
 std::string last_glfw_error() {

@@ -1,3 +1,7 @@
+struct Surface {
+  vec3 normal;    // outward
+  real distance;  // from it, of a point
+};
 // Contact with a half space n.x >= d, as an inequality constraint with Coulomb friction at the level of positions
 // (method.md eqs. 11-12). `depth`: n.x - d (negative inside); `moved`: the vertex's displacement so far in this substep.
 // Friction takes back the tangential part of the displacement, at most friction * the normal correction.

@@ -13,6 +13,10 @@ struct Touch {
   vec3 impulse;
   mat3 response;  // velocity there per impulse there
   mat3 stopping;  // its inverse
+#if SHAPES
+  vec3 surface;   // the obstacle's velocity there
+  real friction;
+#endif
 };
 // The inverse inertia from the second moments of the mass about the centre; 0 where it has none, as all is on a line.
 mat3 inverse_inertia_of(mat3 moments) {
@@ -31,7 +35,11 @@ real least_velocity(real approach, real gap, real h, real fall, real restitution
 Touch touch_at(Rigid b, vec3 normal, vec3 arm, real least, vec3 impulse) {
   mat3 turn = mat3(real(0), arm.z, -arm.y, -arm.z, real(0), arm.x, arm.y, -arm.x, real(0));  // turn * p = cross(arm, p)
   mat3 response = mat3(real(1)) + transpose(turn) * b.inverse_inertia * turn;
+#if SHAPES
+  return Touch(normal, arm, least, impulse, response, inverse(response), vec3(real(0)), real(0));
+#else
   return Touch(normal, arm, least, impulse, response, inverse(response));
+#endif
 }
 Rigid pushed(Rigid b, vec3 arm, vec3 impulse) {
   b.velocity += impulse;
@@ -60,14 +68,19 @@ vec3 impulse_at(Touch t, vec3 velocity, real friction) {
   }
   return impulse;
 }
+#if SHAPES
+#define SLIP_OF(k, v) (v - contacts[k].surface), contacts[k].friction
+#else
+#define SLIP_OF(k, v) v, params.friction
+#endif
 SHARED_TOUCHES
 // Over the contacts in `contacts` until no impulse changes by more than `enough`; a body slower than `still` in the end stands still.
-Rigid settled(TOUCHES Rigid b, int count, real friction, real enough, real still) {
+Rigid settled(TOUCHES Rigid b, int count, real enough, real still) {
   real change = enough + enough;
   for (int sweep = 0; sweep < 200 && change > enough; ++sweep) {
     change = real(0);
     for (int k = 0; k < count; ++k) {
-      vec3 arm = contacts[k].arm, impulse = impulse_at(contacts[k], velocity_at(b, arm), friction), more = impulse - contacts[k].impulse;
+      vec3 arm = contacts[k].arm, impulse = impulse_at(contacts[k], SLIP_OF(k, velocity_at(b, arm))), more = impulse - contacts[k].impulse;
       b = pushed(b, arm, more);
       change = max(change, length(more));
       contacts[k].impulse = impulse;

@@ -24,6 +24,8 @@ struct Record4 {
   float rest;
 };
 #define MAX_PLANES 8
+#define MAX_SHAPES 16
+#define MAX_OBSTACLES 32  // half spaces and shapes: bits of a word, beside one
 #define RIGID_SUMS 21
 #define RIGID_SPEED 1024.0  // m/s, the fastest that sums hold
 #define RIGID_PARTS 256.0  // of a quantum: of 2^23 vertices they do not overflow
@@ -60,6 +62,37 @@ struct Step {
   vec4 compliance[2];       // over h^2, by constraint kind
 };
 
+// An obstacle that is no half space at rest, at the end of a substep (a uniform block, std140). Its own coordinates are from its centre.
+#define SHAPE_PLANE 0     // below y = 0
+#define SHAPE_SPHERE 1
+#define SHAPE_CAPSULE 2   // about a part of the y axis
+#define SHAPE_BOX 3
+#define SHAPE_CYLINDER 4  // along the y axis
+#define SHAPE_HEIGHTS 5   // below heights over a grid of x and z
+#define SHAPE_GRID 6      // distances at the points of a grid
+struct Shape {
+  vec3 centre;
+  int kind;
+  vec3 centre_low;  // what `centre` drops
+  float friction;
+  vec3 right;       // its x axis
+  float restitution;
+  vec3 up;          // y
+  float radius;
+  vec3 front;       // z
+  float spacing;    // m, of a field's points (heights: the least)
+  vec3 extent;      // half lengths along its axes
+  float trust;      // what is left of a distance where it may be too long (heights), 0 to 1
+  vec3 velocity;    // of the centre over the substep
+  int first;        // of a field's values
+  vec3 spin;        // rad/s
+  int _0;
+  vec3 origin;      // of a field's points
+  int _1;
+  ivec3 cells;      // points of a field along each axis
+  int _2;
+};
+
 // A hard body that touches half spaces (rigid.glsl). Momenta and impulses per mass of the body.
 struct RigidSide {
   int sums[RIGID_SUMS];   // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and products; then what is
@@ -77,7 +110,7 @@ struct RigidSide {
   vec3 angular;
   float _1;
   vec4 impulses[MOST_TOUCHES];
-  uint touches[MOST_TOUCHES];  // vertex * MAX_PLANES + plane
+  uint touches[MOST_TOUCHES];  // vertex * MAX_OBSTACLES + obstacle
 };
 struct RigidRecord {
   uint first;      // of its vertices
@@ -128,5 +161,8 @@ struct RigidRecord {
 #define BIND_NEWTON_COARSE 13
 // Uniform blocks.
 #define BIND_STEP 0
+#define BIND_SHAPES 1
+// Texture units of the simulation: the fields of all shapes, one after the other.
+#define UNIT_FIELDS 15
 // Atomic counters.
 #define BIND_GUARDS 0

@@ -54,11 +54,26 @@ void add_rigid_sum(uint b, int which, int rest, float value) {
   add_quanta(b, rest, round((quanta - whole) * RIGID_PARTS));
 }
 void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u); }
+#if SHAPES
+// Whether a vertex at x meets a shape on so many times its way over a substep.
+bool meets_shapes(Pair x, vec3 way, float times) {
+  bool any = false;
+  for (int k = 0; k < SHAPES && !any; ++k) {
+    vec3 relative_way = times * (way - params.h * shape_velocity(k, x));
+    any = met(k, pair_add(x, relative_way), relative_way).distance < 0.0;
+  }
+  return any;
+}
+#endif
 // Vertex i is at x with velocity v and will be at `next`.
 void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
   uint b = state.body, s = side_now();
   vec3 way = relative(next, x);
   bool inside = touches(next);
+#if SHAPES
+  inside = inside || meets_shapes(x, way, 1.0);
+  if (meets_shapes(x, way, 4.0)) rigid_bodies[b].sides[s].soon = 1u;
+#endif
   if (inside || touches(pair_add(next, 3.0 * way))) rigid_bodies[b].sides[s].soon = 1u;
   if (inside) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
   if (!state.summed) return;

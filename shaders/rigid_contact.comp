@@ -12,7 +12,7 @@ layout(local_size_x = 256) in;
 #include "impulses.glsl"
 shared Rigid before, body;  // the centre from the body's origin; momenta per mass
 shared uint worst, worst_place;
-shared uint places[MOST_TOUCHES];  // of the touches: vertex * MAX_PLANES + plane
+shared uint places[MOST_TOUCHES];  // of the touches: vertex * MAX_OBSTACLES + obstacle
 
 Pair position_of(uint i) { return Pair(positions[i].high, positions[i].low); }
 
@@ -40,15 +40,49 @@ Rigid rigid_motion(uint b, uint s) {
   return motion;
 }
 
+// What a vertex at x meets of an obstacle: the gap now; how the obstacle moves there, brakes and rebounds.
+struct Meeting {
+  vec3 normal;
+  float gap;
+  vec3 velocity;
+  float friction, restitution;
+};
+#if SHAPES
+#define OBSTACLES (uint(params.plane_count) + uint(SHAPES))
+#else
+#define OBSTACLES uint(params.plane_count)
+#endif
+Meeting meeting_with(uint p, Pair x, vec3 arm) {
+#if SHAPES
+  if (p >= uint(params.plane_count)) {
+    int k = int(p) - params.plane_count;
+    vec3 speed = shape_velocity(k, x), way = params.h * ((velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale - speed);
+    Surface plane = met(k, pair_add(x, params.h * speed + way), way);
+    return Meeting(plane.normal, plane.distance - dot(plane.normal, way), speed, shapes[k].friction, shapes[k].restitution);
+  }
+#endif
+  return Meeting(params.planes[p].xyz, depth_of(x, params.planes[p]), vec3(0.0), params.friction, params.restitution);
+}
+vec3 slip_at(Meeting m, vec3 velocity) {
+#if SHAPES
+  return velocity - m.velocity;
+#else
+  return velocity;
+#endif
+}
 // The normal velocity at a contact may not be under this.
-float least_at(Pair x, vec4 plane, vec3 arm) {
-  return least_velocity(dot(plane.xyz, velocity_at(before, arm)), depth_of(x, plane) - closed_gap * params.body_size, params.h, params.h * length(params.gravity), params.restitution);
+float least_at(Meeting m, vec3 arm) {
+  return least_velocity(dot(m.normal, slip_at(m, velocity_at(before, arm))), m.gap - closed_gap * params.body_size, params.h, params.h * length(params.gravity), m.restitution);
 }
 void take_in(int k, uint place, vec3 origin, vec3 impulse) {
-  Pair x = position_of(place / MAX_PLANES);
-  vec4 plane = params.planes[place % MAX_PLANES];
+  Pair x = position_of(place / MAX_OBSTACLES);
   vec3 arm = arm_of(x, origin) - before.centre;
-  contacts[k] = touch_at(before, plane.xyz, arm, least_at(x, plane, arm), impulse);
+  Meeting m = meeting_with(place % MAX_OBSTACLES, x, arm);
+  contacts[k] = touch_at(before, m.normal, arm, least_at(m, arm), impulse);
+#if SHAPES
+  contacts[k].surface = m.velocity;
+  contacts[k].friction = m.friction;
+#endif
   places[k] = place;
 }
 
@@ -69,7 +103,7 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
   barrier();
   if (lane == 0u) {  // starts from the impulses before
     for (int k = 0; k < touching; ++k) now = pushed(now, contacts[k].arm, contacts[k].impulse);
-    body = settled(now, touching, params.friction, enough, still);
+    body = settled(now, touching, enough, still);
   }
   // Contacts are taken in as the motion found so far breaks them, the worst first.
   for (int round = 0; round < MOST_TOUCHES; ++round) {
@@ -84,12 +118,12 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
       uint vertex = near[s * params.vertex_count + rigid_bodies[b].first + k];
       Pair x = position_of(vertex);
       vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
-      for (uint p = 0u; p < uint(params.plane_count); ++p) {
-        vec4 plane = params.planes[p];
-        float over = least_at(x, plane, arm) - dot(plane.xyz, speed);
-        if (over > most || (over == most && vertex * MAX_PLANES + p < place)) {
+      for (uint p = 0u; p < OBSTACLES; ++p) {
+        Meeting m = meeting_with(p, x, arm);
+        float over = least_at(m, arm) - dot(m.normal, slip_at(m, speed));
+        if (over > most || (over == most && vertex * MAX_OBSTACLES + p < place)) {
           most = over;
-          place = vertex * MAX_PLANES + p;
+          place = vertex * MAX_OBSTACLES + p;
         }
       }
     }
@@ -106,7 +140,7 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     barrier();
     if (lane == 0u) {
       take_in(at, worst_place, origin, vec3(0.0));
-      body = settled(body, touching, params.friction, enough, still);
+      body = settled(body, touching, enough, still);
     }
     barrier();
   }

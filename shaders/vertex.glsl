@@ -3,6 +3,9 @@
 #include "vertex_state.glsl"
 layout(std430, binding = BIND_PREDICTED) buffer Predicted { Velocity predicted[]; };  // a Pair, padded
 #include "contact.glsl"
+#if SHAPES
+#include "shape_contact.glsl"
+#endif
 
 Pair predict_velocity(Pair v) {
   v = pair_add(v, params.gravity * params.h);
@@ -21,7 +24,7 @@ bool touches(Pair x) {
   for (int k = 1; k < params.plane_count; ++k) any = any || depth_of(x, params.planes[k]) < 0.0;
   return any;
 }
-// Corrects a vertex out of all half spaces; `moved`: its displacement in this substep before the correction.
+// Corrects a vertex out of all obstacles; `moved`: its displacement in this substep before the correction.
 Pair resolve_contacts(Pair x, vec3 moved) {
   for (int k = 0; k < params.plane_count; ++k) {
     vec4 plane = params.planes[k];
@@ -32,6 +35,17 @@ Pair resolve_contacts(Pair x, vec3 moved) {
       moved += correction;
     }
   }
+#if SHAPES
+  for (int k = 0; k < SHAPES; ++k) {
+    vec3 carried = params.h * shape_velocity(k, x);
+    Surface plane = met(k, x, moved - carried);
+    if (plane.distance < 0.0) {
+      vec3 correction = plane_correction(plane.normal, plane.distance, moved - carried, shapes[k].friction);
+      x = pair_add(x, correction);
+      moved += correction;
+    }
+  }
+#endif
   return x;
 }
 
@@ -54,7 +68,11 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   }
   if ((phases & PHASE_SOLVE) != 0u) {
     Pair corrected = pair_add(x, correction);
-    if (touches(corrected)) {
+    bool meets = touches(corrected);
+#if SHAPES
+    meets = true;  // that depends on where it comes from
+#endif
+    if (meets) {
       vec3 moved = correction;
       if (predicts) moved += params.h * v.high;
       else moved += params.h * velocities[i].high + relative(x, Pair(predicted[i].high, predicted[i].low));
@@ -93,7 +111,11 @@ Pair leapt(uint i, Position own, Velocity speed, vec3 correction) {
   v = pair_add(pair_add(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
   v = Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
   Pair x = predict_position(start, v);
-  if (touches(x)) {
+  bool meets = touches(x);
+#if SHAPES
+  meets = true;
+#endif
+  if (meets) {
     Pair free = x;
     x = resolve_contacts(x, params.h * v.high);
     v = pair_add(v, relative(x, free) * params.inverse_h);

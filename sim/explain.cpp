@@ -15,7 +15,7 @@ Explanation explain(Sim& sim) {
   for (const Buffer* buffer :
        {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0], &sim.quantized[1],
         &sim.step_block, &sim.guard_counts, &sim.check.words, &sim.check.read_back, &sim.check.positions,
-        &sim.check.velocities, &sim.rigid_bodies})
+        &sim.check.velocities, &sim.rigid_bodies, &sim.shapes, &sim.fields})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;

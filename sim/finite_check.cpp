@@ -125,6 +125,7 @@ bool restore_checkpoint(Sim& sim) {
   sim.positions.write(0, sim.positions.bytes(), positions.data());
   sim.velocities.write(0, sim.velocities.bytes(), velocities.data());
   sim.needs_predict = true;
+  write_shapes(sim);
   forget_answers(sim);
   start_check(sim, nullptr);
   return true;

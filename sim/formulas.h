@@ -37,6 +37,8 @@ struct Formulas {
   static real atan(real y, real x) { return Math::atan(y, x); }
   static real pow(real x, real y) { return Math::pow(x, y); }
   static real log(real x) { return Math::log(x); }
+  const float* texels = nullptr;  // of a shape's field
+  real texel(int i) const { return real(texels[i]); }
   using Ids = const uint*;
   static uint id_of(Ids ids, int j) { return ids[j]; }
   // in order of use
@@ -46,11 +48,15 @@ struct Formulas {
 #include "shaders/constraints/types.glsl"
 #include "constraint_formulas.inc"  // CMake's: every other file there
 #include "shaders/contact.glsl"
+#include "shaders/shapes.glsl"
+#define SHAPES 1
 #define SHARED_TOUCHES  // a work-group's in GLSL, the caller's here
 #define TOUCHES Touch *contacts,
 #include "shaders/impulses.glsl"
 #undef TOUCHES
 #undef SHARED_TOUCHES
+#undef SLIP_OF
+#undef SHAPES
 #pragma GCC diagnostic pop
   // clang-format on
 };

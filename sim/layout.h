@@ -6,6 +6,7 @@
 
 namespace tetpbd {
 namespace layout {
+using glm::ivec3;
 using glm::uint;
 using glm::vec3;
 using glm::vec4;
@@ -13,8 +14,10 @@ using glm::vec4;
 }  // namespace layout
 using layout::Position;
 using layout::RigidRecord;
+using layout::Shape;
 using layout::Step;
 using layout::Velocity;
 static_assert(sizeof(Position) == 32 && sizeof(Velocity) == 32 && sizeof(layout::Record4) == 20);
+static_assert(sizeof(Shape) == 160);
 static_assert(sizeof(Step) == 96 + 32 + 16 * MAX_PLANES + 32);
 }  // namespace tetpbd

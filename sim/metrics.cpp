@@ -70,7 +70,10 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
                         GL_STREAM_READ);
   for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
-    m.kernels.push_back(Program::compute(fmt::format("metrics/{}.comp", name)));
+    m.kernels.push_back(Program::compute(
+        fmt::format("metrics/{}.comp", name), {},
+        {fmt::format("SHAPES {}", model.shapes.size()), fmt::format("FIELDS {:d}", has_fields(model))}));
+  m.vertices = double(model.positions.size());
   return m;
 }
 
@@ -89,6 +92,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
     const float* row = rows.data() + b * M_STRIDE;
     for (std::size_t at = 0; at < M_ROW; ++at) sums[at] += double(row[at]);
     result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
+    result.penetration_max = largest(result.penetration_max, double(row[M_PENETRATION]) / m.bodies[b].size);
     result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
     for (int a = 0; a < 3; ++a)
       result.centre[a] += m.bodies[b].mass * (double(row[M_ORIGIN + a]) + double(row[M_CENTRE + a]));
@@ -97,6 +101,14 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
     return count ? std::sqrt(squares / double(count)) : 0.0;
   };
   const auto vector = [&](std::size_t at) { return glm::dvec3(sums[at], sums[at + 1], sums[at + 2]); };
+  double deeper = 0, most = m.vertices / 1000;
+  for (int octaves = 0; octaves < DEPTHS && deeper <= most; ++octaves) {
+    const double here = sums[std::size_t(M_DEPTHS + octaves)];
+    if (deeper + here > most) result.penetration_999 = std::exp2(-0.5 * (octaves + (most - deeper) / here));
+    deeper += here;
+  }
+  result.penetration_999 = std::min(result.penetration_999, result.penetration_max);
+  if (!pending.obstacles) result.penetration_max = result.penetration_999 = std::nan("");
   result.volume = m.volume + sums[M_VOLUME_CHANGE];
   result.volume_error_percent = 100 * (result.volume - m.volume) / m.volume;
   result.tet_volume_rms = rms(sums[M_TET_SQUARES], m.counts[2]);
@@ -122,6 +134,7 @@ void measure(Metrics& m, const Sim& sim) {
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
+  bind_shapes(sim, sim.shapes_now);
   sim.positions.bind_storage(BIND_M_POSITIONS);
   sim.velocities.bind_storage(BIND_M_VELOCITIES);
   m.rest.bind_storage(BIND_M_REST);
@@ -152,9 +165,10 @@ void measure(Metrics& m, const Sim& sim) {
   }
   m.pending.push_back({Fence::here(),
                        slot,
-                       {.step = sim.steps, .time = double(sim.steps) * sim.settings.dt},
+                       {.step = sim.steps, .time = time_of(sim)},
                        sim.settings.ground ? sim.settings.ground_height : 0.0,
-                       sim.settings.gravity});
+                       sim.settings.gravity,
+                       has_obstacles(*sim.model, sim.settings)});
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {
@@ -174,9 +188,10 @@ Measurement measure_now(Metrics& m, const Sim& sim) {
 Measurement nothing_measured() {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Measurement m;
-  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max,
-                        &m.inverted_tets, &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance,
-                        &m.speed, &m.kinetic, &m.potential, &m.elastic, &m.contacts})
+  for (double* value :
+       {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
+        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
+        &m.potential, &m.elastic, &m.contacts, &m.penetration_max, &m.penetration_999})
     *value = nan;
   m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
   return m;
@@ -189,6 +204,8 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   errors.last = now;
   errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
   errors.max_energy = std::max(errors.max_energy, now.energy());
+  errors.penetration_max = std::fmax(now.penetration_max, errors.penetration_max);
+  errors.penetration_999 = std::fmax(now.penetration_999, errors.penetration_999);
   double mass = 0;
   for (std::size_t i = 0; i < sim.inverse_masses.size(); ++i) {
     mass += sim.model->masses[i];

@@ -32,8 +32,11 @@ struct Measurement {
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
   double elastic = 0;                 ///< J, of a material
-  double contacts = 0;    ///< pairs of a vertex and a half space (ground, obstacle) that it touches
-  double non_finite = 0;  ///< vertices with a position or velocity that is not finite
+  double contacts = 0;  ///< pairs of a vertex and a half space (ground, obstacle) that it touches
+  double penetration_max =
+      0;  ///< of the vertex deepest in an obstacle, over the body's size; NaN without one
+  double penetration_999 = 0;  ///< that 99.9 % of vertices are under
+  double non_finite = 0;       ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }
   double energy() const { return kinetic + potential; }
 };
@@ -49,12 +52,14 @@ struct Metrics {
     std::size_t slot;
     Measurement result;  ///< step and time before
     double ground, gravity;
+    bool obstacles;
   };
 
   std::vector<BodyRanges> bodies;
-  double mass = 0, volume = 0, mass_sizes = 0;  ///< of all bodies; the last sums mass times size
-  std::vector<Buffer> records;                  ///< by kind
-  std::array<std::size_t, 3> counts{};          ///< constraints, by kind
+  double mass = 0, volume = 0, mass_sizes = 0,
+         vertices = 0;                  ///< of all bodies; the last sums mass times size
+  std::vector<Buffer> records;          ///< by kind
+  std::array<std::size_t, 3> counts{};  ///< constraints, by kind
   Buffer rest, partials;
   std::vector<Program> kernels;  ///< in order of dispatch
   std::vector<Buffer> rows;      ///< a ring: a row per body in each
@@ -81,9 +86,10 @@ struct RunErrors {
   /// m|v|)). NaN while there was nothing to measure: fixed vertices, damping, contact from the start.
   double linear_drift = std::numeric_limits<double>::quiet_NaN();
   double angular_drift = std::numeric_limits<double>::quiet_NaN();
-  double start_energy = 0, max_energy = 0;  ///< J
-  bool free = true;                         ///< so far no contact and no fixed vertex
-  std::optional<Measurement> first, last;   ///< of states that were finite
+  double start_energy = 0, max_energy = 0;          ///< J
+  double penetration_max = 0, penetration_999 = 0;  ///< largest
+  bool free = true;                                 ///< so far no contact and no fixed vertex
+  std::optional<Measurement> first, last;           ///< of states that were finite
   bool finite = true;
   std::optional<NonFinite> non_finite;  ///< what check_finite() found, if the caller asked it
 };

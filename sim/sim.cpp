@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <span>
@@ -95,6 +96,7 @@ void write_step_block(Sim& sim, int before = 0) {
     block.compliance[k / 4][glm::length_t(k % 4)] = float(s.compliance[k] / (h * h));
   }
   sim.step_block.write(0, sizeof block, &block);
+  write_shapes(sim);
   sim.needs_predict = true;  // the quantized positions hold a prediction with the old h and gravity
 }
 
@@ -223,6 +225,55 @@ void take_renewal(Sim& sim) {
   if (sim.renewal.again) renew(sim);
 }
 
+std::vector<int> first_values(const Model& model) {
+  std::vector<int> first{0};
+  for (const Obstacle& shape : model.shapes)
+    first.push_back(first.back() + (shape.field ? int(shape.field->values.size()) : 0));
+  return first;
+}
+
+void make_fields(Sim& sim) {
+  std::vector<float> values;
+  for (const Obstacle& shape : sim.model->shapes)
+    if (shape.field) values.insert(values.end(), shape.field->values.begin(), shape.field->values.end());
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
+  if (values.size() > std::size_t(most))
+    throw Error("the fields of obstacles are too large",
+                fmt::format("{} values, the driver allows {}", values.size(), most),
+                "give their meshes fewer voxels", 1);
+  sim.fields = Buffer("fields of obstacles", values);
+  GLuint texture = 0;
+  glGenTextures(1, &texture);
+  sim.fields_texture = Owned<GLuint, delete_texture>(texture);
+  glBindTexture(GL_TEXTURE_BUFFER, texture);
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_R32F, sim.fields.id());
+  label_object(GL_TEXTURE, texture, "fields of obstacles");
+  glBindTexture(GL_TEXTURE_BUFFER, 0);
+}
+
+// Bytes from one list of shapes to the next.
+std::size_t shapes_stride(const Sim& sim) {
+  GLint alignment = 256;
+  glGetIntegerv(GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT, &alignment);
+  const std::size_t bytes = sim.model->shapes.size() * sizeof(Shape), unit = std::size_t(alignment);
+  return (bytes + unit - 1) / unit * unit;
+}
+
+Shape shape_block(const MovingShape& shape, int first) {
+  const auto& s = shape.solid;
+  Shape block{};
+  split_pair(shape.pose.centre, block.centre, block.centre_low);
+  block.right = glm::vec3(shape.pose.axes[0]), block.up = glm::vec3(shape.pose.axes[1]);
+  block.front = glm::vec3(shape.pose.axes[2]);
+  block.kind = s.kind, block.first = first, block.cells = s.cells;
+  block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
+  block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
+  block.velocity = glm::vec3(shape.velocity), block.spin = glm::vec3(shape.spin);
+  block.friction = float(shape.friction), block.restitution = float(shape.restitution);
+  return block;
+}
+
 // Everything but the state.
 Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning,
              ConstraintSystem system) {
@@ -236,6 +287,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   const std::size_t count = sim.model->positions.size();
   const SolverInput input = solver_input(sim, settings);
   const auto defines = vertex_defines(input);
+  if (has_fields(*sim.model)) make_fields(sim);
   sim.solver = find_solver_mode(settings.mode)->create(input);
   if (sim.solver.schedule)
     sim.predict = std::move(sim.solver.begin);
@@ -309,7 +361,7 @@ void remake(Sim& sim, const Settings& settings) {
                kinds_of(settings) == kinds_of(sim.settings) ? sim.system
                                                             : build_constraints(sim.model->rest, settings));
   fresh.inverse_masses = sim.inverse_masses;
-  fresh.steps = sim.steps;
+  fresh.steps = sim.steps, fresh.origin = sim.origin;
   fresh.timed = sim.timed;
   start_watch(fresh, state);
   write_state(fresh, state);
@@ -349,8 +401,11 @@ void retime_velocities(Sim& sim, const Settings& then) {
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
   check_settings(settings, "settings");
   if (model->obstacles.size() + 1 > MAX_PLANES)
-    throw Error("too many obstacles", fmt::format("{} planes", model->obstacles.size()),
+    throw Error("too many obstacles", fmt::format("{} half spaces", model->obstacles.size()),
                 fmt::format("at most {} beside the ground", MAX_PLANES - 1));
+  if (model->shapes.size() > MAX_SHAPES)
+    throw Error("too many obstacles", fmt::format("{} with a shape, or moving", model->shapes.size()),
+                fmt::format("at most {}", MAX_SHAPES));
   ConstraintSystem system = build_constraints(model->rest, settings);
   Sim sim = make_sim(std::move(model), settings, tuning, std::move(system));
   reset(sim);
@@ -375,8 +430,41 @@ void forget_contacts(Sim& sim) {
   sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
 }
 
+void write_shapes(Sim& sim) {
+  if (sim.model->shapes.empty()) return;
+  const Settings& s = sim.settings;
+  const int substeps = on_cpu(sim) ? 0 : s.substeps * sim.watch.finer;
+  const double h = s.dt / (s.substeps * sim.watch.finer);
+  const auto lists = shapes_of(*sim.model, s, time_of(sim) - h, h, substeps + 1);
+  const std::size_t stride = shapes_stride(sim);
+  const std::vector<int> first = first_values(*sim.model);
+  std::vector<char> bytes(lists.size() * stride);
+  for (std::size_t l = 0; l < lists.size(); ++l)
+    for (std::size_t k = 0; k < lists[l].size(); ++k) {
+      const Shape block = shape_block(lists[l][k], first[k]);
+      std::memcpy(&bytes[l * stride + k * sizeof block], &block, sizeof block);
+    }
+  if (sim.shapes.bytes() == bytes.size())
+    sim.shapes.write(0, bytes.size(), bytes.data());
+  else
+    sim.shapes = Buffer("shapes", bytes, GL_STREAM_DRAW);
+  sim.shapes_now = 0;
+}
+
+void bind_shapes(const Sim& sim, int list) {
+  if (!sim.shapes) return;
+  const std::size_t stride = shapes_stride(sim), lists = sim.shapes.bytes() / stride;
+  glBindBufferRange(GL_UNIFORM_BUFFER, BIND_SHAPES, sim.shapes.id(),
+                    GLintptr(std::min(std::size_t(list), lists - 1) * stride),
+                    GLsizeiptr(sim.model->shapes.size() * sizeof(Shape)));
+  if (!sim.fields) return;
+  glActiveTexture(GL_TEXTURE0 + UNIT_FIELDS);
+  glBindTexture(GL_TEXTURE_BUFFER, sim.fields_texture.id());
+  glActiveTexture(GL_TEXTURE0);
+}
+
 void reset(Sim& sim) {
-  sim.steps = 0;
+  sim.steps = 0, sim.origin = {};
   if (sim.guard_counts) sim.guard_counts.clear();
   sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
@@ -414,6 +502,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
   const auto renewed_for = [&](const Settings& s) { return std::tuple(kinds_of(s), forces(s), substep(s)); };
   const Settings before = sim.settings;
+  if (settings.dt != before.dt) sim.origin = {sim.steps, time_of(sim)};
   const bool anew = made_for(settings) != made_for(before) || !take_constraints(sim, settings);
   if (anew) remake(sim, settings);
   const bool same = forces(settings) == forces(sim.settings);

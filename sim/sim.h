@@ -28,6 +28,12 @@ struct Renewal {
   bool again = false;  ///< settings have changed since
 };
 
+/// When it was at a step; time runs on from there by dt.
+struct TimeOrigin {
+  long step = 0;
+  double time = 0;  ///< s
+};
+
 struct Sim {
   std::shared_ptr<const Model> model;
   Settings settings;
@@ -40,6 +46,11 @@ struct Sim {
   Buffer quantized[2];  ///< what neighbours see (quantized.glsl); a double-buffered solver reads one and
                         ///< writes the other
   Buffer step_block;    ///< Step
+  Buffer shapes;  ///< Shape: of each obstacle with a shape as it is at the step's start, then at the end of
+                  ///< each substep; one list where nothing moves
+  Buffer fields;  ///< of shapes, one after the other
+  Owned<GLuint, delete_texture> fields_texture;
+  int shapes_now = 0;   ///< which list of `shapes` is of the present
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
   Buffer
@@ -54,6 +65,7 @@ struct Sim {
   bool needs_predict = true;   ///< the quantized positions are not those of the next step
   unsigned read_index = 0;     ///< which of `quantized` is read next
   long steps = 0;              ///< taken since the start
+  TimeOrigin origin;           ///< ask time_of()
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
   State host;   ///< state of a CPU mode; the GPU buffers follow it
@@ -86,6 +98,13 @@ void reset(Sim& sim);
 /// Whether the mode steps on the CPU: then `host` is the state.
 inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
 
+/// s, since the start.
+inline double time_of(const Sim& sim) {
+  return sim.origin.time + double(sim.steps - sim.origin.step) * sim.settings.dt;
+}
+/// The shapes at and after the present, for kernels; a list of them for the next kernels.
+void write_shapes(Sim& sim);
+void bind_shapes(const Sim& sim, int list);
 /// What is known of hard bodies in contact, before something else moves them.
 void forget_contacts(Sim& sim);
 /// Velocities of mid-substep with the settings `then` become those with the settings of now.

@@ -50,6 +50,7 @@ std::size_t snapshot_memory(const Sim& sim) {
 
 Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
   Snapshot taken{sim.steps,
+                 sim.origin,
                  sim.settings,
                  sim.quantum,
                  sim.needs_predict,
@@ -72,7 +73,7 @@ Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
 
 void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   finish_renewal(sim);
-  sim.steps = then.steps;
+  sim.steps = then.steps, sim.origin = then.origin;
   sim.needs_predict = true;
   const bool same_kind = on_cpu(sim) == then.host.has_value();
   if (same_kind && sim.watch.at_rest > 0) set_stiffening(sim, then.watch.stiffening);
@@ -101,6 +102,7 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
     sim.watch.stiffer = 1, sim.watch.calm = 0;
     retime_velocities(sim, then.settings);
   }
+  write_shapes(sim);
   start_check(sim, nullptr);
   sim.check.found = then.found;
 }

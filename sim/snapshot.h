@@ -8,6 +8,7 @@ namespace tetpbd {
 
 struct Snapshot {
   long steps = 0;
+  TimeOrigin origin;
   Settings settings;
   double quantum = 0;  // these as in Sim
   bool needs_predict = true;

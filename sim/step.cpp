@@ -63,10 +63,12 @@ void bind(Sim& sim) {
   glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
 }
 
-void step_on_gpu(Sim& sim) {
+void step_on_gpu(Sim& sim, bool moving) {
   count_down_renewal(sim);
   const unsigned watched = watch(sim);
+  if (moving) write_shapes(sim);
   bind(sim);
+  bind_shapes(sim, 0);
   if (sim.timed) sim.timer.begin();
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
   Dispatcher dispatcher{sim};
@@ -78,6 +80,7 @@ void step_on_gpu(Sim& sim) {
   dispatcher.bind_quantized();
   sim.needs_predict = false;
   for (int substep = 0; substep < sim.settings.substeps * sim.watch.finer; ++substep) {
+    if (moving) bind_shapes(sim, ++sim.shapes_now);
     if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
     for (const Dispatch& dispatch : sim.substep)
       if (dispatch.pass + 1 == sim.solver.iteration.size())
@@ -93,14 +96,17 @@ void step_on_gpu(Sim& sim) {
 }  // namespace
 
 void step(Sim& sim) {
+  const bool moving = std::ranges::any_of(sim.model->shapes, moves);
   if (on_cpu(sim)) {
-    const GuardCounts counts = sim.solver.step_on_cpu(sim.host, sim.settings, sim.inverse_masses);
+    const GuardCounts counts =
+        sim.solver.step_on_cpu(sim.host, sim.settings, sim.inverse_masses, time_of(sim));
     for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += counts[g];
     upload(sim, sim.host);
   } else {
-    step_on_gpu(sim);
+    step_on_gpu(sim, moving);
   }
   ++sim.steps;
+  if (on_cpu(sim) && moving) write_shapes(sim);
   check_step(sim);
 }
 

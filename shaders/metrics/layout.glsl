@@ -27,12 +27,15 @@
 #define M_KINETIC 15           // J
 #define M_HEIGHT 16            // sum m y
 #define M_COVARIANCE 17        // 9: sum m (x - x0) X^T, column by column
-#define M_CONTACTS 26          // pairs of a vertex and a half space that it touches
+#define M_CONTACTS 26          // pairs of a vertex and an obstacle that it touches
 #define M_NON_FINITE 27        // vertices with a position or velocity that is not finite
-#define M_ANGULAR 28           // 3: sum m r x u about the centre of mass
-#define M_RIGID_SQUARES 31     // sum m |x - c - R X|^2
-#define M_CENTRE 32            // 3: c - x0
-#define M_ROTATION 35          // 4: quaternion w, x, y, z
-#define M_ORIGIN 39            // 3: x0
-#define M_ROW 42
-#define M_STRIDE 64            // floats from one body's row to the next: a multiple of any driver's binding alignment
+#define M_PENETRATION 28       // m, of the vertex that is deepest in an obstacle
+#define M_DEPTHS 29            // DEPTHS: vertices inside by so much of the body's size: each half an octave less than the one before, from 1
+#define DEPTHS 32
+#define M_ANGULAR 61           // 3: sum m r x u about the centre of mass
+#define M_RIGID_SQUARES 64     // sum m |x - c - R X|^2
+#define M_CENTRE 65            // 3: c - x0
+#define M_ROTATION 68          // 4: quaternion w, x, y, z
+#define M_ORIGIN 72            // 3: x0
+#define M_ROW 75
+#define M_STRIDE 128           // floats from one body's row to the next: a multiple of any driver's binding alignment

@@ -8,7 +8,7 @@ layout(std430, binding = BIND_M_ROW) buffer Row { float row[]; };
 uniform uint groups;                // of the kernels that write partials
 uniform uvec2 vertex_range, edge_range, hinge_range, tet_range;  // of the body: first and end
 uniform float mass;      // kg, of the body
-uniform float touching;  // m, how near to a half space counts as contact
+uniform float touching;  // m, how near to an obstacle counts as contact
 shared float scratch[METRICS_SIZE];
 
 // A tree over the work-group; the result is in scratch[0] for every invocation until the next call.
@@ -30,7 +30,7 @@ void store_partial(int quantity, float value, bool largest) {
 }
 
 // Largest quantities are maxima, all others sums.
-bool is_maximum(int quantity) { return quantity == M_TET_MAX || quantity == M_STRETCH_MAX; }
+bool is_maximum(int quantity) { return quantity == M_TET_MAX || quantity == M_STRETCH_MAX || quantity == M_PENETRATION; }
 
 // Sums the groups' partials of one quantity, in order.
 float total_of(int quantity) {

@@ -1,13 +1,22 @@
 // Moments of one body: mass, momentum, energy, and the covariance that gives its best-fitting rotation.
 #include "metrics/reduce.glsl"
 #include "finite.glsl"
+#if SHAPES
+#include "contact.glsl"
+#include "shape_contact.glsl"
+#endif
 layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
 layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
 
+shared uint depths[DEPTHS];
+
 void main() {
+  uint me = gl_LocalInvocationIndex;
+  if (me < DEPTHS) depths[me] = 0u;
+  barrier();
   vec3 moment = vec3(0.0), momentum = vec3(0.0);
   mat3 covariance = mat3(0.0);
-  float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, non_finite = 0.0;
+  float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, non_finite = 0.0, deepest = 0.0;
   for (uint i = vertex_range.x + gl_GlobalInvocationID.x; i < vertex_range.y; i += groups * METRICS_SIZE) {
     Position p = positions[i];
     vec3 x = relative(p, positions[vertex_range.x]);
@@ -21,8 +30,22 @@ void main() {
     kinetic += 0.5 * m * dot(v, v);
     height += m * p.high.y;
     covariance += m * outerProduct(x, at_rest.xyz);
-    for (int k = 0; k < params.plane_count; ++k)
-      if ((dot(params.planes[k].xyz, p.high) - params.planes[k].w) + dot(params.planes[k].xyz, p.low) < touching) contacts += 1.0;
+    float outside_by = 0.0;
+    for (int k = 0; k < params.plane_count; ++k) {
+      float gap = (dot(params.planes[k].xyz, p.high) - params.planes[k].w) + dot(params.planes[k].xyz, p.low);
+      if (gap < touching) contacts += 1.0;
+      outside_by = min(outside_by, gap);
+    }
+#if SHAPES
+    for (int k = 0; k < SHAPES; ++k) {
+      float gap = gap_to(k, Pair(p.high, p.low));
+      if (gap < touching) contacts += 1.0;
+      outside_by = min(outside_by, gap);
+    }
+#endif
+    deepest = max(deepest, -outside_by);
+    int octaves = int(-2.0 * log2(-outside_by * 1e-5 / touching));
+    if (outside_by < 0.0 && octaves < DEPTHS) atomicAdd(depths[max(octaves, 0)], 1u);
   }
   for (int a = 0; a < 3; ++a) {
     store_partial(M_MOMENT + a, moment[a], false);
@@ -34,4 +57,6 @@ void main() {
   store_partial(M_HEIGHT, height, false);
   store_partial(M_CONTACTS, contacts, false);
   store_partial(M_NON_FINITE, non_finite, false);
+  store_partial(M_PENETRATION, deepest, true);
+  if (me < DEPTHS) partials[(M_DEPTHS + me) * METRICS_GROUPS + gl_WorkGroupID.x] = float(depths[me]);
 }

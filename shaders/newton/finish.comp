@@ -24,6 +24,7 @@ void main() {
   Pair x = Pair(own.high, own.low);
   vec4 offset = at(OFFSET, i);
   vec3 u = vec3(0.0), v = vec3(0.0), before = velocities[i].high + velocities[i].low;
+  vec3 way = vec3(0.0), gain = vec3(0.0);
   uint touched = 0u;
   float push = 0.0;
   if (own.inverse_mass > 0.0) {
@@ -35,21 +36,29 @@ void main() {
     bool known = (floatBitsToUint(at(WAY, i).w) & KNOWN) != 0u;
     v = (u - offset.xyz) / offset.w;
     if (!known) v += (0.5 * params.h) * params.gravity;
-    for (int k = 0; k < params.plane_count; ++k) {
-      vec3 n = params.planes[k].xyz;
-      bool clamped = depth_of(x, params.planes[k]) + dot(n, free) < 0.0;
+    for (int k = 0; k < OBSTACLES; ++k) {
+      Surface plane = plane_of(k, x, free);
+      vec3 n = (holds & (1u << k)) != 0u ? normal_of(uint(k), i) : plane.normal;
+      bool clamped = plane.distance < 0.0;
       if ((holds & (1u << k)) != 0u || clamped) {
         float force = -dot(n, last.residual);
         if (force > 0.0 || clamped) touched |= 1u << k;
         push = max(push, force);
       }
     }
-    v = free_part(v, touched);
+#if SHAPES
+    vec3 carried = velocity_of(touched, x);
+    v = carried + free_part(v - carried, touched, i);
+#else
+    v = free_part(v, touched, i);
+#endif
+    way = free_part(u, touched, i);
+    gain = free_part(v - before, touched, i);
   }
   x = pair_add(x, u);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v, 0.0, vec3(0.0), 0.0);
   note_unless_finite(i, x.high, v);
-  put(WAY, i, free_part(u, touched), uintBitsToFloat(touched | KNOWN));
-  put(GAIN, i, free_part(v - before, touched), push);
+  put(WAY, i, way, uintBitsToFloat(touched | KNOWN));
+  put(GAIN, i, gain, push);
 }

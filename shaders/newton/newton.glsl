@@ -4,20 +4,27 @@
 #include "pair.glsl"
 #include "quantized.glsl"
 #include "vertex_state.glsl"
+#include "contact.glsl"
+#if SHAPES
+#include "shape_contact.glsl"
+#define OBSTACLES (params.plane_count + SHAPES)
+#else
+#define OBSTACLES params.plane_count
+#endif
 layout(local_size_x = GROUP_SIZE) in;
 
 // By vertex, VERTICES of each.
 #define AIM 0      // where inertia carries it, from its place; mass / h^2 (0: fixed)
 #define OFFSET 1   // z of BDF2 from its place; h
-#define WAY 2      // of the last step; bits: a step is known, half spaces touched
-#define GAIN 3     // of velocity in the last step; the force of half spaces, N
-#define RESIDUAL 4 // r; bits of half spaces that hold it
+#define WAY 2      // of the last step; bits: a step is known, obstacles touched
+#define GAIN 3     // of velocity in the last step; the force of obstacles, N
+#define RESIDUAL 4 // r; bits of obstacles that hold it
 #define SEARCH 5   // z = M^-1 r
 #define DIRECTION 6   // p
 #define IMAGE 7    // q = A p
 #define STEP 8     // s, of Newton
 #define INVERSE 9  // of A's 3x3 block: xx, xy, xz, yy
-#define INVERSE2 10  // yz, zz; resistance to sliding, N/m; with it of half space, a bit
+#define INVERSE2 10  // yz, zz; resistance to sliding, N/m; with it of obstacles, bits
 #define PRODUCT 11 // A z
 #define REST 12    // place; 1 + number among free bodies, or 0
 #define KNOWN 0x80000000u
@@ -76,11 +83,39 @@ vec4 rotation_of(uint aggregate) {
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 vec4 opposite(vec4 q) { return vec4(-q.xyz, q.w); }
 
-// Without what the half spaces of `bits` hold: their normals, made orthogonal to each other.
-vec3 free_part(vec3 v, uint bits) {
+// The plane of obstacle k that a vertex at x meets on the way u, and the distance of x + u from it.
+Surface plane_of(int k, Pair x, vec3 u) {
+#if SHAPES
+  if (k >= params.plane_count) {
+    int s = k - params.plane_count;
+    return met(s, pair_add(x, u), u - params.h * shape_velocity(s, x));
+  }
+#endif
+  return Surface(params.planes[k].xyz, depth_of(x, params.planes[k]) + dot(params.planes[k].xyz, u));
+}
+// u, moved out of the obstacles that x + u is in.
+vec3 kept_out(Pair x, vec3 u) {
+  for (int k = 0; k < OBSTACLES; ++k) {
+    Surface plane = plane_of(k, x, u);
+    u -= plane.normal * min(plane.distance, 0.0);
+  }
+  return u;
+}
+vec3 aimed(uint i) { return start_parts[start_part()] * at(AIM, i).xyz; }
+vec3 start_of(uint i, Pair x) { return kept_out(x, aimed(i)); }
+// In a step a shape holds vertex i at the plane that it meets on its way to the start.
+vec3 normal_of(uint k, uint i) {
+#if SHAPES
+  return plane_of(int(k), Pair(positions[i].high, positions[i].low), aimed(i)).normal;
+#else
+  return params.planes[k].xyz;
+#endif
+}
+// Without what the obstacles of `bits` hold of vertex i: their normals, made orthogonal to each other.
+vec3 free_part(vec3 v, uint bits, uint i) {
   if ((bits & (bits - 1u)) == 0u) {
     if (bits != 0u) {
-      vec3 n = params.planes[findLSB(bits)].xyz;
+      vec3 n = normal_of(uint(findLSB(bits)), i);
       v -= n * dot(n, v);
     }
     return v;
@@ -88,7 +123,7 @@ vec3 free_part(vec3 v, uint bits) {
   vec3 held[3] = vec3[3](vec3(0.0), vec3(0.0), vec3(0.0));
   int count = 0;
   for (; bits != 0u && count < 3; bits &= bits - 1u) {
-    vec3 n = params.planes[findLSB(bits)].xyz;
+    vec3 n = normal_of(uint(findLSB(bits)), i);
     for (int k = 0; k < count; ++k) n -= held[k] * dot(held[k], n);
     float l = length(n);
     if (l > 1e-3) held[count++] = n / l;
@@ -96,16 +131,22 @@ vec3 free_part(vec3 v, uint bits) {
   for (int k = 0; k < count; ++k) v -= held[k] * dot(held[k], v);
   return v;
 }
-uint held_by(vec4 residual) { return floatBitsToUint(residual.w); }
-// u, moved out of the half spaces that x + u is in.
-vec3 kept_out(Pair x, vec3 u) {
-  for (int k = 0; k < params.plane_count; ++k) {
-    vec3 n = params.planes[k].xyz;
-    u -= n * min(depth_of(x, params.planes[k]) + dot(n, u), 0.0);
-  }
-  return u;
+// Of the first obstacle of `bits`.
+float friction_of(uint bits) {
+#if SHAPES
+  int k = findLSB(bits) - params.plane_count;
+  if (k >= 0) return shapes[k].friction;
+#endif
+  return params.friction;
 }
-vec3 start_of(uint i, Pair x) { return kept_out(x, start_parts[start_part()] * at(AIM, i).xyz); }
+vec3 velocity_of(uint bits, Pair x) {
+#if SHAPES
+  int k = findLSB(bits) - params.plane_count;
+  if (k >= 0) return shape_velocity(k, x);
+#endif
+  return vec3(0.0);
+}
+uint held_by(vec4 residual) { return floatBitsToUint(residual.w); }
 
 // A sum over the work-group, in a fixed order; for all of it.
 shared vec2 group_sums[GROUP_SIZE];

@@ -37,7 +37,7 @@ void main() {
     for (uint k = 1u; k < LANES; ++k) sum += parts[lane + k];
     float inertia = at(AIM, i).w, slides = at(INVERSE, i).w;
     sum += inertia * own;
-    if (slides > 0.0) sum += slides * free_part(own, floatBitsToUint(at(INVERSE2, i).w));
+    if (slides > 0.0) sum += slides * free_part(own, floatBitsToUint(at(INVERSE2, i).w), i);
     if (!(inertia > 0.0)) sum = vec3(0.0);
     put(PRODUCT, i, sum, 0.0);
     dots = vec2(dot(at(RESIDUAL, i).xyz, own), dot(sum, own));

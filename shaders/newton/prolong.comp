@@ -5,7 +5,7 @@ void main() {
   if (i >= VERTICES) return;
   vec4 residual = at(RESIDUAL, i), d = at(INVERSE, i), a = at(INVERSE2, i);
   uint holds = held_by(residual);
-  vec3 r = free_part(residual.xyz, holds);
+  vec3 r = free_part(residual.xyz, holds, i);
   mat3 B = mat3(d.x, a.x, a.y, a.x, d.y, a.z, a.y, a.z, d.z);
   vec3 z = B * r;
   if (at(AIM, i).w > 0.0 && AGGREGATES > 0) {
@@ -17,5 +17,5 @@ void main() {
       z += turned(rotation_of(aggregate), way + cross(turn, (rest - centre.xyz) / centre.w)) * (float(word & 65535u) * (1.0 / 65535.0));
     }
   }
-  put(SEARCH, i, free_part(z, holds), 0.0);
+  put(SEARCH, i, free_part(z, holds, i), 0.0);
 }

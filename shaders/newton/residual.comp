@@ -4,9 +4,9 @@ shared vec3 parts[3][GROUP_SIZE];
 
 // Friction of the last substep's force against the way since it (lagged: Li et al. 2020): resistance per way, and smoothly less below `slip`.
 const float slip_speed = 0.05;  // m/s
-float resistance(float normal_force, vec3 slid) {
+float resistance(float friction, float normal_force, vec3 slid) {
   float way = length(slid), slip = slip_speed * params.h;
-  return params.friction * normal_force * (way < slip ? (2.0 - way / slip) / slip : 1.0 / way);
+  return friction * normal_force * (way < slip ? (2.0 - way / slip) / slip : 1.0 / way);
 }
 void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
   Position own = positions[i];
@@ -21,19 +21,29 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
     r = -force - aim.w * (u - aim.xyz);
     mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z, diagonal.z + aim.w);
     float push = at(GAIN, i).w;
-    if (push > 0.0 && touched != 0u && params.friction > 0.0) {
-      vec3 slid = free_part(u, touched);
-      slides = resistance(push, slid);
+    if (push > 0.0 && touched != 0u && friction_of(touched) > 0.0) {
+#if SHAPES
+      vec3 slid = free_part(u - params.h * velocity_of(touched, x), touched, i);
+#else
+      vec3 slid = free_part(u, touched, i);
+#endif
+      slides = resistance(friction_of(touched), push, slid);
       r -= slides * slid;
       for (int c = 0; c < 3; ++c) {
         vec3 axis = vec3(0.0);
         axis[c] = slides;
-        D[c] += free_part(axis, touched);
+        D[c] += free_part(axis, touched, i);
       }
     }
-    for (int k = 0; k < params.plane_count; ++k) {
+    for (int k = 0; k < OBSTACLES; ++k) {
+#if SHAPES
+      Surface plane = plane_of(k, x, aimed(i));
+      vec3 n = plane.normal;
+      bool there = plane.distance + dot(n, u - aimed(i)) <= 2.0 * params.quantum;
+#else
       vec3 n = params.planes[k].xyz;
       bool there = depth_of(x, params.planes[k]) + dot(n, u) <= 2.0 * params.quantum;
+#endif
       if (there && (dot(n, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
     }
     mat3 B = inverse(D);

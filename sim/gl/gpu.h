@@ -60,6 +60,7 @@ class Owned {
 inline void delete_buffer(GLuint id) { glDeleteBuffers(1, &id); }
 inline void delete_program(GLuint id) { glDeleteProgram(id); }
 inline void delete_query(GLuint id) { glDeleteQueries(1, &id); }
+inline void delete_texture(GLuint id) { glDeleteTextures(1, &id); }
 inline void delete_fence(GLsync sync) { glDeleteSync(sync); }
 
 /// Throws Error naming what did not fit if it does not, or the last GL call failed.

@@ -20,6 +20,7 @@ struct Implicit {
   std::vector<int> anew;           ///< steps for which a vertex takes implicit Euler's, which know no instant
                                    ///< before: at the start, and after an impact
   std::vector<Touching> touching;  ///< now
+  std::vector<double> time = {0};  ///< s, one number
   int most = 0;  ///< Newton steps at most, each with the friction found so far; 0: to the end
 };
 /// Throws Error for compliances not above 0.

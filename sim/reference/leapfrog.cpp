@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -64,14 +65,13 @@ Points accelerations(Leapfrog& run) {
   return a;
 }
 
-// Out of the half space, as inelastically as a vertex can: what it sank by is taken back, and of its slip
-// what friction holds. Written anew: with the solvers' formula it would share their mistakes.
-void touch(const glm::dvec4& plane, double friction, const glm::dvec3& before, double h, glm::dvec3& x,
-           glm::dvec3& v) {
-  const glm::dvec3 n(plane);
-  const double depth = plane.w - glm::dot(n, x);
+// Out of a plane, at `depth` behind it after moving by `moved` along, as inelastically as a vertex can: what
+// it sank by is taken back, and of its slip what friction holds. Written anew: with the solvers' formula it
+// would share their mistakes.
+void touch(const glm::dvec3& n, double depth, double friction, const glm::dvec3& moved, double h,
+           glm::dvec3& x, glm::dvec3& v) {
   if (depth <= 0) return;
-  const glm::dvec3 moved = x - before, slip = moved - n * glm::dot(n, moved);
+  const glm::dvec3 slip = moved - n * glm::dot(n, moved);
   const double length = glm::length(slip), held = std::min(length, friction * depth);
   const glm::dvec3 correction = depth * n - (length > 0 ? slip * (held / length) : glm::dvec3(0));
   x += correction;
@@ -80,7 +80,7 @@ void touch(const glm::dvec4& plane, double friction, const glm::dvec3& before, d
 
 Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
   require_compliances(input.system, compliances);
-  Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}};
+  Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}, {0}};
   std::vector<std::uint32_t> vertices;
   for_each_spring(run, [&](auto, const ConstraintList& list, auto&&, std::size_t) {
     vertices.insert(vertices.end(), list.vertices.begin(), list.vertices.end());
@@ -107,7 +107,10 @@ void advance(Leapfrog& run, long steps) {
   const Settings& settings = run.input.settings;
   const std::vector<glm::dvec4> planes = planes_of(run.input.model, settings);
   const double keep = std::exp(-settings.damping * run.h);
-  for (long s = 0; s < steps; ++s) {
+  std::vector<MovingShape> shapes;
+  for (long s = 0; s < steps; ++s, run.time[0] += run.h) {
+    if (s == 0 || std::ranges::any_of(run.input.model.shapes, moves))
+      shapes = shapes_of(run.input.model, settings, run.time[0], run.h, 1)[0];
     const Points a = accelerations(run);
     parallel_for(
         a.size(),
@@ -116,8 +119,15 @@ void advance(Leapfrog& run, long steps) {
           const glm::dvec3 before = run.x[i];
           run.v[i] = (run.v[i] + run.h * a[i]) * keep;
           run.x[i] += run.h * run.v[i];
+          glm::dvec3& x = run.x[i];
           for (const glm::dvec4& plane : planes)
-            touch(plane, settings.friction, before, run.h, run.x[i], run.v[i]);
+            touch(glm::dvec3(plane), plane.w - glm::dot(glm::dvec3(plane), x), settings.friction, x - before,
+                  run.h, x, run.v[i]);
+          for (const MovingShape& shape : shapes) {
+            const glm::dvec3 way = x - before - run.h * shape.velocity_at(x);
+            const auto met = shape.meeting(x, way);
+            touch(met.normal, -met.distance, shape.friction, way, run.h, x, run.v[i]);
+          }
         },
         4096);
   }

@@ -16,11 +16,12 @@ namespace tetpbd {
 struct Leapfrog {
   ReferenceInput input;
   Compliances compliances;
-  double h = 0;       ///< s
-  Points x;           ///< m, at the time reached
-  Points v;           ///< m/s, half a step before
-  Points parts;       ///< N, by constraint and vertex of it, all kinds one after the other
-  Grouped at_vertex;  ///< which of them act on a vertex
+  double h = 0;                    ///< s
+  Points x;                        ///< m, at the time reached
+  Points v;                        ///< m/s, half a step before
+  Points parts;                    ///< N, by constraint and vertex of it, all kinds one after the other
+  Grouped at_vertex;               ///< which of them act on a vertex
+  std::vector<double> time = {0};  ///< s, one number
 };
 /// From `start`, whose velocities are those of the same instant. Throws Error for compliances not above 0.
 Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);
@@ -34,8 +35,8 @@ State state_of(Leapfrog& run);
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
                    int iterations = 100);
 
-/// How stiff the stiffest constraint is, 1/s^2 (method.md eq. 39b): the largest eigenvalue of M^-1 K is at most
-/// this where each has its part of its vertices' masses, but for what bends and turns.
+/// How stiff the stiffest constraint is, 1/s^2 (method.md eq. 39b): the largest eigenvalue of M^-1 K is at
+/// most this where each has its part of its vertices' masses, but for what bends and turns.
 double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances,
                            const Points& positions);
 

@@ -108,7 +108,7 @@ Pair leapfrog_pair(const ReferenceInput& input, double stable) {
   return pair_of(
       input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
       [&](double h) { return leapfrog(input, compliances_of(input), start, h); },
-      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v); });
+      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.time); });
 }
 
 Pair implicit_pair(const ReferenceInput& input) {
@@ -118,7 +118,7 @@ Pair implicit_pair(const ReferenceInput& input) {
       [&](double h) { return implicit(input, compliances_of(input), start, h); },
       [](Implicit& run, auto&& each) {
         for (State* state : {&run.now, &run.before}) each(state->positions), each(state->velocities);
-        each(run.anew), each(run.touching);
+        each(run.anew), each(run.touching), each(run.time);
       });
 }
 
@@ -181,6 +181,10 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const Model& model = input.model;
   add(model.rest.positions), add(model.rest.tets), add(model.positions), add(model.velocities);
   add(model.masses), add(model.obstacles), add(input.inverse_masses);
+  for (const Obstacle& shape : model.shapes) {
+    add(numbers_of(shape));
+    if (shape.field) add(shape.field->values);
+  }
   const Settings& s = input.settings;
   if (s.material == "none")
     add(s.constraints), add(s.stiffness), add(s.compliance);

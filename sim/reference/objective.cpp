@@ -222,16 +222,17 @@ struct ActiveSet {
   double slack = 0;        // m, what is no gap
 
   double gap(std::size_t i, std::size_t p, const glm::dvec3& moved) const {
-    return glm::dot(glm::dvec3(o.planes[p]), x[i] + moved) - o.planes[p].w;
+    const glm::dvec4 plane = o.plane(i, p);
+    return glm::dot(glm::dvec3(plane), x[i] + moved) - plane.w;
   }
   bool any() const { return std::ranges::find(held, 1) != held.end(); }
   // What a vertex is free to do, as a projector, and how it first gets onto the planes that hold it.
   std::pair<glm::dmat3, glm::dvec3> freedom(std::size_t i) const {
     glm::dmat3 free(1);
     glm::dvec3 way(0);
-    for (std::size_t p = 0; p < o.planes.size(); ++p) {
-      if (!held[i * o.planes.size() + p]) continue;
-      const glm::dvec3 n(o.planes[p]), e = free * n;
+    for (std::size_t p = 0; p < o.plane_count(); ++p) {
+      if (!held[i * o.plane_count() + p]) continue;
+      const glm::dvec3 n(o.plane(i, p)), e = free * n;
       if (glm::dot(e, e) < 1e-12) continue;
       way -= e * (gap(i, p, way) / glm::dot(n, e));
       free -= glm::outerProduct(e, e) / glm::dot(e, e);
@@ -243,10 +244,10 @@ struct ActiveSet {
   bool update(const Points& step, const Points& forces) {
     bool changed = false;
     for (std::size_t i = 0; i < x.size(); ++i)
-      for (std::size_t p = 0; p < o.planes.size() && o.masses[i] > 0; ++p) {
-        char& now = held[i * o.planes.size() + p];
+      for (std::size_t p = 0; p < o.plane_count() && o.masses[i] > 0; ++p) {
+        char& now = held[i * o.plane_count() + p];
         const char next =
-            now ? glm::dot(glm::dvec3(o.planes[p]), forces[i]) > 0 : gap(i, p, step[i]) < -slack;
+            now ? glm::dot(glm::dvec3(o.plane(i, p)), forces[i]) > 0 : gap(i, p, step[i]) < -slack;
         changed = changed || next != now;
         now = next;
       }
@@ -316,7 +317,7 @@ bool newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
     } else {
       flat(result.step) = factor.solve(-flat(g));
     }
-    if (o.planes.empty() || !set.update(result.step, result.forces)) break;
+    if (o.plane_count() == 0 || !set.update(result.step, result.forces)) break;
   }
   result.descent = flat(g).dot(flat(result.step));
   return true;
@@ -328,16 +329,16 @@ constexpr int newton_limit = 1000;
 Minimum newton(const Objective& o, Points start, int most) {
   Minimum result;
   Points& x = result.positions = std::move(start);
-  ActiveSet set{o, x, std::vector<char>(x.size() * o.planes.size(), 0)};
+  ActiveSet set{o, x, std::vector<char>(x.size() * o.plane_count(), 0)};
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (!(o.masses[i] > 0)) x[i] = o.predicted[i];
     set.slack = std::max(set.slack, 1e-14 * glm::length(x[i]));
   }
   for (std::size_t i = 0; i < x.size(); ++i)
-    for (std::size_t p = 0; p < o.planes.size() && o.masses[i] > 0; ++p) {
+    for (std::size_t p = 0; p < o.plane_count() && o.masses[i] > 0; ++p) {
       const double gap = set.gap(i, p, glm::dvec3(0));
-      if (gap < 0) x[i] -= gap * glm::dvec3(o.planes[p]);
-      set.held[i * o.planes.size() + p] = gap <= set.slack;
+      if (gap < 0) x[i] -= gap * glm::dvec3(o.plane(i, p));
+      set.held[i * o.plane_count() + p] = gap <= set.slack;
     }
   Factor factor;
   NewtonStep newton;
@@ -365,10 +366,10 @@ Minimum newton(const Objective& o, Points start, int most) {
     if (++result.iterations == most) result.converged = true;
   }
   for (std::size_t i = 0; i < x.size(); ++i)
-    for (std::size_t p = 0; p < o.planes.size(); ++p)
-      if (set.held[i * o.planes.size() + p])
+    for (std::size_t p = 0; p < o.plane_count(); ++p)
+      if (set.held[i * o.plane_count() + p])
         result.touching.push_back(
-            {std::uint32_t(i), std::uint32_t(p), glm::dot(glm::dvec3(o.planes[p]), newton.forces[i])});
+            {std::uint32_t(i), std::uint32_t(p), glm::dot(glm::dvec3(o.plane(i, p)), newton.forces[i])});
   return result;
 }
 
@@ -379,7 +380,8 @@ Minimum minimise(Objective o, Points start, int most) {
   const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
   for (Points* list : {&o.predicted, &start})
     for (glm::dvec3& p : *list) p -= origin;
-  for (glm::dvec4& plane : o.planes) plane.w -= glm::dot(glm::dvec3(plane), origin);
+  for (auto* list : {&o.planes, &o.own_planes})
+    for (glm::dvec4& plane : *list) plane.w -= glm::dot(glm::dvec3(plane), origin);
   for (Objective::Drag& drag : o.drags) drag.from -= origin;
   Minimum result = newton(o, std::move(start), most);
   for (glm::dvec3& p : result.positions) p += origin;

@@ -15,11 +15,15 @@ namespace {
 
 void refuse_contact(const ReferenceInput& input, const Points& positions) {
   const std::vector<glm::dvec4> planes = planes_of(input.model, input.settings);
+  const std::vector<MovingShape> shapes = shapes_of(input.model, input.settings, 0, 0, 1)[0];
+  const auto inside = [&](const glm::dvec3& x) {
+    return std::ranges::any_of(planes, [&](auto& p) { return glm::dot(glm::dvec3(p), x) < p.w; }) ||
+           std::ranges::any_of(shapes, [&](auto& s) { return s.surface_at(x).distance < 0; });
+  };
   for (std::size_t i = 0; i < positions.size(); ++i)
-    for (const glm::dvec4& plane : planes)
-      if (input.inverse_masses[i] > 0 && glm::dot(glm::dvec3(plane), positions[i]) < plane.w)
-        throw Error("the reference knows no contact", fmt::format("vertex {} is inside an obstacle", i),
-                    "compare before the first contact, or without the ground", 1);
+    if (input.inverse_masses[i] > 0 && inside(positions[i]))
+      throw Error("the reference knows no contact", fmt::format("vertex {} is inside an obstacle", i),
+                  "compare before the first contact, or without the ground", 1);
 }
 
 // v += h g, damped, y = x + h v: the same first part of a substep as CpuPbd and predict.comp.

@@ -25,11 +25,12 @@ struct RigidBody {
   /// Of `rest`, those within `reach` of a plane when they were found, and how far any has moved since, m.
   std::vector<std::uint32_t> near{};
   double reach = 0, moved = 1;
+  double time = 0;                                             ///< s
   std::vector<std::pair<std::size_t, glm::dvec3>> impulses{};  ///< of the last step's contacts, by number
 };
 
-/// The model's bodies at their start. Throws Error for fixed vertices that leave a body free to turn (all on a
-/// line), and for starts that are not the rest shape in rigid motion.
+/// The model's bodies at their start. Throws Error for fixed vertices that leave a body free to turn (all on
+/// a line), and for starts that are not the rest shape in rigid motion.
 std::vector<RigidBody> rigid_bodies(const Model& model);
 /// Moves a body on by `h` seconds under the settings' gravity, ground and friction and the model's obstacles:
 /// second order in h in flight, first in contact. `restitution`: of Newton, normal velocity after an impact

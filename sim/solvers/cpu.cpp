@@ -13,8 +13,8 @@ Solver create(const SolverInput& input) {
   Solver solver;
   const auto pbd = std::make_shared<CpuPbd<real>>(input.model, input.system);
   solver.step_on_cpu = [pbd](State& state, const Settings& settings,
-                             const std::vector<double>& inverse_masses) {
-    return pbd->step(state, settings, inverse_masses, Sweep::gauss_seidel);
+                             const std::vector<double>& inverse_masses, double time) {
+    return pbd->step(state, settings, inverse_masses, Sweep::gauss_seidel, time);
   };
   return solver;
 }

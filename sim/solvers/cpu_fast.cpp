@@ -302,8 +302,9 @@ class FastPbd {
   }
 
   /// As CpuPbd::step, in another order.
-  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses) {
-    const Substep substep(model_, settings);
+  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
+                   double time) {
+    const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
@@ -327,7 +328,7 @@ class FastPbd {
         if (damped(settings)) std::copy(&x[begin], &x[end], &work_.starts[begin]);
         if (contact.wanted()) {
           barrier.wait(thread);
-          if (thread == 0) contact.prepare(substep, inverse_masses, work_, v);
+          if (thread == 0) contact.prepare(substep, s, inverse_masses, work_, v);
           barrier.wait(thread);
         }
         for_each_free_vertex([&](std::size_t i) {
@@ -337,7 +338,7 @@ class FastPbd {
         for (int iteration = 0; iteration < settings.iterations; ++iteration) {
           solve(settings, thread, threads, iteration == 0, barrier, counts);
           for_each_free_vertex([&](std::size_t i) {
-            move_to(i, substep.out_of_planes(x[i].position(), predicted_[i], v[i]));
+            move_to(i, substep.out_of_obstacles(s, x[i].position(), predicted_[i], v[i]));
           });
         }
         for_each_free_vertex([&](std::size_t i) {
@@ -409,10 +410,9 @@ class FastPbd {
 
 Solver create_cpu_fast_solver(const SolverInput& input) {
   Solver solver;
-  solver.step_on_cpu = [pbd = std::make_shared<FastPbd>(input)](State& state, const Settings& settings,
-                                                                const std::vector<double>& inverse_masses) {
-    return pbd->step(state, settings, inverse_masses);
-  };
+  solver.step_on_cpu = [pbd = std::make_shared<FastPbd>(input)](
+                           State& state, const Settings& settings, const std::vector<double>& inverse_masses,
+                           double time) { return pbd->step(state, settings, inverse_masses, time); };
   return solver;
 }
 

@@ -115,11 +115,11 @@ class CpuPbd {
   /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26), `settings.substeps` substeps. Returns
   /// how often each guard triggered.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
-                   Sweep sweep) {
+                   Sweep sweep, double time = 0) {
     const bool jacobi = sweep == Sweep::jacobi, soft = compliant(settings);
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
-    const Substep substep(model_, settings);
+    const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
@@ -131,7 +131,7 @@ class CpuPbd {
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
     for (int s = 0; s < settings.substeps; ++s) {
       if (damped(settings)) start = x;
-      contact.prepare(substep, inverse_masses, vertices, v);
+      contact.prepare(substep, s, inverse_masses, vertices, v);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
       predicted = x;
@@ -151,7 +151,7 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
-          x[i] = substep.out_of_planes(x[i], predicted[i], v[i]);
+          x[i] = substep.out_of_obstacles(s, x[i], predicted[i], v[i]);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)

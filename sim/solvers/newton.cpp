@@ -293,6 +293,8 @@ Solver create_newton_solver(const SolverInput& input) {
                                     {"COARSE_ROW", (unknowns + 3) / 4},
                                     {"CENTRES_AT", unknowns * ((unknowns + 3) / 4)}})
     defines.push_back(fmt::format("{} {}u", name, value));
+  defines.push_back(fmt::format("SHAPES {}", input.model.shapes.size()));
+  defines.push_back(fmt::format("FIELDS {:d}", has_fields(input.model)));
   const ShaderWords words{{}, kind_words(input.system)};
   const auto pass = [&](const char* name, std::size_t work_groups, std::size_t bytes) {
     return Pass{Program::compute(fmt::format("newton/{}.comp", name), words, defines),

@@ -12,7 +12,7 @@ namespace tetpbd {
 
 /// Whether hard bodies are carried: rigid_in_contact(), and there is something to touch.
 inline bool touches_rigidly(const Model& model, const Settings& settings) {
-  return rigid_in_contact(settings) && !planes_of(model, settings).empty();
+  return rigid_in_contact(settings) && has_obstacles(model, settings);
 }
 
 class RigidContact {
@@ -32,17 +32,17 @@ class RigidContact {
     return carried_[i] ? x + s.h * v : s.predict(x, v);
   }
 
-  /// At a substep's start: finds bodies that would get into a half space, and sets their velocities v.
-  /// `place.at(i)`: of vertex i, m.
+  /// At the start of a substep, by number: finds bodies that would get into a half space, and sets their
+  /// velocities v. `place.at(i)`: of vertex i, m.
   template <class Place>
-  void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
+  void prepare(const Substep& s, int substep, const std::vector<double>& inverse_masses, const Place& place,
                std::vector<glm::dvec3>& v) {
     if (!wanted_) return;
     for (const Body& body : model_.bodies) {
       if (!body.one_piece) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
-      const auto near = near_contacts(s, inverse_masses, place, v, first, end);
-      const bool moved = !near.empty() && move(s, near, place, v, first, end);
+      const auto near = near_contacts(s, substep, inverse_masses, place, v, first, end);
+      const bool moved = !near.empty() && move(s, substep, near, place, v, first, end);
       std::fill(carried_.begin() + std::ptrdiff_t(first), carried_.begin() + std::ptrdiff_t(end), moved);
     }
   }
@@ -52,16 +52,21 @@ class RigidContact {
 
   // The vertices that would be in a half space next; none if one is fixed.
   template <class Place>
-  std::vector<std::size_t> near_contacts(const Substep& s, const std::vector<double>& inverse_masses,
-                                         const Place& place, const std::vector<glm::dvec3>& v,
-                                         std::size_t first, std::size_t end) const {
+  std::vector<std::size_t> near_contacts(const Substep& s, int substep,
+                                         const std::vector<double>& inverse_masses, const Place& place,
+                                         const std::vector<glm::dvec3>& v, std::size_t first,
+                                         std::size_t end) const {
     std::vector<std::size_t> found;
     for (std::size_t i = first; i < end; ++i) {
       if (!(inverse_masses[i] > 0)) return {};
       glm::dvec3 speed = v[i];
-      const glm::dvec3 next = s.predict(place.at(std::uint32_t(i)), speed);
+      const glm::dvec3 here = place.at(std::uint32_t(i)), next = s.predict(here, speed);
+      const auto meets = [&](const MovingShape& shape) {
+        return shape.meeting(next, next - here - s.h * shape.velocity_at(here)).distance < 0;
+      };
       if (std::ranges::any_of(s.planes,
-                              [&](const glm::dvec4& p) { return glm::dot(glm::dvec3(p), next) < p.w; }))
+                              [&](const glm::dvec4& p) { return glm::dot(glm::dvec3(p), next) < p.w; }) ||
+          std::ranges::any_of(s.shapes_in(substep), meets))
         found.push_back(i);
     }
     return found;
@@ -69,7 +74,7 @@ class RigidContact {
 
   // False for a body without inertia about some axis.
   template <class Place>
-  bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place,
+  bool move(const Substep& s, int substep, const std::vector<std::size_t>& near, const Place& place,
             std::vector<glm::dvec3>& v, std::size_t first, std::size_t end) const {
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
     double mass = 0;
@@ -92,23 +97,40 @@ class RigidContact {
     const Rules::Rigid before = body;
     body.velocity = (body.velocity + s.h * s.gravity) * s.velocity_scale, body.spin *= s.velocity_scale;
     const double fall = s.h * glm::length(s.gravity), enough = 1e-9 * (fall + glm::length(body.velocity));
+    const Rules::Rigid falling = body;
     // Contacts are taken in as the motion found so far breaks them, the worst first.
     Rules::Touch touches[MOST_TOUCHES], worst;
     for (int count = 0; count < MOST_TOUCHES; ++count) {
       const double loose = 1e-3 * fall + enough;
       double most = loose;
-      for (const std::size_t i : near)
+      // Of vertex i at arm: a normal and the gap there, how the obstacle moves, brakes and rebounds.
+      const auto consider = [&](const glm::dvec3& arm, const glm::dvec3& n, double gap,
+                                const glm::dvec3& surface, double friction, double restitution) {
+        const double least =
+            Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
+                                   gap - Rules{}.closed_gap * model_.size, s.h, fall, restitution);
+        const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
+        if (!(over > most)) return;
+        most = over, worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0));
+        worst.surface = surface, worst.friction = friction;
+      };
+      for (const std::size_t i : near) {
+        const glm::dvec3 arm = at(i) - body.centre;
         for (const glm::dvec4& plane : s.planes) {
-          const glm::dvec3 n(plane), arm = at(i) - body.centre;
-          const double least = Rules{}.least_velocity(
-              glm::dot(n, Rules{}.velocity_at(before, arm)),
-              glm::dot(n, at(i)) - plane.w - Rules{}.closed_gap * model_.size, s.h, fall, restitution_);
-          const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm));
-          if (over > most) most = over, worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0));
+          const glm::dvec3 n(plane);
+          consider(arm, n, glm::dot(n, at(i)) - plane.w, glm::dvec3(0), s.friction, restitution_);
         }
+        for (const MovingShape& shape : s.shapes_in(substep)) {
+          const glm::dvec3 surface = shape.velocity_at(at(i)),
+                           way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
+          const auto met = shape.meeting(at(i) + s.h * surface + way, way);
+          consider(arm, met.normal, met.distance - glm::dot(met.normal, way), surface, shape.friction,
+                   shape.restitution);
+        }
+      }
       if (most == loose) break;
       touches[count] = worst;
-      body = Rules{}.settled(touches, body, count + 1, s.friction, enough, 1e-4 * fall);
+      body = Rules{}.settled(touches, body, count + 1, enough, 1e-4 * fall);
     }
     for (std::size_t i = first; i < end; ++i) v[i] = Rules{}.velocity_at(body, at(i) - body.centre);
     return true;

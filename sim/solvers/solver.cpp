@@ -144,8 +144,9 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
 }
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {
-  return {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),
-          define("LEAPFROG", input.leapfrog), define("BODY_COUNT", input.model.bodies.size())};
+  return {define("COMPLIANT", input.compliant),        define("RIGID_CONTACT", input.rigid),
+          define("LEAPFROG", input.leapfrog),          define("BODY_COUNT", input.model.bodies.size()),
+          define("SHAPES", input.model.shapes.size()), define("FIELDS", has_fields(input.model))};
 }
 
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {

@@ -51,21 +51,23 @@ struct Solver {
   std::vector<std::pair<int, GLuint>> bindings;  ///< storage binding, buffer; beside those every mode shares
   std::vector<Pass> iteration;  ///< the passes of one iteration, in order; the last one moves the vertices
   bool double_buffered =
-      false;             ///< an iteration reads one buffer of quantized positions and writes the other
+      false;  ///< an iteration reads one buffer of quantized positions and writes the other
   /// The dispatches of a substep of so many iterations, where they are not those of Jacobi; and the pass in
   /// place of predict.comp.
   std::vector<Dispatch> (*schedule)(int iterations) = nullptr;
   Pass begin;
   /// What a step hands on to the next beside what every mode has: of these `buffers`, first byte and bytes.
   std::vector<std::array<std::size_t, 3>> handed_on{};
-  /// What is made for certain forces and a certain length of a substep (mode newton's second level): a job for
-  /// others, to run in any thread while the model lives, and the number of the buffer that is to hold it.
+  /// What is made for certain forces and a certain length of a substep (mode newton's second level): a job
+  /// for others, to run in any thread while the model lives, and the number of the buffer that is to hold it.
   std::function<MakeWords(const SolverInput&)> renewed{};
   std::size_t renewable = 0;
   /// With it: takes over other numbers of the same constraints.
   std::function<void(const Solver&, const ConstraintSystem&)> take_numbers{};
   bool unfused = false;  ///< prediction and velocities in dispatches of their own
-  std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses)> step_on_cpu;
+  /// `time`: at the step's start, s.
+  std::function<GuardCounts(State&, const Settings&, const std::vector<double>& inverse_masses, double time)>
+      step_on_cpu;
 };
 
 /// The dispatches of a substep in order (method.md, "A step"): predict, solve x iterations, finish.

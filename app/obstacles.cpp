@@ -1,0 +1,172 @@
+#include "app/obstacles.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <ranges>
+
+#include "app/files.h"
+#include "app/scene.h"
+#include "sim/did_you_mean.h"
+#include "sim/error.h"
+
+namespace tetpbd {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+/// Keys of a shape beside those that all have; those before "|" must be there.
+struct ShapeKeys {
+  std::vector<std::string> needed, allowed;
+};
+const std::array<ShapeKeys, shape_names.size()> keys_of_shape = {{
+    {{"normal"}, {"point"}},
+    {{"radius"}, {"centre"}},
+    {{"radius", "half_length"}, {"centre", "rotation"}},
+    {{"half"}, {"centre", "rotation"}},
+    {{"radius", "half_length"}, {"centre", "rotation"}},
+    {{"half"}, {"centre", "rotation", "image", "heights"}},
+    {{"mesh"}, {"centre", "rotation", "scale", "height", "voxels"}},
+}};
+
+void make_heights(Obstacle& o) {
+  if (o.image.empty()) return set_heights(o, o.heights);
+  const auto image = read_png(o.image);
+  if (!image || image->width < 2 || image->height < 2)
+    throw Error("no picture of heights", o.image.string(), "give a PNG of 2 to 1024 pixels a side");
+  std::vector<std::vector<double>> rows(std::size_t(image->height));
+  for (std::size_t p = 0; p < image->rgba.size(); p += 4)
+    rows[p / 4 / std::size_t(image->width)].push_back(
+        (image->rgba[p] + image->rgba[p + 1] + image->rgba[p + 2]) / 765.0);
+  set_heights(o, rows);
+}
+
+}  // namespace
+
+fs::path found_file(const fs::path& name, const fs::path& folder) {
+  return (fs::exists(folder / name) ? folder : models_folder()) / name;
+}
+
+fs::path file_name(const fs::path& file) {
+  const auto whole = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
+  const fs::path shipped = whole(file).lexically_relative(whole(models_folder()));
+  return shipped.empty() || *shipped.begin() == ".." ? whole(file) : shipped;
+}
+
+json obstacle_schema() {
+  return json::parse(R"({
+    "shape": "text", "point": {"three": [-1e6, 1e6]}, "normal": {"three": [-1e3, 1e3]},
+    "centre": {"three": [-1e6, 1e6]}, "rotation": {"three": [-3600, 3600]},
+    "radius": [1e-6, 1e6], "half_length": [1e-6, 1e6], "half": {"three": [1e-6, 1e6]},
+    "image": "text", "mesh": "text", "scale": {"three": [1e-6, 1e6]}, "height": [1e-6, 1e6],
+    "voxels": [8, 256, "whole number"],
+    "heights": {"least": 2, "most": 1024, "of": "2 to 1024 rows of heights", "each":
+      {"least": 2, "most": 1024, "of": "2 to 1024 heights from 0 to 1", "each": [0, 1]}},
+    "friction": [0, 10], "restitution": [0, 1],
+    "velocity": {"three": [-1e5, 1e5]}, "spin": {"three": [-1e5, 1e5]},
+    "keyframes": {"least": 1, "most": 1000, "of": "1 to 1000 keyframes", "each":
+      {"time": [1e-9, 1e9], "centre": {"three": [-1e6, 1e6]}, "rotation": {"three": [-1e6, 1e6]}}}
+  })");
+}
+
+Obstacle read_obstacle(const json& value, const std::string& where, const std::string& file,
+                       const fs::path& folder) {
+  const auto refuse = [&](const std::string& key, const std::string& what,
+                          const std::string& mend = "see docs/guide.md") {
+    throw Error(fmt::format("'{}.{}' {}", where, key, what), file, mend);
+  };
+  Obstacle o;
+  const std::string shape = value.value("shape", shape_names[0]);
+  const auto found = std::ranges::find(shape_names, shape);
+  if (found == shape_names.end())
+    refuse("shape", fmt::format("is no shape; there are {}", fmt::join(shape_names, ", ")),
+           did_you_mean(shape, {shape_names.begin(), shape_names.end()}) + "see docs/guide.md");
+  o.shape = int(found - shape_names.begin());
+  const ShapeKeys& keys = keys_of_shape[std::size_t(o.shape)];
+  for (const std::string& key : keys.needed)
+    if (!value.contains(key)) refuse(key, fmt::format("is missing: a {} needs it", shape));
+  static const std::vector<std::string> all = {"shape",    "friction", "restitution",
+                                               "velocity", "spin",     "keyframes"};
+  for (const auto& [key, held] : value.items())
+    if (!std::ranges::count(keys.needed, key) && !std::ranges::count(keys.allowed, key) &&
+        !std::ranges::count(all, key))
+      refuse(key, fmt::format("is nothing that a {} has", shape));
+  const auto get = [&](const char* key, auto& to) {
+    if (value.contains(key)) value[key].get_to(to);
+  };
+  get("point", o.centre), get("centre", o.centre), get("normal", o.normal), get("rotation", o.rotation);
+  get("radius", o.radius), get("half_length", o.half_length), get("half", o.half);
+  get("heights", o.heights), get("scale", o.scale), get("height", o.height), get("voxels", o.voxels);
+  get("velocity", o.velocity), get("spin", o.spin);
+  if (value.contains("friction")) o.friction = value["friction"];
+  if (value.contains("restitution")) o.restitution = value["restitution"];
+  if (o.shape == SHAPE_PLANE && !(glm::length(o.normal) > 1e-9)) refuse("normal", "must not be zero");
+  if (o.shape == SHAPE_HEIGHTS && value.contains("image") == value.contains("heights"))
+    refuse("heights", "or an image, one of the two, must be there");
+  for (const auto& row : o.heights)
+    if (row.size() != o.heights[0].size()) refuse("heights", "must be rows of the same length");
+  for (const char* key : {"image", "mesh"})
+    if (value.contains(key)) {
+      const fs::path path = found_file(value[key].get<std::string>(), folder);
+      if (!fs::is_regular_file(path)) refuse(key, fmt::format("is no file: {}", path.string()));
+      (key[0] == 'i' ? o.image : o.mesh) = path;
+    }
+  const json frames = value.value("keyframes", json::array());
+  if (!frames.empty() && (value.contains("velocity") || value.contains("spin")))
+    refuse("keyframes", "already say how it moves", "leave out velocity and spin");
+  Obstacle::Key key{0, o.centre, o.rotation};
+  for (const json& frame : frames) {
+    const double time = frame.value("time", 0.0);
+    if (!(time > key.time))
+      refuse(fmt::format("keyframes.{}.time", o.keyframes.size()),
+             "must be later than the one before, and 0");
+    key.time = time;
+    if (frame.contains("centre")) frame["centre"].get_to(key.centre);
+    if (frame.contains("rotation")) frame["rotation"].get_to(key.rotation);
+    o.keyframes.push_back(key);
+  }
+  return o;
+}
+
+json obstacle_json(const Obstacle& o) {
+  json result = json::object();
+  const auto has = [&](const char* key) {
+    const ShapeKeys& keys = keys_of_shape[std::size_t(o.shape)];
+    return std::ranges::count(keys.needed, key) + std::ranges::count(keys.allowed, key) > 0;
+  };
+  const auto put = [&](const char* key, const auto& held) {
+    if (has(key)) result[key] = held;
+  };
+  if (o.shape != SHAPE_PLANE) result["shape"] = shape_names[std::size_t(o.shape)];
+  put("point", o.centre), put("centre", o.centre), put("normal", o.normal), put("rotation", o.rotation);
+  put("radius", o.radius), put("half_length", o.half_length), put("half", o.half);
+  if (!o.image.empty()) result["image"] = file_name(o.image);
+  if (!o.heights.empty()) result["heights"] = o.heights;
+  if (o.shape == SHAPE_GRID) result["mesh"] = file_name(o.mesh);
+  put("scale", o.scale), put("voxels", o.voxels);
+  if (o.height > 0) result["height"] = o.height;
+  if (o.friction) result["friction"] = *o.friction;
+  if (o.restitution) result["restitution"] = *o.restitution;
+  if (o.velocity != glm::dvec3(0)) result["velocity"] = o.velocity;
+  if (o.spin != glm::dvec3(0)) result["spin"] = o.spin;
+  for (const Obstacle::Key& key : o.keyframes)
+    result["keyframes"].push_back({{"time", key.time}, {"centre", key.centre}, {"rotation", key.rotation}});
+  return result;
+}
+
+void load_field(Obstacle& o) {
+  if (o.shape == SHAPE_HEIGHTS) make_heights(o);
+  if (o.shape != SHAPE_GRID) return;
+  SurfaceMesh surface = load_surface(o.mesh);
+  for (glm::dvec3& p : surface.positions) p *= o.scale;
+  const Bounds box = bounds(surface.positions);
+  const double scale = o.height > 0 ? o.height / std::max(box.high.y - box.low.y, 1e-300) : 1;
+  for (glm::dvec3& p : surface.positions) p = (p - box.centre()) * scale;
+  o.field = std::make_shared<const DistanceField>(distance_field(surface, o.voxels, o.mesh.string()));
+  o.surface = std::make_shared<const SurfaceMesh>(std::move(surface));
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,24 @@
+// Vertices and the SHAPES obstacles that have a shape (method.md, "Shapes").
+layout(std140, binding = BIND_SHAPES) uniform ShapeBlock { Shape shapes[SHAPES]; };
+#if FIELDS
+layout(binding = UNIT_FIELDS) uniform samplerBuffer fields;
+real texel(int i) { return texelFetch(fields, i).r; }
+#else
+real texel(int i) { return 0.0; }
+#endif
+#include "shapes.glsl"
+
+vec3 from_centre(int k, Pair x) { return (x.high - shapes[k].centre) + (x.low - shapes[k].centre_low); }
+vec3 into_shape(int k, vec3 v) { return vec3(dot(shapes[k].right, v), dot(shapes[k].up, v), dot(shapes[k].front, v)); }
+// m/s, of the matter of shape k where x is.
+vec3 shape_velocity(int k, Pair x) { return shapes[k].velocity + cross(shapes[k].spin, from_centre(k, x)); }
+Solid solid_of(int k) {
+  return Solid(shapes[k].kind, shapes[k].extent, shapes[k].radius, shapes[k].trust, shapes[k].spacing, shapes[k].origin, shapes[k].cells, shapes[k].first);
+}
+float gap_to(int k, Pair x) { return surface_of(solid_of(k), into_shape(k, from_centre(k, x))).distance; }
+// What a vertex at x meets of shape k that came there by `way`, relative to the shape.
+Surface met(int k, Pair x, vec3 way) {
+  vec3 to = into_shape(k, from_centre(k, x));
+  Surface s = meeting(solid_of(k), to - into_shape(k, way), to);
+  return Surface(s.normal.x * shapes[k].right + s.normal.y * shapes[k].up + s.normal.z * shapes[k].front, s.distance);
+}

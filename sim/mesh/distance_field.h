@@ -1,0 +1,25 @@
+// How far points are from a surface, on a grid: what a solver or a shader looks up in place of triangles.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "sim/mesh/tet_mesh.h"
+
+namespace tetpbd {
+
+/// Values are at grid points, `origin + spacing * (i, j, k)`; the surface keeps three cells from the border.
+struct DistanceField {
+  glm::ivec3 size{0};
+  glm::dvec3 origin{0};
+  double spacing = 0;         ///< m
+  std::vector<float> values;  ///< m, negative inside; x fastest
+};
+
+/// With `voxels` cells along the longest side of the surface's box. A surface that encloses nothing (open,
+/// flat) counts as a sheet one cell thick. For tets give {mesh.positions, mesh.surface}. Kept in the cache.
+/// Throws Error naming `source`, also where the program was built without OpenVDB.
+DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::string& source = "surface");
+
+}  // namespace tetpbd

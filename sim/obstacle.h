@@ -1,0 +1,84 @@
+// Obstacles: what bodies touch and never move. Half spaces at rest are planes of the model (planes_of); all
+// others are shapes with a signed distance (shaders/shapes.glsl), which may move.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/formulas.h"
+#include "sim/mesh/distance_field.h"
+
+namespace tetpbd {
+
+/// By number: SHAPE_ of layout.glsl.
+inline constexpr std::array shape_names = {"half-space", "sphere",       "capsule", "box",
+                                           "cylinder",   "height-field", "mesh"};
+
+/// As a scene describes it; what its shape does not ask for plays no part.
+struct Obstacle {
+  struct Key {
+    double time = 0;                    ///< s
+    glm::dvec3 centre{0}, rotation{0};  ///< m, degrees
+  };
+  int shape = SHAPE_PLANE;
+  glm::dvec3 centre{0};    ///< m; of a half space, a point of its surface
+  glm::dvec3 normal{0};    ///< of a half space, of any length but 0
+  glm::dvec3 rotation{0};  ///< degrees about x, then y, then z
+  double radius = 0, half_length = 0;
+  glm::dvec3 half{0};  ///< m, half lengths along its own axes
+  std::filesystem::path image, mesh;
+  std::vector<std::vector<double>>
+      heights;          ///< rows along x, one behind the other along z; 0: bottom, 1: top
+  glm::dvec3 scale{1};  ///< of a mesh, as of a body's
+  double height = 0;
+  int voxels = 64;                              ///< along the longest side of a mesh
+  std::optional<double> friction, restitution;  ///< none: the world's
+  glm::dvec3 velocity{0}, spin{0};              ///< m/s; rad/s about the centre
+  std::vector<Key> keyframes;  ///< by time, linear in between and from the start, at rest after the last
+
+  /// In its own coordinates, of a height field (metres, size.y is 1) and of a mesh.
+  std::shared_ptr<const DistanceField> field;
+  std::shared_ptr<const SurfaceMesh> surface;  ///< of a mesh, in its own coordinates, for pictures
+  double trust = 1;  ///< of a height field: what a distance along its normal is worth where it is steepest
+};
+/// The field of a height field, from rows as `heights`.
+void set_heights(Obstacle& obstacle, const std::vector<std::vector<double>>& rows);
+
+/// Whether it needs no more than a plane does.
+bool is_plane(const Obstacle& obstacle);
+bool moves(const Obstacle& obstacle);
+
+/// All that its motion and its touch depend on, beside the values of its field.
+std::vector<double> numbers_of(const Obstacle& obstacle);
+
+struct Pose {
+  glm::dvec3 centre{0};
+  glm::dmat3 axes{1};  ///< columns: where its own axes point
+};
+/// Of angles about x, then y, then z, degrees.
+glm::dmat3 rotation_of(const glm::dvec3& degrees);
+Pose pose_at(const Obstacle& obstacle, double time);
+
+/// A shape over a substep: as it stands at its end, and how its matter moves to there.
+struct MovingShape {
+  Formulas<double>::Solid solid{};
+  const float* texels = nullptr;
+  Pose pose;
+  glm::dvec3 velocity{0}, spin{0};  ///< m/s of the centre, rad/s
+  double friction = 0, restitution = 0;
+
+  glm::dvec3 velocity_at(const glm::dvec3& x) const { return velocity + glm::cross(spin, x - pose.centre); }
+  /// How far x is from it, and where to; of a point that came there by `way` relative to the shape, from the
+  /// plane that it meets.
+  Formulas<double>::Surface surface_at(const glm::dvec3& x) const;
+  Formulas<double>::Surface meeting(const glm::dvec3& x, const glm::dvec3& way) const;
+};
+/// `friction`, `restitution`: where the obstacle has none of its own.
+MovingShape moving_shape(const Obstacle& obstacle, double start, double h, double friction,
+                         double restitution);
+
+}  // namespace tetpbd

@@ -1,5 +1,7 @@
 #include "app/baselines.h"
 
+#include <utility>
+
 #include "sim/interrupt.h"
 #include "sim/material.h"
 #include "sim/reference/implicit.h"
@@ -40,7 +42,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
   Settings touching = settings;
   touching.rigid_contact = true;
   RigidContact contact(model, touching);
-  const Substep substep(model, settings);
+  double time = 0;
   const Model nothing;  // to touch: contact is found here
   Settings flight = settings, carried = settings;
   flight.ground = carried.ground = false, carried.gravity = 0;
@@ -52,8 +54,9 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
   return baseline_run(
       model, settings, steps, right,
       [&] {
+        const Substep substep(model, settings, std::exchange(time, time + settings.dt));
         for (int s = 0; s < settings.substeps; ++s) {
-          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities);
+          contact.prepare(substep, s, model.inverse_masses, Place{now.positions}, now.velocities);
           for (RigidBody& body : bodies) {
             const bool touches = contact.carries(body.first);
             if (touches) {

@@ -1,0 +1,557 @@
+// Obstacles with a shape: their distances, and bodies that meet them, in every mode, against closed forms.
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <random>
+
+#include "app/scene.h"
+#include "sim/error.h"
+#include "sim/material.h"
+#include "sim/metrics.h"
+#include "sim/reference/implicit.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/reference/rigid.h"
+#include "sim/sim.h"
+#include "sim/snapshot.h"
+#include "tests/gl_test.h"
+#include "tests/sim_samples.h"
+
+using namespace tetpbd;
+
+namespace {
+
+const std::vector<std::string> all_modes = {"node", "constraint", "cpu", "cpu-double", "cpu-fast"};
+
+Obstacle half_space(const glm::dvec3& normal) {
+  Obstacle o;
+  o.normal = normal;
+  return o;
+}
+Obstacle box(const glm::dvec3& half, const glm::dvec3& centre = glm::dvec3(0)) {
+  Obstacle o;
+  o.shape = SHAPE_BOX, o.half = half, o.centre = centre;
+  return o;
+}
+Obstacle round_shape(int shape, double radius, double half_length, const glm::dvec3& centre = glm::dvec3(0)) {
+  Obstacle o;
+  o.shape = shape, o.radius = radius, o.half_length = half_length, o.centre = centre;
+  return o;
+}
+Obstacle hills(double height = 0.2, int points = 41) {
+  Obstacle o;
+  o.shape = SHAPE_HEIGHTS, o.half = {1, height, 1};
+  for (int k = 0; k < points; ++k) {
+    o.heights.emplace_back();
+    for (int i = 0; i < points; ++i)
+      o.heights.back().push_back(0.5 + 0.25 * std::sin(6.0 * i / (points - 1)) +
+                                 0.25 * std::cos(5.0 * k / (points - 1)));
+  }
+  set_heights(o, o.heights);
+  return o;
+}
+// A sphere as distances at the points of a grid.
+Obstacle grid_sphere(double radius, int cells) {
+  Obstacle o;
+  o.shape = SHAPE_GRID;
+  auto field = std::make_shared<DistanceField>();
+  field->spacing = 2 * radius / cells, field->size = glm::ivec3(cells + 7);
+  field->origin = glm::dvec3(-radius - 3 * field->spacing);
+  for (int k = 0; k < field->size.z; ++k)
+    for (int j = 0; j < field->size.y; ++j)
+      for (int i = 0; i < field->size.x; ++i)
+        field->values.push_back(
+            float(glm::length(field->origin + field->spacing * glm::dvec3(i, j, k)) - radius));
+  o.field = field;
+  return o;
+}
+std::vector<Obstacle> every_shape() {
+  return {half_space({0, 1, 0}), round_shape(SHAPE_SPHERE, 0.7, 0),     round_shape(SHAPE_CAPSULE, 0.3, 0.5),
+          box({0.7, 0.4, 0.5}),  round_shape(SHAPE_CYLINDER, 0.5, 0.4), hills(),
+          grid_sphere(0.7, 28)};
+}
+
+MovingShape still(const Obstacle& o) { return moving_shape(o, 0, 0, 0.5, 0); }
+
+double unit(std::mt19937& random) { return double(random()) / 4294967296.0; }
+glm::dvec3 within(std::mt19937& random, double reach) {
+  const double x = unit(random), y = unit(random), z = unit(random);
+  return reach * (2.0 * glm::dvec3(x, y, z) - 1.0);
+}
+
+// A ball's corners and its centre; a corner at the bottom.
+TetMesh ball_mesh(double radius) {
+  TetMesh mesh;
+  mesh.positions = {{0, 0, 0}, {0, radius, 0}, {0, -radius, 0}};
+  for (int k = 0; k < 10; ++k) {
+    const double a = k * std::numbers::pi / 5, y = radius / std::sqrt(5.0) * (k % 2 ? -1 : 1);
+    mesh.positions.push_back(
+        {2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
+  }
+  for (std::uint32_t k = 0; k < 10; ++k) {
+    const std::uint32_t a = 3 + k, b = 3 + (k + 1) % 10, c = 3 + (k + 2) % 10;
+    mesh.tets.push_back({0, a, b, c});
+    mesh.tets.push_back({0, k % 2 ? 2u : 1u, a, c});
+  }
+  finish_tets(mesh, "ball");
+  return mesh;
+}
+
+struct Setup {
+  std::shared_ptr<Model> model = std::make_shared<Model>();
+  Settings settings{.iterations = 1, .substeps = 20};
+  Setup() { settings.ground = false; }
+};
+void add(Setup& to, const TetMesh& mesh, const glm::dvec3& centre, const glm::dmat3& turn = glm::dmat3(1),
+         const glm::dvec3& velocity = glm::dvec3(0)) {
+  std::vector<glm::dvec3> start;
+  for (const glm::dvec3& p : mesh.positions) start.push_back(centre + turn * p);
+  add_body(*to.model, "body", mesh, 1000, start, velocity, glm::dvec3(0), {});
+}
+const TetMesh slab = make_block({0.4, 0.2, 0.4}, {4, 2, 4});
+
+void in_mode(Setup& setup, const std::string& mode) {
+  setup.settings.mode = mode;
+  const SolverMode& row = *find_solver_mode(mode);
+  if (!row.leapfrog && !row.implicit) return;
+  setup.settings.material = "neo-hookean", setup.settings.young_modulus = 1e6;
+  setup.settings.iterations = 8, setup.settings.substeps = 1;
+}
+
+glm::dvec3 centre_of(const Model& model, const std::vector<glm::dvec3>& values) {
+  double mass = 0;
+  glm::dvec3 sum(0);
+  for (std::size_t i = 0; i < values.size(); ++i) mass += model.masses[i], sum += model.masses[i] * values[i];
+  return sum / mass;
+}
+double deepest(const Sim& sim) {
+  double most = 0;
+  const State state = read_state(sim);
+  for (const Obstacle& o : sim.model->shapes) {
+    const MovingShape shape = moving_shape(o, time_of(sim), 0, 0, 0);
+    for (const glm::dvec3& x : state.positions) most = std::max(most, -shape.surface_at(x).distance);
+  }
+  return most / sim.model->size;
+}
+Sim run(const Setup& setup, int steps) {
+  Sim sim = create_sim(setup.model, setup.settings);
+  for (int s = 0; s < steps; ++s) step(sim);
+  return sim;
+}
+
+}  // namespace
+
+TEST_CASE("obstacles: a distance's gradient is its normal, and its sign says inside") {
+  std::mt19937 random(1);
+  for (const Obstacle& o : every_shape()) {
+    CAPTURE(o.shape);
+    const MovingShape shape = still(o);
+    const bool closed = o.shape < SHAPE_HEIGHTS;
+    int inside = 0, tested = 0;
+    double wrong = 0;
+    for (int k = 0; k < 2000; ++k) {
+      const glm::dvec3 x = within(random, 0.95);
+      const auto s = shape.surface_at(x);
+      glm::dvec3 slope;
+      for (int a = 0; a < 3; ++a) {
+        glm::dvec3 d(0);
+        d[a] = 1e-6;
+        slope[a] = (shape.surface_at(x + d).distance - shape.surface_at(x - d).distance) / 2e-6;
+      }
+      inside += s.distance < 0;
+      // Not beside an edge of the surface, or between its sides, where there are two normals.
+      const bool smooth =
+          glm::length(shape.surface_at(x + 1e-5 * within(random, 1)).normal - s.normal) < 1e-3;
+      if (closed && smooth)
+        wrong = std::max(wrong, glm::length(slope - s.normal)), ++tested;
+      else if (smooth && std::abs(s.distance) < 0.02)
+        wrong = std::max(wrong, 0.1 * glm::length(slope - s.normal)), ++tested;
+      CHECK(std::abs(glm::length(s.normal) - 1) < 1e-12);
+      if (closed && s.distance > 0)  // the nearest point is on the surface
+        wrong = std::max(wrong, std::abs(shape.surface_at(x - s.distance * s.normal).distance));
+    }
+    CHECK(inside > 20);
+    CHECK(tested > (closed ? 1500 : 20));
+    CHECK(wrong < (closed ? 1e-6 : 0.06));
+  }
+  const auto at = [](const Obstacle& o, const glm::dvec3& x) { return still(o).surface_at(x).distance; };
+  CHECK(at(box({1, 2, 3}), {4, 6, 3}) == doctest::Approx(5));
+  CHECK(at(box({1, 2, 3}), {0.75, 0, 0}) == doctest::Approx(-0.25));
+  CHECK(at(round_shape(SHAPE_CAPSULE, 1, 2), {3, 6, 0}) == doctest::Approx(4));
+  CHECK(at(round_shape(SHAPE_CYLINDER, 1, 2), {4, 6, 0}) == doctest::Approx(5));
+  for (int k = 0; k < 200; ++k) {
+    const glm::dvec3 x = within(random, 1.5);
+    CHECK(at(grid_sphere(0.7, 28), x) <= glm::length(x) - 0.7 + 2e-3);
+    if (glm::length(x) < 0.75)
+      CHECK(at(grid_sphere(0.7, 28), x) == doctest::Approx(glm::length(x) - 0.7).epsilon(0.02));
+  }
+}
+
+TEST_CASE("obstacles: a way meets a shape where it goes in, and nothing where it passes by") {
+  std::mt19937 random(2);
+  for (const Obstacle& o : every_shape()) {
+    CAPTURE(o.shape);
+    const MovingShape shape = still(o);
+    int hits = 0, misses = 0, wrong = 0;
+    for (int k = 0; k < 3000; ++k) {
+      const glm::dvec3 from = within(random, 1.5), to = within(random, 1.5);
+      if (!(shape.surface_at(from).distance > 0.01)) continue;
+      double least = 1;
+      for (int n = 1; n <= 400; ++n) {
+        const glm::dvec3 x = from + n / 400.0 * (to - from);
+        least = std::min(least, shape.surface_at(x).distance);
+      }
+      const auto met = shape.meeting(to, to - from);
+      const double cell = o.field ? 0.05 : 0.01;
+      if (least < -cell) ++hits, wrong += !(met.distance < 0);
+      if (least > cell) ++misses, wrong += !(met.distance > 0);
+      // The plane is outside: what it stops at has not gone in.
+      if (met.distance < 0 && o.shape < SHAPE_HEIGHTS)
+        wrong += shape.surface_at(to - met.distance * met.normal).distance < -1e-6;
+    }
+    CHECK(hits > 100);
+    CHECK(misses > 100);
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in every kind of mode") {
+  std::vector<std::vector<Obstacle>> grounds = {{half_space({0, 1, 0})},
+                                                {box({1, 0.5, 1}, {0, -0.5, 0})},
+                                                {round_shape(SHAPE_CYLINDER, 1, 0.5, {0, -0.5, 0})}};
+  grounds[0][0].friction = 0.5;
+  std::vector<Obstacle> rails, balls;
+  for (const double x : {-0.1, 0.1}) {
+    rails.push_back(round_shape(SHAPE_CAPSULE, 0.05, 0.5, {x, -0.05, 0}));
+    rails.back().rotation = {90, 0, 0};
+    for (const double z : {-0.1, 0.1}) balls.push_back(round_shape(SHAPE_SPHERE, 0.05, 0, {x, -0.05, z}));
+  }
+  grounds.push_back(rails), grounds.push_back(balls);
+  Obstacle flat = hills(1e-3);
+  set_heights(flat, std::vector<std::vector<double>>(9, std::vector<double>(9, 0.5)));
+  grounds.push_back({flat});
+  Obstacle under = grid_sphere(2, 40);
+  under.centre = {0, -2, 0};
+  for (const char* mode : {"node", "cpu-double", "newton", "explicit"})
+    for (const auto& ground : grounds) {
+      CAPTURE(mode);
+      CAPTURE(ground[0].shape);
+      Setup setup;
+      add(setup, slab, {0, 0.13, 0});
+      setup.model->shapes = ground;
+      in_mode(setup, mode);
+      if (setup.settings.mode != "node" && setup.settings.mode != "cpu-double")
+        setup.settings.constraint_damping = 2e-3;
+      const Sim sim = run(setup, 100);
+      CHECK(deepest(sim) < 1e-4);
+      const State end = read_state(sim);
+      CHECK(centre_of(*setup.model, end.positions).y == doctest::Approx(0.1).epsilon(0.02));
+      CHECK(glm::length(centre_of(*setup.model, end.velocities)) < 0.02);
+    }
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "obstacles: a block slides down a tilted box as Coulomb has it, or sticks, in every mode") {
+  for (const std::string mode : {"node", "constraint", "cpu", "cpu-double", "cpu-fast", "newton"})
+    for (const double degrees : {25.0, 28.0}) {
+      CAPTURE(mode);
+      CAPTURE(degrees);
+      const double angle = glm::radians(degrees);
+      const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0),
+          down(-std::cos(angle), -std::sin(angle), 0);
+      Setup setup;
+      add(setup, slab, 0.1 * normal, glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
+      Obstacle slope = box({2, 0.5, 1}, -0.5 * normal);
+      slope.rotation = {0, 0, degrees}, slope.friction = 0.5;
+      setup.model->shapes = {slope};
+      in_mode(setup, mode);
+      setup.settings.friction = 0.9;  // the obstacle's own counts
+      const Sim sim = run(setup, 100);
+      const glm::dvec3 moved = centre_of(*setup.model, read_state(sim).positions) - 0.1 * normal;
+      const double pull = 9.81 * (std::sin(angle) - 0.5 * std::cos(angle));
+      if (pull > 0)
+        CHECK(glm::dot(moved, down) / (pull * 0.5 * 0.5 / 2) == doctest::Approx(1).epsilon(0.02));
+      else
+        CHECK(std::abs(glm::dot(moved, down)) < (mode == "newton" ? 2e-3 : 1e-5));
+    }
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "obstacles: a hard ball bounces off a sphere to the square of the obstacle's restitution") {
+  for (const std::string& mode : all_modes)
+    for (const double restitution : {0.5, 0.9}) {
+      CAPTURE(mode);
+      CAPTURE(restitution);
+      Setup setup;
+      add(setup, ball_mesh(0.25), {0, 0.75, 0});
+      setup.model->shapes = {round_shape(SHAPE_SPHERE, 0.6, 0, {0, -0.6, 0})};
+      setup.model->shapes[0].restitution = restitution;
+      in_mode(setup, mode);
+      Sim sim = create_sim(setup.model, setup.settings);
+      double apex = 0, worst = 0;
+      bool hit = false;
+      for (int s = 0; s < 150; ++s) {
+        step(sim);
+        worst = std::max(worst, deepest(sim));
+        const State now = read_state(sim);
+        hit = hit || (s > 40 && centre_of(*setup.model, now.velocities).y > -0.5);
+        if (hit) apex = std::max(apex, centre_of(*setup.model, now.positions).y - 0.25);
+      }
+      CHECK(std::sqrt(apex / 0.5) / restitution == doctest::Approx(1).epsilon(0.03));
+      CHECK(worst < 5e-3);
+    }
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt and a turntable drag") {
+  for (const std::string mode : {"node", "cpu-double", "newton", "explicit"}) {
+    CAPTURE(mode);
+    {
+      Setup setup;
+      add(setup, slab, {0, 0.1, 0});
+      Obstacle floor = half_space({0, 1, 0}), pusher = box({0.2, 0.5, 0.5}, {-0.41, 0.55, 0});
+      pusher.velocity = {0.5, 0, 0};
+      floor.friction = 0, pusher.friction = 0;
+      setup.model->shapes = {floor, pusher};
+      in_mode(setup, mode);
+      setup.settings.constraint_damping = setup.settings.material == "none" ? 0 : 2e-3;
+      const Sim sim = run(setup, 120);
+      const State end = read_state(sim);
+      CHECK(centre_of(*setup.model, end.velocities).x == doctest::Approx(0.5).epsilon(0.02));
+      CHECK(centre_of(*setup.model, end.positions).x == doctest::Approx(-0.01 + 0.5 * 0.6).epsilon(0.02));
+      CHECK(deepest(sim) < 5e-3);
+    }
+    {
+      Setup setup;
+      add(setup, slab, {0, 0.1, 0});
+      Obstacle belt = half_space({0, 1, 0});
+      belt.velocity = {1, 0, 0};
+      setup.model->shapes = {belt};
+      in_mode(setup, mode);
+      const Sim sim = run(setup, 100);
+      // Pulled by mu g to the belt's speed.
+      const double time = 1 / (0.5 * 9.81), way = 0.5 * time + (0.5 - time);
+      const State end = read_state(sim);
+      CHECK(centre_of(*setup.model, end.velocities).x == doctest::Approx(1).epsilon(0.02));
+      CHECK(centre_of(*setup.model, end.positions).x == doctest::Approx(way).epsilon(0.02));
+    }
+    {
+      Setup setup;
+      add(setup, slab, {0.5, 0.1, 0}, glm::dmat3(1), {0, 0, -1});  // at the speed of the plate there
+      Obstacle plate = round_shape(SHAPE_CYLINDER, 2, 0.5, {0, -0.5, 0});
+      plate.spin = {0, 2, 0}, plate.friction = 1;
+      setup.model->shapes = {plate};
+      in_mode(setup, mode);
+      const Sim sim = run(setup, 100);
+      const glm::dvec3 end = centre_of(*setup.model, read_state(sim).positions);
+      CHECK(glm::length(end - glm::dvec3(0.5 * std::cos(1), end.y, -0.5 * std::sin(1))) < 0.02);
+    }
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as an edge at 50 m/s") {
+  for (const std::string mode :
+       {"node 20", "node 1", "explicit", "newton", "cpu", "cpu-fast", "constraint"}) {
+    CAPTURE(mode);
+    Setup setup;
+    add(setup, slab, {0, 0.5, 0}, glm::dmat3(1), {0, -50, 0});
+    setup.model->shapes = {box({0.5, 0.05, 0.5}, {0, -0.05, 0})};
+    in_mode(setup, mode.substr(0, mode.find(' ')));
+    if (mode == "node 20") setup.settings.iterations = 20, setup.settings.substeps = 1;
+    Sim sim = create_sim(setup.model, setup.settings);
+    double lowest = 1, worst = 0;
+    for (int s = 0; s < 30; ++s) {
+      step(sim);
+      for (const glm::dvec3& x : read_state(sim).positions)
+        if (std::abs(x.x) < 0.5 && std::abs(x.z) < 0.5) lowest = std::min(lowest, x.y);
+      worst = std::max(worst, deepest(sim));
+    }
+    CHECK(!check_finite(sim, true));
+    CHECK(lowest > -0.05);
+    CHECK(worst < 5e-3);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "obstacles: the GPU steps as the same method in double, and to the same bits again") {
+  for (const Obstacle& o : every_shape()) {
+    CAPTURE(o.shape);
+    Setup setup;
+    add(setup, ball_mesh(0.25), {0.1, 0.7 + 0.27, 0.05}, glm::dmat3(1), {0.5, -3, 0.2});
+    Obstacle moving = o;
+    moving.velocity = {0.3, 0.5, 0}, moving.spin = {0, 0, 2};
+    setup.model->shapes = {moving};
+    setup.settings.rigid_contact = false;
+    Sim sim = create_sim(setup.model, setup.settings), again = create_sim(setup.model, setup.settings);
+    double worst = 0;
+    for (int s = 0; s < 40; ++s) {
+      const State one = samples::reference_after(sim, 1, Sweep::jacobi);
+      step(sim), step(again);
+      worst = std::max(worst, samples::distance(one, read_state(sim)));
+    }
+    CHECK(worst < 2e-5);
+    CHECK(state_hash(sim) == state_hash(again));
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: time goes with the state: back, anew, and at another dt") {
+  for (const char* mode : {"node", "cpu-fast"}) {
+    CAPTURE(mode);
+    Setup setup;
+    add(setup, slab, {0, 0.12, 0});
+    Obstacle lift = box({1, 0.5, 1}, {0, -0.5, 0});
+    lift.keyframes = {{0.1, {0, -0.4, 0}, {0, 0, 10}}, {0.3, {0, -0.5, 0}, {0, 90, 0}}};
+    setup.model->shapes = {lift};
+    in_mode(setup, mode);
+    Sim sim = create_sim(setup.model, setup.settings);
+    for (int s = 0; s < 15; ++s) step(sim);
+    Buffer buffer("kept", std::max<std::size_t>(snapshot_bytes(sim), 4));
+    const Snapshot kept = take_snapshot(sim, buffer, 0);
+    for (int s = 0; s < 15; ++s) step(sim);
+    const auto hash = state_hash(sim);
+    restore_snapshot(sim, kept, buffer);
+    for (int s = 0; s < 15; ++s) step(sim);
+    CHECK(state_hash(sim) == hash);
+    reset(sim);
+    for (int s = 0; s < 30; ++s) step(sim);
+    CHECK(state_hash(sim) == hash);
+    Settings slower = sim.settings;
+    slower.dt = 0.01;
+    apply_settings(sim, slower);
+    CHECK(time_of(sim) == doctest::Approx(0.15));
+    step(sim);
+    CHECK(time_of(sim) == doctest::Approx(0.16));
+  }
+  const Pose pose = pose_at(
+      [] {
+        Obstacle o = box({1, 1, 1});
+        o.keyframes = {{1, {2, 0, 0}, {0, 0, 90}}};
+        return o;
+      }(),
+      0.5);
+  CHECK(pose.centre == glm::dvec3(1, 0, 0));
+  CHECK(pose.axes[0].y == doctest::Approx(std::sqrt(0.5)));
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: references meet them too") {
+  Setup setup;
+  add(setup, slab, {0, 0.35, 0});
+  Obstacle belt = box({3, 0.5, 1}, {0, -0.5, 0});
+  belt.velocity = {0.2, 0, 0};
+  setup.model->shapes = {belt};
+  RigidBody body = rigid_bodies(*setup.model).at(0);
+  for (int s = 0; s < 6000; ++s) advance(body, *setup.model, setup.settings, 1e-4);
+  CHECK(body.centre.y == doctest::Approx(0.1).epsilon(1e-3));
+  CHECK(body.velocity.x == doctest::Approx(0.2).epsilon(1e-3));
+  const Sim hard = run(setup, 120);
+  CHECK(glm::length(centre_of(*setup.model, read_state(hard).positions) - body.centre) < 2e-3);
+
+  Setup soft;
+  add(soft, ball_mesh(0.25), {0, 0.3, 0});
+  soft.model->shapes = {round_shape(SHAPE_SPHERE, 0.6, 0, {0, -0.6, 0}), belt};
+  soft.model->shapes[1].centre.y = -0.6;
+  in_mode(soft, "explicit");
+  soft.settings.young_modulus = 1e5, soft.settings.constraint_damping = 2e-3;
+  const Sim sim = create_sim(soft.model, soft.settings);
+  const ReferenceInput input{*sim.model, sim.system, sim.settings, sim.inverse_masses};
+  const State start{soft.model->positions, soft.model->velocities};
+  Leapfrog leaps = leapfrog(input, sim.settings.compliance, start, 5e-5);
+  Implicit implicits = implicit(input, sim.settings.compliance, start, 1e-3);
+  advance(leaps, 3000), advance(implicits, 150);
+  const double apart = samples::distance(state_of(leaps), state_of(implicits));
+  CHECK(apart < 5e-3);
+  CHECK(-still(soft.model->shapes[0]).surface_at(state_of(leaps).positions[2]).distance < 1e-4);
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: penetration is measured over planes and shapes") {
+  Setup setup;
+  add(setup, slab, {0, 0.1, 0});
+  setup.model->shapes = {box({1, 0.5, 1}, {0, -0.49, 0})};
+  const Sim sim = create_sim(setup.model, setup.settings);
+  Metrics metrics = create_metrics(*sim.model);
+  const Measurement now = measure_now(metrics, sim);
+  CHECK(now.penetration_max == doctest::Approx(0.01 / setup.model->size));
+  CHECK(now.penetration_999 == doctest::Approx(0.01 / setup.model->size).epsilon(0.5));
+  CHECK(now.contacts == 25);
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite") {
+  std::mt19937 random(3);
+  for (int round = 0; round < 12; ++round) {
+    CAPTURE(round);
+    Setup setup;
+    add(setup, ball_mesh(0.3), within(random, 0.5), glm::dmat3(1), within(random, 30));
+    for (Obstacle o : every_shape()) {
+      o.centre = within(random, 0.8), o.rotation = within(random, 180);
+      o.velocity = within(random, 5), o.spin = within(random, 20);
+      if (unit(random) < 0.5) setup.model->shapes.push_back(o);
+    }
+    in_mode(setup, std::array{"node", "newton", "explicit", "cpu-fast"}[std::size_t(round % 4)]);
+    if (round % 3 == 0) setup.settings.substeps = 1;
+    Sim sim = run(setup, 40);
+    CHECK(!check_finite(sim, true));
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again; what is wrong is refused") {
+  const auto file =
+      std::filesystem::temp_directory_path() / ("tetpbd_obstacles_" + std::to_string(getpid()) + ".json");
+  const auto load = [&](const std::string& obstacles) {
+    std::ofstream(file)
+        << R"({"bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}],
+      "world": {"obstacles": [)"
+        << obstacles << "]}}";
+    return load_scene(file.string());
+  };
+  const std::string all = R"({"point": [0, 0, 0], "normal": [0, 1, 0]},
+    {"normal": [1, 3, 0], "friction": 0.2, "velocity": [1, 0, 0]},
+    {"shape": "sphere", "centre": [1, 0, 0], "radius": 0.5, "restitution": 0.5},
+    {"shape": "capsule", "centre": [0, 0.9, 0], "radius": 0.2, "half_length": 0.5, "spin": [0, 1, 0]},
+    {"shape": "cylinder", "radius": 0.2, "half_length": 0.5, "rotation": [90, 0, 0]},
+    {"shape": "box", "half": [1, 0.1, 1], "keyframes": [{"time": 0.1, "centre": [0, 0.1, 0]}, {"time": 1, "rotation": [0, 0, 30]}]},
+    {"shape": "height-field", "half": [1, 0.2, 1], "heights": [[0, 0.5], [1, 0.1], [0.2, 0.3]]})";
+  const Scene scene = load(all);
+  const auto model = build_model(scene);
+  CHECK(model->obstacles.size() == 1);
+  CHECK(model->shapes.size() == 6);
+  Sim sim = create_sim(model, scene.settings);
+  for (int s = 0; s < 20; ++s) step(sim);
+  const auto written = scene_json(scene);
+  std::ofstream(file) << written.dump();
+  const Scene again = load_scene(file.string());
+  CHECK(scene_json(again) == written);
+  Sim replay = create_sim(build_model(again), again.settings);
+  for (int s = 0; s < 20; ++s) step(replay);
+  CHECK(state_hash(sim) == state_hash(replay));
+  const auto error_of = [&](const std::string& obstacle) {
+    try {
+      build_model(load(obstacle));
+    } catch (const Error& error) {
+      CHECK(std::string(error.what()).find('\n') == std::string::npos);
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  for (const auto& [text, word] : std::initializer_list<std::pair<const char*, const char*>>{
+           {R"({"shape": "spere", "radius": 1})", "sphere"},
+           {R"({"shape": "sphere"})", "radius"},
+           {R"({"shape": "sphere", "radius": -1})", "radius"},
+           {R"({"shape": "sphere", "radius": 1, "half": [1, 1, 1]})", "half"},
+           {R"({"shape": "box", "half": [1, 1]})", "three numbers"},
+           {R"({"normal": [0, 0, 0]})", "normal"},
+           {R"({"point": [0, 0, 0]})", "normal"},
+           {R"({"shape": "mesh", "mesh": "no.obj"})", "no.obj"},
+           {R"({"shape": "height-field", "half": [1, 1, 1]})", "heights"},
+           {R"({"shape": "height-field", "half": [1, 1, 1], "image": "no.png"})", "no.png"},
+           {R"({"shape": "height-field", "half": [1, 1, 1], "heights": [[0, 1], [0]]})", "same length"},
+           {R"({"shape": "box", "half": [1, 1, 1], "spin": [0, 1, 0], "keyframes": [{"time": 1}]})",
+            "keyframes"},
+           {R"({"shape": "box", "half": [1, 1, 1], "keyframes": [{"time": 1}, {"time": 1}]})",
+            "keyframes.1.time"}}) {
+    CAPTURE(text);
+    CHECK(error_of(text).find(word) != std::string::npos);
+  }
+  std::filesystem::remove(file);
+}

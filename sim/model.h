@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/mesh/carry.h"
 #include "sim/mesh/tet_mesh.h"
 #include "sim/obstacle.h"
 
@@ -36,6 +37,8 @@ struct Model {
   double size = 1;                     ///< m, diagonal of the largest body at rest
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
+  /// Where a body has a fine surface: of all bodies, what is drawn and exported in place of `rest.surface`.
+  CarriedSurface carried;
 };
 
 /// The half spaces of a step, n.x >= d as (n, d): the ground of the settings first, then obstacles.

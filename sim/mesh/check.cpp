@@ -1,10 +1,12 @@
 // What is wrong with a surface, and what a mesh of tets is like: both from which triangles meet where.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include "sim/mesh/disjoint_sets.h"
@@ -173,7 +175,8 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
   look_for(
       check, "positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh",
       positions.size(), [&](std::size_t v) { return reach(v) > largest_coordinate; }, at_vertex);
-  if (!check.defect.empty()) return check;
+  check.hopeless = !check.defect.empty();
+  if (check.hopeless) return check;
   if (triangles.size() < 4) {
     check.defect = "too few triangles to enclose a volume";
     check.place = fmt::format("{} of them", triangles.size());
@@ -227,6 +230,75 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
       [](std::size_t) { return true; }, [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
   if (check.defect.empty()) orient(surface, topology, size, check);
   return check;
+}
+
+namespace {
+
+// A triangle of no area with its corner c on the side a b: the neighbour across that side, cut in two at c,
+// takes its place. Whether there was one such neighbour.
+bool flip_flat(SurfaceMesh& surface, std::size_t flat) {
+  const Triangle t = surface.triangles[flat];
+  const auto side = [&](std::size_t k) {
+    return glm::distance(surface.positions[t[k]], surface.positions[t[(k + 1) % 3]]);
+  };
+  const std::size_t k = std::ranges::max({0u, 1u, 2u}, {}, side);
+  const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+  std::size_t other = surface.triangles.size(), count = 0;
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const auto has = [&](std::uint32_t v) { return std::ranges::count(surface.triangles[i], v) > 0; };
+    if (i != flat && has(a) && has(b)) other = i, ++count;
+  }
+  if (count != 1) return false;
+  Triangle first = surface.triangles[other], second = first;
+  std::ranges::replace(first, a, c), std::ranges::replace(second, b, c);
+  if (std::ranges::count(first, c) > 1) return false;  // it names c already
+  surface.triangles[other] = first, surface.triangles[flat] = second;
+  return true;
+}
+
+}  // namespace
+
+std::string repair(SurfaceMesh& surface) {
+  std::vector<std::string> done;
+  const auto say = [&](std::size_t count, const char* one, const char* many) {
+    if (count > 0) done.push_back(fmt::format("{} {}", count, count == 1 ? one : many));
+  };
+  SurfaceMesh mended = surface;
+  auto& triangles = mended.triangles;
+  if (check_surface(mended).hopeless) return {};
+  mended = surface;
+  const double size = bounds(surface.positions).size();
+  const auto named_twice = [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; };
+  const std::size_t twice = std::size_t(std::ranges::count_if(triangles, named_twice));
+  std::erase_if(triangles, named_twice);
+  const std::size_t before_welding = triangles.size();
+  weld(mended, 0);
+  say(surface.positions.size() - mended.positions.size(), "vertex merged or without a triangle",
+      "vertices merged or without a triangle");
+  std::size_t dropped = twice + before_welding - triangles.size(), flipped = 0;
+  for (std::size_t t = 0; t < triangles.size();) {
+    const bool flat = glm::length(area_vector(mended, triangles[t])) <= degenerate_area * size * size;
+    const bool mends = flat && flip_flat(mended, t);
+    flipped += mends, dropped += flat && !mends;
+    if (flat && !mends)
+      triangles.erase(triangles.begin() + std::ptrdiff_t(t));
+    else
+      ++t;
+  }
+  say(dropped, "triangle without area dropped", "triangles without area dropped");
+  say(flipped, "triangle without area turned into its neighbour",
+      "triangles without area turned into neighbours");
+  const std::size_t all = triangles.size();
+  std::set<Triangle> seen;
+  std::erase_if(triangles, [&](Triangle t) {
+    std::ranges::sort(t);
+    return !seen.insert(t).second;
+  });
+  say(all - triangles.size(), "repeated triangle dropped", "repeated triangles dropped");
+  drop_unused_vertices(mended.positions, triangles);
+  say(check_surface(mended).flipped_triangles, "triangle turned outward", "triangles turned outward");
+  if (!done.empty()) surface = std::move(mended);
+  return fmt::format("{}", fmt::join(done, ", "));
 }
 
 MeshReport report(const TetMesh& mesh) {

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/error.h"
+
 namespace tetpbd {
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -68,16 +70,27 @@ struct SurfaceCheck {
   std::size_t count = 0;  ///< how many of it
   std::string place;      ///< the same in words, and where the first is
   std::string hint;       ///< what to do about it
+  bool hopeless = false;  ///< no wrap mends it either (wrap.h)
 };
 /// Orients triangles consistently and outward where possible (that is no defect), and stops at the first
 /// defect. Self-intersections are not looked for: TetGen finds them, and tetrahedralise() names them.
 SurfaceCheck check_surface(SurfaceMesh& surface);
+/// Mends what can be mended without a choice: vertices in one place merged, triangles without area and those
+/// that others repeat dropped, then vertices without a triangle; turned outward where the rest is sound. Says
+/// what it did; empty: nothing, and the surface is as it was.
+std::string repair(SurfaceMesh& surface);
+
+/// The surface encloses no solid that TetGen can fill; a wrap may (wrap.h).
+struct NotSolid : Error {
+  using Error::Error;
+};
 
 /// TetGen's switches without a leading '-' and with Q. Throws Error for those that need files, do something
 /// else than fill a surface or do not exist, and when p is missing.
 std::string checked_switches(const std::string& switches);
 /// Runs the program tetgen with `switches` (for example "pYq1.85o/140") and a time limit in seconds. Results
-/// are cached by content and switches in the user's cache folder. Throws Error naming the defect of `source`.
+/// are cached by content and switches in the user's cache folder. Throws Error, for a defect of `source`
+/// NotSolid.
 TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, double time_limit = 600,
                        const std::string& source = "surface");
 

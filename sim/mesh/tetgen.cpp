@@ -60,10 +60,10 @@ void throw_intersections(const SurfaceMesh& surface, const fs::path& input, cons
   const Triangle& t = surface.triangles.at(std::max<std::size_t>(facet, 1) - 1);
   const glm::dvec3 first =
       (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
-  throw Error("surface intersects itself",
-              fmt::format("{} pair{} of triangles, first near {} in {}", pairs, pairs == 1 ? "" : "s",
-                          point_text(first), source),
-              "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
+  throw NotSolid("surface intersects itself",
+                 fmt::format("{} pair{} of triangles, first near {} in {}", pairs, pairs == 1 ? "" : "s",
+                             point_text(first), source),
+                 "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
 }
 
 TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seconds,
@@ -77,9 +77,9 @@ TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seco
                 "allow larger tets (a), ask for less quality (q), or use a coarser surface");
   if (end.kind == SubprocessEnd::done && fs::exists(output)) return read_node_ele(output);
   throw_intersections(surface, input, source);
-  throw Error(fmt::format("TetGen failed with {} ({})", switches,
-                          end.kind == SubprocessEnd::done ? "it made no tet" : end.reason),
-              source, "try other switches, such as pYq1.85o/140, or remesh the surface");
+  throw NotSolid(fmt::format("TetGen failed with {} ({})", switches,
+                             end.kind == SubprocessEnd::done ? "it made no tet" : end.reason),
+                 source, "try other switches, such as pYq1.85o/140, or remesh the surface");
 }
 
 }  // namespace
@@ -107,15 +107,16 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
 
   SurfaceMesh surface = given;
   const SurfaceCheck check = check_surface(surface);
-  if (!check.defect.empty()) throw Error(check.defect, check.place + " in " + source, check.hint);
+  if (check.hopeless) throw Error(check.defect, check.place + " in " + source, check.hint);
+  if (!check.defect.empty()) throw NotSolid(check.defect, check.place + " in " + source, check.hint);
   TetMesh mesh = run(surface, switches, time_limit, source);
   finish_tets(mesh, source);
   // TetGen fills everything inside the outermost surface: volumes of parts inside one another count twice.
   if (check.components > 1 && std::abs(mesh_volume(mesh) - check.volume) > 1e-6 * check.volume)
-    throw Error("parts of the surface lie inside one another",
-                fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume,
-                            mesh_volume(mesh), source),
-                "remove the inner parts: cavities are not supported");
+    throw NotSolid("parts of the surface lie inside one another",
+                   fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume,
+                               mesh_volume(mesh), source),
+                   "remove the inner parts: cavities are not supported");
   keep_mesh(key, mesh);
   return mesh;
 }

@@ -36,11 +36,12 @@ Surface cylinder_surface(vec3 p, real half_length, real radius) {
   vec3 along = vec3(real(0), p.y < real(0) ? real(-1) : real(1), real(0));
   return beyond_sides(vec3(r - radius, abs(p.y) - half_length, r - radius), around, along, vec3(real(0)));
 }
-// A distance at the nearest point of a box that holds all of the surface, and the way from there: a distance that is not too long.
+// From a distance at the nearest point of a box that holds all of the surface, and the way from there: the angle between this way and that to
+// the surface is no acute one.
 Surface outside(Surface s, vec3 way) {
-  way += max(s.distance, real(0)) * s.normal;
-  real l = length(way);
-  return l > real(0) ? Surface(way / l, l) : s;
+  real inner = max(s.distance, real(0));
+  vec3 n = way + inner * s.normal;
+  return Surface(n / length(n), sqrt(dot(way, way) + inner * inner));
 }
 // Bilinear heights: (y - H) / sqrt(1 + |grad H|^2). A block whose top they are, without a bottom.
 Surface heights_surface(Solid s, vec3 p) {

@@ -11,6 +11,7 @@
 #include "sim/constraint_kinds.h"
 #include "sim/error.h"
 #include "sim/hilbert.h"
+#include "sim/moving_shape.h"
 #include "sim/parallel.h"
 #include "sim/settings.h"
 

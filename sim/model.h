@@ -44,9 +44,6 @@ struct Model {
 /// The half spaces of a step, n.x >= d as (n, d): the ground of the settings first, then obstacles.
 std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings);
 
-/// Shapes over the substeps of h from `start` on, one list each; a single one where nothing moves.
-std::vector<std::vector<MovingShape>> shapes_of(const Model& model, const Settings& settings, double start,
-                                                double h, int substeps);
 bool has_fields(const Model& model);  ///< any of its shapes
 bool has_obstacles(const Model& model, const Settings& settings);
 /// The nearest place to x outside each in turn.

@@ -1,4 +1,4 @@
-#include "sim/obstacle.h"
+#include "sim/moving_shape.h"
 
 #define GLM_ENABLE_EXPERIMENTAL  // euler_angles
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/formulas.h"
+#include "sim/layout.h"
 #include "sim/mesh/distance_field.h"
 
 namespace tetpbd {
@@ -62,23 +62,5 @@ struct Pose {
 /// Of angles about x, then y, then z, degrees.
 glm::dmat3 rotation_of(const glm::dvec3& degrees);
 Pose pose_at(const Obstacle& obstacle, double time);
-
-/// A shape over a substep: as it stands at its end, and how its matter moves to there.
-struct MovingShape {
-  Formulas<double>::Solid solid{};
-  const float* texels = nullptr;
-  Pose pose;
-  glm::dvec3 velocity{0}, spin{0};  ///< m/s of the centre, rad/s
-  double friction = 0, restitution = 0;
-
-  glm::dvec3 velocity_at(const glm::dvec3& x) const { return velocity + glm::cross(spin, x - pose.centre); }
-  /// How far x is from it, and where to; of a point that came there by `way` relative to the shape, from the
-  /// plane that it meets.
-  Formulas<double>::Surface surface_at(const glm::dvec3& x) const;
-  Formulas<double>::Surface meeting(const glm::dvec3& x, const glm::dvec3& way) const;
-};
-/// `friction`, `restitution`: where the obstacle has none of its own.
-MovingShape moving_shape(const Obstacle& obstacle, double start, double h, double friction,
-                         double restitution);
 
 }  // namespace tetpbd

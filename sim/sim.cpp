@@ -12,6 +12,7 @@
 #include "sim/error.h"
 #include "sim/hash.h"
 #include "sim/material.h"
+#include "sim/moving_shape.h"
 #include "sim/parallel.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/solvers/cpu_pbd.h"

@@ -12,6 +12,7 @@
 #include "sim/error.h"
 #include "sim/material.h"
 #include "sim/metrics.h"
+#include "sim/moving_shape.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "sim/error.h"
+#include "sim/moving_shape.h"
 
 namespace tetpbd {
 

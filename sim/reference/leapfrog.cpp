@@ -7,6 +7,7 @@
 #include <random>
 
 #include "sim/error.h"
+#include "sim/moving_shape.h"
 
 namespace tetpbd {
 

@@ -7,6 +7,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "sim/error.h"
+#include "sim/moving_shape.h"
 #include "sim/rotation.h"
 
 namespace tetpbd {

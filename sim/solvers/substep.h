@@ -4,8 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/formulas.h"
-#include "sim/model.h"
+#include "sim/moving_shape.h"
 #include "sim/settings.h"
 
 namespace tetpbd {

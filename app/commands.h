@@ -69,6 +69,9 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
 int run_mesh_command(const std::filesystem::path& file, const std::string& switches,
                      const std::filesystem::path& out, bool json);
 
+/// `tetpbd mesh --repair OUT`: mends a surface as far as that takes no choice (repair() of tet_mesh.h).
+int run_repair(const std::filesystem::path& file, const std::filesystem::path& out);
+
 struct BenchOptions {
   std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
   SceneOverrides overrides;  ///< for every scene

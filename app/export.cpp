@@ -34,6 +34,15 @@ std::vector<Triangle> faces_of(const Model& model) {
   return faces;
 }
 
+// What is seen: the fine surface that rides on the tets, else their boundary.
+SurfaceMesh seen_surface(const Model& model, const std::vector<glm::dvec3>& positions) {
+  SurfaceMesh surface{carried_positions(model.carried, model.rest.tets, positions), model.carried.triangles};
+  if (surface.triangles.empty()) surface = {in_original_order(model, positions), faces_of(model)};
+  for (glm::dvec3& p : surface.positions) p = glm::vec3(p);
+  drop_unused_vertices(surface.positions, surface.triangles);
+  return surface;
+}
+
 // Samples follow: the vertices of the OBJ, in its order.
 std::string pc2_header(std::size_t vertices, long frames) {
   const auto bytes = [](auto value) { return bytes_of(std::vector{value}); };
@@ -93,6 +102,11 @@ void write_arrays(const Sim& sim, const std::filesystem::path& folder) {
   write_npy(folder / "tets.npy", original_tets(model));
   write_npy(folder / "faces.npy", faces_of(model));
   write_npy(folder / "bodies.npy", body_numbers(model));
+  if (model.carried.triangles.empty()) return;
+  const SurfaceMesh surface = seen_surface(model, state.positions);
+  write_npy(folder / "surface.npy",
+            std::vector<glm::vec3>(surface.positions.begin(), surface.positions.end()));
+  write_npy(folder / "surface_faces.npy", surface.triangles);
 }
 
 Export::Export(const Sim& sim, const RunOptions& options)
@@ -117,8 +131,7 @@ void add_frame(Export& files, const Sim& sim) {
                                double(sim.steps) * sim.settings.dt, name);
   }
   if (files.cache || files.ply) {
-    SurfaceMesh surface{{positions.begin(), positions.end()}, faces_of(*sim.model)};
-    drop_unused_vertices(surface.positions, surface.triangles);
+    const SurfaceMesh surface = seen_surface(*sim.model, state.positions);
     files.surface_vertices = surface.positions.size();
     if (files.ply) write_surface(files.folder / "ply" / (name + ".ply"), surface);
     if (files.cache && files.count == 0) write_surface(files.folder / "surface.obj", surface);

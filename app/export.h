@@ -15,7 +15,8 @@ struct RunOptions;
 
 inline constexpr std::array export_formats{"vtk", "pc2", "ply"};
 
-/// Of the state now: positions, velocities; rest (positions), tets, faces, bodies (of vertices).
+/// Of the state now: positions, velocities; rest (positions), tets, faces, bodies (of vertices); where a fine
+/// surface rides on the tets also surface and surface_faces.
 void write_arrays(const Sim& sim, const std::filesystem::path& folder);
 
 /// Frames that a run writes as it goes. What grows with each is a whole file after close().

@@ -41,7 +41,7 @@ struct Arguments {
   MapOptions map;
   bool hard_cases = false;
   ReproduceOptions reproduce;
-  std::filesystem::path mesh_file, mesh_out;
+  std::filesystem::path mesh_file, mesh_out, mesh_repaired;
   std::string switches = "pYq1.85o/140";
   bool json = false, selftest = false;
   std::vector<std::array<const CLI::Option*, 2>> apart;  ///< never together: one would be dropped
@@ -412,12 +412,16 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_gpu(reproduce, a.reproduce.gpu);
 
   CLI::App& mesh = command(
-      "mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it",
-      [](const Arguments& a) { return run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json); });
+      "mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", [](const Arguments& a) {
+        return a.mesh_repaired.empty() ? run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json)
+                                       : run_repair(a.mesh_file, a.mesh_repaired);
+      });
   add(mesh, "file", a.mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")->required();
   add_tetgen(mesh, a.switches);
   add(mesh, "--out", a.mesh_out,
       "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  add(mesh, "--repair", a.mesh_repaired,
+      "mend the surface as far as that is safe, and write it: .ply .obj .off .stl");
   mesh.add_flag("--json", a.json, "print the report as JSON");
 
   CLI::App& info =

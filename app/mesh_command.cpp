@@ -4,6 +4,7 @@
 #include "app/files.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
+#include "sim/mesh/wrap.h"
 
 namespace tetpbd {
 
@@ -22,7 +23,9 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
     const SurfaceMesh surface = load_surface(file);
     SurfaceMesh oriented = surface;
     const SurfaceCheck check = check_surface(oriented);
-    if (!check.defect.empty()) throw Error(check.defect, check.place + " in " + file.string(), check.hint);
+    if (!check.defect.empty())
+      throw Error(check.defect, check.place + " in " + file.string(),
+                  check.hint + (check.hopeless ? "" : "; --repair may mend it, a scene wraps it"));
     document["tetgen"] = switches;
     put("surface", {{"vertices", surface.positions.size()},
                     {"triangles", surface.triangles.size()},
@@ -44,6 +47,19 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
   }
   if (json) fmt::print("{}\n", json_text(document, 2));
   return counts.inverted == 0 ? 0 : 1;
+}
+
+int run_repair(const std::filesystem::path& file, const std::filesystem::path& out) {
+  if (!is_surface_file(out))
+    throw Error("not a surface format", out.string(), "use .ply, .obj, .stl or .off");
+  SurfaceMesh surface = load_as_is(file);
+  const std::string done = repair(surface);
+  write_surface(out, surface);
+  SurfaceMesh oriented = surface;
+  const SurfaceCheck left = check_surface(oriented);
+  fmt::print("{}: {}; {}, written {}\n", file.string(), done.empty() ? "nothing to mend" : done,
+             left.defect.empty() ? "sound" : fmt::format("{} ({})", left.defect, left.place), out.string());
+  return left.defect.empty() ? 0 : 1;
 }
 
 }  // namespace tetpbd

@@ -36,8 +36,10 @@ fs::path models_folder() {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells, taper)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, tetgen, scale, height, rotation,
-                                                position, density, velocity, spin, fixed, heavy, deform)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(WrapOptions, voxels, thickness)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, scale, height,
+                                                rotation, position, density, velocity, spin, fixed, heavy,
+                                                deform)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
 
 namespace {
@@ -50,7 +52,8 @@ json schema() {
   json result = json::parse(R"({
     "name": "text", "description": "text", "duration": [1e-6, 1e6],
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
-      "name": "text", "mesh": "text", "tetgen": "text", "deform": "text",
+      "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "deform": "text",
+      "wrap": {"or": false, "voxels": [8, 1000, "whole number"], "thickness": [1, 20]},
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
         "taper": [0, 0.95]},
@@ -101,7 +104,8 @@ void check(const json& value, const json& allowed, const std::string& path, cons
             "a list of " + allowed["of"].get<std::string>());
     for (std::size_t i = 0; i < value.size(); ++i)
       check(value[i], allowed["each"], inner(std::to_string(i)), file);
-  } else if (allowed.is_object() && !(allowed.contains("or") && value.is_string())) {
+  } else if (allowed.is_object() && !(allowed.value("or", json()) == "text" && value.is_string()) &&
+             !(value == false && allowed.value("or", json()) == false)) {
     require(value.is_object(), "an object in braces");
     for (const auto& [key, held] : value.items()) {
       if (!allowed.contains(key) || key == "or") {
@@ -148,14 +152,23 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   auto body = value.get<BodyDescription>();
   if (value.contains("block")) body.block = value["block"].get<BodyDescription::Block>();
   if (value.contains("tet")) body.tet = value["tet"].get<std::array<glm::dvec3, 4>>();
-  if (!body.mesh.empty() + bool(body.block) + bool(body.tet) != 1)
-    refuse(fmt::format("'{}' needs one of \"mesh\", \"block\" and \"tet\"", where), file);
+  if (value.value("wrap", json()) == false) body.wrap.reset();
+  if (value.contains("wrap") && body.wrap) body.wrap = value["wrap"].get<WrapOptions>();
+  const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet);
+  if (kinds > 1 || (kinds == 0 && body.surface.empty()))
+    refuse(fmt::format("'{}' needs one of \"mesh\", \"block\" and \"tet\", or a \"surface\"", where), file);
+  if (kinds == 0 && !body.wrap)
+    refuse(fmt::format("'{}' has a surface alone, so it needs its \"wrap\"", where), file);
   const glm::dvec3 cells = body.block ? glm::dvec3(body.block->cells) : glm::dvec3(0);
   if (cells.x * cells.y * cells.z > 2e6)
     refuse(fmt::format("'{}.block.cells' must be at most 2 million in all", where), file);
-  if (body.name.empty()) body.name = body.block ? "block" : body.tet ? "tet" : body.mesh.stem().string();
+  if (body.name.empty())
+    body.name = body.block ? "block"
+                : body.tet ? "tet"
+                           : (body.mesh.empty() ? body.surface : body.mesh).stem().string();
   body.name = printable(body.name);
-  if (!body.mesh.empty()) body.mesh = found_file(body.mesh, folder);
+  for (fs::path* named : {&body.mesh, &body.surface})
+    if (!named->empty()) *named = found_file(*named, folder);
   return body;
 }
 
@@ -253,13 +266,41 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   return false;
 }
 
-TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
+// `own`: becomes the surface that was wrapped, if one was.
+TetMesh mesh_of(const BodyDescription& body, const std::string& scene, SurfaceMesh& own) {
   if (const auto& b = body.block)
     return b->taper > 0 ? make_spindle(b->size, b->cells, b->taper) : make_block(b->size, b->cells);
-  if (!body.tet) return load_mesh(body.mesh, body.tetgen);
-  TetMesh mesh{{body.tet->begin(), body.tet->end()}, {{0, 1, 2, 3}}, {}};
-  finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene));
-  return mesh;
+  if (body.tet) {
+    TetMesh mesh{{body.tet->begin(), body.tet->end()}, {{0, 1, 2, 3}}, {}};
+    finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene));
+    return mesh;
+  }
+  const fs::path& file = body.mesh.empty() ? body.surface : body.mesh;
+  if (!is_surface_file(file) || !fs::is_regular_file(file)) return load_mesh(file, body.tetgen);
+  SurfaceMesh surface = load_surface(file);
+  Filled filled = fill_or_wrap(surface, body.tetgen, body.wrap, body.mesh.empty(), file.string());
+  if (!filled.note.empty()) {
+    own = std::move(surface);
+    print_error(fmt::format("tetpbd: {}: {}\n", printable(file.string()), printable(filled.note)));
+  }
+  return std::move(filled.mesh);
+}
+
+/// A body's tets, and what rides on them where it is not their own boundary.
+std::pair<TetMesh, CarriedSurface> body_of(const BodyDescription& body, const std::string& scene) {
+  SurfaceMesh surface;
+  TetMesh mesh = mesh_of(body, scene, surface);
+  if (!body.surface.empty()) surface = load_surface(body.surface);
+  const fs::path& file = body.surface.empty() ? body.mesh : body.surface;
+  CarriedSurface carried;
+  if (!surface.triangles.empty()) carried = carry(surface, mesh, file.string());
+  return {std::move(mesh), std::move(carried)};
+}
+
+void add_carried(CarriedSurface& all, const CarriedSurface& more, std::size_t first_tet) {
+  const auto base = std::uint32_t(all.vertices.size());
+  for (auto [tet, weights] : more.vertices) all.vertices.push_back({tet + std::uint32_t(first_tet), weights});
+  for (const auto& [a, b, c] : more.triangles) all.triangles.push_back({a + base, b + base, c + base});
 }
 
 }  // namespace
@@ -338,6 +379,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     BodyDescription& body = scene.bodies[0];
     body.name = overrides.mesh.stem().string();
     body.mesh = overrides.mesh;
+    body.surface.clear();
     body.block.reset(), body.tet.reset();
     scene.name = printable(fmt::format("{} with {}", scene.name, body.mesh.filename().string()));
     if (std::ranges::none_of(overrides.set, [](const auto& given) { return given.starts_with("camera"); }))
@@ -396,11 +438,17 @@ void note_unused(const Settings& settings, const std::vector<std::string>& modes
 
 json body_json(const BodyDescription& body) {
   json result = body;
-  if (body.mesh.empty()) {
-    result.erase("mesh"), result.erase("tetgen");
-  } else {
-    result["mesh"] = file_name(body.mesh);
-  }
+  const auto put_path = [&](const char* key, const fs::path& file) {
+    if (file.empty())
+      result.erase(key);
+    else
+      result[key] = file_name(file);
+  };
+  put_path("mesh", body.mesh), put_path("surface", body.surface);
+  if (body.block || body.tet)
+    result.erase("tetgen");
+  else
+    result["wrap"] = body.wrap ? json(*body.wrap) : json(false);
   if (body.height == 0) result.erase("height");
   for (json& box : result["fixed"]) box.erase("ratio"), box.erase("share");
   if (body.block) result["block"] = *body.block;
@@ -433,8 +481,12 @@ std::string setting_text(const Parameter& row, const json& value) {
 
 std::shared_ptr<const Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
+  bool carries = false;
   for (const BodyDescription& body : scene.bodies) {
-    TetMesh mesh = mesh_of(body, scene.name);
+    auto [mesh, carried] = body_of(body, scene.name);
+    carries = carries || !carried.triangles.empty();
+    add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried,
+                model->rest.tets.size());
     for (auto& p : mesh.positions) p *= body.scale;
     if (model->rest.tets.size() + mesh.tets.size() > most_tets)
       throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
@@ -467,6 +519,7 @@ std::shared_ptr<const Model> build_model(const Scene& scene) {
     deform(start, mesh, body.deform, unsigned(scene.settings.seed));
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
+  if (!carries) model->carried = {};
   for (const Obstacle& obstacle : scene.obstacles) {
     add_obstacle(*model, obstacle);
     if (!is_plane(obstacle)) load_field(model->shapes.back());

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "render/camera.h"
+#include "sim/mesh/wrap.h"
 #include "sim/model.h"
 #include "sim/settings.h"
 
@@ -32,10 +33,12 @@ struct BodyDescription {
   std::filesystem::path mesh;                    ///< a file, or
   std::optional<Block> block;                    ///< a generated block, or
   std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m
+  std::filesystem::path surface;                 ///< a fine one that rides on it, or, alone, on its wrap
   std::string tetgen = "pYq1.85o/140";
-  glm::dvec3 scale{1};     ///< along the mesh's own axes, before all else
-  double height = 0;       ///< m, scales the mesh; 0 keeps its size
-  glm::dvec3 rotation{0};  ///< degrees about x, then y, then z
+  std::optional<WrapOptions> wrap = WrapOptions{};  ///< of a surface that TetGen refuses; none: an error
+  glm::dvec3 scale{1};                              ///< along the mesh's own axes, before all else
+  double height = 0;                                ///< m, scales the mesh; 0 keeps its size
+  glm::dvec3 rotation{0};                           ///< degrees about x, then y, then z
   glm::dvec3 position{0};  ///< m, where the middle of the bottom of its bounding box goes
   double density = 1000;   ///< kg/m^3
   glm::dvec3 velocity{0};  ///< m/s

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "render/carried.h"
 #include "render/layout.h"
 #include "render/marks.h"
 #include "sim/layout.h"
@@ -25,6 +26,9 @@ struct Recipe {
 const std::map<std::string, Recipe> recipes = {
     {"surface", {{"render/surface.vert", "render/body.frag"}, {}}},
     {"surface shadow", {{"render/surface.vert", "render/depth.frag"}, {"SHADOW"}}},
+    {"carried", {{"render/carried.vert", "render/body.frag"}, {}}},
+    {"carried shadow", {{"render/carried.vert", "render/depth.frag"}, {"SHADOW"}}},
+    {"cofactors", {{"render/cofactors.comp"}, {}}},
     {"tets", {{"render/body.vert", "render/tets.geom", "render/body.frag"}, {}}},
     {"tets shadow", {{"render/body.vert", "render/tets.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"caps", {{"render/body.vert", "render/caps.geom", "render/body.frag"}, {}}},
@@ -73,6 +77,9 @@ void fill(const Renderer& renderer, const Program& program, GLuint positions, co
   glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
 }
 
+// The other corners of a tet, by corner; even permutations, which keep the sign of the volume.
+constexpr std::array<std::array<std::size_t, 3>, 4> even{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+
 // The name of the buffer of values, made when first asked for and filled by their program.
 GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, const Program& program,
                 const auto& make) {
@@ -106,9 +113,16 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   const Program& program = use(renderer, "tet values");
   program.set("kind", int(colour));
   program.set("material", frame.material);
-  // Even permutations, which keep the sign of the volume.
-  return gathered(renderer, frame, values, program, [&](const TetMesh& mesh) {
-    return gather<4>(mesh, mesh.tets, {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}}, label, bytes);
+  return gathered(renderer, frame, values, program,
+                  [&](const TetMesh& mesh) { return gather<4>(mesh, mesh.tets, even, label, bytes); });
+}
+
+// What a fine surface needs beside the positions.
+void fill_cofactors(Renderer& renderer, const Frame& frame) {
+  if (!renderer.carried_array) make_carried(renderer);
+  rest_of(renderer), tets_of(renderer);
+  gathered(renderer, frame, renderer.cofactors, use(renderer, "cofactors"), [](const TetMesh& mesh) {
+    return gather<4>(mesh, mesh.tets, even, "cofactors", mesh.positions.size() * 3 * sizeof(glm::vec4));
   });
 }
 
@@ -244,6 +258,8 @@ void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool sha
     glDepthMask(GL_TRUE);
   } else if (look == Look::tets) {
     elements("tets", GL_LINES_ADJACENCY, tets_of(renderer));
+  } else if (shows_carried(renderer, frame.options)) {
+    draw_carried(renderer, frame, use(renderer, shadow ? "carried shadow" : "carried"), values);
   } else {
     use(renderer, shadow ? "surface shadow" : "surface");
     glBindVertexArray(renderer.surface_array.id());
@@ -469,7 +485,9 @@ Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies) {
 Renderer make_renderer(const Model& model) {
   std::vector<std::size_t> bodies;
   for (const Body& body : model.bodies) bodies.push_back(body.first_vertex);
-  return make_renderer(model.rest, std::move(bodies));
+  Renderer renderer = make_renderer(model.rest, std::move(bodies));
+  renderer.carried = model.carried;
+  return renderer;
 }
 
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target) {
@@ -501,8 +519,11 @@ void draw(Renderer& renderer, const Frame& frame) {
     rest_of(renderer);
   bind_view(renderer, frame);
   const GLuint values = find_values(renderer, frame);
-  if (!tets || lit_planes) fill_corners(renderer, frame, values);
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  const bool carried = shows_carried(renderer, options);
+  if (carried) fill_cofactors(renderer, frame);
+  if ((!tets && !carried) || lit_planes) fill_corners(renderer, frame, values);
+  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
+                  (carried ? GL_TEXTURE_FETCH_BARRIER_BIT : 0));
   if (options.shadow) draw_shadow_map(renderer, frame, values);
   if (lit_planes) light_planes(renderer, frame, planes);
 

@@ -1,6 +1,7 @@
 // Draws bodies straight from the simulation's position buffer, plain or coloured by error.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <map>
@@ -46,8 +47,13 @@ struct Renderer {
   Buffer triangles, tets;  ///< indices
   Buffer graph;            ///< edges' vertices
   Buffer arrow_vertices;
-  Buffer rest;           ///< vec4: rest position and body
-  VertexGather corners;  ///< of the surface, three a triangle; values: corners.comp
+  Buffer rest;             ///< vec4: rest position and body
+  CarriedSurface carried;  ///< of all bodies, or empty
+  Buffer carried_vertices, carried_triangles;
+  VertexArray carried_array;
+  std::array<Texture, 5> carried_texels;
+  VertexGather cofactors;  ///< of deformation gradients, by vertex: cofactors.comp
+  VertexGather corners;    ///< of the surface, three a triangle; values: corners.comp
   std::map<Colour, VertexGather> values;
   Buffer values_copy;  ///< on its way back
   Fence values_copied;

@@ -23,11 +23,15 @@ void delete_named(GLuint id) {
 template <GLenum kind>
 struct Named : Owned<GLuint, delete_named<kind>> {
   Named() = default;
+  /// A texture of another target.
+  Named(const std::string& label, GLenum target) requires(kind == GL_TEXTURE) : Named::Owned(make(target)) {
+    label_object(kind, this->id(), label);
+  }
   explicit Named(const std::string& label) : Named::Owned(make()) { label_object(kind, this->id(), label); }
-  static GLuint make() {
+  static GLuint make(GLenum target = GL_TEXTURE_2D) {
     GLuint id = 0;
     if constexpr (kind == GL_VERTEX_ARRAY) glGenVertexArrays(1, &id), glBindVertexArray(id);
-    if constexpr (kind == GL_TEXTURE) glGenTextures(1, &id), glBindTexture(GL_TEXTURE_2D, id);
+    if constexpr (kind == GL_TEXTURE) glGenTextures(1, &id), glBindTexture(target, id);
     if constexpr (kind == GL_RENDERBUFFER)
       glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id);
     if constexpr (kind == GL_FRAMEBUFFER) glGenFramebuffers(1, &id), glBindFramebuffer(GL_FRAMEBUFFER, id);

@@ -4,7 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/commands.h"
+#include "app/scene.h"
 #include "mesh_samples.h"
+#include "render_stage.h"
+#include "run_program.h"
 #include "sim/mesh/carry.h"
 #include "sim/mesh/distance_field.h"
 #include "sim/mesh/wrap.h"
@@ -238,4 +242,121 @@ TEST_CASE("repair: mends what needs no choice, leaves a sound surface as it is")
     CHECK(repair(s) == "");
     CHECK(s.triangles == before.triangles);
   }
+}
+
+TEST_CASE("surface files: triangle strips of PLY") {
+  const Folder folder;
+  const char* head =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+  for (const char* strips : {"6 0 2 1 3 0 2\n", "9 0 2 1 3 -1 1 3 0 2\n"}) {
+    SurfaceMesh s = load_surface(folder.write("strips.ply", std::string(head) + strips));
+    CHECK(s.triangles == std::vector<Triangle>{{0, 2, 1}, {1, 2, 3}, {1, 3, 0}, {0, 3, 2}});
+    const SurfaceCheck check = check_surface(s);
+    CHECK(check.defect == "");
+    CHECK(check.flipped_triangles == 0);
+  }
+  CHECK(contains(error_of([&] { load_surface(folder.write("bad.ply", std::string(head) + "3 0 1 7\n")); }),
+                 "names vertex 7 of 4"));
+}
+
+TEST_CASE("repair: the command writes what is sound, and says what is left") {
+  const Folder folder;
+  write_surface(folder.path / "cube.ply", cube());
+  CHECK(run_repair(folder.path / "cube.ply", folder.path / "same.ply") == 0);
+  CHECK(run_program::read(folder.path / "same.ply") == run_program::read(folder.path / "cube.ply"));
+  SurfaceMesh open = cube();
+  open.triangles.push_back(open.triangles[0]);
+  open.triangles.erase(open.triangles.begin() + 5);
+  write_surface(folder.path / "open.obj", open);
+  CHECK(run_repair(folder.path / "open.obj", folder.path / "mended.ply") == 1);
+  CHECK(load_surface(folder.path / "mended.ply").triangles.size() == 11);
+  CHECK(contains(error_of([&] { run_repair(folder.path / "open.obj", folder.path / "a.msh"); }), "a.msh"));
+}
+
+TEST_CASE("scene: a body's fine surface, beside bodies without") {
+  const Folder folder;
+  write_surface(folder.path / "fine.obj", sphere(10));
+  const auto scene_with = [&](const std::string& first) {
+    return load_scene(
+        folder
+            .write("s.json", fmt::format(R"({{"bodies": [{{{}, "height": 1, "position": [2, 1, 0]}},
+      {{"block": {{"size": [1, 1, 1], "cells": [1, 1, 1]}}}}]}})",
+                                         first))
+            .string());
+  };
+  const Scene scene =
+      scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]}, "surface": "fine.obj")");
+  const auto model = build_model(scene);
+  const CarriedSurface& carried = model->carried;
+  CHECK(carried.triangles.size() == 1200 + 12);
+  const auto x = carried_positions(carried, model->rest.tets, model->rest.positions);
+  const SurfaceMesh fine = sphere(10);
+  for (std::size_t v = 0; v < fine.positions.size(); ++v)
+    CHECK(glm::distance(x[v], fine.positions[v] * 0.5 + glm::dvec3(2, 1.5, 0)) < 1e-6);
+  CHECK(bounds({x.begin() + std::ptrdiff_t(fine.positions.size()), x.end()}).high == glm::dvec3(0.5, 1, 0.5));
+  const std::string json = body_json(scene.bodies[0]).dump();
+  CHECK(contains(json, "fine.obj"));
+  CHECK(build_model(scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]})"))
+            ->carried.triangles.empty());
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": false)"); }),
+                 "needs its \"wrap\""));
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": {"voxels": 3})"); }),
+                 "'bodies.0.wrap.voxels' must be a whole number from 8 to 1000, not 3"));
+  CHECK(
+      contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": true)"); }), "must be an object"));
+}
+
+TEST_CASE("run: a broken mesh becomes a body, and files have its surface" * needs_openvdb) {
+  const run_program::Folder folder;
+  SurfaceMesh open = sphere(10);
+  open.triangles.resize(open.triangles.size() - 30);
+  write_surface(folder.path / "open.obj", open);
+  std::ofstream(folder.path / "s.json") << R"({"bodies": [{"mesh": "open.obj", "wrap": {"voxels": 16}}]})";
+  const auto done = run_program::program(
+      "run --scene s.json --steps 2 --export ply,pc2,vtk --positions --png-every 2 --size 64x48 --out o",
+      folder, "TETPBD_CACHE=cache");
+  CHECK(done.status == 0);
+  CHECK(contains(done.err, "open.obj: surface is open: "));
+  CHECK(contains(done.err, "so it was wrapped with 16 voxels across"));
+  const SurfaceMesh seen = load_surface(folder.path / "o/ply/frame_00000.ply");
+  CHECK(seen.triangles == load_surface(folder.path / "open.obj").triangles);
+  CHECK(fs::exists(folder.path / "o/surface.npy"));
+  CHECK(fs::exists(folder.path / "o/surface_faces.npy"));
+  const auto refused = run_program::program("run --scene s.json --set bodies.0.wrap=false --out o", folder);
+  CHECK(refused.status == 2);
+  CHECK(contains(refused.err, "surface is open"));
+}
+
+TEST_CASE("render: a carried surface looks as its own mesh would, also deformed") {
+  const Folder folder;
+  Stage stage(tetrahedralise(sphere(8), "pYq1.4"));
+  const Image background = stage.empty(), plain = stage.image();
+  stage.renderer.carried = carry(sphere(24), stage.mesh, "sphere");
+  const auto like = [&](const Image& a, const Image& b) {
+    const Difference first = difference(a, background), second = difference(b, background);
+    CHECK(first.count > 3000);
+    CHECK(std::abs(first.count - second.count) < first.count / 20);
+    CHECK(glm::all(glm::lessThanEqual(glm::abs(first.low - second.low), glm::ivec2(3))));
+    CHECK(glm::all(glm::lessThanEqual(glm::abs(first.high - second.high), glm::ivec2(3))));
+    CHECK(difference(a, b, 40).count < first.count / 20);  // the light on it, too
+  };
+  like(plain, stage.image());
+  stage.frame.options.shadow = true;
+  stage.frame.ground = -1.0f;
+  stage.image();
+  stage.frame.options.shadow = false;
+  stage.frame.ground.reset();
+  for (glm::dvec3& p : stage.mesh.positions) p = {0.6 * p.x + 0.3 * p.y, 1.2 * p.y, p.z + 0.4 * p.x};
+  stage.move(1);
+  const Image moved = stage.image();
+  stage.frame.options.look = Look::tets;  // shows what is simulated
+  stage.image();
+  stage.frame.options.look = Look::surface;
+  stage.frame.options.colour = Colour::volume;
+  stage.image();
+  stage.frame.options.colour = Colour::plain;
+  stage.renderer.carried = {};
+  like(stage.image(), moved);
+  CHECK(gl_error_count() == 0);
 }

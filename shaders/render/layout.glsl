@@ -21,6 +21,11 @@
 #define UNIT_SHADOW 0        // compared by the sampler
 #define UNIT_SHADOW_DEPTH 1  // the same texture as plain depth
 #define UNIT_PLANES 2        // what light arrives on planes
+#define UNIT_POSITIONS 3     // of vertices that carry a fine surface, and what else of them ...
+#define UNIT_TETS 4
+#define UNIT_REST 5
+#define UNIT_COFACTORS 6
+#define UNIT_VALUES 7
 #define IMAGE_PLANES 0       // the same, as it is made
 // Vertex attributes; of the surface HIGH is a corner's place and LOW what is left of it by the cut.
 #define ATTRIBUTE_HIGH 0
@@ -29,6 +34,7 @@
 #define ATTRIBUTE_VALUE 3
 #define ATTRIBUTE_REST 4
 #define ATTRIBUTE_VELOCITY 5
+#define ATTRIBUTE_CARRIED 0
 
 #define COLOUR_PLAIN 0
 #define COLOUR_VOLUME 1

@@ -12,6 +12,7 @@
 
 #include "sim/mesh/tet_mesh.h"
 #include "sim/mesh/text_file.h"
+#include "sim/mesh/wrap.h"
 
 namespace tetpbd {
 namespace {
@@ -185,11 +186,23 @@ Polygons read_ply(const fs::path& file) {
       for (const PlyProperty& property : element.properties) {
         const double length = property.length ? value(*property.length) : 1;
         if (!(length >= 0)) text.fail("length of a list is negative");
-        const bool is_face = element.name == "face" && property.name.starts_with("vertex_ind");
+        const bool is_list = property.name.starts_with("vertex_ind");
+        const bool is_face = is_list && element.name == "face",
+                   is_strip = is_list && element.name == "tristrips";
         if (is_face) mesh.faces.emplace_back();
+        Polygon strip;  // each corner ends a triangle, every other one turned; -1 ends the strip
         for (double k = 0; k < length; ++k) {
           const double number = value(*property.type);
           if (is_face) mesh.faces.back().push_back(corner(number));
+          if (is_strip) {
+            if (number == -1) {
+              strip.clear();
+              continue;
+            }
+            strip.push_back(corner(number));
+            if (const std::size_t n = strip.size(); n > 2)
+              mesh.faces.push_back({strip[n - 3 + (n % 2 == 0)], strip[n - 2 - (n % 2 == 0)], strip[n - 1]});
+          }
           const std::size_t axis = std::string_view("x y z").find(property.name) / 2;  // names have no blank
           if (axis < 3) position[int(axis)] = number;
         }
@@ -269,7 +282,7 @@ void weld(SurfaceMesh& surface, double tolerance) {
 
 bool is_surface_file(const fs::path& file) { return reader_of(file) != std::end(readers); }
 
-SurfaceMesh load_surface(const fs::path& file) {
+SurfaceMesh load_as_is(const fs::path& file) {
   if (!is_surface_file(file))
     throw Error("not a surface format", file.string(), "use .ply, .obj, .stl or .off");
   Polygons mesh = reader_of(file)->second(file);
@@ -286,6 +299,11 @@ SurfaceMesh load_surface(const fs::path& file) {
                   "export the surface as triangles");
     add_triangles(surface, std::move(mesh.faces[f]));
   }
+  return surface;
+}
+
+SurfaceMesh load_surface(const fs::path& file) {
+  SurfaceMesh surface = load_as_is(file);
   weld(surface, weld_tolerance * bounds(surface.positions).size());
   if (surface.triangles.empty())
     throw Error("file holds no triangle", file.string(), "export the surface as triangles or polygons");

@@ -18,6 +18,9 @@ bool can_wrap();
 /// The outer side of all that is nearer than `thickness` to a triangle: closed, and a solid. Throws Error.
 SurfaceMesh wrap(const SurfaceMesh& surface, const WrapOptions& options, const std::string& source);
 
+/// load_surface() without welding and dropping: for repair(), which says what it does.
+SurfaceMesh load_as_is(const std::filesystem::path& file);
+
 struct Filled {
   TetMesh mesh;
   std::string note;  ///< what was wrapped, and why; empty where the surface itself was filled

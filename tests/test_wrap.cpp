@@ -162,6 +162,12 @@ TEST_CASE("wrap: a sound surface is left alone, a hopeless one refused" * needs_
   CHECK(contains(error_of([&] { fill_or_wrap(lost, coarse, WrapOptions{}, false, "lost.obj"); }),
                  "2 positions are not finite numbers: 1 vertex, first vertex 3 in lost.obj: "));
   CHECK(contains(error_of([&] { wrap({}, {}, "nothing.obj"); }), "nothing.obj"));
+  SurfaceMesh scan = sphere(20);
+  scan.triangles.resize(scan.triangles.size() - 30);  // a small hole does not make it hollow
+  CHECK(mesh_volume(fill_or_wrap(scan, coarse, WrapOptions{30, 1}, false, "scan.obj").mesh) > 4.2);
+  SurfaceMesh bowl = sphere(20);
+  std::erase_if(bowl.triangles, [&](const Triangle& t) { return bowl.positions[t[0]].z > 0.1; });
+  CHECK(mesh_volume(fill_or_wrap(bowl, coarse, WrapOptions{30, 1}, false, "bowl.obj").mesh) < 1.9);
   const SurfaceMesh round = wrap(cube(), {40, 1}, "cube.obj");
   const Bounds box = bounds(round.positions);
   CHECK(box.low.x == doctest::Approx(-std::sqrt(3.0) / 40).epsilon(0.05));

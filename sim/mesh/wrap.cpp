@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <numeric>
 
 #include "sim/mesh/cache.h"
 #include "sim/mesh/disjoint_sets.h"
@@ -36,18 +38,40 @@ Grid in_voxels(const std::vector<glm::dvec3>& positions, const glm::dvec3& origi
   return result;
 }
 
-// No edge has an odd number of triangles: then inside and outside are apart.
-bool is_closed(const std::vector<Triangle>& triangles) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+// Those with an odd number of triangles; without any, inside and outside are apart.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> open_edges(const std::vector<Triangle>& triangles) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges, open;
   for (const Triangle& t : triangles)
     for (std::size_t k = 0; k < 3; ++k) edges.push_back(std::minmax(t[k], t[(k + 1) % 3]));
   std::ranges::sort(edges);
   for (auto first = edges.begin(); first != edges.end();) {
     const auto next = std::find_if(first, edges.end(), [&](const auto& edge) { return edge != *first; });
-    if ((next - first) % 2) return false;
+    if ((next - first) % 2) open.push_back(*first);
     first = next;
   }
-  return true;
+  return open;
+}
+
+// Fans over small holes, as scans have them, lest the wrap goes in and the body is hollow. What is wide open,
+// a bowl or a cloth, stays so.
+void close_holes(SurfaceMesh& surface) {
+  constexpr double widest = 0.25;  // of the surface's size
+  const auto edges = open_edges(surface.triangles);
+  DisjointSets holes(surface.positions.size());
+  for (const auto& [a, b] : edges) holes.join(a, b);
+  std::map<std::uint32_t, std::vector<glm::dvec3>> rims;  // by root
+  for (const auto& [a, b] : edges)
+    for (const std::uint32_t v : {a, b}) rims[holes.root(a)].push_back(surface.positions[v]);
+  std::map<std::uint32_t, std::uint32_t> middles;
+  const double size = bounds(surface.positions).size();
+  for (const auto& [root, rim] : rims) {
+    if (bounds(rim).size() > widest * size) continue;
+    middles[root] = std::uint32_t(surface.positions.size());
+    surface.positions.push_back(std::accumulate(rim.begin(), rim.end(), glm::dvec3(0)) / double(rim.size()));
+  }
+  for (const auto& [a, b] : edges)
+    if (const auto middle = middles.find(holes.root(a)); middle != middles.end())
+      surface.triangles.push_back({a, b, middle->second});
 }
 
 // By the solid angles of the triangles (A. Van Oosterom and J. Strackee, 1983): 4 pi inside, 0 outside.
@@ -175,13 +199,15 @@ SurfaceMesh wrap(const SurfaceMesh& surface, const WrapOptions& options, const s
   require_openvdb("wrapping", source);
   require_readable_positions(surface, source);
   const Bounds box = bounds(surface.positions);
+  SurfaceMesh closed = surface;
+  close_holes(closed);
   std::string defect;
   // A level set may touch itself within a cell: another grid cuts it elsewhere.
   for (const double finer : {1.0, 1.07, 0.93, 1.15}) {
     const double voxel = box.size() / options.voxels / finer;
     const glm::dvec3 origin = box.low - 0.37 * voxel;  // so that flat sides lie between grid points
-    const Grid points = in_voxels(surface.positions, origin, voxel);
-    SurfaceMesh result = level_set({points, surface.triangles}, options.thickness);
+    const Grid points = in_voxels(closed.positions, origin, voxel);
+    SurfaceMesh result = level_set({points, closed.triangles}, options.thickness);
     keep_outermost(result);
     for (glm::dvec3& p : result.positions) p = origin + p * voxel;
     repair(result);
@@ -243,7 +269,7 @@ DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::
   if (unseal(left, key) && take_array(left, field.values) && field.values.size() == count) return field;
 
   const Grid points = in_voxels(surface.positions, field.origin, field.spacing);
-  bool is_signed = is_closed(surface.triangles);
+  bool is_signed = open_edges(surface.triangles).empty();
   if (is_signed) {
     field.values = grid_values({points, surface.triangles}, field.size, true);
     is_signed = std::ranges::min(field.values) < 0;  // else two-sided sheets

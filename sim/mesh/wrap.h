@@ -15,7 +15,8 @@ struct WrapOptions {
 
 /// Whether the program was built with OpenVDB.
 bool can_wrap();
-/// The outer side of all that is nearer than `thickness` to a triangle: closed, and a solid. Throws Error.
+/// The outer side of all that is nearer than `thickness` to a triangle, or to one across a hole narrower than
+/// a quarter of the surface: closed, and a solid. Throws Error.
 SurfaceMesh wrap(const SurfaceMesh& surface, const WrapOptions& options, const std::string& source);
 
 /// load_surface() without welding and dropping: for repair(), which says what it does.

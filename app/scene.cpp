@@ -12,6 +12,7 @@
 #include "app/auto_solver.h"
 #include "app/obstacles.h"
 #include "app/run_loop.h"
+#include "render/shapes.h"
 #include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/layout.h"
@@ -479,7 +480,7 @@ std::string setting_text(const Parameter& row, const json& value) {
   return text.empty() ? "none" : text;
 }
 
-std::shared_ptr<const Model> build_model(const Scene& scene) {
+std::shared_ptr<Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   bool carries = false;
   for (const BodyDescription& body : scene.bodies) {
@@ -534,6 +535,7 @@ Camera scene_camera(const Scene& scene, const Model& model, float aspect) {
   const Bounds rest = bounds(model.rest.positions);
   box.low = glm::min(box.low, rest.low);
   box.high = glm::max(box.high, rest.high);
+  box = with_shapes(box, model, 0, 2 * box.size());
   if (scene.settings.ground) box.low.y = std::min(box.low.y, scene.settings.ground_height);
   Camera camera;
   frame_box(camera, glm::vec3(box.low), glm::vec3(box.high), aspect);

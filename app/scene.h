@@ -94,7 +94,7 @@ nlohmann::ordered_json scene_json(const Scene& scene);
 /// The text that set_parameter() takes; lists are those of words.
 std::string setting_text(const Parameter& row, const nlohmann::json& value);
 /// Meshes loaded and tetrahedralised, placed, deformed.
-std::shared_ptr<const Model> build_model(const Scene& scene);
+std::shared_ptr<Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.
 Camera scene_camera(const Scene& scene, const Model& model, float aspect);
 

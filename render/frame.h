@@ -104,8 +104,11 @@ struct Frame {
   Camera camera;
   Viewport viewport;
   ViewOptions options;
-  std::optional<float> ground;    ///< height, metres
-  std::vector<glm::vec4> planes;  ///< walls: dot(xyz, x) = w, xyz of unit length towards the bodies
+  std::optional<float> ground;         ///< height, metres
+  std::vector<glm::vec4> planes;       ///< walls: dot(xyz, x) = w, xyz of unit length towards the bodies
+  std::shared_ptr<const Model> model;  ///< whose shapes are drawn, as they stand at `time`; none: none
+  double time = 0;                     ///< s
+  int chosen_shape = -1;               ///< shown in another colour
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
   std::vector<std::uint32_t> worst;            ///< as rings, also through the body
   std::string caption;                         ///< upper left

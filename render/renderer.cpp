@@ -1,6 +1,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <glm/gtc/color_space.hpp>
 #include <glm/gtc/matrix_transform.hpp>
@@ -35,6 +36,8 @@ const std::map<std::string, Recipe> recipes = {
     {"caps shadow", {{"render/body.vert", "render/caps.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"background", {{"render/background.vert", "render/background.frag"}, {}}},
     {"plane", {{"render/plane.vert", "render/plane.frag"}, {}}},
+    {"shapes", {{"render/shape.vert", "render/body.frag"}, {"SHAPE"}}},
+    {"shapes shadow", {{"render/shape.vert", "render/depth.frag"}, {"SHADOW"}}},
     {"graph", {{"render/body.vert", "render/graph.geom", "render/graph.frag"}, {}}},
     {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
     {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},
@@ -139,9 +142,20 @@ glm::vec4 cut_plane(const Renderer& renderer, const ViewOptions& options) {
   return glm::vec4(n, options.is_cut() ? glm::dot(n, middle) + half * float(2 * options.cut - 1) : 1e30f);
 }
 
+// Farther from the bodies, in their size, obstacles play no part in the light.
+constexpr float shape_reach = 3;
+
+bool has_shapes(const Frame& frame) { return frame.model && !frame.model->shapes.empty(); }
+
 std::vector<glm::vec4> planes_of(const Frame& frame) {
   std::vector<glm::vec4> planes = frame.planes;
   if (frame.ground) planes.insert(planes.begin(), glm::vec4(0, 1, 0, *frame.ground));
+  for (std::size_t i = 0; frame.model && i < frame.model->shapes.size(); ++i) {
+    const Obstacle& shape = frame.model->shapes[i];
+    if (shape.shape != SHAPE_PLANE) continue;
+    const Pose pose = pose_at(shape, frame.time);
+    planes.emplace_back(glm::vec3(pose.axes[1]), float(glm::dot(pose.axes[1], pose.centre)));
+  }
   planes.resize(std::min<std::size_t>(planes.size(), MAX_PLANES));
   return planes;
 }
@@ -281,9 +295,14 @@ void fit_light(Renderer& renderer, const Frame& frame) {
   }
   const std::size_t count = renderer.mesh.positions.size();
   const float rest_size = glm::length(renderer.rest_high - renderer.rest_low);
+  shadow.size = has_shapes(frame) ? 1536 : 512;  // obstacles are larger than bodies
   const Program& kernel = use(renderer, "shadow fit");
   kernel.set("count", unsigned(count));
-  kernel.set("map_size", float(Shadow::size));
+  kernel.set("map_size", float(shadow.size));
+  const Bounds nothing{glm::dvec3(1e30), glm::dvec3(-1e30)};
+  const Bounds shapes = frame.model ? with_shapes(nothing, *frame.model, frame.time, INFINITY) : nothing;
+  kernel.set("shapes_low", glm::vec3(shapes.low)), kernel.set("shapes_high", glm::vec3(shapes.high));
+  kernel.set("reach", shape_reach * rest_size);
   // Centre and radius of what is worth a shadow: a blown-up vertex must not take the whole map.
   kernel.set("limit", glm::vec4(frame.camera.target, 4.0f * std::max(frame.camera.distance, rest_size)));
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
@@ -299,9 +318,10 @@ void fit_light(Renderer& renderer, const Frame& frame) {
 void make_map(Shadow& shadow) {
   Texture depth("shadow depth");
   clear_errors();
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, Shadow::size, Shadow::size, 0, GL_DEPTH_COMPONENT,
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow.size, shadow.size, 0, GL_DEPTH_COMPONENT,
                GL_FLOAT, nullptr);
-  check_memory("the shadow map", std::size_t(Shadow::size) * Shadow::size * 4);
+  shadow.depth_size = shadow.size;
+  check_memory("the shadow map", std::size_t(shadow.size) * std::size_t(shadow.size) * 4);
   shadow.depth = std::move(depth);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
   shadow.framebuffer = Framebuffer("shadow");
@@ -324,9 +344,9 @@ void make_map(Shadow& shadow) {
 }
 
 void draw_shadow_map(Renderer& renderer, const Frame& frame, GLuint values) {
-  if (!renderer.shadow.depth) make_map(renderer.shadow);
+  if (renderer.shadow.depth_size != renderer.shadow.size) make_map(renderer.shadow);
   glBindFramebuffer(GL_FRAMEBUFFER, renderer.shadow.framebuffer.id());
-  glViewport(0, 0, Shadow::size, Shadow::size);
+  glViewport(0, 0, renderer.shadow.size, renderer.shadow.size);
   glDisable(GL_SCISSOR_TEST);
   glDepthMask(GL_TRUE);
   glClear(GL_DEPTH_BUFFER_BIT);
@@ -335,6 +355,9 @@ void draw_shadow_map(Renderer& renderer, const Frame& frame, GLuint values) {
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
   draw_bodies(renderer, frame, values, true);
+  glEnable(GL_DEPTH_CLAMP);  // shapes may reach farther than the map
+  draw_shapes(renderer, frame, true);
+  glDisable(GL_DEPTH_CLAMP);
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
@@ -353,7 +376,8 @@ void bind_shadows(const Shadow& shadow) {
 // As fine as the picture needs it.
 void light_planes(Renderer& renderer, const Frame& frame, int count) {
   Shadow& shadow = renderer.shadow;
-  const int size = std::clamp(frame.viewport.height / 32 * 16, 128, 512);  // whole work-groups
+  const int part = has_shapes(frame) ? 16 : 32;
+  const int size = std::clamp(frame.viewport.height / part * 16, 128, 512);  // whole work-groups
   if (shadow.planes_size != size || shadow.planes_count != count) {
     shadow.planes = Texture("light on planes");
     clear_errors();
@@ -417,8 +441,8 @@ void draw_surroundings(Renderer& renderer, const Frame& frame) {
 // However drawing ends, by a shader that does not compile, too.
 struct Afterwards {
   ~Afterwards() {
-    for (GLenum what :
-         {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL})
+    for (GLenum what : {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL,
+                        GL_DEPTH_CLAMP})
       glDisable(what);
     for (int unit : {UNIT_SHADOW, UNIT_SHADOW_DEPTH, UNIT_PLANES}) glBindSampler(GLuint(unit), 0);
     glBindVertexArray(0);
@@ -501,6 +525,7 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   frame.material = energy_material(sim.settings);
   frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
   frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
+  frame.model = sim.model, frame.time = time_of(sim);
   for (std::uint32_t v = 0; v < sim.inverse_masses.size(); ++v)
     if (!(sim.inverse_masses[v] > 0)) frame.pinned.push_back(v);
   frame.target = target.framebuffer.id();
@@ -542,6 +567,8 @@ void draw(Renderer& renderer, const Frame& frame) {
   glDepthFunc(GL_LESS);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
   const bool surroundings = options.backdrop && !frame.over, mixed = options.look == Look::graph;
+  glDisable(GL_BLEND);
+  if (!frame.over) draw_shapes(renderer, frame, false);
   if (surroundings && mixed) draw_surroundings(renderer, frame);
   if (frame.opacity == 1)
     glDisable(GL_BLEND);

@@ -11,6 +11,7 @@
 
 #include "render/frame.h"
 #include "render/legend.h"
+#include "render/shapes.h"
 #include "sim/model.h"
 
 namespace tetpbd {
@@ -23,11 +24,11 @@ struct VertexGather {
   explicit operator bool() const { return bool(values); }
 };
 
-/// The key light's depth image of the bodies, fitted to where they are by the GPU (no read-back).
+/// The key light's depth image of bodies and obstacles, fitted to where they are by the GPU (no read-back).
 struct Shadow {
-  static constexpr int size = 512;  ///< texels a side
-  Buffer bounds, light;             ///< light: the uniform block
-  Buffer centre;                    ///< a copy of its `centre`, on its way back
+  int size = 0, depth_size = 0;  ///< texels a side, wanted and made
+  Buffer bounds, light;          ///< light: the uniform block
+  Buffer centre;                 ///< a copy of its `centre`, on its way back
   Fence centre_copied;
   Texture depth;
   Texture planes;  ///< what light arrives on each: maps beside each other
@@ -57,6 +58,7 @@ struct Renderer {
   std::map<Colour, VertexGather> values;
   Buffer values_copy;  ///< on its way back
   Fence values_copied;
+  ShapeSurfaces shapes;
   Shadow shadow;
   Legend legend;
 };

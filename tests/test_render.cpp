@@ -9,6 +9,7 @@
 
 #include "render/layout.h"
 #include "sim/error.h"
+#include "sim/moving_shape.h"
 #include "tests/render_stage.h"
 
 namespace colour_maps {
@@ -601,5 +602,58 @@ TEST_CASE("render: block layouts are what the shaders see") {
   };
   CHECK(block_bytes(stage.renderer.programs.at("surface"), "ViewBlock") == sizeof(View));
   CHECK(block_bytes(stage.renderer.programs.at("surface"), "LightBlock") == sizeof(Light));
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: a shape's surface is where its distance is zero, and faces outward") {
+  std::vector<Obstacle> shapes(5);
+  shapes[0].shape = SHAPE_SPHERE, shapes[1].shape = SHAPE_CAPSULE, shapes[2].shape = SHAPE_BOX;
+  shapes[3].shape = SHAPE_CYLINDER, shapes[4].shape = SHAPE_HEIGHTS;
+  for (Obstacle& o : shapes) {
+    o.radius = 0.3, o.half_length = 0.5, o.half = {0.4, 0.2, 0.3};
+    if (o.shape == SHAPE_HEIGHTS)
+      set_heights(o, {{0.2, 0.5, 1}, {0.4, 0.6, 0.3}, {0.1, 0, 0.5}, {0.3, 0.3, 0.2}});
+    CAPTURE(o.shape);
+    const auto corners = tessellated(o);
+    const MovingShape exact = moving_shape(o, 0, 0, 0, 0);
+    double volume = 0, farthest = 0;
+    for (std::size_t c = 0; c < corners.size(); c += 3) {
+      const glm::dvec3 p[] = {glm::dvec3(corners[c].position), glm::dvec3(corners[c + 1].position),
+                              glm::dvec3(corners[c + 2].position)};
+      volume += glm::dot(p[0], glm::cross(p[1], p[2])) / 6;
+      for (const glm::dvec3& x : p)
+        if (o.shape != SHAPE_HEIGHTS || x.y > -0.19)
+          farthest = std::max(farthest, std::abs(exact.surface_at(x).distance));
+    }
+    CHECK(farthest < 0.01);  // edges of boxes and cylinders are a little round
+    const double pi = 3.14159265, r = o.radius, l = o.half_length;
+    const double right[] = {4 * pi / 3 * r * r * r, 4 * pi / 3 * r * r * r + 2 * pi * r * r * l,
+                            8 * 0.4 * 0.2 * 0.3, 2 * pi * r * r * l};
+    if (o.shape != SHAPE_HEIGHTS) CHECK(volume == doctest::Approx(right[o.shape - 1]).epsilon(0.02));
+  }
+}
+
+TEST_CASE("render: obstacles are seen, where they stand by then, and cast shadow on bodies and ground") {
+  Stage stage;
+  stage.move(0.5, {0, 0.3, 0});
+  stage.frame.ground = 0.0f;
+  stage.frame.camera = {.target = {0, 0.5f, 0}, .distance = 5, .azimuth = -60, .elevation = 30};
+  stage.frame.options.shadow = true, stage.frame.options.grid = false;
+  const Image without = stage.image();
+  Model model;
+  Obstacle& plate = model.shapes.emplace_back();
+  plate.shape = SHAPE_BOX;
+  plate.half = {0.5, 0.05, 0.5}, plate.centre = {0.6, 1.2, 0.45}, plate.velocity = {0, 2, 0};
+  stage.frame.model = std::make_shared<const Model>(model);
+  const Image with = stage.image();
+  const auto seen = [&](const Image& image, const glm::vec3& p) {
+    return brightness(pixel(image, project(stage.frame.camera, p, width, height)));
+  };
+  CHECK(pixel(with, project(stage.frame.camera, {0.6f, 1.25f, 0.45f}, width, height)).z >
+        pixel(with, project(stage.frame.camera, {0.6f, 1.25f, 0.45f}, width, height)).x + 5);
+  CHECK(seen(with, {0, 0.55f, 0}) < seen(without, {0, 0.55f, 0}) - 20);        // the body's top
+  CHECK(seen(with, {0.3f, 0, 0.35f}) < seen(without, {0.3f, 0, 0.35f}) - 20);  // the ground
+  stage.frame.time = 10;
+  CHECK(difference(stage.image(), without, 20).count < 300);  // the light's map is coarser
   CHECK(gl_error_count() == 0);
 }

@@ -23,7 +23,11 @@ float edge_cover(vec3 barycentric) {
 
 void main() {
   int kind = int(view.colour.x);
+#ifdef SHAPE
+  bool plain = true;
+#else
   bool plain = kind == COLOUR_PLAIN;
+#endif
   vec3 albedo = plain ? point.albedo : scale_colour(kind, point.value, view.colour.y, view.colour.z);
   vec3 normal = normalize(gl_FrontFacing ? point.normal : -point.normal);
   vec3 colour = shade(albedo, point.position, normal, plain);

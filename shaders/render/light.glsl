@@ -32,7 +32,7 @@ vec2 arriving(vec3 position, float plane) {
 float body_shadow(vec3 position, vec3 normal, float facing) {
   if (view.right.w == 0.0) return 1.0;
   vec3 s = light_space(position + normal * light.centre.w * (1.0 + 1.5 * (1.0 - facing))) * 0.5 + 0.5;
-  s.z -= 0.5 * light.centre.w / light.extent.x;
+  s.z = min(s.z - 0.5 * light.centre.w / light.extent.x, 1.0);
   const vec2 around[4] = vec2[](vec2(-0.4, -1.0), vec2(1.0, -0.4), vec2(0.4, 1.0), vec2(-1.0, 0.4));
   float texel = 0.5 * light.centre.w / light.extent.y, lit = 0.0;
   for (int i = 0; i < 4; ++i) lit += texture(shadow_map, vec3(s.xy + texel * around[i], s.z));

@@ -1,6 +1,6 @@
 // The shadow map's projection around the bodies' bounds: least and greatest x, y, z of all finite positions, as integers of the
 // same order, since minimum and maximum of integers are atomic and do not depend on the order of threads; then, by the
-// work-group that ends last, the projection. Its size goes in steps and its centre by whole texels, so that shadow edges
+// work-group that ends last, the projection, which also takes in obstacles. Its size goes in steps and its centre by whole texels, so that shadow edges
 // do not crawl while a body moves.
 #include "layout.glsl"
 #include "render/view.glsl"
@@ -14,6 +14,8 @@ layout(std430, binding = BIND_RENDER_FIT) writeonly buffer Fit { Light fitted; }
 uniform uint count;
 uniform float map_size;  // texels
 uniform vec4 limit;      // centre and radius of what is worth a shadow
+uniform vec3 shapes_low, shapes_high;  // bounds of obstacles; the other way round where there are none
+uniform float reach;     // how far from the bodies these matter
 
 shared uint low_bits[3], high_bits[3];
 
@@ -53,8 +55,14 @@ void fit_light() {
   }
   for (int a = 0; a < 3; ++a) bounds[a] = ~0u, bounds[3 + a] = 0u;  // for the next picture
   done = 0u;
-  vec3 centre = 0.5 * (low + high);
+  vec3 centre = 0.5 * (low + high), bodies = centre;
   vec3 half_size = max(0.5 * (high - low) * (1.0 + view.tets.y), vec3(1e-4 * limit.w));
+  if (shapes_low.x <= shapes_high.x) {
+    low = min(centre - half_size, clamp(shapes_low, low - reach, high + reach));
+    high = max(centre + half_size, clamp(shapes_high, low - reach, high + reach));
+    centre = 0.5 * (low + high);
+    half_size = 0.5 * (high - low);
+  }
   vec3 z = key_direction;
   vec3 x = normalize(cross(vec3(0.0, 1.0, 0.0), z));
   vec3 y = cross(z, x);
@@ -67,7 +75,7 @@ void fit_light() {
   vec4 row0 = vec4(x, -middle.x) / across, row1 = vec4(y, -middle.y) / across;
   vec4 row2 = vec4(-z, front) / depth - vec4(0.0, 0.0, 0.0, 1.0);
   fitted.matrix = transpose(mat4(row0, row1, row2, vec4(0.0, 0.0, 0.0, 1.0)));
-  fitted.centre = vec4(centre, texel);
+  fitted.centre = vec4(bodies, texel);
   fitted.extent = vec4(2.0 * depth, across, 0.0, 0.0);
 }
 

@@ -420,6 +420,7 @@ void draw_panel(Session& s) {
     if (group.name == std::string_view("Solver")) draw_solver(s);
     draw_settings(s, group);
   }
+  if (section(s, "Obstacles", !s.loaded.scene.obstacles.empty())) draw_obstacles(s);
   if (section(s, "View")) draw_view(s);
   if (section(s, "Side by side", false)) draw_lane_rows(s);
   if (section(s, "Stability map", false)) draw_map(s);

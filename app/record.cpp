@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"
+#include "app/edit_obstacles.h"
 #include "app/files.h"
+#include "app/obstacles.h"
 #include "app/session.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -169,6 +171,10 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
     lanes = std::move(made);
     s.loaded.chosen = 0;
     start_lanes(s);
+  } else if (a.contains("obstacles")) {
+    std::vector<Obstacle> wanted;
+    for (const ordered_json& o : a["obstacles"]) wanted.push_back(read_obstacle(o, "obstacles", where, {}));
+    change_obstacles(s, std::move(wanted));
   } else if (a.contains("reset")) {
     restart(s);
   } else if (a.contains("set")) {

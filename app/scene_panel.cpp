@@ -3,6 +3,10 @@
 #include <imgui.h>
 #include <imgui_stdlib.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "app/edit_obstacles.h"
 #include "app/files.h"
 #include "app/ui.h"
 #include "app/widgets.h"
@@ -106,6 +110,91 @@ void draw_scene(Session& s) {
   ImGui::BeginDisabled(s.changes.future.empty());
   if (button(s, "Redo", "redo", "what was taken back, again\nCtrl+Y, Ctrl+Shift+Z", width)) redo(s);
   ImGui::EndDisabled();
+}
+
+namespace {
+
+// Three numbers, or one.
+bool drag_field(Session& s, const char* label, double* value, int count, double speed, double low,
+                const char* format, const char* help) {
+  const double most = 1e6;
+  const bool changed = ImGui::DragScalarN(begin_row(s, label).c_str(), ImGuiDataType_Double, value, count,
+                                          float(speed), &low, &most, format, ImGuiSliderFlags_AlwaysClamp);
+  end_row(s, label, help);
+  return changed && std::all_of(value, value + count, [](double x) { return std::isfinite(x); });
+}
+
+// Of its own, or the world's, to which a right click goes back.
+bool own_or_worlds(Session& s, const char* label, std::optional<double>& own, double worlds, double most) {
+  double value = own.value_or(worlds);
+  if (!slider(s, label, value, worlds, 0, most, "%.3g", "of its own; right click: the world's")) return false;
+  own = value == worlds ? std::nullopt : std::optional(value);
+  return true;
+}
+
+bool obstacle_fields(Session& s, Obstacle& o) {
+  const Settings& world = s.loaded.sim().settings;
+  const double step = 0.005 * s.loaded.sim().model->size, least = 1e-3 * s.loaded.sim().model->size;
+  const int shape = o.shape;
+  const bool sized = shape == SHAPE_BOX || shape == SHAPE_HEIGHTS, flat = shape == SHAPE_PLANE;
+  bool changed = false, others = false;
+  glm::dvec3 centre = o.centre, rotation = o.rotation;
+  if (drag_field(s, "centre", &centre.x, 3, step, -1e6, "%.3f", "m, at the start"))
+    move_by(o, centre - o.centre), changed = true;
+  if (!flat &&
+      drag_field(s, "rotation", &rotation.x, 3, 1, -3600, "%.1f", "degrees about x, then y, then z")) {
+    for (Obstacle::Key& key : o.keyframes) key.rotation += rotation - o.rotation;
+    o.rotation = rotation, changed = true;
+  }
+  if (flat) {
+    const glm::dvec3 before = o.normal;
+    if (drag_field(s, "normal", &o.normal.x, 3, 0.01, -1e3, "%.2f", "points to where bodies may be"))
+      glm::length(o.normal) > 1e-3 ? void(changed = true) : void(o.normal = before);
+  }
+  if (shape == SHAPE_SPHERE || shape == SHAPE_CAPSULE || shape == SHAPE_CYLINDER)
+    changed |= drag_field(s, "radius", &o.radius, 1, step, least, "%.3f m", "m");
+  if (shape == SHAPE_CAPSULE || shape == SHAPE_CYLINDER)
+    changed |=
+        drag_field(s, "half length", &o.half_length, 1, step, least, "%.3f m", "m, along its own y axis");
+  if (sized)
+    others |= drag_field(s, "half", &o.half.x, 3, step, least, "%.3f", "m, half lengths along its own axes");
+  if (shape == SHAPE_GRID && o.height > 0)
+    others |= drag_field(s, "height", &o.height, 1, step, least, "%.3f m", "m");
+  changed |= own_or_worlds(s, "its friction", o.friction, world.friction, 2);
+  changed |= own_or_worlds(s, "its restitution", o.restitution, world.restitution, 1);
+  if (o.keyframes.empty()) {
+    changed |= drag_field(s, "velocity", &o.velocity.x, 3, step, -1e5, "%.2f", "m/s; all start anew");
+    changed |=
+        drag_field(s, "spin", &o.spin.x, 3, 0.02, -1e5, "%.2f", "rad/s about its centre; all start anew");
+  } else {
+    ImGui::TextDisabled("moves through %zu keyframes", o.keyframes.size());
+  }
+  if (others) o.field = nullptr;
+  return changed || others;
+}
+
+}  // namespace
+
+void draw_obstacles(Session& s) {
+  const Words shapes(shape_names.begin(), shape_names.end());
+  if (const auto chosen =
+          combo(s, "add obstacle", "", shapes,
+                "one more, beside the bodies; a mesh: the file of the path above. Click on one in the "
+                "view to choose it, then drag to move, Ctrl + drag to turn"))
+    add_obstacle(s, int(std::ranges::find(shapes, *chosen) - shapes.begin()));
+  for (int i = 0; i < int(s.loaded.scene.obstacles.size()); ++i) {
+    const Obstacle& o = s.loaded.scene.obstacles[std::size_t(i)];
+    const std::string name =
+        fmt::format("{} {}{}", i + 1, shape_names[std::size_t(o.shape)], moves(o) ? ", moving" : "");
+    if (ImGui::Selectable(name.c_str(), i == s.obstacle)) choose_obstacle(s, i == s.obstacle ? -1 : i);
+    mark(s, fmt::format("obstacle {}", i + 1));
+  }
+  if (s.obstacle < 0) return;
+  ImGui::PushID("obstacle");
+  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  if (obstacle_fields(s, wanted[std::size_t(s.obstacle)])) change_obstacles(s, std::move(wanted));
+  if (button(s, "Remove", "remove obstacle", "the chosen obstacle goes\nDelete", -1)) remove_obstacle(s);
+  ImGui::PopID();
 }
 
 }  // namespace tetpbd

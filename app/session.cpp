@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "app/edit_obstacles.h"
 #include "app/files.h"
 #include "app/reference_command.h"
 #include "app/run_loop.h"
@@ -38,13 +39,12 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
   return parameter_text(a, row) != parameter_text(b, row);
 }
 
-// The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
+}  // namespace
+
 void disturb(Session& s) {
   if (!std::exchange(s.loaded.disturbed, true))
     for (Lane& lane : s.loaded.lanes) lane.distance = {}, lane.apart = {};
 }
-
-}  // namespace
 
 void forget_errors(Session& s) {
   std::erase_if(s.messages,
@@ -123,7 +123,10 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
   const auto model = build_model(scene);
   if (const auto rule = choose_by_rule(scene, *model)) fmt::print("solver: {}\n", *rule);
   auto choice = choose_for(scene, model);
-  Loaded loaded{name, overrides, scene, scene.settings, {}, {}, {}, choice};
+  Loaded loaded{name, overrides, scene, scene.settings, model, {}, {}, {}, choice};
+  auto field = model->shapes.begin();
+  for (Obstacle& o : loaded.scene.obstacles)
+    if (!is_plane(o)) o = *field++;
   loaded.lanes.push_back({create_sim(model, scene.settings)});
   loaded.renderer = make_renderer(*model);
   loaded.picker = make_picker(model->rest);
@@ -220,12 +223,6 @@ void watch_state(Session& s) {
 
 namespace {
 
-std::vector<Settings> settings_of_lanes(const Session& s) {
-  std::vector<Settings> settings;
-  for (const Lane& lane : s.loaded.lanes) settings.push_back(lane.sim.settings);
-  return settings;
-}
-
 void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
   const Settings old = s.loaded.sim().settings;
   for (std::size_t i = 0; i < of_lanes.size(); ++i) {
@@ -255,6 +252,19 @@ void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
 
 }  // namespace
 
+Change settings_and_obstacles(const Session& s) {
+  Change now{{}, s.loaded.scene.obstacles};
+  for (const Lane& lane : s.loaded.lanes) now.lanes.push_back(lane.sim.settings);
+  return now;
+}
+
+void keep_change(Session& s, const Change& before) {
+  auto& [past, future, open] = s.changes;
+  if (!std::exchange(open, true)) past.push_back(before);
+  if (constexpr std::size_t most_kept = 200; past.size() > most_kept) past.erase(past.begin());
+  future.clear();
+}
+
 void change_settings(Session& s, const Settings& wanted) {
   const Settings old = s.loaded.sim().settings;
   // Nothing ends a step early, so a slider does not go where one takes minutes.
@@ -265,8 +275,8 @@ void change_settings(Session& s, const Settings& wanted) {
                               most));
   attempt(s, [&] {
     // Of all lanes, before any is changed.
-    const std::vector<Settings> before = settings_of_lanes(s);
-    std::vector<Settings> of_lanes = before;
+    const Change before = settings_and_obstacles(s);
+    std::vector<Settings> of_lanes = before.lanes;
     of_lanes[s.loaded.chosen] = wanted;
     for (Settings& own : of_lanes) {
       for (const Parameter& row : parameters())
@@ -274,23 +284,28 @@ void change_settings(Session& s, const Settings& wanted) {
           set_parameter(own, row, parameter_text(wanted, row), row.name);
       check_settings(own, "settings");
     }
-    if (of_lanes == before) return;
+    if (of_lanes == before.lanes) return;
     put_settings(s, of_lanes);
-    auto& [past, future, open] = s.changes;
-    if (!std::exchange(open, true)) past.push_back(before);
-    if (constexpr std::size_t most_kept = 200; past.size() > most_kept) past.erase(past.begin());
-    future.clear();
+    keep_change(s, before);
   });
 }
 
 namespace {
 
-void take_back(Session& s, const char* word, std::vector<std::vector<Settings>>& from,
-               std::vector<std::vector<Settings>>& to) {
+void take_back(Session& s, const char* word, std::vector<Change>& from, std::vector<Change>& to) {
   if (from.empty()) return say(s, fmt::format("nothing to {}", word));
   s.log("{}", word);
-  const std::vector<Settings> now = settings_of_lanes(s);
-  if (attempt(s, [&] { put_settings(s, from.back()); })) to.push_back(now);
+  const Change now = settings_and_obstacles(s);
+  const bool done = attempt(s, [&] {
+    put_settings(s, from.back().lanes);
+    const auto numbers = [](const std::vector<Obstacle>& all) {
+      std::vector<std::vector<double>> list;
+      for (const Obstacle& o : all) list.push_back(numbers_of(o));
+      return list;
+    };
+    if (numbers(now.obstacles) != numbers(from.back().obstacles)) put_obstacles(s, from.back().obstacles);
+  });
+  if (done) to.push_back(now);
   from.pop_back();
   s.changes.open = false;
 }
@@ -314,6 +329,7 @@ void choose_soon(Session& s) {
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset(), s.hold.reset();
   s.changes = {};
+  s.obstacle = -1;
   s.loaded = std::move(loaded);
   note_scene(s);
   if (!keep_camera) {
@@ -340,10 +356,13 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                     scene.settings = others.front();
                     others.erase(others.begin());
                     scene.mode_open = false, scene.budget_ms.reset();
+                    scene.obstacles = s.loaded.scene.obstacles;
                   }
                   Loaded loaded = load(name, overrides, scene);
                   if (keep_settings) loaded.own = s.loaded.own;
                   take_over(s, std::move(loaded), keep_camera);
+                  if (keep_settings && s.record)
+                    put_obstacles(s, s.loaded.scene.obstacles), s.loaded.disturbed = false;
                   const fs::path file = overrides.mesh.empty() ? fs::path(name) : overrides.mesh;
                   if (std::error_code error; fs::is_regular_file(file, error)) remember(s.ui.kept, file);
                   for (const Settings& own : others)

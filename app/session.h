@@ -33,8 +33,9 @@ struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
   Scene scene;
-  Settings own{};           ///< of the scene as it was asked for: what a setting goes back to
-  std::vector<Lane> lanes;  ///< one, or several side by side
+  Settings own{};                  ///< of the scene as it was asked for: what a setting goes back to
+  std::shared_ptr<Model> model{};  ///< of all lanes; its obstacles may change (edit_obstacles.h)
+  std::vector<Lane> lanes;         ///< one, or several side by side
   Renderer renderer;
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
@@ -129,9 +130,13 @@ struct Ui {
       {{0, 1, 2}, {1, 4, 5}}};  ///< plot_rows(): of one lane, of several
 };
 
-/// Settings of all lanes: before each change, and after those that were taken back.
+struct Change {
+  std::vector<Settings> lanes;
+  std::vector<Obstacle> obstacles;
+};
+/// As it was before each change, and after those that were taken back.
 struct Changes {
-  std::vector<std::vector<Settings>> past, future;
+  std::vector<Change> past, future;
   bool open = false;  ///< what changes now belongs to the last change, as long as a slider is held
 };
 
@@ -155,6 +160,8 @@ struct Session {
   std::optional<Grab> grab;                ///< by the mouse
   double grab_radius = usual_grab_radius;  ///< part of the size
   Changes changes;
+  int obstacle = -1;             ///< of the scene's, the chosen one; -1: none
+  bool moving_obstacle = false;  ///< by the mouse
   std::vector<Message> messages;
   std::optional<Task> task;
   double budget_ms = 0.5;           ///< for the solver auto
@@ -192,6 +199,10 @@ void restart(Session& session);
 void change_settings(Session& session, const Settings& wanted);
 /// Settings as they were before the last change, or again as they were after it.
 void undo(Session& session);
+Change settings_and_obstacles(const Session& session);
+void keep_change(Session& session, const Change& before);
+/// The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
+void disturb(Session& session);
 void redo(Session& session);
 /// The scene with the settings and the camera of now, into a file of its own, with a picture beside it.
 void save_scene(Session& session);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/edit_obstacles.h"
 #include "app/run_loop.h"
 #include "app/widgets.h"
 #include "render/legend.h"
@@ -33,6 +34,8 @@ void escape(Session& s) {
     flip(s, "help", s.ui.help);
   else if (s.grab)
     let_go(s);
+  else if (s.obstacle >= 0)
+    choose_obstacle(s, -1);
   else
     s.messages.clear();
 }
@@ -154,6 +157,7 @@ void draw_help(Session& s) {
       {"Wheel", "closer, farther"},
       {"Double click", "pin a vertex, or free it (or Ctrl + click)"},
       {"Alt + drag", "move the plane of a cut (or Alt + wheel)"},
+      {"Obstacle", "click: choose it, then drag: move, Ctrl + drag: turn"},
       {"Rest", "what a setting means, what is there on a body"},
       {"Right click", "on a setting: back to the scene's"},
       {"Ctrl + click", "on a slider: type a value"},
@@ -200,14 +204,18 @@ void draw_edge(Session& s, const Rect& panel) {
   ImGui::PopStyleVar(3);
 }
 
+// In window coordinates.
+ImVec2 seen_at(const Session& s, const Rect& place, const glm::dvec3& point) {
+  const glm::vec4 seen = projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) *
+                         glm::vec4(glm::vec3(point), 1);
+  return {place.x + place.width * (0.5f + 0.5f * seen.x / seen.w),
+          place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)};
+}
+
 // From what is held to the cursor: how far it lags says how hard it is pulled.
 void draw_pull(const Session& s, const Rect& view) {
   const Rect place = lane_place(s, s.loaded.chosen, view);
-  const glm::vec4 seen = projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) *
-                         glm::vec4(glm::vec3(s.grab->position), 1);
-  const ImVec2 from(place.x + place.width * (0.5f + 0.5f * seen.x / seen.w),
-                    place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)),
-      to = ImGui::GetIO().MousePos;
+  const ImVec2 from = seen_at(s, place, s.grab->position), to = ImGui::GetIO().MousePos;
   ImDrawList& draw = *ImGui::GetBackgroundDrawList();
   draw.PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y + place.height));
   for (const auto& [colour, width] :
@@ -268,6 +276,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_Y, "Ctrl + Y", "redo (or Ctrl + Shift + Z)", redo, 0, GLFW_MOD_CONTROL},
       {GLFW_KEY_Z, "", "", redo, 0, GLFW_MOD_CONTROL | GLFW_MOD_SHIFT},
       {GLFW_KEY_S, "Ctrl + S", "save the scene with its settings", save_scene, 0, GLFW_MOD_CONTROL},
+      {GLFW_KEY_DELETE, "Delete", "remove the chosen obstacle", remove_obstacle},
       {GLFW_KEY_ESCAPE, "Esc", "close help; let go; close messages", escape},
       {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
   };
@@ -302,6 +311,12 @@ void draw_ui(Session& s, const Layout& layout) {
         (chosen ? 3.0f : 1.0f) * s.ui.scale);
   }
   if (s.grab) draw_pull(s, layout.view);
+  if (s.obstacle >= 0) {
+    const auto& obstacle = s.loaded.scene.obstacles[std::size_t(s.obstacle)];
+    const ImVec2 at = seen_at(s, lane_place(s, s.loaded.chosen, layout.view),
+                              pose_at(obstacle, time_of(s.loaded.sim())).centre);
+    mark(s, "chosen obstacle", {at.x - 1, at.y - 1, 2, 2});
+  }
   if (layout.panel.width > 0) {
     draw_edge(s, layout.panel);  // such windows stand before those that come after them
     begin_part(s.ui.help ? "help" : "panel", layout.panel);
@@ -319,7 +334,7 @@ void draw_ui(Session& s, const Layout& layout) {
   }
   draw_messages(s, layout.view);
   if (s.loaded.probe.reading) draw_reading(s, *s.loaded.probe.reading);
-  s.changes.open = s.changes.open && ImGui::IsAnyItemActive();
+  s.changes.open = s.changes.open && (ImGui::IsAnyItemActive() || s.moving_obstacle);
 }
 
 void draw_busy(const Layout& layout, const std::string& what) {

@@ -53,6 +53,7 @@ void begin_part(const char* name, const Rect& place);
 /// The panel at the right, and parts of it.
 void draw_panel(Session& session);
 void draw_scene(Session& session);
+void draw_obstacles(Session& session);
 void draw_map(Session& session);
 /// The bar below the view: speed, loop, what can be gone back to.
 void draw_timeline(Session& session);

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/session.h"
+#include "app/edit_obstacles.h"
 
 namespace tetpbd {
 
@@ -55,6 +55,7 @@ void draw_lanes(Session& s, const Target& target) {
       frame.grabbed.push_back(s.hold->caught());
       std::erase_if(frame.pinned, [&](std::uint32_t v) { return s.hold->has(v); });
     }
+    frame.chosen_shape = shape_of(s, s.obstacle);
     frame.options.follow = s.view.follow && i == s.loaded.chosen;
     frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
     if (s.view.worst && i == s.loaded.chosen)
@@ -99,7 +100,7 @@ bool follow_bodies(Session& s, double elapsed) {
     if (const auto now = poll_centre(s.loaded.renderer)) s.centre = now;
   });
   // While the mouse pulls a vertex it aims by the camera, which therefore keeps still.
-  if (!s.centre || s.grab) return false;
+  if (!s.centre || s.grab || s.moving_obstacle) return false;
   const glm::vec3 goal = *s.centre + s.beside;
   follow(s.camera, goal, float(elapsed));
   return glm::distance(s.camera.target, goal) > 1e-3f * s.camera.distance;

@@ -9,12 +9,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <glm/gtc/matrix_transform.hpp>
 #include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "app/commands.h"
+#include "app/edit_obstacles.h"
 #include "app/files.h"
 #include "app/session.h"
 #include "app/ui.h"
@@ -41,8 +43,10 @@ struct Input {
   Session& session;
   Rect view{};
   /// `asking`: pressed, and the picker has not answered yet.
-  enum class Drag { none, asking, grab, orbit, pan, cut } drag = Drag::none;
+  enum class Drag { none, asking, grab, orbit, pan, cut, obstacle } drag = Drag::none;
   bool pinning = false;                              ///< the question is for a vertex to pin
+  bool turning = false;                              ///< what is dragged, in place of moving it
+  double depth = 0;                                  ///< m, of the place by which an obstacle is held
   int button = -1;                                   ///< that holds the drag
   double x = 0, y = 0;                               ///< cursor, as far as events have been handled
   double last_press = -1, press_x = 0, press_y = 0;  ///< s, and where: for double clicks
@@ -96,11 +100,32 @@ double cut_moved(const Session& s, float dx, float dy, const Rect& place) {
   return double(glm::dot(glm::vec2(dx, dy), way) / glm::dot(way, way));
 }
 
+// Along the view's plane at the depth where it is held, or about the view's axes.
+void drag_obstacle(Input& in, const Ray& before, float dx, float dy) {
+  Session& s = in.session;
+  const glm::dvec3 forward(glm::normalize(s.camera.target - eye(s.camera)));
+  const auto held = [&](const Ray& ray) {
+    const glm::dvec3 along(ray.direction);
+    return glm::dvec3(ray.origin) + along * (in.depth / glm::dot(along, forward));
+  };
+  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  Obstacle& o = wanted[std::size_t(s.obstacle)];
+  const glm::dvec3 right(glm::normalize(glm::cross(forward, glm::dvec3(0, 1, 0))));
+  if (in.turning)
+    turn_by(o, glm::dmat3(glm::rotate(glm::rotate(glm::dmat4(1), 0.01 * double(dx), glm::dvec3(0, 1, 0)),
+                                      0.01 * double(dy), right)));
+  else
+    move_by(o, held(ray_at_cursor(in)) - held(before));
+  change_obstacles(s, std::move(wanted));
+}
+
 void move(Input& in, double x, double y) {
   Session& s = in.session;
   const float dx = float(x - in.x), dy = float(y - in.y);
   if (dx != 0 || dy != 0) in.rested = s.now;
+  const Ray ray_before = ray_at_cursor(in);
   in.x = x, in.y = y;
+  if (in.drag == Drag::obstacle && (dx != 0 || dy != 0)) drag_obstacle(in, ray_before, dx, dy);
   constexpr float degrees = 0.35f;  // a window coordinate: a turn of the wrist is half a turn of the view
   if (in.drag == Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees);
   if (in.drag == Drag::cut) {
@@ -129,7 +154,8 @@ void press(Input& in, int button, int modifiers) {
   } else if (left) {
     const bool twice = s.now - in.last_press < double_click && std::abs(in.x - in.press_x) < same_place &&
                        std::abs(in.y - in.press_y) < same_place;
-    in.pinning = twice || (modifiers & GLFW_MOD_CONTROL);
+    in.turning = modifiers & GLFW_MOD_CONTROL;
+    in.pinning = twice || in.turning;
     in.drag = Drag::asking;
     in.last_press = twice ? -1 : s.now;
     in.press_x = in.x, in.press_y = in.y;
@@ -147,6 +173,11 @@ void release(Input& in, int button) {
                           c.distance, c.target.x, c.target.y, c.target.z);
   // A press that the picker has not answered yet is a click: it may still pin a vertex, but catches none.
   if (in.drag == Drag::grab) let_go(s);
+  if (in.drag == Drag::obstacle) {
+    const glm::dvec3& at = s.loaded.scene.obstacles[std::size_t(s.obstacle)].centre;
+    s.log("obstacle {} at {:.3f} {:.3f} {:.3f}", s.obstacle + 1, at.x, at.y, at.z);
+    s.moving_obstacle = false;
+  }
   in.drag = Drag::none;
   in.button = -1;
 }
@@ -171,19 +202,34 @@ void key(Input& in, int code, int modifiers) {
       return row.act(in.session);
 }
 
+// Chosen by a click where no body is behind it, led by a drag once it is chosen, so that turning the view
+// moves none. Whether the press is for it, or for nothing.
+bool take_obstacle(Input& in, const Pick& pick) {
+  Session& s = in.session;
+  const Ray& ray = pick.ray;
+  const auto hit = obstacle_on(s, ray);
+  const bool chosen = hit && hit->number == s.obstacle, led = chosen && in.drag == Drag::asking;
+  if (pick.hit && !(chosen && hit->distance < double(pick.distance))) return false;
+  if (hit) choose_obstacle(s, hit->number);
+  if (led) {
+    s.moving_obstacle = true;
+    in.depth =
+        hit->distance * double(glm::dot(ray.direction, glm::normalize(s.camera.target - eye(s.camera))));
+  }
+  if (in.drag == Drag::asking) in.drag = led ? Drag::obstacle : Drag::orbit;
+  return true;
+}
+
 void take_answer(Input& in) {
   Session& s = in.session;
   const auto pick = poll(s.loaded.picker);
   if (!pick) return;
-  if (std::exchange(in.pinning, false)) {
-    if (pick->hit)
-      toggle_pin(s, pick->vertex);
-    else if (in.drag == Drag::asking)
-      in.drag = Drag::orbit;
-  } else if (in.drag == Drag::asking) {
-    if (pick->hit) catch_vertex(s, *pick);
-    in.drag = s.grab ? Drag::grab : Drag::orbit;
-  }
+  const bool pinning = std::exchange(in.pinning, false);
+  if (take_obstacle(in, *pick)) return;
+  if (pinning) return toggle_pin(s, pick->vertex);
+  if (in.drag != Drag::asking) return;
+  catch_vertex(s, *pick);
+  in.drag = s.grab ? Drag::grab : Drag::orbit;
 }
 
 // Asks what is under a cursor that has come to rest, and again when the picture there may have changed.
@@ -251,6 +297,7 @@ void handle_input(Input& in, const Rect& view) {
   Session& s = in.session;
   attempt(s, [&] { take_answer(in), hover(in); });
   if (in.drag == Drag::grab && !s.grab) in.drag = Drag::none;  // let go by a key or a new scene
+  if (in.drag == Drag::obstacle && s.obstacle < 0) in.drag = Drag::none, s.moving_obstacle = false;
   if (!s.grab) return;
   const Sim& sim = s.loaded.sim();
   aim(*s.grab, sim, s.camera, ray_at_cursor(in));

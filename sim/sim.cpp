@@ -452,6 +452,8 @@ void write_shapes(Sim& sim) {
   sim.shapes_now = 0;
 }
 
+void take_obstacles(Sim& sim, bool others) { others ? remake(sim, sim.settings) : write_step_block(sim); }
+
 void bind_shapes(const Sim& sim, int list) {
   if (!sim.shapes) return;
   const std::size_t stride = shapes_stride(sim), lists = sim.shapes.bytes() / stride;

@@ -104,6 +104,9 @@ inline double time_of(const Sim& sim) {
 }
 /// The shapes at and after the present, for kernels; a list of them for the next kernels.
 void write_shapes(Sim& sim);
+/// After those of its model have changed, which the lanes of a window share; `others`: also in number, kind or
+/// field. The state stays.
+void take_obstacles(Sim& sim, bool others);
 void bind_shapes(const Sim& sim, int list);
 /// What is known of hard bodies in contact, before something else moves them.
 void forget_contacts(Sim& sim);

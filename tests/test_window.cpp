@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "app/edit_obstacles.h"
 #include "app/files.h"
 #include "app/preferences.h"
 #include "app/reference_command.h"
@@ -374,6 +375,64 @@ TEST_CASE("window: changes of settings are taken back and done again, and errors
   s.changes.open = false;
   undo(s);
   for (const Lane& lane : s.loaded.lanes) CHECK(lane.sim.settings.gravity == own.gravity);
+}
+
+TEST_CASE("window: obstacles come, move, turn and go while bodies go on, and all of it is taken back") {
+  GlTest gl;
+  for (const char* mode : {"node", "cpu-fast"}) {
+    CAPTURE(mode);
+    Scene scene = load_scene("beam", {.solver = "hard", .parameters = {{"mode", mode}}});
+    scene.bodies[0].block->cells = {3, 2, 2};
+    Session s;
+    take_over(s, load("beam", {}, scene), false);
+    for (int i = 0; i < 3; ++i) step_lanes(s);
+    const auto& all = s.loaded.scene.obstacles;
+    for (const int shape : {SHAPE_BOX, SHAPE_PLANE, SHAPE_HEIGHTS, SHAPE_CYLINDER}) {
+      add_obstacle(s, shape);
+      s.changes.open = false;
+      step_lanes(s);
+      CHECK(all.back().shape == shape);
+    }
+    CHECK(s.loaded.sim().steps == 7);  // it goes on
+    CHECK(s.obstacle == 3);
+    CHECK(shape_of(s, 1) == -1);
+    CHECK(shape_of(s, 3) == 2);
+    CHECK(s.loaded.model->shapes.size() == 3);
+    CHECK(s.loaded.model->obstacles.size() == 1);
+    std::vector<Obstacle> wanted = all;
+    const glm::dvec3 before = wanted[0].centre;
+    move_by(wanted[0], {1, 2, 3});
+    turn_by(wanted[0], rotation_of({10, 20, 30}));
+    turn_by(wanted[0], rotation_of({0, 40, 0}));
+    change_obstacles(s, wanted);
+    s.changes.open = false;
+    const glm::dmat3 turned = rotation_of({0, 40, 0}) * rotation_of({10, 20, 30});
+    for (int axis = 0; axis < 3; ++axis)
+      CHECK(glm::distance(pose_at(s.loaded.model->shapes[0], 0).axes[axis], turned[axis]) < 1e-9);
+    const Ray down{glm::vec3(before + glm::dvec3(1, 9, 3)), {0, -1, 0}};
+    const auto hit = obstacle_on(s, down);
+    REQUIRE(hit);
+    CHECK(hit->number == 0);
+    CHECK_FALSE(obstacle_on(s, {{50, 50, 50}, {0, 1, 0}}));
+    undo(s);
+    CHECK(all[0].centre == before);
+    remove_obstacle(s);
+    CHECK(all.size() == 3);
+    step_lanes(s);
+    wanted = all;
+    wanted[0].velocity = {1, 0, 0};
+    change_obstacles(s, wanted);
+    CHECK(s.loaded.sim().steps == 0);  // it moves otherwise: anew
+    for (int i = 0; i < 5; ++i) undo(s), s.changes.open = false;
+    CHECK(all.empty());
+    const std::size_t count = all.size();
+    s.ui.mesh = "no.ply";
+    add_obstacle(s, SHAPE_GRID);
+    CHECK(s.messages.back().error);
+    CHECK(all.size() == count);
+    CHECK_FALSE(check_finite(s.loaded.sim(), true));
+  }
+  CHECK(gl_error_count() == 0);
 }
 
 TEST_CASE("window: a saved scene is loaded as it was; a file that fails leaves an error until one works") {

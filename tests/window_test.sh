@@ -150,6 +150,21 @@ pinned=$(new_events | sed -n 's/^pin //p' | tail -n 1)
 sleep 0.5
 forget; xdotool keydown ctrl; press 1; release 1; xdotool keyup ctrl; await "^unpin $pinned\$"
 
+# ----------------------------------------------------------------------------------------------------------- obstacles
+click "section Obstacles" 0.1; await '^opened Obstacles'; sleep 0.5; shot before.png
+choose "add obstacle" sphere; await '^obstacles 1'; await '^obstacle 1 chosen'; sleep 1; shot obstacle.png
+differ before.png obstacle.png 1000 "an obstacle"
+drag 1 $(point "chosen obstacle" 0.5 0.5) 40 0; release 1; await '^obstacle 1 at '; pause_for_frame
+read -r ox oy < <(point "chosen obstacle" 0.5 0.5)
+key Escape; await '^obstacle 0 chosen'
+drag 1 "$ox" "$oy" 0 0; release 1; await '^obstacle 1 chosen'  # a drag would turn the view
+key s; await '^step'
+key ctrl+z; await '^undo'; key ctrl+z; await '^obstacles 0'
+key ctrl+y; await '^obstacles 1'
+click "obstacle 1" 0.1; await '^obstacle 1 chosen'; key Delete; await '^obstacles 0'
+key r; await '^reset'
+click "section Obstacles" 0.1; await '^folded Obstacles'; sleep 0.5
+
 # ---------------------------------------------------------------------------------------------- screenshots, panels
 key p; await '^screenshot screenshot_000.png'
 [[ $(identify -format '%wx%h' screenshot_000.png) == "${vw}x$vh" ]] || fail "the screenshot's size is not the view's"

@@ -1,0 +1,155 @@
+#include "app/edit_obstacles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "app/obstacles.h"
+#include "sim/error.h"
+#include "sim/moving_shape.h"
+
+namespace tetpbd {
+
+namespace {
+
+bool moves_alike(const Obstacle& a, const Obstacle& b) {
+  return a.velocity == b.velocity && a.spin == b.spin && a.keyframes.empty() == b.keyframes.empty();
+}
+
+// What kernels are made for.
+auto layout_of(const Model& model) {
+  std::vector<const void*> shapes;
+  for (const Obstacle& o : model.shapes) shapes.push_back(o.field.get());
+  return std::pair(model.obstacles.size(), shapes);
+}
+
+void take(Session& s, const std::vector<Obstacle>& wanted) {
+  Model& model = *s.loaded.model;
+  const auto before = layout_of(model);
+  model.obstacles.clear(), model.shapes.clear();
+  for (const Obstacle& o : wanted) add_obstacle(model, o);
+  if (model.obstacles.size() >= MAX_PLANES || model.shapes.size() > MAX_SHAPES)
+    throw Error("too many obstacles", fmt::format("{} of them", wanted.size()),
+                fmt::format("keep to {} half spaces and {} others", MAX_PLANES - 1, MAX_SHAPES));
+  const bool others = layout_of(model) != before;
+  for (Lane& lane : s.loaded.lanes) {
+    take_obstacles(lane.sim, others);
+    if (others) lane.metrics.reset();
+  }
+  if (others) s.loaded.map.reset();
+}
+
+}  // namespace
+
+void put_obstacles(Session& s, std::vector<Obstacle> wanted) {
+  for (Obstacle& o : wanted)
+    if (!o.field) load_field(o);
+  const std::vector<Obstacle> before = s.loaded.scene.obstacles;
+  try {
+    take(s, wanted);
+  } catch (...) {
+    take(s, before);
+    throw;
+  }
+  ordered_json list = ordered_json::array();
+  for (const Obstacle& o : wanted) list.push_back(ordered_json(obstacle_json(o)));
+  note(s, {{"obstacles", list}});
+  disturb(s);
+  s.loaded.scene.obstacles = std::move(wanted);
+  const auto& now = s.loaded.scene.obstacles;
+  s.obstacle = std::min(s.obstacle, int(now.size()) - 1);
+  if (now.size() != before.size()) s.log("obstacles {}", now.size());
+  if (now.size() == before.size() && !std::ranges::equal(now, before, moves_alike)) restart(s);
+}
+
+void change_obstacles(Session& s, std::vector<Obstacle> wanted) {
+  attempt(s, [&] {
+    const Change before = settings_and_obstacles(s);
+    put_obstacles(s, std::move(wanted));
+    keep_change(s, before);
+  });
+}
+
+void choose_obstacle(Session& s, int number) {
+  if (std::exchange(s.obstacle, number) != number) s.log("obstacle {} chosen", number + 1);
+}
+
+void add_obstacle(Session& s, int shape) {
+  Obstacle o;
+  o.shape = shape;
+  const double size = 0.2 * s.loaded.sim().model->size;
+  o.normal = {0, 1, 0};
+  o.radius = o.half_length = size;
+  o.half = glm::dvec3(size, shape == SHAPE_HEIGHTS ? 0.4 * size : size, size) *
+           (shape == SHAPE_HEIGHTS ? 2.0 : 1.0);
+  if (shape == SHAPE_CAPSULE || shape == SHAPE_CYLINDER) o.radius = 0.5 * size;
+  o.height = shape == SHAPE_GRID ? 2 * size : 0;
+  if (shape == SHAPE_GRID) o.mesh = found_file(s.ui.mesh, {});
+  for (int k = 0; shape == SHAPE_HEIGHTS && k < 24; ++k)
+    for (int i = 0; i < 24; ++i) {
+      if (i == 0) o.heights.emplace_back();
+      o.heights.back().push_back(std::round(50 + 25 * (std::sin(0.6 * i) + std::cos(0.5 * k))) / 100);
+    }
+  const Settings& world = s.loaded.sim().settings;
+  const double angle = glm::radians(double(s.camera.azimuth) + 60);
+  o.centre = glm::dvec3(s.camera.target) +
+             (shape == SHAPE_HEIGHTS ? 5 : 3) * size * glm::dvec3(std::sin(angle), 0, std::cos(angle));
+  const double low = shape == SHAPE_CAPSULE   ? o.radius + o.half_length
+                     : shape == SHAPE_HEIGHTS ? o.half.y
+                                              : size;
+  if (world.ground) o.centre.y = world.ground_height + (shape == SHAPE_PLANE ? 0 : low);
+  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  wanted.push_back(std::move(o));
+  const std::size_t count = wanted.size();
+  change_obstacles(s, std::move(wanted));
+  if (s.loaded.scene.obstacles.size() == count) choose_obstacle(s, int(count) - 1);
+}
+
+void remove_obstacle(Session& s) {
+  if (s.obstacle < 0) return;
+  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  wanted.erase(wanted.begin() + s.obstacle);
+  change_obstacles(s, std::move(wanted));
+}
+
+void move_by(Obstacle& o, const glm::dvec3& way) {
+  o.centre += way;
+  for (Obstacle::Key& key : o.keyframes) key.centre += way;
+}
+
+void turn_by(Obstacle& o, const glm::dmat3& turn) {
+  const glm::dmat3 now = turn * rotation_of(o.rotation);
+  const glm::dvec3 before = o.rotation;
+  o.rotation =
+      glm::degrees(glm::dvec3(std::atan2(now[1].z, now[2].z), std::asin(std::clamp(-now[0].z, -1.0, 1.0)),
+                              std::atan2(now[0].y, now[0].x)));
+  for (Obstacle::Key& key : o.keyframes) key.rotation += o.rotation - before;
+  o.spin = turn * o.spin;
+  o.normal = turn * o.normal;
+}
+
+std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
+  std::optional<ObstacleHit> first;
+  const double size = s.loaded.model->size, far = 100 * (size + double(s.camera.distance));
+  const auto& all = s.loaded.scene.obstacles;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const MovingShape shape = moving_shape(all[i], time_of(s.loaded.sim()), 0, 0, 0);
+    double t = 0, gap = 0;
+    for (int turn = 0; turn < 400 && t < far; ++turn) {
+      gap = shape.surface_at(glm::dvec3(ray.origin) + t * glm::dvec3(ray.direction)).distance;
+      if (gap < 1e-4 * size) break;
+      t += std::max(gap * all[i].trust, 1e-4 * size);
+    }
+    if (gap < 1e-4 * size && t > 0 && t < far && (!first || t < first->distance))
+      first = ObstacleHit{int(i), t};
+  }
+  return first;
+}
+
+int shape_of(const Session& s, int obstacle) {
+  const auto& all = s.loaded.scene.obstacles;
+  if (obstacle < 0 || is_plane(all[std::size_t(obstacle)])) return -1;
+  return obstacle - int(std::count_if(all.begin(), all.begin() + obstacle, is_plane));
+}
+
+}  // namespace tetpbd

@@ -175,9 +175,10 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
 
 TEST_CASE("every shipped scene runs in every mode") {
   GlTest gl;
-  CHECK(scene_names() == std::vector<std::string>{"armadillo-drop", "beam", "bunny-drop", "clamped-bunny",
-                                                  "dragon-drop", "hung-armadillo", "jelly-beam",
-                                                  "jelly-bunny", "muscle", "soft-beam"});
+  CHECK(scene_names() == std::vector<std::string>{"armadillo-drop", "beam", "bowl", "bunny-drop",
+                                                  "clamped-bunny", "dragon-drop", "funnel", "hung-armadillo",
+                                                  "jelly-beam", "jelly-bunny", "muscle", "press", "rollers",
+                                                  "soft-beam", "spikes", "stairs"});
   for (const std::string& name : scene_names()) {
     CAPTURE(name);
     const auto model = build_model(load_scene(name));

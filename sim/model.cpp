@@ -45,7 +45,8 @@ bool has_obstacles(const Model& model, const Settings& settings) {
 glm::dvec3 out_of_obstacles(const Model& model, const Settings& settings, double time, glm::dvec3 x) {
   for (const glm::dvec4& plane : planes_of(model, settings))
     x += glm::dvec3(plane) * std::max(0.0, plane.w - glm::dot(glm::dvec3(plane), x));
-  for (const MovingShape& shape : shapes_of(model, settings, time, 0, 1)[0]) {
+  const auto shapes = shapes_of(model, settings, time, 0, 1);
+  for (const MovingShape& shape : shapes[0]) {
     const auto surface = shape.surface_at(x);
     x -= surface.normal * std::min(0.0, surface.distance);
   }

@@ -37,10 +37,10 @@ show random 30 'Back from random places' --scene hard/random --mode node --look 
 show beam 64 'A beam of jelly, clamped at one end' --scene jelly-beam --look wire --colour stretch
 show swing 100 'A beam of soft material swings down' --scene soft-beam --material neo-hookean --young-modulus 3e5 --mode explicit --colour energy --range 2000
 show block 60 'A spinning block' --scene beam --set 'bodies.0.fixed=[]' --set 'bodies.0.spin=[3,2,5]' --set 'bodies.0.position=[0,1,0]' --set camera.distance=4 --set 'camera.target=[0,0.9,0]' --mode node --colour velocity
-show bowl 120 'A bunny of jelly falls into a bowl' --scene bowl
-show funnel 150 'A cube of gelatine sinks through a funnel' --scene funnel
-show rollers 200 'Rollers pull a bunny through their gap' --scene rollers
-show press 260 'A press on a bunny' --scene press
-show spikes 110 'A bunny on spikes' --scene spikes
-show stairs 160 'A block of jelly tumbles down stairs' --scene stairs
+show bowl 100 'A ball of jelly rolls down into a bowl' --scene bowl
+show funnel 240 'A ball of jelly, squeezed through a funnel' --scene funnel
+show rollers 150 'Rollers pull a block of jelly through their gap' --scene rollers
+show press 210 'A press on a ball of jelly' --scene press
+show spikes 80 'A slab of jelly on spikes' --scene spikes
+show stairs 150 'A cube of jelly tumbles down stairs' --scene stairs
 du -sh "$folder"

@@ -131,6 +131,13 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
     j["watch"] = {{"largest_residual", watch.largest_residual},
                   {"least_health", watch.least_health},
                   {"most_substeps", watch.most_substeps}};
+  if (sim.pairs) {
+    const PairNumbers pairs = touched(sim);
+    j["contact"] = {{"touches", pairs.touches},
+                    {"deepest", pairs.deepest / sim.model->size},
+                    {"detections", pairs.detections},
+                    {"dropped", 0}};
+  }
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);

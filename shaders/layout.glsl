@@ -159,6 +159,12 @@ struct RigidRecord {
 #define BIND_NEWTON_SUMS 8
 #define BIND_NEWTON_MESH 9
 #define BIND_NEWTON_COARSE 13
+// Contact between bodies (pairs/pairs.glsl).
+#define BIND_PAIR_MESH 14
+#define BIND_PAIR_GRID 15
+#define BIND_PAIR_LISTS 16
+#define BIND_PAIR_SUMS 17
+#define BIND_PAIR_REST 18
 // Uniform blocks.
 #define BIND_STEP 0
 #define BIND_SHAPES 1

@@ -15,7 +15,8 @@ Explanation explain(Sim& sim) {
   for (const Buffer* buffer :
        {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0], &sim.quantized[1],
         &sim.step_block, &sim.guard_counts, &sim.check.words, &sim.check.read_back, &sim.check.positions,
-        &sim.check.velocities, &sim.rigid_bodies, &sim.shapes, &sim.fields})
+        &sim.check.velocities, &sim.rigid_bodies, &sim.shapes, &sim.fields, &sim.pairs.mesh, &sim.pairs.rest,
+        &sim.pairs.grid, &sim.pairs.lists, &sim.pairs.sums})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;

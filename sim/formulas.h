@@ -48,6 +48,7 @@ struct Formulas {
 #include "shaders/constraints/types.glsl"
 #include "constraint_formulas.inc"  // CMake's: every other file there
 #include "shaders/contact.glsl"
+#include "shaders/pairs/formulas.glsl"
 #include "shaders/shapes.glsl"
 #define SHAPES 1
 #define SHARED_TOUCHES  // a work-group's in GLSL, the caller's here

@@ -83,8 +83,12 @@ const std::vector<Parameter>& parameters() {
         {"gravity", "world", &S::gravity, "pull downwards: 9.81 on Earth, 0 in space", -1000, 1000, "m/s^2"},
         {"ground", "world", &S::ground, "whether there is a ground to fall onto"},
         {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
+        {"contact", "world", &S::contact,
+         "whether bodies touch each other (bodies), and also themselves (self); else they pass through each "
+         "other",
+         0, 1, "", false, Effect::rebuild},
         {"friction", "world", &S::friction,
-         "Coulomb friction of ground and walls: 0 is ice, 0.5 wood, 1 rubber", 0, 10},
+         "Coulomb friction of ground, walls and bodies: 0 is ice, 0.5 wood, 1 rubber", 0, 10},
         {"restitution", "world", &S::restitution,
          "bounce of hard bodies (rigid_contact): speed after an impact over before; 0: none, 1: all of it"},
         {"rigid_contact", "solver", &S::rigid_contact,
@@ -130,6 +134,7 @@ std::vector<std::string> choices(const Parameter& parameter) {
     for (const ConstraintKind& kind : constraint_kinds)
       if (!kind.of_material()) names.push_back(kind.name);
   if (parameter.name == "material") names = {"none", "springs", "neo-hookean"};
+  if (parameter.name == "contact") names = {"none", "bodies", "self"};
   return names;
 }
 
@@ -250,7 +255,8 @@ bool uses(const Settings& settings, const ConstraintKind& kind) {
 }
 
 bool rigid_in_contact(const Settings& settings) {
-  return settings.rigid_contact && hard(settings) && uses(settings, Stretch::row) && settings.mode != "paper";
+  return settings.rigid_contact && settings.contact == "none" && hard(settings) &&
+         uses(settings, Stretch::row) && settings.mode != "paper";
 }
 
 bool hard(const Settings& settings) {
@@ -291,6 +297,9 @@ void check_settings(const Settings& settings, const std::string& where) {
     if (const auto kind = kind_without_force(settings))
       throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,
                   fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));
+  if (settings.contact != "none" && !mode.pairs)
+    throw Error(fmt::format("in mode {} bodies do not touch each other", mode.name), where,
+                "set contact to none or use mode node, constraint, explicit, cpu or cpu-double");
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");

@@ -37,6 +37,7 @@ struct Settings {
   bool ground = true;
   double ground_height = 0;
   double friction = 0.5;
+  std::string contact = "none";  ///< of bodies with each other: none, bodies, self (pairs.h)
   bool rigid_contact = true;
   double restitution = 0;
   int seed = 1;

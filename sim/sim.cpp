@@ -318,6 +318,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
     sim.rigid_contact = {Program::compute("rigid_contact.comp", {}, defines), work_groups(count, group_size),
                          4 * count};
   }
+  if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(*sim.model, settings, defines);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -494,12 +495,13 @@ void write_state(Sim& sim, const State& state) {
   sim.quantum = quantum_of(sim, state);
   write_step_block(sim);
   start_check(sim, &state);
+  start_pairs(sim, state);
 }
 
 void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(settings, "settings");
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s));
+    return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s), s.contact);
   };
   const auto substep = [](const Settings& s) { return s.dt / s.substeps; };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };

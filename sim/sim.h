@@ -14,6 +14,7 @@
 #include "sim/gl/gpu.h"
 #include "sim/layout.h"
 #include "sim/model.h"
+#include "sim/pairs.h"
 #include "sim/solvers/solver.h"
 #include "sim/watch.h"
 
@@ -57,6 +58,7 @@ struct Sim {
       rigid_bodies;    ///< RigidRecord, of hard bodies in contact (rigid.glsl), and vertices near half spaces
   Pass rigid_contact;  ///< before each substep, where there are any
   unsigned rigid_side = 0;  ///< of their records, which was written last
+  Pairs pairs;   ///< contact between bodies, where there is any
   Pass predict;             ///< makes the quantized positions of the next step, after a change from outside
   std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;

@@ -67,6 +67,7 @@ void step_on_gpu(Sim& sim, bool moving) {
   count_down_renewal(sim);
   const unsigned watched = watch(sim);
   if (moving) write_shapes(sim);
+  look_around(sim);
   bind(sim);
   bind_shapes(sim, 0);
   if (sim.timed) sim.timer.begin();
@@ -87,6 +88,10 @@ void step_on_gpu(Sim& sim, bool moving) {
         dispatcher.move(dispatch.phases | (substep == 0 ? watched : 0));
       else
         dispatcher.run(sim.solver.iteration[dispatch.pass], dispatch.phases);
+    if (sim.pairs && sim.pairs.near) {
+      touch(sim);
+      dispatcher.program = 0, dispatcher.bind_quantized();
+    }
   }
   // Vertex fetches and copies read the state next.
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);

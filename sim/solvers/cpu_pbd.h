@@ -9,6 +9,7 @@
 #include "sim/constraints.h"
 #include "sim/model.h"
 #include "sim/settings.h"
+#include "sim/solvers/pair_contact.h"
 #include "sim/solvers/rigid_contact.h"
 #include "sim/solvers/solver.h"
 
@@ -121,6 +122,7 @@ class CpuPbd {
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
     const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
+    const PairContact pairs(model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;
@@ -156,6 +158,7 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0 && !contact.carries(i)) v[i] += (x[i] - predicted[i]) / substep.h;
+      pairs.resolve(state, inverse_masses, substep.h);
     }
     return guards;
   }

@@ -28,17 +28,21 @@ const std::vector<SolverMode> rows = {
     {.name = "node",
      .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch: for hard bodies and k "
              "below 1",
-     .create = create_node_solver},
+     .create = create_node_solver,
+     .pairs = true},
     {.name = "constraint",
      .help =
          "Jacobi on the GPU, a constraint adds to its vertices with integer atomics: as right, mostly slower",
-     .create = create_constraint_solver},
+     .create = create_constraint_solver,
+     .pairs = true},
     {.name = "cpu",
      .help = "non-linear Gauss-Seidel on one CPU core: the paper's baseline",
-     .create = create_cpu_solver},
+     .create = create_cpu_solver,
+     .pairs = true},
     {.name = "cpu-double",
      .help = "the same in double precision: what stability is held against",
-     .create = create_cpu_double_solver},
+     .create = create_cpu_double_solver,
+     .pairs = true},
     {.name = "cpu-fast",
      .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions: for machines without a GPU",
      .create = create_cpu_fast_solver},
@@ -47,7 +51,8 @@ const std::vector<SolverMode> rows = {
              "for what "
              "is soft",
      .create = create_node_solver,
-     .leapfrog = true},
+     .leapfrog = true,
+     .pairs = true},
     {.name = "newton",
      .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
              "levels: "

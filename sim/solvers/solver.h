@@ -106,6 +106,7 @@ struct SolverMode {
   bool compliance = true;  ///< and compliance
   bool implicit = false;   ///< forces, in implicit steps
   bool leapfrog = false;   ///< forces in place of corrections: substeps are as many as stay stable
+  bool pairs = false;      ///< and contact between bodies
   bool offered = true;     ///< in --mode and the window; else in bench and compare alone
 };
 /// Those that are offered.

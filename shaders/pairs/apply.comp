@@ -1,0 +1,22 @@
+// Moves the vertices that contacts push, and what their neighbours see of them. One invocation per vertex of a surface.
+#include "pairs/pairs.glsl"
+#include "quantized.glsl"
+#include "vertex.glsl"
+void main() {
+  uint s = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
+  if (s >= SURFACE_VERTICES) return;
+  uint i = surface_vertex(s);
+  if (pair_sums[4u * i + 3u] == 0) return;
+  vec3 correction = vec3(pair_sums[4u * i], pair_sums[4u * i + 1u], pair_sums[4u * i + 2u]) * (params.quantum / PARTS);
+  for (uint c = 0u; c < 4u; ++c) pair_sums[4u * i + c] = 0;
+  Position own = positions[i];
+  if (!(own.inverse_mass > 0.0)) return;
+  Pair x = pair_add(Pair(own.high, own.low), correction), v = Pair(velocities[i].high, velocities[i].low);
+  v = pair_add(v, correction * params.inverse_h);
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
+  velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+#if !LEAPFROG
+  x = predict_position(x, predict_velocity(v));
+#endif
+  quantized_out[i] = quantize(x, weight_of(own));
+}

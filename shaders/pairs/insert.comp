@@ -1,0 +1,27 @@
+// Puts triangles that are near another body into the cells that they are in. One invocation per triangle.
+#include "pairs/pairs.glsl"
+layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
+const int most_cells = 64;  // of a triangle: those of a body that is torn out of shape would have no end
+void main() {
+  uint t = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
+  if (t >= TRIANGLES) return;
+  vec3 a = positions[triangle_vertex(t, 0u)].high, b = positions[triangle_vertex(t, 1u)].high, c = positions[triangle_vertex(t, 2u)].high;
+  vec3 low = min(a, min(b, c)), high = max(a, max(b, c));
+  if (!near_another(triangle_body(t), low - margin, high + margin)) return;
+  ivec3 first = cell_of(low), last = cell_of(high), across = last - first + 1;
+  if (any(greaterThan(across, ivec3(most_cells))) || across.x * across.y * across.z > most_cells) {
+    atomicAdd(pair_lists[OVERFLOWN], 1u);
+    return;
+  }
+  for (int z = first.z; z <= last.z; ++z)
+    for (int y = first.y; y <= last.y; ++y)
+      for (int x = first.x; x <= last.x; ++x) {
+        uint entry = atomicAdd(pair_lists[ENTRIES], 1u);
+        if (entry >= MOST_ENTRIES) {
+          atomicAdd(pair_lists[OVERFLOWN], 1u);
+          return;
+        }
+        pair_grid[CELLS + 2u * entry] = t;
+        pair_grid[CELLS + 2u * entry + 1u] = atomicExchange(pair_grid[hash_of(ivec3(x, y, z))], entry + 1u);
+      }
+}

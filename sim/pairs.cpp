@@ -1,0 +1,258 @@
+#include "sim/pairs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "sim/error.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+bool bodies_touch(const Model& model, const Settings& settings) {
+  return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
+}
+
+PairMesh pair_mesh(const Model& model) {
+  PairMesh mesh;
+  double length = 0;
+  for (std::uint32_t b = 0; b < model.bodies.size(); ++b) {
+    const Body& body = model.bodies[b];
+    std::vector<std::uint32_t> vertices;
+    for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t) {
+      const auto& [i, j, k] = model.rest.surface[t];
+      mesh.triangles.push_back({i, j, k, b});
+      vertices.insert(vertices.end(), {i, j, k});
+      length += glm::distance(model.rest.positions[i], model.rest.positions[j]);
+    }
+    std::ranges::sort(vertices);
+    const auto rest = std::ranges::unique(vertices);
+    vertices.erase(rest.begin(), rest.end());
+    for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b});
+  }
+  mesh.edge = length / double(std::max<std::size_t>(mesh.triangles.size(), 1));
+  return mesh;
+}
+
+namespace {
+
+constexpr std::uint32_t counters = 8, box = 7, candidates = 4, group = 64;  // pairs.glsl
+enum Counter { entries, records, groups, overflown = 5, touching, deepest };
+constexpr std::size_t entries_per_triangle = 16;
+
+float unsorted(std::uint32_t bits) {
+  return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
+}
+
+std::size_t groups_for(std::size_t items) { return (items + group - 1) / group; }
+
+void run(const Pairs::Kernel& kernel) {
+  kernel.program.use();
+  if (kernel.work_groups)
+    glDispatchCompute(GLuint(kernel.work_groups), 1, 1);
+  else
+    glDispatchComputeIndirect(groups * 4);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+}
+
+void bind_pairs(const Sim& sim) {
+  const Pairs& p = sim.pairs;
+  p.mesh.bind_storage(BIND_PAIR_MESH), p.grid.bind_storage(BIND_PAIR_GRID);
+  p.lists.bind_storage(BIND_PAIR_LISTS), p.sums.bind_storage(BIND_PAIR_SUMS);
+  if (p.rest) p.rest.bind_storage(BIND_PAIR_REST);
+  glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, p.lists.id());
+}
+
+void find_boxes(Pairs& p) {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  p.empty.copy_to(p.lists, 4 * counters, 4 * counters, p.empty.bytes() - 4 * counters);
+  run(p.boxes);
+}
+
+void find_candidates(Sim& sim, double margin) {
+  Pairs& p = sim.pairs;
+  if (sim.kernels_timed) p.detecting.begin();
+  find_boxes(p);
+  p.empty.copy_to(p.lists, 0, 0, 4 * overflown);
+  const GLuint zero = 0;
+  glBindBuffer(GL_SHADER_STORAGE_BUFFER, p.grid.id());
+  glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, 0, GLsizeiptr(4 * p.cells), GL_RED_INTEGER,
+                       GL_UNSIGNED_INT, &zero);
+  for (const Pairs::Kernel* kernel : {&p.insert, &p.query}) {
+    kernel->program.use();
+    kernel->program.set("margin", float(margin));
+    run(*kernel);
+  }
+  glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
+  if (sim.kernels_timed) p.detecting.end();
+  ++p.detections, p.since = 0;
+}
+
+// Whether bodies may touch before the answer after the next comes.
+void decide(Sim& sim, const std::vector<Bounds>& boxes, double fastest) {
+  Pairs& p = sim.pairs;
+  const Settings& s = sim.settings;
+  const double seconds = 2 * double(Pairs::every + 1) * s.dt,
+               apart = 2 * (fastest + std::abs(s.gravity) * seconds) * seconds + 2 * p.margin;
+  p.fastest = fastest;
+  p.near = s.contact == "self";
+  for (std::size_t a = 0; a < boxes.size() && !p.near; ++a)
+    for (std::size_t b = a + 1; b < boxes.size() && !p.near; ++b)
+      p.near = !glm::any(glm::greaterThan(boxes[a].low, boxes[b].high + apart)) &&
+               !glm::any(glm::greaterThan(boxes[b].low, boxes[a].high + apart));
+  if (!p.near) p.since = -1;
+}
+
+void take_answer(Sim& sim) {
+  Pairs& p = sim.pairs;
+  const auto words = take<std::uint32_t>(p.asked, p.answer, "contacts", true);
+  if (!words) return;
+  if ((*words)[overflown] > 0)
+    throw Error(
+        "contacts between bodies found no room", fmt::format("{} triangles", (*words)[overflown]),
+        "the bodies are torn out of shape, or their meshes differ too much in size: set contact to none");
+  p.touches += (*words)[touching];
+  p.deepest = std::max(p.deepest, double(std::bit_cast<float>((*words)[deepest])));
+  std::vector<Bounds> boxes(sim.model->bodies.size());
+  double fastest = 0;
+  for (std::size_t b = 0; b < boxes.size(); ++b) {
+    const std::uint32_t* of_body = &(*words)[counters + box * b];
+    for (glm::length_t c = 0; c < 3; ++c)
+      boxes[b].low[c] = double(unsorted(of_body[c])), boxes[b].high[c] = double(unsorted(of_body[3 + c]));
+    fastest = std::max(fastest, double(std::bit_cast<float>(of_body[6])));
+  }
+  decide(sim, boxes, fastest);
+}
+
+void ask(Pairs& p) {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  p.lists.copy_to(p.answer, 0, 0, p.answer.bytes());
+  p.empty.copy_to(p.lists, 4 * overflown, 4 * overflown, 4 * (counters - overflown));
+  p.asked = Fence::here();
+}
+
+}  // namespace
+
+Pairs make_pairs(const Model& model, const Settings& settings,
+                 const std::vector<std::string>& vertex_defines) {
+  const PairMesh surfaces = pair_mesh(model);
+  std::vector<std::uint32_t> words;
+  for (const auto& triangle : surfaces.triangles) words.insert(words.end(), triangle.begin(), triangle.end());
+  const std::size_t vertices_at = words.size();
+  for (const auto& [vertex, body] : surfaces.vertices) words.insert(words.end(), {vertex, body});
+  const std::size_t slices_at = words.size();
+  constexpr std::size_t slice = 1024;
+  for (std::size_t first = 0; first < surfaces.vertices.size();) {
+    const std::uint32_t body = surfaces.vertices[first].body;
+    std::size_t end = first;
+    while (end < surfaces.vertices.size() && end < first + slice && surfaces.vertices[end].body == body)
+      ++end;
+    words.insert(words.end(), {body, std::uint32_t(first), std::uint32_t(end)});
+    first = end;
+  }
+  const std::size_t slices = (words.size() - slices_at) / 3, triangles = surfaces.triangles.size(),
+                    vertices = surfaces.vertices.size(), bodies = model.bodies.size();
+  Pairs p;
+  p.margin = pair_margin(surfaces);
+  p.cells = std::bit_ceil(2 * triangles + 1);
+  p.mesh = Buffer("surfaces", words);
+  if (settings.contact == "self") {
+    std::vector<glm::vec4> rest;
+    for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
+    p.rest = Buffer("surfaces at rest", rest);
+  }
+  const std::size_t most = entries_per_triangle * triangles + 1024, records_at = counters + box * bodies;
+  p.grid = Buffer("grid of triangles", 4 * (p.cells + 2 * most));
+  p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * vertices));
+  p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(4 * model.positions.size(), 0),
+                  GL_DYNAMIC_COPY);
+  std::vector<std::uint32_t> empty(records_at, 0);
+  empty[groups + 1] = empty[groups + 2] = 1;
+  for (std::size_t b = 0; b < bodies; ++b) std::fill_n(&empty[counters + box * b], 3, ~0u);
+  p.empty = Buffer("no contacts", empty);
+  p.answer = Buffer("contacts read-back", 4 * records_at, nullptr, GL_STREAM_READ);
+  p.lists.write(0, 4 * records_at, empty.data());
+
+  std::vector<std::string> defines = vertex_defines;
+  for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"VERTICES_AT", vertices_at},
+                                    {"SLICES_AT", slices_at},
+                                    {"SLICES", slices},
+                                    {"TRIANGLES", triangles},
+                                    {"SURFACE_VERTICES", vertices},
+                                    {"CANDIDATES", candidates},
+                                    {"CELLS", p.cells},
+                                    {"MOST_ENTRIES", most},
+                                    {"RECORDS_AT", records_at},
+                                    {"GROUP_SIZE", group}})
+    defines.push_back(fmt::format("{} {}u", name, value));
+  defines.push_back(fmt::format("CELL {:.9g}", 1.2 * surfaces.edge));
+  defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
+  defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
+  const auto kernel = [&](const char* name, std::size_t work_groups) {
+    return Pairs::Kernel{Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups};
+  };
+  p.boxes = kernel("boxes", slices), p.insert = kernel("insert", groups_for(triangles));
+  p.query = kernel("query", groups_for(vertices)), p.apply = kernel("apply", groups_for(vertices));
+  p.meet = kernel("meet", 0), p.push = kernel("push", 0);
+  return p;
+}
+
+void look_around(Sim& sim) {
+  Pairs& p = sim.pairs;
+  if (!p || sim.steps % Pairs::every != 0) return;
+  take_answer(sim);
+  bind_pairs(sim);
+  sim.positions.bind_storage(BIND_POSITIONS), sim.velocities.bind_storage(BIND_VELOCITIES);
+  if (!p.near || p.since < 0) find_boxes(p);
+  ask(p);
+}
+
+void touch(Sim& sim) {
+  Pairs& p = sim.pairs;
+  if (!p || !p.near) return;
+  const Settings& s = sim.settings;
+  const double h = s.dt / s.substeps,
+               fastest = p.fastest + std::abs(s.gravity) * 2 * double(Pairs::every) * s.dt;
+  // Candidates serve while nothing can have crossed the margin; a body that crosses it in a substep gets a
+  // wider one. First, bodies may be deep in each other.
+  const double margin = std::exchange(p.overlapping, false) ? std::max(0.2 * sim.model->size, p.margin)
+                                                            : std::max(p.margin, 2.2 * fastest * h);
+  const double serve = std::max(1.0, std::floor(margin / (2 * fastest * h + 1e-30)));
+  bind_pairs(sim);
+  sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
+  if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps))) find_candidates(sim, margin);
+  ++p.since;
+  if (sim.kernels_timed) p.solving.begin();
+  for (const Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel);
+  if (sim.kernels_timed) p.solving.end();
+}
+
+void start_pairs(Sim& sim, const State& state) {
+  Pairs& p = sim.pairs;
+  if (!p) return;
+  p.asked = {}, p.since = -1;
+  std::vector<Bounds> boxes;
+  for (const Body& body : sim.model->bodies) {
+    const auto first = state.positions.begin() + std::ptrdiff_t(body.first_vertex);
+    boxes.push_back(bounds({first, first + std::ptrdiff_t(body.vertices)}));
+  }
+  double fastest = 0;
+  for (const glm::dvec3& v : state.velocities) fastest = std::max(fastest, glm::length(v));
+  decide(sim, boxes, fastest);
+  p.overlapping = p.near;
+  std::vector<std::uint32_t> words(p.lists.bytes() / 4, ~0u);  // nothing is held
+  p.empty.read(0, p.empty.bytes(), words.data());
+  p.lists.write(0, p.lists.bytes(), words.data());
+}
+
+PairNumbers touched(Sim& sim) {
+  Pairs& p = sim.pairs;
+  if (p)
+    for (int turn = 0; turn < 2; ++turn) take_answer(sim), ask(p);
+  return p;
+}
+
+}  // namespace tetpbd

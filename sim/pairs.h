@@ -1,0 +1,67 @@
+// Contact of bodies with each other and with themselves (method.md, "Bodies in contact"): once a step, or
+// more often where bodies are fast, each vertex of a surface finds the triangles near it; in each substep the
+// one that it is in pushes it out. On the GPU here, in double in solvers/pair_contact.h. A scene whose bodies
+// are far apart pays for their boxes alone.
+#pragma once
+
+#include "sim/gl/gpu.h"
+#include "sim/model.h"
+
+namespace tetpbd {
+
+struct Settings;
+struct Sim;
+
+/// Whether anything can touch.
+bool bodies_touch(const Model& model, const Settings& settings);
+
+/// Surfaces of all bodies.
+struct PairMesh {
+  struct Item {
+    std::uint32_t vertex, body;
+  };
+  std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
+  std::vector<Item> vertices;                           ///< each once, by body
+  double edge = 1;                                      ///< m, the mean
+};
+PairMesh pair_mesh(const Model& model);
+/// m: how near a candidate is, of bodies that move slowly.
+inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
+
+struct PairNumbers {
+  long detections = 0;        ///< since the start
+  std::uint64_t touches = 0;  ///< contacts, summed over substeps, since the start
+  double deepest = 0;         ///< m, the largest depth that a vertex came to in a substep
+};
+
+/// Part of a Sim.
+struct Pairs : PairNumbers {
+  static constexpr long every = 2;  ///< steps from one look at the boxes to the next
+  Buffer mesh, rest, grid, lists, sums, empty, answer;
+  Fence asked;
+  struct Kernel {
+    Program program;
+    std::size_t work_groups = 0;  ///< 0: as many as there are records
+  };
+  Kernel boxes, insert, query, meet, push, apply;
+  std::size_t cells = 0;
+  double margin = 0;        ///< m, of slow bodies
+  bool near = true;         ///< bodies may touch before the answer after the next
+  bool overlapping = true;  ///< and may be deep in each other from the start
+  double fastest = 0;       ///< m/s, any vertex, by the last answer
+  long since = -1;          ///< substeps since candidates were looked for; below 0: never
+  Timer detecting, solving;
+  explicit operator bool() const { return bool(mesh); }
+};
+Pairs make_pairs(const Model& model, const Settings& settings,
+                 const std::vector<std::string>& vertex_defines);
+/// Before a step: takes the last answer and asks again. Throws Error if contacts had no room.
+void look_around(Sim& sim);
+/// After a substep's last dispatch: changes positions, velocities and what neighbours see next.
+void touch(Sim& sim);
+/// Of a state that is given.
+void start_pairs(Sim& sim, const State& state);
+/// As of the last step. Waits.
+PairNumbers touched(Sim& sim);
+
+}  // namespace tetpbd

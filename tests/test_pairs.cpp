@@ -1,0 +1,170 @@
+// Contact of bodies with each other and themselves: momentum, depth, friction, rest; the GPU against double.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "sim/sim.h"
+#include "tests/gl_test.h"
+#include "tests/reference_scenes.h"
+
+using namespace tetpbd;
+using reference_scenes::centre_of;
+
+namespace {
+
+struct Placed {
+  glm::dvec3 at{0}, velocity{0}, spin{0};
+  std::vector<std::uint32_t> fixed{};
+  glm::dvec3 size{0.5};
+  glm::ivec3 cells{4};
+};
+
+std::shared_ptr<const Model> blocks(const std::vector<Placed>& all) {
+  auto model = std::make_shared<Model>();
+  for (const Placed& one : all) {
+    TetMesh mesh = make_block(one.size, one.cells);
+    finish_tets(mesh, "block");
+    auto start = mesh.positions;
+    for (auto& p : start) p += one.at;
+    add_body(*model, "block", mesh, 1000, start, one.velocity, one.spin, one.fixed);
+  }
+  return model;
+}
+
+Settings touching(const std::string& mode, double young_modulus = 2e5) {
+  Settings s;
+  s.mode = mode, s.contact = "bodies", s.material = "neo-hookean", s.young_modulus = young_modulus;
+  s.poisson_ratio = 0.4, s.gravity = 0, s.ground = false, s.friction = 0, s.substeps = 20;
+  return s;
+}
+
+struct Motion {
+  glm::dvec3 momentum{0}, spin{0};
+  double energy = 0;
+};
+Motion motion_of(const Sim& sim) {
+  const State state = read_state(sim);
+  Motion sum;
+  for (std::size_t i = 0; i < state.positions.size(); ++i) {
+    const glm::dvec3 p = sim.model->masses[i] * state.velocities[i];
+    sum.momentum += p, sum.spin += glm::cross(state.positions[i], p);
+    sum.energy += 0.5 * glm::dot(p, state.velocities[i]);
+  }
+  return sum;
+}
+double speed_of(const Sim& sim, std::size_t body, glm::length_t axis) {
+  const State state = read_state(sim);
+  const Body& b = sim.model->bodies[body];
+  double mass = 0, momentum = 0;
+  for (std::size_t i = b.first_vertex; i < b.first_vertex + b.vertices; ++i)
+    mass += sim.model->masses[i], momentum += sim.model->masses[i] * state.velocities[i][axis];
+  return momentum / mass;
+}
+
+}  // namespace
+
+TEST_CASE("pairs: a vertex and a triangle: weights, gap and normal") {
+  Formulas<double> f;
+  const glm::dvec3 a(0, 0, 0), b(1, 0, 0), c(0, 0, -1);  // looks up
+  const auto at = [&](const glm::dvec3& p) { return f.meet(a - p, b - p, c - p); };
+  CHECK(at({0.2, 0.3, -0.2}).gap == doctest::Approx(0.3));
+  CHECK(at({0.2, -0.3, -0.2}).gap == doctest::Approx(-0.3));
+  CHECK(at({0.2, -0.3, -0.2}).normal.y == doctest::Approx(1));
+  CHECK(at({0.2, 0.3, -0.2}).weights.x == doctest::Approx(0.6));
+  // Over an edge and a corner; below an edge the vertex leaves towards it.
+  CHECK(at({-0.3, 0.4, -0.5}).gap == doctest::Approx(0.5));
+  CHECK(at({-0.3, 0.4, -0.5}).normal.x == doctest::Approx(-0.6));
+  CHECK(at({-0.3, -0.4, -0.5}).normal.y == doctest::Approx(0.8));
+  CHECK(at({2, 0.1, 0}).weights.y == doctest::Approx(1));
+  CHECK(f.meet(a, a, b).gap > 1e20);  // no area
+  // Nearest weights against a search.
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto part = [&](int k) { return std::sin(12.9898 * trial + 78.233 * k) * 1.5; };
+    const glm::dvec3 p(part(1), part(2), part(3)), q(part(4), part(5), part(6)), r(part(7), part(8), part(9));
+    const glm::dvec3 w = f.nearest_weights(p, q, r);
+    const double found = glm::length(w.x * p + w.y * q + w.z * r);
+    double least = 1e9;
+    for (int i = 0; i <= 60; ++i)
+      for (int j = 0; i + j <= 60; ++j)
+        least = std::min(least, glm::length((double(i) * p + double(j) * q + double(60 - i - j) * r) / 60.0));
+    CHECK(found <= least + 1e-12);
+    CHECK(found >= least - 0.1);
+    CHECK(w.x + w.y + w.z == doctest::Approx(1));
+    CHECK(std::min({w.x, w.y, w.z}) >= 0);
+  }
+}
+
+TEST_CASE("pairs: two bodies that collide keep their momentum, part again and gain no energy") {
+  GlTest gl;
+  const auto model = blocks({{{0, 0, 0}, {2, 0, 0}}, {{0.7, 0.13, 0.08}, {-1, 0, 0}, {0, 0, 2}}});
+  std::vector<double> speeds;
+  for (const std::string mode : {"cpu-double", "node", "constraint", "explicit"}) {
+    CAPTURE(mode);
+    Sim sim = create_sim(model, touching(mode));
+    const Motion before = motion_of(sim);
+    for (int s = 0; s < 80; ++s) step(sim);
+    REQUIRE_FALSE(check_finite(sim, true));
+    const Motion after = motion_of(sim);
+    const double scale = glm::length(before.momentum);
+    CHECK(glm::length(after.momentum - before.momentum) < 1e-5 * scale);
+    CHECK(glm::length(after.spin - before.spin) < 2e-3 * scale);
+    CHECK(after.energy < 1.001 * before.energy);
+    CHECK(speed_of(sim, 0, 0) < speed_of(sim, 1, 0));  // they have parted
+    speeds.push_back(speed_of(sim, 1, 0));
+    if (mode == "cpu-double") continue;
+    CHECK(touched(sim).touches > 0);
+    CHECK(touched(sim).deepest < 0.02 * model->size);
+  }
+  for (const double speed : speeds) CHECK(speed == doctest::Approx(speeds[0]).epsilon(0.05));
+}
+
+TEST_CASE("pairs: kernels do what the CPU does in double") {
+  GlTest gl;
+  const auto model = blocks({{{0, 0, 0}, {3, 0, 0}}, {{0.505, 0.13, 0.08}, {-1, 0.5, 0}}});
+  Settings settings = touching("node");
+  settings.friction = 0.4, settings.substeps = 1, settings.dt = 5e-4,
+  settings.young_modulus = 1;  // all but loose
+  Sim kernels = create_sim(model, settings);
+  settings.mode = "cpu-double";
+  Sim truth = create_sim(model, settings);
+  for (int s = 0; s < 12; ++s) step(kernels), step(truth);
+  CHECK(touched(kernels).touches > 20);
+  const State a = read_state(kernels), b = read_state(truth);
+  double off = 0, moved = 0;
+  for (std::size_t i = 0; i < a.positions.size(); ++i) {
+    off = std::max(off, glm::length(a.velocities[i] - b.velocities[i]));
+    moved = std::max(moved, glm::length(b.velocities[i] - model->velocities[i]));
+  }
+  CHECK(moved > 0.5);
+  CHECK(off < 2e-3 * moved);
+}
+
+TEST_CASE("pairs: the same bits twice; nothing but boxes while bodies are far apart") {
+  GlTest gl;
+  const auto near =
+      blocks({{{0, 0, 0}, {1, 0, 0}}, {{0.52, 0.1, 0}, {-1, 0, 0}}, {{0.1, 0.55, 0.1}, {0, -1, 0}}});
+  std::uint64_t bits = 0;
+  for (int run = 0; run < 2; ++run) {
+    Sim sim = create_sim(near, touching("node"));
+    for (int s = 0; s < 20; ++s) step(sim);
+    if (run == 0) bits = state_hash(sim);
+    CHECK(state_hash(sim) == bits);
+    CHECK(touched(sim).detections > 10);
+  }
+  const auto far = blocks({{{0, 0, 0}}, {{5, 0, 0}}});
+  Settings settings = touching("node");
+  Sim sim = create_sim(far, settings);
+  for (int s = 0; s < 20; ++s) step(sim);
+  CHECK(touched(sim).detections == 0);
+  CHECK(touched(sim).touches == 0);
+  settings.contact = "none";
+  Sim without = create_sim(far, settings);
+  CHECK_FALSE(without.pairs);
+  for (int s = 0; s < 20; ++s) step(without);
+  CHECK(state_hash(sim) == state_hash(without));
+}
+
+TEST_CASE("pairs: modes without contact between bodies refuse it") {
+  for (const std::string mode : {"newton", "cpu-fast"})
+    CHECK_THROWS_WITH(check_settings(touching(mode), "here"), doctest::Contains("do not touch each other"));
+}

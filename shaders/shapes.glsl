@@ -92,24 +92,26 @@ Surface surface_of(Solid s, vec3 p) {
 // in steps of the distance, half a cell at least.
 Surface meeting(Solid s, vec3 from, vec3 to) {
   vec3 way = to - from;
-  real l = length(way), least = max(real(0.5) * s.spacing, l / real(64)), close = real(1e-3) * l + real(4) * rounding * length(from);
+  real l = length(way), least = max(real(0.5) * s.spacing, l / real(64)), close = real(1e-3) * l + real(4) * rounding * length(from), t = real(0);
   bool convex = s.kind < SHAPE_HEIGHTS, hit = false, on = true;
-  Surface here = surface_of(s, from);
-  if (here.distance * s.trust > l) return Surface(here.normal, here.distance + dot(here.normal, way));
-  Surface end = surface_of(s, to), plane = end;
-  real t = real(0);
-  for (int turn = 0; turn < 64 && on; ++turn) {
-    if (here.distance <= (convex ? close : real(0))) {
-      plane = Surface(here.normal, here.distance + dot(here.normal, way) * (real(1) - t));
-      hit = plane.distance < real(0);
-      on = !hit && !convex;
-    }
-    real approach = -dot(here.normal, way);
-    on = on && l > real(0) && (!convex || approach > real(0));
-    if (on) {
-      t += convex ? here.distance / approach : max(here.distance * s.trust, least) / l;
-      on = t < real(1);
-      if (on) here = surface_of(s, from + t * way);
+  Surface here = Surface(vec3(real(0)), real(0)), end = here, plane = here;
+  for (int turn = 0; turn < 66 && on; ++turn) {  // the start, the end, then the way: a single call, which is long
+    Surface found = surface_of(s, turn == 1 ? to : from + t * way);
+    if (turn == 1) end = found;
+    else here = found;
+    if (turn == 0) {
+      on = here.distance * s.trust <= l;
+      end = Surface(here.normal, here.distance + dot(here.normal, way));
+    } else {
+      if (here.distance <= (convex ? close : real(0))) {
+        plane = Surface(here.normal, here.distance + dot(here.normal, way) * (real(1) - t));
+        hit = plane.distance < real(0);
+        on = !hit && !convex;
+      }
+      real approach = -dot(here.normal, way);
+      on = on && l > real(0) && (!convex || approach > real(0));
+      if (on) t += convex ? here.distance / approach : max(here.distance * s.trust, least) / l;
+      on = on && t < real(1);
     }
   }
   // Inside, the nearest point is better known than a plane, but only on the same side.

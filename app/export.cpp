@@ -37,7 +37,17 @@ std::vector<Triangle> faces_of(const Model& model) {
 // What is seen: the fine surface that rides on the tets, else their boundary.
 SurfaceMesh seen_surface(const Model& model, const std::vector<glm::dvec3>& positions) {
   SurfaceMesh surface{carried_positions(model.carried, model.rest.tets, positions), model.carried.triangles};
-  if (surface.triangles.empty()) surface = {in_original_order(model, positions), faces_of(model)};
+  if (surface.triangles.empty()) {
+    surface = {in_original_order(model, positions), faces_of(model)};
+  } else {  // and sheets, which carry none
+    const auto base = std::uint32_t(surface.positions.size());
+    surface.positions.insert(surface.positions.end(), positions.begin(), positions.end());
+    for (const Body& body : model.bodies)
+      for (std::size_t t = 0; body.is_sheet() && t < body.triangles; ++t) {
+        const auto& [i, j, k] = model.rest.surface[body.first_triangle + t];
+        surface.triangles.push_back({i + base, j + base, k + base});
+      }
+  }
   for (glm::dvec3& p : surface.positions) p = glm::vec3(p);
   drop_unused_vertices(surface.positions, surface.triangles);
   return surface;
@@ -74,14 +84,28 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
     values[0].push_back(now.volume), values[1].push_back(now.strain), values[2].push_back(now.energy);
     ends.push_back(std::uint32_t(4 * (t + 1)));
   }
+  // The triangles of sheets, which have no tet.
+  std::vector<Triangle> sheets;
+  for (const Body& body : model.bodies)
+    for (std::size_t t = 0; body.is_sheet() && t < body.triangles; ++t) {
+      Triangle triangle = model.rest.surface[body.first_triangle + t];
+      for (std::uint32_t& v : triangle) v = model.original[v];
+      sheets.push_back(triangle), ends.push_back(std::uint32_t(4 * tets + 3 * sheets.size()));
+      for (auto& list : values) list.push_back(0);
+    }
+  std::vector<std::uint32_t> corners;
+  for (const Tet& tet : original_tets(model)) corners.insert(corners.end(), tet.begin(), tet.end());
+  for (const Triangle& t : sheets) corners.insert(corners.end(), t.begin(), t.end());
+  std::vector<std::uint8_t> types(tets, 10);  // VTK's numbers
+  types.resize(ends.size(), 5);
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-      positions.size(), tets);
+      positions.size(), types.size());
   text += "<Points>\n" + array("Float32", "Points", positions) + "</Points>\n<Cells>\n";
-  text += array("Int32", "connectivity", original_tets(model)) + array("Int32", "offsets", ends);
-  text += array("UInt8", "types", std::vector<std::uint8_t>(tets, 10)) + "</Cells>\n<PointData>\n";
+  text += array("Int32", "connectivity", corners) + array("Int32", "offsets", ends);
+  text += array("UInt8", "types", types) + "</Cells>\n<PointData>\n";
   text += array("Float32", "displacement", moved);
   text += array("Float32", "velocity", rows_of(model, state.velocities));
   text += array("Int32", "body", body_numbers(model)) + "</PointData>\n<CellData>\n";

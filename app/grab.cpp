@@ -44,6 +44,13 @@ void watch(Grab& grab, const Sim& sim, bool wait = false) {
 // How much farther than when it was caught.
 double apart(const Grab& grab) { return glm::distance(grab.seen - grab.neighbours, grab.resting); }
 
+// Tets, and triangles (which those of a sheet need) with a corner twice.
+void for_each_element(const TetMesh& mesh, const auto& visit) {
+  std::ranges::for_each(mesh.tets, visit);
+  if (mesh.thickness > 0)
+    for (const auto& [a, b, c] : mesh.surface) visit(Tet{a, b, c, c});
+}
+
 // Those within the radius (m) at rest and joined to the vertex there, for another limb may be as near; the
 // nearest first.
 std::vector<std::uint32_t> around(const TetMesh& rest, std::uint32_t vertex, double radius) {
@@ -51,8 +58,9 @@ std::vector<std::uint32_t> around(const TetMesh& rest, std::uint32_t vertex, dou
   const auto within = [&](std::uint32_t v) { return far(v) < radius; };
   std::set<std::uint32_t> found{vertex};
   std::vector<Tet> near;
-  for (const Tet& tet : rest.tets)
+  for_each_element(rest, [&](const Tet& tet) {
     if (std::ranges::any_of(tet, within)) near.push_back(tet);
+  });
   for (std::size_t before = 0; before < found.size();) {
     before = found.size();
     for (const Tet& tet : near)
@@ -115,8 +123,8 @@ Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick) {
   const TetMesh& rest = sim.model->rest;
   const std::set<std::uint32_t> held(hold.vertices.begin(), hold.vertices.end());
   int edges = 0;
-  for (const Tet& tet : rest.tets) {
-    if (std::ranges::none_of(tet, [&](std::uint32_t v) { return held.contains(v); })) continue;
+  for_each_element(rest, [&](const Tet& tet) {
+    if (std::ranges::none_of(tet, [&](std::uint32_t v) { return held.contains(v); })) return;
     const bool own = std::ranges::count(tet, hold.caught()) > 0;
     for (const std::uint32_t v : tet) {
       if (own && v != hold.caught())
@@ -124,7 +132,7 @@ Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick) {
       if (!held.contains(v) && grab.watched.size() < most_neighbours && !std::ranges::count(grab.watched, v))
         grab.watched.push_back(v);
     }
-  }
+  });
   grab.edge /= std::max(edges, 1);
   if (grab.watched.empty()) grab.watched.push_back(hold.vertices.back());  // all of the body is held
   grab.watched.push_back(hold.caught());

@@ -162,6 +162,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
 // The tet whose volume is farthest from that at rest, now.
 std::string worst_tet(const Sim& sim) {
   const Model& model = *sim.model;
+  if (model.rest.tets.empty()) return "no tets";
   const auto x = read_state(sim).positions;
   const auto error = [&](std::size_t t) {
     const auto [a, b, c, d] = model.rest.tets[t];

@@ -89,7 +89,7 @@ void judge(LiveMap& map) {
   } else {
     const auto volumes = tet_volumes({state.positions, map.model->rest.tets, {}});
     const double now = std::accumulate(volumes.begin(), volumes.end(), 0.0);
-    map.loss = std::max(map.loss, 100 * (map.volume - now) / map.volume);
+    if (map.volume > 0) map.loss = std::max(map.loss, 100 * (map.volume - now) / map.volume);
   }
   cell.percent = map.right ? 100 * map.error.rms : map.loss;
   if (sim.steps >= map.steps)

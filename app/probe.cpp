@@ -95,6 +95,7 @@ bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait) {
     const TetMesh& mesh = lane.sim.model->rest;
     probe.next = {.vertex = pick->vertex,
                   .tet = pick->inside ? pick->element : tet_behind(mesh, mesh.surface[pick->element])};
+    if (probe.next.tet == mesh.tets.size()) return probe.reading.reset(), true;  // of a sheet
     copy_values(probe, lane);
   }
   const auto values = take<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);

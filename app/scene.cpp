@@ -36,11 +36,12 @@ fs::path models_folder() {
 }
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells, taper)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Sheet, size, cells)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(WrapOptions, voxels, thickness)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, scale, height,
                                                 rotation, position, density, velocity, spin, fixed, heavy,
-                                                deform)
+                                                deform, thickness)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
 
 namespace {
@@ -58,6 +59,9 @@ json schema() {
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
         "taper": [0, 0.95]},
+      "sheet": {"size": {"least": 2, "most": 2, "of": "two numbers", "each": [1e-6, 1e6]},
+        "cells": {"least": 2, "most": 2, "of": "two numbers", "each": [1, 2000, "whole number"]}},
+      "thickness": [1e-9, 1e6],
       "tet": {"least": 4, "most": 4, "of": "four points", "each": {"three": [-1e6, 1e6]}},
       "scale": {"three": [1e-6, 1e6]}, "height": [1e-6, 1e6],
       "rotation": {"three": [-3600, 3600]}, "position": {"three": [-1e6, 1e6]},
@@ -152,21 +156,29 @@ BodyDescription read_body(const json& value, const std::string& where, const std
                           const fs::path& folder) {
   auto body = value.get<BodyDescription>();
   if (value.contains("block")) body.block = value["block"].get<BodyDescription::Block>();
+  if (value.contains("sheet")) body.sheet = value["sheet"].get<BodyDescription::Sheet>();
   if (value.contains("tet")) body.tet = value["tet"].get<std::array<glm::dvec3, 4>>();
   if (value.value("wrap", json()) == false) body.wrap.reset();
   if (value.contains("wrap") && body.wrap) body.wrap = value["wrap"].get<WrapOptions>();
-  const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet);
+  const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet) + bool(body.sheet);
   if (kinds > 1 || (kinds == 0 && body.surface.empty()))
-    refuse(fmt::format("'{}' needs one of \"mesh\", \"block\" and \"tet\", or a \"surface\"", where), file);
+    refuse(
+        fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where),
+        file);
   if (kinds == 0 && !body.wrap)
     refuse(fmt::format("'{}' has a surface alone, so it needs its \"wrap\"", where), file);
+  if (body.thickness > 0 && (body.block || body.tet || (!body.mesh.empty() && !is_surface_file(body.mesh))))
+    refuse(fmt::format("'{}.thickness' is of a sheet, or of a surface mesh that is to be one", where), file);
+  if (!body.surface.empty() && (body.sheet || body.thickness > 0))
+    refuse(fmt::format("'{}' is a sheet, which carries no surface", where), file);
   const glm::dvec3 cells = body.block ? glm::dvec3(body.block->cells) : glm::dvec3(0);
   if (cells.x * cells.y * cells.z > 2e6)
     refuse(fmt::format("'{}.block.cells' must be at most 2 million in all", where), file);
   if (body.name.empty())
-    body.name = body.block ? "block"
-                : body.tet ? "tet"
-                           : (body.mesh.empty() ? body.surface : body.mesh).stem().string();
+    body.name = body.block   ? "block"
+                : body.tet   ? "tet"
+                : body.sheet ? "sheet"
+                             : (body.mesh.empty() ? body.surface : body.mesh).stem().string();
   body.name = printable(body.name);
   for (fs::path* named : {&body.mesh, &body.surface})
     if (!named->empty()) *named = found_file(*named, folder);
@@ -271,11 +283,13 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
 TetMesh mesh_of(const BodyDescription& body, const std::string& scene, SurfaceMesh& own) {
   if (const auto& b = body.block)
     return b->taper > 0 ? make_spindle(b->size, b->cells, b->taper) : make_block(b->size, b->cells);
+  if (body.sheet) return make_sheet(body.sheet->size, body.sheet->cells);
   if (body.tet) {
     TetMesh mesh{{body.tet->begin(), body.tet->end()}, {{0, 1, 2, 3}}, {}};
     finish_tets(mesh, fmt::format("body '{}' of scene '{}'", body.name, scene));
     return mesh;
   }
+  if (body.thickness > 0) return sheet_of(load_surface(body.mesh), body.mesh.string());
   const fs::path& file = body.mesh.empty() ? body.surface : body.mesh;
   if (!is_surface_file(file) || !fs::is_regular_file(file)) return load_mesh(file, body.tetgen);
   SurfaceMesh surface = load_surface(file);
@@ -381,7 +395,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     body.name = overrides.mesh.stem().string();
     body.mesh = overrides.mesh;
     body.surface.clear();
-    body.block.reset(), body.tet.reset();
+    body.block.reset(), body.tet.reset(), body.sheet.reset();
     scene.name = printable(fmt::format("{} with {}", scene.name, body.mesh.filename().string()));
     if (std::ranges::none_of(overrides.set, [](const auto& given) { return given.starts_with("camera"); }))
       scene.camera.reset();  // it was chosen for another body
@@ -446,14 +460,16 @@ json body_json(const BodyDescription& body) {
       result[key] = file_name(file);
   };
   put_path("mesh", body.mesh), put_path("surface", body.surface);
-  if (body.block || body.tet)
+  if (body.block || body.tet || body.sheet || body.thickness > 0)
     result.erase("tetgen");
   else
     result["wrap"] = body.wrap ? json(*body.wrap) : json(false);
   if (body.height == 0) result.erase("height");
+  if (body.thickness == 0) result.erase("thickness");
   for (json& box : result["fixed"]) box.erase("ratio"), box.erase("share");
   if (body.block) result["block"] = *body.block;
   if (body.tet) result["tet"] = *body.tet;
+  if (body.sheet) result["sheet"] = *body.sheet;
   return result;
 }
 
@@ -486,8 +502,9 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
   for (const BodyDescription& body : scene.bodies) {
     auto [mesh, carried] = body_of(body, scene.name);
     carries = carries || !carried.triangles.empty();
-    add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried,
-                model->rest.tets.size());
+    if (!mesh.tets.empty())  // a sheet is drawn as itself
+      add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried,
+                  model->rest.tets.size());
     for (auto& p : mesh.positions) p *= body.scale;
     if (model->rest.tets.size() + mesh.tets.size() > most_tets)
       throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
@@ -511,11 +528,15 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
         if (chosen && is_in(i, heavy)) mass_factors[i] *= heavy.ratio;
       }
     }
+    if (body.height > 0 && !(own.high.y > own.low.y))
+      throw Error("a flat sheet has no height", fmt::format("body '{}' of {}", body.name, scene.name),
+                  "give scale or size");
     const double scale = body.height > 0 ? body.height / (own.high.y - own.low.y) : 1.0;
     for (auto& p : mesh.positions) p = turn * ((p - own.centre()) * scale);
     const Bounds placed = bounds(mesh.positions);
     const glm::dvec3 bottom(placed.centre().x, placed.low.y, placed.centre().z);
     for (auto& p : mesh.positions) p += body.position - bottom;
+    if (mesh.tets.empty()) mesh.thickness = body.thickness > 0 ? body.thickness : 1e-3 * placed.size();
     std::vector<glm::dvec3> start = mesh.positions;
     deform(start, mesh, body.deform, unsigned(scene.settings.seed));
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);

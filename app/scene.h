@@ -24,6 +24,10 @@ struct BodyDescription {
     glm::ivec3 cells{1};
     double taper = 0;  ///< make_spindle()
   };
+  struct Sheet {
+    std::array<double, 2> size{1, 1};  ///< m, along x and z
+    std::array<int, 2> cells{1, 1};
+  };
   /// Vertices in a box; heavy ones, a pseudo-random `share`, have `ratio` times the mass of the material.
   struct Box {
     glm::dvec3 low{0}, high{1};  ///< fractions of the body's bounding box
@@ -32,8 +36,10 @@ struct BodyDescription {
   std::string name;
   std::filesystem::path mesh;                    ///< a file, or
   std::optional<Block> block;                    ///< a generated block, or
-  std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m
-  std::filesystem::path surface;                 ///< a fine one that rides on it, or, alone, on its wrap
+  std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m, or
+  std::optional<Sheet> sheet;                    ///< a flat sheet
+  double thickness = 0;  ///< m, of a sheet, 0: a thousandth of its size; of a surface mesh, makes it a sheet
+  std::filesystem::path surface;  ///< a fine one that rides on it, or, alone, on its wrap
   std::string tetgen = "pYq1.85o/140";
   std::optional<WrapOptions> wrap = WrapOptions{};  ///< of a surface that TetGen refuses; none: an error
   glm::dvec3 scale{1};                              ///< along the mesh's own axes, before all else

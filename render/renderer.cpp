@@ -274,10 +274,14 @@ void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool sha
     elements("tets", GL_LINES_ADJACENCY, tets_of(renderer));
   } else if (shows_carried(renderer, frame.options)) {
     draw_carried(renderer, frame, use(renderer, shadow ? "carried shadow" : "carried"), values);
-  } else {
+  }
+  const bool own = look != Look::tets && !graph && !shows_carried(renderer, frame.options);
+  const auto all = glm::ivec2(0, 3 * renderer.mesh.surface.size());
+  const std::vector<glm::ivec2> parts = own ? std::vector{all} : renderer.sheets;
+  if (!graph && !parts.empty()) {
     use(renderer, shadow ? "surface shadow" : "surface");
     glBindVertexArray(renderer.surface_array.id());
-    glDrawArrays(GL_TRIANGLES, 0, GLsizei(3 * renderer.mesh.surface.size()));
+    for (const glm::ivec2& part : parts) glDrawArrays(GL_TRIANGLES, part.x, part.y);
   }
   glDisable(GL_CLIP_DISTANCE0);
   if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, tets_of(renderer));
@@ -511,6 +515,8 @@ Renderer make_renderer(const Model& model) {
   for (const Body& body : model.bodies) bodies.push_back(body.first_vertex);
   Renderer renderer = make_renderer(model.rest, std::move(bodies));
   renderer.carried = model.carried;
+  for (const Body& body : model.bodies)
+    if (body.is_sheet()) renderer.sheets.emplace_back(3 * body.first_triangle, 3 * body.triangles);
   return renderer;
 }
 
@@ -546,7 +552,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   const GLuint values = find_values(renderer, frame);
   const bool carried = shows_carried(renderer, options);
   if (carried) fill_cofactors(renderer, frame);
-  if ((!tets && !carried) || lit_planes) fill_corners(renderer, frame, values);
+  if ((!tets && !carried) || lit_planes || !renderer.sheets.empty()) fill_corners(renderer, frame, values);
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
                   (carried ? GL_TEXTURE_FETCH_BARRIER_BIT : 0));
   if (options.shadow) draw_shadow_map(renderer, frame, values);

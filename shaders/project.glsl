@@ -9,7 +9,13 @@ void project_$KIND(uint number, uint owned) {
     x[j] = between(q, first);
     w[j] = inverse_mass_of(q);
   }
-  Constraint$ARITY c = $KIND(x, uintBitsToFloat(record.y), record.x);
+#if $VALUES == 1
+  float rest = uintBitsToFloat(record.y);
+#else
+  float rest[$VALUES];
+  for (uint v = 0u; v < $VALUES; ++v) rest[v] = uintBitsToFloat(patch_words[RECORDS_AT + number + (v + 1u) / 2u][(v + 1u) % 2u]);
+#endif
+  Constraint$ARITY c = $KIND(x, rest, record.x);
   float k = params.stiffness[$KIND_ROW][$KIND_COLUMN];
 #if COMPLIANT
 #if $MATERIAL
@@ -25,7 +31,7 @@ void project_$KIND(uint number, uint owned) {
     vec3 start[$ARITY];
     ivec4 first_start = start_positions[record.x & 255u];
     for (int j = 0; j < $ARITY; ++j) start[j] = between(start_positions[local_id(record.x, j)], first_start);
-    Constraint$ARITY then = $KIND(start, uintBitsToFloat(record.y), record.x);
+    Constraint$ARITY then = $KIND(start, rest, record.x);
 #if $RATE  // the change of C, without its cancellation
     c.C = 0.0;
     for (int j = 0; j < $ARITY; ++j) c.C += 0.5 * dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);

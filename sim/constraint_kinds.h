@@ -106,9 +106,23 @@ struct Dashpot {
   static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
+struct Isobend {
+  static constexpr ConstraintKind row{.name = "isobend",
+                                      .arity = 4,
+                                      .noun = "curvatures across hinges",
+                                      .compliance_unit = "1/J",
+                                      .most_compliance = 1e8,
+                                      .values = 4};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.isobend(x, rest, id);
+  }
+  static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
+  static std::array<double, 4> rest(glm::dvec3* x);
+};
 // The next row goes here.
 
-using Kinds = std::tuple<Stretch, Bend, Volume, NeoHookean, Dashpot  // and its name here
+using Kinds = std::tuple<Stretch, Bend, Volume, NeoHookean, Dashpot, Isobend  // and its name here
                          >;
 
 /// A constraint's rest values as its formula takes them: a number, or where there are several.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "sim/parallel.h"
 #include "sim/settings.h"
@@ -63,6 +64,22 @@ std::array<double, 8> NeoHookean::rest(glm::dvec3* x) {
   const glm::dmat3 sides(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
   const glm::dmat3 m = glm::inverse(glm::transpose(sides) * sides);
   return {m[0][0], m[1][0], m[2][0], m[1][1], m[2][1], m[2][2], 1 / glm::determinant(sides), 1};
+}
+
+std::array<double, 4> Isobend::rest(glm::dvec3* x) {
+  const auto cotangent = [&](int at, int a, int b) {
+    const glm::dvec3 u = x[a] - x[at], v = x[b] - x[at];
+    return glm::dot(u, v) / glm::length(glm::cross(u, v));
+  };
+  const auto twice_area = [&](int wing) { return glm::length(glm::cross(x[2] - x[wing], x[3] - x[wing])); };
+  const double scale = std::sqrt(6 / (twice_area(0) + twice_area(1)));
+  std::array<double, 4> values{-scale * (cotangent(2, 1, 3) + cotangent(3, 1, 2)),
+                               scale * (cotangent(3, 0, 2) + cotangent(3, 1, 2)),
+                               scale * (cotangent(2, 0, 3) + cotangent(2, 1, 3)), 0};
+  // A wing without area has no weights: there the constraint does nothing.
+  if (!std::isfinite(values[0] + values[1] + values[2])) return {};
+  values[3] = evaluate<double>(x, values.data()).C;
+  return values;
 }
 
 std::size_t ConstraintSystem::count() const {

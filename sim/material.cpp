@@ -69,6 +69,9 @@ void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame
 }  // namespace
 
 ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings) {
+  if (mesh.thickness > 0 && settings.material != "none")
+    throw Error("a sheet has no material", "material " + settings.material,
+                "give constraints stretch and isobend their compliance, and material none");
   ConstraintSystem system = build_constraints(mesh, kinds_in_use(settings));
   const Lame m = lame(settings.young_modulus, settings.poisson_ratio);
   if (settings.material == "springs")

@@ -110,7 +110,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.penetration_999 = std::min(result.penetration_999, result.penetration_max);
   if (!pending.obstacles) result.penetration_max = result.penetration_999 = std::nan("");
   result.volume = m.volume + sums[M_VOLUME_CHANGE];
-  result.volume_error_percent = 100 * (result.volume - m.volume) / m.volume;
+  result.volume_error_percent = m.volume > 0 ? 100 * (result.volume - m.volume) / m.volume : 0;
   result.tet_volume_rms = rms(sums[M_TET_SQUARES], m.counts[2]);
   result.inverted_tets = sums[M_INVERTED];
   result.stretch_rms = rms(sums[M_STRETCH_SQUARES], m.counts[0]);
@@ -144,9 +144,10 @@ void measure(Metrics& m, const Sim& sim) {
     const Metrics::BodyRanges& body = m.bodies[b];
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(),
                       GLintptr(b * M_STRIDE * sizeof(float)), M_STRIDE * sizeof(float));
-    // About four tets per invocation before there are more groups.
-    const unsigned groups = unsigned(
-        std::min<std::size_t>(METRICS_GROUPS, work_groups(body.tets.y - body.tets.x, 4 * METRICS_SIZE)));
+    // About four tets per invocation before there are more groups; of a sheet, edges.
+    const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
+    const unsigned groups =
+        unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
     for (const Program& kernel : m.kernels) {
       kernel.use();
       kernel.set("groups", groups);

@@ -81,6 +81,7 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
     });
   };
   model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
+  model.rest.thickness = std::max(model.rest.thickness, mesh.tets.empty() ? mesh.thickness : 0);
   append_shifted(model.rest.tets, mesh.tets);
   append_shifted(model.rest.surface, mesh.surface);
   glm::dvec3 centre{0};
@@ -159,6 +160,7 @@ double factor_of(const std::string& how) {
 
 // The one nearest the middle.
 Tet middle_tet(const std::vector<glm::dvec3>& x, const TetMesh& rest, const glm::dvec3& centre) {
+  if (rest.tets.empty()) throw Error("a sheet has no tets", "--deform", "take a deformation of all of it");
   return std::ranges::min(rest.tets, {}, [&](const Tet& t) {
     return glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
   });

@@ -23,6 +23,7 @@ struct Body {
   std::string name;
   std::size_t first_vertex = 0, vertices = 0, first_tet = 0, tets = 0, first_triangle = 0, triangles = 0;
   bool one_piece = false;  ///< and so a rigid body, if it is hard
+  bool is_sheet() const { return tets == 0; }
 };
 
 struct Model {

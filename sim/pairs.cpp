@@ -13,8 +13,12 @@
 namespace tetpbd {
 
 bool bodies_touch(const Model& model, const Settings& settings) {
-  return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
+  return std::ranges::any_of(model.bodies, [](const Body& body) { return !body.is_sheet(); }) &&
+         (settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1));
 }
+
+// What a sheet keeps from solids, as a part of its edges: between its vertices it would cut corners off them.
+constexpr double sheet_gap = 0.2;
 
 PairMesh pair_mesh(const Model& model) {
   PairMesh mesh;
@@ -22,16 +26,20 @@ PairMesh pair_mesh(const Model& model) {
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b) {
     const Body& body = model.bodies[b];
     std::vector<std::uint32_t> vertices;
+    double across = 0;  // its edges, one of each triangle
     for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t) {
       const auto& [i, j, k] = model.rest.surface[t];
-      mesh.triangles.push_back({i, j, k, b});
+      if (!body.is_sheet()) mesh.triangles.push_back({i, j, k, b});
       vertices.insert(vertices.end(), {i, j, k});
-      length += glm::distance(model.rest.positions[i], model.rest.positions[j]);
+      across += glm::distance(model.rest.positions[i], model.rest.positions[j]);
     }
+    if (!body.is_sheet()) length += across;
     std::ranges::sort(vertices);
     const auto rest = std::ranges::unique(vertices);
     vertices.erase(rest.begin(), rest.end());
-    for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b});
+    const double thickness = body.is_sheet() ? sheet_gap * across / double(body.triangles) : 0;
+    for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b, float(thickness)});
+    mesh.thickness = std::max(mesh.thickness, thickness);
   }
   mesh.edge = length / double(std::max<std::size_t>(mesh.triangles.size(), 1));
   return mesh;
@@ -83,7 +91,7 @@ void find_candidates(Sim& sim, double margin) {
                        GL_UNSIGNED_INT, &zero);
   for (const Pairs::Kernel* kernel : {&p.insert, &p.query}) {
     kernel->program.use();
-    kernel->program.set("margin", float(margin));
+    kernel->program.set("margin", float(margin + p.thickness));
     run(*kernel);
   }
   glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
@@ -96,7 +104,7 @@ void decide(Sim& sim, const std::vector<Bounds>& boxes, double fastest) {
   Pairs& p = sim.pairs;
   const Settings& s = sim.settings;
   const double seconds = 2 * double(Pairs::every + 1) * s.dt,
-               apart = 2 * (fastest + std::abs(s.gravity) * seconds) * seconds + 2 * p.margin;
+               apart = 2 * (fastest + std::abs(s.gravity) * seconds) * seconds + 2 * p.margin + p.thickness;
   p.fastest = fastest;
   p.near = s.contact == "self";
   for (std::size_t a = 0; a < boxes.size() && !p.near; ++a)
@@ -142,7 +150,8 @@ Pairs make_pairs(const Model& model, const Settings& settings,
   std::vector<std::uint32_t> words;
   for (const auto& triangle : surfaces.triangles) words.insert(words.end(), triangle.begin(), triangle.end());
   const std::size_t vertices_at = words.size();
-  for (const auto& [vertex, body] : surfaces.vertices) words.insert(words.end(), {vertex, body});
+  for (const auto& [vertex, body, thickness] : surfaces.vertices)
+    words.insert(words.end(), {vertex, body, std::bit_cast<std::uint32_t>(thickness)});
   const std::size_t slices_at = words.size();
   constexpr std::size_t slice = 1024;
   for (std::size_t first = 0; first < surfaces.vertices.size();) {
@@ -156,7 +165,7 @@ Pairs make_pairs(const Model& model, const Settings& settings,
   const std::size_t slices = (words.size() - slices_at) / 3, triangles = surfaces.triangles.size(),
                     vertices = surfaces.vertices.size(), bodies = model.bodies.size();
   Pairs p;
-  p.margin = pair_margin(surfaces);
+  p.margin = pair_margin(surfaces), p.thickness = surfaces.thickness;
   p.cells = std::bit_ceil(2 * triangles + 1);
   p.mesh = Buffer("surfaces", words);
   if (settings.contact == "self") {

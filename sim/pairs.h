@@ -15,17 +15,20 @@ struct Sim;
 /// Whether anything can touch.
 bool bodies_touch(const Model& model, const Settings& settings);
 
-/// Surfaces of all bodies.
+/// Surfaces of all bodies. Vertices of a sheet meet the triangles of solids; nothing meets a sheet's
+/// triangles.
 struct PairMesh {
   struct Item {
     std::uint32_t vertex, body;
+    float thickness;  ///< m, how near a sheet's vertex comes to a triangle; of solids 0
   };
-  std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
+  std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body; of solids: a sheet has no inside
   std::vector<Item> vertices;                           ///< each once, by body
   double edge = 1;                                      ///< m, the mean
+  double thickness = 0;                                 ///< m, the largest of a vertex
 };
 PairMesh pair_mesh(const Model& model);
-/// m: how near a candidate is, of bodies that move slowly.
+/// m: how near a candidate is, of bodies that move slowly, beside the thickness.
 inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 
 struct PairNumbers {
@@ -46,6 +49,7 @@ struct Pairs : PairNumbers {
   Kernel boxes, insert, query, meet, push, apply;
   std::size_t cells = 0;
   double margin = 0;        ///< m, of slow bodies
+  double thickness = 0;     ///< m, the largest of a vertex
   bool near = true;         ///< bodies may touch before the answer after the next
   bool overlapping = true;  ///< and may be deep in each other from the start
   double fastest = 0;       ///< m/s, any vertex, by the last answer

@@ -24,7 +24,7 @@ const std::vector<Parameter>& parameters() {
          0, 0, "", false, Effect::rebuild},
         {"constraints", "solver", &S::constraints,
          "kinds of constraint that hold a body together, separated by commas: lengths of edges, angles "
-         "of the surface, volumes of tets",
+         "of the surface (bend; isobend: quadratic, for thin sheets), volumes of tets",
          0, 0, "", false, Effect::rebuild},
     };
     for (std::size_t k = 0; k < kind_count; ++k)
@@ -293,6 +293,10 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (compliant(settings) && !mode.compliance)
     throw Error(fmt::format("mode {} has no compliance", mode.name), where,
                 "set compliance and constraint_damping to 0 or use another mode");
+  for (const ConstraintKind& kind : constraint_kinds)
+    if (kind.values > 1 && uses(settings, kind) && !mode.compliance)
+      throw Error(fmt::format("mode {} has no {}", mode.name, kind.name), where,
+                  "leave it out of constraints or use another mode");
   if (mode.leapfrog || mode.implicit)
     if (const auto kind = kind_without_force(settings))
       throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,

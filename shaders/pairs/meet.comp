@@ -19,6 +19,7 @@ void main() {
     Meeting m = meet(corners[0], corners[1], corners[2]);
     if (c == 0u || nearer(m, least)) least = m, in_triangle = t;
   }
+  least.gap -= surface_thickness(pair_lists[k]);
   if (!(least.gap < 0.0)) in_triangle = NONE;
   pair_lists[k + 1u] = pair_lists[HELD + pair_lists[k]] = in_triangle;
   if (in_triangle == NONE) return;

@@ -3,13 +3,14 @@
 #include "types.glsl"
 #include "pair.glsl"
 layout(local_size_x = GROUP_SIZE) in;
-// Vertices of each triangle (x 3) and its body; vertices of surfaces, and the body of each; slices of those lists that belong to one body
+// Vertices of each triangle (x 3) and its body; vertices of surfaces, with body and thickness; slices of those lists that belong to one body
 // (body, first, end).
 layout(std430, binding = BIND_PAIR_MESH) restrict readonly buffer PairMesh { uint pair_mesh[]; };
 uint triangle_vertex(uint t, uint corner) { return pair_mesh[4u * t + corner]; }
 uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
-uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 2u * s]; }
-uint surface_body(uint s) { return pair_mesh[VERTICES_AT + 2u * s + 1u]; }
+uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 3u * s]; }
+uint surface_body(uint s) { return pair_mesh[VERTICES_AT + 3u * s + 1u]; }
+float surface_thickness(uint s) { return uintBitsToFloat(pair_mesh[VERTICES_AT + 3u * s + 2u]); }  // m, of a sheet, else 0
 // First entry of each cell (a hash of where it is) plus 1, then entries (triangle, the next plus 1). Their order is chance, and plays no part.
 layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
 // Counters; then of each body the box around its surface and its speed, as numbers that sort like the floats; then records of vertices that

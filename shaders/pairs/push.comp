@@ -25,6 +25,7 @@ void main() {
     weights[j] = p.inverse_mass;
   }
   m = meet(corners[0], corners[1], corners[2]);
+  m.gap -= surface_thickness(pair_lists[k]);
   for (uint j = 0u; j < 3u; ++j) {
     way -= m.weights[j] * params.h * velocities[corner[j]].high;
     weight += m.weights[j] * m.weights[j] * weights[j] * float(pair_sums[4u * corner[j] + 3u]);

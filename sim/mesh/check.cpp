@@ -232,6 +232,24 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
   return check;
 }
 
+TetMesh sheet_of(SurfaceMesh surface, const std::string& source) {
+  repair(surface);
+  SurfaceMesh checked = surface;
+  const SurfaceCheck check = check_surface(checked);
+  if (check.hopeless) throw Error(check.defect, check.place + " in " + source, check.hint);
+  if (surface.triangles.empty()) throw Error("sheet has no area", source, "export the surface again");
+  const SurfaceTopology topology = surface_topology(surface.triangles, surface.positions.size());
+  std::vector<std::size_t> first(topology.patches, surface.triangles.size());  // it stays as it is
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    std::size_t& one = first[topology.patch[t]];
+    one = std::min(one, t);
+    if (topology.turned[t] != topology.turned[one])
+      std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+  }
+  const double thickness = 1e-3 * bounds(surface.positions).size();
+  return {std::move(surface.positions), {}, std::move(surface.triangles), false, thickness};
+}
+
 namespace {
 
 // A triangle of no area with its corner c on the side a b: the neighbour across that side, cut in two at c,
@@ -307,14 +325,24 @@ MeshReport report(const TetMesh& mesh) {
   r.tets = mesh.tets.size();
   r.surface_triangles = mesh.surface.size();
   r.edges = tet_edges(mesh).size();
-  r.faces = (4 * r.tets + r.surface_triangles) / 2;
+  DisjointSets parts(r.vertices);
+  std::vector<char> solid(r.vertices, 0);
+  for (const Tet& tet : mesh.tets)
+    for (const std::uint32_t v : tet) parts.join(tet[0], v), solid[v] = 1;
+  std::vector<Triangle> boundary, sheets;
+  for (const Triangle& t : mesh.surface) (solid[t[0]] ? boundary : sheets).push_back(t);
+  for (const Triangle& t : sheets) parts.join(t[0], t[1]), parts.join(t[0], t[2]);
+  for (std::uint32_t v = 0; v < r.vertices; ++v) r.components += parts.root(v) == v;
+  r.faces = (4 * r.tets + boundary.size()) / 2 + sheets.size();
   r.euler_characteristic = int(r.vertices) - int(r.edges) + int(r.faces) - int(r.tets);
 
-  const SurfaceTopology surface = surface_topology(mesh.surface, mesh.positions.size());
-  r.surface_vertices = surface.vertices;
+  const SurfaceTopology surface = surface_topology(boundary, mesh.positions.size()),
+                        thin = surface_topology(sheets, mesh.positions.size());
+  r.surface_vertices = surface.vertices + thin.vertices;
+  for (std::size_t e = 0; e < thin.edge_count(); ++e) r.bends += thin.uses_of(e) == 2;
   // Where parts of the boundary touch in a vertex or an edge they are taken as separate sheets: one vertex
   // for each fan of triangles, one edge for each pair.
-  int euler = int(mesh.surface.size());
+  int euler = int(boundary.size());
   for (const std::uint32_t fans : surface.fans) euler += int(fans);
   for (std::size_t e = 0; e < surface.edge_count(); ++e) {
     r.bends += surface.uses_of(e) == 2;
@@ -322,11 +350,7 @@ MeshReport report(const TetMesh& mesh) {
   }
   r.genus = int(surface.patches) - euler / 2;
 
-  DisjointSets parts(r.vertices);
-  for (const Tet& tet : mesh.tets)
-    for (const std::uint32_t v : tet) parts.join(tet[0], v);
-  for (std::uint32_t v = 0; v < r.vertices; ++v) r.components += parts.root(v) == v;
-
+  if (r.tets == 0) return r;
   r.smallest_tet_volume = INFINITY;
   r.min_dihedral_deg = 180;
   struct Shape {

@@ -167,6 +167,24 @@ TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double tap
   return mesh;
 }
 
+TetMesh make_sheet(const std::array<double, 2>& size, const std::array<int, 2>& cells) {
+  SurfaceMesh surface;
+  const auto row = std::uint32_t(cells[0] + 1);
+  for (int z = 0; z <= cells[1]; ++z)
+    for (int x = 0; x <= cells[0]; ++x)
+      surface.positions.emplace_back(size[0] * (double(x) / cells[0] - 0.5), 0,
+                                     size[1] * (double(z) / cells[1] - 0.5));
+  for (std::uint32_t z = 0; z < std::uint32_t(cells[1]); ++z)
+    for (std::uint32_t x = 0; x + 1 < row; ++x) {
+      const std::uint32_t a = z * row + x, b = a + 1, c = a + row, d = c + 1;  // upwards: z, then x
+      if ((x + z) % 2 == 0)
+        surface.triangles.insert(surface.triangles.end(), {{a, c, d}, {a, d, b}});
+      else
+        surface.triangles.insert(surface.triangles.end(), {{a, c, b}, {b, c, d}});
+    }
+  return sheet_of(std::move(surface), "sheet");
+}
+
 double tet_volume(const TetMesh& mesh, const Tet& tet) {
   const glm::dvec3& origin = mesh.positions[tet[0]];
   return glm::dot(glm::cross(mesh.positions[tet[1]] - origin, mesh.positions[tet[2]] - origin),
@@ -192,16 +210,28 @@ std::vector<double> lumped_masses(const TetMesh& mesh, double density) {
     const double quarter = density * volumes[i] / 4;
     for (const std::uint32_t v : mesh.tets[i]) masses[v] += quarter;
   }
+  if (mesh.tets.empty())
+    for (const auto& [a, b, c] : mesh.surface) {
+      const auto& x = mesh.positions;
+      const double third = density * mesh.thickness * glm::length(glm::cross(x[b] - x[a], x[c] - x[a])) / 6;
+      masses[a] += third, masses[b] += third, masses[c] += third;
+    }
   return masses;
 }
 
 std::vector<std::array<std::uint32_t, 2>> tet_edges(const TetMesh& mesh) {
   const auto each = [&](std::size_t i, const auto& emit) {
-    const Tet& t = mesh.tets[i];
-    for (std::size_t a = 0; a < 4; ++a)
-      for (std::size_t b = a + 1; b < 4; ++b) emit(std::min(t[a], t[b]), std::max(t[a], t[b]));
+    const auto emit_edges = [&](const auto& element) {
+      for (std::size_t a = 0; a < element.size(); ++a)
+        for (std::size_t b = a + 1; b < element.size(); ++b)
+          emit(std::min(element[a], element[b]), std::max(element[a], element[b]));
+    };
+    if (i < mesh.tets.size())
+      emit_edges(mesh.tets[i]);
+    else
+      emit_edges(mesh.surface[i - mesh.tets.size()]);
   };
-  Grouped others = group_by_key(mesh.tets.size(), mesh.positions.size(), each);
+  Grouped others = group_by_key(mesh.tets.size() + mesh.surface.size(), mesh.positions.size(), each);
   std::vector<std::array<std::uint32_t, 2>> edges;
   for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
     const auto first = others.values.begin() + others.first[v],

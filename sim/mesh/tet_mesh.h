@@ -23,13 +23,16 @@ struct SurfaceMesh {
   std::vector<Triangle> triangles;
 };
 
-/// Every tet has positive signed volume ((x1-x0)x(x2-x0)).(x3-x0)/6. `surface` holds the faces that belong to
-/// one tet, outward (counter-clockwise from outside), indexing `positions`.
+/// Of bodies, solid or thin. Every tet has positive signed volume ((x1-x0)x(x2-x0)).(x3-x0)/6. `surface`
+/// holds the faces that belong to one tet, outward (counter-clockwise from outside), indexing `positions`.
 struct TetMesh {
   std::vector<glm::dvec3> positions;
   std::vector<Tet> tets;
   std::vector<Triangle> surface;
   bool one_piece = false;  ///< tets joined by faces: no hinges
+  /// m, of a sheet, which has no tets: its triangles have mass, edges and hinges. Of a model's mesh the
+  /// largest, 0 without sheets.
+  double thickness = 0;
 };
 
 /// Largest coordinate of a mesh file: volumes (cubes of it) and their products stay far inside a double.
@@ -114,12 +117,20 @@ TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);
 /// The same with rounded cross-sections along y, thinner by `taper` at the ends.
 TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper);
 
+/// A sheet of these triangles, which may be open, turned to agree with their neighbours where they can be; as
+/// thick as a thousandth of its size. Throws Error naming `source`.
+TetMesh sheet_of(SurfaceMesh surface, const std::string& source);
+/// A flat one in the plane y = 0, size along x and z in metres, centred on the origin; the diagonals of its
+/// cells alternate.
+TetMesh make_sheet(const std::array<double, 2>& size, const std::array<int, 2>& cells);
+
 double tet_volume(const TetMesh& mesh, const Tet& tet);
 std::vector<double> tet_volumes(const TetMesh& mesh);
 double mesh_volume(const TetMesh& mesh);  ///< m^3, sum of signed tet volumes
-/// kg per vertex: a quarter of each adjacent tet's mass (density in kg/m^3).
+/// kg per vertex: a quarter of each adjacent tet's mass, of a sheet a third of each triangle's (density in
+/// kg/m^3).
 std::vector<double> lumped_masses(const TetMesh& mesh, double density);
-/// Undirected edges of all tets, each once, sorted.
+/// Undirected edges of all tets and triangles, each once, sorted.
 std::vector<std::array<std::uint32_t, 2>> tet_edges(const TetMesh& mesh);
 
 struct Bounds {
@@ -136,8 +147,8 @@ std::string point_text(const glm::dvec3& p);
 struct MeshReport {
   std::size_t vertices, surface_vertices, surface_triangles, edges, bends, tets, faces;
   int euler_characteristic;  ///< V - E + F - T
-  int genus;                 ///< of the boundary, summed over its components
-  int components;            ///< of the tetrahedra (by shared vertices)
+  int genus;                 ///< of the tets' boundary, summed over its components
+  int components;            ///< of tetrahedra and sheets (by shared vertices)
   double volume, smallest_tet_volume, mean_tet_volume;
   double min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg;
   std::size_t slivers;  ///< tets with a dihedral angle under 5 or over 175 degrees

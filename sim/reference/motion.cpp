@@ -181,6 +181,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const Model& model = input.model;
   add(model.rest.positions), add(model.rest.tets), add(model.positions), add(model.velocities);
   add(model.masses), add(model.obstacles), add(input.inverse_masses);
+  if (model.rest.thickness > 0) add(model.rest.surface);
   for (const Obstacle& shape : model.shapes) {
     add(numbers_of(shape));
     if (shape.field) add(shape.field->values);

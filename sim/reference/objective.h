@@ -64,7 +64,7 @@ Points gradient(const Objective& objective, const Points& positions);
 template <class Kind, class Positions>
 auto unclamped(Positions& x, const double* rest) {
   auto c = Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest));
-  if constexpr (Kind::row.components == 1) {
+  if constexpr (Kind::row.components == 1 && Kind::row.values == 1) {
     const double unit = c.C;
     if (unit == 1 || unit == -1) {
       double further = unit;

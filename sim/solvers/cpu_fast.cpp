@@ -187,7 +187,7 @@ template <class Kind, bool damped>
         start[j] =
             j == 0 ? glm::vec3(0) : glm::vec3(starts[j][0][lane], starts[j][1][lane], starts[j][2][lane]);
       if constexpr (components == 1) {
-        const auto then = Kind::template evaluate<float, LaneMath>(start, rest[0], no_ids);
+        const auto then = Kind::template evaluate<float, LaneMath>(start, rest_of<Kind>(rest), no_ids);
         c.C = Kind::row.rate ? change_of(c, then, x, start) : c.C + gamma * (c.C - then.C);
       }
     }

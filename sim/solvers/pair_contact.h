@@ -28,7 +28,7 @@ class PairContact {
     auto& v = state.velocities;
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
-    const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h));
+    const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness);
     std::vector<int> counts(x.size(), 0);
     for (const Contact& c : contacts) {
       ++counts[c.vertex];
@@ -86,7 +86,7 @@ class PairContact {
       glm::dvec3 low{1e30}, high{-1e30};
     };
     std::vector<Box> boxes(model_.bodies.size());
-    for (const auto& [vertex, body] : mesh_.vertices) {
+    for (const auto& [vertex, body, thickness] : mesh_.vertices) {
       boxes[body].low = glm::min(boxes[body].low, x[vertex]);
       boxes[body].high = glm::max(boxes[body].high, x[vertex]);
     }
@@ -106,7 +106,7 @@ class PairContact {
         for_each_cell(low, high, [&](const Cell& cell) { grid[cell].push_back(t); });
     }
     std::vector<Contact> contacts;
-    for (const auto& [vertex, body] : mesh_.vertices) {
+    for (const auto& [vertex, body, thickness] : mesh_.vertices) {
       const glm::dvec3 own = x[vertex];
       if (!near_another(body, own - margin, own + margin)) continue;
       Contact best{vertex, {}, {}};
@@ -123,6 +123,7 @@ class PairContact {
             best.meeting = m, std::copy_n(corners.begin(), 3, best.corners.begin());
         }
       });
+      best.meeting.gap -= double(thickness);
       if (best.meeting.gap < 0) contacts.push_back(best);
     }
     return contacts;

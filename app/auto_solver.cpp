@@ -12,6 +12,7 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
+#include "sim/pairs.h"
 
 namespace tetpbd {
 
@@ -51,6 +52,8 @@ std::vector<Settings> candidates(const Settings& own) {
     all.push_back(base);
   }
   all.push_back(own);
+  if (own.contact != "none")
+    std::erase_if(all, [](const Settings& s) { return !find_solver_mode(s.mode)->pairs; });
   return all;
 }
 
@@ -172,7 +175,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   if (!std::exchange(scene.mode_open, false)) return std::nullopt;
   Settings& s = scene.settings;
   if (!has_forces(s)) {
-    if (!scene.by_device || !hard(s) || !is_software_renderer()) return std::nullopt;
+    if (!scene.by_device || !hard(s) || !is_software_renderer() || s.contact != "none") return std::nullopt;
     set_mode(s, "cpu-fast", scene.name);
     return "cpu-fast: on a software renderer faster than node and nearer to what is right";
   }
@@ -181,7 +184,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   // Four times as many where newton would take four times its own (sim/watch.h).
   const double wanted = explicit_substeps(model, s),
                most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? finer_times : 1);
-  if (wanted <= most) {
+  if (wanted <= most || bodies_touch(model, s)) {  // newton has no contact of bodies
     set_mode(s, "explicit", scene.name);
     return fmt::format("explicit, about {:g} substep{}", wanted, wanted == 1 ? "" : "s");
   }

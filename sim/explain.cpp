@@ -13,21 +13,26 @@ Explanation explain(Sim& sim) {
     result.bytes += buffer.bytes();
   };
   for (const Buffer* buffer :
-       {&sim.positions, &sim.velocities, &sim.predicted, &sim.quantized[0], &sim.quantized[1],
-        &sim.step_block, &sim.guard_counts, &sim.check.words, &sim.check.read_back, &sim.check.positions,
-        &sim.check.velocities, &sim.rigid_bodies, &sim.shapes, &sim.fields, &sim.pairs.mesh, &sim.pairs.rest,
-        &sim.pairs.grid, &sim.pairs.lists, &sim.pairs.sums})
+       {&sim.positions,       &sim.velocities,      &sim.predicted,        &sim.quantized[0],
+        &sim.quantized[1],    &sim.step_block,      &sim.guard_counts,     &sim.check.words,
+        &sim.check.read_back, &sim.check.positions, &sim.check.velocities, &sim.rigid_bodies,
+        &sim.shapes,          &sim.fields,          &sim.pairs.mesh,       &sim.pairs.rest,
+        &sim.pairs.grid,      &sim.pairs.lists,     &sim.pairs.sums,       &sim.pairs.empty,
+        &sim.pairs.answer})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 
   std::map<Pass*, std::optional<double>> times_of;
-  const auto time_of = [&](Pass& pass) {
-    if (const auto known = times_of.find(&pass); known != times_of.end()) return known->second;
+  const auto mean = [](Timer& timer) {
     double sum = 0;
     int count = 0;
-    for (; const auto ms = pass.timer.poll(true); ++count) sum += *ms;
-    return times_of[&pass] = count > 0 ? std::optional(sum / count) : std::nullopt;
+    for (; const auto ms = timer.poll(true); ++count) sum += *ms;
+    return count > 0 ? std::optional(sum / count) : std::nullopt;
+  };
+  const auto time_of = [&](Pass& pass) {
+    if (const auto known = times_of.find(&pass); known != times_of.end()) return known->second;
+    return times_of[&pass] = mean(pass.timer);
   };
   const auto kernel = [&](Pass& pass, const std::string& what, long per_step, std::size_t more) {
     const auto ms = time_of(pass);
@@ -55,6 +60,13 @@ Explanation explain(Sim& sim) {
     }
     kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
   }
+  for (const auto& [name, timer, per_step] :
+       {std::tuple{"pairs: boxes, insert, query", &sim.pairs.detecting, 1L},
+        {"pairs: meet, push, apply", &sim.pairs.solving, long(sim.settings.substeps)}})
+    if (const auto ms = mean(*timer)) {
+      result.dispatches.push_back({name, 0, per_step, 0, ms});
+      result.ms_per_step += *ms * double(per_step), result.dispatches_per_step += 3 * per_step;
+    }
   return result;
 }
 

@@ -175,17 +175,23 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
 
 TEST_CASE("every shipped scene runs in every mode") {
   GlTest gl;
-  CHECK(scene_names() == std::vector<std::string>{"armadillo-drop", "beam", "bowl", "bunny-drop",
-                                                  "clamped-bunny", "dragon-drop", "funnel", "hung-armadillo",
-                                                  "jelly-beam", "jelly-bunny", "muscle", "press", "rollers",
-                                                  "soft-beam", "spikes", "stairs"});
+  CHECK(scene_names() ==
+        std::vector<std::string>{
+            "armadillo-drop", "beam",          "bowl",        "bowl-32", "bunny-drop",     "clamped-bunny",
+            "cloth-on-bunny", "dragon-drop",   "folded-ears", "funnel",  "hung-armadillo", "jelly-beam",
+            "jelly-bunny",    "muscle",        "press",       "ring",    "rollers",        "soft-beam",
+            "spikes",         "squishy-balls", "stack",       "stairs",  "twisted-beams"});
   for (const std::string& name : scene_names()) {
     CAPTURE(name);
     const auto model = build_model(load_scene(name));
     for (const SolverMode& mode : pbd_modes()) {
       CAPTURE(mode.name);
-      const Scene scene =
-          load_scene(name, {.parameters = {{"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}}});
+      std::map<std::string, std::string> parameters = {
+          {"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}};
+      if (!mode.pairs) parameters["contact"] = "none";
+      if (!mode.compliance && name == "cloth-on-bunny") continue;  // its bending needs some
+      if (mode.name != "node" && name == "bowl-32") continue;      // large
+      const Scene scene = load_scene(name, {.parameters = {parameters.begin(), parameters.end()}});
       Sim sim = create_sim(model, scene.settings);
       for (int s = 0; s < 4; ++s) step(sim);
       Metrics metrics = create_metrics(*model, sim.system);

@@ -14,6 +14,7 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
+#include "sim/overlap.h"
 
 namespace tetpbd {
 
@@ -113,7 +114,8 @@ ordered_json settings_json(Scene scene, const Settings& settings) {
 }
 
 ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
-                             const ordered_json& hash, const std::optional<SolverChoice>& choice) {
+                             const Overlap& overlap, const ordered_json& hash,
+                             const std::optional<SolverChoice>& choice) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -134,9 +136,10 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   if (sim.pairs) {
     const PairNumbers pairs = touched(sim);
     j["contact"] = {{"touches", pairs.touches},
-                    {"deepest", pairs.deepest / sim.model->size},
                     {"detections", pairs.detections},
-                    {"dropped", 0}};
+                    {"penetration_max", overlap.largest},
+                    {"penetration_999", overlap.part_999},
+                    {"vertices_inside", overlap.inside}};
   }
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
@@ -200,6 +203,12 @@ int run_headless(Scene scene, const RunOptions& options) {
   std::optional<Export> files;
   if (options.positions_every > 0 || !options.exports.empty()) files.emplace(sim, options);
 
+  Overlap overlap;
+  const auto measure_overlap = [&] {
+    const Overlap now = overlap_of(*model, read_state(sim).positions, sim.settings.contact == "self");
+    overlap = {std::max(now.inside, overlap.inside), std::max(now.largest, overlap.largest), 0,
+               std::max(now.part_999, overlap.part_999)};
+  };
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
@@ -211,6 +220,7 @@ int run_headless(Scene scene, const RunOptions& options) {
       progress.update(s);
       if (frames) frames->draw_frame(s);
       if (files && s % files->every == 0) add_frame(*files, sim);
+      if (sim.pairs && s % steps_per_frame(sim.settings.dt) == 0) measure_overlap();
     };
     if (!check_finite(sim)) plan.stepped(0);
     run = run_loop(sim, &metrics, steps, plan);
@@ -221,7 +231,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   const bool good = !found || restore_checkpoint(sim);
   while (good && found && sim.steps < found->step - 1) step(sim);  // the last good one: the same bits again
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
-  auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
+  auto statistics = statistics_json(scene, sim, context.capabilities(), run, overlap, hash, choice);
   statistics["error"]["measured_every"] = options.measure_every;
   if (files)
     statistics["frames"] = {{"count", files->count},

@@ -29,8 +29,10 @@ still armadillo 65 --scene armadillo-drop "${near[@]}" "${jelly[@]}" --set camer
 still jelly 64 --scene jelly-beam --set camera.target=[0,0.45,0] --set camera.distance=1.9 --set camera.azimuth=20 --look wire --colour stretch
 
 for scene in models/scenes/*.json; do
-  "$program" run --scene "$scene" --steps 60 --png-every 60 --size 192x144 --samples 8 --out "$out"
-  mv "$out"/frame_00060.png "${scene%.json}.png"
+  steps=060
+  [[ $scene == *cloth* ]] && steps=160
+  "$program" run --scene "$scene" --steps $((10#$steps)) --png-every $((10#$steps)) --size 192x144 --samples 8 --out "$out"
+  mv "$out/frame_00$steps.png" "${scene%.json}.png"
 done
 
 # A beam's end is led up and around and let go, by four solvers.

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <glm/gtc/color_space.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <iterator>
+#include <ranges>
 #include <tuple>
 #include <utility>
 
@@ -532,8 +534,13 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
   frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
   frame.model = sim.model, frame.time = time_of(sim);
-  for (std::uint32_t v = 0; v < sim.inverse_masses.size(); ++v)
-    if (!(sim.inverse_masses[v] > 0)) frame.pinned.push_back(v);
+  const auto held = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };
+  for (const Body& body : sim.model->bodies) {
+    const auto vertices =
+        std::views::iota(std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices));
+    if (!std::ranges::all_of(vertices, held))  // a body that stands fast as a whole needs no dots
+      std::ranges::copy_if(vertices, std::back_inserter(frame.pinned), held);
+  }
   frame.target = target.framebuffer.id();
   return frame;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sim/error.h"
+#include "sim/overlap.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -47,7 +48,7 @@ PairMesh pair_mesh(const Model& model) {
 
 namespace {
 
-constexpr std::uint32_t counters = 8, box = 7, candidates = 4, group = 64;  // pairs.glsl
+constexpr std::uint32_t counters = 8, box = 7, candidates = 8, group = 64;  // pairs.glsl
 enum Counter { entries, records, groups, overflown = 5, touching, deepest };
 constexpr std::size_t entries_per_triangle = 16;
 
@@ -87,7 +88,7 @@ void find_candidates(Sim& sim, double margin) {
   p.empty.copy_to(p.lists, 0, 0, 4 * overflown);
   const GLuint zero = 0;
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, p.grid.id());
-  glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, 0, GLsizeiptr(4 * p.cells), GL_RED_INTEGER,
+  glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, 0, GLsizeiptr(p.cleared), GL_RED_INTEGER,
                        GL_UNSIGNED_INT, &zero);
   for (const Pairs::Kernel* kernel : {&p.insert, &p.query}) {
     kernel->program.use();
@@ -174,9 +175,11 @@ Pairs make_pairs(const Model& model, const Settings& settings,
     p.rest = Buffer("surfaces at rest", rest);
   }
   const std::size_t most = entries_per_triangle * triangles + 1024, records_at = counters + box * bodies;
-  p.grid = Buffer("grid of triangles", 4 * (p.cells + 2 * most));
+  const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
+  p.cleared = 4 * entries_at;
+  p.grid = Buffer("grid of triangles", 4 * (entries_at + 2 * most));
   p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * vertices));
-  p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(4 * model.positions.size(), 0),
+  p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
   empty[groups + 1] = empty[groups + 2] = 1;
@@ -193,6 +196,7 @@ Pairs make_pairs(const Model& model, const Settings& settings,
                                     {"SURFACE_VERTICES", vertices},
                                     {"CANDIDATES", candidates},
                                     {"CELLS", p.cells},
+                                    {"ENTRIES_AT", entries_at},
                                     {"MOST_ENTRIES", most},
                                     {"RECORDS_AT", records_at},
                                     {"GROUP_SIZE", group}})
@@ -226,9 +230,8 @@ void touch(Sim& sim) {
   const double h = s.dt / s.substeps,
                fastest = p.fastest + std::abs(s.gravity) * 2 * double(Pairs::every) * s.dt;
   // Candidates serve while nothing can have crossed the margin; a body that crosses it in a substep gets a
-  // wider one. First, bodies may be deep in each other.
-  const double margin = std::exchange(p.overlapping, false) ? std::max(0.2 * sim.model->size, p.margin)
-                                                            : std::max(p.margin, 2.2 * fastest * h);
+  // wider one, and so do bodies that start deep in each other.
+  const double margin = std::max(p.margin, 2.2 * fastest * h) + 2 * std::exchange(p.overlap, 0);
   const double serve = std::max(1.0, std::floor(margin / (2 * fastest * h + 1e-30)));
   bind_pairs(sim);
   sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
@@ -251,7 +254,7 @@ void start_pairs(Sim& sim, const State& state) {
   double fastest = 0;
   for (const glm::dvec3& v : state.velocities) fastest = std::max(fastest, glm::length(v));
   decide(sim, boxes, fastest);
-  p.overlapping = p.near;
+  p.overlap = p.near ? overlap_of(*sim.model, state.positions, sim.settings.contact == "self").deepest : 0;
   std::vector<std::uint32_t> words(p.lists.bytes() / 4, ~0u);  // nothing is held
   p.empty.read(0, p.empty.bytes(), words.data());
   p.lists.write(0, p.lists.bytes(), words.data());

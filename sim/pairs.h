@@ -47,13 +47,13 @@ struct Pairs : PairNumbers {
     std::size_t work_groups = 0;  ///< 0: as many as there are records
   };
   Kernel boxes, insert, query, meet, push, apply;
-  std::size_t cells = 0;
-  double margin = 0;        ///< m, of slow bodies
-  double thickness = 0;     ///< m, the largest of a vertex
-  bool near = true;         ///< bodies may touch before the answer after the next
-  bool overlapping = true;  ///< and may be deep in each other from the start
-  double fastest = 0;       ///< m/s, any vertex, by the last answer
-  long since = -1;          ///< substeps since candidates were looked for; below 0: never
+  std::size_t cells = 0, cleared = 0;  ///< of the grid, bytes for each detection
+  double margin = 0;                   ///< m, of slow bodies
+  double thickness = 0;                ///< m, the largest of a vertex
+  bool near = true;                    ///< bodies may touch before the answer after the next
+  double overlap = 0;                  ///< m, how deep they start in each other
+  double fastest = 0;                  ///< m/s, any vertex, by the last answer
+  long since = -1;                     ///< substeps since candidates were looked for; below 0: never
   Timer detecting, solving;
   explicit operator bool() const { return bool(mesh); }
 };

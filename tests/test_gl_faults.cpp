@@ -387,7 +387,7 @@ TEST_CASE("shader faults name file and line, or the uniform") {
             "no such shader: " + folder.string() + "/pears.glsl"));
   CHECK(has(with("render/plane.frag", "uniform float opacity", "const float opacity = 1.0"),
             "no such uniform: 'opacity' in plane"));
-  CHECK(has(with("render/surface.vert", "vec3 edge;", "vec2 edge;"), "surface"));
+  CHECK(has(with("render/point.glsl", "vec3 edge;", "vec2 edge;"), "surface"));
   CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
   const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");
   CAPTURE(unlinked);

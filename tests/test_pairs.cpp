@@ -2,7 +2,9 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <random>
 
+#include "sim/overlap.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 #include "tests/reference_scenes.h"
@@ -107,7 +109,7 @@ TEST_CASE("pairs: two bodies that collide keep their momentum, part again and ga
     const Motion after = motion_of(sim);
     const double scale = glm::length(before.momentum);
     CHECK(glm::length(after.momentum - before.momentum) < 1e-5 * scale);
-    CHECK(glm::length(after.spin - before.spin) < 2e-3 * scale);
+    CHECK(glm::length(after.spin - before.spin) < 4e-3 * scale);
     CHECK(after.energy < 1.001 * before.energy);
     CHECK(speed_of(sim, 0, 0) < speed_of(sim, 1, 0));  // they have parted
     speeds.push_back(speed_of(sim, 1, 0));
@@ -162,6 +164,93 @@ TEST_CASE("pairs: the same bits twice; nothing but boxes while bodies are far ap
   CHECK_FALSE(without.pairs);
   for (int s = 0; s < 20; ++s) step(without);
   CHECK(state_hash(sim) == state_hash(without));
+}
+
+TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") {
+  const auto model = blocks({{}, {{0.45, 0.03, 0.02}}, {{5, 0, 0}}});
+  const Overlap apart =
+      overlap_of(*blocks({{}, {{0.51, 0.03, 0.02}}}), blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
+  CHECK(apart.inside == 0);
+  CHECK(apart.largest == 0);
+  const Overlap overlap = overlap_of(*model, model->positions, false);
+  CHECK(overlap.inside == 32);  // 4 x 4 vertices of each face
+  CHECK(overlap.largest == doctest::Approx(0.05 / (0.5 * std::sqrt(3.0))));
+  CHECK(overlap.part_999 <= overlap.largest);
+}
+
+TEST_CASE("pairs: a block slides on another as friction says") {
+  GlTest gl;
+  std::vector<std::uint32_t> all(125);
+  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  const double friction = 0.3, speed = 1.5;
+  const auto model = blocks({{{0, -0.25, 0}, {}, {}, all, {3, 0.5, 1}},
+                             {{-0.8, 0.1, 0.02}, {speed, 0, 0}, {}, {}, {0.4, 0.2, 0.4}}});
+  for (const std::string mode : {"explicit", "node"}) {
+    CAPTURE(mode);
+    Settings settings = touching(mode, 1e6);
+    settings.gravity = 9.81, settings.friction = friction;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 20; ++s) step(sim);  // it has come to lie
+    const double before = speed_of(sim, 1, 0);
+    for (int s = 0; s < 40; ++s) step(sim);
+    CHECK(before - speed_of(sim, 1, 0) == doctest::Approx(friction * 9.81 * 0.2).epsilon(0.02));
+    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.005);
+  }
+}
+
+TEST_CASE("pairs: at 50 m/s and steps of 5 ms bodies do not pass through each other") {
+  GlTest gl;
+  const auto model = blocks({{}, {{2.01, 0.03, 0.02}, {-50, 0, 0}}});
+  for (const std::string mode : {"explicit", "node"}) {
+    CAPTURE(mode);
+    Sim sim = create_sim(model, touching(mode, 1e8));
+    for (int s = 0; s < 20; ++s) step(sim);
+    REQUIRE_FALSE(check_finite(sim, true));
+    CHECK(speed_of(sim, 0, 0) < speed_of(sim, 1, 0));
+    CHECK(speed_of(sim, 0, 0) + speed_of(sim, 1, 0) == doctest::Approx(-50).epsilon(1e-4));
+    const State state = read_state(sim);
+    CHECK(state.positions[0].x < state.positions[model->bodies[1].first_vertex].x);
+  }
+}
+
+TEST_CASE("pairs: three blocks on each other come to rest") {
+  GlTest gl;
+  const auto model = blocks({{{0, 0.25, 0}}, {{0.02, 0.75, 0.03}, {}, {0, 0.01, 0}}, {{0, 1.25, -0.02}}});
+  Settings settings = touching("explicit", 1e6);
+  settings.gravity = 9.81, settings.ground = true, settings.friction = 0.5, settings.damping = 0.2;
+  settings.constraint_damping = 3e-3;
+  Sim sim = create_sim(model, settings);
+  for (int s = 0; s < 600; ++s) step(sim);
+  CHECK(motion_of(sim).energy < 0.02);  // J, of 375 kg: what each substep gives vertices and contact takes
+  CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.002);
+  const glm::dvec3 before = centre_of(*model, read_state(sim).positions);
+  for (int s = 0; s < 200; ++s) step(sim);
+  CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) < 3e-4);
+}
+
+TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
+  GlTest gl;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int round = 0; round < 6; ++round) {
+    CAPTURE(round);
+    std::vector<Placed> all;
+    for (int b = 0; b < 3; ++b) {
+      Placed one;
+      do {
+        for (int c = 0; c < 3; ++c) one.at[c] = 0.4 * unit(random), one.spin[c] = 2 * unit(random);
+      } while (std::ranges::any_of(
+          all, [&](const Placed& other) { return glm::distance(other.at, one.at) < 0.35; }));
+      all.push_back(one);
+    }
+    const auto model = blocks(all);
+    Settings settings = touching(round % 2 ? "explicit" : "node", 1e5);
+    settings.constraint_damping = 3e-3;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 200; ++s) step(sim);
+    REQUIRE_FALSE(check_finite(sim, true));
+    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.01);
+  }
 }
 
 TEST_CASE("pairs: modes without contact between bodies refuse it") {

@@ -3,7 +3,8 @@ struct Meeting {
   vec3 weights;  // of the corners, at the point nearest to the vertex
   vec3 normal;   // unit, out of the triangle's body, along which the vertex leaves it
   real gap;      // m, negative inside
-  real faces;    // how far the face looks at the vertex: of triangles as near as each other, the sign of the first is right
+  vec3 face;     // the triangle's own normal, unit
+  real rank;     // by distance; of triangles as near as each other the sign of that which faces the vertex most is right, and comes first
 };
 // Weights of the corners at the point of a triangle that is nearest to the origin (Ericson 2005, Real-Time Collision Detection, 5.1.5).
 vec3 nearest_weights(vec3 a, vec3 b, vec3 c) {
@@ -32,30 +33,40 @@ Meeting meet(vec3 a, vec3 b, vec3 c) {
   real area = length(n), far = length(to);
   m.normal = vec3(0, 1, 0);
   m.gap = real(1e30);
-  m.faces = real(0);
+  m.rank = real(1e30);
+  m.face = m.normal;
   if (!(area > real(0))) return m;
   n /= area;
+  m.face = n;
   real along = dot(to, n);
-  m.gap = along < real(0) ? -far : far;
-  m.faces = abs(along);
+  // Inside, the nearest point is in a face, or on an edge that is all but flat or bent inwards; a stale triangle's edge says nothing.
+  m.gap = along < real(-0.7) * far ? -far : far;
+  m.rank = far - real(1e-3) * abs(along);
   // Beside the face, away from or towards the edge; a vertex on it has no such direction.
   bool beside = far > real(1e-6) * sqrt(area) && abs(along) < real(0.999999) * far;
   m.normal = beside ? to / m.gap : n;
   return m;
 }
-bool nearer(Meeting a, Meeting b) {
-  real x = abs(a.gap), y = abs(b.gap);
-  if (x < real(0.9999) * y) return true;
-  return x <= y * real(1.0001) && a.faces > b.faces;
-}
-// How a vertex is to move relative to the triangle that it is in: out of it by the depth, but not faster than it came and `push` (m in this
-// substep), and what friction takes back of its way along it. `way`: of this substep, relative to the triangle.
-vec3 meeting_correction(Meeting m, vec3 way, real push, real friction) {
-  real normal_way = dot(way, m.normal);
-  real out_by = -m.gap, most = push - (normal_way < real(0) ? normal_way : real(0));
-  if (out_by > most) out_by = most;
+// Whether a vertex, with its normal of any length, can have come in through the triangle: those that look the same way are the far side of a thin part, or
+// beside the rim of a face.
+bool opposes(Meeting m, vec3 normal) { return dot(m.face, normal) < real(0.3) * length(normal); }
+// How a vertex is to move relative to the triangle that it is in, whose `way` in this substep it went relative to it: what stops it and what friction
+// takes back along the triangle changes its velocity as well; what is left of the depth, by `push` (m) at most, only its place, so that
+// it gives no energy.
+struct Stop {
+  vec3 stopped;
+  vec3 pushed;  // beside
+};
+Stop meeting_correction(Meeting m, vec3 way, real push, real friction) {
+  Stop s;
+  real normal_way = dot(way, m.normal), stop = normal_way < real(0) ? -normal_way : real(0), left = -m.gap;
+  if (stop > left) stop = left;
+  left -= stop;
   vec3 slip = way - m.normal * normal_way;
-  real l = length(slip), grip = friction * out_by;
+  real l = length(slip), grip = friction * stop;
   if (l > grip) slip *= grip / l;
-  return m.normal * out_by - slip;
+  s.stopped = m.normal * stop - slip;
+  left -= real(0.01) * push;  // so much may stay, for a contact that comes and goes never rests
+  s.pushed = m.normal * (left < real(0) ? real(0) : left < push ? left : push);
+  return s;
 }

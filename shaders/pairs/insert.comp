@@ -8,6 +8,13 @@ void main() {
   vec3 a = positions[triangle_vertex(t, 0u)].high, b = positions[triangle_vertex(t, 1u)].high, c = positions[triangle_vertex(t, 2u)].high;
   vec3 low = min(a, min(b, c)), high = max(a, max(b, c));
   if (!near_another(triangle_body(t), low - margin, high + margin)) return;
+  vec3 normal = cross(b - a, c - a);
+  float area = length(normal);
+  if (area > 0.0) {
+    ivec3 unit = ivec3(round(normal * (4096.0 / area)));
+    for (uint j = 0u; j < 3u; ++j)
+      for (uint k = 0u; k < 3u; ++k) atomicAdd(pair_grid[CELLS + 3u * triangle_vertex(t, j) + k], uint(unit[k]));
+  }
   ivec3 first = cell_of(low), last = cell_of(high), across = last - first + 1;
   if (any(greaterThan(across, ivec3(most_cells))) || across.x * across.y * across.z > most_cells) {
     atomicAdd(pair_lists[OVERFLOWN], 1u);
@@ -21,7 +28,7 @@ void main() {
           atomicAdd(pair_lists[OVERFLOWN], 1u);
           return;
         }
-        pair_grid[CELLS + 2u * entry] = t;
-        pair_grid[CELLS + 2u * entry + 1u] = atomicExchange(pair_grid[hash_of(ivec3(x, y, z))], entry + 1u);
+        pair_grid[ENTRIES_AT + 2u * entry] = t;
+        pair_grid[ENTRIES_AT + 2u * entry + 1u] = atomicExchange(pair_grid[hash_of(ivec3(x, y, z))], entry + 1u);
       }
 }

@@ -11,7 +11,8 @@ uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
 uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 3u * s]; }
 uint surface_body(uint s) { return pair_mesh[VERTICES_AT + 3u * s + 1u]; }
 float surface_thickness(uint s) { return uintBitsToFloat(pair_mesh[VERTICES_AT + 3u * s + 2u]); }  // m, of a sheet, else 0
-// First entry of each cell (a hash of where it is) plus 1, then entries (triangle, the next plus 1). Their order is chance, and plays no part.
+// First entry of each cell (a hash of where it is) plus 1; normals of vertices, of 4096 for each of their triangles; then entries (triangle, the next
+// plus 1). Their order is chance, and plays no part.
 layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
 // Counters; then of each body the box around its surface and its speed, as numbers that sort like the floats; then records of vertices that
 // have candidates.
@@ -25,9 +26,10 @@ layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_gr
 #define BOX 7u
 #define RECORD (2u + CANDIDATES)  // vertex of a surface, the one it is in (NONE: none), candidates
 #define NONE 0xffffffffu
+#define BESIDE 0x80000000u  // of a candidate: it says whether the vertex is in the body, but does not push it
 #define HELD (RECORDS_AT + RECORD * SURFACE_VERTICES)  // then, of each vertex of a surface, the triangle that it was in last
 layout(std430, binding = BIND_PAIR_LISTS) restrict buffer PairLists { uint pair_lists[]; };
-// By vertex: the sum of its corrections in 32nds of a quantum, and how many contacts it is part of.
+// By vertex: the sum of what stops it in 32nds of a quantum, how many contacts it is part of, and the sum of what pushes it beside.
 #define PARTS 32.0
 layout(std430, binding = BIND_PAIR_SUMS) restrict buffer PairSums { int pair_sums[]; };
 uniform float margin;  // m, how near a candidate is

@@ -13,13 +13,13 @@ bool is_neighbour(uint i, uint t) {
   return false;
 }
 #endif
-float gap_of(uint t, Pair own) {
+Meeting meeting_of(uint t, Pair own) {
   vec3 corners[3];
   for (uint c = 0u; c < 3u; ++c) {
     Position p = positions[triangle_vertex(t, c)];
     corners[c] = relative(Pair(p.high, p.low), own);
   }
-  return abs(meet(corners[0], corners[1], corners[2]).gap);
+  return meet(corners[0], corners[1], corners[2]);
 }
 void main() {
   uint s = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
@@ -27,9 +27,11 @@ void main() {
   uint i = surface_vertex(s), body = surface_body(s);
   Pair own = Pair(positions[i].high, positions[i].low);
   uint held = pair_lists[HELD + s];
-  float radius = held == NONE ? margin : max(margin, 1.05 * gap_of(held, own) + 0.5 * margin);
+  float radius = held == NONE ? margin : max(margin, 1.05 * abs(meeting_of(held, own).gap) + 0.5 * margin);
   pair_lists[HELD + s] = NONE;
   if (!near_another(body, own.high - radius, own.high + radius)) return;
+  vec3 normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
+  bool solid = !(surface_thickness(s) > 0.0);  // a sheet has two sides
   uint found[CANDIDATES];
   float distances[CANDIDATES];
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
@@ -38,17 +40,19 @@ void main() {
     for (int y = first.y; y <= last.y; ++y)
       for (int x = first.x; x <= last.x; ++x)
         for (uint entry = pair_grid[hash_of(ivec3(x, y, z))]; entry != 0u;) {
-          uint t = pair_grid[CELLS + 2u * (entry - 1u)];
-          entry = pair_grid[CELLS + 2u * (entry - 1u) + 1u];
+          uint t = pair_grid[ENTRIES_AT + 2u * (entry - 1u)];
+          entry = pair_grid[ENTRIES_AT + 2u * (entry - 1u) + 1u];
 #if CONTACT_SELF
           if (triangle_body(t) == body && is_neighbour(i, t)) continue;
 #else
           if (triangle_body(t) == body) continue;
 #endif
-          float d = gap_of(t, own);
+          Meeting m = meeting_of(t, own);
+          float d = m.rank;
 #if CONTACT_SELF
-          if (triangle_body(t) == body && d > SELF_MARGIN) continue;  // a thin part's other side is no contact
+          if (triangle_body(t) == body && abs(m.gap) > SELF_MARGIN) continue;  // a thin part's other side is no contact
 #endif
+          if (solid && !opposes(m, normal)) t |= BESIDE;
           uint at = CANDIDATES;
           for (uint k = CANDIDATES; k-- > 0u;) {
             if (found[k] == t) {
@@ -66,6 +70,9 @@ void main() {
           }
         }
   if (found[0] == NONE) return;
+  bool opposed = false;
+  for (uint k = 0u; k < CANDIDATES; ++k) opposed = opposed || (found[k] & BESIDE) == 0u;
+  if (!opposed) return;
   uint record = atomicAdd(pair_lists[RECORDS], 1u), k = RECORDS_AT + RECORD * record;
   atomicMax(pair_lists[GROUPS], record / GROUP_SIZE + 1u);
   pair_lists[k] = s;

@@ -34,7 +34,7 @@ class PairContact {
       ++counts[c.vertex];
       for (glm::length_t j = 0; j < 3; ++j) counts[c.corners[std::size_t(j)]] += c.meeting.weights[j] > 0;
     }
-    std::vector<glm::dvec3> corrections(x.size(), glm::dvec3(0));
+    std::vector<glm::dvec3> stopped(x.size(), glm::dvec3(0));
     for (const Contact& c : contacts) {
       const auto& m = c.meeting;
       glm::dvec3 way = h * v[c.vertex];
@@ -45,14 +45,16 @@ class PairContact {
         weight += b * b * inverse_masses[c.corners[j]] * counts[c.corners[j]];
       }
       if (!(weight > 0)) continue;
-      const double push_speed = 0.5;  // push.comp
-      const glm::dvec3 lambda =
-          Formulas<double>{}.meeting_correction(m, way, push_speed * model_.size * h, friction_) / weight;
-      corrections[c.vertex] += inverse_masses[c.vertex] * lambda;
-      for (std::size_t j = 0; j < 3; ++j)
-        corrections[c.corners[j]] -= m.weights[glm::length_t(j)] * inverse_masses[c.corners[j]] * lambda;
+      const double push_most = cell_ / 12;  // push.comp
+      const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, friction_);
+      const auto add = [&](std::uint32_t i, double factor) {
+        factor *= inverse_masses[i] / weight;
+        x[i] += factor * (by.stopped + by.pushed), stopped[i] += factor * by.stopped;
+      };
+      add(c.vertex, 1);
+      for (std::size_t j = 0; j < 3; ++j) add(c.corners[j], -m.weights[glm::length_t(j)]);
     }
-    for (std::size_t i = 0; i < x.size(); ++i) x[i] += corrections[i], v[i] += corrections[i] / h;
+    for (std::size_t i = 0; i < x.size(); ++i) v[i] += stopped[i] / h;
   }
 
  private:
@@ -105,12 +107,19 @@ class PairContact {
       if (near_another(body, low - margin, high + margin))
         for_each_cell(low, high, [&](const Cell& cell) { grid[cell].push_back(t); });
     }
+    std::vector<glm::dvec3> normals(x.size(), glm::dvec3(0));
+    for (const auto& [i, j, k, body] : mesh_.triangles) {
+      const glm::dvec3 n = glm::cross(x[j] - x[i], x[k] - x[i]);
+      if (const double area = glm::length(n); area > 0)
+        for (const std::uint32_t v : {i, j, k}) normals[v] += n / area;
+    }
     std::vector<Contact> contacts;
     for (const auto& [vertex, body, thickness] : mesh_.vertices) {
       const glm::dvec3 own = x[vertex];
       if (!near_another(body, own - margin, own + margin)) continue;
       Contact best{vertex, {}, {}};
-      best.meeting.gap = margin;
+      best.meeting.gap = best.meeting.rank = margin;
+      Formulas<double>::Meeting nearest = best.meeting;
       for_each_cell(own - margin, own + margin, [&](const Cell& cell) {
         const auto found = grid.find(cell);
         if (found == grid.end()) return;
@@ -119,12 +128,14 @@ class PairContact {
           if (corners[3] == body && (!self_ || neighbours(vertex, corners))) continue;
           const auto m =
               Formulas<double>{}.meet(x[corners[0]] - own, x[corners[1]] - own, x[corners[2]] - own);
-          if (Formulas<double>{}.nearer(m, best.meeting))
+          if (m.rank < nearest.rank) nearest = m;
+          if (!(thickness > 0) && !Formulas<double>{}.opposes(m, normals[vertex])) continue;
+          if (m.rank < best.meeting.rank)
             best.meeting = m, std::copy_n(corners.begin(), 3, best.corners.begin());
         }
       });
       best.meeting.gap -= double(thickness);
-      if (best.meeting.gap < 0) contacts.push_back(best);
+      if (best.meeting.gap < 0 && nearest.gap <= double(thickness)) contacts.push_back(best);
     }
     return contacts;
   }

@@ -1,0 +1,17 @@
+// How deep bodies are in each other: measured in double on the CPU, by the tets, not by what contact found.
+#pragma once
+
+#include "sim/model.h"
+
+namespace tetpbd {
+
+struct Overlap {
+  std::size_t inside = 0;  ///< vertices of surfaces that are in a tet of another body
+  double largest = 0;   ///< from such a vertex to the surface of that body, over its own body's size at rest
+  double deepest = 0;   ///< m, the same of any
+  double part_999 = 0;  ///< which 99.9 % of all vertices of surfaces keep below
+};
+/// `self`: and of tets of its own body, but those near it at rest.
+Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& positions, bool self);
+
+}  // namespace tetpbd

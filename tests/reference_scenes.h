@@ -9,7 +9,7 @@
 
 #include "sim/error.h"
 #include "sim/material.h"
-#include "sim/reference/reference.h"
+#include "tests/reference_steps.h"
 
 namespace reference_scenes {
 

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "sim/error.h"
-#include "sim/reference/reference.h"
 #include "sim/sim.h"
 #include "sim/solvers/colours.h"
 #include "sim/solvers/cpu_pbd.h"
 #include "tests/gl_test.h"
+#include "tests/reference_steps.h"
 
 using namespace tetpbd;
 

@@ -1,8 +1,8 @@
 // One step of each mode against the same step in double on the CPU.
 #include <doctest/doctest.h>
 
-#include "sim/reference/reference.h"
 #include "tests/gl_test.h"
+#include "tests/reference_steps.h"
 #include "tests/sim_samples.h"
 
 using namespace samples;

@@ -29,35 +29,6 @@ ordered_json spread(std::vector<double> values) {
   return {{"median", median(values)}, {"min", percentile(values, 0)}, {"max", percentile(values, 1)}};
 }
 
-}  // namespace
-
-ordered_json launch_and_bandwidth_limits(bool software) {
-  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, work_groups = bytes / 16 / 8 / 256;
-  const Buffer from("probe, from", bytes), to("probe, to", bytes);
-  from.clear();
-  from.bind_storage(0);
-  to.bind_storage(1);
-  const auto seconds_each = [&](const char* copy, std::size_t groups, int times) {
-    const Program program = Program::compute("probe.comp", {{{"COPY", copy}}, {}});
-    program.use();
-    std::chrono::steady_clock::time_point begin;
-    for (int k = -times; k < times; ++k) {  // the first half to warm up
-      if (k == 0) {
-        glFinish();
-        begin = std::chrono::steady_clock::now();
-      }
-      glDispatchCompute(unsigned(groups), 1, 1);
-      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    }
-    glFinish();
-    return seconds_since(begin) / times;
-  };
-  return {{"dispatch_us", seconds_each("0", 256, software ? 20 : 5000) * 1e6},
-          {"copy_gb_s", 2 * double(bytes) / seconds_each("1", work_groups, software ? 2 : 50) * 1e-9}};
-}
-
-namespace {
-
 /// Frames as fast as they come: a step, and a picture of it if there is one. One wait, at the end.
 void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
                  const std::function<void()>& picture) {
@@ -128,6 +99,31 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
 }
 
 }  // namespace
+
+ordered_json launch_and_bandwidth_limits(bool software) {
+  const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, work_groups = bytes / 16 / 8 / 256;
+  const Buffer from("probe, from", bytes), to("probe, to", bytes);
+  from.clear();
+  from.bind_storage(0);
+  to.bind_storage(1);
+  const auto seconds_each = [&](const char* copy, std::size_t groups, int times) {
+    const Program program = Program::compute("probe.comp", {{{"COPY", copy}}, {}});
+    program.use();
+    std::chrono::steady_clock::time_point begin;
+    for (int k = -times; k < times; ++k) {  // the first half to warm up
+      if (k == 0) {
+        glFinish();
+        begin = std::chrono::steady_clock::now();
+      }
+      glDispatchCompute(unsigned(groups), 1, 1);
+      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    }
+    glFinish();
+    return seconds_since(begin) / times;
+  };
+  return {{"dispatch_us", seconds_each("0", 256, software ? 20 : 5000) * 1e6},
+          {"copy_gb_s", 2 * double(bytes) / seconds_each("1", work_groups, software ? 2 : 50) * 1e-9}};
+}
 
 Sweep bench_sweep(const BenchOptions& options) {
   Sweep sweep{"bench", "bench", split(columns, ','), 0, table, {}};

@@ -94,6 +94,13 @@ std::vector<double> ticks(const Axis& axis) {
 constexpr std::array markers = {"m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", "m-3.7 -3.7h7.4v7.4h-7.4z",
                                 "m0 -5l4.6 8h-9.2z", "m0 -5l5 5l-5 5l-5 -5z"};
 
+constexpr double least_percent = 1e-4, decades = 6;
+
+std::string heat_code(double part) {
+  const glm::dvec3 c = 255.0 * heat(part);
+  return fmt::format("#{:02x}{:02x}{:02x}", std::lround(c.x), std::lround(c.y), std::lround(c.z));
+}
+
 }  // namespace
 
 std::string palette_colour(std::size_t index) {
@@ -164,17 +171,6 @@ void write_svg(const std::filesystem::path& name, const std::string& picture) {
   print_error(fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n",
                           printable(png.file.string())));
 }
-
-namespace {
-
-constexpr double least_percent = 1e-4, decades = 6;
-
-std::string heat_code(double part) {
-  const glm::dvec3 c = 255.0 * heat(part);
-  return fmt::format("#{:02x}{:02x}{:02x}", std::lround(c.x), std::lround(c.y), std::lround(c.z));
-}
-
-}  // namespace
 
 // Dark blue, green, yellow, red.
 glm::dvec3 heat(double part) {

@@ -27,18 +27,11 @@ std::vector<std::uint32_t> body_numbers(const Model& model) {
   return numbers;
 }
 
-std::vector<Triangle> faces_of(const Model& model) {
-  std::vector<Triangle> faces = model.rest.surface;
-  for (Triangle& face : faces)
-    for (std::uint32_t& v : face) v = model.original[v];
-  return faces;
-}
-
 // What is seen: the fine surface that rides on the tets, else their boundary.
 SurfaceMesh seen_surface(const Model& model, const std::vector<glm::dvec3>& positions) {
   SurfaceMesh surface{carried_positions(model.carried, model.rest.tets, positions), model.carried.triangles};
   if (surface.triangles.empty()) {
-    surface = {in_original_order(model, positions), faces_of(model)};
+    surface = {in_original_order(model, positions), in_original_numbers(model, model.rest.surface)};
   } else {  // and sheets, which carry none
     const auto base = std::uint32_t(surface.positions.size());
     surface.positions.insert(surface.positions.end(), positions.begin(), positions.end());
@@ -88,14 +81,14 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
   std::vector<Triangle> sheets;
   for (const Body& body : model.bodies)
     for (std::size_t t = 0; body.is_sheet() && t < body.triangles; ++t) {
-      Triangle triangle = model.rest.surface[body.first_triangle + t];
-      for (std::uint32_t& v : triangle) v = model.original[v];
-      sheets.push_back(triangle), ends.push_back(std::uint32_t(4 * tets + 3 * sheets.size()));
+      sheets.push_back(model.rest.surface[body.first_triangle + t]);
+      ends.push_back(std::uint32_t(4 * tets + 3 * sheets.size()));
       for (auto& list : values) list.push_back(0);
     }
   std::vector<std::uint32_t> corners;
   for (const Tet& tet : original_tets(model)) corners.insert(corners.end(), tet.begin(), tet.end());
-  for (const Triangle& t : sheets) corners.insert(corners.end(), t.begin(), t.end());
+  for (const Triangle& t : in_original_numbers(model, sheets))
+    corners.insert(corners.end(), t.begin(), t.end());
   std::vector<std::uint8_t> types(tets, 10);  // VTK's numbers
   types.resize(ends.size(), 5);
   std::string text = fmt::format(
@@ -124,7 +117,7 @@ void write_arrays(const Sim& sim, const std::filesystem::path& folder) {
   write_npy(folder / "velocities.npy", rows_of(model, state.velocities));
   write_npy(folder / "rest.npy", rows_of(model, model.rest.positions));
   write_npy(folder / "tets.npy", original_tets(model));
-  write_npy(folder / "faces.npy", faces_of(model));
+  write_npy(folder / "faces.npy", in_original_numbers(model, model.rest.surface));
   write_npy(folder / "bodies.npy", body_numbers(model));
   if (model.carried.triangles.empty()) return;
   const SurfaceMesh surface = seen_surface(model, state.positions);

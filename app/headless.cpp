@@ -193,7 +193,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   Sim sim = create_sim(model, scene.settings, tuning);
   warm_up(sim);
   Metrics metrics = create_metrics(*model, sim.system);
-  const auto right = motion_of({*model, sim.system, sim.settings, sim.inverse_masses}, options.reference);
+  const auto right = right_motion(*model, sim.settings, options.reference);
   std::optional<FrameWriter> frames;
   if (options.png_every > 0 || !options.video.empty())
     frames.emplace(scene, sim, options, right ? &*right : nullptr);

@@ -23,6 +23,12 @@ long compared_every(const Model& model) { return std::max(4l, long(model.positio
 // How far its iterations go, about.
 double effort(const Settings& s) { return leaps(s) ? 1e9 / s.stability : double(s.iterations) * s.substeps; }
 
+GLuint patch_words(const Sim& sim) {
+  for (const auto& [binding, buffer] : sim.solver.bindings)
+    if (binding == BIND_PATCHES && sim.solver.double_buffered) return buffer;
+  return 0;
+}
+
 }  // namespace
 
 std::string describe(const Lane& lane, bool material) {
@@ -60,16 +66,6 @@ void History::add(double value, double time) {
   every *= 2;
 }
 
-namespace {
-
-GLuint patch_words(const Sim& sim) {
-  for (const auto& [binding, buffer] : sim.solver.bindings)
-    if (binding == BIND_PATCHES && sim.solver.double_buffered) return buffer;
-  return 0;
-}
-
-}  // namespace
-
 bool has_patches(const Lane& lane) { return patch_words(lane.sim) != 0; }
 
 GLuint patch_numbers(Lane& lane) {
@@ -79,8 +75,7 @@ GLuint patch_numbers(Lane& lane) {
   const std::size_t patches = lane.sim.solver.iteration[0].work_groups,
                     each = 4 + 2 * std::size_t(std::ranges::count(present, true));
   std::vector<std::uint32_t> chunks(patches * each);
-  glBindBuffer(GL_COPY_READ_BUFFER, words);
-  glGetBufferSubData(GL_COPY_READ_BUFFER, 0, GLsizeiptr(chunks.size() * 4), chunks.data());
+  read_buffer(words, 0, chunks.size() * 4, chunks.data());
   std::vector<float> numbers(lane.sim.model->positions.size());
   for (std::size_t p = 0; p < patches; ++p)  // patches.h: how many are owned, the first of them
     for (std::uint32_t k = 0; k < chunks[p * each + 1]; ++k) numbers.at(chunks[p * each + 2] + k) = float(p);

@@ -15,11 +15,6 @@ namespace tetpbd {
 
 namespace {
 
-std::uint64_t key_of(const Model& model, const Settings& settings) {
-  const ConstraintSystem none;
-  return scene_key({model, none, settings, model.inverse_masses});
-}
-
 MapCell& now_filled(LiveMap& map) { return map.cells[map.order[map.done]]; }
 
 void end_cell(LiveMap& map, MapCell::State state) {
@@ -32,7 +27,7 @@ void end_cell(LiveMap& map, MapCell::State state) {
 // Whether what the cell is held against is there.
 bool has_answer(LiveMap& map) {
   const MapCell& cell = now_filled(map);
-  const std::uint64_t key = key_of(*map.model, cell.settings);
+  const std::uint64_t key = scene_key(*map.model, cell.settings);
   if (map.right_of == key && !map.search) return true;
   if (!map.search) {
     map.right_of = key;
@@ -87,50 +82,13 @@ void judge(LiveMap& map) {
   if (map.right) {
     add_state(map.error, *map.right, *map.model, sim.steps, state);
   } else {
-    const auto volumes = tet_volumes({state.positions, map.model->rest.tets, {}});
-    const double now = std::accumulate(volumes.begin(), volumes.end(), 0.0);
+    const double now = mesh_volume({state.positions, map.model->rest.tets, {}});
     if (map.volume > 0) map.loss = std::max(map.loss, 100 * (map.volume - now) / map.volume);
   }
   cell.percent = map.right ? 100 * map.error.rms : map.loss;
   if (sim.steps >= map.steps)
     end_cell(map, std::isfinite(cell.percent) ? MapCell::finished : MapCell::failed);
 }
-
-}  // namespace
-
-LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x,
-                  const std::string& y, double seconds) {
-  LiveMap map{
-      .x = map_axis(x, "across"), .y = map_axis(y, "up"), .model = std::move(model), .seconds = seconds};
-  if (map.model->rest.tets.size() > LiveMap::most_tets)
-    throw Error(fmt::format("a map here is of at most {} tets", LiveMap::most_tets), "stability map",
-                "take a smaller scene, or tetpbd map");
-  const std::size_t columns = map.x.values.size();
-  for (const std::string& up : map.y.values)
-    for (const std::string& across : map.x.values) {
-      MapCell& cell = map.cells.emplace_back();
-      cell.settings = base;
-      set_parameter(cell.settings, *map.x.row, across, "across");
-      set_parameter(cell.settings, *map.y.row, up, "up");
-      check_settings(cell.settings,
-                     fmt::format("{} {}, {} {}", map.x.row->name, across, map.y.row->name, up));
-    }
-  const auto rest = tet_volumes(map.model->rest);
-  map.volume = std::accumulate(rest.begin(), rest.end(), 0.0);
-  map.order.resize(map.cells.size());
-  std::iota(map.order.begin(), map.order.end(), std::size_t(0));
-  // By columns, where it is `x` that changes the motion, or makes the solver again.
-  const auto costs = [&](const MapAxis& axis, std::size_t other) {
-    return axis.values.size() > 1 &&
-           key_of(*map.model, map.cells[0].settings) != key_of(*map.model, map.cells[other].settings);
-  };
-  if (costs(map.x, std::min<std::size_t>(1, columns - 1)) &&
-      !costs(map.y, std::min(columns, map.cells.size() - 1)))
-    std::ranges::sort(map.order, {}, [&](std::size_t i) { return std::pair(i % columns, i / columns); });
-  return map;
-}
-
-namespace {
 
 // A batch of steps, or what comes before and after one; false while it has to wait.
 bool go_on(LiveMap& map, const std::function<bool()>& in_time) {
@@ -155,6 +113,37 @@ bool go_on(LiveMap& map, const std::function<bool()>& in_time) {
 }
 
 }  // namespace
+
+LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x,
+                  const std::string& y, double seconds) {
+  LiveMap map{
+      .x = map_axis(x, "across"), .y = map_axis(y, "up"), .model = std::move(model), .seconds = seconds};
+  if (map.model->rest.tets.size() > LiveMap::most_tets)
+    throw Error(fmt::format("a map here is of at most {} tets", LiveMap::most_tets), "stability map",
+                "take a smaller scene, or tetpbd map");
+  const std::size_t columns = map.x.values.size();
+  for (const std::string& up : map.y.values)
+    for (const std::string& across : map.x.values) {
+      MapCell& cell = map.cells.emplace_back();
+      cell.settings = base;
+      set_parameter(cell.settings, *map.x.row, across, "across");
+      set_parameter(cell.settings, *map.y.row, up, "up");
+      check_settings(cell.settings,
+                     fmt::format("{} {}, {} {}", map.x.row->name, across, map.y.row->name, up));
+    }
+  map.volume = mesh_volume(map.model->rest);
+  map.order.resize(map.cells.size());
+  std::iota(map.order.begin(), map.order.end(), std::size_t(0));
+  // By columns, where it is `x` that changes the motion, or makes the solver again.
+  const auto costs = [&](const MapAxis& axis, std::size_t other) {
+    return axis.values.size() > 1 &&
+           scene_key(*map.model, map.cells[0].settings) != scene_key(*map.model, map.cells[other].settings);
+  };
+  if (costs(map.x, std::min<std::size_t>(1, columns - 1)) &&
+      !costs(map.y, std::min(columns, map.cells.size() - 1)))
+    std::ranges::sort(map.order, {}, [&](std::size_t i) { return std::pair(i % columns, i / columns); });
+  return map;
+}
 
 void fill_map(LiveMap& map, double budget) {
   const auto in_time = [budget, begin = std::chrono::steady_clock::now()] {

@@ -293,8 +293,8 @@ void add_commands(CLI::App& app, Arguments& a) {
       "often as --positions-every says (default: every 1/30 s)")
       ->check(one_of(export_formats));
   CLI::Option* replay = add(run, "--replay", a.run.replay,
-                            "instead: what a record of tetpbd view --record says, lanes and all; "
-                            "with --video, drawn at the speed it was played");
+                            "instead: what a record of tetpbd view --record says, lanes and all; with "
+                            "--video, drawn at the speed it was played");
   for (const char* dropped :
        {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
         "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
@@ -368,10 +368,9 @@ void add_commands(CLI::App& app, Arguments& a) {
         a.hard_cases = true;
         a.compare.axes.modes = hard_case_modes, a.compare.steps = 0, a.compare.out = "stability";
       },
-      "instead: which mode recovers from the scenes of models/scenes/hard, and when: from "
-      "recovered_at_step on, for the last 5 % of the steps at least, the volume is within 1 %, no tet "
-      "inverted "
-      "and hard bodies within 1 % of their shape; scenes in which no constraint acts are left out");
+      "instead: which mode recovers from the scenes of models/scenes/hard, and when: from recovered_at_step "
+      "on, for the last 5 % of the steps at least, the volume is within 1 %, no tet inverted and hard bodies "
+      "within 1 % of their shape; scenes in which no constraint acts are left out");
   add(compare, "--scene,--scenes", a.compare.scene, "a scene");
   add_overrides(compare, a.compare.overrides);
   add_axes(compare, a.compare.axes);

@@ -31,6 +31,36 @@ double to_number(const std::string& text, const std::string& where) {
   return value;
 }
 
+ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
+                     const std::string& x, const std::string& y, std::optional<Motion>& last, Film& film) {
+  ordered_json row = {{"x", x}, {"y", y}};
+  Scene own = scene;
+  own.settings = settings;
+  const long steps = duration_in_steps(own);
+  if (!last || last->scene != scene_key(*model, settings))
+    last = answer_for(*model, settings, steps);
+  MeasuredRun run;
+  try {
+    run = run_model(model, settings, steps, last ? &*last : nullptr, true, film.of(steps));
+  } catch (const Error& error) {  // of this setting: its mode does not go so far
+    for (const std::string& key : split(results, ',')) row[key] = nullptr;
+    row["finite"] = false, row["refused"] = error.what();
+    return row;
+  }
+  const auto& found = run.errors.non_finite;
+  const double nothing = std::nan("");
+  const bool motion = run.motion && run.errors.finite;
+  row["finite"] = run.errors.finite;
+  row["failed_at_step"] = found ? ordered_json(found->step) : ordered_json();
+  row["motion_rms"] = motion ? run.motion->rms : nothing;
+  row["motion_final"] = motion ? run.motion->final : nothing;
+  row["max_volume_loss_percent"] = run.errors.finite ? run.errors.max_volume_loss_percent : nothing;
+  row["tet_volume_max"] = run.errors.finite && run.errors.last ? run.errors.last->tet_volume_max : nothing;
+  row["ms_per_step"] = median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms);
+  row["film"] = film.write();
+  return row;
+}
+
 }  // namespace
 
 MapAxis map_axis(const std::string& text, const std::string& flag) {
@@ -74,41 +104,6 @@ std::optional<Motion> answer_for(const Model& model, const Settings& settings, l
   const ConstraintSystem system = build_constraints(model.rest, settings);
   return find_motion({model, system, settings, model.inverse_masses}, steps, {}, {}, progress);
 }
-
-namespace {
-
-ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
-                     const std::string& x, const std::string& y, std::optional<Motion>& last, Film& film) {
-  ordered_json row = {{"x", x}, {"y", y}};
-  Scene own = scene;
-  own.settings = settings;
-  const long steps = duration_in_steps(own);
-  const ConstraintSystem none;
-  if (!last || last->scene != scene_key({*model, none, settings, model->inverse_masses}))
-    last = answer_for(*model, settings, steps);
-  MeasuredRun run;
-  try {
-    run = run_model(model, settings, steps, last ? &*last : nullptr, true, film.of(steps));
-  } catch (const Error& error) {  // of this setting: its mode does not go so far
-    for (const std::string& key : split(results, ',')) row[key] = nullptr;
-    row["finite"] = false, row["refused"] = error.what();
-    return row;
-  }
-  const auto& found = run.errors.non_finite;
-  const double nothing = std::nan("");
-  const bool motion = run.motion && run.errors.finite;
-  row["finite"] = run.errors.finite;
-  row["failed_at_step"] = found ? ordered_json(found->step) : ordered_json();
-  row["motion_rms"] = motion ? run.motion->rms : nothing;
-  row["motion_final"] = motion ? run.motion->final : nothing;
-  row["max_volume_loss_percent"] = run.errors.finite ? run.errors.max_volume_loss_percent : nothing;
-  row["tet_volume_max"] = run.errors.finite && run.errors.last ? run.errors.last->tet_volume_max : nothing;
-  row["ms_per_step"] = median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms);
-  row["film"] = film.write();
-  return row;
-}
-
-}  // namespace
 
 int run_map(const MapOptions& options) {
   const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");

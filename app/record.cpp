@@ -99,19 +99,6 @@ void set_view(Session& s, const ordered_json& given, const std::string& where) {
   s.overlaid = view.at("overlay"), s.ghost = view.at("ghost");
 }
 
-}  // namespace
-
-void note_step(Session& s) {
-  if (!s.record) return;
-  s.record->step = steps_of(s.loaded.lanes), s.record->shown = false;
-  if (ordered_json view = view_json(s); view != s.record->view) {
-    s.record->view = view;
-    note(s, {{"view", std::move(view)}});
-  }
-}
-
-namespace {
-
 // Null where the state is not finite: when that is found depends on the machine.
 ordered_json hashes(Session& s) {
   ordered_json result = ordered_json::array();
@@ -222,6 +209,15 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
 }
 
 }  // namespace
+
+void note_step(Session& s) {
+  if (!s.record) return;
+  s.record->step = steps_of(s.loaded.lanes), s.record->shown = false;
+  if (ordered_json view = view_json(s); view != s.record->view) {
+    s.record->view = view;
+    note(s, {{"view", std::move(view)}});
+  }
+}
 
 void end_record(Session& s) {
   if (!s.record) return;

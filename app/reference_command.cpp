@@ -45,8 +45,7 @@ void print_motion(const Scene& scene, const Motion& motion) {
 // The cache's file of this scene's motion; empty without a cache folder.
 std::filesystem::path cached_motion(std::uint64_t scene) { return cache_file("motion_" + hex(scene)); }
 
-}  // namespace
-
+// A line of JSON, then the kept positions as float64, frames x N x 3, in the first order of vertices.
 void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion) {
   ordered_json head = {
       {"format", format_name},
@@ -68,6 +67,7 @@ void write_motion(const std::filesystem::path& file, const Model& model, const M
   write_file(file, text);
 }
 
+// Throws Error for what is no such file, or of another scene than `scene` (scene_key).
 Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene) {
   std::ifstream in(file, std::ios::binary);
   std::string line;
@@ -100,16 +100,6 @@ Motion read_motion(const std::filesystem::path& file, const Model& model, std::u
   return motion;
 }
 
-std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file) {
-  const std::uint64_t scene = scene_key(input);
-  const std::filesystem::path from = file.empty() ? cached_motion(scene) : file;
-  std::error_code ignored;
-  if (file.empty() && !std::filesystem::exists(from, ignored)) return std::nullopt;
-  return read_motion(from, input.model, scene);
-}
-
-namespace {
-
 std::filesystem::path find_and_keep(const Scene& scene, const Model& model, const ReferenceOptions& options) {
   const ConstraintSystem system = build_constraints(model.rest, scene.settings);
   const ReferenceInput input{model, system, scene.settings, model.inverse_masses};
@@ -128,16 +118,19 @@ std::filesystem::path find_and_keep(const Scene& scene, const Model& model, cons
 
 }  // namespace
 
-std::optional<Motion> right_motion(const Model& model, const Settings& settings) {
-  const ConstraintSystem none;  // what moves it stands in the settings
-  return motion_of({model, none, settings, model.inverse_masses}, {});
+std::optional<Motion> right_motion(const Model& model, const Settings& settings,
+                                   const std::filesystem::path& file) {
+  const std::uint64_t scene = scene_key(model, settings);
+  const std::filesystem::path from = file.empty() ? cached_motion(scene) : file;
+  std::error_code ignored;
+  if (file.empty() && !std::filesystem::exists(from, ignored)) return std::nullopt;
+  return read_motion(from, model, scene);
 }
 
 std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps) {
   if (compliant(settings)) return std::nullopt;
-  const ConstraintSystem none;
   try {
-    return find_motion({model, none, settings, model.inverse_masses}, steps);
+    return find_motion({model, {}, settings, model.inverse_masses}, steps);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error&) {

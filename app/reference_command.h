@@ -19,14 +19,10 @@ struct ReferenceOptions {
 /// Prints what the motion is and how wrong it may be. An interrupted search goes on where it was.
 int run_reference(const Scene& scene, const ReferenceOptions& options);
 
-/// A line of JSON, then the kept positions as float64, frames x N x 3, in the first order of vertices.
-void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion);
-/// Throws Error for what is no such file, or of another scene than `scene` (scene_key).
-Motion read_motion(const std::filesystem::path& file, const Model& model, std::uint64_t scene);
-/// The motion in `file`, or without one the cache's of this scene, if it has any.
-std::optional<Motion> motion_of(const ReferenceInput& input, const std::filesystem::path& file);
-/// The cache's.
-std::optional<Motion> right_motion(const Model& model, const Settings& settings);
+/// In `file`, or without one the cache's of this scene, if it has any. Throws Error for a file of another
+/// scene.
+std::optional<Motion> right_motion(const Model& model, const Settings& settings,
+                                   const std::filesystem::path& file = {});
 /// Of rigid bodies, found at once; nothing for scenes that are not theirs.
 std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps);
 /// Puts it there, over so many steps at least, if it is not. Throws Error for scenes without one.

@@ -83,37 +83,6 @@ void draw_scenes(Session& s) {
   end_row(s, "scene", s.loaded.scene.description + "\non the command line: --scene");
 }
 
-}  // namespace
-
-void draw_scene(Session& s) {
-  draw_scenes(s);
-  begin_row(s, "open file");
-  ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
-  bool load_it =
-      ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
-  end_row(s, "mesh",
-          "a scene (.json), or a mesh in place of this scene's first body: .ply .obj .stl .off surfaces, "
-          ".node/.ele .msh tetrahedra. A file can also be dropped onto the window");
-  ImGui::SameLine();
-  load_it |= button(s, "Load", "load", "opens the file of this path");
-  if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
-  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
-  if (button(s, "Save scene", "save scene",
-             "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S",
-             width))
-    save_scene(s);
-  ImGui::SameLine();
-  ImGui::BeginDisabled(s.changes.past.empty());
-  if (button(s, "Undo", "undo", "takes back the last change of a setting\nCtrl+Z", width)) undo(s);
-  ImGui::EndDisabled();
-  ImGui::SameLine();
-  ImGui::BeginDisabled(s.changes.future.empty());
-  if (button(s, "Redo", "redo", "what was taken back, again\nCtrl+Y, Ctrl+Shift+Z", width)) redo(s);
-  ImGui::EndDisabled();
-}
-
-namespace {
-
 // Three numbers, or one.
 bool drag_field(Session& s, const char* label, double* value, int count, double speed, double low,
                 const char* format, const char* help) {
@@ -175,12 +144,38 @@ bool obstacle_fields(Session& s, Obstacle& o) {
 
 }  // namespace
 
+void draw_scene(Session& s) {
+  draw_scenes(s);
+  begin_row(s, "open file");
+  ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
+  bool load_it =
+      ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
+  end_row(s, "mesh",
+          "a scene (.json), or a mesh in place of this scene's first body: .ply .obj .stl .off surfaces, "
+          ".node/.ele .msh tetrahedra. A file can also be dropped onto the window");
+  ImGui::SameLine();
+  load_it |= button(s, "Load", "load", "opens the file of this path");
+  if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
+  if (button(s, "Save scene", "save scene",
+             "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S",
+             width))
+    save_scene(s);
+  ImGui::SameLine();
+  ImGui::BeginDisabled(s.changes.past.empty());
+  if (button(s, "Undo", "undo", "takes back the last change of a setting\nCtrl+Z", width)) undo(s);
+  ImGui::EndDisabled();
+  ImGui::SameLine();
+  ImGui::BeginDisabled(s.changes.future.empty());
+  if (button(s, "Redo", "redo", "what was taken back, again\nCtrl+Y, Ctrl+Shift+Z", width)) redo(s);
+  ImGui::EndDisabled();
+}
+
 void draw_obstacles(Session& s) {
   const Words shapes(shape_names.begin(), shape_names.end());
-  if (const auto chosen =
-          combo(s, "add obstacle", "", shapes,
-                "one more, beside the bodies; a mesh: the file of the path above. Click on one in the "
-                "view to choose it, then drag to move, Ctrl + drag to turn"))
+  if (const auto chosen = combo(s, "add obstacle", "", shapes,
+                                "one more, beside the bodies; a mesh: the file of the path above. Click on "
+                                "one in the view to choose it, then drag to move, Ctrl + drag to turn"))
     add_obstacle(s, int(std::ranges::find(shapes, *chosen) - shapes.begin()));
   for (int i = 0; i < int(s.loaded.scene.obstacles.size()); ++i) {
     const Obstacle& o = s.loaded.scene.obstacles[std::size_t(i)];

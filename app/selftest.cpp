@@ -170,8 +170,7 @@ int run_selftest(int gpu) {
   const ordered_json limits = launch_and_bandwidth_limits(context.capabilities().software);
   fmt::print(
       "\nto share, ms a step and the error:\ntetpbd {} | {} | {} | {} | dispatch {:.2f} us | copy {:.0f} "
-      "GB/s | "
-      "{} of {} checks\n",
+      "GB/s | {} of {} checks\n",
       TETPBD_VERSION, context.capabilities().renderer, context.capabilities().version, fmt::join(said, " | "),
       number(limits, "dispatch_us"), number(limits, "copy_gb_s"),
       std::size_t(checks.all) - checks.failed.size(), checks.all);

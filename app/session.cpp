@@ -39,6 +39,79 @@ bool differs(const Settings& a, const Settings& b, const Parameter& row) {
   return parameter_text(a, row) != parameter_text(b, row);
 }
 
+void say_choice(Session& s) {
+  s.budget_ms = s.loaded.choice->budget_ms;
+  say(s, "solver: " + describe(*s.loaded.choice));
+}
+
+std::uint64_t key_of(const Lane& lane) { return scene_key(*lane.sim.model, lane.sim.settings); }
+
+// What lanes are held against, if one answer is right for all; found again only where it is another.
+void find_right(Session& s) {
+  const auto& lanes = s.loaded.lanes;
+  auto& right = s.loaded.right;
+  if (lanes.size() == 1 && s.view.colour != Colour::motion) return right.reset();
+  const Sim& first = lanes[0].sim;
+  const std::uint64_t key = key_of(lanes[0]);
+  s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& lane) { return key_of(lane) == key; });
+  const long steps = std::max(1l, std::lround(s.loaded.scene.duration / first.settings.dt));
+  if (!s.loaded.comparable) return right.reset();
+  if (right && right->scene == key && right->kept.back() >= steps) return;
+  right = right_motion(*first.model, first.settings);
+  if (!right) right = rigid_motion(*first.model, first.settings, steps);
+}
+
+bool is_fixed(Session& s, std::uint32_t vertex) {
+  const bool fixed = !(s.loaded.sim().model->inverse_masses[vertex] > 0);
+  if (fixed) say(s, fmt::format("vertex {} is fixed by the scene", vertex));
+  return fixed;
+}
+
+void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
+  const Settings old = s.loaded.sim().settings;
+  for (std::size_t i = 0; i < of_lanes.size(); ++i) {
+    Lane& lane = s.loaded.lanes[i];
+    if (of_lanes[i] == lane.sim.settings) continue;
+    const bool alone = of_lanes.size() == 1 && !s.loaded.right;
+    const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
+    const Settings own = lane.sim.settings;
+    apply_settings(lane.sim, of_lanes[i]);
+    note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
+    lane.patches = {};
+    if (alone && lane.sim.steps > 0) disturb(s);
+    if (alone || key_of(lane) == before) continue;
+    disturb(s);
+    s.loaded.comparable =
+        std::ranges::all_of(s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
+  }
+  forget_errors(s);  // such as that of a setting that did not go with the others
+  for (const Parameter& row : parameters()) {
+    const Settings& now = s.loaded.sim().settings;
+    if (!differs(now, old, row)) continue;
+    s.log("set {} {}", row.name, parameter_text(now, row));
+    if (row.effect == Effect::restart) say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
+    if (row.effect == Effect::rebuild) s.loaded.lane().step_ms = {};
+  }
+}
+
+void take_back(Session& s, const char* word, std::vector<Change>& from, std::vector<Change>& to) {
+  if (from.empty()) return say(s, fmt::format("nothing to {}", word));
+  s.log("{}", word);
+  const Change now = settings_and_obstacles(s);
+  const bool done = attempt(s, [&] {
+    put_settings(s, from.back().lanes);
+    const auto numbers = [](const std::vector<Obstacle>& all) {
+      std::vector<std::vector<double>> list;
+      for (const Obstacle& o : all) list.push_back(numbers_of(o));
+      return list;
+    };
+    if (numbers(now.obstacles) != numbers(from.back().obstacles)) put_obstacles(s, from.back().obstacles);
+  });
+  if (done) to.push_back(now);
+  from.pop_back();
+  s.changes.open = false;
+}
+
 }  // namespace
 
 void disturb(Session& s) {
@@ -82,42 +155,6 @@ void log_state(Session& s) {
   }
   s.log("state {} {:016x}", s.loaded.sim().steps, state_hash(s.loaded.sim()));
 }
-
-namespace {
-
-void say_choice(Session& s) {
-  s.budget_ms = s.loaded.choice->budget_ms;
-  say(s, "solver: " + describe(*s.loaded.choice));
-}
-
-std::uint64_t key_of(const Lane& lane) {
-  const ConstraintSystem none;
-  const Model& model = *lane.sim.model;
-  return scene_key({model, none, lane.sim.settings, model.inverse_masses});
-}
-
-// What lanes are held against, if one answer is right for all; found again only where it is another.
-void find_right(Session& s) {
-  const auto& lanes = s.loaded.lanes;
-  auto& right = s.loaded.right;
-  if (lanes.size() == 1 && s.view.colour != Colour::motion) return right.reset();
-  const Sim& first = lanes[0].sim;
-  const std::uint64_t key = key_of(lanes[0]);
-  s.loaded.comparable = std::ranges::all_of(lanes, [&](const Lane& lane) { return key_of(lane) == key; });
-  const long steps = std::max(1l, std::lround(s.loaded.scene.duration / first.settings.dt));
-  if (!s.loaded.comparable) return right.reset();
-  if (right && right->scene == key && right->kept.back() >= steps) return;
-  right = right_motion(*first.model, first.settings);
-  if (!right) right = rigid_motion(*first.model, first.settings, steps);
-}
-
-bool is_fixed(Session& s, std::uint32_t vertex) {
-  const bool fixed = !(s.loaded.sim().model->inverse_masses[vertex] > 0);
-  if (fixed) say(s, fmt::format("vertex {} is fixed by the scene", vertex));
-  return fixed;
-}
-
-}  // namespace
 
 Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene) {
   const auto model = build_model(scene);
@@ -221,37 +258,6 @@ void watch_state(Session& s) {
   say(s, error_of(*found).what(), true, true);
 }
 
-namespace {
-
-void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
-  const Settings old = s.loaded.sim().settings;
-  for (std::size_t i = 0; i < of_lanes.size(); ++i) {
-    Lane& lane = s.loaded.lanes[i];
-    if (of_lanes[i] == lane.sim.settings) continue;
-    const bool alone = of_lanes.size() == 1 && !s.loaded.right;
-    const std::uint64_t before = alone ? 0 : key_of(lane);  // it reads the whole mesh
-    const Settings own = lane.sim.settings;
-    apply_settings(lane.sim, of_lanes[i]);
-    note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
-    lane.patches = {};
-    if (alone && lane.sim.steps > 0) disturb(s);
-    if (alone || key_of(lane) == before) continue;
-    disturb(s);
-    s.loaded.comparable =
-        std::ranges::all_of(s.loaded.lanes, [&](const Lane& other) { return key_of(other) == key_of(lane); });
-  }
-  forget_errors(s);  // such as that of a setting that did not go with the others
-  for (const Parameter& row : parameters()) {
-    const Settings& now = s.loaded.sim().settings;
-    if (!differs(now, old, row)) continue;
-    s.log("set {} {}", row.name, parameter_text(now, row));
-    if (row.effect == Effect::restart) say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
-    if (row.effect == Effect::rebuild) s.loaded.lane().step_ms = {};
-  }
-}
-
-}  // namespace
-
 Change settings_and_obstacles(const Session& s) {
   Change now{{}, s.loaded.scene.obstacles};
   for (const Lane& lane : s.loaded.lanes) now.lanes.push_back(lane.sim.settings);
@@ -289,28 +295,6 @@ void change_settings(Session& s, const Settings& wanted) {
     keep_change(s, before);
   });
 }
-
-namespace {
-
-void take_back(Session& s, const char* word, std::vector<Change>& from, std::vector<Change>& to) {
-  if (from.empty()) return say(s, fmt::format("nothing to {}", word));
-  s.log("{}", word);
-  const Change now = settings_and_obstacles(s);
-  const bool done = attempt(s, [&] {
-    put_settings(s, from.back().lanes);
-    const auto numbers = [](const std::vector<Obstacle>& all) {
-      std::vector<std::vector<double>> list;
-      for (const Obstacle& o : all) list.push_back(numbers_of(o));
-      return list;
-    };
-    if (numbers(now.obstacles) != numbers(from.back().obstacles)) put_obstacles(s, from.back().obstacles);
-  });
-  if (done) to.push_back(now);
-  from.pop_back();
-  s.changes.open = false;
-}
-
-}  // namespace
 
 void undo(Session& s) { take_back(s, "undo", s.changes.past, s.changes.future); }
 void redo(Session& s) { take_back(s, "redo", s.changes.future, s.changes.past); }

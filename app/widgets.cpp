@@ -49,6 +49,17 @@ bool explain_item(Session& s, const std::string& name, const std::string& help, 
   return true;
 }
 
+// What is open is the preferences' business, not Dear ImGui's.
+bool foldable(Session& s, const char* label, const std::string& name, bool open, auto widget) {
+  const auto& kept = s.ui.kept.open;
+  if (const auto found = kept.find(name); found != kept.end()) open = found->second;
+  ImGui::SetNextItemOpen(open);
+  const bool shown = widget(label);
+  mark(s, "section " + name);
+  if (shown != open) s.ui.kept.open[name] = shown, s.log("{} {}", shown ? "opened" : "folded", name);
+  return shown;
+}
+
 }  // namespace
 
 bool describe_item(Session& s, const std::string& name, const std::string& help, const std::string& back) {
@@ -78,21 +89,6 @@ bool end_row(Session& s, const std::string& name, const std::string& help, const
   ImGui::EndGroup();
   return explain_item(s, name, help, back);
 }
-
-namespace {
-
-// What is open is the preferences' business, not Dear ImGui's.
-bool foldable(Session& s, const char* label, const std::string& name, bool open, auto widget) {
-  const auto& kept = s.ui.kept.open;
-  if (const auto found = kept.find(name); found != kept.end()) open = found->second;
-  ImGui::SetNextItemOpen(open);
-  const bool shown = widget(label);
-  mark(s, "section " + name);
-  if (shown != open) s.ui.kept.open[name] = shown, s.log("{} {}", shown ? "opened" : "folded", name);
-  return shown;
-}
-
-}  // namespace
 
 bool section(Session& s, const char* name, bool open) {
   return foldable(s, name, name, open, [](const char* label) { return ImGui::CollapsingHeader(label); });

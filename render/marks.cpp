@@ -43,10 +43,7 @@ void draw_arrows(Renderer& renderer, const Frame& frame) {
     for (std::size_t i = 0; i < vertices.size(); i += every) some.push_back(vertices[i]);
     renderer.arrow_vertices = Buffer("arrow vertices", some);
   }
-  glBindBuffer(GL_ARRAY_BUFFER, frame.velocities);
-  glEnableVertexAttribArray(ATTRIBUTE_VELOCITY);
-  glVertexAttribPointer(ATTRIBUTE_VELOCITY, 3, GL_FLOAT, GL_FALSE, sizeof(Velocity),
-                        reinterpret_cast<const void*>(offsetof(Velocity, high)));
+  attribute(ATTRIBUTE_VELOCITY, frame.velocities, 3, sizeof(Velocity), offsetof(Velocity, high));
   const Program& program = use(renderer, "arrows");
   program.set("seconds", float(frame.options.arrow_seconds));
   program.set("viewport", glm::vec3(frame.viewport.width, frame.viewport.height, 0));

@@ -191,20 +191,6 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   return view;
 }
 
-// Of a buffer, or zeros where there is none.
-void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset,
-               GLenum type = GL_FLOAT) {
-  if (!buffer) {
-    glDisableVertexAttribArray(index);
-    glVertexAttrib4f(index, 0, 0, 0, 0);
-    return;
-  }
-  glBindBuffer(GL_ARRAY_BUFFER, buffer);
-  glEnableVertexAttribArray(index);
-  glVertexAttribPointer(index, count, type, type != GL_FLOAT, GLsizei(stride),
-                        reinterpret_cast<const void*>(offset));
-}
-
 // The values of this frame by vertex, found where they have to be, and their copy on its way back.
 GLuint find_values(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
@@ -216,9 +202,7 @@ GLuint find_values(Renderer& renderer, const Frame& frame) {
   if (options.worst && value && !renderer.values_copied) {
     const std::size_t bytes = renderer.mesh.positions.size() * sizeof(float);
     if (!renderer.values_copy) renderer.values_copy = Buffer("values' copy", bytes, nullptr, GL_STREAM_READ);
-    glBindBuffer(GL_COPY_READ_BUFFER, value);
-    glBindBuffer(GL_COPY_WRITE_BUFFER, renderer.values_copy.id());
-    glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, GLsizeiptr(bytes));
+    copy_buffer(value, 0, renderer.values_copy.id(), 0, bytes);
     renderer.values_copied = Fence::here();
   }
   return value;
@@ -458,6 +442,19 @@ struct Afterwards {
 
 }  // namespace
 
+void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset,
+               GLenum type) {
+  if (!buffer) {
+    glDisableVertexAttribArray(index);
+    glVertexAttrib4f(index, 0, 0, 0, 0);
+    return;
+  }
+  glBindBuffer(GL_ARRAY_BUFFER, buffer);
+  glEnableVertexAttribArray(index);
+  glVertexAttribPointer(index, count, type, type != GL_FLOAT, GLsizei(stride),
+                        reinterpret_cast<const void*>(offset));
+}
+
 const Program& use(Renderer& renderer, const std::string& name) {
   if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
   const Program& program = renderer.programs.at(name);
@@ -612,10 +609,7 @@ std::vector<float> read_values(Renderer& renderer, const Frame& frame) {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
   const GLuint values = vertex_values(renderer, frame);
   std::vector<float> result(values ? renderer.mesh.positions.size() : 0);
-  if (!values) return result;
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glBindBuffer(GL_COPY_READ_BUFFER, values);
-  glGetBufferSubData(GL_COPY_READ_BUFFER, 0, GLsizeiptr(result.size() * sizeof(float)), result.data());
+  if (values) read_buffer(values, 0, result.size() * sizeof(float), result.data());
   return result;
 }
 

@@ -70,6 +70,9 @@ Renderer make_renderer(const Model& model);
 void draw(Renderer& renderer, const Frame& frame);
 /// Puts what shaders know of the view in place, without which nothing is drawn.
 void bind_view(Renderer& renderer, const Frame& frame);
+/// A vertex attribute of a buffer, or zeros where there is none.
+void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset,
+               GLenum type = GL_FLOAT);
 /// The vertex attributes of all but the surface; `values` by vertex, 0: none.
 void bind_vertices(Renderer& renderer, const Frame& frame, GLuint values = 0);
 /// The program of that name, made when first asked for, in use.

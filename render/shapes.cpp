@@ -147,13 +147,8 @@ void make_surfaces(ShapeSurfaces& surfaces, const Model& model) {
   }
   surfaces.corners = Buffer("surfaces of shapes", corners);
   surfaces.array = VertexArray("shapes");
-  glBindBuffer(GL_ARRAY_BUFFER, surfaces.corners.id());
-  for (const auto& [index, offset] : {std::pair(ATTRIBUTE_HIGH, offsetof(Corner, position)),
-                                      {ATTRIBUTE_NORMAL, offsetof(Corner, normal)}}) {
-    glEnableVertexAttribArray(GLuint(index));
-    glVertexAttribPointer(GLuint(index), 3, GL_FLOAT, GL_FALSE, sizeof(Corner),
-                          reinterpret_cast<const void*>(offset));
-  }
+  attribute(ATTRIBUTE_HIGH, surfaces.corners.id(), 3, sizeof(Corner), offsetof(Corner, position));
+  attribute(ATTRIBUTE_NORMAL, surfaces.corners.id(), 3, sizeof(Corner), offsetof(Corner, normal));
   surfaces.made_of = std::move(made_of);
 }
 

@@ -11,40 +11,6 @@
 
 namespace tetpbd {
 
-template <GLenum kind>
-void delete_named(GLuint id) {
-  if constexpr (kind == GL_VERTEX_ARRAY) glDeleteVertexArrays(1, &id);
-  if constexpr (kind == GL_TEXTURE) glDeleteTextures(1, &id);
-  if constexpr (kind == GL_RENDERBUFFER) glDeleteRenderbuffers(1, &id);
-  if constexpr (kind == GL_FRAMEBUFFER) glDeleteFramebuffers(1, &id);
-  if constexpr (kind == GL_SAMPLER) glDeleteSamplers(1, &id);
-}
-/// Left bound by its making: a name is an object only once it was bound, and only then has a label.
-template <GLenum kind>
-struct Named : Owned<GLuint, delete_named<kind>> {
-  Named() = default;
-  /// A texture of another target.
-  Named(const std::string& label, GLenum target) requires(kind == GL_TEXTURE) : Named::Owned(make(target)) {
-    label_object(kind, this->id(), label);
-  }
-  explicit Named(const std::string& label) : Named::Owned(make()) { label_object(kind, this->id(), label); }
-  static GLuint make(GLenum target = GL_TEXTURE_2D) {
-    GLuint id = 0;
-    if constexpr (kind == GL_VERTEX_ARRAY) glGenVertexArrays(1, &id), glBindVertexArray(id);
-    if constexpr (kind == GL_TEXTURE) glGenTextures(1, &id), glBindTexture(target, id);
-    if constexpr (kind == GL_RENDERBUFFER)
-      glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id);
-    if constexpr (kind == GL_FRAMEBUFFER) glGenFramebuffers(1, &id), glBindFramebuffer(GL_FRAMEBUFFER, id);
-    if constexpr (kind == GL_SAMPLER) glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0);
-    return id;
-  }
-};
-using VertexArray = Named<GL_VERTEX_ARRAY>;
-using Texture = Named<GL_TEXTURE>;
-using Renderbuffer = Named<GL_RENDERBUFFER>;
-using Framebuffer = Named<GL_FRAMEBUFFER>;
-using Sampler = Named<GL_SAMPLER>;
-
 /// 8-bit sRGB with alpha, top row first.
 struct Image {
   int width = 0, height = 0;

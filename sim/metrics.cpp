@@ -25,6 +25,55 @@ glm::uvec2 range_of(const ConstraintList& list, glm::uvec2 vertices) {
           std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
 }
 
+// Whether the result is there.
+bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
+  if (!pending.fence.sync()) return true;
+  if (!reached(pending.fence.sync(), wait, "measuring")) return false;
+  pending.fence = {};
+  Measurement& result = pending.result;
+  const std::vector<float> rows = m.rows[pending.slot].read_all<float>();
+  std::array<double, M_ROW> sums{};
+  const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const float* row = rows.data() + b * M_STRIDE;
+    for (std::size_t at = 0; at < M_ROW; ++at) sums[at] += double(row[at]);
+    result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
+    result.penetration_max = largest(result.penetration_max, double(row[M_PENETRATION]) / m.bodies[b].size);
+    result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
+    for (int a = 0; a < 3; ++a)
+      result.centre[a] += m.bodies[b].mass * (double(row[M_ORIGIN + a]) + double(row[M_CENTRE + a]));
+  }
+  const auto rms = [](double squares, std::size_t count) {
+    return count ? std::sqrt(squares / double(count)) : 0.0;
+  };
+  const auto vector = [&](std::size_t at) { return glm::dvec3(sums[at], sums[at + 1], sums[at + 2]); };
+  double deeper = 0, most = m.vertices / 1000;
+  for (int octaves = 0; octaves < DEPTHS && deeper <= most; ++octaves) {
+    const double here = sums[std::size_t(M_DEPTHS + octaves)];
+    if (deeper + here > most) result.penetration_999 = std::exp2(-0.5 * (octaves + (most - deeper) / here));
+    deeper += here;
+  }
+  result.penetration_999 = std::min(result.penetration_999, result.penetration_max);
+  if (!pending.obstacles) result.penetration_max = result.penetration_999 = std::nan("");
+  result.volume = m.volume + sums[M_VOLUME_CHANGE];
+  result.volume_error_percent = m.volume > 0 ? 100 * (result.volume - m.volume) / m.volume : 0;
+  result.tet_volume_rms = rms(sums[M_TET_SQUARES], m.counts[2]);
+  result.inverted_tets = sums[M_INVERTED];
+  result.stretch_rms = rms(sums[M_STRETCH_SQUARES], m.counts[0]);
+  result.bend_rms_rad = rms(sums[M_BEND_SQUARES], m.counts[1]);
+  result.rigid_distance = std::sqrt(sums[M_RIGID_SQUARES] / m.mass) / (m.mass_sizes / m.mass);
+  result.momentum = vector(M_MOMENTUM);
+  result.angular_momentum = vector(M_ANGULAR);
+  result.speed = sums[M_SPEED];
+  result.centre /= m.mass;
+  result.kinetic = sums[M_KINETIC];
+  result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
+  result.elastic = sums[M_ELASTIC];
+  result.contacts = sums[M_CONTACTS];
+  result.non_finite = sums[M_NON_FINITE];
+  return true;
+}
+
 }  // namespace
 
 Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
@@ -76,59 +125,6 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   m.vertices = double(model.positions.size());
   return m;
 }
-
-namespace {
-
-// Whether the result is there.
-bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
-  if (!pending.fence.sync()) return true;
-  if (!reached(pending.fence.sync(), wait, "measuring")) return false;
-  pending.fence = {};
-  Measurement& result = pending.result;
-  const std::vector<float> rows = m.rows[pending.slot].read_all<float>();
-  std::array<double, M_ROW> sums{};
-  const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
-  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
-    const float* row = rows.data() + b * M_STRIDE;
-    for (std::size_t at = 0; at < M_ROW; ++at) sums[at] += double(row[at]);
-    result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
-    result.penetration_max = largest(result.penetration_max, double(row[M_PENETRATION]) / m.bodies[b].size);
-    result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
-    for (int a = 0; a < 3; ++a)
-      result.centre[a] += m.bodies[b].mass * (double(row[M_ORIGIN + a]) + double(row[M_CENTRE + a]));
-  }
-  const auto rms = [](double squares, std::size_t count) {
-    return count ? std::sqrt(squares / double(count)) : 0.0;
-  };
-  const auto vector = [&](std::size_t at) { return glm::dvec3(sums[at], sums[at + 1], sums[at + 2]); };
-  double deeper = 0, most = m.vertices / 1000;
-  for (int octaves = 0; octaves < DEPTHS && deeper <= most; ++octaves) {
-    const double here = sums[std::size_t(M_DEPTHS + octaves)];
-    if (deeper + here > most) result.penetration_999 = std::exp2(-0.5 * (octaves + (most - deeper) / here));
-    deeper += here;
-  }
-  result.penetration_999 = std::min(result.penetration_999, result.penetration_max);
-  if (!pending.obstacles) result.penetration_max = result.penetration_999 = std::nan("");
-  result.volume = m.volume + sums[M_VOLUME_CHANGE];
-  result.volume_error_percent = m.volume > 0 ? 100 * (result.volume - m.volume) / m.volume : 0;
-  result.tet_volume_rms = rms(sums[M_TET_SQUARES], m.counts[2]);
-  result.inverted_tets = sums[M_INVERTED];
-  result.stretch_rms = rms(sums[M_STRETCH_SQUARES], m.counts[0]);
-  result.bend_rms_rad = rms(sums[M_BEND_SQUARES], m.counts[1]);
-  result.rigid_distance = std::sqrt(sums[M_RIGID_SQUARES] / m.mass) / (m.mass_sizes / m.mass);
-  result.momentum = vector(M_MOMENTUM);
-  result.angular_momentum = vector(M_ANGULAR);
-  result.speed = sums[M_SPEED];
-  result.centre /= m.mass;
-  result.kinetic = sums[M_KINETIC];
-  result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
-  result.elastic = sums[M_ELASTIC];
-  result.contacts = sums[M_CONTACTS];
-  result.non_finite = sums[M_NON_FINITE];
-  return true;
-}
-
-}  // namespace
 
 void measure(Metrics& m, const Sim& sim) {
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);

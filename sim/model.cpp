@@ -140,13 +140,6 @@ void renumber(Model& model) {
   rename(model.rest.surface);
 }
 
-std::vector<Tet> original_tets(const Model& model) {
-  std::vector<Tet> tets = model.rest.tets;
-  for (Tet& tet : tets)
-    for (std::uint32_t& v : tet) v = model.original[v];
-  return tets;
-}
-
 namespace {
 
 double factor_of(const std::string& how) {

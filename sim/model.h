@@ -68,8 +68,16 @@ std::vector<T> in_original_order(const Model& model, const std::vector<T>& rows)
   for (std::size_t i = 0; i < rows.size(); ++i) result[model.original[i]] = rows[i];
   return result;
 }
-/// The tets with the vertices' original numbers.
-std::vector<Tet> original_tets(const Model& model);
+/// Tets or triangles with the vertices' original numbers.
+template <class Elements>
+Elements in_original_numbers(const Model& model, Elements elements) {
+  for (auto& element : elements)
+    for (std::uint32_t& v : element) v = model.original[v];
+  return elements;
+}
+inline std::vector<Tet> original_tets(const Model& model) {
+  return in_original_numbers(model, model.rest.tets);
+}
 
 /// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F,
 /// squash:F, twist:DEGREES, invert-one, coincident, fold. Throws Error for anything else.

@@ -19,33 +19,32 @@ const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> rows = [] {
     std::vector<Parameter> all = {
         {"mode", "solver", &S::mode,
-         "how constraints are solved, and where: hard bodies on the GPU by node, soft ones by explicit "
-         "or newton, without a GPU by cpu-fast",
+         "how constraints are solved, and where: hard bodies on the GPU by node, soft ones by explicit or "
+         "newton, without a GPU by cpu-fast",
          0, 0, "", false, Effect::rebuild},
         {"constraints", "solver", &S::constraints,
-         "kinds of constraint that hold a body together, separated by commas: lengths of edges, angles "
-         "of the surface (bend; isobend: quadratic, for thin sheets), volumes of tets",
+         "kinds of constraint that hold a body together, separated by commas: lengths of edges, angles of "
+         "the surface (bend; isobend: quadratic, for thin sheets), volumes of tets",
          0, 0, "", false, Effect::rebuild},
     };
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
-        all.push_back(
-            {std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
-             fmt::format("part of a correction that is applied to {} in an iteration: 1 is hard; less is "
-                         "softer, but depends on iterations and mesh",
-                         constraint_kinds[k].noun)});
+        all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
+                       fmt::format("part of a correction that is applied to {} in an iteration: 1 is hard; "
+                                   "less is softer, but depends on iterations and mesh",
+                                   constraint_kinds[k].noun)});
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
-        all.push_back(
-            {std::string("compliance_") + constraint_kinds[k].name, "solver", KindMember{&S::compliance, k},
-             fmt::format("softness of {}, of a spring 1 over its stiffness; 0: as hard as iterations "
-                         "make it. Above 0 it brings mass_splitting with it",
-                         constraint_kinds[k].noun),
-             0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
+        all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
+                       KindMember{&S::compliance, k},
+                       fmt::format("softness of {}, of a spring 1 over its stiffness; 0: as hard as "
+                                   "iterations make it. Above 0 it brings mass_splitting with it",
+                                   constraint_kinds[k].noun),
+                       0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
     const std::vector<Parameter> others = {
         {"material", "solver", &S::material,
-         "what bodies are made of, in place of constraints, k and compliance: none; springs along edges "
-         "and volumes; neo-hookean tets, right for large strains",
+         "what bodies are made of, in place of constraints, k and compliance: none; springs along edges and "
+         "volumes; neo-hookean tets, right for large strains",
          0, 0, "", false, Effect::rebuild},
         {"young_modulus", "solver", &S::young_modulus,
          "stiffness of the material, Young's modulus: jelly 2e4, rubber 1e6, wood 1e10", 1, 1e12, "Pa", true,
@@ -58,8 +57,8 @@ const std::vector<Parameter>& parameters() {
          "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0,
          10, "s", true},
         {"omega", "solver", &S::omega,
-         "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most "
-         "scenes, above 2 it may not; with compliance at most 2",
+         "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
+         "above 2 it may not; with compliance at most 2",
          0, 4},
         {"mass_splitting", "solver", &S::mass_splitting,
          "a vertex shares its mass out among its constraints, which keeps momentum; off: corrections are "
@@ -69,12 +68,12 @@ const std::vector<Parameter>& parameters() {
          "Mode newton: of conjugate gradients, 2 to 32 as the material is stiff",
          0, 100000, "", true},
         {"substeps", "solver", &S::substeps,
-         "parts into which a step is cut: more are more accurate and stiffer, and cost as much more. 5 "
-         "for hard bodies, 20 to be sure",
+         "parts into which a step is cut: more are more accurate and stiffer, and cost as much more. 5 for "
+         "hard bodies, 20 to be sure",
          1, 100000, "", true},
         {"stability", "solver", &S::stability,
-         "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower "
-         "it if a body that is much deformed fails",
+         "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower it if "
+         "a body that is much deformed fails",
          0.01, 1},
         {"dt", "solver", &S::dt, "time that one step simulates; shorter steps are more accurate", 1e-6, 1,
          "s", true},
@@ -92,8 +91,8 @@ const std::vector<Parameter>& parameters() {
         {"restitution", "world", &S::restitution,
          "bounce of hard bodies (rigid_contact): speed after an impact over before; 0: none, 1: all of it"},
         {"rigid_contact", "solver", &S::rigid_contact,
-         "hard bodies (all k 1, stretch among them, no compliance) that touch something move as rigid "
-         "ones; off, as in the paper: they rebound by what the corrections add",
+         "hard bodies (all k 1, stretch among them, no compliance) that touch something move as rigid ones; "
+         "off, as in the paper: they rebound by what the corrections add",
          0, 1, "", false, Effect::rebuild},
         {"seed", "solver", &S::seed, "number that chooses among random starts and masses", 0, 2147483647, "",
          false, Effect::restart},

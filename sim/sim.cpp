@@ -244,12 +244,8 @@ void make_fields(Sim& sim) {
                 fmt::format("{} values, the driver allows {}", values.size(), most),
                 "give their meshes fewer voxels", 1);
   sim.fields = Buffer("fields of obstacles", values);
-  GLuint texture = 0;
-  glGenTextures(1, &texture);
-  sim.fields_texture = Owned<GLuint, delete_texture>(texture);
-  glBindTexture(GL_TEXTURE_BUFFER, texture);
+  sim.fields_texture = Texture("fields of obstacles", GL_TEXTURE_BUFFER);
   glTexBuffer(GL_TEXTURE_BUFFER, GL_R32F, sim.fields.id());
-  label_object(GL_TEXTURE, texture, "fields of obstacles");
   glBindTexture(GL_TEXTURE_BUFFER, 0);
 }
 
@@ -558,14 +554,16 @@ GuardCounts guard_counts(Sim& sim) {
   return sim.guards;
 }
 
+State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities) {
+  State state;
+  for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
+  for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
+  return state;
+}
+
 State read_state(const Sim& sim) {
   if (on_cpu(sim)) return sim.host;
-  State state;
-  for (const Position& p : sim.positions.read_all<Position>())
-    state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  for (const Velocity& v : sim.velocities.read_all<Velocity>())
-    state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
-  return state;
+  return state_of(sim.positions.read_all<Position>(), sim.velocities.read_all<Velocity>());
 }
 
 std::uint64_t state_hash(const Sim& sim) {

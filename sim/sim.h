@@ -50,7 +50,7 @@ struct Sim {
   Buffer shapes;  ///< Shape: of each obstacle with a shape as it is at the step's start, then at the end of
                   ///< each substep; one list where nothing moves
   Buffer fields;  ///< of shapes, one after the other
-  Owned<GLuint, delete_texture> fields_texture;
+  Texture fields_texture;
   int shapes_now = 0;   ///< which list of `shapes` is of the present
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
@@ -114,6 +114,7 @@ void bind_shapes(const Sim& sim, int list);
 void forget_contacts(Sim& sim);
 /// Velocities of mid-substep with the settings `then` become those with the settings of now.
 void retime_velocities(Sim& sim, const Settings& then);
+State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 /// A state that is not finite is taken, and found by check_finite() at once.

@@ -30,10 +30,7 @@ State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
   std::vector<Velocity> velocities(vertices);
   from.read(at, vertices * sizeof(Position), positions.data());
   from.read(at + vertices * sizeof(Position), vertices * sizeof(Velocity), velocities.data());
-  State state;
-  for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
-  return state;
+  return state_of(positions, velocities);
 }
 
 }  // namespace

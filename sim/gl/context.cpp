@@ -36,6 +36,46 @@ int gl_integer(GLenum name) {
   return value;
 }
 
+std::vector<EGLDeviceEXT> query_devices() {
+  const auto query = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
+  EGLint count = 0;
+  if (!query || !query(0, nullptr, &count)) return {};
+  std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(count));
+  query(count, devices.data(), &count);
+  return devices;
+}
+
+std::string device_string(EGLDeviceEXT device, EGLint name) {
+  const auto query =
+      reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
+  const char* text = query ? query(device, name) : nullptr;
+  return text ? text : "";
+}
+
+bool is_software(EGLDeviceEXT device) {
+  return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
+}
+
+/// Current, or none. `any_version`: what the driver has, so that load_gl() can say it. With `reset`, the
+/// driver tells of a GPU that was reset, and checks no bounds in shaders.
+EGLContext make_context(EGLDisplay display, bool debug, bool any_version, bool reset) {
+  if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
+  if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
+  const EGLint attributes[][2] = {
+      {EGL_CONTEXT_MAJOR_VERSION, 4},
+      {EGL_CONTEXT_MINOR_VERSION, 3},
+      {EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT},
+      {EGL_CONTEXT_OPENGL_DEBUG, debug},
+      {reset ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY : EGL_NONE, EGL_LOSE_CONTEXT_ON_RESET},
+      {EGL_NONE, EGL_NONE}};
+  const EGLContext context =
+      eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes[any_version ? 3 : 0]);
+  if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
+    return context;
+  eglDestroyContext(display, context);
+  return EGL_NO_CONTEXT;
+}
+
 }  // namespace
 
 int gl_error_count() { return error_count; }
@@ -78,57 +118,12 @@ void check_context() {
   const GLenum status = glGetGraphicsResetStatus();
   if (status == GL_NO_ERROR) return;
   const bool guilty = status == GL_GUILTY_CONTEXT_RESET;
-  throw ContextLost(
-      "the GPU was reset",
-      guilty ? "by what this program did (a step too long for it?)" : "by another program",
-      "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and look into "
-      "the system's log",
-      1);
+  throw ContextLost("the GPU was reset",
+                    guilty ? "by what this program did (a step too long for it?)" : "by another program",
+                    "start again; if it happens again, use fewer iterations, substeps or a smaller mesh, and "
+                    "look into the system's log",
+                    1);
 }
-
-namespace {
-
-std::vector<EGLDeviceEXT> query_devices() {
-  const auto query = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
-  EGLint count = 0;
-  if (!query || !query(0, nullptr, &count)) return {};
-  std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(count));
-  query(count, devices.data(), &count);
-  return devices;
-}
-
-std::string device_string(EGLDeviceEXT device, EGLint name) {
-  const auto query =
-      reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
-  const char* text = query ? query(device, name) : nullptr;
-  return text ? text : "";
-}
-
-bool is_software(EGLDeviceEXT device) {
-  return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
-}
-
-/// Current, or none. `any_version`: what the driver has, so that load_gl() can say it. With `reset`, the
-/// driver tells of a GPU that was reset, and checks no bounds in shaders.
-EGLContext make_context(EGLDisplay display, bool debug, bool any_version, bool reset) {
-  if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
-  if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
-  const EGLint attributes[][2] = {
-      {EGL_CONTEXT_MAJOR_VERSION, 4},
-      {EGL_CONTEXT_MINOR_VERSION, 3},
-      {EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT},
-      {EGL_CONTEXT_OPENGL_DEBUG, debug},
-      {reset ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY : EGL_NONE, EGL_LOSE_CONTEXT_ON_RESET},
-      {EGL_NONE, EGL_NONE}};
-  const EGLContext context =
-      eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes[any_version ? 3 : 0]);
-  if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
-    return context;
-  eglDestroyContext(display, context);
-  return EGL_NO_CONTEXT;
-}
-
-}  // namespace
 
 std::vector<std::string> list_devices() {
   std::vector<std::string> names;

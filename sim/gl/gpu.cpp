@@ -59,16 +59,16 @@ void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) cons
   delete_buffer(staging);
 }
 
-void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
+void read_buffer(GLuint from, std::size_t offset, std::size_t bytes, void* data) {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glBindBuffer(GL_COPY_READ_BUFFER, id());
+  glBindBuffer(GL_COPY_READ_BUFFER, from);
   glGetBufferSubData(GL_COPY_READ_BUFFER, GLintptr(offset), GLsizeiptr(bytes), data);
 }
 
-void Buffer::copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const {
+void copy_buffer(GLuint from, std::size_t offset, GLuint to, std::size_t at, std::size_t bytes) {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glBindBuffer(GL_COPY_READ_BUFFER, id());
-  glBindBuffer(GL_COPY_WRITE_BUFFER, to.id());
+  glBindBuffer(GL_COPY_READ_BUFFER, from);
+  glBindBuffer(GL_COPY_WRITE_BUFFER, to);
   glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GLintptr(offset), GLintptr(at),
                       GLsizeiptr(bytes));
 }

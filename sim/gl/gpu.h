@@ -60,13 +60,51 @@ class Owned {
 inline void delete_buffer(GLuint id) { glDeleteBuffers(1, &id); }
 inline void delete_program(GLuint id) { glDeleteProgram(id); }
 inline void delete_query(GLuint id) { glDeleteQueries(1, &id); }
-inline void delete_texture(GLuint id) { glDeleteTextures(1, &id); }
 inline void delete_fence(GLsync sync) { glDeleteSync(sync); }
+
+template <GLenum kind>
+void delete_named(GLuint id) {
+  if constexpr (kind == GL_VERTEX_ARRAY) glDeleteVertexArrays(1, &id);
+  if constexpr (kind == GL_TEXTURE) glDeleteTextures(1, &id);
+  if constexpr (kind == GL_RENDERBUFFER) glDeleteRenderbuffers(1, &id);
+  if constexpr (kind == GL_FRAMEBUFFER) glDeleteFramebuffers(1, &id);
+  if constexpr (kind == GL_SAMPLER) glDeleteSamplers(1, &id);
+}
+/// Left bound by its making: a name is an object only once it was bound, and only then has a label.
+template <GLenum kind>
+struct Named : Owned<GLuint, delete_named<kind>> {
+  Named() = default;
+  /// `target`: of a texture.
+  explicit Named(const std::string& label, [[maybe_unused]] GLenum target = GL_TEXTURE_2D)
+      : Named::Owned(make(target)) {
+    label_object(kind, this->id(), label);
+  }
+  static GLuint make([[maybe_unused]] GLenum target) {
+    GLuint id = 0;
+    if constexpr (kind == GL_VERTEX_ARRAY) glGenVertexArrays(1, &id), glBindVertexArray(id);
+    if constexpr (kind == GL_TEXTURE) glGenTextures(1, &id), glBindTexture(target, id);
+    if constexpr (kind == GL_RENDERBUFFER)
+      glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id);
+    if constexpr (kind == GL_FRAMEBUFFER) glGenFramebuffers(1, &id), glBindFramebuffer(GL_FRAMEBUFFER, id);
+    if constexpr (kind == GL_SAMPLER) glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0);
+    return id;
+  }
+};
+using VertexArray = Named<GL_VERTEX_ARRAY>;
+using Texture = Named<GL_TEXTURE>;
+using Renderbuffer = Named<GL_RENDERBUFFER>;
+using Framebuffer = Named<GL_FRAMEBUFFER>;
+using Sampler = Named<GL_SAMPLER>;
 
 /// Throws Error naming what did not fit if it does not, or the last GL call failed.
 void check_memory(const std::string& what, std::size_t bytes, bool fits = true);
 /// Forgets GL errors of earlier calls, so that check_memory judges the next alone.
 void clear_errors();
+
+/// Of a buffer by its name. Waits for the GPU.
+void read_buffer(GLuint from, std::size_t offset, std::size_t bytes, void* data);
+/// Of what kernels wrote, queued: done when the GPU comes to the next fence.
+void copy_buffer(GLuint from, std::size_t offset, GLuint to, std::size_t at, std::size_t bytes);
 
 /// A buffer of fixed size.
 class Buffer : public Owned<GLuint, delete_buffer> {
@@ -79,9 +117,12 @@ class Buffer : public Owned<GLuint, delete_buffer> {
 
   const std::string& label() const { return label_; }
   void write(std::size_t offset, std::size_t bytes, const void* data) const;
-  void read(std::size_t offset, std::size_t bytes, void* data) const;  ///< waits for the GPU
-  /// Of what kernels wrote, queued: done when the GPU comes to the next fence.
-  void copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const;
+  void read(std::size_t offset, std::size_t bytes, void* data) const {
+    read_buffer(id(), offset, bytes, data);
+  }
+  void copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const {
+    copy_buffer(id(), offset, to.id(), at, bytes);
+  }
   void clear() const;  ///< to zero bytes
   void bind_storage(int binding) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), id()); }
   void bind_uniform(int binding) const { glBindBufferBase(GL_UNIFORM_BUFFER, GLuint(binding), id()); }

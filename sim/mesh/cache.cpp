@@ -53,9 +53,7 @@ bool unseal(std::string_view& bytes, std::uint64_t key) {
 
 std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try {
   TetMesh mesh;
-  if (!unseal(bytes, key) || !take_array(bytes, mesh.positions) || !take_array(bytes, mesh.tets) ||
-      !bytes.empty())
-    return {};
+  if (!take_sealed(bytes, key, mesh.positions, mesh.tets)) return {};
   finish_tets(mesh, "cache");
   return mesh;
 } catch (const Error&) {  // damage passes the checksum only by malice, but a cache folder may be shared
@@ -84,9 +82,7 @@ void keep_cached(const std::string& name, std::string bytes, std::uint64_t key) 
 std::optional<TetMesh> read_mesh(std::uint64_t key) { return parse_mesh(read_cached(mesh_file(key)), key); }
 
 void keep_mesh(std::uint64_t key, const TetMesh& mesh) {
-  std::string bytes;
-  put_array(bytes, mesh.positions), put_array(bytes, mesh.tets);
-  keep_cached(mesh_file(key), std::move(bytes), key);
+  keep_cached(mesh_file(key), key, mesh.positions, mesh.tets);
 }
 
 }  // namespace tetpbd

@@ -44,10 +44,21 @@ bool take_array(std::string_view& bytes, std::vector<T>& values) {
 /// match.
 void seal(std::string& bytes, std::uint64_t key);
 bool unseal(std::string_view& bytes, std::uint64_t key);
+/// Arrays with a seal behind them; false where they are not these, or more.
+template <class... T>
+bool take_sealed(std::string_view bytes, std::uint64_t key, std::vector<T>&... arrays) {
+  return unseal(bytes, key) && (take_array(bytes, arrays) && ...) && bytes.empty();
+}
 /// A file of the folder; empty when it is not there.
 std::string read_cached(const std::string& name);
 /// With a seal.
 void keep_cached(const std::string& name, std::string bytes, std::uint64_t key);
+template <class... T>
+void keep_cached(const std::string& name, std::uint64_t key, const std::vector<T>&... arrays) {
+  std::string bytes;
+  (put_array(bytes, arrays), ...);
+  keep_cached(name, std::move(bytes), key);
+}
 
 /// Of the surface's bits, the switches and the program that fills it.
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches,

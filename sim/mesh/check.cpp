@@ -156,6 +156,28 @@ std::array<double, 6> dihedral_angles(const TetMesh& mesh, const Tet& tet) {
   return angles;
 }
 
+// A triangle of no area with its corner c on the side a b: the neighbour across that side, cut in two at c,
+// takes its place. Whether there was one such neighbour.
+bool flip_flat(SurfaceMesh& surface, std::size_t flat) {
+  const Triangle t = surface.triangles[flat];
+  const auto side = [&](std::size_t k) {
+    return glm::distance(surface.positions[t[k]], surface.positions[t[(k + 1) % 3]]);
+  };
+  const std::size_t k = std::ranges::max({0u, 1u, 2u}, {}, side);
+  const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+  std::size_t other = surface.triangles.size(), count = 0;
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const auto has = [&](std::uint32_t v) { return std::ranges::count(surface.triangles[i], v) > 0; };
+    if (i != flat && has(a) && has(b)) other = i, ++count;
+  }
+  if (count != 1) return false;
+  Triangle first = surface.triangles[other], second = first;
+  std::ranges::replace(first, a, c), std::ranges::replace(second, b, c);
+  if (std::ranges::count(first, c) > 1) return false;  // it names c already
+  surface.triangles[other] = first, surface.triangles[flat] = second;
+  return true;
+}
+
 }  // namespace
 
 SurfaceCheck check_surface(SurfaceMesh& surface) {
@@ -249,32 +271,6 @@ TetMesh sheet_of(SurfaceMesh surface, const std::string& source) {
   const double thickness = 1e-3 * bounds(surface.positions).size();
   return {std::move(surface.positions), {}, std::move(surface.triangles), false, thickness};
 }
-
-namespace {
-
-// A triangle of no area with its corner c on the side a b: the neighbour across that side, cut in two at c,
-// takes its place. Whether there was one such neighbour.
-bool flip_flat(SurfaceMesh& surface, std::size_t flat) {
-  const Triangle t = surface.triangles[flat];
-  const auto side = [&](std::size_t k) {
-    return glm::distance(surface.positions[t[k]], surface.positions[t[(k + 1) % 3]]);
-  };
-  const std::size_t k = std::ranges::max({0u, 1u, 2u}, {}, side);
-  const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
-  std::size_t other = surface.triangles.size(), count = 0;
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const auto has = [&](std::uint32_t v) { return std::ranges::count(surface.triangles[i], v) > 0; };
-    if (i != flat && has(a) && has(b)) other = i, ++count;
-  }
-  if (count != 1) return false;
-  Triangle first = surface.triangles[other], second = first;
-  std::ranges::replace(first, a, c), std::ranges::replace(second, b, c);
-  if (std::ranges::count(first, c) > 1) return false;  // it names c already
-  surface.triangles[other] = first, surface.triangles[flat] = second;
-  return true;
-}
-
-}  // namespace
 
 std::string repair(SurfaceMesh& surface) {
   std::vector<std::string> done;

@@ -261,12 +261,10 @@ Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches,
   if (!options) return {tetrahedralise(surface, switches, 600, source), ""};
   const std::string how = fmt::format("wrap {} {} {}", options->voxels, options->thickness, always);
   const std::uint64_t key = mesh_key(surface, checked_switches(switches) + how, "");
-  const std::string file = fmt::format("{:016x}.wrap", key), bytes = read_cached(file);
-  std::string_view left = bytes;
+  const std::string file = fmt::format("{:016x}.wrap", key);
   Filled filled;
   std::vector<char> note;
-  if (unseal(left, key) && take_array(left, filled.mesh.positions) && take_array(left, filled.mesh.tets) &&
-      take_array(left, note)) {
+  if (take_sealed(read_cached(file), key, filled.mesh.positions, filled.mesh.tets, note)) {
     filled.note.assign(note.begin(), note.end());
     finish_tets(filled.mesh, file);
     return filled;
@@ -283,10 +281,8 @@ Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches,
     }
   filled.mesh = tetrahedralise(wrap(surface, *options, source), switches, 600, "the wrap of " + source);
   filled.note = fmt::format("{}, so it was wrapped with {} voxels across", why, options->voxels);
-  std::string kept;
-  put_array(kept, filled.mesh.positions), put_array(kept, filled.mesh.tets);
-  put_array(kept, std::vector<char>(filled.note.begin(), filled.note.end()));
-  keep_cached(file, std::move(kept), key);
+  keep_cached(file, key, filled.mesh.positions, filled.mesh.tets,
+              std::vector<char>(filled.note.begin(), filled.note.end()));
   return filled;
 }
 
@@ -301,10 +297,9 @@ DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::
   field.size = glm::ivec3(glm::ceil(extent / field.spacing - 1e-9)) + 2 * margin + 1;
   field.origin = box.low - field.spacing * margin;
   const std::uint64_t key = mesh_key(surface, fmt::format("distance {}", voxels), "");
-  const std::string file = fmt::format("{:016x}.distance", key), bytes = read_cached(file);
-  std::string_view left = bytes;
+  const std::string file = fmt::format("{:016x}.distance", key);
   const std::size_t count = std::size_t(field.size.x) * std::size_t(field.size.y) * std::size_t(field.size.z);
-  if (unseal(left, key) && take_array(left, field.values) && field.values.size() == count) return field;
+  if (take_sealed(read_cached(file), key, field.values) && field.values.size() == count) return field;
 
   const Grid points = in_voxels(surface.positions, field.origin, field.spacing);
   bool is_signed = open_edges(surface.triangles).empty();
@@ -317,9 +312,7 @@ DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::
     for (float& value : field.values) value -= 0.5f;
   }
   for (float& value : field.values) value *= float(field.spacing);
-  std::string kept;
-  put_array(kept, field.values);
-  keep_cached(file, std::move(kept), key);
+  keep_cached(file, key, field.values);
   return field;
 }
 

@@ -197,6 +197,10 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   return key;
 }
 
+std::uint64_t scene_key(const Model& model, const Settings& settings) {
+  return scene_key({model, {}, settings, model.inverse_masses});
+}
+
 Motion find_motion(const ReferenceInput& input, long steps, const std::string& method,
                    const std::filesystem::path& unfinished, const std::function<void(long)>& progress) {
   require_answer(input);

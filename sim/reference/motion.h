@@ -38,6 +38,8 @@ Compliances compliances_of(const ReferenceInput& input);
 /// Of all that decides the motion: mesh, masses, start, kinds and compliances, world, `dt`. Not of how it is
 /// solved.
 std::uint64_t scene_key(const ReferenceInput& input);
+/// What moves it stands in the settings.
+std::uint64_t scene_key(const Model& model, const Settings& settings);
 
 /// The motion over `steps` steps of the scene, by the method named or the one that suits it. `progress` is
 /// told each that is done; where `unfinished` names a file, what is done is kept there from time to time, and

@@ -160,8 +160,8 @@ bool take_aggregates(std::string_view bytes, std::uint64_t key, std::size_t vert
     return std::ranges::all_of(
         shares, [&](const Share& s) { return s.weight == 0 || s.aggregate < result.all.size(); });
   };
-  return unseal(bytes, key) && take_array(bytes, result.all) && take_array(bytes, result.of_vertex) &&
-         bytes.empty() && result.of_vertex.size() == vertices && std::ranges::all_of(result.of_vertex, sound);
+  return take_sealed(bytes, key, result.all, result.of_vertex) && result.of_vertex.size() == vertices &&
+         std::ranges::all_of(result.of_vertex, sound);
 }
 
 void list_members(Aggregates& result) {
@@ -206,11 +206,7 @@ Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::s
     each([&](const glm::dvec3& x, double m) { squares += m * glm::dot(x - middle, x - middle); });
     result.all[a] = {middle, centre.w > 0 && squares > 0 ? std::sqrt(squares / centre.w) : model.size};
   }
-  if (large) {
-    std::string bytes;
-    put_array(bytes, result.all), put_array(bytes, result.of_vertex);
-    keep_cached(file, std::move(bytes), key);
-  }
+  if (large) keep_cached(file, key, result.all, result.of_vertex);
   return result;
 }
 

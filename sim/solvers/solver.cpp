@@ -48,15 +48,13 @@ const std::vector<SolverMode> rows = {
      .create = create_cpu_fast_solver},
     {.name = "explicit",
      .help = "leapfrog on the GPU, of what has a material or compliance, in as many substeps as stay stable: "
-             "for what "
-             "is soft",
+             "for what is soft",
      .create = create_node_solver,
      .leapfrog = true,
      .pairs = true},
     {.name = "newton",
      .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
-             "levels: "
-             "for what is stiff, has small tets or starts badly deformed",
+             "levels: for what is stiff, has small tets or starts badly deformed",
      .create = create_newton_solver,
      .implicit = true},
     {.name = "paper",
@@ -65,6 +63,8 @@ const std::vector<SolverMode> rows = {
      .compliance = false,
      .offered = false},
 };
+
+std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
 
 }  // namespace
 
@@ -120,12 +120,6 @@ Tuning tuning_from_environment() {
   }
   return tuning;
 }
-
-namespace {
-
-std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
-
-}  // namespace
 
 std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   std::vector<Substitutions> words;

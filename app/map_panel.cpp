@@ -118,7 +118,10 @@ void draw_map(Session& s) {
   }
   auto& map = s.loaded.map;
   const bool filling = map && !map->is_done();
-  if (ImGui::Button(filling ? "Stop##map" : "Fill the map##map", ImVec2(-1, 0))) {
+  if (button(s, filling ? "Stop##map" : "Fill the map##map", "fill map",
+             "runs the first second of these bodies for each pair of values, beside all else;\na click on a "
+             "cell gives its values to the chosen lane",
+             -1)) {
     if (filling) {
       map.reset();
       s.log("map stopped");
@@ -132,11 +135,6 @@ void draw_map(Session& s) {
       });
     }
   }
-  mark(s, "fill map");
-  if (ImGui::IsItemHovered())
-    ImGui::SetTooltip(
-        "runs the first second of these bodies for each pair of values, beside all else;\na click on a cell "
-        "gives its values to the chosen lane");
   if (map) draw_grid(s, *map);
 }
 

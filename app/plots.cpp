@@ -227,22 +227,18 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
       "what is plotted, of all lanes; the wheel on a plot zooms, a drag scrolls, a double click shows all");
   const PlotRow& row = plot_rows()[chosen];
   ImGui::SameLine();
-  if (ImGui::Button("CSV")) {
+  if (button(s, "CSV", fmt::format("csv {}", slot + 1).c_str(), "copies all values as CSV")) {
     const std::string text = plot_csv(s, row);
     ImGui::SetClipboardText(text.c_str());
     say(s, fmt::format("copied {} rows", std::ranges::count(text, '\n') - 1));
   }
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("copies all values as CSV");
-  mark(s, fmt::format("csv {}", slot + 1));
   ImGui::SameLine();
-  if (ImGui::Button("SVG"))
+  if (button(s, "SVG", fmt::format("svg {}", slot + 1).c_str(), "saves the plot into the current folder"))
     attempt(s, [&] {
       const std::string file = free_name("plot", "svg");
       write_file(file, to_svg(plot_chart(s, row)));
       say(s, "saved " + file);
     });
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("saves the plot into the current folder");
-  mark(s, fmt::format("svg {}", slot + 1));
   draw_curves(s, row, slot, ImVec2(width, std::max(ImGui::GetContentRegionAvail().y, 1.0f)));
   ImGui::EndGroup();
   ImGui::PopID();

@@ -33,10 +33,14 @@ void parallel_parts(std::size_t count, std::size_t least, F&& f) {
 
 /// Calls f(item) for 0 .. count, `least` items or more to a thread.
 template <class F>
-void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
+void parallel_for(std::size_t count, std::size_t least, F&& f) {
   parallel_parts(count, least, [&](std::size_t first, std::size_t end) {
     for (std::size_t i = first; i < end; ++i) f(i);
   });
+}
+template <class F>
+void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
+  parallel_for(count, least, std::forward<F>(f));
 }
 
 /// Sorts items none of which are equal.

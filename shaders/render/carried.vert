@@ -1,6 +1,7 @@
 // A vertex of a fine surface that rides on tetrahedra, straight from the simulation's buffer, to the image or the shadow map.
 // Vertex shaders need not have storage buffers in GL 4.3, hence textures.
 #include "render/view.glsl"
+#include "render/point.glsl"
 layout(location = ATTRIBUTE_CARRIED) in uvec4 carried;  // as carried.cpp packs it
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;  // two texels each: Position
 layout(binding = UNIT_TETS) uniform usamplerBuffer tets;
@@ -8,13 +9,6 @@ layout(binding = UNIT_REST) uniform samplerBuffer rest;
 layout(binding = UNIT_COFACTORS) uniform samplerBuffer cofactors;  // three columns each
 layout(binding = UNIT_VALUES) uniform samplerBuffer values;
 uniform int valued;
-out Point {
-  vec3 position;
-  vec3 normal;
-  vec3 edge;
-  float value;
-  flat vec3 albedo;
-} point;
 
 // From an octahedron unfolded to a square.
 vec3 unpacked_normal(uint bits) {
@@ -41,14 +35,6 @@ void main() {
   bool shown = finite(p) && finite(vec3(value * 1e-30));
   gl_ClipDistance[0] = shown ? 1.0 : -1e30;
   if (!shown) p = vec3(0.0);
-#ifdef SHADOW
-  gl_Position = light.matrix * vec4(p, 1.0);
-#else
-  gl_Position = view.camera * vec4(p, 1.0);
-  point.position = p;
-  point.normal = normal / max(length(normal), 1e-30);
-  point.edge = vec3(1.0);
-  point.value = value;
-  point.albedo = view.palette[int(texelFetch(rest, int(tet.x)).w) % PALETTE_SIZE].rgb;
-#endif
+  vec3 albedo = view.palette[int(texelFetch(rest, int(tet.x)).w) % PALETTE_SIZE].rgb;
+  put(vec3(1.0), p, normal / max(length(normal), 1e-30), value, albedo);
 }

@@ -3,15 +3,8 @@
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"
-layout(local_size_x = 128) in;
-layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_RENDER_REST) readonly buffer Rest { vec4 rest[]; };
-layout(std430, binding = BIND_RENDER_OFFSETS) readonly buffer Offsets { uint offsets[]; };
-layout(std430, binding = BIND_RENDER_ITEMS) readonly buffer Items { uint items[]; };  // the other corners
+#include "render/gathered.glsl"
 layout(std430, binding = BIND_RENDER_VALUES) writeonly buffer Cofactors { vec4 cofactors[]; };
-uniform uint count;
-
-vec3 position(uint v) { return positions[v].high + positions[v].low; }
 
 void main() {
   uint v = gl_GlobalInvocationID.x;

@@ -2,18 +2,11 @@
 // those of the triangles around the vertex that lie within the angle of an edge of its own. So edges stay sharp without a geometry
 // shader; GPUs made for computing have few units for those.
 #include "render/view.glsl"
-layout(local_size_x = 128) in;
-layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_RENDER_REST) readonly buffer Rest { vec4 rest[]; };
+#include "render/gathered.glsl"
 layout(std430, binding = BIND_RENDER_TRIANGLES) readonly buffer Triangles { uint triangles[]; };
-layout(std430, binding = BIND_RENDER_OFFSETS) readonly buffer Offsets { uint offsets[]; };
-layout(std430, binding = BIND_RENDER_ITEMS) readonly buffer Items { uint items[]; };  // the other corners
 layout(std430, binding = BIND_RENDER_VALUES) readonly buffer Values { float values[]; };
 layout(std430, binding = BIND_RENDER_CORNERS) writeonly buffer Corners { SurfaceCorner corners[]; };
-uniform uint count;
 uniform int valued, rested;  // whether there are values, and rest positions with bodies
-
-vec3 position(uint v) { return positions[v].high + positions[v].low; }
 
 vec3 normal_at(uint v, vec3 face) {
   vec3 x = position(v), sum = vec3(0.0);

@@ -31,38 +31,31 @@ Points accelerations(Leapfrog& run) {
   const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
   for_each_spring(run, [&](auto kind, const ConstraintList& list, auto&& alpha, std::size_t offset) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
-    parallel_for(
-        list.count(),
-        [&](std::size_t c) {
-          const std::uint32_t* vertices = list.vertices.data() + c * arity;
-          std::array<glm::dvec3, arity> x;
-          for (std::size_t j = 0; j < arity; ++j) x[j] = run.x[vertices[j]] - run.x[vertices[0]];
-          const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
-          for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] = glm::dvec3(0);
-          for (int k = 0; k < kind.row.components; ++k) {
-            const auto [C, gradient] = component(value, k);
-            double size = kind.row.rate ? 0 : C;
-            const double resists = kind.row.rate ? 1 : dashpots ? 0 : tau;
-            for (std::size_t j = 0; j < arity; ++j)
-              size += resists * glm::dot(gradient[j], run.v[vertices[j]]);
-            for (std::size_t j = 0; j < arity; ++j)
-              run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
-          }
-        },
-        1024);
+    parallel_for(list.count(), 1024, [&](std::size_t c) {
+      const std::uint32_t* vertices = list.vertices.data() + c * arity;
+      std::array<glm::dvec3, arity> x;
+      for (std::size_t j = 0; j < arity; ++j) x[j] = run.x[vertices[j]] - run.x[vertices[0]];
+      const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
+      for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] = glm::dvec3(0);
+      for (int k = 0; k < kind.row.components; ++k) {
+        const auto [C, gradient] = component(value, k);
+        double size = kind.row.rate ? 0 : C;
+        const double resists = kind.row.rate ? 1 : dashpots ? 0 : tau;
+        for (std::size_t j = 0; j < arity; ++j) size += resists * glm::dot(gradient[j], run.v[vertices[j]]);
+        for (std::size_t j = 0; j < arity; ++j)
+          run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
+      }
+    });
   });
   const glm::dvec3 gravity(0, -run.input.settings.gravity, 0);
   Points a(run.x.size(), glm::dvec3(0));
-  parallel_for(
-      a.size(),
-      [&](std::size_t i) {
-        if (run.input.inverse_masses[i] == 0) return;
-        glm::dvec3 force(0);
-        for (std::uint32_t k = run.at_vertex.first[i]; k < run.at_vertex.first[i + 1]; ++k)
-          force += run.parts[run.at_vertex.values[k]];
-        a[i] = gravity + force * run.input.inverse_masses[i];
-      },
-      1024);
+  parallel_for(a.size(), 1024, [&](std::size_t i) {
+    if (run.input.inverse_masses[i] == 0) return;
+    glm::dvec3 force(0);
+    for (std::uint32_t k = run.at_vertex.first[i]; k < run.at_vertex.first[i + 1]; ++k)
+      force += run.parts[run.at_vertex.values[k]];
+    a[i] = gravity + force * run.input.inverse_masses[i];
+  });
   return a;
 }
 
@@ -113,24 +106,21 @@ void advance(Leapfrog& run, long steps) {
     if (s == 0 || std::ranges::any_of(run.input.model.shapes, moves))
       shapes = shapes_of(run.input.model, settings, run.time[0], run.h, 1)[0];
     const Points a = accelerations(run);
-    parallel_for(
-        a.size(),
-        [&](std::size_t i) {
-          if (run.input.inverse_masses[i] == 0) return;
-          const glm::dvec3 before = run.x[i];
-          run.v[i] = (run.v[i] + run.h * a[i]) * keep;
-          run.x[i] += run.h * run.v[i];
-          glm::dvec3& x = run.x[i];
-          for (const glm::dvec4& plane : planes)
-            touch(glm::dvec3(plane), plane.w - glm::dot(glm::dvec3(plane), x), settings.friction, x - before,
-                  run.h, x, run.v[i]);
-          for (const MovingShape& shape : shapes) {
-            const glm::dvec3 way = x - before - run.h * shape.velocity_at(x);
-            const auto met = shape.meeting(x, way);
-            touch(met.normal, -met.distance, shape.friction, way, run.h, x, run.v[i]);
-          }
-        },
-        4096);
+    parallel_for(a.size(), 4096, [&](std::size_t i) {
+      if (run.input.inverse_masses[i] == 0) return;
+      const glm::dvec3 before = run.x[i];
+      run.v[i] = (run.v[i] + run.h * a[i]) * keep;
+      run.x[i] += run.h * run.v[i];
+      glm::dvec3& x = run.x[i];
+      for (const glm::dvec4& plane : planes)
+        touch(glm::dvec3(plane), plane.w - glm::dot(glm::dvec3(plane), x), settings.friction, x - before,
+              run.h, x, run.v[i]);
+      for (const MovingShape& shape : shapes) {
+        const glm::dvec3 way = x - before - run.h * shape.velocity_at(x);
+        const auto met = shape.meeting(x, way);
+        touch(met.normal, -met.distance, shape.friction, way, run.h, x, run.v[i]);
+      }
+    });
   }
   for (std::size_t i = 0; i < run.x.size(); ++i)
     if (!std::isfinite(glm::dot(run.x[i], run.x[i]) + glm::dot(run.v[i], run.v[i])))

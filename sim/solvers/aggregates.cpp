@@ -214,30 +214,27 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
   const auto count = Eigen::Index(6 * aggregates.all.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(count, count);
   // Columns of one aggregate at a time; the matrix is symmetric.
-  parallel_for(
-      aggregates.all.size(),
-      [&](std::size_t a) {
-        const auto add = [&](const Share& other, std::size_t v, const Eigen::Matrix<double, 6, 3>& from) {
-          if (other.weight > 0)
-            A.block<6, 6>(6 * Eigen::Index(other.aggregate), 6 * Eigen::Index(a)) +=
-                (from * modes(model, aggregates, v, other)).transpose();
-        };
-        for (std::uint32_t k = aggregates.members.first[a]; k < aggregates.members.first[a + 1]; ++k) {
-          const std::uint32_t member = aggregates.members.values[k], v = member / 4;
-          const Modes own = modes(model, aggregates, v, aggregates.of_vertex[v][member % 4]);
-          Eigen::Matrix3d diagonal = rows.inertia[v] * Eigen::Matrix3d::Identity();
-          for (std::uint32_t e = rows.neighbours.first[v]; e < rows.neighbours.first[v + 1]; ++e) {
-            const Eigen::Map<const Eigen::Matrix3d> block(&rows.blocks[e][0].x);
-            diagonal -= block;
-            const std::uint32_t u = rows.neighbours.values[e];
-            const Eigen::Matrix<double, 6, 3> from = own.transpose() * block;
-            for (const Share& share : aggregates.of_vertex[u]) add(share, u, from);
-          }
-          const Eigen::Matrix<double, 6, 3> from = own.transpose() * diagonal;
-          for (const Share& share : aggregates.of_vertex[v]) add(share, v, from);
-        }
-      },
-      1);
+  parallel_for(aggregates.all.size(), 1, [&](std::size_t a) {
+    const auto add = [&](const Share& other, std::size_t v, const Eigen::Matrix<double, 6, 3>& from) {
+      if (other.weight > 0)
+        A.block<6, 6>(6 * Eigen::Index(other.aggregate), 6 * Eigen::Index(a)) +=
+            (from * modes(model, aggregates, v, other)).transpose();
+    };
+    for (std::uint32_t k = aggregates.members.first[a]; k < aggregates.members.first[a + 1]; ++k) {
+      const std::uint32_t member = aggregates.members.values[k], v = member / 4;
+      const Modes own = modes(model, aggregates, v, aggregates.of_vertex[v][member % 4]);
+      Eigen::Matrix3d diagonal = rows.inertia[v] * Eigen::Matrix3d::Identity();
+      for (std::uint32_t e = rows.neighbours.first[v]; e < rows.neighbours.first[v + 1]; ++e) {
+        const Eigen::Map<const Eigen::Matrix3d> block(&rows.blocks[e][0].x);
+        diagonal -= block;
+        const std::uint32_t u = rows.neighbours.values[e];
+        const Eigen::Matrix<double, 6, 3> from = own.transpose() * block;
+        for (const Share& share : aggregates.of_vertex[u]) add(share, u, from);
+      }
+      const Eigen::Matrix<double, 6, 3> from = own.transpose() * diagonal;
+      for (const Share& share : aggregates.of_vertex[v]) add(share, v, from);
+    }
+  });
   A = (0.5 * (A + A.transpose())).eval();
   // An aggregate of one vertex does not turn; what no member feels may have any value.
   A.diagonal() *= 1 + 1e-6;
@@ -250,13 +247,10 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
   });
   const std::size_t width = (std::size_t(count) + 3) / 4 * 4;
   std::vector<float> values(width * std::size_t(count), 0.0f);
-  parallel_for(
-      std::size_t(count),
-      [&](std::size_t row) {
-        for (Eigen::Index c = 0; c < count; ++c)
-          values[row * width + std::size_t(c)] = float(inverse(Eigen::Index(row), c));
-      },
-      64);
+  parallel_for(std::size_t(count), 64, [&](std::size_t row) {
+    for (Eigen::Index c = 0; c < count; ++c)
+      values[row * width + std::size_t(c)] = float(inverse(Eigen::Index(row), c));
+  });
   return values;
 }
 

@@ -21,17 +21,11 @@ std::pair<const char*, const char*> usual_axes(const Settings& settings) {
 }
 
 std::string words_of(const LiveMap& map, const MapCell& cell) {
-  switch (cell.state) {
-    case MapCell::failed:
-      return fmt::format("not finite at step {}", cell.failed_at);
-    case MapCell::refused:
-      return cell.why;
-    case MapCell::finished:
-      return fmt::format("{:.3g} % {}", cell.percent,
-                         map.motion ? "from the right motion" : "of volume lost");
-    default:
-      return cell.state == MapCell::running || !map.search ? "not yet" : "its right motion is being found";
-  }
+  if (cell.state == MapCell::failed) return fmt::format("not finite at step {}", cell.failed_at);
+  if (cell.state == MapCell::refused) return cell.why;
+  if (cell.state == MapCell::finished)
+    return fmt::format("{:.3g} % {}", cell.percent, map.motion ? "from the right motion" : "of volume lost");
+  return cell.state == MapCell::running || !map.search ? "not yet" : "its right motion is being found";
 }
 
 void draw_grid(Session& s, const LiveMap& map) {

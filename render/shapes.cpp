@@ -157,22 +157,13 @@ void make_surfaces(ShapeSurfaces& surfaces, const Model& model) {
 std::vector<Corner> tessellated(const Obstacle& o) {
   const float r = float(o.radius),
               edge = 0.04f * float(std::min({own_half(o).x, own_half(o).y, own_half(o).z}));
-  switch (o.shape) {
-    case SHAPE_SPHERE:
-      return rounded(glm::vec3(0), 0, r);
-    case SHAPE_CAPSULE:
-      return rounded({0, o.half_length, 0}, 0, r);
-    case SHAPE_BOX:
-      return rounded(glm::vec3(o.half) - edge, 0, edge);
-    case SHAPE_CYLINDER:
-      return rounded({0, float(o.half_length) - edge, 0}, r - edge, edge);
-    case SHAPE_HEIGHTS:
-      return o.field ? smoothed(block_of(o)) : std::vector<Corner>();
-    case SHAPE_GRID:
-      return o.surface ? smoothed(*o.surface) : std::vector<Corner>();
-    default:
-      return {};
-  }
+  if (o.shape == SHAPE_SPHERE) return rounded(glm::vec3(0), 0, r);
+  if (o.shape == SHAPE_CAPSULE) return rounded({0, o.half_length, 0}, 0, r);
+  if (o.shape == SHAPE_BOX) return rounded(glm::vec3(o.half) - edge, 0, edge);
+  if (o.shape == SHAPE_CYLINDER) return rounded({0, float(o.half_length) - edge, 0}, r - edge, edge);
+  if (o.shape == SHAPE_HEIGHTS && o.field) return smoothed(block_of(o));
+  if (o.shape == SHAPE_GRID && o.surface) return smoothed(*o.surface);
+  return {};
 }
 
 Bounds with_shapes(const Bounds& box, const Model& model, double time, double reach) {

@@ -175,13 +175,6 @@ std::optional<Measurement> collect(Metrics& m, bool wait) {
   return result;
 }
 
-Measurement measure_now(Metrics& m, const Sim& sim) {
-  while (collect(m, true)) {
-  }
-  measure(m, sim);
-  return *collect(m, true);
-}
-
 Measurement nothing_measured() {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Measurement m;

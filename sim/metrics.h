@@ -73,8 +73,6 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made = {});
 void measure(Metrics& metrics, const Sim& sim);
 /// The oldest measurement that is ready; with `wait`, the oldest there is.
 std::optional<Measurement> collect(Metrics& metrics, bool wait = false);
-/// Measures now and waits.
-Measurement measure_now(Metrics& metrics, const Sim& sim);
 
 /// Where there was nothing to measure: NaN, which files show as null.
 Measurement nothing_measured();

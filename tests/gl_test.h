@@ -5,8 +5,7 @@
 
 #include <vector>
 
-#include "sim/gl/context.h"
-#include "sim/solvers/solver.h"
+#include "sim/metrics.h"
 
 /// The modes that take bodies without compliance.
 inline std::vector<tetpbd::SolverMode> pbd_modes() {
@@ -14,6 +13,18 @@ inline std::vector<tetpbd::SolverMode> pbd_modes() {
   std::erase_if(modes, [](const tetpbd::SolverMode& mode) { return mode.leapfrog || mode.implicit; });
   return modes;
 }
+
+namespace tetpbd {
+
+/// Measures now and waits.
+inline Measurement measure_now(Metrics& metrics, const Sim& sim) {
+  while (collect(metrics, true)) {
+  }
+  measure(metrics, sim);
+  return *collect(metrics, true);
+}
+
+}  // namespace tetpbd
 
 struct GlTest {
   tetpbd::HeadlessContext context{-1, true};

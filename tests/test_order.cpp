@@ -298,7 +298,7 @@ TEST_CASE("every mode, scene and mesh size gives the same bits twice") {
   for (const auto& [name, model] : models)
     for (const SolverMode& mode : pbd_modes()) {
       CAPTURE(name);
-      CAPTURE(mode.name);
+      CAPTURE(std::string(mode.name));
       Settings settings = settings_of(mode.name);
       settings.ground_height = model->positions[0].y;  // contact from the first step on
       for (const glm::dvec3& p : model->positions)

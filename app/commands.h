@@ -53,7 +53,7 @@ inline long steps_per_frame(double dt) { return std::max(1L, std::lround(1.0 / 3
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
 int run_headless(Scene scene, const RunOptions& options);
 /// Prints buffers, bytes, kernels and dispatches a step.
-int print_explanation(Scene scene, int gpu);
+int print_explanation(Scene scene, int gpu, long steps);
 int print_info(int gpu);
 /// `tetpbd info --selftest`: whether this device computes what it should, and how fast; ends with a line to
 /// share. Throws Error (status 1) if a check fails.

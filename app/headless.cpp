@@ -251,18 +251,19 @@ int run_headless(Scene scene, const RunOptions& options) {
   return 0;
 }
 
-int print_explanation(Scene scene, int gpu) {
+int print_explanation(Scene scene, int gpu, long steps) {
   const auto model = build_model(scene);
   HeadlessContext context(gpu);
   choose_and_say(scene, model);
   Sim sim = create_sim(model, scene.settings);
   warm_up(sim);
+  long before = 0;
   if (!on_cpu(sim)) {
-    run_loop(sim, nullptr, 3);
-    sim.kernels_timed = true;
+    run_loop(sim, nullptr, steps);
+    before = sim.steps, sim.kernels_timed = true;
     run_loop(sim, nullptr, 10, {.most_seconds = 10});
   }
-  const Explanation e = explain(sim);
+  const Explanation e = explain(sim, int(sim.steps - before));
   fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),
              model->rest.tets.size());
   for (std::size_t k = 0; k < sim.system.lists.size(); ++k)

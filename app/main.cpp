@@ -209,7 +209,7 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
   add(command, "--budget-ms", a.overrides.budget_ms, 1e-6, 1e6,
       "GPU ms per step, for --solver auto (default: a tenth of dt)");
   add_gpu(command, a.run.gpu);
-  command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches, and stop");
+  command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches after --steps steps (default: 3), and stop");
   add_sizes(command, "--size", a.sizes, "of images and window, WxH from 16x16 to 16384x16384")->expected(1);
   add_samples(command, a.run.samples);
   CLI::App& view = *command.add_option_group("View");
@@ -504,7 +504,7 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   return [a = std::move(arguments)] {
     if (a.start != start_view || !a.run.record.empty())
       catch_interrupts();  // else there is nothing to finish
-    return a.explain ? print_explanation(*a.opened, a.run.gpu) : a.start(a);
+    return a.explain ? print_explanation(*a.opened, a.run.gpu, a.run.steps ? a.run.steps : 3) : a.start(a);
   };
 }
 

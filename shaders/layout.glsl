@@ -86,11 +86,11 @@ struct Shape {
   vec3 velocity;    // of the centre over the substep
   int first;        // of a field's values
   vec3 spin;        // rad/s
-  int _0;
+  float reach;      // m: all of its surface is nearer to `centre`
   vec3 origin;      // of a field's points
-  int _1;
+  float travel;     // m, of the centre in a substep
   ivec3 cells;      // points of a field along each axis
-  int _2;
+  float turn;       // rad, in a substep
 };
 
 // A hard body that touches half spaces (rigid.glsl). Momenta and impulses per mass of the body.

@@ -58,7 +58,8 @@ void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].f
 // Whether a vertex at x meets a shape on so many times its way over a substep.
 bool meets_shapes(Pair x, vec3 way, float times) {
   bool any = false;
-  for (int k = 0; k < SHAPES && !any; ++k) {
+  for (uint left = shapes_near(x, length(way), times); left != 0u && !any; left &= left - 1u) {
+    int k = findLSB(left);
     vec3 relative_way = times * (way - params.h * shape_velocity(k, x));
     any = met(k, pair_add(x, relative_way), relative_way).distance < 0.0;
   }

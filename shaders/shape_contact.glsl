@@ -15,6 +15,19 @@ vec3 shape_velocity(int k, Pair x) { return shapes[k].velocity + cross(shapes[k]
 Solid solid_of(int k) {
   return Solid(shapes[k].kind, shapes[k].extent, shapes[k].radius, shapes[k].trust, shapes[k].spacing, shapes[k].origin, shapes[k].cells, shapes[k].first);
 }
+// Whether the straight way `times` (way - carried), `way` so long and `carried` what shape k carries x by, may meet it: it is as near as that,
+// of either end.
+bool may_meet(int k, Pair x, float way, float times) {
+  vec3 arm = from_centre(k, x);
+  float most = shapes[k].reach + times * (way + shapes[k].travel), left = max(1.0 - times * shapes[k].turn, 0.0);
+  return left * left * dot(arm, arm) <= most * most;
+}
+// A bit for each shape that may be met.
+uint shapes_near(Pair x, float way, float times) {
+  uint bits = 0u;
+  for (int k = 0; k < SHAPES; ++k) bits |= may_meet(k, x, way, times) ? 1u << k : 0u;
+  return bits;
+}
 float gap_to(int k, Pair x) { return surface_of(solid_of(k), into_shape(k, from_centre(k, x))).distance; }
 // What a vertex at x meets of shape k that came there by `way`, relative to the shape.
 Surface met(int k, Pair x, vec3 way) {

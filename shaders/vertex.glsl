@@ -36,13 +36,16 @@ Pair resolve_contacts(Pair x, vec3 moved) {
     }
   }
 #if SHAPES
-  for (int k = 0; k < SHAPES; ++k) {
+  for (uint left = shapes_near(x, length(moved), 1.0); left != 0u;) {
+    int k = findLSB(left);
+    left &= left - 1u;
     vec3 carried = params.h * shape_velocity(k, x);
     Surface plane = met(k, x, moved - carried);
     if (plane.distance < 0.0) {
       vec3 correction = plane_correction(plane.normal, plane.distance, moved - carried, shapes[k].friction);
       x = pair_add(x, correction);
       moved += correction;
+      left = shapes_near(x, length(moved), 1.0) & ~((2u << k) - 1u);
     }
   }
 #endif
@@ -68,9 +71,10 @@ Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
   }
   if ((phases & PHASE_SOLVE) != 0u) {
     Pair corrected = pair_add(x, correction);
-    bool meets = touches(corrected);
 #if SHAPES
-    meets = true;  // that depends on where it comes from
+    const bool meets = true;  // that depends on where it comes from
+#else
+    bool meets = touches(corrected);
 #endif
     if (meets) {
       vec3 moved = correction;
@@ -111,9 +115,10 @@ Pair leapt(uint i, Position own, Velocity speed, vec3 correction) {
   v = pair_add(pair_add(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
   v = Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
   Pair x = predict_position(start, v);
-  bool meets = touches(x);
 #if SHAPES
-  meets = true;
+  bool meets = touches(x) || shapes_near(x, length(params.h * v.high), 1.0) != 0u;
+#else
+  bool meets = touches(x);
 #endif
   if (meets) {
     Pair free = x;

@@ -1,11 +1,14 @@
 // What a simulation allocates and dispatches.
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "sim/sim.h"
 
 namespace tetpbd {
 
-Explanation explain(Sim& sim) {
+Explanation explain(Sim& sim, int timed_steps) {
+  Pairs& p = sim.pairs;
   Explanation result;
   const auto add = [&](const Buffer& buffer) {
     if (!buffer) return;
@@ -16,9 +19,9 @@ Explanation explain(Sim& sim) {
        {&sim.positions,       &sim.velocities,      &sim.predicted,        &sim.quantized[0],
         &sim.quantized[1],    &sim.step_block,      &sim.guard_counts,     &sim.check.words,
         &sim.check.read_back, &sim.check.positions, &sim.check.velocities, &sim.rigid_bodies,
-        &sim.shapes,          &sim.fields,          &sim.pairs.mesh,       &sim.pairs.rest,
-        &sim.pairs.grid,      &sim.pairs.lists,     &sim.pairs.sums,       &sim.pairs.empty,
-        &sim.pairs.answer})
+        &sim.shapes,          &sim.fields,          &p.mesh,       &p.rest,
+        &p.grid,      &p.lists,     &p.sums,       &p.empty,
+        &p.answer})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
@@ -28,11 +31,11 @@ Explanation explain(Sim& sim) {
     double sum = 0;
     int count = 0;
     for (; const auto ms = timer.poll(true); ++count) sum += *ms;
-    return count > 0 ? std::optional(sum / count) : std::nullopt;
+    return std::pair(count > 0 ? std::optional(sum / count) : std::nullopt, count);
   };
   const auto time_of = [&](Pass& pass) {
     if (const auto known = times_of.find(&pass); known != times_of.end()) return known->second;
-    return times_of[&pass] = mean(pass.timer);
+    return times_of[&pass] = mean(pass.timer).first;
   };
   const auto kernel = [&](Pass& pass, const std::string& what, long per_step, std::size_t more) {
     const auto ms = time_of(pass);
@@ -60,12 +63,11 @@ Explanation explain(Sim& sim) {
     }
     kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
   }
-  for (const auto& [name, timer, per_step] :
-       {std::tuple{"pairs: boxes, insert, query", &sim.pairs.detecting, 1L},
-        {"pairs: meet, push, apply", &sim.pairs.solving, long(sim.settings.substeps)}})
-    if (const auto ms = mean(*timer)) {
-      result.dispatches.push_back({name, 0, per_step, 0, ms});
-      result.ms_per_step += *ms * double(per_step), result.dispatches_per_step += 3 * per_step;
+  for (Pairs::Kernel* k : {&p.boxes, &p.insert, &p.query, &p.meet, &p.push, &p.apply})
+    if (const auto [ms, count] = mean(k->timer); ms) {
+      const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
+      result.dispatches.push_back({k->program.label(), k->work_groups, per_step, 0, ms});
+      result.ms_per_step += *ms * count / std::max(timed_steps, 1), result.dispatches_per_step += per_step;
     }
   return result;
 }

@@ -16,6 +16,7 @@ struct MovingShape {
   glm::dvec3 velocity{0}, spin{0};  ///< m/s of the centre, rad/s
   double friction = 0, restitution = 0;
 
+  double reach() const;  ///< m: all of its surface is nearer to its centre; infinite of half spaces and heights
   glm::dvec3 velocity_at(const glm::dvec3& x) const { return velocity + glm::cross(spin, x - pose.centre); }
   /// How far x is from it, and where to; of a point that came there by `way` relative to the shape, from the
   /// plane that it meets.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtx/euler_angles.hpp>
+#include <limits>
 
 namespace tetpbd {
 
@@ -93,6 +94,15 @@ Formulas<double>::Surface MovingShape::surface_at(const glm::dvec3& x) const {
   auto surface = Formulas<double>{texels}.surface_of(solid, glm::transpose(pose.axes) * (x - pose.centre));
   surface.normal = pose.axes * surface.normal;
   return surface;
+}
+
+double MovingShape::reach() const {
+  if (solid.kind == SHAPE_PLANE || solid.kind == SHAPE_HEIGHTS) return std::numeric_limits<double>::infinity();
+  const glm::dvec3 end = solid.origin + solid.spacing * glm::dvec3(solid.cells - 1);
+  const glm::dvec3 field = glm::max(glm::abs(solid.origin), glm::abs(end));
+  if (solid.kind == SHAPE_GRID) return glm::length(field);
+  if (solid.kind == SHAPE_CYLINDER) return glm::length(glm::dvec2(solid.extent.y, solid.radius));
+  return glm::length(solid.extent) + solid.radius;
 }
 
 MovingShape moving_shape(const Obstacle& o, double start, double h, double friction, double restitution) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sim/error.h"
+#include "sim/gl/context.h"
 #include "sim/overlap.h"
 #include "sim/sim.h"
 
@@ -48,8 +49,9 @@ PairMesh pair_mesh(const Model& model) {
 
 namespace {
 
-constexpr std::uint32_t counters = 8, box = 7, candidates = 8, group = 64;  // pairs.glsl
-enum Counter { entries, records, groups, overflown = 5, touching, deepest };
+// pairs.glsl
+constexpr std::uint32_t counters = 11, box = 13, candidates = 8, group = 64;
+enum Counter { entries, records, groups, lane_groups = 5, overflown = 8, touching, deepest };
 constexpr std::size_t entries_per_triangle = 16;
 
 float unsorted(std::uint32_t bits) {
@@ -58,12 +60,14 @@ float unsorted(std::uint32_t bits) {
 
 std::size_t groups_for(std::size_t items) { return (items + group - 1) / group; }
 
-void run(const Pairs::Kernel& kernel) {
+void run(Pairs::Kernel& kernel, bool timed) {
   kernel.program.use();
+  if (timed) kernel.timer.begin();
   if (kernel.work_groups)
     glDispatchCompute(GLuint(kernel.work_groups), 1, 1);
   else
-    glDispatchComputeIndirect(groups * 4);
+    glDispatchComputeIndirect(GLintptr(4 * kernel.counted_by));
+  if (timed) kernel.timer.end();
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
@@ -75,45 +79,65 @@ void bind_pairs(const Sim& sim) {
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, p.lists.id());
 }
 
-void find_boxes(Pairs& p) {
+void find_boxes(Pairs& p, bool timed) {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   p.empty.copy_to(p.lists, 4 * counters, 4 * counters, p.empty.bytes() - 4 * counters);
-  run(p.boxes);
+  run(p.boxes, timed);
 }
 
 void find_candidates(Sim& sim, double margin) {
   Pairs& p = sim.pairs;
-  if (sim.kernels_timed) p.detecting.begin();
-  find_boxes(p);
+  find_boxes(p, sim.kernels_timed);
   p.empty.copy_to(p.lists, 0, 0, 4 * overflown);
   const GLuint zero = 0;
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, p.grid.id());
   glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, 0, GLsizeiptr(p.cleared), GL_RED_INTEGER,
                        GL_UNSIGNED_INT, &zero);
-  for (const Pairs::Kernel* kernel : {&p.insert, &p.query}) {
+  for (Pairs::Kernel* kernel : {&p.insert, &p.query}) {
     kernel->program.use();
     kernel->program.set("margin", float(margin + p.thickness));
-    run(*kernel);
+    run(*kernel, sim.kernels_timed);
   }
   glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
-  if (sim.kernels_timed) p.detecting.end();
   ++p.detections, p.since = 0;
 }
 
-// Whether bodies may touch before the answer after the next comes.
-void decide(Sim& sim, const std::vector<Bounds>& boxes, double fastest) {
+// Of the surface of a body.
+struct Extent {
+  Bounds places, speeds;  // of speeds, the means of its parts
+  double spread = 0;      // m/s, how far from these any is, but a few
+};
+// m/s, at most.
+double speed_of(const Extent& e) {
+  return glm::length(glm::max(glm::abs(e.speeds.low), glm::abs(e.speeds.high))) + e.spread;
+}
+double closing_speed(const Extent& a, const Extent& b) {
+  const auto most = glm::max(glm::abs(a.speeds.high - b.speeds.low), glm::abs(b.speeds.high - a.speeds.low));
+  return glm::length(most) + a.spread + b.spread;
+}
+
+// Whether bodies may touch before the answer after the next comes, and how fast they approach each other.
+void decide(Sim& sim, const std::vector<Extent>& bodies) {
   Pairs& p = sim.pairs;
   const Settings& s = sim.settings;
+  p.fastest = p.closing = 0;
+  for (const Extent& body : bodies) p.fastest = std::max(p.fastest, speed_of(body));
   const double seconds = 2 * double(Pairs::every + 1) * s.dt,
-               apart = 2 * (fastest + std::abs(s.gravity) * seconds) * seconds + 2 * p.margin + p.thickness;
-  p.fastest = fastest;
+               apart = 2 * (p.fastest + std::abs(s.gravity) * seconds) * seconds + 2 * p.margin + p.thickness;
   p.near = s.contact == "self";
-  for (std::size_t a = 0; a < boxes.size() && !p.near; ++a)
-    for (std::size_t b = a + 1; b < boxes.size() && !p.near; ++b)
-      p.near = !glm::any(glm::greaterThan(boxes[a].low, boxes[b].high + apart)) &&
-               !glm::any(glm::greaterThan(boxes[b].low, boxes[a].high + apart));
+  for (std::size_t a = 0; a < bodies.size(); ++a) {
+    if (s.contact == "self") p.closing = std::max(p.closing, closing_speed(bodies[a], bodies[a]));
+    for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+      if (glm::any(glm::greaterThan(bodies[a].places.low, bodies[b].places.high + apart)) ||
+          glm::any(glm::greaterThan(bodies[b].places.low, bodies[a].places.high + apart)))
+        continue;
+      p.near = true;
+      p.closing = std::max(p.closing, closing_speed(bodies[a], bodies[b]));
+    }
+  }
   if (!p.near) p.since = -1;
 }
+constexpr double spreads = 3;  // root mean squares that hold all of a body but a few
 
 void take_answer(Sim& sim) {
   Pairs& p = sim.pairs;
@@ -125,15 +149,17 @@ void take_answer(Sim& sim) {
         "the bodies are torn out of shape, or their meshes differ too much in size: set contact to none");
   p.touches += (*words)[touching];
   p.deepest = std::max(p.deepest, double(std::bit_cast<float>((*words)[deepest])));
-  std::vector<Bounds> boxes(sim.model->bodies.size());
-  double fastest = 0;
-  for (std::size_t b = 0; b < boxes.size(); ++b) {
+  std::vector<Extent> bodies(sim.model->bodies.size());
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
     const std::uint32_t* of_body = &(*words)[counters + box * b];
-    for (glm::length_t c = 0; c < 3; ++c)
-      boxes[b].low[c] = double(unsorted(of_body[c])), boxes[b].high[c] = double(unsorted(of_body[3 + c]));
-    fastest = std::max(fastest, double(std::bit_cast<float>(of_body[6])));
+    Extent& e = bodies[b];
+    for (glm::length_t c = 0; c < 3; ++c) {
+      const auto at = [&](int k) { return double(unsorted(of_body[k + c])); };
+      e.places.low[c] = at(0), e.places.high[c] = at(3), e.speeds.low[c] = at(6), e.speeds.high[c] = at(9);
+    }
+    e.spread = spreads * double(std::bit_cast<float>(of_body[12]));
   }
-  decide(sim, boxes, fastest);
+  decide(sim, bodies);
 }
 
 void ask(Pairs& p) {
@@ -164,7 +190,8 @@ Pairs make_pairs(const Model& model, const Settings& settings,
     first = end;
   }
   const std::size_t slices = (words.size() - slices_at) / 3, triangles = surfaces.triangles.size(),
-                    vertices = surfaces.vertices.size(), bodies = model.bodies.size();
+                    vertices = surfaces.vertices.size(), bodies = model.bodies.size(),
+                    lanes = is_software_renderer() ? 1 : 8;
   Pairs p;
   p.margin = pair_margin(surfaces), p.thickness = surfaces.thickness;
   p.cells = std::bit_ceil(2 * triangles + 1);
@@ -175,15 +202,16 @@ Pairs make_pairs(const Model& model, const Settings& settings,
     p.rest = Buffer("surfaces at rest", rest);
   }
   const std::size_t most = entries_per_triangle * triangles + 1024, records_at = counters + box * bodies;
-  const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
+  const std::size_t entries_at = 3 * (p.cells + model.positions.size());  // behind normals of vertices
   p.cleared = 4 * entries_at;
-  p.grid = Buffer("grid of triangles", 4 * (entries_at + 2 * most));
+  p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
   p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * vertices));
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
-  empty[groups + 1] = empty[groups + 2] = 1;
-  for (std::size_t b = 0; b < bodies; ++b) std::fill_n(&empty[counters + box * b], 3, ~0u);
+  empty[groups + 1] = empty[groups + 2] = empty[lane_groups + 1] = empty[lane_groups + 2] = 1;
+  for (std::size_t b = 0; b < bodies; ++b)
+    for (const std::size_t low : {0, 6}) std::fill_n(&empty[counters + box * b + low], 3, ~0u);
   p.empty = Buffer("no contacts", empty);
   p.answer = Buffer("contacts read-back", 4 * records_at, nullptr, GL_STREAM_READ);
   p.lists.write(0, 4 * records_at, empty.data());
@@ -195,6 +223,7 @@ Pairs make_pairs(const Model& model, const Settings& settings,
                                     {"TRIANGLES", triangles},
                                     {"SURFACE_VERTICES", vertices},
                                     {"CANDIDATES", candidates},
+                                    {"LANES", lanes},
                                     {"CELLS", p.cells},
                                     {"ENTRIES_AT", entries_at},
                                     {"MOST_ENTRIES", most},
@@ -204,12 +233,13 @@ Pairs make_pairs(const Model& model, const Settings& settings,
   defines.push_back(fmt::format("CELL {:.9g}", 1.2 * surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
-  const auto kernel = [&](const char* name, std::size_t work_groups) {
-    return Pairs::Kernel{Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups};
+  const auto kernel = [&](const char* name, std::size_t work_groups, int counted_by = 0) {
+    return Pairs::Kernel{
+        Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups, counted_by, {}};
   };
   p.boxes = kernel("boxes", slices), p.insert = kernel("insert", groups_for(triangles));
-  p.query = kernel("query", groups_for(vertices)), p.apply = kernel("apply", groups_for(vertices));
-  p.meet = kernel("meet", 0), p.push = kernel("push", 0);
+  p.query = kernel("query", groups_for(lanes * vertices)), p.apply = kernel("apply", groups_for(vertices));
+  p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
   return p;
 }
 
@@ -219,7 +249,7 @@ void look_around(Sim& sim) {
   take_answer(sim);
   bind_pairs(sim);
   sim.positions.bind_storage(BIND_POSITIONS), sim.velocities.bind_storage(BIND_VELOCITIES);
-  if (!p.near || p.since < 0) find_boxes(p);
+  if (!p.near || p.since < 0) find_boxes(p, sim.kernels_timed);
   ask(p);
 }
 
@@ -227,33 +257,34 @@ void touch(Sim& sim) {
   Pairs& p = sim.pairs;
   if (!p || !p.near) return;
   const Settings& s = sim.settings;
-  const double h = s.dt / s.substeps,
-               fastest = p.fastest + std::abs(s.gravity) * 2 * double(Pairs::every) * s.dt;
-  // Candidates serve while nothing can have crossed the margin; a body that crosses it in a substep gets a
-  // wider one, and so do bodies that start deep in each other.
-  const double margin = std::max(p.margin, 2.2 * fastest * h) + 2 * std::exchange(p.overlap, 0);
-  const double serve = std::max(1.0, std::floor(margin / (2 * fastest * h + 1e-30)));
+  const double h = s.dt / (s.substeps * sim.watch.finer),
+               gained = std::abs(s.gravity) * 2 * double(Pairs::every) * s.dt, closing = p.closing + gained;
+  // Candidates serve while bodies cannot have crossed the margin, or twice it if one of two is stopped by
+  // something else; a body that crosses it in a substep gets a wider one, and so do bodies that start deep in
+  // each other.
+  const double margin = std::max(p.margin, 1.1 * closing * h) + 2 * std::exchange(p.overlap, 0);
+  const double serve =
+      std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
   bind_pairs(sim);
   sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
-  if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps))) find_candidates(sim, margin);
+  if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer))) find_candidates(sim, margin);
   ++p.since;
-  if (sim.kernels_timed) p.solving.begin();
-  for (const Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel);
-  if (sim.kernels_timed) p.solving.end();
+  for (Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel, sim.kernels_timed);
 }
 
 void start_pairs(Sim& sim, const State& state) {
   Pairs& p = sim.pairs;
   if (!p) return;
   p.asked = {}, p.since = -1;
-  std::vector<Bounds> boxes;
+  std::vector<Extent> bodies;
   for (const Body& body : sim.model->bodies) {
-    const auto first = state.positions.begin() + std::ptrdiff_t(body.first_vertex);
-    boxes.push_back(bounds({first, first + std::ptrdiff_t(body.vertices)}));
+    const auto of_body = [&](const std::vector<glm::dvec3>& all) {
+      const auto first = all.begin() + std::ptrdiff_t(body.first_vertex);
+      return bounds({first, first + std::ptrdiff_t(body.vertices)});
+    };
+    bodies.push_back({of_body(state.positions), of_body(state.velocities)});
   }
-  double fastest = 0;
-  for (const glm::dvec3& v : state.velocities) fastest = std::max(fastest, glm::length(v));
-  decide(sim, boxes, fastest);
+  decide(sim, bodies);
   p.overlap = p.near ? overlap_of(*sim.model, state.positions, sim.settings.contact == "self").deepest : 0;
   std::vector<std::uint32_t> words(p.lists.bytes() / 4, ~0u);  // nothing is held
   p.empty.read(0, p.empty.bytes(), words.data());

@@ -44,7 +44,9 @@ struct Pairs : PairNumbers {
   Fence asked;
   struct Kernel {
     Program program;
-    std::size_t work_groups = 0;  ///< 0: as many as there are records
+    std::size_t work_groups = 0;  ///< 0: as many as this counter of `lists` says
+    int counted_by = 0;
+    Timer timer;
   };
   Kernel boxes, insert, query, meet, push, apply;
   std::size_t cells = 0, cleared = 0;  ///< of the grid, bytes for each detection
@@ -52,9 +54,8 @@ struct Pairs : PairNumbers {
   double thickness = 0;                ///< m, the largest of a vertex
   bool near = true;                    ///< bodies may touch before the answer after the next
   double overlap = 0;                  ///< m, how deep they start in each other
-  double fastest = 0;                  ///< m/s, any vertex, by the last answer
+  double fastest = 0, closing = 0;     ///< m/s, any body, and two that are near, by the last answer
   long since = -1;                     ///< substeps since candidates were looked for; below 0: never
-  Timer detecting, solving;
   explicit operator bool() const { return bool(mesh); }
 };
 Pairs make_pairs(const Model& model, const Settings& settings,

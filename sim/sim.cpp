@@ -257,7 +257,7 @@ std::size_t shapes_stride(const Sim& sim) {
   return (bytes + unit - 1) / unit * unit;
 }
 
-Shape shape_block(const MovingShape& shape, int first) {
+Shape shape_block(const MovingShape& shape, int first, double h) {
   const auto& s = shape.solid;
   Shape block{};
   split_pair(shape.pose.centre, block.centre, block.centre_low);
@@ -266,6 +266,8 @@ Shape shape_block(const MovingShape& shape, int first) {
   block.kind = s.kind, block.first = first, block.cells = s.cells;
   block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
   block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
+  block.reach = float(std::min(1.01 * shape.reach(), 1e18));  // its square is finite
+  block.travel = float(h * glm::length(shape.velocity)), block.turn = float(h * glm::length(shape.spin));
   block.velocity = glm::vec3(shape.velocity), block.spin = glm::vec3(shape.spin);
   block.friction = float(shape.friction), block.restitution = float(shape.restitution);
   return block;
@@ -439,7 +441,7 @@ void write_shapes(Sim& sim) {
   std::vector<char> bytes(lists.size() * stride);
   for (std::size_t l = 0; l < lists.size(); ++l)
     for (std::size_t k = 0; k < lists[l].size(); ++k) {
-      const Shape block = shape_block(lists[l][k], first[k]);
+      const Shape block = shape_block(lists[l][k], first[k], h);
       std::memcpy(&bytes[l * stride + k * sizeof block], &block, sizeof block);
     }
   if (sim.shapes.bytes() == bytes.size())

@@ -180,6 +180,6 @@ struct Explanation {
   std::size_t bytes_per_step = 0;  ///< read and written by all dispatches; caches may serve part of it
 };
 /// What the simulation allocates and dispatches. Waits for what is timed.
-Explanation explain(Sim& sim);
+Explanation explain(Sim& sim, int timed_steps = 0);
 
 }  // namespace tetpbd

@@ -88,6 +88,7 @@ Surface plane_of(int k, Pair x, vec3 u) {
 #if SHAPES
   if (k >= params.plane_count) {
     int s = k - params.plane_count;
+    if (!may_meet(s, x, length(u), 1.0)) return Surface(vec3(0.0), 1e9);
     return met(s, pair_add(x, u), u - params.h * shape_velocity(s, x));
   }
 #endif

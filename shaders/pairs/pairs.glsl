@@ -11,19 +11,20 @@ uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
 uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 3u * s]; }
 uint surface_body(uint s) { return pair_mesh[VERTICES_AT + 3u * s + 1u]; }
 float surface_thickness(uint s) { return uintBitsToFloat(pair_mesh[VERTICES_AT + 3u * s + 2u]); }  // m, of a sheet, else 0
-// First entry of each cell (a hash of where it is) plus 1; normals of vertices, of 4096 for each of their triangles; then entries (triangle, the next
-// plus 1). Their order is chance, and plays no part.
+// Of each cell (a hash of where it is) the first entry plus 1, and the largest of all numbers of bodies in it plus 1 and of their complements; normals of vertices, of 4096 for each of their triangles; then entries (triangle, its body,
+// the next plus 1). Their order is chance, and plays no part.
 layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
-// Counters; then of each body the box around its surface and its speed, as numbers that sort like the floats; then records of vertices that
-// have candidates.
+// Counters; then of each body the box around its surface, that around the mean velocities of its slices, and how far from these the others are, as
+// numbers that sort like the floats; then records of vertices that have candidates.
 #define ENTRIES 0u     // of the grid
 #define RECORDS 1u
 #define GROUPS 2u      // of work-groups for all records: three numbers for an indirect dispatch
-#define OVERFLOWN 5u   // entries that had no room
-#define TOUCHING 6u    // contacts, of all substeps since
-#define DEEPEST 7u     // m, as sortable
-#define BOXES 8u
-#define BOX 7u
+#define LANE_GROUPS 5u // the same with CANDIDATES invocations per record
+#define OVERFLOWN 8u   // entries that had no room
+#define TOUCHING 9u    // contacts, of all substeps since
+#define DEEPEST 10u    // m, as sortable
+#define BOXES 11u
+#define BOX 13u
 #define RECORD (2u + CANDIDATES)  // vertex of a surface, the one it is in (NONE: none), candidates
 #define NONE 0xffffffffu
 #define BESIDE 0x80000000u  // of a candidate: it says whether the vertex is in the body, but does not push it
@@ -56,8 +57,11 @@ bool near_another(uint body, vec3 low, vec3 high) {
 #endif
 }
 ivec3 cell_of(vec3 x) { return ivec3(floor(x / CELL)); }
+#define CELL_WORDS 3u
+#define NORMALS_AT (CELL_WORDS * CELLS)
+// Its place in pair_grid.
 uint hash_of(ivec3 cell) {
   uvec3 u = uvec3(cell) * uvec3(73856093u, 19349663u, 83492791u);
   uint h = u.x ^ u.y ^ u.z;
-  return (h ^ (h >> 15)) & (CELLS - 1u);
+  return CELL_WORDS * ((h ^ (h >> 15)) & (CELLS - 1u));
 }

@@ -1,5 +1,6 @@
 // The candidates of each vertex of a surface: the nearest triangles within the margin, of equally near ones those of the least number, so that
-// the order in which they are found plays no part. A vertex that is deep in a body looks as far as its surface. One invocation per vertex.
+// the order in which they are found plays no part. A vertex that is deep in a body looks as far as its surface. LANES invocations per vertex: each
+// looks into some of the cells, then the lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
@@ -21,60 +22,101 @@ Meeting meeting_of(uint t, Pair own) {
   }
   return meet(corners[0], corners[1], corners[2]);
 }
-void main() {
-  uint s = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
-  if (s >= SURFACE_VERTICES) return;
-  uint i = surface_vertex(s), body = surface_body(s);
-  Pair own = Pair(positions[i].high, positions[i].low);
-  uint held = pair_lists[HELD + s];
-  float radius = held == NONE ? margin : max(margin, 1.05 * abs(meeting_of(held, own).gap) + 0.5 * margin);
-  pair_lists[HELD + s] = NONE;
-  if (!near_another(body, own.high - radius, own.high + radius)) return;
-  vec3 normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
-  bool solid = !(surface_thickness(s) > 0.0);  // a sheet has two sides
-  uint found[CANDIDATES];
-  float distances[CANDIDATES];
-  for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
-  ivec3 first = cell_of(own.high - radius), last = cell_of(own.high + radius);
-  for (int z = first.z; z <= last.z; ++z)
-    for (int y = first.y; y <= last.y; ++y)
-      for (int x = first.x; x <= last.x; ++x)
-        for (uint entry = pair_grid[hash_of(ivec3(x, y, z))]; entry != 0u;) {
-          uint t = pair_grid[ENTRIES_AT + 2u * (entry - 1u)];
-          entry = pair_grid[ENTRIES_AT + 2u * (entry - 1u) + 1u];
-#if CONTACT_SELF
-          if (triangle_body(t) == body && is_neighbour(i, t)) continue;
+uint found[CANDIDATES];
+float distances[CANDIDATES];
+void consider(uint t, float d) {
+  uint at = CANDIDATES;
+  for (uint k = CANDIDATES; k-- > 0u;) {
+    if (found[k] == t) return;
+    if (d < distances[k] || (d == distances[k] && t < found[k])) at = k;
+  }
+  for (uint k = 0u; k < CANDIDATES; ++k) {
+    if (k < at) continue;
+    uint t_out = found[k];
+    float d_out = distances[k];
+    found[k] = t, distances[k] = d;
+    t = t_out, d = d_out;
+  }
+}
+#if LANES > 1
+shared uint lists[GROUP_SIZE][CANDIDATES];
+shared float list_distances[GROUP_SIZE][CANDIDATES];
+shared uint near_some[GROUP_SIZE / LANES];
+// Leaves the nearest of all lists in that of the first lane.
+void merge(uint lane) {
+  for (uint half_size = LANES / 2u; half_size > 0u; half_size /= 2u) {
+    for (uint k = 0u; k < CANDIDATES; ++k) lists[gl_LocalInvocationIndex][k] = found[k], list_distances[gl_LocalInvocationIndex][k] = distances[k];
+    barrier();
+    if (lane < half_size) {
+      uint from = gl_LocalInvocationIndex + half_size;
+      for (uint k = 0u; k < CANDIDATES; ++k)
+        if (lists[from][k] != NONE && list_distances[from][k] <= distances[CANDIDATES - 1u]) consider(lists[from][k], list_distances[from][k]);
+    }
+    barrier();
+  }
+}
+#endif
+// Whether another body is near, or this one is asked for as well; each lane asks about some of them.
+bool near_some_other(uint lane, uint part, uint body, vec3 low, vec3 high) {
+#if CONTACT_SELF || LANES == 1
+  return near_another(body, low, high);
 #else
-          if (triangle_body(t) == body) continue;
+  if (lane == 0u) near_some[part] = 0u;
+  barrier();
+  for (uint other = lane; other < BODY_COUNT; other += LANES)
+    if (other != body && in_box(other, low, high)) near_some[part] = 1u;
+  barrier();
+  return near_some[part] != 0u;
 #endif
-          Meeting m = meeting_of(t, own);
-          float d = m.rank;
+}
+void main() {
+  uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
+  uint s = group_index() * (GROUP_SIZE / LANES) + part;
+  bool there = s < SURFACE_VERTICES;
+  uint i = surface_vertex(there ? s : 0u), body = surface_body(there ? s : 0u);
+  Pair own = Pair(positions[i].high, positions[i].low);
+  uint held = there ? pair_lists[HELD + s] : NONE;
+  float radius = held == NONE ? margin : max(margin, 1.05 * abs(meeting_of(held, own).gap) + 0.5 * margin);
+  for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
+  bool near = near_some_other(lane, part, body, own.high - radius, own.high + radius);
+  if (there && near) {
+    vec3 normal = vec3(ivec3(pair_grid[NORMALS_AT + 3u * i], pair_grid[NORMALS_AT + 3u * i + 1u], pair_grid[NORMALS_AT + 3u * i + 2u]));
+    bool solid = !(surface_thickness(s) > 0.0);  // a sheet has two sides
+    ivec3 first = cell_of(own.high - radius), across = cell_of(own.high + radius) - first + 1;
+    for (int c = int(lane); c < across.x * across.y * across.z; c += int(LANES)) {
+      ivec3 cell = first + ivec3(c % across.x, c / across.x % across.y, c / (across.x * across.y));
+      uint at = hash_of(cell);
+#if !CONTACT_SELF
+      if (pair_grid[at + 1u] == body + 1u && pair_grid[at + 2u] == ~body) continue;  // no other body is there
+#endif
+      for (uint entry = pair_grid[at]; entry != 0u;) {
+        uint k = ENTRIES_AT + 3u * (entry - 1u), t = pair_grid[k], of_body = pair_grid[k + 1u];
+        entry = pair_grid[k + 2u];
 #if CONTACT_SELF
-          if (triangle_body(t) == body && abs(m.gap) > SELF_MARGIN) continue;  // a thin part's other side is no contact
+        if (of_body == body && is_neighbour(i, t)) continue;
+#else
+        if (of_body == body) continue;
 #endif
-          if (solid && !opposes(m, normal)) t |= BESIDE;
-          uint at = CANDIDATES;
-          for (uint k = CANDIDATES; k-- > 0u;) {
-            if (found[k] == t) {
-              at = CANDIDATES;
-              break;
-            }
-            if (d < distances[k] || (d == distances[k] && t < found[k])) at = k;
-          }
-          for (uint k = 0u; k < CANDIDATES; ++k) {
-            if (k < at) continue;
-            uint t_out = found[k];
-            float d_out = distances[k];
-            found[k] = t, distances[k] = d;
-            t = t_out, d = d_out;
-          }
-        }
+        Meeting m = meeting_of(t, own);
+#if CONTACT_SELF
+        if (of_body == body && abs(m.gap) > SELF_MARGIN) continue;  // a thin part's other side is no contact
+#endif
+        if (m.rank <= distances[CANDIDATES - 1u]) consider(solid && !opposes(m, normal) ? t | BESIDE : t, m.rank);
+      }
+    }
+  }
+#if LANES > 1
+  merge(lane);
+#endif
+  if (lane != 0u) return;
+  if (there) pair_lists[HELD + s] = NONE;
   if (found[0] == NONE) return;
   bool opposed = false;
   for (uint k = 0u; k < CANDIDATES; ++k) opposed = opposed || (found[k] & BESIDE) == 0u;
   if (!opposed) return;
   uint record = atomicAdd(pair_lists[RECORDS], 1u), k = RECORDS_AT + RECORD * record;
   atomicMax(pair_lists[GROUPS], record / GROUP_SIZE + 1u);
+  atomicMax(pair_lists[LANE_GROUPS], record / (GROUP_SIZE / CANDIDATES) + 1u);
   pair_lists[k] = s;
   for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + 2u + c] = found[c];
 }

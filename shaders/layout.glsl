@@ -86,11 +86,11 @@ struct Shape {
   vec3 velocity;    // of the centre over the substep
   int first;        // of a field's values
   vec3 spin;        // rad/s
-  float reach;      // m: all of its surface is nearer to `centre`
+  int _0;
   vec3 origin;      // of a field's points
-  float travel;     // m, of the centre in a substep
+  int _1;
   ivec3 cells;      // points of a field along each axis
-  float turn;       // rad, in a substep
+  int _2;
 };
 
 // A hard body that touches half spaces (rigid.glsl). Momenta and impulses per mass of the body.

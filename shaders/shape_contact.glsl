@@ -1,5 +1,8 @@
 // Vertices and the SHAPES obstacles that have a shape (method.md, "Shapes").
-layout(std140, binding = BIND_SHAPES) uniform ShapeBlock { Shape shapes[SHAPES]; };
+layout(std140, binding = BIND_SHAPES) uniform ShapeBlock {
+  vec4 reaches[SHAPES];  // centres, and how far from there a shape is met within four substeps, by what it carries (reach_of, sim.cpp)
+  Shape shapes[SHAPES];
+};
 #if FIELDS
 layout(binding = UNIT_FIELDS) uniform samplerBuffer fields;
 real texel(int i) { return texelFetch(fields, i).r; }
@@ -18,9 +21,9 @@ Solid solid_of(int k) {
 // Whether the straight way `times` (way - carried), `way` so long and `carried` what shape k carries x by, may meet it: it is as near as that,
 // of either end.
 bool may_meet(int k, Pair x, float way, float times) {
-  vec3 arm = from_centre(k, x);
-  float most = shapes[k].reach + times * (way + shapes[k].travel), left = max(1.0 - times * shapes[k].turn, 0.0);
-  return left * left * dot(arm, arm) <= most * most;
+  vec3 arm = x.high - reaches[k].xyz;
+  float most = reaches[k].w + 2.0 * times * way;
+  return dot(arm, arm) <= most * most;
 }
 // A bit for each shape that may be met.
 uint shapes_near(Pair x, float way, float times) {

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "sim/error.h"
-#include "sim/gl/context.h"
 #include "sim/overlap.h"
 #include "sim/sim.h"
 
@@ -171,7 +170,7 @@ void ask(Pairs& p) {
 
 }  // namespace
 
-Pairs make_pairs(const Model& model, const Settings& settings,
+Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,
                  const std::vector<std::string>& vertex_defines) {
   const PairMesh surfaces = pair_mesh(model);
   std::vector<std::uint32_t> words;
@@ -190,8 +189,7 @@ Pairs make_pairs(const Model& model, const Settings& settings,
     first = end;
   }
   const std::size_t slices = (words.size() - slices_at) / 3, triangles = surfaces.triangles.size(),
-                    vertices = surfaces.vertices.size(), bodies = model.bodies.size(),
-                    lanes = is_software_renderer() ? 1 : 8;
+                    vertices = surfaces.vertices.size(), bodies = model.bodies.size();
   Pairs p;
   p.margin = pair_margin(surfaces), p.thickness = surfaces.thickness;
   p.cells = std::bit_ceil(2 * triangles + 1);
@@ -202,7 +200,7 @@ Pairs make_pairs(const Model& model, const Settings& settings,
     p.rest = Buffer("surfaces at rest", rest);
   }
   const std::size_t most = entries_per_triangle * triangles + 1024, records_at = counters + box * bodies;
-  const std::size_t entries_at = 3 * (p.cells + model.positions.size());  // behind normals of vertices
+  const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
   p.cleared = 4 * entries_at;
   p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
   p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * vertices));

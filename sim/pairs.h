@@ -58,7 +58,7 @@ struct Pairs : PairNumbers {
   long since = -1;                     ///< substeps since candidates were looked for; below 0: never
   explicit operator bool() const { return bool(mesh); }
 };
-Pairs make_pairs(const Model& model, const Settings& settings,
+Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,
                  const std::vector<std::string>& vertex_defines);
 /// Before a step: takes the last answer and asks again. Throws Error if contacts had no room.
 void look_around(Sim& sim);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -136,6 +137,9 @@ std::vector<RigidRecord> rigid_records(const Model& model) {
 Tuning within_limits(Tuning tuning) {
   GLint row = 0;
   glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &row);
+  if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // one knows no barriers
+  if (tuning.lanes > 8 || !std::has_single_bit(tuning.lanes))
+    throw Error("no such tuning", fmt::format("lanes={}", tuning.lanes), "a power of two up to 8");
   if (tuning.row == 0 || tuning.row > unsigned(row)) tuning.row = unsigned(row);
   GLint64 bytes = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
@@ -249,15 +253,29 @@ void make_fields(Sim& sim) {
   glBindTexture(GL_TEXTURE_BUFFER, 0);
 }
 
+// Of a list of shapes: all reaches, then all shapes.
+std::size_t shapes_bytes(const Sim& sim) {
+  return sim.model->shapes.size() * (sizeof(glm::vec4) + sizeof(Shape));
+}
+
 // Bytes from one list of shapes to the next.
 std::size_t shapes_stride(const Sim& sim) {
   GLint alignment = 256;
   glGetIntegerv(GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT, &alignment);
-  const std::size_t bytes = sim.model->shapes.size() * sizeof(Shape), unit = std::size_t(alignment);
+  const std::size_t bytes = shapes_bytes(sim), unit = std::size_t(alignment);
   return (bytes + unit - 1) / unit * unit;
 }
 
-Shape shape_block(const MovingShape& shape, int first, double h) {
+// How far from its centre it is met by what it carries on `times` its way over h, |way - h (v + w x arm)| <=
+// |way| + h (|v| + |w| |arm|): |arm| (1 - times h |w|) <= radius + times h |v| + times |way|.
+glm::vec4 reach_of(const MovingShape& shape, double h) {
+  constexpr double times = 4;
+  const double left = 1 - times * h * glm::length(shape.spin), size = glm::length(shape.pose.centre);
+  const double reach = 1.01 * (shape.reach() + times * h * glm::length(shape.velocity)) / left + 1e-6 * size;
+  return {glm::vec3(shape.pose.centre), left < 0.5 ? 1e18f : float(std::min(reach, 1e18))};  // squares are finite
+}
+
+Shape shape_block(const MovingShape& shape, int first) {
   const auto& s = shape.solid;
   Shape block{};
   split_pair(shape.pose.centre, block.centre, block.centre_low);
@@ -266,8 +284,6 @@ Shape shape_block(const MovingShape& shape, int first, double h) {
   block.kind = s.kind, block.first = first, block.cells = s.cells;
   block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
   block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
-  block.reach = float(std::min(1.01 * shape.reach(), 1e18));  // its square is finite
-  block.travel = float(h * glm::length(shape.velocity)), block.turn = float(h * glm::length(shape.spin));
   block.velocity = glm::vec3(shape.velocity), block.spin = glm::vec3(shape.spin);
   block.friction = float(shape.friction), block.restitution = float(shape.restitution);
   return block;
@@ -316,7 +332,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
     sim.rigid_contact = {Program::compute("rigid_contact.comp", {}, defines), work_groups(count, group_size),
                          4 * count};
   }
-  if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(*sim.model, settings, defines);
+  if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(*sim.model, settings, sim.tuning.lanes, defines);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -441,8 +457,11 @@ void write_shapes(Sim& sim) {
   std::vector<char> bytes(lists.size() * stride);
   for (std::size_t l = 0; l < lists.size(); ++l)
     for (std::size_t k = 0; k < lists[l].size(); ++k) {
-      const Shape block = shape_block(lists[l][k], first[k], h);
-      std::memcpy(&bytes[l * stride + k * sizeof block], &block, sizeof block);
+      const Shape block = shape_block(lists[l][k], first[k]);
+      const glm::vec4 reach = reach_of(lists[l][k], h);
+      const std::size_t at = l * stride + lists[l].size() * sizeof reach;
+      std::memcpy(&bytes[l * stride + k * sizeof reach], &reach, sizeof reach);
+      std::memcpy(&bytes[at + k * sizeof block], &block, sizeof block);
     }
   if (sim.shapes.bytes() == bytes.size())
     sim.shapes.write(0, bytes.size(), bytes.data());
@@ -458,7 +477,7 @@ void bind_shapes(const Sim& sim, int list) {
   const std::size_t stride = shapes_stride(sim), lists = sim.shapes.bytes() / stride;
   glBindBufferRange(GL_UNIFORM_BUFFER, BIND_SHAPES, sim.shapes.id(),
                     GLintptr(std::min(std::size_t(list), lists - 1) * stride),
-                    GLsizeiptr(sim.model->shapes.size() * sizeof(Shape)));
+                    GLsizeiptr(shapes_bytes(sim)));
   if (!sim.fields) return;
   glActiveTexture(GL_TEXTURE0 + UNIT_FIELDS);
   glBindTexture(GL_TEXTURE_BUFFER, sim.fields_texture.id());

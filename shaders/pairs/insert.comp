@@ -13,26 +13,24 @@ void main() {
   if (area > 0.0) {
     ivec3 unit = ivec3(round(normal * (4096.0 / area)));
     for (uint j = 0u; j < 3u; ++j)
-      for (uint k = 0u; k < 3u; ++k) atomicAdd(pair_grid[NORMALS_AT + 3u * triangle_vertex(t, j) + k], uint(unit[k]));
+      for (uint k = 0u; k < 3u; ++k) atomicAdd(pair_grid[CELLS + 3u * triangle_vertex(t, j) + k], uint(unit[k]));
   }
   ivec3 first = cell_of(low), last = cell_of(high), across = last - first + 1;
   if (any(greaterThan(across, ivec3(most_cells))) || across.x * across.y * across.z > most_cells) {
     atomicAdd(pair_lists[OVERFLOWN], 1u);
     return;
   }
-  uint entry = atomicAdd(pair_lists[ENTRIES], uint(across.x * across.y * across.z)), body = triangle_body(t);
-  if (entry + uint(across.x * across.y * across.z) > MOST_ENTRIES) {
-    atomicAdd(pair_lists[OVERFLOWN], 1u);
-    return;
-  }
   for (int z = first.z; z <= last.z; ++z)
     for (int y = first.y; y <= last.y; ++y)
       for (int x = first.x; x <= last.x; ++x) {
-        uint cell = hash_of(ivec3(x, y, z)), k = ENTRIES_AT + 3u * entry;
+        uint entry = atomicAdd(pair_lists[ENTRIES], 1u), k = ENTRIES_AT + 3u * entry;
+        if (entry >= MOST_ENTRIES) {
+          atomicAdd(pair_lists[OVERFLOWN], 1u);
+          return;
+        }
+        bvec3 is_first = equal(ivec3(x, y, z), first);
         pair_grid[k] = t;
-        pair_grid[k + 1u] = body;
-        pair_grid[k + 2u] = atomicExchange(pair_grid[cell], ++entry);
-        atomicMax(pair_grid[cell + 1u], body + 1u);
-        atomicMax(pair_grid[cell + 2u], ~body);
+        pair_grid[k + 1u] = triangle_body(t) | (is_first.x ? FIRST_ALONG_X : 0u) | (is_first.y ? FIRST_ALONG_X << 1 : 0u) | (is_first.z ? FIRST_ALONG_X << 2 : 0u);
+        pair_grid[k + 2u] = atomicExchange(pair_grid[hash_of(ivec3(x, y, z))], entry + 1u);
       }
 }

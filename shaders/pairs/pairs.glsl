@@ -11,8 +11,8 @@ uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
 uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 3u * s]; }
 uint surface_body(uint s) { return pair_mesh[VERTICES_AT + 3u * s + 1u]; }
 float surface_thickness(uint s) { return uintBitsToFloat(pair_mesh[VERTICES_AT + 3u * s + 2u]); }  // m, of a sheet, else 0
-// Of each cell (a hash of where it is) the first entry plus 1, and the largest of all numbers of bodies in it plus 1 and of their complements; normals of vertices, of 4096 for each of their triangles; then entries (triangle, its body,
-// the next plus 1). Their order is chance, and plays no part.
+// First entry of each cell (a hash of where it is) plus 1; normals of vertices, of 4096 for each of their triangles; then entries (triangle; its body
+// and, along each axis, whether the cell is the first that it is in; the next plus 1). Their order is chance, and plays no part.
 layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
 // Counters; then of each body the box around its surface, that around the mean velocities of its slices, and how far from these the others are, as
 // numbers that sort like the floats; then records of vertices that have candidates.
@@ -57,11 +57,10 @@ bool near_another(uint body, vec3 low, vec3 high) {
 #endif
 }
 ivec3 cell_of(vec3 x) { return ivec3(floor(x / CELL)); }
-#define CELL_WORDS 3u
-#define NORMALS_AT (CELL_WORDS * CELLS)
-// Its place in pair_grid.
+#define FIRST_ALONG_X 0x20000000u
+#define BODY_OF_ENTRY 0x1fffffffu
 uint hash_of(ivec3 cell) {
   uvec3 u = uvec3(cell) * uvec3(73856093u, 19349663u, 83492791u);
   uint h = u.x ^ u.y ^ u.z;
-  return CELL_WORDS * ((h ^ (h >> 15)) & (CELLS - 1u));
+  return (h ^ (h >> 15)) & (CELLS - 1u);
 }

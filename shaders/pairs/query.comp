@@ -1,6 +1,6 @@
 // The candidates of each vertex of a surface: the nearest triangles within the margin, of equally near ones those of the least number, so that
 // the order in which they are found plays no part. A vertex that is deep in a body looks as far as its surface. LANES invocations per vertex: each
-// looks into some of the cells, then the lists are merged.
+// looks into some of the cells; then each looks at some of the triangles found there, and their lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
@@ -14,13 +14,11 @@ bool is_neighbour(uint i, uint t) {
   return false;
 }
 #endif
-Meeting meeting_of(uint t, Pair own) {
-  vec3 corners[3];
+void corners_of(uint t, Pair own, out vec3 corners[3]) {
   for (uint c = 0u; c < 3u; ++c) {
     Position p = positions[triangle_vertex(t, c)];
     corners[c] = relative(Pair(p.high, p.low), own);
   }
-  return meet(corners[0], corners[1], corners[2]);
 }
 uint found[CANDIDATES];
 float distances[CANDIDATES];
@@ -38,7 +36,21 @@ void consider(uint t, float d) {
     t = t_out, d = d_out;
   }
 }
+// Triangle t, and a vertex at `own`, of the same body or not, whose normal is `normal`; a sheet has two sides.
+void look_at(uint t, bool same_body, Pair own, bool sheet, vec3 normal) {
+  vec3 corners[3];
+  corners_of(t, own, corners);
+  vec3 beyond = max(max(min(corners[0], min(corners[1], corners[2])), -max(corners[0], max(corners[1], corners[2]))), vec3(0.0));
+  if (dot(beyond, beyond) > 1.01 * distances[CANDIDATES - 1u] * distances[CANDIDATES - 1u]) return;
+  Meeting m = meet(corners[0], corners[1], corners[2]);
+#if CONTACT_SELF
+  if (same_body && abs(m.gap) > SELF_MARGIN) return;  // a thin part's other side is no contact
+#endif
+  if (m.rank <= distances[CANDIDATES - 1u]) consider(sheet || opposes(m, normal) ? t : t | BESIDE, m.rank);
+}
 #if LANES > 1
+#define WAITING 96u  // triangles per vertex; more are looked at at once, by lanes that wait for each other
+shared uint waiting[GROUP_SIZE / LANES][WAITING], waiting_count[GROUP_SIZE / LANES];
 shared uint lists[GROUP_SIZE][CANDIDATES];
 shared float list_distances[GROUP_SIZE][CANDIDATES];
 shared uint near_some[GROUP_SIZE / LANES];
@@ -76,36 +88,52 @@ void main() {
   uint i = surface_vertex(there ? s : 0u), body = surface_body(there ? s : 0u);
   Pair own = Pair(positions[i].high, positions[i].low);
   uint held = there ? pair_lists[HELD + s] : NONE;
-  float radius = held == NONE ? margin : max(margin, 1.05 * abs(meeting_of(held, own).gap) + 0.5 * margin);
+  float radius = margin;
+  if (held != NONE) {
+    vec3 corners[3];
+    corners_of(held, own, corners);
+    radius = max(margin, 1.05 * abs(meet(corners[0], corners[1], corners[2]).gap) + 0.5 * margin);
+  }
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
+#if LANES > 1
+  if (lane == 0u) waiting_count[part] = 0u;
+  barrier();
+#endif
   bool near = near_some_other(lane, part, body, own.high - radius, own.high + radius);
+  bool sheet = surface_thickness(there ? s : 0u) > 0.0;
+  vec3 normal = vec3(0.0);
   if (there && near) {
-    vec3 normal = vec3(ivec3(pair_grid[NORMALS_AT + 3u * i], pair_grid[NORMALS_AT + 3u * i + 1u], pair_grid[NORMALS_AT + 3u * i + 2u]));
-    bool solid = !(surface_thickness(s) > 0.0);  // a sheet has two sides
+    normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
     ivec3 first = cell_of(own.high - radius), across = cell_of(own.high + radius) - first + 1;
     for (int c = int(lane); c < across.x * across.y * across.z; c += int(LANES)) {
       ivec3 cell = first + ivec3(c % across.x, c / across.x % across.y, c / (across.x * across.y));
-      uint at = hash_of(cell);
-#if !CONTACT_SELF
-      if (pair_grid[at + 1u] == body + 1u && pair_grid[at + 2u] == ~body) continue;  // no other body is there
-#endif
-      for (uint entry = pair_grid[at]; entry != 0u;) {
+      // A triangle that is in several of these cells is looked at in one of them: along each axis in its first or in the vertex's.
+      uint known = (cell.x == first.x ? FIRST_ALONG_X : 0u) | (cell.y == first.y ? FIRST_ALONG_X << 1 : 0u) | (cell.z == first.z ? FIRST_ALONG_X << 2 : 0u);
+      for (uint entry = pair_grid[hash_of(cell)]; entry != 0u;) {
         uint k = ENTRIES_AT + 3u * (entry - 1u), t = pair_grid[k], of_body = pair_grid[k + 1u];
         entry = pair_grid[k + 2u];
+        if ((known | of_body | BODY_OF_ENTRY) != 0xffffffffu) continue;
+        of_body &= BODY_OF_ENTRY;
 #if CONTACT_SELF
         if (of_body == body && is_neighbour(i, t)) continue;
 #else
         if (of_body == body) continue;
 #endif
-        Meeting m = meeting_of(t, own);
-#if CONTACT_SELF
-        if (of_body == body && abs(m.gap) > SELF_MARGIN) continue;  // a thin part's other side is no contact
+#if LANES > 1
+        uint slot = atomicAdd(waiting_count[part], 1u);
+        if (slot < WAITING) {
+          waiting[part][slot] = t;
+          continue;
+        }
 #endif
-        if (m.rank <= distances[CANDIDATES - 1u]) consider(solid && !opposes(m, normal) ? t | BESIDE : t, m.rank);
+        look_at(t, of_body == body, own, sheet, normal);
       }
     }
   }
 #if LANES > 1
+  barrier();
+  for (uint slot = lane; slot < min(waiting_count[part], WAITING); slot += LANES)
+    look_at(waiting[part][slot], triangle_body(waiting[part][slot]) == body, own, sheet, normal);
   merge(lane);
 #endif
   if (lane != 0u) return;

@@ -17,8 +17,11 @@ namespace {
 // small mesh needs a patch for every part of the GPU, and an invocation for each of its constraints; a large
 // one gains from large patches, in which fewer constraints belong to two, and from small work-groups, of
 // which a part of the GPU runs many.
-Cut cut_for(std::size_t vertices, bool software) {
+// A kernel that knows shapes needs so many registers that fewer work-groups run side by side.
+Cut cut_for(std::size_t vertices, bool shapes, bool software) {
   if (software) return {64, 64};
+  if (shapes && vertices <= 4000) return {32, 512};
+  if (shapes && vertices <= 14000) return {32, 256};
   if (vertices <= 4000) return {16, 512};
   if (vertices <= 8000) return {16, 256};
   if (vertices <= 14000) return {24, 256};
@@ -30,7 +33,7 @@ Cut cut_for(std::size_t vertices, bool software) {
 
 Solver create_node_solver(const SolverInput& input) {
   const std::size_t vertices = input.model.positions.size();
-  const Cut cut = tuned(cut_for(vertices, input.software), input.tuning);
+  const Cut cut = tuned(cut_for(vertices, !input.model.shapes.empty(), input.software), input.tuning);
   if (cut.patch > std::min<std::size_t>(cut.group, Patches::most_vertices - 4))
     throw Error("a patch does not fit a work-group",
                 fmt::format("{} vertices, work-groups of {}", cut.patch, cut.group),

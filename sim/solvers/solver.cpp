@@ -110,13 +110,14 @@ Tuning tuning_from_environment() {
     unsigned* target = nullptr;
     for (const auto& [name, member] :
          {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
-          std::pair("row=", &tuning.row), std::pair("threads=", &tuning.threads)})
+          std::pair("row=", &tuning.row), std::pair("lanes=", &tuning.lanes),
+          std::pair("threads=", &tuning.threads)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
     if (!target || std::from_chars(number, end, *target).ptr != end)
       throw Error(fmt::format("'{}' is no tuning", assignment), "TETPBD_TUNE",
-                  "write group=N, patch=N, row=N or threads=N, separated by commas");
+                  "write group=N, patch=N, row=N, lanes=N or threads=N, separated by commas");
   }
   return tuning;
 }

@@ -81,6 +81,7 @@ struct Tuning {
   unsigned patch = 0;       ///< constraints of a patch in mode constraint, vertices of one in mode node
   unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
   std::size_t storage = 0;  ///< most bytes of a storage buffer
+  unsigned lanes = 0;       ///< invocations that look for what a vertex touches, a power of two up to 8
   unsigned threads = 0;     ///< of mode cpu-fast; 0: as many as the machine has cores and work is for
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };

@@ -52,8 +52,6 @@ std::vector<Settings> candidates(const Settings& own) {
     all.push_back(base);
   }
   all.push_back(own);
-  if (own.contact != "none")
-    std::erase_if(all, [](const Settings& s) { return !find_solver_mode(s.mode)->pairs; });
   return all;
 }
 
@@ -184,7 +182,8 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   // Four times as many where newton would take four times its own (sim/watch.h).
   const double wanted = explicit_substeps(model, s),
                most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? finer_times : 1);
-  if (wanted <= most || bodies_touch(model, s)) {  // newton has no contact of bodies
+  // Of bodies that touch newton is the less right, and takes four times its substeps as well.
+  if (wanted <= most * (bodies_touch(model, s) ? finer_times : 1)) {
     set_mode(s, "explicit", scene.name);
     return fmt::format("explicit, about {:g} substep{}", wanted, wanted == 1 ? "" : "s");
   }

@@ -228,6 +228,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                                     {"RECORDS_AT", records_at},
                                     {"GROUP_SIZE", group}})
     defines.push_back(fmt::format("{} {}u", name, value));
+  defines.push_back(fmt::format("IMPLICIT {:d}", is_implicit(settings)));
+  defines.push_back(fmt::format("VERTICES {}u", model.positions.size()));
   defines.push_back(fmt::format("CELL {:.9g}", 1.2 * surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
@@ -264,7 +266,7 @@ void touch(Sim& sim) {
   const double serve =
       std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
   bind_pairs(sim);
-  sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
+  if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
   if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer))) find_candidates(sim, margin);
   ++p.since;
   for (Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel, sim.kernels_timed);

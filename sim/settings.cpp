@@ -302,7 +302,7 @@ void check_settings(const Settings& settings, const std::string& where) {
                   fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));
   if (settings.contact != "none" && !mode.pairs)
     throw Error(fmt::format("in mode {} bodies do not touch each other", mode.name), where,
-                "set contact to none or use mode node, constraint, explicit, cpu or cpu-double");
+                "set contact to none or use another mode");
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");

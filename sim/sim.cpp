@@ -190,7 +190,7 @@ void start_watch(Sim& sim, const State& state) {
   w.mending = 0;
   if (is_implicit(sim.settings)) {
     const double turn = fastest_spin(*sim.model, state) * sim.settings.dt / sim.settings.substeps;
-    set_finer(sim, turn > TURN_LIMIT ? finer_times : 1);
+    set_finer(sim, turn > TURN_LIMIT || sim.pairs ? finer_times : 1);
   }
   if (!(w.at_rest > 0)) return;
   const double now = stiffest(sim, sim.settings, state.positions) / w.at_rest;

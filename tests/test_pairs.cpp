@@ -5,6 +5,7 @@
 #include <random>
 
 #include "sim/overlap.h"
+#include "sim/reference/motion.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 #include "tests/reference_scenes.h"
@@ -40,13 +41,13 @@ Settings touching(const std::string& mode, double young_modulus = 2e5) {
   return s;
 }
 
-struct Motion {
+struct Momenta {
   glm::dvec3 momentum{0}, spin{0};
   double energy = 0;
 };
-Motion motion_of(const Sim& sim) {
+Momenta motion_of(const Sim& sim) {
   const State state = read_state(sim);
-  Motion sum;
+  Momenta sum;
   for (std::size_t i = 0; i < state.positions.size(); ++i) {
     const glm::dvec3 p = sim.model->masses[i] * state.velocities[i];
     sum.momentum += p, sum.spin += glm::cross(state.positions[i], p);
@@ -100,20 +101,22 @@ TEST_CASE("pairs: two bodies that collide keep their momentum, part again and ga
   GlTest gl;
   const auto model = blocks({{{0, 0, 0}, {2, 0, 0}}, {{0.7, 0.13, 0.08}, {-1, 0, 0}, {0, 0, 2}}});
   std::vector<double> speeds;
-  for (const std::string mode : {"cpu-double", "node", "constraint", "explicit"}) {
+  for (const std::string mode : {"cpu-double", "node", "constraint", "explicit", "cpu-fast", "newton"}) {
     CAPTURE(mode);
-    Sim sim = create_sim(model, touching(mode));
-    const Motion before = motion_of(sim);
+    Settings settings = touching(mode);
+    if (mode == "newton") settings.iterations = 8, settings.substeps = 5;  // 20 near another body
+    Sim sim = create_sim(model, settings);
+    const Momenta before = motion_of(sim);
     for (int s = 0; s < 80; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
-    const Motion after = motion_of(sim);
+    const Momenta after = motion_of(sim);
     const double scale = glm::length(before.momentum);
     CHECK(glm::length(after.momentum - before.momentum) < 1e-5 * scale);
     CHECK(glm::length(after.spin - before.spin) < 4e-3 * scale);
     CHECK(after.energy < 1.001 * before.energy);
     CHECK(speed_of(sim, 0, 0) < speed_of(sim, 1, 0));  // they have parted
     speeds.push_back(speed_of(sim, 1, 0));
-    if (mode == "cpu-double") continue;
+    if (mode.starts_with("cpu")) continue;
     CHECK(touched(sim).touches > 0);
     CHECK(touched(sim).deepest < 0.02 * model->size);
   }
@@ -255,7 +258,36 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
   }
 }
 
-TEST_CASE("pairs: modes without contact between bodies refuse it") {
-  for (const std::string mode : {"newton", "cpu-fast"})
-    CHECK_THROWS_WITH(check_settings(touching(mode), "here"), doctest::Contains("do not touch each other"));
+TEST_CASE("pairs: modes without contact between bodies refuse it, and so do references that cannot") {
+  Settings hard;
+  hard.mode = "paper", hard.contact = "bodies";
+  CHECK_THROWS_WITH(check_settings(hard, "here"), doctest::Contains("do not touch each other"));
+  const auto model = blocks({{{0, 0, 0}}, {{0.6, 0, 0}}});
+  hard.mode = "node";
+  CHECK_THROWS_WITH(find_motion({*model, {}, hard, model->inverse_masses}, 2),
+                    doctest::Contains("no right motion of bodies that touch"));
+}
+
+TEST_CASE("pairs: explicit, newton and PBD are held against a reference in which bodies touch") {
+  GlTest gl;
+  const auto model = blocks({{{-0.3, 0, 0}, {1, 0, 0}}, {{0.3, 0.06, 0.04}, {-1, 0, 0}}});
+  Settings settings = touching("explicit", 1e5);
+  const long steps = 40;
+  settings.iterations = 8, settings.substeps = 5;
+  const ConstraintSystem system = build_constraints(model->rest, settings);
+  const Motion right = find_motion({*model, system, settings, model->inverse_masses}, steps);
+  CHECK(right.method == "leapfrog");
+  // It is not that of bodies that pass through each other.
+  settings.contact = "none";
+  const Motion through = find_motion({*model, system, settings, model->inverse_masses}, steps);
+  CHECK(right.scene != through.scene);
+  CHECK(error_to(*model, {right.positions.back(), {}}, {through.positions.back(), {}}) > 0.1);
+  settings.contact = "bodies";
+  for (const auto& [mode, most] : {std::pair("explicit", 0.001), {"newton", 0.003}, {"node", 0.01}}) {
+    CAPTURE(mode);
+    settings.mode = mode;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < steps; ++s) step(sim);
+    CHECK(error_to(*model, {right.positions.back(), {}}, read_state(sim)) < most);
+  }
 }

@@ -188,7 +188,6 @@ TEST_CASE("every shipped scene runs in every mode") {
       CAPTURE(std::string(mode.name));
       std::map<std::string, std::string> parameters = {
           {"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}};
-      if (!mode.pairs) parameters["contact"] = "none";
       if (!mode.compliance && name == "cloth-on-bunny") continue;  // its bending needs some
       if (mode.name != std::string("node") && name == "bowl-32") continue;      // large
       const Scene scene = load_scene(name, {.parameters = {parameters.begin(), parameters.end()}});

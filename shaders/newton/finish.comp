@@ -8,7 +8,8 @@ vec3 rigid_way(uint i, Pair x, vec3 u) {
   if (body == 0u) return vec3(0.0);
   uint k = MOTIONS_AT + MOTION_WORDS * (body - 1u);
   vec3 arm = relative(x, Pair(numbers(k + 7u), numbers(k + 10u))) + u;
-  return numbers(k) + turned(vec4(numbers(k + 3u), sums[k + 6u]), arm) - arm;
+  vec3 q = numbers(k + 3u);
+  return numbers(k) + 2.0 * cross(q, cross(q, arm) + sums[k + 6u] * arm);  // not the place turned less the place, which rounds
 }
 void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);

@@ -1,7 +1,12 @@
 // Moves the vertices that contacts push, and what their neighbours see of them. One invocation per vertex of a surface.
 #include "pairs/pairs.glsl"
+#if IMPLICIT
+#include "vertex_state.glsl"
+layout(std430, binding = BIND_NEWTON_VECTORS) restrict buffer Vectors { vec4 vectors[]; };
+#else
 #include "quantized.glsl"
 #include "vertex.glsl"
+#endif
 void main() {
   uint s = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (s >= SURFACE_VERTICES) return;
@@ -19,8 +24,12 @@ void main() {
   v = pair_add(v, stopped * params.inverse_h);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+#if IMPLICIT
+  vectors[2u * VERTICES + i].xyz += stopped;  // WAY (newton.glsl): the history of BDF2 has what velocity has, and so keeps momentum
+#else
 #if !LEAPFROG
   x = predict_position(x, predict_velocity(v));
 #endif
   quantized_out[i] = quantize(x, weight_of(own));
+#endif
 }

@@ -1,7 +1,8 @@
 // The right motion of a body with compliance, by explicit leapfrog in double at a step far below what its
 // fastest vibration allows: no linear system, no iteration, no tolerance. Cheaper than an implicit step
 // wherever a step of the scene takes fewer than some hundred of them. Vertices meet half spaces without
-// bouncing, with Coulomb friction.
+// bouncing, with Coulomb friction. Bodies meet each other as in modes on the CPU: right is what that comes to
+// with ever shorter steps.
 #pragma once
 
 #include <vector>

@@ -12,6 +12,7 @@
 #include "sim/hash.h"
 #include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
+#include "sim/pairs.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"
@@ -194,6 +195,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
   add(numbers);
+  if (bodies_touch(model, s)) add(s.contact);
   return key;
 }
 
@@ -210,8 +212,14 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   const double stable = !soft || method == "implicit"
                             ? 0
                             : stable_step(input, compliances_of(input), input.model.rest.positions);
+  const bool touching = bodies_touch(input.model, input.settings);
   if (method.empty())
-    motion.method = !soft ? "rigid body" : most_stable * stable < input.settings.dt ? "implicit" : "leapfrog";
+    motion.method = !soft                                                    ? "rigid body"
+                    : !touching && most_stable * stable < input.settings.dt ? "implicit"
+                                                                             : "leapfrog";
+  if (touching && motion.method != "leapfrog")
+    throw Error("no right motion of bodies that touch each other", motion.method,
+                "give them a material, and use leapfrog");
   if ((motion.method == "rigid body") == soft)
     throw Error("no method for this scene", method,
                 "with compliance or a material leapfrog or implicit, for k = 1 a rigid body");

@@ -306,6 +306,7 @@ class FastPbd {
                    double time) {
     const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
+    const PairContact pairs(model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
     x.resize(state.positions.size());
@@ -344,6 +345,15 @@ class FastPbd {
         for_each_free_vertex([&](std::size_t i) {
           if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;
         });
+        if (pairs.wanted()) {
+          barrier.wait(thread);
+          if (thread == 0) {
+            for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = x[i].position();
+            pairs.resolve(state.positions, v, inverse_masses, substep.h);
+            for (std::size_t i = 0; i < x.size(); ++i) move_to(i, state.positions[i]);
+          }
+          barrier.wait(thread);
+        }
       }
 #pragma omp critical
       for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += counts[g];

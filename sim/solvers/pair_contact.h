@@ -21,11 +21,11 @@ class PairContact {
         friction_(settings.friction) {
     if (wanted_) mesh_ = pair_mesh(model), cell_ = 1.2 * mesh_.edge;
   }
-  /// After a substep of `h`.
-  void resolve(State& state, const std::vector<double>& inverse_masses, double h) const {
+  bool wanted() const { return wanted_; }
+  /// After a substep of `h`: of places `x` and velocities `v`.
+  void resolve(std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v,
+               const std::vector<double>& inverse_masses, double h) const {
     if (!wanted_) return;
-    auto& x = state.positions;
-    auto& v = state.velocities;
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
     const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness);

@@ -45,7 +45,8 @@ const std::vector<SolverMode> rows = {
      .pairs = true},
     {.name = "cpu-fast",
      .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions: for machines without a GPU",
-     .create = create_cpu_fast_solver},
+     .create = create_cpu_fast_solver,
+     .pairs = true},
     {.name = "explicit",
      .help = "leapfrog on the GPU, of what has a material or compliance, in as many substeps as stay stable: "
              "for what is soft",
@@ -56,7 +57,8 @@ const std::vector<SolverMode> rows = {
      .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
              "levels: for what is stiff, has small tets or starts badly deformed",
      .create = create_newton_solver,
-     .implicit = true},
+     .implicit = true,
+     .pairs = true},
     {.name = "paper",
      .help = "the paper's GPU pipeline: a kernel per kind, floats added by compare-and-swap",
      .create = create_paper_solver,

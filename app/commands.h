@@ -48,8 +48,6 @@ struct RunOptions {
   std::filesystem::path replay;  ///< what `run` does in place of a scene's steps
   bool progress = false;         ///< show it even if standard error is no terminal
 };
-/// Of a film in real time.
-inline long steps_per_frame(double dt) { return std::max(1L, std::lround(1.0 / 30 / dt)); }
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
 int run_headless(Scene scene, const RunOptions& options);
 /// Prints buffers, bytes, kernels and dispatches a step.

@@ -26,7 +26,8 @@ const char* compare_columns =
     "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
     "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
     "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
-    "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy";
+    "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy,penetration_max,penetration_999,"
+    "overlap_max,overlap_999,overlap_vertices";
 const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
     "wall_ms_per_step:wall-ms 11, motion_final:motion 11, motion_rms:rms 11, max_volume_loss_percent:loss-% "
@@ -47,6 +48,7 @@ constexpr Judge judges[] = {
     {"motion", "motion_final", "distance from the right motion, % of the size", 100},
     {"volume", "max_volume_loss_percent", "largest volume loss, %", 1},
     {"strain", "stretch_rms_peak", "largest RMS strain of edges, %", 100},
+    {"overlap", "overlap_max", "how deep bodies are in each other, % of the size", 100},
 };
 // Infinite where nothing is known.
 double error_by(const Judge& judge, const ordered_json& row) {

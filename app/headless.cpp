@@ -14,7 +14,6 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/overlap.h"
 
 namespace tetpbd {
 
@@ -114,8 +113,7 @@ ordered_json settings_json(Scene scene, const Settings& settings) {
 }
 
 ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
-                             const Overlap& overlap, const ordered_json& hash,
-                             const std::optional<SolverChoice>& choice) {
+                             const ordered_json& hash, const std::optional<SolverChoice>& choice) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -135,11 +133,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                   {"most_substeps", watch.most_substeps}};
   if (sim.pairs) {
     const PairNumbers pairs = touched(sim);
-    j["contact"] = {{"touches", pairs.touches},
-                    {"detections", pairs.detections},
-                    {"penetration_max", overlap.largest},
-                    {"penetration_999", overlap.part_999},
-                    {"vertices_inside", overlap.inside}};
+    j["contact"] = {{"touches", pairs.touches}, {"detections", pairs.detections}};
   }
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
@@ -203,12 +197,6 @@ int run_headless(Scene scene, const RunOptions& options) {
   std::optional<Export> files;
   if (options.positions_every > 0 || !options.exports.empty()) files.emplace(sim, options);
 
-  Overlap overlap;
-  const auto measure_overlap = [&] {
-    const Overlap now = overlap_of(*model, read_state(sim).positions, sim.settings.contact == "self");
-    overlap = {std::max(now.inside, overlap.inside), std::max(now.largest, overlap.largest), 0,
-               std::max(now.part_999, overlap.part_999)};
-  };
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
@@ -220,7 +208,6 @@ int run_headless(Scene scene, const RunOptions& options) {
       progress.update(s);
       if (frames) frames->draw_frame(s);
       if (files && s % files->every == 0) add_frame(*files, sim);
-      if (sim.pairs && s % steps_per_frame(sim.settings.dt) == 0) measure_overlap();
     };
     if (!check_finite(sim)) plan.stepped(0);
     run = run_loop(sim, &metrics, steps, plan);
@@ -231,7 +218,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   const bool good = !found || restore_checkpoint(sim);
   while (good && found && sim.steps < found->step - 1) step(sim);  // the last good one: the same bits again
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
-  auto statistics = statistics_json(scene, sim, context.capabilities(), run, overlap, hash, choice);
+  auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
   statistics["error"]["measured_every"] = options.measure_every;
   if (files)
     statistics["frames"] = {{"count", files->count},

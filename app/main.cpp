@@ -209,7 +209,9 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
   add(command, "--budget-ms", a.overrides.budget_ms, 1e-6, 1e6,
       "GPU ms per step, for --solver auto (default: a tenth of dt)");
   add_gpu(command, a.run.gpu);
-  command.add_flag("--explain", a.explain, "print what the scene allocates and dispatches after --steps steps (default: 3), and stop");
+  command.add_flag(
+      "--explain", a.explain,
+      "print what the scene allocates and dispatches after --steps steps (default: 3), and stop");
   add_sizes(command, "--size", a.sizes, "of images and window, WxH from 16x16 to 16384x16384")->expected(1);
   add_samples(command, a.run.samples);
   CLI::App& view = *command.add_option_group("View");
@@ -379,8 +381,8 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(compare, "--steps", a.compare.steps, 1L, most_steps, "steps of each run");
   add(compare, "--judge", a.compare.judge,
       "by what: motion (the distance from the right one, found first if need be), volume (largest net loss), "
-      "strain (default: motion where it is known)")
-      ->check(one_of(std::array{"motion", "volume", "strain"}));
+      "strain, overlap (how deep bodies are in each other; default: motion where it is known)")
+      ->check(one_of(std::array{"motion", "volume", "strain", "overlap"}));
   add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9,
       "print the best setting within so many ms per step");
   add(compare, "--error", a.compare.error_percent, 1e-9, 1e9,

@@ -9,6 +9,8 @@
 
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
+#include "sim/overlap.h"
+#include "sim/pairs.h"
 
 namespace tetpbd {
 
@@ -68,6 +70,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     hold_against(run, plan.right, *sim.model, s, double(s) * sim.settings.dt,
                  [&] { return read_state(sim); });
   };
+  const bool touching = metrics && bodies_touch(*sim.model, sim.settings);
   if (metrics) measure(*metrics, sim);
   hold(0);
   const auto begin = steady_clock::now();
@@ -84,6 +87,9 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     if (plan.wait) run.wall_ms.push_back(seconds * 1e3), run.seconds += seconds;
     take(false);
     hold(s);
+    if (touching && (s % steps_per_frame(sim.settings.dt) == 0 || s == steps))
+      run.errors.overlap = largest(run.errors.overlap, overlap_of(*sim.model, read_state(sim).positions,
+                                                                  sim.settings.contact == "self"));
     if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }

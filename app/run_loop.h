@@ -1,7 +1,9 @@
 // The one loop that steps a simulation for its numbers: the time of each step beside the error.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
@@ -11,6 +13,9 @@
 #include "sim/reference/motion.h"
 
 namespace tetpbd {
+
+/// Of a film in real time.
+inline long steps_per_frame(double dt) { return std::max(1L, std::lround(1.0 / 30 / dt)); }
 
 /// The value that this part of them does not exceed; NaN where there are none.
 double percentile(std::vector<double> values, double part);

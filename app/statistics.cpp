@@ -38,6 +38,9 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"contacts", count(m.contacts)},
           {"penetration_max", m.penetration_max},
           {"penetration_999", m.penetration_999},
+          {"overlap_max", so_far.overlap.largest},
+          {"overlap_999", so_far.overlap.part_999},
+          {"overlap_vertices", so_far.overlap.inside},
           {"finite", int(now.finite())}};
 }
 
@@ -62,6 +65,7 @@ ordered_json error_json(const RunErrors& errors) {
   const Measurement last = errors.last.value_or(nothing_measured());
   result["penetration_max"] = over_all(last.penetration_max, errors.penetration_max);
   result["penetration_999"] = over_all(last.penetration_999, errors.penetration_999);
+  for (const char* key : {"overlap_max", "overlap_999", "overlap_vertices"}) result[key] = all[key];
   return result;
 }
 

@@ -99,4 +99,9 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
   return result;
 }
 
+Overlap largest(const Overlap& a, const Overlap& b) {
+  return {std::max(a.inside, b.inside), std::max(a.largest, b.largest), std::max(a.deepest, b.deepest),
+          std::max(a.part_999, b.part_999)};
+}
+
 }  // namespace tetpbd

@@ -13,5 +13,7 @@ struct Overlap {
 };
 /// `self`: and of tets of its own body, but those near it at rest.
 Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& positions, bool self);
+/// The larger of each.
+Overlap largest(const Overlap& a, const Overlap& b);
 
 }  // namespace tetpbd

@@ -190,7 +190,7 @@ void start_watch(Sim& sim, const State& state) {
   w.mending = 0;
   if (is_implicit(sim.settings)) {
     const double turn = fastest_spin(*sim.model, state) * sim.settings.dt / sim.settings.substeps;
-    set_finer(sim, turn > TURN_LIMIT || sim.pairs ? finer_times : 1);
+    set_finer(sim, turn > TURN_LIMIT ? finer_times : 1);
   }
   if (!(w.at_rest > 0)) return;
   const double now = stiffest(sim, sim.settings, state.positions) / w.at_rest;
@@ -272,7 +272,8 @@ glm::vec4 reach_of(const MovingShape& shape, double h) {
   constexpr double times = 4;
   const double left = 1 - times * h * glm::length(shape.spin), size = glm::length(shape.pose.centre);
   const double reach = 1.01 * (shape.reach() + times * h * glm::length(shape.velocity)) / left + 1e-6 * size;
-  return {glm::vec3(shape.pose.centre), left < 0.5 ? 1e18f : float(std::min(reach, 1e18))};  // squares are finite
+  return {glm::vec3(shape.pose.centre),
+          left < 0.5 ? 1e18f : float(std::min(reach, 1e18))};  // squares are finite
 }
 
 Shape shape_block(const MovingShape& shape, int first) {
@@ -332,7 +333,8 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
     sim.rigid_contact = {Program::compute("rigid_contact.comp", {}, defines), work_groups(count, group_size),
                          4 * count};
   }
-  if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(*sim.model, settings, sim.tuning.lanes, defines);
+  if (bodies_touch(*sim.model, settings))
+    sim.pairs = make_pairs(*sim.model, settings, sim.tuning.lanes, defines);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -476,8 +478,7 @@ void bind_shapes(const Sim& sim, int list) {
   if (!sim.shapes) return;
   const std::size_t stride = shapes_stride(sim), lists = sim.shapes.bytes() / stride;
   glBindBufferRange(GL_UNIFORM_BUFFER, BIND_SHAPES, sim.shapes.id(),
-                    GLintptr(std::min(std::size_t(list), lists - 1) * stride),
-                    GLsizeiptr(shapes_bytes(sim)));
+                    GLintptr(std::min(std::size_t(list), lists - 1) * stride), GLsizeiptr(shapes_bytes(sim)));
   if (!sim.fields) return;
   glActiveTexture(GL_TEXTURE0 + UNIT_FIELDS);
   glBindTexture(GL_TEXTURE_BUFFER, sim.fields_texture.id());
@@ -488,6 +489,7 @@ void reset(Sim& sim) {
   sim.steps = 0, sim.origin = {};
   if (sim.guard_counts) sim.guard_counts.clear();
   sim.guards = {};
+  static_cast<PairNumbers&>(sim.pairs) = {};
   sim.inverse_masses = sim.model->inverse_masses;
   finish_renewal(sim);
   State state{sim.model->positions, sim.model->velocities};
@@ -513,6 +515,7 @@ void write_state(Sim& sim, const State& state) {
   write_step_block(sim);
   start_check(sim, &state);
   start_pairs(sim, state);
+  if (is_implicit(sim.settings) && sim.pairs && sim.pairs.near) set_finer(sim, finer_times);
 }
 
 void apply_settings(Sim& sim, const Settings& settings) {

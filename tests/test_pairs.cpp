@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "app/run_loop.h"
 #include "sim/overlap.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -289,5 +290,20 @@ TEST_CASE("pairs: explicit, newton and PBD are held against a reference in which
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < steps; ++s) step(sim);
     CHECK(error_to(*model, {right.positions.back(), {}}, read_state(sim)) < most);
+  }
+}
+
+TEST_CASE("pairs: a run says how deep bodies came to be in each other, where they touch") {
+  GlTest gl;
+  const auto model = blocks({{{-0.3, 0, 0}, {1, 0, 0}}, {{0.3, 0.06, 0.04}, {-1, 0, 0}}});
+  for (const std::string mode : {"explicit", "cpu-fast"}) {
+    Settings settings = touching(mode, 1e5);
+    const Overlap met = run_model(model, settings, 40).errors.overlap;
+    CHECK(met.inside > 10);
+    CHECK(met.largest > 1e-5);
+    CHECK(met.largest < 0.01);
+    CHECK(met.part_999 <= met.largest);
+    settings.contact = "none";
+    CHECK(run_model(model, settings, 40).errors.overlap.inside == 0);  // it is not asked
   }
 }

@@ -261,7 +261,7 @@ Solver create_newton_solver(const SolverInput& input) {
     vectors[(slots - 1) * vertices + v] = glm::vec4(glm::vec3(input.model.rest.positions[v]), free_number[v]);
   const unsigned group = std::max(tuned({0, 128}, input.tuning).group, row_lanes), rows = group / lanes;
   const std::size_t count = aggregates.all.size(), unknowns = 6 * count, turns = (vertices + rows - 1) / rows;
-  const std::size_t bodies = free.size() / 2, slices = std::clamp<std::size_t>(largest / 2048, 1, 32);
+  const std::size_t bodies = free.size() / 2, slices = std::clamp<std::size_t>(largest / 256, 1, 32);
   std::size_t tests = 0;  // of constraints at Newton's start
   for (std::size_t k = 0; k < kind_count; ++k)
     if (constraint_kinds[k].tet) tests = std::max(tests, input.system.lists[k].count());

@@ -228,6 +228,8 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
   view.add_flag("!--no-shadow", look.shadow, "no shadow");
   view.add_flag("!--no-grid", look.grid, "no lines on the ground");
   view.add_flag("!--no-legend", look.legend, "no colour bar");
+  view.add_flag("--contacts", look.contacts, "dots and arrows where something touches");
+  view.add_flag("--arrows", look.arrows, "velocities");
   view.add_flag("--follow", look.follow,
                 "the camera goes where the bodies go (the window: from the start; else only as they would "
                 "leave the picture)");

@@ -334,7 +334,10 @@ void draw_view(Session& s) {
   const std::tuple<const char*, const char*, bool&, bool> switches[] = {
       {"follow", "the camera goes where the bodies go\nL", view.follow, first.follow},
       {"probe", "the cursor at rest on a body says what is there", s.probing, true},
-      {"contacts", "dots where vertices touch the ground or walls", view.contacts, first.contacts},
+      {"contacts",
+       "dots where vertices touch the ground or walls, arrows where they are in other bodies: red is a "
+       "thousandth of the size",
+       view.contacts, first.contacts},
       {"arrows", "velocities of some of the vertices", view.arrows, first.arrows},
       {"shadow", "of the bodies, on the ground and on each other", view.shadow, first.shadow},
       {"smooth normals", "round shading; without, each triangle is flat\nN", view.smooth_normals,

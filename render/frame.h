@@ -100,6 +100,7 @@ struct Frame {
   GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity and arrows alone
   GLuint values =
       0;  ///< buffer of floats by vertex; needed for Colour::motion (measure_distances) and patch alone
+  const Pairs* pairs = nullptr;  ///< bodies that touch each other; needed for contacts alone
   glm::vec4 material{0};  ///< as tet_energy of values.glsl has it; needed for energy and residual alone
   Camera camera;
   Viewport viewport;

@@ -28,6 +28,41 @@ void draw_contacts(Renderer& renderer, const Frame& frame) {
   glEnable(GL_DEPTH_TEST);
 }
 
+// Normals of the triangles that vertices of other bodies are in, redder as these are deeper, to a thousandth
+// of the size.
+void draw_touches(Renderer& renderer, const Frame& frame) {
+  const Pairs& pairs = *frame.pairs;
+  const float size = glm::length(renderer.rest_high - renderer.rest_low);
+  const std::size_t count = pairs.surface_vertices, bytes = count * sizeof(TouchArrow);
+  if (renderer.touches.bytes() != bytes) renderer.touches = Buffer("arrows of contacts", bytes);
+  const Program& fill = use(renderer, "touches");
+  for (const auto& [name, value] : {std::pair("count", count),
+                                    {"vertices_at", pairs.vertices_at},
+                                    {"records_at", pairs.records_at},
+                                    {"record_words", pairs.record_words}})
+    fill.set(name, unsigned(value));
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
+  pairs.mesh.bind_storage(BIND_RENDER_TRIANGLES), pairs.lists.bind_storage(BIND_RENDER_OFFSETS);
+  renderer.touches.bind_storage(BIND_RENDER_VALUES);
+  glDispatchCompute(GLuint((count + 127) / 128), 1, 1);
+  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
+  const GLuint arrows = renderer.touches.id();
+  attribute(ATTRIBUTE_HIGH, arrows, 3, sizeof(TouchArrow), offsetof(TouchArrow, from));
+  attribute(ATTRIBUTE_VALUE, arrows, 1, sizeof(TouchArrow), offsetof(TouchArrow, depth));
+  attribute(ATTRIBUTE_VELOCITY, arrows, 3, sizeof(TouchArrow), offsetof(TouchArrow, along));
+  for (const GLuint none : {ATTRIBUTE_LOW, ATTRIBUTE_REST}) attribute(none, 0, 1, 0, 0);
+  const Program& program = use(renderer, "contact arrows");
+  program.set("seconds", 0.04f * size);
+  program.set("deepest", 0.001f * size);
+  program.set("viewport", glm::vec3(frame.viewport.width, frame.viewport.height, 0));
+  program.set("width", scaled(frame, 1.8f));
+  glDisable(GL_DEPTH_TEST);
+  glDrawArrays(GL_POINTS, 0, GLsizei(count));
+  glEnable(GL_DEPTH_TEST);
+  glDisableVertexAttribArray(ATTRIBUTE_VELOCITY);
+  bind_vertices(renderer, frame);
+}
+
 // Of a few hundred vertices of the surface.
 void draw_arrows(Renderer& renderer, const Frame& frame) {
   constexpr std::size_t about = 300;
@@ -79,6 +114,7 @@ void draw_marks(Renderer& renderer, const Frame& frame) {
   bind_vertices(renderer, frame);
   glEnable(GL_PROGRAM_POINT_SIZE);
   if (frame.options.contacts) draw_contacts(renderer, frame);
+  if (frame.options.contacts && frame.pairs) draw_touches(renderer, frame);
   if (frame.options.arrows) draw_arrows(renderer, frame);
   draw_dots(renderer, frame);
   glDisable(GL_PROGRAM_POINT_SIZE);

@@ -42,6 +42,8 @@ const std::map<std::string, Recipe> recipes = {
     {"shapes shadow", {{"render/shape.vert", "render/depth.frag"}, {"SHADOW"}}},
     {"graph", {{"render/body.vert", "render/graph.geom", "render/graph.frag"}, {}}},
     {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
+    {"touches", {{"render/touches.comp"}, {}}},
+    {"contact arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {"CONTACTS"}}},
     {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},
     {"dots", {{"render/dots.vert", "render/dots.frag"}, {}}},
     {"corners", {{"render/corners.comp"}, {}}},
@@ -523,6 +525,7 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   Frame frame;
   frame.positions = sim.positions.id();
   frame.velocities = sim.velocities.id();
+  if (sim.pairs && sim.pairs.near) frame.pairs = &sim.pairs;
   frame.camera = camera;
   frame.viewport = {0, 0, target.width, target.height};
   frame.options = options;

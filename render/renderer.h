@@ -48,7 +48,7 @@ struct Renderer {
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer graph;            ///< edges' vertices
-  Buffer arrow_vertices;
+  Buffer arrow_vertices, touches;
   Buffer rest;             ///< vec4: rest position and body
   CarriedSurface carried;  ///< of all bodies, or empty
   Buffer carried_vertices, carried_triangles;

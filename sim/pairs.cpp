@@ -192,6 +192,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                     vertices = surfaces.vertices.size(), bodies = model.bodies.size();
   Pairs p;
   p.margin = pair_margin(surfaces), p.thickness = surfaces.thickness;
+  p.surface_vertices = vertices, p.vertices_at = vertices_at, p.record_words = 2 + candidates;
   p.cells = std::bit_ceil(2 * triangles + 1);
   p.mesh = Buffer("surfaces", words);
   if (settings.contact == "self") {
@@ -201,7 +202,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   }
   const std::size_t most = entries_per_triangle * triangles + 1024, records_at = counters + box * bodies;
   const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
-  p.cleared = 4 * entries_at;
+  p.cleared = 4 * entries_at, p.records_at = records_at;
   p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
   p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * vertices));
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
@@ -267,7 +268,8 @@ void touch(Sim& sim) {
       std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
   bind_pairs(sim);
   if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
-  if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer))) find_candidates(sim, margin);
+  if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer)))
+    find_candidates(sim, margin);
   ++p.since;
   for (Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel, sim.kernels_timed);
 }

@@ -49,6 +49,7 @@ struct Pairs : PairNumbers {
     Timer timer;
   };
   Kernel boxes, insert, query, meet, push, apply;
+  std::size_t surface_vertices = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
   std::size_t cells = 0, cleared = 0;  ///< of the grid, bytes for each detection
   double margin = 0;                   ///< m, of slow bodies
   double thickness = 0;                ///< m, the largest of a vertex

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "app/run_loop.h"
+#include "render/renderer.h"
 #include "sim/overlap.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -306,4 +307,28 @@ TEST_CASE("pairs: a run says how deep bodies came to be in each other, where the
     settings.contact = "none";
     CHECK(run_model(model, settings, 40).errors.overlap.inside == 0);  // it is not asked
   }
+}
+
+TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
+  GlTest gl;
+  const auto model = blocks({{{-0.24, 0, 0}}, {{0.24, 0, 0}}});  // two centimetres in each other
+  Sim sim = create_sim(model, touching("explicit"));
+  step(sim);
+  REQUIRE(touched(sim).touches > 0);
+  Renderer renderer = make_renderer(*model);
+  const Target target = make_target(320, 240);
+  Camera camera;
+  camera.distance = 3;
+  const auto picture = [&](bool contacts) {
+    Frame frame = frame_of(sim, camera, {.contacts = contacts}, target);
+    frame.target = target.framebuffer.id();
+    draw(renderer, frame);
+    return read_rgba(target);
+  };
+  const Image without = picture(false), with = picture(true);
+  long red = 0;
+  for (std::size_t p = 0; p + 3 < with.rgba.size(); p += 4)
+    red += with.rgba[p] > without.rgba[p] + 20 && with.rgba[p + 1] + 20 < without.rgba[p + 1];
+  CHECK(red > 100);  // two centimetres are more than a thousandth of the size
+  CHECK(gl_error_count() == 0);
 }

@@ -1,2 +1,3 @@
+in vec3 colour;
 layout(location = 0) out vec4 result;
-void main() { result = vec4(0.02, 0.025, 0.04, 0.9); }
+void main() { result = vec4(colour, 0.9); }

@@ -5,9 +5,12 @@ uniform vec3 viewport;  // pixels; z unused
 uniform float width;
 in Arrow {
   vec4 from, to;
+  vec3 colour;
 } arrow[];
+out vec3 colour;
 
 void put(vec4 at, vec2 pixels) {
+  colour = arrow[0].colour;
   gl_Position = at + vec4(2.0 * pixels / viewport.xy * at.w, 0.0, 0.0);
   EmitVertex();
 }

@@ -27,6 +27,13 @@
 #define UNIT_COFACTORS 6
 #define UNIT_VALUES 7
 #define IMAGE_PLANES 0       // the same, as it is made
+// A vertex in a triangle of another body.
+struct TouchArrow {
+  vec3 from;
+  float depth;  // m
+  vec3 along;   // unit
+  float _0;
+};
 // Vertex attributes; of the surface HIGH is a corner's place and LOW what is left of it by the cut.
 #define ATTRIBUTE_HIGH 0
 #define ATTRIBUTE_LOW 1

@@ -22,6 +22,7 @@ namespace {
 /// Draws what a run asked for and writes it.
 struct FrameWriter {
   const RunOptions& options;
+  const Sim& sim;
   double dt;    ///< s
   double size;  ///< m, of the bodies
   const Motion* right;
@@ -35,8 +36,9 @@ struct FrameWriter {
   long drawn = 0;                 ///< step of the last frame
   Buffer answers{}, distances{};  ///< of the colour motion
 
-  FrameWriter(const Scene& scene, const Sim& sim, const RunOptions& run, const Motion* motion)
+  FrameWriter(const Scene& scene, const Sim& all, const RunOptions& run, const Motion* motion)
       : options(run),
+        sim(all),
         dt(scene.settings.dt),
         size(sim.model->size),
         right(motion),
@@ -83,7 +85,7 @@ struct FrameWriter {
       frame.values = distances.id();
     }
     if (!png && !film) return;
-    frame.time = double(s) * dt;
+    renew(frame, sim);
     move_camera(s);
     if (*frame.options.scale().title && !frame.options.hold_range)
       frame.options.range() = fitted_range(frame.options.scale(), read_values(renderer, frame));

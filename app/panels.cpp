@@ -335,7 +335,8 @@ void draw_view(Session& s) {
       {"follow", "the camera goes where the bodies go\nL", view.follow, first.follow},
       {"probe", "the cursor at rest on a body says what is there", s.probing, true},
       {"contacts",
-       "dots where vertices touch the ground or walls, arrows where they are in other bodies: red is a "
+       "dots where vertices touch the ground, walls or obstacles, arrows where they are in other bodies: red "
+       "is a "
        "thousandth of the size",
        view.contacts, first.contacts},
       {"arrows", "velocities of some of the vertices", view.arrows, first.arrows},

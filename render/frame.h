@@ -111,6 +111,7 @@ struct Frame {
   double time = 0;                     ///< s
   int chosen_shape = -1;               ///< shown in another colour
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
+  std::vector<std::uint32_t> touching;         ///< shapes, also through the body
   std::vector<std::uint32_t> worst;            ///< as rings, also through the body
   std::string caption;                         ///< upper left
   bool over = false;                           ///< the bodies alone, into what is drawn already
@@ -120,5 +121,7 @@ struct Frame {
 
 /// A picture of a simulation with its ground, walls and pinned vertices (infinite mass), all of the target.
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target);
+/// What changes from step to step: the time, and what touches.
+void renew(Frame& frame, const Sim& sim);
 
 }  // namespace tetpbd

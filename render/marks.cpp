@@ -10,6 +10,8 @@ namespace tetpbd {
 
 namespace {
 
+constexpr glm::vec3 contact_colour(0.95f, 0.35f, 0.0f);
+
 // Pixels of marks of this size at 720 lines.
 float scaled(const Frame& frame, float size) {
   return size * std::max(1.0f, float(frame.viewport.height) / 720.0f);
@@ -19,7 +21,7 @@ float scaled(const Frame& frame, float size) {
 // wall, as metrics count them.
 void draw_contacts(Renderer& renderer, const Frame& frame) {
   const Program& program = use(renderer, "contacts");
-  program.set("colour", glm::vec3(0.95f, 0.35f, 0.0f));
+  program.set("colour", contact_colour);
   program.set("hole", 0.0f);
   program.set("size", scaled(frame, 7));
   program.set("touching", 1e-5f * glm::length(renderer.rest_high - renderer.rest_low));
@@ -102,6 +104,7 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
   batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_DEPTH_TEST);
+  batch(frame.touching, contact_colour, 7.0f);
   batch(frame.worst, glm::vec3(0.70f, 0.0f, 0.30f), 18.0f, 0.68f);
 }
 
@@ -109,7 +112,7 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
 
 void draw_marks(Renderer& renderer, const Frame& frame) {
   if (!frame.options.contacts && !frame.options.arrows && frame.pinned.empty() && frame.grabbed.empty() &&
-      frame.worst.empty())
+      frame.worst.empty() && frame.touching.empty())
     return;
   bind_vertices(renderer, frame);
   glEnable(GL_PROGRAM_POINT_SIZE);

@@ -15,6 +15,7 @@
 #include "render/marks.h"
 #include "sim/layout.h"
 #include "sim/material.h"
+#include "sim/moving_shape.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -521,11 +522,34 @@ Renderer make_renderer(const Model& model) {
   return renderer;
 }
 
+// Vertices within 10^-5 of the size of a shape, as metrics count them. Waits for the GPU.
+static std::vector<std::uint32_t> touching_shapes(const Sim& sim) {
+  if (sim.model->shapes.empty()) return {};
+  const auto shapes = shapes_of(*sim.model, sim.settings, time_of(sim), 0, 1)[0];
+  const double near = 1e-5 * sim.model->size;
+  std::vector<std::uint32_t> touching;
+  const State state = read_state(sim);
+  for (std::uint32_t v = 0; v < state.positions.size(); ++v) {
+    const glm::dvec3& x = state.positions[v];
+    if (std::ranges::any_of(shapes, [&](const MovingShape& shape) {
+          return glm::distance(x, shape.pose.centre) < 1.01 * shape.reach() + near &&
+                 shape.surface_at(x).distance < near;
+        }))
+      touching.push_back(v);
+  }
+  return touching;
+}
+
+void renew(Frame& frame, const Sim& sim) {
+  frame.time = time_of(sim);
+  frame.pairs = sim.pairs && sim.pairs.near ? &sim.pairs : nullptr;
+  if (frame.options.contacts) frame.touching = touching_shapes(sim);
+}
+
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target) {
   Frame frame;
   frame.positions = sim.positions.id();
   frame.velocities = sim.velocities.id();
-  if (sim.pairs && sim.pairs.near) frame.pairs = &sim.pairs;
   frame.camera = camera;
   frame.viewport = {0, 0, target.width, target.height};
   frame.options = options;
@@ -533,7 +557,8 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   frame.material = energy_material(sim.settings);
   frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
   frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
-  frame.model = sim.model, frame.time = time_of(sim);
+  frame.model = sim.model;
+  renew(frame, sim);
   const auto held = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };
   for (const Body& body : sim.model->bodies) {
     const auto vertices =

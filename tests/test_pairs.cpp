@@ -330,5 +330,18 @@ TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
   for (std::size_t p = 0; p + 3 < with.rgba.size(); p += 4)
     red += with.rgba[p] > without.rgba[p] + 20 && with.rgba[p + 1] + 20 < without.rgba[p + 1];
   CHECK(red > 100);  // two centimetres are more than a thousandth of the size
+  // Vertices on an obstacle are known as well.
+  Model other = *blocks({{{0, 0, 0}}});
+  Obstacle ball;
+  ball.shape = SHAPE_SPHERE, ball.radius = 0.25, ball.centre = {0, -0.5, 0};
+  add_obstacle(other, ball);
+  Settings settings = touching("explicit");
+  settings.gravity = 9.81;
+  Sim on_ball = create_sim(std::make_shared<const Model>(other), settings);
+  Frame frame = frame_of(on_ball, camera, {.contacts = true}, target);
+  for (int s = 0; s < 5; ++s) step(on_ball);
+  renew(frame, on_ball);
+  CHECK(frame.touching.size() >= 1);
+  CHECK(frame.touching.size() < 40);
   CHECK(gl_error_count() == 0);
 }

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <glm/gtc/constants.hpp>
 #include <random>
 
 #include "app/run_loop.h"
@@ -22,12 +23,16 @@ struct Placed {
   std::vector<std::uint32_t> fixed{};
   glm::dvec3 size{0.5};
   glm::ivec3 cells{4};
+  bool round = false;  // a ball across which the block was
 };
 
 std::shared_ptr<const Model> blocks(const std::vector<Placed>& all) {
   auto model = std::make_shared<Model>();
   for (const Placed& one : all) {
     TetMesh mesh = make_block(one.size, one.cells);
+    for (glm::dvec3& p : mesh.positions)
+      if (const double l = glm::length(p); one.round && l > 0)
+        p *= std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) / l;
     finish_tets(mesh, "block");
     auto start = mesh.positions;
     for (auto& p : start) p += one.at;
@@ -257,6 +262,36 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
     for (int s = 0; s < 200; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
     CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.01);
+  }
+}
+
+TEST_CASE("pairs: eight balls fall into a bowl in ten ways: all end finite and out of each other") {
+  GlTest gl;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int start = 0; start < 10; ++start) {
+    CAPTURE(start);
+    std::vector<Placed> all;
+    for (int b = 0; b < 8; ++b) {
+      Placed one;
+      one.size = glm::dvec3(0.3), one.cells = glm::ivec3(4), one.round = true;
+      one.at = {0.2 * (b % 2 ? 1 : -1), 0.3 + 0.4 * double(b / 4), 0.2 * (b / 2 % 2 ? 1 : -1)};
+      for (int c = 0; c < 3; ++c) one.at[c] += 0.03 * unit(random), one.spin[c] = 3 * unit(random);
+      all.push_back(one);
+    }
+    Model model = *blocks(all);
+    for (int side = 0; side < 4; ++side) {  // a funnel without a hole
+      const double angle = glm::half_pi<double>() * side;
+      model.obstacles.emplace_back(glm::normalize(glm::dvec3(std::cos(angle), 1.5, std::sin(angle))), -0.25);
+    }
+    Settings settings = touching("explicit", 5e4);
+    settings.gravity = 9.81, settings.damping = 1, settings.friction = 0.3;
+    const auto shared = std::make_shared<const Model>(model);
+    Sim sim = create_sim(shared, settings);
+    for (int s = 0; s < 120; ++s) step(sim);
+    REQUIRE_FALSE(check_finite(sim, true));
+    CHECK(touched(sim).touches > 100);
+    CHECK(overlap_of(*shared, read_state(sim).positions, false).largest < 0.02);
   }
 }
 

@@ -3,7 +3,6 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -13,6 +12,7 @@
 #include "sim/reference/objective.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
+#include "tests/mesh_samples.h"
 #include "tests/sim_samples.h"
 
 using namespace tetpbd;
@@ -148,24 +148,28 @@ TEST_CASE("sheets: masses are area times thickness times density") {
   CHECK(hinges(sheet).size() == r.bends);
 }
 
+constexpr const char* two_triangles = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nf 1 3 2\nf 2 3 4\n";
+
 TEST_CASE(
     "sheets: an open surface is read as one, its triangles turned alike; two faces of a solid are not") {
-  std::ofstream("sheet_test.obj") << "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nf 1 3 2\nf 2 3 4\n";
-  SurfaceMesh surface = load_surface("sheet_test.obj");
+  const samples::Folder folder;
+  const auto file = folder.write("sheet_test.obj", two_triangles);
+  SurfaceMesh surface = load_surface(file);
   std::swap(surface.triangles[1][1], surface.triangles[1][2]);
   const TetMesh sheet = sheet_of(surface, "here");
   CHECK(sheet.positions.size() == 4);
   CHECK(hinges(sheet).size() == 1);
-  CHECK_THROWS_AS(load_mesh("sheet_test.obj", "pYq1.85o/140"), Error);
+  CHECK_THROWS_AS(load_mesh(file, "pYq1.85o/140"), Error);
   surface.positions[0].x = NAN;
   CHECK_THROWS_WITH(sheet_of(surface, "here"), doctest::Contains("finite"));
 }
 
 TEST_CASE("sheets: scenes have them, flat or from a file, and say what is wrong") {
-  std::ofstream("sheet_test.obj") << "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nf 1 3 2\nf 2 3 4\n";
-  const auto scene_of = [](const std::string& body, const std::string& solver = "{}") {
-    std::ofstream("sheet_test.json") << R"({"bodies": [)" << body << R"(], "solver": )" << solver << "}";
-    return load_scene("sheet_test.json");
+  const samples::Folder folder;
+  folder.write("sheet_test.obj", two_triangles);
+  const auto scene_of = [&](const std::string& body, const std::string& solver = "{}") {
+    const std::string text = R"({"bodies": [)" + body + R"(], "solver": )" + solver + "}";
+    return load_scene(folder.write("sheet_test.json", text).string());
   };
   const Scene scene = scene_of(
       R"({"sheet": {"size": [1, 2], "cells": [4, 8]}, "rotation": [90, 0, 0], "density": 200,
@@ -182,8 +186,8 @@ TEST_CASE("sheets: scenes have them, flat or from a file, and say what is wrong"
   CHECK(first == doctest::Approx(2 * 200 * 1e-3 * std::sqrt(5)));
   CHECK(second == doctest::Approx(10));
   CHECK(std::ranges::count(model->inverse_masses, 0.0) == 1);
-  std::ofstream("sheet_test.json") << scene_json(scene);
-  CHECK(build_model(load_scene("sheet_test.json"))->masses == model->masses);
+  const auto again = folder.write("sheet_test.json", scene_json(scene).dump());
+  CHECK(build_model(load_scene(again.string()))->masses == model->masses);
   const char* flat = R"({"sheet": {"size": [1, 2], "cells": [4, 8]}, "height": 1})";
   CHECK_THROWS_WITH(build_model(scene_of(flat)), doctest::Contains("has no height"));
   CHECK_THROWS_WITH(scene_of(R"({"block": {"size": [1, 1, 1], "cells": [1, 1, 1]}, "thickness": 1})"),

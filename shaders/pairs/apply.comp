@@ -2,7 +2,7 @@
 #include "pairs/pairs.glsl"
 #if IMPLICIT
 #include "vertex_state.glsl"
-layout(std430, binding = BIND_NEWTON_VECTORS) restrict buffer Vectors { vec4 vectors[]; };
+#include "newton/vectors.glsl"
 #else
 #include "quantized.glsl"
 #include "vertex.glsl"
@@ -25,7 +25,8 @@ void main() {
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
 #if IMPLICIT
-  vectors[2u * VERTICES + i].xyz += stopped;  // WAY (newton.glsl): the history of BDF2 has what velocity has, and so keeps momentum
+  vec4 way = at(WAY, i);
+  put(WAY, i, way.xyz + stopped, way.w);  // the history of BDF2 has what velocity has, and so keeps momentum
 #else
 #if !LEAPFROG
   x = predict_position(x, predict_velocity(v));

@@ -335,9 +335,8 @@ void draw_view(Session& s) {
       {"follow", "the camera goes where the bodies go\nL", view.follow, first.follow},
       {"probe", "the cursor at rest on a body says what is there", s.probing, true},
       {"contacts",
-       "dots where vertices touch the ground, walls or obstacles, arrows where they are in other bodies: red "
-       "is a "
-       "thousandth of the size",
+       "dots where vertices touch the ground, walls or obstacles, arrows where they are in other bodies: "
+       "red is a thousandth of the size",
        view.contacts, first.contacts},
       {"arrows", "velocities of some of the vertices", view.arrows, first.arrows},
       {"shadow", "of the bodies, on the ground and on each other", view.shadow, first.shadow},

@@ -104,7 +104,7 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
   batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_DEPTH_TEST);
-  batch(frame.touching, contact_colour, 7.0f);
+  if (frame.options.contacts) batch(frame.touching, contact_colour, 7.0f);
   batch(frame.worst, glm::vec3(0.70f, 0.0f, 0.30f), 18.0f, 0.68f);
 }
 
@@ -112,7 +112,7 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
 
 void draw_marks(Renderer& renderer, const Frame& frame) {
   if (!frame.options.contacts && !frame.options.arrows && frame.pinned.empty() && frame.grabbed.empty() &&
-      frame.worst.empty() && frame.touching.empty())
+      frame.worst.empty())
     return;
   bind_vertices(renderer, frame);
   glEnable(GL_PROGRAM_POINT_SIZE);

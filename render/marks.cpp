@@ -30,15 +30,18 @@ void draw_contacts(Renderer& renderer, const Frame& frame) {
   glEnable(GL_DEPTH_TEST);
 }
 
-// Normals of the triangles that vertices of other bodies are in, redder as these are deeper, to a thousandth
-// of the size.
+// Along which normals vertices and edges leave the bodies that they are in, redder as these are deeper, to a
+// thousandth of the size.
 void draw_touches(Renderer& renderer, const Frame& frame) {
   const Pairs& pairs = *frame.pairs;
   const float size = glm::length(renderer.rest_high - renderer.rest_low);
-  const std::size_t count = pairs.surface_vertices, bytes = count * sizeof(TouchArrow);
+  const std::size_t count = pairs.items, bytes = count * sizeof(TouchArrow);
   if (renderer.touches.bytes() != bytes) renderer.touches = Buffer("arrows of contacts", bytes);
   const Program& fill = use(renderer, "touches");
   for (const auto& [name, value] : {std::pair("count", count),
+                                    {"triangles", pairs.triangles},
+                                    {"vertices", pairs.vertices},
+                                    {"edges_at", pairs.edges_at},
                                     {"vertices_at", pairs.vertices_at},
                                     {"records_at", pairs.records_at},
                                     {"record_words", pairs.record_words}})

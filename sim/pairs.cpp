@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "sim/error.h"
@@ -14,12 +15,46 @@
 namespace tetpbd {
 
 bool bodies_touch(const Model& model, const Settings& settings) {
-  return std::ranges::any_of(model.bodies, [](const Body& body) { return !body.is_sheet(); }) &&
-         (settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1));
+  return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
 }
 
-// What a sheet keeps from solids, as a part of its edges: between its vertices it would cut corners off them.
+// What a sheet keeps from others, as a part of its edges: between its vertices it would cut corners off them.
 constexpr double sheet_gap = 0.2;
+// rad. An edge that turns by less leaves at most a fifteenth of its length between its vertices.
+constexpr double sharp = 0.52;
+
+namespace {
+
+void add_sharp_edges(const TetMesh& rest, const Body& body, std::uint32_t number, PairMesh& mesh) {
+  struct Half {
+    std::uint32_t low, high, from, beside, triangle;
+  };
+  std::vector<Half> halves;
+  std::vector<glm::dvec3> normals;
+  for (std::size_t t = 0; t < body.triangles; ++t) {
+    const auto& corners = rest.surface[body.first_triangle + t];
+    const auto& [i, j, k] = corners;
+    const auto& x = rest.positions;
+    normals.push_back(glm::cross(x[j] - x[i], x[k] - x[i]));
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::uint32_t a = corners[c], b = corners[(c + 1) % 3];
+      halves.push_back({std::min(a, b), std::max(a, b), a, corners[(c + 2) % 3], std::uint32_t(t)});
+    }
+  }
+  std::ranges::sort(halves, [](const Half& a, const Half& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  for (std::size_t k = 0; k + 1 < halves.size(); ++k) {
+    const Half &a = halves[k], &b = halves[k + 1];
+    if (a.low != b.low || a.high != b.high || a.from == b.from) continue;
+    const glm::dvec3 &n = normals[a.triangle], &m = normals[b.triangle];
+    const bool convex = glm::dot(n, rest.positions[b.beside] - rest.positions[a.from]) < 0;
+    if (convex && glm::dot(n, m) < std::cos(sharp) * glm::length(n) * glm::length(m))
+      mesh.edges.push_back({{a.from, b.from}, {a.beside, b.beside}, number});
+  }
+}
+
+}  // namespace
 
 PairMesh pair_mesh(const Model& model) {
   PairMesh mesh;
@@ -30,16 +65,18 @@ PairMesh pair_mesh(const Model& model) {
     double across = 0;  // its edges, one of each triangle
     for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t) {
       const auto& [i, j, k] = model.rest.surface[t];
-      if (!body.is_sheet()) mesh.triangles.push_back({i, j, k, b});
+      mesh.triangles.push_back({i, j, k, b});
       vertices.insert(vertices.end(), {i, j, k});
       across += glm::distance(model.rest.positions[i], model.rest.positions[j]);
     }
-    if (!body.is_sheet()) length += across;
+    length += across;
+    if (!body.is_sheet()) add_sharp_edges(model.rest, body, b, mesh);
     std::ranges::sort(vertices);
     const auto rest = std::ranges::unique(vertices);
     vertices.erase(rest.begin(), rest.end());
     const double thickness = body.is_sheet() ? sheet_gap * across / double(body.triangles) : 0;
-    for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b, float(thickness)});
+    mesh.thicknesses.push_back(float(thickness));
+    for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b});
     mesh.thickness = std::max(mesh.thickness, thickness);
   }
   mesh.edge = length / double(std::max<std::size_t>(mesh.triangles.size(), 1));
@@ -175,9 +212,13 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   const PairMesh surfaces = pair_mesh(model);
   std::vector<std::uint32_t> words;
   for (const auto& triangle : surfaces.triangles) words.insert(words.end(), triangle.begin(), triangle.end());
+  const std::size_t edges_at = words.size();
+  for (const auto& [vertex, beside, body] : surfaces.edges)
+    words.insert(words.end(), {vertex[0], vertex[1], beside[0], beside[1], body});
   const std::size_t vertices_at = words.size();
-  for (const auto& [vertex, body, thickness] : surfaces.vertices)
-    words.insert(words.end(), {vertex, body, std::bit_cast<std::uint32_t>(thickness)});
+  for (const auto& [vertex, body] : surfaces.vertices) words.insert(words.end(), {vertex, body});
+  const std::size_t thicknesses_at = words.size();
+  for (const float thickness : surfaces.thicknesses) words.push_back(std::bit_cast<std::uint32_t>(thickness));
   const std::size_t slices_at = words.size();
   constexpr std::size_t slice = 1024;
   for (std::size_t first = 0; first < surfaces.vertices.size();) {
@@ -189,10 +230,12 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     first = end;
   }
   const std::size_t slices = (words.size() - slices_at) / 3, triangles = surfaces.triangles.size(),
-                    vertices = surfaces.vertices.size(), bodies = model.bodies.size();
+                    edges = surfaces.edges.size(), vertices = surfaces.vertices.size(),
+                    items = vertices + edges, targets = triangles + edges, bodies = model.bodies.size();
   Pairs p;
   p.margin = pair_margin(surfaces), p.thickness = surfaces.thickness;
-  p.surface_vertices = vertices, p.vertices_at = vertices_at, p.record_words = 2 + candidates;
+  p.triangles = triangles, p.vertices = vertices, p.items = items;
+  p.edges_at = edges_at, p.vertices_at = vertices_at, p.record_words = 2 + candidates;
   p.cells = std::bit_ceil(2 * triangles + 1);
   p.mesh = Buffer("surfaces", words);
   if (settings.contact == "self") {
@@ -200,11 +243,11 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
     p.rest = Buffer("surfaces at rest", rest);
   }
-  const std::size_t most = entries_per_triangle * triangles + 1024, records_at = counters + box * bodies;
+  const std::size_t most = entries_per_triangle * targets + 1024, records_at = counters + box * bodies;
   const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
   p.cleared = 4 * entries_at, p.records_at = records_at;
   p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
-  p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * vertices));
+  p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * items));
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
@@ -221,6 +264,9 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                                     {"SLICES", slices},
                                     {"TRIANGLES", triangles},
                                     {"SURFACE_VERTICES", vertices},
+                                    {"EDGES", edges},
+                                    {"EDGES_AT", edges_at},
+                                    {"THICKNESSES_AT", thicknesses_at},
                                     {"CANDIDATES", candidates},
                                     {"LANES", lanes},
                                     {"CELLS", p.cells},
@@ -230,6 +276,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                                     {"GROUP_SIZE", group}})
     defines.push_back(fmt::format("{} {}u", name, value));
   defines.push_back(fmt::format("IMPLICIT {:d}", is_implicit(settings)));
+  defines.push_back(fmt::format("SHEETS {:d}", surfaces.thickness > 0));
   defines.push_back(fmt::format("VERTICES {}u", model.positions.size()));
   defines.push_back(fmt::format("CELL {:.9g}", 1.2 * surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
@@ -238,8 +285,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     return Pairs::Kernel{
         Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups, counted_by, {}};
   };
-  p.boxes = kernel("boxes", slices), p.insert = kernel("insert", groups_for(triangles));
-  p.query = kernel("query", groups_for(lanes * vertices)), p.apply = kernel("apply", groups_for(vertices));
+  p.boxes = kernel("boxes", slices), p.insert = kernel("insert", groups_for(targets));
+  p.query = kernel("query", groups_for(lanes * items)), p.apply = kernel("apply", groups_for(vertices));
   p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
   return p;
 }

@@ -15,17 +15,20 @@ struct Sim;
 /// Whether anything can touch.
 bool bodies_touch(const Model& model, const Settings& settings);
 
-/// Surfaces of all bodies. Vertices of a sheet meet the triangles of solids; nothing meets a sheet's
-/// triangles.
+/// Surfaces of all bodies.
 struct PairMesh {
   struct Item {
     std::uint32_t vertex, body;
-    float thickness;  ///< m, how near a sheet's vertex comes to a triangle; of solids 0
   };
-  std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body; of solids: a sheet has no inside
-  std::vector<Item> vertices;                           ///< each once, by body
-  double edge = 1;                                      ///< m, the mean
-  double thickness = 0;                                 ///< m, the largest of a vertex
+  struct Edge {
+    std::uint32_t vertex[2], beside[2], body;  ///< ends; third vertices of the triangles left and right of it
+  };
+  std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
+  std::vector<Edge> edges;         ///< of solids, where they are convex and sharp at rest
+  std::vector<Item> vertices;      ///< each once, by body
+  std::vector<float> thicknesses;  ///< m, by body: how near a sheet lets others come; of solids 0
+  double edge = 1;                 ///< m, the mean
+  double thickness = 0;            ///< m, the largest
 };
 PairMesh pair_mesh(const Model& model);
 /// m: how near a candidate is, of bodies that move slowly, beside the thickness.
@@ -49,7 +52,8 @@ struct Pairs : PairNumbers {
     Timer timer;
   };
   Kernel boxes, insert, query, meet, push, apply;
-  std::size_t surface_vertices = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
+  std::size_t triangles = 0, vertices = 0, items = 0;  ///< vertices of surfaces and sharp edges
+  std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
   std::size_t cells = 0, cleared = 0;  ///< of the grid, bytes for each detection
   double margin = 0;                   ///< m, of slow bodies
   double thickness = 0;                ///< m, the largest of a vertex

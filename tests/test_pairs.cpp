@@ -24,6 +24,7 @@ struct Placed {
   glm::dvec3 size{0.5};
   glm::ivec3 cells{4};
   bool round = false;  // a ball across which the block was
+  glm::dmat3 turn{1};
 };
 
 std::shared_ptr<const Model> blocks(const std::vector<Placed>& all) {
@@ -35,7 +36,7 @@ std::shared_ptr<const Model> blocks(const std::vector<Placed>& all) {
         p *= std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) / l;
     finish_tets(mesh, "block");
     auto start = mesh.positions;
-    for (auto& p : start) p += one.at;
+    for (auto& p : start) p = one.turn * p + one.at;
     add_body(*model, "block", mesh, 1000, start, one.velocity, one.spin, one.fixed);
   }
   return model;
@@ -80,12 +81,12 @@ TEST_CASE("pairs: a vertex and a triangle: weights, gap and normal") {
   CHECK(at({0.2, 0.3, -0.2}).gap == doctest::Approx(0.3));
   CHECK(at({0.2, -0.3, -0.2}).gap == doctest::Approx(-0.3));
   CHECK(at({0.2, -0.3, -0.2}).normal.y == doctest::Approx(1));
-  CHECK(at({0.2, 0.3, -0.2}).weights.x == doctest::Approx(0.6));
+  CHECK(at({0.2, 0.3, -0.2}).weights[1] == doctest::Approx(-0.6));
   // Over an edge and a corner; below an edge the vertex leaves towards it.
   CHECK(at({-0.3, 0.4, -0.5}).gap == doctest::Approx(0.5));
   CHECK(at({-0.3, 0.4, -0.5}).normal.x == doctest::Approx(-0.6));
   CHECK(at({-0.3, -0.4, -0.5}).normal.y == doctest::Approx(0.8));
-  CHECK(at({2, 0.1, 0}).weights.y == doctest::Approx(1));
+  CHECK(at({2, 0.1, 0}).weights[2] == doctest::Approx(-1));
   CHECK(f.meet(a, a, b).gap > 1e20);  // no area
   // Nearest weights against a search.
   for (int trial = 0; trial < 200; ++trial) {
@@ -102,6 +103,83 @@ TEST_CASE("pairs: a vertex and a triangle: weights, gap and normal") {
     CHECK(w.x + w.y + w.z == doctest::Approx(1));
     CHECK(std::min({w.x, w.y, w.z}) >= 0);
   }
+}
+
+TEST_CASE("pairs: two edges: weights, gap and normal") {
+  Formulas<double> f;
+  // A ridge along x whose crest is the x-axis, and a keel along z above it whose crest is at y = lift.
+  const auto at = [&](double lift, double aside = 0) {
+    const glm::dvec3 a(-1, 0, 0), q(aside, lift, -1), r(aside, lift, 2);
+    const glm::dvec3 left(0, -1, -1), right(0, -1, 1), keel_left(aside + 1, lift + 1, 0),
+        keel_right(aside - 1, lift + 1, 0);
+    return f.meet_edges(glm::dvec3(2, 0, 0), left - a, right - a, q - a, r - a, keel_right - a,
+                        keel_left - a);
+  };
+  REQUIRE(glm::dot(glm::cross(glm::dvec3(2, 0, 0), glm::dvec3(1, -1, 1)), {0, 1, 0}) < 0);
+  CHECK(at(0.1).gap > 1);  // they do not cross
+  CHECK(at(0.1).rank == doctest::Approx(0.1));
+  const auto m = at(-0.1);
+  CHECK(m.gap == doctest::Approx(-0.1));
+  CHECK(m.normal.y == doctest::Approx(-1));  // the ridge leaves downwards
+  CHECK(m.weights[0] == doctest::Approx(0.5));
+  CHECK(m.weights[1] == doctest::Approx(0.5));
+  CHECK(m.weights[2] == doctest::Approx(-2.0 / 3));
+  CHECK(m.weights[3] == doctest::Approx(-1.0 / 3));
+  CHECK(at(-0.1, 1.5).gap > 1);  // past the end
+  CHECK(at(-0.1, 1.5).rank == doctest::Approx(std::hypot(0.1, 0.5)));
+  const glm::dvec3 along(1, 0, 0), o(0);
+  CHECK(f.meet_edges(along, o, o, {0, 1, 0}, {1, 1, 0}, o, o).gap > 1);  // parallel
+  CHECK(f.meet_edges(along, o, o, o, o, o, o).gap > 1);                  // no length
+}
+
+TEST_CASE("pairs: sharp edges are those of a block, and none of a ball") {
+  CHECK(pair_mesh(*blocks({{}})).edges.size() == 12 * 4);
+  Placed ball;
+  ball.round = true, ball.cells = glm::ivec3(8);
+  CHECK(pair_mesh(*blocks({ball})).edges.size() == 0);
+}
+
+TEST_CASE("pairs: edges that cross stop each other, on the GPU as in double") {
+  GlTest gl;
+  const double r = std::sqrt(0.5);
+  Placed ridge{{0, 0, 0}}, keel{{0.07, 0.705, 0.09}, {0, -1, 0}};
+  ridge.turn = glm::dmat3(1, 0, 0, 0, r, r, 0, -r, r), keel.turn = glm::dmat3(r, r, 0, -r, r, 0, 0, 0, 1);
+  ridge.cells = keel.cells = glm::ivec3(2);
+  const auto model = blocks({ridge, keel});
+  for (const std::string mode : {"explicit", "node", "newton", "cpu-double", "cpu-fast"}) {
+    CAPTURE(mode);
+    Settings settings = touching(mode, 1e6);
+    if (mode == "newton") settings.iterations = 8, settings.substeps = 5;
+    Sim sim = create_sim(model, settings);
+    const Momenta before = motion_of(sim);
+    double lowest = 1;
+    for (int s = 0; s < 40; ++s) {
+      step(sim);
+      const State state = read_state(sim);
+      double crest = -1, under = 1;
+      for (std::size_t i = 0; i < state.positions.size(); ++i)
+        if (i < model->bodies[1].first_vertex)
+          crest = std::max(crest, state.positions[i].y);
+        else
+          under = std::min(under, state.positions[i].y);
+      lowest = std::min(lowest, under - crest);
+    }
+    REQUIRE_FALSE(check_finite(sim, true));
+    CHECK(lowest > -0.05);  // edges are 0.25 m long, and bend
+    CHECK(speed_of(sim, 0, 1) < speed_of(sim, 1, 1));
+    CHECK(glm::length(motion_of(sim).momentum - before.momentum) < 1e-5 * glm::length(before.momentum));
+    CHECK(motion_of(sim).energy < 1.001 * before.energy);
+  }
+  Settings loose = touching("node", 1);
+  loose.friction = 0.4, loose.substeps = 1, loose.dt = 5e-4;
+  Sim kernels = create_sim(model, loose);
+  loose.mode = "cpu-double";
+  Sim truth = create_sim(model, loose);
+  for (int s = 0; s < 20; ++s) step(kernels), step(truth);
+  CHECK(touched(kernels).touches > 4);
+  const State a = read_state(kernels), b = read_state(truth);
+  for (std::size_t i = 0; i < a.positions.size(); ++i)
+    CHECK(glm::length(a.velocities[i] - b.velocities[i]) < 2e-3);
 }
 
 TEST_CASE("pairs: two bodies that collide keep their momentum, part again and gain no energy") {
@@ -265,16 +343,17 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
   }
 }
 
-TEST_CASE("pairs: eight balls fall into a bowl in ten ways: all end finite and out of each other") {
+TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end finite and out of each other") {
   GlTest gl;
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1);
-  for (int start = 0; start < 10; ++start) {
+  for (int start = 0; start < 20; ++start) {
     CAPTURE(start);
+    const bool balls = start % 2 == 0;
     std::vector<Placed> all;
     for (int b = 0; b < 8; ++b) {
       Placed one;
-      one.size = glm::dvec3(0.3), one.cells = glm::ivec3(4), one.round = true;
+      one.size = glm::dvec3(0.3), one.cells = glm::ivec3(balls ? 4 : 2), one.round = balls;
       one.at = {0.2 * (b % 2 ? 1 : -1), 0.3 + 0.4 * double(b / 4), 0.2 * (b / 2 % 2 ? 1 : -1)};
       for (int c = 0; c < 3; ++c) one.at[c] += 0.03 * unit(random), one.spin[c] = 3 * unit(random);
       all.push_back(one);

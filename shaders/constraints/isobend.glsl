@@ -1,7 +1,7 @@
-// Isometric bending (Bergou and others 2006; cubic shells leave the surface's normal out as well): C = |L| - |L at rest|, without unit, of
-// L = sum k_j x_j, with wings x0 and x1 and the edge x2 -> x3. `rest`: weights k of x1, x2 and x3, which cotangents at rest give
-// (constraint_kinds.h), and |L| there. All k sum to 0 and do not change, so C^2 / 2 is quadratic in x where the rest shape is flat. Where it is not, a
-// hinge that is folded the other way by as much is at rest too.
+// Isometric bending (Bergou and others 2006): C = +-|L| - its value at rest, without unit, of L = sum k_j x_j, with wings x0 and x1 and the edge
+// x2 -> x3. The sign is that of the side to which the hinge is folded, so that of two mirrored shapes one is at rest (as cubic shells tell them apart,
+// Garg and others 2007). `rest`: weights k of x1, x2 and x3, which cotangents at rest give (constraint_kinds.h), and +-|L| there. All k sum to 0 and do
+// not change, so C^2 / 2 is quadratic in x where the rest shape is flat.
 Constraint4 isobend(vec3 x[4], const real rest[4], Ids ids) {
   Constraint4 c;
   vec3 d1 = x[1] - x[0], d2 = x[2] - x[0], d3 = x[3] - x[0];
@@ -13,6 +13,8 @@ Constraint4 isobend(vec3 x[4], const real rest[4], Ids ids) {
   vec3 across = cross(d3 - d2, d1);
   real area = length(across);
   bool bent = l > real(4) * rounding * noise, sound = bent || area > real(0);
+  bool other_way = bent && dot(L, across) < real(0);
+  if (other_way) l = -l;
   vec3 n = bent ? L / l : sound ? across / area : any_direction(id_of(ids, 0), id_of(ids, 1));
   c.C = apply_dead_zone(l - rest[3], noise);
   c.guards = sound ? 0u : GUARD_HINGE;

@@ -1,9 +1,9 @@
-// A vertex and a triangle of the surface of a body, all places relative to the vertex (method.md, "Bodies in contact").
+// A vertex and a triangle, or two edges, of the surfaces of bodies (method.md, "Bodies in contact").
 struct Meeting {
-  vec3 weights;  // of the corners, at the point nearest to the vertex
-  vec3 normal;   // unit, out of the triangle's body, along which the vertex leaves it
-  real gap;      // m, negative inside
-  vec3 face;     // the triangle's own normal, unit
+  real weights[4];  // of the vertex and the corners, or of the ends of the first edge and of the second, at the nearest points; these below 0
+  vec3 normal;      // unit, out of the second's body, along which the first leaves it
+  real gap;         // m, negative inside
+  vec3 face;        // the triangle's own normal, unit
   real rank;     // by distance; of triangles as near as each other the sign of that which faces the vertex most is right, and comes first
 };
 // Weights of the corners at the point of a triangle that is nearest to the origin (Ericson 2005, Real-Time Collision Detection, 5.1.5).
@@ -25,11 +25,13 @@ vec3 nearest_weights(vec3 a, vec3 b, vec3 c) {
   real whole = va + vb + vc;
   return whole > real(0) ? vec3(va / whole, vb / whole, vc / whole) : vec3(1, 0, 0);
 }
-// A triangle without area meets nothing: gap is far, then.
+// A vertex at the origin and a triangle. One without area meets nothing: gap is far, then.
 Meeting meet(vec3 a, vec3 b, vec3 c) {
   Meeting m;
-  m.weights = nearest_weights(a, b, c);
-  vec3 n = cross(b - a, c - a), to = -(m.weights.x * a + m.weights.y * b + m.weights.z * c);
+  vec3 weights = nearest_weights(a, b, c);
+  m.weights[0] = real(1);
+  for (int j = 0; j < 3; ++j) m.weights[j + 1] = -weights[j];
+  vec3 n = cross(b - a, c - a), to = -(weights.x * a + weights.y * b + weights.z * c);
   real area = length(n), far = length(to);
   m.normal = vec3(0, 1, 0);
   m.gap = real(1e30);
@@ -45,6 +47,58 @@ Meeting meet(vec3 a, vec3 b, vec3 c) {
   // Beside the face, away from or towards the edge; a vertex on it has no such direction.
   bool beside = far > real(1e-6) * sqrt(area) && abs(along) < real(0.999999) * far;
   m.normal = beside ? to / m.gap : n;
+  return m;
+}
+// A vertex at the origin and a triangle of a sheet, which has two sides; `under` says on which the vertex belongs.
+Meeting meet_sheet(vec3 a, vec3 b, vec3 c, bool under) {
+  Meeting m = meet(a, b, c);
+  if (!(m.gap < real(1e29))) return m;
+  vec3 to = -m.weights[1] * a - m.weights[2] * b - m.weights[3] * c;  // from the vertex
+  real far = length(to);
+  if (under) m.face = -m.face;
+  bool crossed = dot(to, m.face) > real(0.7) * far;  // not beside its rim
+  m.normal = crossed || !(far > real(0)) ? m.face : -to / far;
+  m.gap = crossed ? -far : far;
+  m.rank = crossed ? real(1e-3) * far : far;  // first of all it is to come back
+  return m;
+}
+// Across the edge of two triangles, from the origin to p, out of the body; `left` is the third vertex of the triangle in which it goes that way.
+vec3 edge_normal(vec3 p, vec3 left, vec3 right) {
+  vec3 a = cross(p, left), b = cross(right, p);
+  return a * length(b) + b * length(a);
+}
+// Two edges, each with the third vertices of the triangles beside it; all places relative to the first end of the first. They are in each other where
+// the nearest point of each is behind both triangles of the other, as where two wedges cross. Else gap is far.
+Meeting meet_edges(vec3 p, vec3 left, vec3 right, vec3 q, vec3 r, vec3 other_left, vec3 other_right) {
+  Meeting m;
+  vec3 e = r - q, between = cross(p, e);
+  real pp = dot(p, p), ee = dot(e, e), pe = dot(p, e), pq = dot(p, q), eq = dot(e, q), across = dot(between, between);
+  m.gap = m.rank = real(1e30);
+  m.normal = m.face = vec3(0, 1, 0);
+  for (int j = 0; j < 4; ++j) m.weights[j] = real(0);
+  if (!(pp > real(0) && ee > real(0))) return m;
+  // Ericson 2005, 5.1.9. The ends of edges that are all but parallel meet triangles instead.
+  bool cross_each_other = across > real(1e-3) * pp * ee;
+  real s = cross_each_other ? (pq * ee - eq * pe) / across : real(0);
+  bool in_both = cross_each_other && s > real(0) && s < real(1);
+  s = clamp(s, real(0), real(1));
+  real t = (s * pe - eq) / ee;
+  in_both = in_both && t > real(0) && t < real(1);
+  if (!(t > real(0) && t < real(1))) {
+    t = t > real(0) ? real(1) : real(0);
+    s = clamp((pq + t * pe) / pp, real(0), real(1));
+  }
+  m.weights[0] = real(1) - s;
+  m.weights[1] = s;
+  m.weights[2] = t - real(1);
+  m.weights[3] = -t;
+  vec3 to = q + t * e - s * p;
+  m.rank = length(to);
+  if (in_both && dot(to, cross(p, left)) < real(0) && dot(to, cross(right, p)) < real(0) && dot(to, cross(e, other_left - q)) > real(0) &&
+      dot(to, cross(other_right - q, e)) > real(0)) {
+    m.gap = -m.rank;
+    m.normal = m.face = to / m.rank;
+  }
   return m;
 }
 // Whether a vertex, with its normal of any length, can have come in through the triangle: those that look the same way are the far side of a thin part, or

@@ -1,19 +1,22 @@
-// Puts triangles that are near another body into the cells that they are in. One invocation per triangle.
+// Puts triangles and sharp edges that are near another body into the cells that they are in. One invocation per target.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 const int most_cells = 64;  // of a triangle: those of a body that is torn out of shape would have no end
 void main() {
   uint t = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
-  if (t >= TRIANGLES) return;
-  vec3 a = positions[triangle_vertex(t, 0u)].high, b = positions[triangle_vertex(t, 1u)].high, c = positions[triangle_vertex(t, 2u)].high;
+  if (t >= TARGETS) return;
+  bool is_edge = EDGES > 0u && t >= TRIANGLES;
+  uvec3 corners = is_edge ? uvec3(edge_vertex(t - TRIANGLES, 0u), edge_vertex(t - TRIANGLES, 1u), edge_vertex(t - TRIANGLES, 1u))
+                          : uvec3(triangle_vertex(t, 0u), triangle_vertex(t, 1u), triangle_vertex(t, 2u));
+  vec3 a = positions[corners.x].high, b = positions[corners.y].high, c = positions[corners.z].high;
   vec3 low = min(a, min(b, c)), high = max(a, max(b, c));
-  if (!near_another(triangle_body(t), low - margin, high + margin)) return;
+  if (!near_another(target_body(t), low - margin, high + margin)) return;
   vec3 normal = cross(b - a, c - a);
   float area = length(normal);
-  if (area > 0.0) {
+  if (!is_edge && area > 0.0) {
     ivec3 unit = ivec3(round(normal * (4096.0 / area)));
     for (uint j = 0u; j < 3u; ++j)
-      for (uint k = 0u; k < 3u; ++k) atomicAdd(pair_grid[CELLS + 3u * triangle_vertex(t, j) + k], uint(unit[k]));
+      for (uint k = 0u; k < 3u; ++k) atomicAdd(pair_grid[CELLS + 3u * corners[j] + k], uint(unit[k]));
   }
   ivec3 first = cell_of(low), last = cell_of(high), across = last - first + 1;
   if (any(greaterThan(across, ivec3(most_cells))) || across.x * across.y * across.z > most_cells) {
@@ -30,7 +33,7 @@ void main() {
         }
         bvec3 is_first = equal(ivec3(x, y, z), first);
         pair_grid[k] = t;
-        pair_grid[k + 1u] = triangle_body(t) | (is_first.x ? FIRST_ALONG_X : 0u) | (is_first.y ? FIRST_ALONG_X << 1 : 0u) | (is_first.z ? FIRST_ALONG_X << 2 : 0u);
+        pair_grid[k + 1u] = target_body(t) | (is_first.x ? FIRST_ALONG_X : 0u) | (is_first.y ? FIRST_ALONG_X << 1 : 0u) | (is_first.z ? FIRST_ALONG_X << 2 : 0u);
         pair_grid[k + 2u] = atomicExchange(pair_grid[hash_of(ivec3(x, y, z))], entry + 1u);
       }
 }

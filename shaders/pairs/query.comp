@@ -1,25 +1,23 @@
-// The candidates of each vertex of a surface: the nearest triangles within the margin, of equally near ones those of the least number, so that
-// the order in which they are found plays no part. A vertex that is deep in a body looks as far as its surface. LANES invocations per vertex: each
-// looks into some of the cells; then each looks at some of the triangles found there, and their lists are merged.
+// The candidates of each item, a vertex of a surface or a sharp edge: the nearest targets within the margin, of equally near ones those of the least
+// number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES invocations per item: each
+// looks into some of the cells; then each looks at some of the targets found there, and their lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
+#include "pairs/meeting.glsl"
 #if CONTACT_SELF
 layout(std430, binding = BIND_PAIR_REST) restrict readonly buffer PairRest { vec4 pair_rest[]; };  // places by vertex
-// Of its own body a vertex meets what is not its neighbour at rest either.
-bool is_neighbour(uint i, uint t) {
-  vec3 x = pair_rest[i].xyz;
-  for (uint c = 0u; c < 3u; ++c)
-    if (distance(x, pair_rest[triangle_vertex(t, c)].xyz) < 2.0 * CELL) return true;
+// Of its own body an item meets what is not its neighbour at rest either; of a sheet, what it has no vertex in common with.
+bool is_neighbour(uint s, uint t) {
+  uvec4 vertices = vertices_of(s, t);
+  float apart = thickness_of(item_body(s)) > 0.0 ? 0.0 : 2.0 * CELL;
+  uint own = item_is_edge(s) ? 2u : 1u;
+  for (uint a = 0u; a < own; ++a)
+    for (uint b = own; b < 4u; ++b)
+      if (distance(pair_rest[vertices[a]].xyz, pair_rest[vertices[b]].xyz) <= apart) return true;
   return false;
 }
 #endif
-void corners_of(uint t, Pair own, out vec3 corners[3]) {
-  for (uint c = 0u; c < 3u; ++c) {
-    Position p = positions[triangle_vertex(t, c)];
-    corners[c] = relative(Pair(p.high, p.low), own);
-  }
-}
 uint found[CANDIDATES];
 float distances[CANDIDATES];
 void consider(uint t, float d) {
@@ -36,17 +34,43 @@ void consider(uint t, float d) {
     t = t_out, d = d_out;
   }
 }
-// Triangle t, and a vertex at `own`, of the same body or not, whose normal is `normal`; a sheet has two sides.
-void look_at(uint t, bool same_body, Pair own, bool sheet, vec3 normal) {
-  vec3 corners[3];
-  corners_of(t, own, corners);
-  vec3 beyond = max(max(min(corners[0], min(corners[1], corners[2])), -max(corners[0], max(corners[1], corners[2]))), vec3(0.0));
+// Item s, at `own` and with the vertex's normal `normal`, that was in `held`, and target t, of the same body or not.
+void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
+#if EDGES
+  if (item_is_edge(s)) {
+    uint e = s - SURFACE_VERTICES, other = t - TRIANGLES;
+    uvec4 vertices = vertices_of(s, t);
+    vec3 p = from_own(vertices.y, own), q = from_own(vertices.z, own), r = from_own(vertices.w, own);
+    vec3 left = from_own(edge_vertex(e, 2u), own), right = from_own(edge_vertex(e, 3u), own);
+    vec3 other_left = from_own(edge_vertex(other, 2u), own), other_right = from_own(edge_vertex(other, 3u), own);
+    float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
+    vec3 own_normal = edge_normal(p, left, right), normal = edge_normal(r - q, other_left - q, other_right - q);
+    if (far <= distances[CANDIDATES - 1u] && dot(own_normal, normal) < 0.3 * length(own_normal) * length(normal)) consider(t, far);
+    return;
+  }
+#endif
+  vec3 a = from_own(triangle_vertex(t, 0u), own), b = from_own(triangle_vertex(t, 1u), own), c = from_own(triangle_vertex(t, 2u), own);
+  vec3 beyond = max(max(min(a, min(b, c)), -max(a, max(b, c))), vec3(0.0));
   if (dot(beyond, beyond) > 1.01 * distances[CANDIDATES - 1u] * distances[CANDIDATES - 1u]) return;
-  Meeting m = meet(corners[0], corners[1], corners[2]);
+  Meeting m = meet(a, b, c);
+  bool opposed = opposes(m, normal);
+#if SHEETS
+  if (thickness_of(triangle_body(t)) > 0.0) {  // it has two sides: that where the vertex is, or was before it went through
+    bool under = dot(m.face, a) > 0.0, was_near = false;
+    for (uint j = 0u; j < 3u && held != NONE; ++j)
+      for (uint l = 0u; l < 3u; ++l) was_near = was_near || triangle_vertex(held & TARGET, j) == triangle_vertex(t, l);
+    if (was_near) under = (held & UNDER) != 0u;
+    if (under) t |= UNDER;
+    m = meet_sheet(a, b, c, under);
+    opposed = true;
+  } else if (thickness_of(surface_body(s)) > 0.0) {
+    opposed = true;
+  }
+#endif
 #if CONTACT_SELF
   if (same_body && abs(m.gap) > SELF_MARGIN) return;  // a thin part's other side is no contact
 #endif
-  if (m.rank <= distances[CANDIDATES - 1u]) consider(sheet || opposes(m, normal) ? t : t | BESIDE, m.rank);
+  if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
 }
 #if LANES > 1
 #define WAITING 96u  // triangles per vertex; more are looked at at once, by lanes that wait for each other
@@ -84,27 +108,32 @@ bool near_some_other(uint lane, uint part, uint body, vec3 low, vec3 high) {
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
   uint s = group_index() * (GROUP_SIZE / LANES) + part;
-  bool there = s < SURFACE_VERTICES;
-  uint i = surface_vertex(there ? s : 0u), body = surface_body(there ? s : 0u);
+  bool there = s < ITEMS;
+  s = there ? s : 0u;
+  bool is_edge = item_is_edge(s);
+  uint i = is_edge ? edge_vertex(s - SURFACE_VERTICES, 0u) : surface_vertex(s), body = item_body(s);
   Pair own = Pair(positions[i].high, positions[i].low);
+  vec3 low = own.high, high = own.high;
+  if (is_edge) {
+    vec3 end = positions[edge_vertex(s - SURFACE_VERTICES, 1u)].high;
+    low = min(low, end), high = max(high, end);
+  }
   uint held = there ? pair_lists[HELD + s] : NONE;
   float radius = margin;
   if (held != NONE) {
-    vec3 corners[3];
-    corners_of(held, own, corners);
-    radius = max(margin, 1.05 * abs(meet(corners[0], corners[1], corners[2]).gap) + 0.5 * margin);
+    float gap = abs(meeting_of(s, held).gap);
+    if (gap < 1e29) radius = max(margin, 1.05 * gap + 0.5 * margin);
   }
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
 #if LANES > 1
   if (lane == 0u) waiting_count[part] = 0u;
   barrier();
 #endif
-  bool near = near_some_other(lane, part, body, own.high - radius, own.high + radius);
-  bool sheet = surface_thickness(there ? s : 0u) > 0.0;
+  bool near = near_some_other(lane, part, body, low - radius, high + radius);
   vec3 normal = vec3(0.0);
   if (there && near) {
-    normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
-    ivec3 first = cell_of(own.high - radius), across = cell_of(own.high + radius) - first + 1;
+    if (!is_edge) normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
+    ivec3 first = cell_of(low - radius), across = cell_of(high + radius) - first + 1;
     for (int c = int(lane); c < across.x * across.y * across.z; c += int(LANES)) {
       ivec3 cell = first + ivec3(c % across.x, c / across.x % across.y, c / (across.x * across.y));
       // A triangle that is in several of these cells is looked at in one of them: along each axis in its first or in the vertex's.
@@ -113,9 +142,12 @@ void main() {
         uint k = ENTRIES_AT + 3u * (entry - 1u), t = pair_grid[k], of_body = pair_grid[k + 1u];
         entry = pair_grid[k + 2u];
         if ((known | of_body | BODY_OF_ENTRY) != 0xffffffffu) continue;
+#if EDGES
+        if (is_edge ? t <= TRIANGLES + (s - SURFACE_VERTICES) : t >= TRIANGLES) continue;  // of two edges, the first looks for the second
+#endif
         of_body &= BODY_OF_ENTRY;
 #if CONTACT_SELF
-        if (of_body == body && is_neighbour(i, t)) continue;
+        if (of_body == body && is_neighbour(s, t)) continue;
 #else
         if (of_body == body) continue;
 #endif
@@ -126,14 +158,14 @@ void main() {
           continue;
         }
 #endif
-        look_at(t, of_body == body, own, sheet, normal);
+        look_at(s, t, of_body == body, own, held, normal);
       }
     }
   }
 #if LANES > 1
   barrier();
   for (uint slot = lane; slot < min(waiting_count[part], WAITING); slot += LANES)
-    look_at(waiting[part][slot], triangle_body(waiting[part][slot]) == body, own, sheet, normal);
+    look_at(s, waiting[part][slot], target_body(waiting[part][slot]) == body, own, held, normal);
   merge(lane);
 #endif
   if (lane != 0u) return;

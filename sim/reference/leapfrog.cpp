@@ -102,7 +102,7 @@ void advance(Leapfrog& run, long steps) {
   const Settings& settings = run.input.settings;
   const std::vector<glm::dvec4> planes = planes_of(run.input.model, settings);
   const double keep = std::exp(-settings.damping * run.h);
-  const PairContact pairs(run.input.model, settings);
+  PairContact pairs(run.input.model, settings);
   std::vector<MovingShape> shapes;
   for (long s = 0; s < steps; ++s, run.time[0] += run.h) {
     if (s == 0 || std::ranges::any_of(run.input.model.shapes, moves))

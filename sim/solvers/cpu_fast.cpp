@@ -306,7 +306,7 @@ class FastPbd {
                    double time) {
     const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
-    const PairContact pairs(model_, settings);
+    PairContact pairs(model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
     x.resize(state.positions.size());

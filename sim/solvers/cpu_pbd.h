@@ -122,7 +122,7 @@ class CpuPbd {
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
     const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
-    const PairContact pairs(model_, settings);
+    PairContact pairs(model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;

@@ -24,44 +24,39 @@ class PairContact {
   bool wanted() const { return wanted_; }
   /// After a substep of `h`: of places `x` and velocities `v`.
   void resolve(std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v,
-               const std::vector<double>& inverse_masses, double h) const {
+               const std::vector<double>& inverse_masses, double h) {
     if (!wanted_) return;
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
     const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness);
     std::vector<int> counts(x.size(), 0);
-    for (const Contact& c : contacts) {
-      ++counts[c.vertex];
-      for (glm::length_t j = 0; j < 3; ++j) counts[c.corners[std::size_t(j)]] += c.meeting.weights[j] > 0;
-    }
+    for (const Contact& c : contacts)
+      for (std::size_t j = 0; j < 4; ++j) counts[c.vertices[j]] += c.meeting.weights[j] != 0;
     std::vector<glm::dvec3> stopped(x.size(), glm::dvec3(0));
-    for (const Contact& c : contacts) {
-      const auto& m = c.meeting;
-      glm::dvec3 way = h * v[c.vertex];
-      double weight = inverse_masses[c.vertex] * counts[c.vertex];
-      for (std::size_t j = 0; j < 3; ++j) {
-        const double b = m.weights[glm::length_t(j)];
-        way -= b * h * v[c.corners[j]];
-        weight += b * b * inverse_masses[c.corners[j]] * counts[c.corners[j]];
+    for (const auto& [vertices, m] : contacts) {
+      glm::dvec3 way(0);
+      double weight = 0;
+      for (std::size_t j = 0; j < 4; ++j) {
+        const double b = m.weights[j];
+        way += b * h * v[vertices[j]];
+        weight += b * b * inverse_masses[vertices[j]] * counts[vertices[j]];
       }
       if (!(weight > 0)) continue;
       const double push_most = cell_ / 12;  // push.comp
       const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, friction_);
-      const auto add = [&](std::uint32_t i, double factor) {
-        factor *= inverse_masses[i] / weight;
-        x[i] += factor * (by.stopped + by.pushed), stopped[i] += factor * by.stopped;
-      };
-      add(c.vertex, 1);
-      for (std::size_t j = 0; j < 3; ++j) add(c.corners[j], -m.weights[glm::length_t(j)]);
+      for (std::size_t j = 0; j < 4; ++j) {
+        const double factor = m.weights[j] * inverse_masses[vertices[j]] / weight;
+        x[vertices[j]] += factor * (by.stopped + by.pushed), stopped[vertices[j]] += factor * by.stopped;
+      }
     }
     for (std::size_t i = 0; i < x.size(); ++i) v[i] += stopped[i] / h;
   }
 
  private:
+  using Meeting = Formulas<double>::Meeting;
   struct Contact {
-    std::uint32_t vertex;
-    std::array<std::uint32_t, 3> corners;
-    Formulas<double>::Meeting meeting;
+    std::array<std::uint32_t, 4> vertices;
+    Meeting meeting;
   };
   using Cell = std::array<int, 3>;
   struct Hash {
@@ -76,35 +71,43 @@ class PairContact {
       for (int y = first.y; y <= last.y; ++y)
         for (int x = first.x; x <= last.x; ++x) f(Cell{x, y, z});
   }
-  bool neighbours(std::uint32_t i, const std::array<std::uint32_t, 4>& t) const {
-    const auto& rest = model_.rest.positions;
-    for (std::size_t c = 0; c < 3; ++c)
-      if (glm::distance(rest[i], rest[t[c]]) < 2 * cell_) return true;
-    return false;
+  bool neighbours(std::uint32_t a, std::uint32_t b, std::uint32_t body) const {
+    const double apart = mesh_.thicknesses[body] > 0 ? 0 : 2 * cell_;
+    return glm::distance(model_.rest.positions[a], model_.rest.positions[b]) <= apart;
   }
-  // The triangle that each vertex is in, if any: the nearest within the margin.
-  std::vector<Contact> find(const std::vector<glm::dvec3>& x, double margin) const {
-    struct Box {
-      glm::dvec3 low{1e30}, high{-1e30};
-    };
-    std::vector<Box> boxes(model_.bodies.size());
-    for (const auto& [vertex, body, thickness] : mesh_.vertices) {
-      boxes[body].low = glm::min(boxes[body].low, x[vertex]);
-      boxes[body].high = glm::max(boxes[body].high, x[vertex]);
-    }
-    const auto near_another = [&](std::uint32_t body, const glm::dvec3& low, const glm::dvec3& high) {
+  struct Near {  // whether another body is there, or the same is asked for as well
+    std::vector<Bounds> boxes;
+    bool self;
+    bool operator()(std::uint32_t body, const glm::dvec3& low, const glm::dvec3& high) const {
       for (std::uint32_t b = 0; b < boxes.size(); ++b)
         if (b != body && glm::all(glm::greaterThanEqual(high, boxes[b].low)) &&
             glm::all(glm::lessThanEqual(low, boxes[b].high)))
           return true;
-      return self_;
-    };
-    std::unordered_map<Cell, std::vector<std::uint32_t>, Hash> grid;
+      return self;
+    }
+  };
+  using Grid = std::unordered_map<Cell, std::vector<std::uint32_t>, Hash>;
+  // The triangle that each vertex is in, and the edge that each sharp one has crossed, if any: the nearest
+  // within the margin.
+  std::vector<Contact> find(const std::vector<glm::dvec3>& x, double margin) {
+    Near near{std::vector<Bounds>(model_.bodies.size(), Bounds{glm::dvec3(1e30), glm::dvec3(-1e30)}), self_};
+    for (const auto& [vertex, body] : mesh_.vertices) {
+      near.boxes[body].low = glm::min(near.boxes[body].low, x[vertex]);
+      near.boxes[body].high = glm::max(near.boxes[body].high, x[vertex]);
+    }
+    std::vector<Contact> contacts;
+    find_vertices(x, margin, near, contacts);
+    find_edges(x, margin, near, contacts);
+    return contacts;
+  }
+  void find_vertices(const std::vector<glm::dvec3>& x, double margin, const Near& near,
+                     std::vector<Contact>& contacts) {
+    Grid grid;
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto& [i, j, k, body] = mesh_.triangles[t];
       const glm::dvec3 low = glm::min(x[i], glm::min(x[j], x[k])),
                        high = glm::max(x[i], glm::max(x[j], x[k]));
-      if (near_another(body, low - margin, high + margin))
+      if (near(body, low - margin, high + margin))
         for_each_cell(low, high, [&](const Cell& cell) { grid[cell].push_back(t); });
     }
     std::vector<glm::dvec3> normals(x.size(), glm::dvec3(0));
@@ -113,33 +116,102 @@ class PairContact {
       if (const double area = glm::length(n); area > 0)
         for (const std::uint32_t v : {i, j, k}) normals[v] += n / area;
     }
-    std::vector<Contact> contacts;
-    for (const auto& [vertex, body, thickness] : mesh_.vertices) {
+    std::vector<Held> held(mesh_.vertices.size());
+    for (std::size_t s = 0; s < mesh_.vertices.size(); ++s) {
+      const auto& [vertex, body] = mesh_.vertices[s];
       const glm::dvec3 own = x[vertex];
-      if (!near_another(body, own - margin, own + margin)) continue;
-      Contact best{vertex, {}, {}};
-      best.meeting.gap = best.meeting.rank = margin;
-      Formulas<double>::Meeting nearest = best.meeting;
+      if (!near(body, own - margin, own + margin)) continue;
+      const double thickness = double(mesh_.thicknesses[body]);
+      Contact best{};
+      best.meeting.rank = margin;
+      Meeting nearest = best.meeting;
+      nearest.gap = margin;
+      const Held was = s < held_.size() ? held_[s] : Held{};
       for_each_cell(own - margin, own + margin, [&](const Cell& cell) {
         const auto found = grid.find(cell);
         if (found == grid.end()) return;
         for (const std::uint32_t t : found->second) {
-          const auto& corners = mesh_.triangles[t];
-          if (corners[3] == body && (!self_ || neighbours(vertex, corners))) continue;
-          const auto m =
-              Formulas<double>{}.meet(x[corners[0]] - own, x[corners[1]] - own, x[corners[2]] - own);
+          const auto& [i, j, k, other] = mesh_.triangles[t];
+          if (other == body && (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) ||
+                                neighbours(vertex, k, body)))
+            continue;
+          const double other_thickness = double(mesh_.thicknesses[other]);
+          const glm::dvec3 a = x[i] - own, b = x[j] - own, c = x[k] - own;
+          auto m = Formulas<double>{}.meet(a, b, c);
+          bool under = false;
+          if (other_thickness > 0) {  // query.comp
+            under = was.target != none && share_a_vertex(was.target, t) ? was.under : glm::dot(m.face, a) > 0;
+            m = Formulas<double>{}.meet_sheet(a, b, c, under);
+          }
+          m.gap -= std::max(thickness, other_thickness);
           if (m.rank < nearest.rank) nearest = m;
-          if (!(thickness > 0) && !Formulas<double>{}.opposes(m, normals[vertex])) continue;
-          if (m.rank < best.meeting.rank)
-            best.meeting = m, std::copy_n(corners.begin(), 3, best.corners.begin());
+          const bool sheets = thickness > 0 || other_thickness > 0;
+          if (m.rank < best.meeting.rank && (sheets || Formulas<double>{}.opposes(m, normals[vertex])))
+            best = {{vertex, i, j, k}, m}, held[s] = {t, under};
         }
       });
-      best.meeting.gap -= double(thickness);
-      if (best.meeting.gap < 0 && nearest.gap <= double(thickness)) contacts.push_back(best);
+      if (best.meeting.rank < margin && best.meeting.gap < 0 && nearest.gap <= 0)
+        contacts.push_back(best);
+      else
+        held[s] = {};
     }
-    return contacts;
+    held_ = std::move(held);
+  }
+  void find_edges(const std::vector<glm::dvec3>& x, double margin, const Near& near,
+                  std::vector<Contact>& contacts) const {
+    Grid grid;
+    const auto box = [&](const PairMesh::Edge& e) { return bounds({x[e.vertex[0]], x[e.vertex[1]]}); };
+    for (std::uint32_t e = 0; e < mesh_.edges.size(); ++e) {
+      const Bounds b = box(mesh_.edges[e]);
+      if (near(mesh_.edges[e].body, b.low - margin, b.high + margin))
+        for_each_cell(b.low, b.high, [&](const Cell& cell) { grid[cell].push_back(e); });
+    }
+    for (std::size_t s = 0; s < mesh_.edges.size(); ++s) {
+      const PairMesh::Edge& own = mesh_.edges[s];
+      const Bounds b = box(own);
+      if (!near(own.body, b.low - margin, b.high + margin)) continue;
+      Contact best{};
+      best.meeting.rank = margin;
+      const auto from_own = [&](std::uint32_t i) { return x[i] - x[own.vertex[0]]; };
+      const glm::dvec3 p = from_own(own.vertex[1]), left = from_own(own.beside[0]),
+                       right = from_own(own.beside[1]);
+      for_each_cell(b.low - margin, b.high + margin, [&](const Cell& cell) {
+        const auto found = grid.find(cell);
+        if (found == grid.end()) return;
+        for (const std::uint32_t e : found->second) {
+          if (e <= s) continue;  // of two edges, the first looks for the second
+          const PairMesh::Edge& other = mesh_.edges[e];
+          if (other.body == own.body && (!self_ || std::ranges::any_of(own.vertex, [&](std::uint32_t i) {
+                return neighbours(i, other.vertex[0], own.body) || neighbours(i, other.vertex[1], own.body);
+              })))
+            continue;
+          const glm::dvec3 q = from_own(other.vertex[0]), r = from_own(other.vertex[1]),
+                           other_left = from_own(other.beside[0]), other_right = from_own(other.beside[1]);
+          Formulas<double> f;
+          const auto m = f.meet_edges(p, left, right, q, r, other_left, other_right);
+          if (!(m.gap < 0 && m.rank < best.meeting.rank)) continue;
+          const glm::dvec3 n = f.edge_normal(p, left, right),
+                           k = f.edge_normal(r - q, other_left - q, other_right - q);
+          if (glm::dot(n, k) < 0.3 * glm::length(n) * glm::length(k))
+            best = {{own.vertex[0], own.vertex[1], other.vertex[0], other.vertex[1]}, m};
+        }
+      });
+      if (best.meeting.rank < margin) contacts.push_back(best);
+    }
+  }
+  static constexpr std::uint32_t none = ~0u;
+  struct Held {  // the triangle that a vertex was in last, and on which side of it it belongs
+    std::uint32_t target = none;
+    bool under = false;
+  };
+  bool share_a_vertex(std::uint32_t a, std::uint32_t b) const {
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j)
+        if (mesh_.triangles[a][i] == mesh_.triangles[b][j]) return true;
+    return false;
   }
 
+  std::vector<Held> held_;  // by vertex of a surface
   const Model& model_;
   bool wanted_, self_;
   double friction_, cell_ = 1;

@@ -15,13 +15,27 @@ Explanation explain(Sim& sim, int timed_steps) {
     result.buffers.push_back({buffer.label(), buffer.bytes()});
     result.bytes += buffer.bytes();
   };
-  for (const Buffer* buffer :
-       {&sim.positions,       &sim.velocities,      &sim.predicted,        &sim.quantized[0],
-        &sim.quantized[1],    &sim.step_block,      &sim.guard_counts,     &sim.check.words,
-        &sim.check.read_back, &sim.check.positions, &sim.check.velocities, &sim.rigid_bodies,
-        &sim.shapes,          &sim.fields,          &p.mesh,       &p.rest,
-        &p.grid,      &p.lists,     &p.sums,       &p.empty,
-        &p.answer})
+  for (const Buffer* buffer : {&sim.positions,
+                               &sim.velocities,
+                               &sim.predicted,
+                               &sim.quantized[0],
+                               &sim.quantized[1],
+                               &sim.step_block,
+                               &sim.guard_counts,
+                               &sim.check.words,
+                               &sim.check.read_back,
+                               &sim.check.positions,
+                               &sim.check.velocities,
+                               &sim.rigid_bodies,
+                               &sim.shapes,
+                               &sim.fields,
+                               &p.mesh,
+                               &p.rest,
+                               &p.grid,
+                               &p.lists,
+                               &p.sums,
+                               &p.empty,
+                               &p.answer})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
@@ -63,7 +77,8 @@ Explanation explain(Sim& sim, int timed_steps) {
     }
     kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
   }
-  for (Pairs::Kernel* k : {&p.boxes, &p.insert, &p.query, &p.meet, &p.push, &p.apply})
+  for (Pairs::Kernel* k :
+       {&p.boxes, &p.cull, &p.insert, &p.query, &p.query_edges, &p.meet, &p.push, &p.apply})
     if (const auto [ms, count] = mean(k->timer); ms) {
       const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
       result.dispatches.push_back({k->program.label(), k->work_groups, per_step, 0, ms});

@@ -18,76 +18,20 @@ bool bodies_touch(const Model& model, const Settings& settings) {
   return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
 }
 
-// What a sheet keeps from others, as a part of its edges: between its vertices it would cut corners off them.
-constexpr double sheet_gap = 0.2;
-// rad. An edge that turns by less leaves at most a fifteenth of its length between its vertices.
-constexpr double sharp = 0.52;
-
-namespace {
-
-void add_sharp_edges(const TetMesh& rest, const Body& body, std::uint32_t number, PairMesh& mesh) {
-  struct Half {
-    std::uint32_t low, high, from, beside, triangle;
-  };
-  std::vector<Half> halves;
-  std::vector<glm::dvec3> normals;
-  for (std::size_t t = 0; t < body.triangles; ++t) {
-    const auto& corners = rest.surface[body.first_triangle + t];
-    const auto& [i, j, k] = corners;
-    const auto& x = rest.positions;
-    normals.push_back(glm::cross(x[j] - x[i], x[k] - x[i]));
-    for (std::size_t c = 0; c < 3; ++c) {
-      const std::uint32_t a = corners[c], b = corners[(c + 1) % 3];
-      halves.push_back({std::min(a, b), std::max(a, b), a, corners[(c + 2) % 3], std::uint32_t(t)});
-    }
-  }
-  std::ranges::sort(halves, [](const Half& a, const Half& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  for (std::size_t k = 0; k + 1 < halves.size(); ++k) {
-    const Half &a = halves[k], &b = halves[k + 1];
-    if (a.low != b.low || a.high != b.high || a.from == b.from) continue;
-    const glm::dvec3 &n = normals[a.triangle], &m = normals[b.triangle];
-    const bool convex = glm::dot(n, rest.positions[b.beside] - rest.positions[a.from]) < 0;
-    if (convex && glm::dot(n, m) < std::cos(sharp) * glm::length(n) * glm::length(m))
-      mesh.edges.push_back({{a.from, b.from}, {a.beside, b.beside}, number});
-  }
-}
-
-}  // namespace
-
-PairMesh pair_mesh(const Model& model) {
-  PairMesh mesh;
-  double length = 0;
-  for (std::uint32_t b = 0; b < model.bodies.size(); ++b) {
-    const Body& body = model.bodies[b];
-    std::vector<std::uint32_t> vertices;
-    double across = 0;  // its edges, one of each triangle
-    for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t) {
-      const auto& [i, j, k] = model.rest.surface[t];
-      mesh.triangles.push_back({i, j, k, b});
-      vertices.insert(vertices.end(), {i, j, k});
-      across += glm::distance(model.rest.positions[i], model.rest.positions[j]);
-    }
-    length += across;
-    if (!body.is_sheet()) add_sharp_edges(model.rest, body, b, mesh);
-    std::ranges::sort(vertices);
-    const auto rest = std::ranges::unique(vertices);
-    vertices.erase(rest.begin(), rest.end());
-    const double thickness = body.is_sheet() ? sheet_gap * across / double(body.triangles) : 0;
-    mesh.thicknesses.push_back(float(thickness));
-    for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b});
-    mesh.thickness = std::max(mesh.thickness, thickness);
-  }
-  mesh.edge = length / double(std::max<std::size_t>(mesh.triangles.size(), 1));
-  return mesh;
-}
-
 namespace {
 
 // pairs.glsl
-constexpr std::uint32_t counters = 11, box = 13, candidates = 8, group = 64;
-enum Counter { entries, records, groups, lane_groups = 5, overflown = 8, touching, deepest };
+constexpr std::uint32_t counters = 24, box = 13, candidates = 8, group = 64;
+enum Counter {
+  groups = 2,
+  lane_groups = 5,
+  insert_groups = 8,
+  query_groups = 11,
+  edge_groups = 14,
+  overflown = 21,
+  touching,
+  deepest
+};
 constexpr std::size_t entries_per_triangle = 16;
 
 float unsorted(std::uint32_t bits) {
@@ -115,21 +59,30 @@ void bind_pairs(const Sim& sim) {
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, p.lists.id());
 }
 
-void find_boxes(Pairs& p, bool timed) {
+// Of bodies, and of leaves as well.
+void find_boxes(Pairs& p, bool leaves, bool timed) {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   p.empty.copy_to(p.lists, 4 * counters, 4 * counters, p.empty.bytes() - 4 * counters);
+  p.boxes.work_groups = p.slices + (leaves ? p.leaves : 0);
   run(p.boxes, timed);
 }
 
 void find_candidates(Sim& sim, double margin) {
   Pairs& p = sim.pairs;
-  find_boxes(p, sim.kernels_timed);
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   p.empty.copy_to(p.lists, 0, 0, 4 * overflown);
+  p.boxes.program.use();
+  p.boxes.program.set("margin", float(margin + p.thickness));
+  find_boxes(p, true, sim.kernels_timed);
   const GLuint zero = 0;
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, p.grid.id());
   glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, 0, GLsizeiptr(p.cleared), GL_RED_INTEGER,
                        GL_UNSIGNED_INT, &zero);
-  for (Pairs::Kernel* kernel : {&p.insert, &p.query}) {
+  run(p.cull, sim.kernels_timed);
+  glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
+  run(p.insert, sim.kernels_timed);
+  for (Pairs::Kernel* kernel : {&p.query, &p.query_edges}) {
+    if (!kernel->counted_by) continue;
     kernel->program.use();
     kernel->program.set("margin", float(margin + p.thickness));
     run(*kernel, sim.kernels_timed);
@@ -173,7 +126,7 @@ void decide(Sim& sim, const std::vector<Extent>& bodies) {
   }
   if (!p.near) p.since = -1;
 }
-constexpr double spreads = 3;  // root mean squares that hold all of a body but a few
+constexpr double spreads = 2;  // root mean squares that hold all of a body but a few
 
 void take_answer(Sim& sim) {
   Pairs& p = sim.pairs;
@@ -217,8 +170,16 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     words.insert(words.end(), {vertex[0], vertex[1], beside[0], beside[1], body});
   const std::size_t vertices_at = words.size();
   for (const auto& [vertex, body] : surfaces.vertices) words.insert(words.end(), {vertex, body});
-  const std::size_t thicknesses_at = words.size();
-  for (const float thickness : surfaces.thicknesses) words.push_back(std::bit_cast<std::uint32_t>(thickness));
+  const std::size_t leaves_at = words.size(), leaves = surfaces.leaves.size();
+  for (const auto& [body, triangles, vertices, edges] : surfaces.leaves)
+    words.insert(words.end(),
+                 {body, triangles[0], triangles[1], vertices[0], vertices[1], edges[0], edges[1]});
+  const std::size_t bodies_at = words.size();
+  for (std::uint32_t b = 0, leaf = 0; b <= surfaces.thicknesses.size(); ++b) {
+    while (leaf < leaves && surfaces.leaves[leaf].body < b) ++leaf;
+    const bool there = b < surfaces.thicknesses.size();
+    words.insert(words.end(), {std::bit_cast<std::uint32_t>(there ? surfaces.thicknesses[b] : 0), leaf});
+  }
   const std::size_t slices_at = words.size();
   constexpr std::size_t slice = 1024;
   for (std::size_t first = 0; first < surfaces.vertices.size();) {
@@ -233,8 +194,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                     edges = surfaces.edges.size(), vertices = surfaces.vertices.size(),
                     items = vertices + edges, targets = triangles + edges, bodies = model.bodies.size();
   Pairs p;
-  p.margin = pair_margin(surfaces), p.thickness = surfaces.thickness;
-  p.triangles = triangles, p.vertices = vertices, p.items = items;
+  p.margin = (settings.contact == "self" ? 1 : 2) * pair_margin(surfaces), p.thickness = surfaces.thickness;
+  p.slices = slices, p.leaves = leaves, p.triangles = triangles, p.vertices = vertices, p.items = items;
   p.edges_at = edges_at, p.vertices_at = vertices_at, p.record_words = 2 + candidates;
   p.cells = std::bit_ceil(2 * triangles + 1);
   p.mesh = Buffer("surfaces", words);
@@ -247,11 +208,12 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
   p.cleared = 4 * entries_at, p.records_at = records_at;
   p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
-  p.lists = Buffer("contacts", 4 * (records_at + (3 + candidates) * items));
+  p.lists = Buffer("contacts", 4 * (records_at + (5 + candidates) * items + targets + 7 * leaves));
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
-  empty[groups + 1] = empty[groups + 2] = empty[lane_groups + 1] = empty[lane_groups + 2] = 1;
+  for (const std::size_t three : {groups, lane_groups, insert_groups, query_groups, edge_groups})
+    empty[three + 1] = empty[three + 2] = 1;
   for (std::size_t b = 0; b < bodies; ++b)
     for (const std::size_t low : {0, 6}) std::fill_n(&empty[counters + box * b + low], 3, ~0u);
   p.empty = Buffer("no contacts", empty);
@@ -266,7 +228,9 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                                     {"SURFACE_VERTICES", vertices},
                                     {"EDGES", edges},
                                     {"EDGES_AT", edges_at},
-                                    {"THICKNESSES_AT", thicknesses_at},
+                                    {"BODIES_AT", bodies_at},
+                                    {"LEAVES_AT", leaves_at},
+                                    {"LEAVES", leaves},
                                     {"CANDIDATES", candidates},
                                     {"LANES", lanes},
                                     {"CELLS", p.cells},
@@ -281,13 +245,17 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   defines.push_back(fmt::format("CELL {:.9g}", 1.2 * surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
+  defines.push_back("QUERY_EDGES 0");
   const auto kernel = [&](const char* name, std::size_t work_groups, int counted_by = 0) {
     return Pairs::Kernel{
         Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups, counted_by, {}};
   };
-  p.boxes = kernel("boxes", slices), p.insert = kernel("insert", groups_for(targets));
-  p.query = kernel("query", groups_for(lanes * items)), p.apply = kernel("apply", groups_for(vertices));
+  p.boxes = kernel("boxes", slices + leaves), p.cull = kernel("cull", leaves);
+  p.insert = kernel("insert", 0, insert_groups), p.query = kernel("query", 0, query_groups);
+  p.apply = kernel("apply", groups_for(vertices));
   p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
+  defines.back() = "QUERY_EDGES 1";
+  if (edges > 0) p.query_edges = kernel("query", 0, edge_groups);
   return p;
 }
 
@@ -297,7 +265,7 @@ void look_around(Sim& sim) {
   take_answer(sim);
   bind_pairs(sim);
   sim.positions.bind_storage(BIND_POSITIONS), sim.velocities.bind_storage(BIND_VELOCITIES);
-  if (!p.near || p.since < 0) find_boxes(p, sim.kernels_timed);
+  if (!p.near || p.since < 0) find_boxes(p, false, sim.kernels_timed);
   ask(p);
 }
 

@@ -23,7 +23,12 @@ struct PairMesh {
   struct Edge {
     std::uint32_t vertex[2], beside[2], body;  ///< ends; third vertices of the triangles left and right of it
   };
+  /// Some 64 triangles that are together at rest, with the vertices and edges that no leaf before has.
+  struct Leaf {
+    std::uint32_t body, triangles[2], vertices[2], edges[2];  ///< first and end
+  };
   std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
+  std::vector<Leaf> leaves;
   std::vector<Edge> edges;         ///< of solids, where they are convex and sharp at rest
   std::vector<Item> vertices;      ///< each once, by body
   std::vector<float> thicknesses;  ///< m, by body: how near a sheet lets others come; of solids 0
@@ -51,8 +56,9 @@ struct Pairs : PairNumbers {
     int counted_by = 0;
     Timer timer;
   };
-  Kernel boxes, insert, query, meet, push, apply;
-  std::size_t triangles = 0, vertices = 0, items = 0;  ///< vertices of surfaces and sharp edges
+  Kernel boxes, cull, insert, query, query_edges, meet, push, apply;
+  std::size_t slices = 0, leaves = 0, triangles = 0, vertices = 0,
+              items = 0;  ///< vertices of surfaces and sharp edges
   std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
   std::size_t cells = 0, cleared = 0;  ///< of the grid, bytes for each detection
   double margin = 0;                   ///< m, of slow bodies

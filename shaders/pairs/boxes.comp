@@ -1,13 +1,53 @@
 // The box around the surface of each body, and how fast it goes: that around the mean velocities of its slices, and the largest root mean square of
-// what a slice deviates from its mean. A single vertex that shakes changes little of this. A work-group per slice.
+// what a slice deviates from its mean. A single vertex that shakes changes little of this. A work-group per slice; behind these, where candidates are
+// looked for, one per leaf for its box and how far its items look.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_VELOCITIES) restrict readonly buffer Velocities { Velocity velocities[]; };
 shared vec3 lows[GROUP_SIZE], highs[GROUP_SIZE];
 shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares
+void gather(uint i, inout vec3 low, inout vec3 high) {
+  vec3 x = positions[i].high;
+  low = min(low, x), high = max(high, x);
+}
+void gather(uint s, inout float reach) {
+  if (pair_lists[HELD + s] != NONE) reach = max(reach, reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])));
+}
+void leaf_box(uint leaf, uint lane) {
+  vec3 low = vec3(1e30), high = vec3(-1e30);
+  float reach = margin;
+  for (uint t = of_leaf(leaf, 1u) + lane; t < of_leaf(leaf, 2u); t += GROUP_SIZE)
+    for (uint c = 0u; c < 3u; ++c) gather(triangle_vertex(t, c), low, high);
+  for (uint s = of_leaf(leaf, 3u) + lane; s < of_leaf(leaf, 4u); s += GROUP_SIZE) gather(s, reach);
+  for (uint e = of_leaf(leaf, 5u) + lane; e < of_leaf(leaf, 6u); e += GROUP_SIZE) {
+    gather(edge_vertex(e, 0u), low, high), gather(edge_vertex(e, 1u), low, high);
+    gather(SURFACE_VERTICES + e, reach);
+  }
+  lows[lane] = low, highs[lane] = high, speeds[lane] = vec4(reach);
+  barrier();
+  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
+    if (lane < half_size) {
+      lows[lane] = min(lows[lane], lows[lane + half_size]);
+      highs[lane] = max(highs[lane], highs[lane + half_size]);
+      speeds[lane] = max(speeds[lane], speeds[lane + half_size]);
+    }
+    barrier();
+  }
+  uint k = LEAF_BOXES + 7u * leaf;
+  if (lane < 3u) {
+    pair_lists[k + lane] = floatBitsToUint(lows[0][lane]);
+    pair_lists[k + 3u + lane] = floatBitsToUint(highs[0][lane]);
+  } else if (lane == 3u) {
+    pair_lists[k + 6u] = floatBitsToUint(speeds[0].x);
+    atomicMax(pair_lists[MOST_REACH], floatBitsToUint(speeds[0].x));
+  }
+}
 void main() {
   uint lane = gl_LocalInvocationIndex, slice = group_index();
-  if (slice >= SLICES) return;
+  if (slice >= SLICES) {
+    if (slice < SLICES + LEAVES) leaf_box(slice - SLICES, lane);
+    return;
+  }
   uint body = pair_mesh[SLICES_AT + 3u * slice], first = pair_mesh[SLICES_AT + 3u * slice + 1u], end = pair_mesh[SLICES_AT + 3u * slice + 2u];
   vec3 low = vec3(1e30), high = vec3(-1e30);
   vec4 speed = vec4(0.0);

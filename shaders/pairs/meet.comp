@@ -25,6 +25,7 @@ void main() {
   bool in_it = pushes && m.rank < none && m.gap < 0.0 && gaps[nearest] <= 0.0;
   pair_lists[k + 1u] = pair_lists[HELD + s] = in_it ? t : NONE;
   if (!in_it) return;
+  pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
   uvec4 vertices = vertices_of(s, t & TARGET);
   for (uint j = 0u; j < 4u; ++j)
     if (m.weights[j] != 0.0) atomicAdd(pair_sums[8u * vertices[j] + 3u], 1);

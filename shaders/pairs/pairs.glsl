@@ -5,7 +5,8 @@
 #include "pair.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 // Vertices of each triangle (x 3) and its body; sharp edges of solids: ends, third vertices of the triangles beside them, body; vertices of surfaces,
-// each with its body; slices of these that belong to one body (body, first, end); the thickness of each body.
+// each with its body; leaves (body, then first and end of their triangles, vertices and edges); of each body its thickness and its first leaf; slices
+// of the vertices that belong to one body (body, first, end).
 layout(std430, binding = BIND_PAIR_MESH) restrict readonly buffer PairMesh { uint pair_mesh[]; };
 uint triangle_vertex(uint t, uint corner) { return pair_mesh[4u * t + corner]; }
 uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
@@ -13,7 +14,9 @@ uint edge_vertex(uint e, uint k) { return pair_mesh[EDGES_AT + 5u * e + k]; }
 uint edge_body(uint e) { return pair_mesh[EDGES_AT + 5u * e + 4u]; }
 uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 2u * s]; }
 uint surface_body(uint s) { return pair_mesh[VERTICES_AT + 2u * s + 1u]; }
-float thickness_of(uint body) { return uintBitsToFloat(pair_mesh[THICKNESSES_AT + body]); }  // m, of a sheet, else 0
+float thickness_of(uint body) { return uintBitsToFloat(pair_mesh[BODIES_AT + 2u * body]); }  // m, of a sheet, else 0
+uint first_leaf(uint body) { return pair_mesh[BODIES_AT + 2u * body + 1u]; }
+uint of_leaf(uint leaf, uint k) { return pair_mesh[LEAVES_AT + 7u * leaf + k]; }
 // What may be in something: an ITEM is a vertex of a surface or, behind these, an edge; what it is in, a TARGET, a triangle or an edge.
 #define ITEMS (SURFACE_VERTICES + EDGES)
 #define TARGETS (TRIANGLES + EDGES)
@@ -33,51 +36,48 @@ uvec4 vertices_of(uint s, uint t) {
 layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
 // Counters; then of each body the box around its surface, that around the mean velocities of its slices, and how far from these the others are, as
 // numbers that sort like the floats; then records of vertices that have candidates.
-#define ENTRIES 0u     // of the grid
+#define ENTRIES 0u        // of the grid
 #define RECORDS 1u
-#define GROUPS 2u      // of work-groups for all records: three numbers for an indirect dispatch
-#define LANE_GROUPS 5u // the same with CANDIDATES invocations per record
-#define OVERFLOWN 8u   // entries that had no room
-#define TOUCHING 9u    // contacts, of all substeps since
-#define DEEPEST 10u    // m, as sortable
-#define BOXES 11u
+#define GROUPS 2u         // of work-groups for all records: three numbers for an indirect dispatch
+#define LANE_GROUPS 5u    // the same with CANDIDATES invocations per record
+#define INSERT_GROUPS 8u  // for targets of leaves that are near another body
+#define QUERY_GROUPS 11u  // for the vertices of these, LANES invocations each
+#define EDGE_GROUPS 14u   // for their edges
+#define NEAR_TARGETS 17u
+#define NEAR_VERTICES 18u
+#define NEAR_EDGES 19u
+#define MOST_REACH 20u  // m, of any leaf
+#define OVERFLOWN 21u   // entries that had no room
+#define TOUCHING 22u    // contacts, of all substeps since
+#define DEEPEST 23u     // m
+#define BOXES 24u
 #define BOX 13u
 #define RECORD (2u + CANDIDATES)  // item, the target it is in (NONE: none), candidates
 #define NONE 0xffffffffu
 #define BESIDE 0x80000000u  // of a candidate: it says whether the vertex is in the body, but does not push it
 #define UNDER 0x40000000u   // of a sheet's triangle: the vertex belongs on the side where it winds clockwise
 #define TARGET 0x3fffffffu
-#define HELD (RECORDS_AT + RECORD * ITEMS)  // then, of each item, the target that it was in last
+#define HELD (RECORDS_AT + RECORD * ITEMS)  // then, of each item, the target that it was in last, and how deep (m)
+#define DEPTHS (HELD + ITEMS)
+#define TARGETS_AT (DEPTHS + ITEMS)  // then the numbers of the targets, vertices and edges of leaves that are near another body, in any order
+#define NEAR_AT (TARGETS_AT + TARGETS)
+#define LEAF_BOXES (NEAR_AT + ITEMS)  // then low, high and reach of each leaf: how far its items look
 layout(std430, binding = BIND_PAIR_LISTS) restrict buffer PairLists { uint pair_lists[]; };
 // By vertex: the sum of what stops it in 32nds of a quantum, how many contacts it is part of, and the sum of what pushes it beside.
 #define PARTS 32.0
 layout(std430, binding = BIND_PAIR_SUMS) restrict buffer PairSums { int pair_sums[]; };
 uniform float margin;  // m, how near a candidate is
+float reach_of(float depth) { return max(margin, 1.05 * depth + 0.5 * margin); }  // of an item that is so deep in a body
 
 uint sortable(float x) {
   uint bits = floatBitsToUint(x);
   return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
 }
 float unsorted(uint bits) { return uintBitsToFloat((bits & 0x80000000u) != 0u ? bits & 0x7fffffffu : ~bits); }
-bool in_box(uint body, vec3 low, vec3 high) {
-  uint k = BOXES + BOX * body;
-  for (uint c = 0u; c < 3u; ++c)
-    if (high[c] < unsorted(pair_lists[k + c]) || low[c] > unsorted(pair_lists[k + 3u + c])) return false;
-  return true;
-}
-// Whether another body is there, or this one is asked for as well.
-bool near_another(uint body, vec3 low, vec3 high) {
-#if CONTACT_SELF
-  return true;
-#else
-  for (uint other = 0u; other < BODY_COUNT; ++other)
-    if (other != body && in_box(other, low, high)) return true;
-  return false;
-#endif
-}
 ivec3 cell_of(vec3 x) { return ivec3(floor(x / CELL)); }
 #define FIRST_ALONG_X 0x20000000u
 #define BODY_OF_ENTRY 0x1fffffffu
+const ivec3 edge_cells = ivec3(1 << 20);  // edges are in cells of their own, so that they do not look through all triangles
 uint hash_of(ivec3 cell) {
   uvec3 u = uvec3(cell) * uvec3(73856093u, 19349663u, 83492791u);
   uint h = u.x ^ u.y ^ u.z;

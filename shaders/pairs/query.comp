@@ -1,4 +1,4 @@
-// The candidates of each item, a vertex of a surface or a sharp edge: the nearest targets within the margin, of equally near ones those of the least
+// The candidates of each vertex of a surface or, with QUERY_EDGES, of each sharp edge: the nearest targets within the margin, of equally near ones those of the least
 // number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES invocations per item: each
 // looks into some of the cells; then each looks at some of the targets found there, and their lists are merged.
 #include "pairs/pairs.glsl"
@@ -34,21 +34,21 @@ void consider(uint t, float d) {
     t = t_out, d = d_out;
   }
 }
-// Item s, at `own` and with the vertex's normal `normal`, that was in `held`, and target t, of the same body or not.
+// Item s, at `own`, that was in `held`, and target t, of the same body or not; `normal` is that of a vertex.
+#if QUERY_EDGES
 void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
-#if EDGES
-  if (item_is_edge(s)) {
-    uint e = s - SURFACE_VERTICES, other = t - TRIANGLES;
-    uvec4 vertices = vertices_of(s, t);
-    vec3 p = from_own(vertices.y, own), q = from_own(vertices.z, own), r = from_own(vertices.w, own);
-    vec3 left = from_own(edge_vertex(e, 2u), own), right = from_own(edge_vertex(e, 3u), own);
-    vec3 other_left = from_own(edge_vertex(other, 2u), own), other_right = from_own(edge_vertex(other, 3u), own);
-    float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
-    vec3 own_normal = edge_normal(p, left, right), normal = edge_normal(r - q, other_left - q, other_right - q);
-    if (far <= distances[CANDIDATES - 1u] && dot(own_normal, normal) < 0.3 * length(own_normal) * length(normal)) consider(t, far);
-    return;
-  }
-#endif
+  uint e = s - SURFACE_VERTICES, other = t - TRIANGLES;
+  uvec4 vertices = vertices_of(s, t);
+  vec3 p = from_own(vertices.y, own), q = from_own(vertices.z, own), r = from_own(vertices.w, own);
+  vec3 left = from_own(edge_vertex(e, 2u), own), right = from_own(edge_vertex(e, 3u), own);
+  vec3 other_left = from_own(edge_vertex(other, 2u), own), other_right = from_own(edge_vertex(other, 3u), own);
+  float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
+  vec3 own_normal = edge_normal(p, left, right), other_normal = edge_normal(r - q, other_left - q, other_right - q);
+  if (far <= distances[CANDIDATES - 1u] && dot(own_normal, other_normal) < 0.3 * length(own_normal) * length(other_normal))
+    consider(t, far);
+}
+#else
+void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   vec3 a = from_own(triangle_vertex(t, 0u), own), b = from_own(triangle_vertex(t, 1u), own), c = from_own(triangle_vertex(t, 2u), own);
   vec3 beyond = max(max(min(a, min(b, c)), -max(a, max(b, c))), vec3(0.0));
   if (dot(beyond, beyond) > 1.01 * distances[CANDIDATES - 1u] * distances[CANDIDATES - 1u]) return;
@@ -72,12 +72,12 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 #endif
   if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
 }
+#endif
 #if LANES > 1
 #define WAITING 96u  // triangles per vertex; more are looked at at once, by lanes that wait for each other
 shared uint waiting[GROUP_SIZE / LANES][WAITING], waiting_count[GROUP_SIZE / LANES];
 shared uint lists[GROUP_SIZE][CANDIDATES];
 shared float list_distances[GROUP_SIZE][CANDIDATES];
-shared uint near_some[GROUP_SIZE / LANES];
 // Leaves the nearest of all lists in that of the first lane.
 void merge(uint lane) {
   for (uint half_size = LANES / 2u; half_size > 0u; half_size /= 2u) {
@@ -92,58 +92,43 @@ void merge(uint lane) {
   }
 }
 #endif
-// Whether another body is near, or this one is asked for as well; each lane asks about some of them.
-bool near_some_other(uint lane, uint part, uint body, vec3 low, vec3 high) {
-#if CONTACT_SELF || LANES == 1
-  return near_another(body, low, high);
-#else
-  if (lane == 0u) near_some[part] = 0u;
-  barrier();
-  for (uint other = lane; other < BODY_COUNT; other += LANES)
-    if (other != body && in_box(other, low, high)) near_some[part] = 1u;
-  barrier();
-  return near_some[part] != 0u;
-#endif
-}
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
-  uint s = group_index() * (GROUP_SIZE / LANES) + part;
-  bool there = s < ITEMS;
-  s = there ? s : 0u;
-  bool is_edge = item_is_edge(s);
-  uint i = is_edge ? edge_vertex(s - SURFACE_VERTICES, 0u) : surface_vertex(s), body = item_body(s);
+  uint number = group_index() * (GROUP_SIZE / LANES) + part;
+#if QUERY_EDGES
+  bool there = number < pair_lists[NEAR_EDGES];
+  uint s = there ? pair_lists[NEAR_AT + SURFACE_VERTICES + number] : SURFACE_VERTICES, e = s - SURFACE_VERTICES;
+  uint i = edge_vertex(e, 0u), body = edge_body(e);
+  vec3 end = positions[edge_vertex(e, 1u)].high, low = min(positions[i].high, end), high = max(positions[i].high, end);
+#else
+  bool there = number < pair_lists[NEAR_VERTICES];
+  uint s = there ? pair_lists[NEAR_AT + number] : 0u, i = surface_vertex(s), body = surface_body(s);
+  vec3 low = positions[i].high, high = low;
+#endif
   Pair own = Pair(positions[i].high, positions[i].low);
-  vec3 low = own.high, high = own.high;
-  if (is_edge) {
-    vec3 end = positions[edge_vertex(s - SURFACE_VERTICES, 1u)].high;
-    low = min(low, end), high = max(high, end);
-  }
   uint held = there ? pair_lists[HELD + s] : NONE;
-  float radius = margin;
-  if (held != NONE) {
-    float gap = abs(meeting_of(s, held).gap);
-    if (gap < 1e29) radius = max(margin, 1.05 * gap + 0.5 * margin);
-  }
+  float radius = held != NONE ? reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])) : margin;
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
 #if LANES > 1
   if (lane == 0u) waiting_count[part] = 0u;
   barrier();
 #endif
-  bool near = near_some_other(lane, part, body, low - radius, high + radius);
   vec3 normal = vec3(0.0);
-  if (there && near) {
-    if (!is_edge) normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
+  if (there) {
+    if (QUERY_EDGES == 0) normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
     ivec3 first = cell_of(low - radius), across = cell_of(high + radius) - first + 1;
     for (int c = int(lane); c < across.x * across.y * across.z; c += int(LANES)) {
       ivec3 cell = first + ivec3(c % across.x, c / across.x % across.y, c / (across.x * across.y));
       // A triangle that is in several of these cells is looked at in one of them: along each axis in its first or in the vertex's.
       uint known = (cell.x == first.x ? FIRST_ALONG_X : 0u) | (cell.y == first.y ? FIRST_ALONG_X << 1 : 0u) | (cell.z == first.z ? FIRST_ALONG_X << 2 : 0u);
-      for (uint entry = pair_grid[hash_of(cell)]; entry != 0u;) {
+      for (uint entry = pair_grid[hash_of(cell + QUERY_EDGES * edge_cells)]; entry != 0u;) {
         uint k = ENTRIES_AT + 3u * (entry - 1u), t = pair_grid[k], of_body = pair_grid[k + 1u];
         entry = pair_grid[k + 2u];
         if ((known | of_body | BODY_OF_ENTRY) != 0xffffffffu) continue;
-#if EDGES
-        if (is_edge ? t <= TRIANGLES + (s - SURFACE_VERTICES) : t >= TRIANGLES) continue;  // of two edges, the first looks for the second
+#if QUERY_EDGES
+        if (t <= TRIANGLES + e) continue;  // of two edges, the first looks for the second
+#elif EDGES
+        if (t >= TRIANGLES) continue;
 #endif
         of_body &= BODY_OF_ENTRY;
 #if CONTACT_SELF

@@ -1,5 +1,5 @@
 // One work-group: adds the partial sums into the row, then finds the centre of mass and the rotation that brings the rest
-// shape nearest (Horn 1987; method.md eq. 21: the largest eigenvector of a symmetric 4x4 matrix, here by cyclic Jacobi rotations).
+// shape nearest (Horn 1987: the largest eigenvector of a symmetric 4x4 matrix, here by cyclic Jacobi rotations).
 #include "metrics/reduce.glsl"
 
 void main() {

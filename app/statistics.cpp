@@ -41,6 +41,7 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"overlap_max", so_far.overlap.largest},
           {"overlap_999", so_far.overlap.part_999},
           {"overlap_vertices", so_far.overlap.inside},
+          {"overlap_triangles", so_far.overlap.triangles},
           {"finite", int(now.finite())}};
 }
 
@@ -65,7 +66,8 @@ ordered_json error_json(const RunErrors& errors) {
   const Measurement last = errors.last.value_or(nothing_measured());
   result["penetration_max"] = over_all(last.penetration_max, errors.penetration_max);
   result["penetration_999"] = over_all(last.penetration_999, errors.penetration_999);
-  for (const char* key : {"overlap_max", "overlap_999", "overlap_vertices"}) result[key] = all[key];
+  for (const char* key : {"overlap_max", "overlap_999", "overlap_vertices", "overlap_triangles"})
+    result[key] = all[key];
   return result;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <unordered_map>
 
 #include "sim/formulas.h"
@@ -28,6 +30,76 @@ bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x
   return at.x > 0 && at.y > 0 && at.z > 0 && at.x + at.y + at.z < 1;
 }
 
+// Whether an edge of one triangle goes through the other.
+bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vector<glm::dvec3>& x) {
+  const auto corner = [&](std::uint32_t t, std::size_t c) { return x[mesh.triangles[t][c % 3]]; };
+  for (const auto& [t, o] : {std::pair(a, b), std::pair(b, a)}) {
+    const glm::dvec3 n = glm::cross(corner(o, 1) - corner(o, 0), corner(o, 2) - corner(o, 0));
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double from = glm::dot(n, corner(t, c) - corner(o, 0)),
+                   to = glm::dot(n, corner(t, c + 1) - corner(o, 0));
+      if (!(from * to < 0)) continue;
+      const glm::dvec3 p = corner(t, c) + (corner(t, c + 1) - corner(t, c)) * (from / (from - to));
+      bool within = true;
+      for (std::size_t k = 0; k < 3; ++k)
+        within = within && glm::dot(glm::cross(corner(o, k + 1) - corner(o, k), p - corner(o, k)), n) > 0;
+      if (within) return true;
+    }
+  }
+  return false;
+}
+
+using Grid = std::unordered_map<Cell, std::vector<std::uint32_t>, CellHash>;
+template <class F>
+void for_each_cell(const Bounds& box, double cell, F&& f) {
+  const Cell low(glm::floor(box.low / cell)), high(glm::floor(box.high / cell));
+  for (Cell c = low; c.z <= high.z; ++c.z)
+    for (c.y = low.y; c.y <= high.y; ++c.y)
+      for (c.x = low.x; c.x <= high.x; ++c.x) f(c);
+}
+bool apart(const Bounds& a, const Bounds& b) {
+  return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
+}
+
+// Pairs, of different bodies or also of one.
+template <class F>
+std::size_t cutting_triangles(const PairMesh& mesh, const std::vector<glm::dvec3>& x, double cell, bool self,
+                              F&& meets_another) {
+  std::vector<Bounds> boxes;
+  Grid grid;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [i, j, k, body] = mesh.triangles[t];
+    boxes.push_back({glm::min(x[i], glm::min(x[j], x[k])), glm::max(x[i], glm::max(x[j], x[k]))});
+    if (meets_another(body, boxes[t]))
+      for_each_cell(boxes[t], cell, [&](const Cell& c) { grid[c].push_back(t); });
+  }
+  std::vector<std::size_t> counts(boxes.size(), 0);
+  parallel_for(
+      counts.size(),
+      [&](std::size_t t) {
+        std::vector<std::uint32_t> near;
+        for_each_cell(boxes[t], cell, [&](const Cell& c) {
+          if (const auto found = grid.find(c); found != grid.end())
+            std::ranges::copy_if(found->second, std::back_inserter(near),
+                                 [&](std::uint32_t o) { return o > t; });
+        });
+        std::ranges::sort(near);
+        const auto same = std::ranges::unique(near);
+        near.erase(same.begin(), same.end());
+        const auto& own = mesh.triangles[t];
+        for (const std::uint32_t o : near) {
+          const auto& other = mesh.triangles[o];
+          if (apart(boxes[t], boxes[o]) || (other[3] == own[3] && !self)) continue;
+          const bool joined = std::any_of(own.begin(), own.begin() + 3, [&](std::uint32_t v) {
+            return v == other[0] || v == other[1] || v == other[2];
+          });
+          counts[t] += !joined && cuts(mesh, std::uint32_t(t), o, x);
+        }
+      },
+      64);
+  return std::reduce(counts.begin(), counts.end());
+}
+
 }  // namespace
 
 Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool self) {
@@ -44,12 +116,10 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
   }
   const auto meets_another = [&](std::size_t body, const Bounds& box) {
     for (std::size_t b = 0; b < boxes.size(); ++b)
-      if (b != body && glm::all(glm::lessThan(box.low, boxes[b].high)) &&
-          glm::all(glm::lessThan(boxes[b].low, box.high)))
-        return true;
+      if (b != body && !apart(box, boxes[b])) return true;
     return self;
   };
-  std::unordered_map<Cell, std::vector<std::uint32_t>, CellHash> grid;
+  Grid grid;
   std::vector<std::uint32_t> body_of(model.rest.tets.size());
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
     for (std::size_t t = model.bodies[b].first_tet; t < model.bodies[b].first_tet + model.bodies[b].tets;
@@ -57,11 +127,8 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
       body_of[t] = b;
       const auto& [i, j, k, l] = model.rest.tets[t];
       const Bounds box = bounds({x[i], x[j], x[k], x[l]});
-      if (!meets_another(b, box)) continue;
-      const Cell low(glm::floor(box.low / cell)), high(glm::floor(box.high / cell));
-      for (Cell c = low; c.z <= high.z; ++c.z)
-        for (c.y = low.y; c.y <= high.y; ++c.y)
-          for (c.x = low.x; c.x <= high.x; ++c.x) grid[c].push_back(std::uint32_t(t));
+      if (meets_another(b, box))
+        for_each_cell(box, cell, [&](const Cell& c) { grid[c].push_back(std::uint32_t(t)); });
     }
   const auto depth = [&](const PairMesh::Item& item) {
     const auto found = grid.find(Cell(glm::floor(x[item.vertex] / cell)));
@@ -89,6 +156,7 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
   parallel_for(
       depths.size(), [&](std::size_t s) { depths[s] = depth(mesh.vertices[s]); }, 64);
   Overlap result;
+  result.triangles = cutting_triangles(mesh, x, cell, self, meets_another);
   if (!depths.empty()) result.deepest = std::ranges::max(depths);
   for (std::size_t s = 0; s < depths.size(); ++s) depths[s] /= sizes[mesh.vertices[s].body];
   result.inside = std::size_t(std::ranges::count_if(depths, [](double d) { return d > 0; }));
@@ -100,8 +168,8 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
 }
 
 Overlap largest(const Overlap& a, const Overlap& b) {
-  return {std::max(a.inside, b.inside), std::max(a.largest, b.largest), std::max(a.deepest, b.deepest),
-          std::max(a.part_999, b.part_999)};
+  return {std::max(a.inside, b.inside), std::max(a.triangles, b.triangles), std::max(a.largest, b.largest),
+          std::max(a.deepest, b.deepest), std::max(a.part_999, b.part_999)};
 }
 
 }  // namespace tetpbd

@@ -261,11 +261,20 @@ TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") 
   const Overlap apart =
       overlap_of(*blocks({{}, {{0.51, 0.03, 0.02}}}), blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
   CHECK(apart.inside == 0);
+  CHECK(apart.triangles == 0);
   CHECK(apart.largest == 0);
   const Overlap overlap = overlap_of(*model, model->positions, false);
   CHECK(overlap.inside == 32);  // 4 x 4 vertices of each face
   CHECK(overlap.largest == doctest::Approx(0.05 / (0.5 * std::sqrt(3.0))));
   CHECK(overlap.part_999 <= overlap.largest);
+  // Edges that cross where no vertex is inside.
+  const double r = std::sqrt(0.5);
+  Placed ridge{}, keel{{0.07, 0.7, 0.09}};
+  ridge.turn = glm::dmat3(1, 0, 0, 0, r, r, 0, -r, r), keel.turn = glm::dmat3(r, r, 0, -r, r, 0, 0, 0, 1);
+  const auto crossed = blocks({ridge, keel});
+  const Overlap cut = overlap_of(*crossed, crossed->positions, false);
+  CHECK(cut.inside == 0);
+  CHECK(cut.triangles == 4);  // two beside each edge
 }
 
 TEST_CASE("pairs: a block slides on another as friction says") {

@@ -10,6 +10,7 @@
 #include "app/scene.h"
 #include "sim/material.h"
 #include "sim/metrics.h"
+#include "sim/overlap.h"
 #include "sim/reference/objective.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
@@ -338,6 +339,7 @@ TEST_CASE("sheets: a ball and another sheet fall on one that is held, and stay o
     REQUIRE_FALSE(check_finite(sim, true));
     const State state = read_state(sim);
     CHECK(crossings(model->rest, state.positions) == 0);
+    CHECK(overlap_of(*model, state.positions, true).triangles == 0);
     const auto lowest = [&](std::size_t body) {
       double low = 1;
       for (std::size_t i = 0; i < model->bodies[body].vertices; ++i)
@@ -376,6 +378,9 @@ TEST_CASE("sheets: one that folds onto itself does not go through itself where t
       step(sim);
       if (s % 10 == 9) most = std::max(most, crossings(sheet, read_state(sim).positions));
     }
+    const auto end = read_state(sim).positions;
+    CHECK((overlap_of(*model, end, true).triangles == 0) == (crossings(sheet, end) == 0));
+    CHECK(overlap_of(*model, end, false).triangles == 0);
     REQUIRE_FALSE(check_finite(sim, true));
     if (contact == "none")
       through = most;

@@ -242,7 +242,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   defines.push_back(fmt::format("IMPLICIT {:d}", is_implicit(settings)));
   defines.push_back(fmt::format("SHEETS {:d}", surfaces.thickness > 0));
   defines.push_back(fmt::format("VERTICES {}u", model.positions.size()));
-  defines.push_back(fmt::format("CELL {:.9g}", 1.2 * surfaces.edge));
+  defines.push_back(fmt::format("EDGE {:.9g}", surfaces.edge));
+  defines.push_back(fmt::format("CELL {:.9g}", 2.1 * surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
   defines.push_back("QUERY_EDGES 0");
@@ -286,7 +287,10 @@ void touch(Sim& sim) {
   if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer)))
     find_candidates(sim, margin);
   ++p.since;
-  for (Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel, sim.kernels_timed);
+  // Implicit substeps are long, so what one pass leaves is much: rings sank in by 0.6 % after 1, 0.003
+  // after 8.
+  for (int pass = 0; pass < (is_implicit(s) ? 8 : 1); ++pass)
+    for (Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel, sim.kernels_timed);
 }
 
 void start_pairs(Sim& sim, const State& state) {

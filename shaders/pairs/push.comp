@@ -4,7 +4,7 @@ layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Po
 layout(std430, binding = BIND_VELOCITIES) restrict readonly buffer Velocities { Velocity velocities[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
-const float push_most = CELL / 12.0;  // m, a tenth of a mean edge, in a substep: so bodies that are deep in each other leave each other
+const float push_most = EDGE / 10.0;  // m, in a substep: so bodies that are deep in each other leave each other
 void add(uint i, uint at, vec3 correction) {
   ivec3 quanta = ivec3(round(clamp(correction, -params.body_size / PARTS, params.body_size / PARTS) * (params.inverse_quantum * PARTS)));
   for (uint c = 0u; c < 3u; ++c)

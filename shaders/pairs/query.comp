@@ -10,7 +10,7 @@ layout(std430, binding = BIND_PAIR_REST) restrict readonly buffer PairRest { vec
 // Of its own body an item meets what is not its neighbour at rest either; of a sheet, what it has no vertex in common with.
 bool is_neighbour(uint s, uint t) {
   uvec4 vertices = vertices_of(s, t);
-  float apart = thickness_of(item_body(s)) > 0.0 ? 0.0 : 2.0 * CELL;
+  float apart = thickness_of(item_body(s)) > 0.0 ? 0.0 : 2.4 * EDGE;
   uint own = item_is_edge(s) ? 2u : 1u;
   for (uint a = 0u; a < own; ++a)
     for (uint b = own; b < 4u; ++b)

@@ -81,7 +81,8 @@ Explanation explain(Sim& sim, int timed_steps) {
        {&p.boxes, &p.cull, &p.insert, &p.query, &p.query_edges, &p.meet, &p.push, &p.apply})
     if (const auto [ms, count] = mean(k->timer); ms) {
       const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
-      result.dispatches.push_back({k->program.label(), k->work_groups, per_step, 0, ms});
+      const std::string what = k == &p.query_edges ? " of edges" : "";
+      result.dispatches.push_back({k->program.label() + what, k->work_groups, per_step, 0, ms});
       result.ms_per_step += *ms * count / std::max(timed_steps, 1), result.dispatches_per_step += per_step;
     }
   return result;

@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numeric>
-#include <unordered_map>
 
+#include "sim/cell_grid.h"
 #include "sim/formulas.h"
 #include "sim/pairs.h"
 #include "sim/parallel.h"
@@ -13,13 +12,6 @@
 namespace tetpbd {
 
 namespace {
-
-using Cell = glm::ivec3;
-struct CellHash {
-  std::size_t operator()(const Cell& c) const {
-    return std::size_t(c.x) * 73856093u ^ std::size_t(c.y) * 19349663u ^ std::size_t(c.z) * 83492791u;
-  }
-};
 
 bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x) {
   const glm::dvec3& origin = x[tet[0]];
@@ -49,14 +41,6 @@ bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vec
   return false;
 }
 
-using Grid = std::unordered_map<Cell, std::vector<std::uint32_t>, CellHash>;
-template <class F>
-void for_each_cell(const Bounds& box, double cell, F&& f) {
-  const Cell low(glm::floor(box.low / cell)), high(glm::floor(box.high / cell));
-  for (Cell c = low; c.z <= high.z; ++c.z)
-    for (c.y = low.y; c.y <= high.y; ++c.y)
-      for (c.x = low.x; c.x <= high.x; ++c.x) f(c);
-}
 bool apart(const Bounds& a, const Bounds& b) {
   return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
 }
@@ -66,22 +50,19 @@ template <class F>
 std::size_t cutting_triangles(const PairMesh& mesh, const std::vector<glm::dvec3>& x, double cell, bool self,
                               F&& meets_another) {
   std::vector<Bounds> boxes;
-  Grid grid;
+  CellGrid grid(cell);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [i, j, k, body] = mesh.triangles[t];
     boxes.push_back({glm::min(x[i], glm::min(x[j], x[k])), glm::max(x[i], glm::max(x[j], x[k]))});
-    if (meets_another(body, boxes[t]))
-      for_each_cell(boxes[t], cell, [&](const Cell& c) { grid[c].push_back(t); });
+    if (meets_another(body, boxes[t])) grid.add(boxes[t], t);
   }
   std::vector<std::size_t> counts(boxes.size(), 0);
   parallel_for(
       counts.size(),
       [&](std::size_t t) {
         std::vector<std::uint32_t> near;
-        for_each_cell(boxes[t], cell, [&](const Cell& c) {
-          if (const auto found = grid.find(c); found != grid.end())
-            std::ranges::copy_if(found->second, std::back_inserter(near),
-                                 [&](std::uint32_t o) { return o > t; });
+        grid.for_each(boxes[t], [&](std::uint32_t o) {
+          if (o > t) near.push_back(o);
         });
         std::ranges::sort(near);
         const auto same = std::ranges::unique(near);
@@ -119,7 +100,7 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
       if (b != body && !apart(box, boxes[b])) return true;
     return self;
   };
-  Grid grid;
+  CellGrid grid(cell);
   std::vector<std::uint32_t> body_of(model.rest.tets.size());
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
     for (std::size_t t = model.bodies[b].first_tet; t < model.bodies[b].first_tet + model.bodies[b].tets;
@@ -127,20 +108,18 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
       body_of[t] = b;
       const auto& [i, j, k, l] = model.rest.tets[t];
       const Bounds box = bounds({x[i], x[j], x[k], x[l]});
-      if (meets_another(b, box))
-        for_each_cell(box, cell, [&](const Cell& c) { grid[c].push_back(std::uint32_t(t)); });
+      if (meets_another(b, box)) grid.add(box, std::uint32_t(t));
     }
   const auto depth = [&](const PairMesh::Item& item) {
-    const auto found = grid.find(Cell(glm::floor(x[item.vertex] / cell)));
-    if (found == grid.end()) return 0.0;
-    for (const std::uint32_t t : found->second) {
+    double depth = 0;  // in the first tet that it is in
+    grid.for_each({x[item.vertex], x[item.vertex]}, [&](std::uint32_t t) {
       const Tet& tet = model.rest.tets[t];
       const bool own = body_of[t] == item.body;
       if (own && (!self || std::ranges::any_of(tet, [&](std::uint32_t v) {
             return glm::distance(rest[v], rest[item.vertex]) < near;
           })))
-        continue;
-      if (!is_in(x[item.vertex], tet, x)) continue;
+        return;
+      if (depth > 0 || !is_in(x[item.vertex], tet, x)) return;
       double least = 1e30;
       for (const auto& [i, j, k, body] : mesh.triangles)
         if (body == body_of[t] && !(own && glm::distance(rest[i], rest[item.vertex]) < near)) {
@@ -148,9 +127,9 @@ Overlap overlap_of(const Model& model, const std::vector<glm::dvec3>& x, bool se
           const glm::dvec3 w = Formulas<double>{}.nearest_weights(a, b, c);
           least = std::min(least, glm::length(w.x * a + w.y * b + w.z * c));
         }
-      return least;
-    }
-    return 0.0;
+      depth = least;
+    });
+    return depth;
   };
   std::vector<double> depths(mesh.vertices.size());
   parallel_for(

@@ -44,7 +44,8 @@ void add_sharp_edges(const TetMesh& rest, const Body& body, std::uint32_t number
   }
 }
 
-// Triangles and vertices that are near each other at rest come together, body by body.
+}  // namespace
+
 void order_in_leaves(const TetMesh& rest, PairMesh& mesh) {
   constexpr std::size_t most = 64;  // triangles
   const Bounds box = bounds(rest.positions);
@@ -80,8 +81,6 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh) {
   }
 }
 
-}  // namespace
-
 PairMesh pair_mesh(const Model& model) {
   PairMesh mesh;
   double length = 0;
@@ -105,7 +104,6 @@ PairMesh pair_mesh(const Model& model) {
     for (const std::uint32_t v : vertices) mesh.vertices.push_back({v, b});
     mesh.thickness = std::max(mesh.thickness, thickness);
   }
-  order_in_leaves(model.rest, mesh);
   mesh.edge = length / double(std::max<std::size_t>(mesh.triangles.size(), 1));
   return mesh;
 }

@@ -161,7 +161,8 @@ void ask(Pairs& p) {
 
 Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,
                  const std::vector<std::string>& vertex_defines) {
-  const PairMesh surfaces = pair_mesh(model);
+  PairMesh surfaces = pair_mesh(model);
+  order_in_leaves(model.rest, surfaces);
   std::vector<std::uint32_t> words;
   for (const auto& triangle : surfaces.triangles) words.insert(words.end(), triangle.begin(), triangle.end());
   const std::size_t edges_at = words.size();

@@ -28,7 +28,7 @@ struct PairMesh {
     std::uint32_t body, triangles[2], vertices[2], edges[2];  ///< first and end
   };
   std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
-  std::vector<Leaf> leaves;
+  std::vector<Leaf> leaves;                             ///< none before order_in_leaves()
   std::vector<Edge> edges;         ///< of solids, where they are convex and sharp at rest
   std::vector<Item> vertices;      ///< each once, by body
   std::vector<float> thicknesses;  ///< m, by body: how near a sheet lets others come; of solids 0
@@ -36,6 +36,8 @@ struct PairMesh {
   double thickness = 0;            ///< m, the largest
 };
 PairMesh pair_mesh(const Model& model);
+/// Triangles, vertices and edges that are near each other at rest come together, body by body.
+void order_in_leaves(const TetMesh& rest, PairMesh& mesh);
 /// m: how near a candidate is, of bodies that move slowly, beside the thickness.
 inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 

@@ -5,7 +5,21 @@
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 layout(std430, binding = BIND_VELOCITIES) restrict readonly buffer Velocities { Velocity velocities[]; };
 shared vec3 lows[GROUP_SIZE], highs[GROUP_SIZE];
-shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares
+shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares, or reaches
+// Leaves the box of all invocations, and the sum of their speeds or the largest, at 0.
+void reduce(uint lane, vec3 low, vec3 high, vec4 speed, bool sum) {
+  lows[lane] = low, highs[lane] = high, speeds[lane] = speed;
+  barrier();
+  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
+    if (lane < half_size) {
+      lows[lane] = min(lows[lane], lows[lane + half_size]);
+      highs[lane] = max(highs[lane], highs[lane + half_size]);
+      vec4 other = speeds[lane + half_size];
+      speeds[lane] = sum ? speeds[lane] + other : max(speeds[lane], other);
+    }
+    barrier();
+  }
+}
 void gather(uint i, inout vec3 low, inout vec3 high) {
   vec3 x = positions[i].high;
   low = min(low, x), high = max(high, x);
@@ -23,16 +37,7 @@ void leaf_box(uint leaf, uint lane) {
     gather(edge_vertex(e, 0u), low, high), gather(edge_vertex(e, 1u), low, high);
     gather(SURFACE_VERTICES + e, reach);
   }
-  lows[lane] = low, highs[lane] = high, speeds[lane] = vec4(reach);
-  barrier();
-  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
-    if (lane < half_size) {
-      lows[lane] = min(lows[lane], lows[lane + half_size]);
-      highs[lane] = max(highs[lane], highs[lane + half_size]);
-      speeds[lane] = max(speeds[lane], speeds[lane + half_size]);
-    }
-    barrier();
-  }
+  reduce(lane, low, high, vec4(reach), false);
   uint k = LEAF_BOXES + 7u * leaf;
   if (lane < 3u) {
     pair_lists[k + lane] = floatBitsToUint(lows[0][lane]);
@@ -57,16 +62,7 @@ void main() {
     low = min(low, x), high = max(high, x);
     speed += vec4(v, dot(v, v));
   }
-  lows[lane] = low, highs[lane] = high, speeds[lane] = speed;
-  barrier();
-  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
-    if (lane < half_size) {
-      lows[lane] = min(lows[lane], lows[lane + half_size]);
-      highs[lane] = max(highs[lane], highs[lane + half_size]);
-      speeds[lane] += speeds[lane + half_size];
-    }
-    barrier();
-  }
+  reduce(lane, low, high, speed, true);
   uint k = BOXES + BOX * body;
   vec4 mean = speeds[0] / float(end - first);
   if (lane < 3u) {

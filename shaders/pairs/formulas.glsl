@@ -67,6 +67,11 @@ vec3 edge_normal(vec3 p, vec3 left, vec3 right) {
   vec3 a = cross(p, left), b = cross(right, p);
   return a * length(b) + b * length(a);
 }
+// Whether two such edges, each with the place of its first end, can have come into each other: those that look the same way have not.
+bool edges_oppose(vec3 p, vec3 left, vec3 right, vec3 q, vec3 r, vec3 other_left, vec3 other_right) {
+  vec3 n = edge_normal(p, left, right), other = edge_normal(r - q, other_left - q, other_right - q);
+  return dot(n, other) < real(0.3) * length(n) * length(other);
+}
 // Two edges, each with the third vertices of the triangles beside it; all places relative to the first end of the first. They are in each other where
 // the nearest point of each is behind both triangles of the other, as where two wedges cross. Else gap is far.
 Meeting meet_edges(vec3 p, vec3 left, vec3 right, vec3 q, vec3 r, vec3 other_left, vec3 other_right) {

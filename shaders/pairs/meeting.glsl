@@ -22,9 +22,8 @@ Meeting meeting_of(uint s, uint t) {
 #endif
 #if SHEETS
   float thickness = thickness_of(triangle_body(t));
-  bool sheet = thickness > 0.0;
   Meeting m;
-  if (sheet)
+  if (thickness > 0.0)
     m = meet_sheet(b, c, d, under);
   else
     m = meet(b, c, d);

@@ -1,6 +1,6 @@
-// The candidates of each vertex of a surface or, with QUERY_EDGES, of each sharp edge: the nearest targets within the margin, of equally near ones those of the least
-// number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES invocations per item: each
-// looks into some of the cells; then each looks at some of the targets found there, and their lists are merged.
+// The candidates of each vertex of a surface or, with QUERY_EDGES, of each sharp edge: the nearest targets within the margin, of equally near ones
+// those of the least number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES
+// invocations per item: each looks into some of the cells; then each looks at some of the targets found there, and their lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
@@ -43,9 +43,7 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   vec3 left = from_own(edge_vertex(e, 2u), own), right = from_own(edge_vertex(e, 3u), own);
   vec3 other_left = from_own(edge_vertex(other, 2u), own), other_right = from_own(edge_vertex(other, 3u), own);
   float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
-  vec3 own_normal = edge_normal(p, left, right), other_normal = edge_normal(r - q, other_left - q, other_right - q);
-  if (far <= distances[CANDIDATES - 1u] && dot(own_normal, other_normal) < 0.3 * length(own_normal) * length(other_normal))
-    consider(t, far);
+  if (far <= distances[CANDIDATES - 1u] && edges_oppose(p, left, right, q, r, other_left, other_right)) consider(t, far);
 }
 #else
 void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {

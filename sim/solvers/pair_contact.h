@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
+#include "sim/cell_grid.h"
 #include "sim/formulas.h"
 #include "sim/pairs.h"
 #include "sim/settings.h"
@@ -19,7 +19,7 @@ class PairContact {
         wanted_(bodies_touch(model, settings)),
         self_(settings.contact == "self"),
         friction_(settings.friction) {
-    if (wanted_) mesh_ = pair_mesh(model), cell_ = 1.2 * mesh_.edge;
+    if (wanted_) mesh_ = pair_mesh(model);
   }
   bool wanted() const { return wanted_; }
   /// After a substep of `h`: of places `x` and velocities `v`.
@@ -42,7 +42,7 @@ class PairContact {
         weight += b * b * inverse_masses[vertices[j]] * counts[vertices[j]];
       }
       if (!(weight > 0)) continue;
-      const double push_most = cell_ / 12;  // push.comp
+      const double push_most = mesh_.edge / 10;  // push.comp
       const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, friction_);
       for (std::size_t j = 0; j < 4; ++j) {
         const double factor = m.weights[j] * inverse_masses[vertices[j]] / weight;
@@ -58,21 +58,8 @@ class PairContact {
     std::array<std::uint32_t, 4> vertices;
     Meeting meeting;
   };
-  using Cell = std::array<int, 3>;
-  struct Hash {
-    std::size_t operator()(const Cell& c) const {
-      return std::size_t(c[0]) * 73856093u ^ std::size_t(c[1]) * 19349663u ^ std::size_t(c[2]) * 83492791u;
-    }
-  };
-  template <class F>
-  void for_each_cell(const glm::dvec3& low, const glm::dvec3& high, F&& f) const {
-    const glm::ivec3 first(glm::floor(low / cell_)), last(glm::floor(high / cell_));
-    for (int z = first.z; z <= last.z; ++z)
-      for (int y = first.y; y <= last.y; ++y)
-        for (int x = first.x; x <= last.x; ++x) f(Cell{x, y, z});
-  }
   bool neighbours(std::uint32_t a, std::uint32_t b, std::uint32_t body) const {
-    const double apart = mesh_.thicknesses[body] > 0 ? 0 : 2 * cell_;
+    const double apart = mesh_.thicknesses[body] > 0 ? 0 : 2.4 * mesh_.edge;
     return glm::distance(model_.rest.positions[a], model_.rest.positions[b]) <= apart;
   }
   struct Near {  // whether another body is there, or the same is asked for as well
@@ -86,7 +73,6 @@ class PairContact {
       return self;
     }
   };
-  using Grid = std::unordered_map<Cell, std::vector<std::uint32_t>, Hash>;
   // The triangle that each vertex is in, and the edge that each sharp one has crossed, if any: the nearest
   // within the margin.
   std::vector<Contact> find(const std::vector<glm::dvec3>& x, double margin) {
@@ -102,13 +88,12 @@ class PairContact {
   }
   void find_vertices(const std::vector<glm::dvec3>& x, double margin, const Near& near,
                      std::vector<Contact>& contacts) {
-    Grid grid;
+    CellGrid grid(1.2 * mesh_.edge);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto& [i, j, k, body] = mesh_.triangles[t];
       const glm::dvec3 low = glm::min(x[i], glm::min(x[j], x[k])),
                        high = glm::max(x[i], glm::max(x[j], x[k]));
-      if (near(body, low - margin, high + margin))
-        for_each_cell(low, high, [&](const Cell& cell) { grid[cell].push_back(t); });
+      if (near(body, low - margin, high + margin)) grid.add({low, high}, t);
     }
     std::vector<glm::dvec3> normals(x.size(), glm::dvec3(0));
     for (const auto& [i, j, k, body] : mesh_.triangles) {
@@ -127,28 +112,24 @@ class PairContact {
       Meeting nearest = best.meeting;
       nearest.gap = margin;
       const Held was = s < held_.size() ? held_[s] : Held{};
-      for_each_cell(own - margin, own + margin, [&](const Cell& cell) {
-        const auto found = grid.find(cell);
-        if (found == grid.end()) return;
-        for (const std::uint32_t t : found->second) {
-          const auto& [i, j, k, other] = mesh_.triangles[t];
-          if (other == body && (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) ||
-                                neighbours(vertex, k, body)))
-            continue;
-          const double other_thickness = double(mesh_.thicknesses[other]);
-          const glm::dvec3 a = x[i] - own, b = x[j] - own, c = x[k] - own;
-          auto m = Formulas<double>{}.meet(a, b, c);
-          bool under = false;
-          if (other_thickness > 0) {  // query.comp
-            under = was.target != none && share_a_vertex(was.target, t) ? was.under : glm::dot(m.face, a) > 0;
-            m = Formulas<double>{}.meet_sheet(a, b, c, under);
-          }
-          m.gap -= std::max(thickness, other_thickness);
-          if (m.rank < nearest.rank) nearest = m;
-          const bool sheets = thickness > 0 || other_thickness > 0;
-          if (m.rank < best.meeting.rank && (sheets || Formulas<double>{}.opposes(m, normals[vertex])))
-            best = {{vertex, i, j, k}, m}, held[s] = {t, under};
+      grid.for_each({own - margin, own + margin}, [&](std::uint32_t t) {
+        const auto& [i, j, k, other] = mesh_.triangles[t];
+        if (other == body && (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) ||
+                              neighbours(vertex, k, body)))
+          return;
+        const double other_thickness = double(mesh_.thicknesses[other]);
+        const glm::dvec3 a = x[i] - own, b = x[j] - own, c = x[k] - own;
+        auto m = Formulas<double>{}.meet(a, b, c);
+        bool under = false;
+        if (other_thickness > 0) {  // query.comp
+          under = was.target != none && share_a_vertex(was.target, t) ? was.under : glm::dot(m.face, a) > 0;
+          m = Formulas<double>{}.meet_sheet(a, b, c, under);
         }
+        m.gap -= std::max(thickness, other_thickness);
+        if (m.rank < nearest.rank) nearest = m;
+        const bool sheets = thickness > 0 || other_thickness > 0;
+        if (m.rank < best.meeting.rank && (sheets || Formulas<double>{}.opposes(m, normals[vertex])))
+          best = {{vertex, i, j, k}, m}, held[s] = {t, under};
       });
       if (best.meeting.rank < margin && best.meeting.gap < 0 && nearest.gap <= 0)
         contacts.push_back(best);
@@ -159,12 +140,11 @@ class PairContact {
   }
   void find_edges(const std::vector<glm::dvec3>& x, double margin, const Near& near,
                   std::vector<Contact>& contacts) const {
-    Grid grid;
+    CellGrid grid(1.2 * mesh_.edge);
     const auto box = [&](const PairMesh::Edge& e) { return bounds({x[e.vertex[0]], x[e.vertex[1]]}); };
     for (std::uint32_t e = 0; e < mesh_.edges.size(); ++e) {
       const Bounds b = box(mesh_.edges[e]);
-      if (near(mesh_.edges[e].body, b.low - margin, b.high + margin))
-        for_each_cell(b.low, b.high, [&](const Cell& cell) { grid[cell].push_back(e); });
+      if (near(mesh_.edges[e].body, b.low - margin, b.high + margin)) grid.add(b, e);
     }
     for (std::size_t s = 0; s < mesh_.edges.size(); ++s) {
       const PairMesh::Edge& own = mesh_.edges[s];
@@ -175,26 +155,20 @@ class PairContact {
       const auto from_own = [&](std::uint32_t i) { return x[i] - x[own.vertex[0]]; };
       const glm::dvec3 p = from_own(own.vertex[1]), left = from_own(own.beside[0]),
                        right = from_own(own.beside[1]);
-      for_each_cell(b.low - margin, b.high + margin, [&](const Cell& cell) {
-        const auto found = grid.find(cell);
-        if (found == grid.end()) return;
-        for (const std::uint32_t e : found->second) {
-          if (e <= s) continue;  // of two edges, the first looks for the second
-          const PairMesh::Edge& other = mesh_.edges[e];
-          if (other.body == own.body && (!self_ || std::ranges::any_of(own.vertex, [&](std::uint32_t i) {
-                return neighbours(i, other.vertex[0], own.body) || neighbours(i, other.vertex[1], own.body);
-              })))
-            continue;
-          const glm::dvec3 q = from_own(other.vertex[0]), r = from_own(other.vertex[1]),
-                           other_left = from_own(other.beside[0]), other_right = from_own(other.beside[1]);
-          Formulas<double> f;
-          const auto m = f.meet_edges(p, left, right, q, r, other_left, other_right);
-          if (!(m.gap < 0 && m.rank < best.meeting.rank)) continue;
-          const glm::dvec3 n = f.edge_normal(p, left, right),
-                           k = f.edge_normal(r - q, other_left - q, other_right - q);
-          if (glm::dot(n, k) < 0.3 * glm::length(n) * glm::length(k))
-            best = {{own.vertex[0], own.vertex[1], other.vertex[0], other.vertex[1]}, m};
-        }
+      grid.for_each({b.low - margin, b.high + margin}, [&](std::uint32_t e) {
+        if (e <= s) return;  // of two edges, the first looks for the second
+        const PairMesh::Edge& other = mesh_.edges[e];
+        if (other.body == own.body && (!self_ || std::ranges::any_of(own.vertex, [&](std::uint32_t i) {
+              return neighbours(i, other.vertex[0], own.body) || neighbours(i, other.vertex[1], own.body);
+            })))
+          return;
+        const glm::dvec3 q = from_own(other.vertex[0]), r = from_own(other.vertex[1]),
+                         other_left = from_own(other.beside[0]), other_right = from_own(other.beside[1]);
+        Formulas<double> f;
+        const auto m = f.meet_edges(p, left, right, q, r, other_left, other_right);
+        if (!(m.gap < 0 && m.rank < best.meeting.rank)) return;
+        if (f.edges_oppose(p, left, right, q, r, other_left, other_right))
+          best = {{own.vertex[0], own.vertex[1], other.vertex[0], other.vertex[1]}, m};
       });
       if (best.meeting.rank < margin) contacts.push_back(best);
     }
@@ -214,7 +188,7 @@ class PairContact {
   std::vector<Held> held_;  // by vertex of a surface
   const Model& model_;
   bool wanted_, self_;
-  double friction_, cell_ = 1;
+  double friction_;
   PairMesh mesh_;
 };
 

@@ -1,0 +1,44 @@
+// What is where: lists by cells of space, of what a box touches.
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "sim/mesh/tet_mesh.h"
+
+namespace tetpbd {
+
+class CellGrid {
+ public:
+  explicit CellGrid(double cell) : cell_(cell) {}  ///< m
+  void add(const Bounds& box, std::uint32_t what) {
+    for_each_cell(box, [&](const Cell& c) { lists_[c].push_back(what); });
+  }
+  /// Calls f with what is in the box's cells; what is in several of them comes several times.
+  template <class F>
+  void for_each(const Bounds& box, F&& f) const {
+    for_each_cell(box, [&](const Cell& c) {
+      if (const auto found = lists_.find(c); found != lists_.end())
+        for (const std::uint32_t what : found->second) f(what);
+    });
+  }
+
+ private:
+  using Cell = glm::ivec3;
+  struct Hash {
+    std::size_t operator()(const Cell& c) const {
+      return std::size_t(c.x) * 73856093u ^ std::size_t(c.y) * 19349663u ^ std::size_t(c.z) * 83492791u;
+    }
+  };
+  template <class F>
+  void for_each_cell(const Bounds& box, F&& f) const {
+    const Cell low(glm::floor(box.low / cell_)), high(glm::floor(box.high / cell_));
+    for (Cell c = low; c.z <= high.z; ++c.z)
+      for (c.y = low.y; c.y <= high.y; ++c.y)
+        for (c.x = low.x; c.x <= high.x; ++c.x) f(c);
+  }
+  double cell_;
+  std::unordered_map<Cell, std::vector<std::uint32_t>, Hash> lists_;
+};
+
+}  // namespace tetpbd

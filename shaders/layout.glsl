@@ -165,6 +165,7 @@ struct RigidRecord {
 #define BIND_PAIR_LISTS 16
 #define BIND_PAIR_SUMS 17
 #define BIND_PAIR_REST 18
+#define BIND_PAIR_SPHERES 19
 // Uniform blocks.
 #define BIND_STEP 0
 #define BIND_SHAPES 1

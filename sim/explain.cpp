@@ -78,7 +78,7 @@ Explanation explain(Sim& sim, int timed_steps) {
     kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
   }
   for (Pairs::Kernel* k :
-       {&p.boxes, &p.cull, &p.insert, &p.query, &p.query_edges, &p.meet, &p.push, &p.apply})
+       {&p.boxes, &p.cull, &p.insert, &p.query, &p.query_edges, &p.meet, &p.push})
     if (const auto [ms, count] = mean(k->timer); ms) {
       const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
       const std::string what = k == &p.query_edges ? " of edges" : "";

@@ -20,7 +20,7 @@ bool bodies_touch(const Model& model, const Settings& settings) {
 namespace {
 
 // pairs.glsl
-constexpr std::uint32_t counters = 24, box = 13, candidates = 8, group = 64;
+constexpr std::uint32_t counters = 24, box = 13, candidates = 8, record = 3 + candidates, group = 64;
 enum Counter {
   groups = 2,
   lane_groups = 5,
@@ -37,8 +37,6 @@ float unsorted(std::uint32_t bits) {
   return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
 }
 
-std::size_t groups_for(std::size_t items) { return (items + group - 1) / group; }
-
 void run(Pairs::Kernel& kernel, bool timed) {
   kernel.program.use();
   if (timed) kernel.timer.begin();
@@ -54,6 +52,7 @@ void bind_pairs(const Sim& sim) {
   const Pairs& p = sim.pairs;
   p.mesh.bind_storage(BIND_PAIR_MESH), p.grid.bind_storage(BIND_PAIR_GRID);
   p.lists.bind_storage(BIND_PAIR_LISTS), p.sums.bind_storage(BIND_PAIR_SUMS);
+  p.spheres.bind_storage(BIND_PAIR_SPHERES);
   if (p.rest) p.rest.bind_storage(BIND_PAIR_REST);
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, p.lists.id());
 }
@@ -196,7 +195,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   Pairs p;
   p.margin = (settings.contact == "self" ? 1 : 2) * pair_margin(surfaces), p.thickness = surfaces.thickness;
   p.slices = slices, p.leaves = leaves, p.triangles = triangles, p.vertices = vertices, p.items = items;
-  p.edges_at = edges_at, p.vertices_at = vertices_at, p.record_words = 2 + candidates;
+  p.edges_at = edges_at, p.vertices_at = vertices_at, p.record_words = record;
   p.cells = std::bit_ceil(2 * triangles + 1);
   p.mesh = Buffer("surfaces", words);
   if (settings.contact == "self") {
@@ -208,7 +207,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
   p.cleared = 4 * entries_at, p.records_at = records_at;
   p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
-  p.lists = Buffer("contacts", 4 * (records_at + (5 + candidates) * items + targets + 7 * leaves));
+  p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + targets + 7 * leaves));
+  p.spheres = Buffer("spheres around triangles", 16 * targets);
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
@@ -253,7 +253,6 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   };
   p.boxes = kernel("boxes", slices + leaves), p.cull = kernel("cull", leaves);
   p.insert = kernel("insert", 0, insert_groups), p.query = kernel("query", 0, query_groups);
-  p.apply = kernel("apply", groups_for(vertices));
   p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
   defines.back() = "QUERY_EDGES 1";
   if (edges > 0) p.query_edges = kernel("query", 0, edge_groups);
@@ -287,10 +286,15 @@ void touch(Sim& sim) {
   if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer)))
     find_candidates(sim, margin);
   ++p.since;
+  p.meet.program.use();
+  p.meet.program.set("substep", std::uint32_t(p.since));
+  // Corrections of one pass bring things nearer to those of the next.
+  p.meet.program.set("closed_most",
+                     is_implicit(s) ? 1e30f : float(std::max(closing, p.fastest + gained) * h));
   // Implicit substeps are long, so what one pass leaves is much: rings sank in by 0.6 % after 1, 0.003
   // after 8.
   for (int pass = 0; pass < (is_implicit(s) ? 8 : 1); ++pass)
-    for (Pairs::Kernel* kernel : {&p.meet, &p.push, &p.apply}) run(*kernel, sim.kernels_timed);
+    for (Pairs::Kernel* kernel : {&p.meet, &p.push}) run(*kernel, sim.kernels_timed);
 }
 
 void start_pairs(Sim& sim, const State& state) {

@@ -50,7 +50,7 @@ struct PairNumbers {
 /// Part of a Sim.
 struct Pairs : PairNumbers {
   static constexpr long every = 2;  ///< steps from one look at the boxes to the next
-  Buffer mesh, rest, grid, lists, sums, empty, answer;
+  Buffer mesh, rest, grid, spheres, lists, sums, empty, answer;
   Fence asked;
   struct Kernel {
     Program program;
@@ -58,7 +58,7 @@ struct Pairs : PairNumbers {
     int counted_by = 0;
     Timer timer;
   };
-  Kernel boxes, cull, insert, query, query_edges, meet, push, apply;
+  Kernel boxes, cull, insert, query, query_edges, meet, push;
   std::size_t slices = 0, leaves = 0, triangles = 0, vertices = 0,
               items = 0;  ///< vertices of surfaces and sharp edges
   std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists

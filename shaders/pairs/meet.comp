@@ -3,32 +3,43 @@
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
+uniform uint substep;       // since candidates were looked for
+uniform float closed_most;  // m, by which an item and a candidate may come nearer in a substep
 const float none = 1e30;
-shared float ranks[GROUP_SIZE], pushing_ranks[GROUP_SIZE], gaps[GROUP_SIZE];
+shared float ranks[GROUP_SIZE], pushing[GROUP_SIZE], gaps[GROUP_SIZE];  // pushing: ranks of those that may
 void main() {
   uint own_lane = gl_LocalInvocationIndex, first = own_lane / CANDIDATES * CANDIDATES, lane = own_lane - first;
   uint record = group_index() * (GROUP_SIZE / CANDIDATES) + own_lane / CANDIDATES, k = RECORDS_AT + RECORD * record;
-  bool there = record < pair_lists[RECORDS];
-  uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + 2u + lane] : NONE;
+  bool there = record < pair_lists[RECORDS] && pair_lists[k + 2u] <= substep;
+  uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + CANDIDATE + lane] : NONE;
   Meeting m;
   m.gap = m.rank = none;
-  bool pushes = t != NONE && (t & BESIDE) == 0u;
   if (t != NONE) m = meeting_of(s, t);
-  ranks[own_lane] = m.rank, pushing_ranks[own_lane] = pushes ? m.rank : none, gaps[own_lane] = m.gap;
+  bool may_push = t != NONE && (t & BESIDE) == 0u && (m.gap < 0.0 || !item_is_edge(s));
+  gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none;
   barrier();
   uint nearest = first, least = first;
-  for (uint c = first + 1u; c < first + CANDIDATES; ++c) {
+  float apart = none;  // m, from where any candidate would be crossed
+  for (uint c = first; c < first + CANDIDATES; ++c) {
     if (ranks[c] < ranks[nearest]) nearest = c;
-    if (pushing_ranks[c] < pushing_ranks[least]) least = c;
+    if (pushing[c] < pushing[least]) least = c;
+    apart = min(apart, gaps[c] < none ? abs(gaps[c]) : ranks[c]);
   }
   if (!there || own_lane != least) return;
-  bool in_it = pushes && m.rank < none && m.gap < 0.0 && gaps[nearest] <= 0.0;
-  pair_lists[k + 1u] = pair_lists[HELD + s] = in_it ? t : NONE;
-  if (!in_it) return;
+  bool pushes = may_push && m.gap < 0.0 && (gaps[nearest] <= 0.0 || item_is_edge(s));
+  pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
+  if (!pushes) {
+    pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
+    return;
+  }
   pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
   uvec4 vertices = vertices_of(s, t & TARGET);
-  for (uint j = 0u; j < 4u; ++j)
-    if (m.weights[j] != 0.0) atomicAdd(pair_sums[8u * vertices[j] + 3u], 1);
+  for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * vertices[j] + 3u], READER + (m.weights[j] != 0.0 ? 1 : 0));
+#if EDGES
+  uvec4 beside = beside_of(s, t & TARGET);
+  if (item_is_edge(s))
+    for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * beside[j] + 3u], READER);
+#endif
   atomicAdd(pair_lists[TOUCHING], 1u);
   atomicMax(pair_lists[DEEPEST], floatBitsToUint(-m.gap));
 }

@@ -13,11 +13,8 @@ Meeting meeting_of(uint s, uint t) {
   vec3 b = from_own(vertices.y, own), c = from_own(vertices.z, own), d = from_own(vertices.w, own);
 #if EDGES
   if (item_is_edge(s)) {
-    uint e = s - SURFACE_VERTICES, other = t - TRIANGLES;
-    Meeting m = meet_edges(b, from_own(edge_vertex(e, 2u), own), from_own(edge_vertex(e, 3u), own), c, d, from_own(edge_vertex(other, 2u), own),
-                     from_own(edge_vertex(other, 3u), own));
-    if (!(m.gap < 0.0)) m.rank = 1e30;  // the nearest that it is in is meant
-    return m;
+    uvec4 beside = beside_of(s, t);
+    return meet_edges(b, from_own(beside.x, own), from_own(beside.y, own), c, d, from_own(beside.z, own), from_own(beside.w, own));
   }
 #endif
 #if SHEETS

@@ -31,6 +31,14 @@ uvec4 vertices_of(uint s, uint t) {
   }
   return uvec4(surface_vertex(s), triangle_vertex(t, 0u), triangle_vertex(t, 1u), triangle_vertex(t, 2u));
 }
+#if EDGES
+// Third vertices of the triangles beside an edge and those beside another.
+uvec4 beside_of(uint s, uint t) {
+  if (!item_is_edge(s)) return uvec4(0u);
+  uint own = s - SURFACE_VERTICES, other = t - TRIANGLES;
+  return uvec4(edge_vertex(own, 2u), edge_vertex(own, 3u), edge_vertex(other, 2u), edge_vertex(other, 3u));
+}
+#endif
 // First entry of each cell (a hash of where it is) plus 1; normals of vertices, of 4096 for each of their triangles; then entries (triangle; its body
 // and, along each axis, whether the cell is the first that it is in; the next plus 1). Their order is chance, and plays no part.
 layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
@@ -52,7 +60,8 @@ layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_gr
 #define DEEPEST 23u     // m
 #define BOXES 24u
 #define BOX 13u
-#define RECORD (2u + CANDIDATES)  // item, the target it is in (NONE: none), candidates
+#define RECORD (3u + CANDIDATES)  // item, the target it is in (NONE: none), the substep in which to look again, candidates
+#define CANDIDATE 3u
 #define NONE 0xffffffffu
 #define BESIDE 0x80000000u  // of a candidate: it says whether the vertex is in the body, but does not push it
 #define UNDER 0x40000000u   // of a sheet's triangle: the vertex belongs on the side where it winds clockwise
@@ -63,7 +72,9 @@ layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_gr
 #define NEAR_AT (TARGETS_AT + TARGETS)
 #define LEAF_BOXES (NEAR_AT + ITEMS)  // then low, high and reach of each leaf: how far its items look
 layout(std430, binding = BIND_PAIR_LISTS) restrict buffer PairLists { uint pair_lists[]; };
-// By vertex: the sum of what stops it in 32nds of a quantum, how many contacts it is part of, and the sum of what pushes it beside.
+// By vertex: the sum of what stops it in 32nds of a quantum, how many contacts move it and, times READER, how many ask where it is, and the sum of what
+// pushes it beside.
+#define READER 0x10000
 #define PARTS 32.0
 layout(std430, binding = BIND_PAIR_SUMS) restrict buffer PairSums { int pair_sums[]; };
 uniform float margin;  // m, how near a candidate is

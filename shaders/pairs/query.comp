@@ -5,6 +5,7 @@
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
+layout(std430, binding = BIND_PAIR_SPHERES) restrict readonly buffer PairSpheres { vec4 pair_spheres[]; };  // around each target: centre, radius
 #if CONTACT_SELF
 layout(std430, binding = BIND_PAIR_REST) restrict readonly buffer PairRest { vec4 pair_rest[]; };  // places by vertex
 // Of its own body an item meets what is not its neighbour at rest either; of a sheet, what it has no vertex in common with.
@@ -37,11 +38,9 @@ void consider(uint t, float d) {
 // Item s, at `own`, that was in `held`, and target t, of the same body or not; `normal` is that of a vertex.
 #if QUERY_EDGES
 void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
-  uint e = s - SURFACE_VERTICES, other = t - TRIANGLES;
-  uvec4 vertices = vertices_of(s, t);
+  uvec4 vertices = vertices_of(s, t), beside = beside_of(s, t);
   vec3 p = from_own(vertices.y, own), q = from_own(vertices.z, own), r = from_own(vertices.w, own);
-  vec3 left = from_own(edge_vertex(e, 2u), own), right = from_own(edge_vertex(e, 3u), own);
-  vec3 other_left = from_own(edge_vertex(other, 2u), own), other_right = from_own(edge_vertex(other, 3u), own);
+  vec3 left = from_own(beside.x, own), right = from_own(beside.y, own), other_left = from_own(beside.z, own), other_right = from_own(beside.w, own);
   float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
   if (far <= distances[CANDIDATES - 1u] && edges_oppose(p, left, right, q, r, other_left, other_right)) consider(t, far);
 }
@@ -129,10 +128,11 @@ void main() {
         if (t >= TRIANGLES) continue;
 #endif
         of_body &= BODY_OF_ENTRY;
+        if (CONTACT_SELF == 0 && of_body == body) continue;
+        vec4 sphere = pair_spheres[t];
+        if (distance(sphere.xyz, 0.5 * (low + high)) > 0.5 * distance(low, high) + 1.01 * (radius + sphere.w)) continue;
 #if CONTACT_SELF
         if (of_body == body && is_neighbour(s, t)) continue;
-#else
-        if (of_body == body) continue;
 #endif
 #if LANES > 1
         uint slot = atomicAdd(waiting_count[part], 1u);
@@ -161,5 +161,6 @@ void main() {
   atomicMax(pair_lists[GROUPS], record / GROUP_SIZE + 1u);
   atomicMax(pair_lists[LANE_GROUPS], record / (GROUP_SIZE / CANDIDATES) + 1u);
   pair_lists[k] = s;
-  for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + 2u + c] = found[c];
+  pair_lists[k + 2u] = 0u;
+  for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + CANDIDATE + c] = found[c];
 }

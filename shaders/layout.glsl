@@ -161,11 +161,10 @@ struct RigidRecord {
 #define BIND_NEWTON_COARSE 13
 // Contact between bodies (pairs/pairs.glsl).
 #define BIND_PAIR_MESH 14
-#define BIND_PAIR_GRID 15
+#define BIND_PAIR_SPHERES 15
 #define BIND_PAIR_LISTS 16
 #define BIND_PAIR_SUMS 17
 #define BIND_PAIR_REST 18
-#define BIND_PAIR_SPHERES 19
 // Uniform blocks.
 #define BIND_STEP 0
 #define BIND_SHAPES 1

@@ -31,7 +31,7 @@ Explanation explain(Sim& sim, int timed_steps) {
                                &sim.fields,
                                &p.mesh,
                                &p.rest,
-                               &p.grid,
+                               &p.spheres,
                                &p.lists,
                                &p.sums,
                                &p.empty,
@@ -77,8 +77,7 @@ Explanation explain(Sim& sim, int timed_steps) {
     }
     kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
   }
-  for (Pairs::Kernel* k :
-       {&p.boxes, &p.cull, &p.insert, &p.query, &p.query_edges, &p.meet, &p.push})
+  for (Pairs::Kernel* k : {&p.boxes, &p.cull, &p.query, &p.query_edges, &p.meet, &p.push})
     if (const auto [ms, count] = mean(k->timer); ms) {
       const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
       const std::string what = k == &p.query_edges ? " of edges" : "";

@@ -20,18 +20,8 @@ bool bodies_touch(const Model& model, const Settings& settings) {
 namespace {
 
 // pairs.glsl
-constexpr std::uint32_t counters = 24, box = 13, candidates = 8, record = 3 + candidates, group = 64;
-enum Counter {
-  groups = 2,
-  lane_groups = 5,
-  insert_groups = 8,
-  query_groups = 11,
-  edge_groups = 14,
-  overflown = 21,
-  touching,
-  deepest
-};
-constexpr std::size_t entries_per_triangle = 16;
+constexpr std::uint32_t counters = 18, box = 13, candidates = 8, record = 3 + candidates, group = 64;
+enum Counter { groups = 2, lane_groups = 5, query_groups = 8, edge_groups = 11, touching = 16, deepest };
 
 float unsorted(std::uint32_t bits) {
   return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
@@ -50,9 +40,8 @@ void run(Pairs::Kernel& kernel, bool timed) {
 
 void bind_pairs(const Sim& sim) {
   const Pairs& p = sim.pairs;
-  p.mesh.bind_storage(BIND_PAIR_MESH), p.grid.bind_storage(BIND_PAIR_GRID);
+  p.mesh.bind_storage(BIND_PAIR_MESH), p.spheres.bind_storage(BIND_PAIR_SPHERES);
   p.lists.bind_storage(BIND_PAIR_LISTS), p.sums.bind_storage(BIND_PAIR_SUMS);
-  p.spheres.bind_storage(BIND_PAIR_SPHERES);
   if (p.rest) p.rest.bind_storage(BIND_PAIR_REST);
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, p.lists.id());
 }
@@ -68,17 +57,12 @@ void find_boxes(Pairs& p, bool leaves, bool timed) {
 void find_candidates(Sim& sim, double margin) {
   Pairs& p = sim.pairs;
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  p.empty.copy_to(p.lists, 0, 0, 4 * overflown);
+  p.empty.copy_to(p.lists, 0, 0, 4 * touching);
   p.boxes.program.use();
   p.boxes.program.set("margin", float(margin + p.thickness));
   find_boxes(p, true, sim.kernels_timed);
-  const GLuint zero = 0;
-  glBindBuffer(GL_SHADER_STORAGE_BUFFER, p.grid.id());
-  glClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, 0, GLsizeiptr(p.cleared), GL_RED_INTEGER,
-                       GL_UNSIGNED_INT, &zero);
   run(p.cull, sim.kernels_timed);
   glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
-  run(p.insert, sim.kernels_timed);
   for (Pairs::Kernel* kernel : {&p.query, &p.query_edges}) {
     if (!kernel->counted_by) continue;
     kernel->program.use();
@@ -130,10 +114,6 @@ void take_answer(Sim& sim) {
   Pairs& p = sim.pairs;
   const auto words = take<std::uint32_t>(p.asked, p.answer, "contacts", true);
   if (!words) return;
-  if ((*words)[overflown] > 0)
-    throw Error(
-        "contacts between bodies found no room", fmt::format("{} triangles", (*words)[overflown]),
-        "the bodies are torn out of shape, or their meshes differ too much in size: set contact to none");
   p.touches += (*words)[touching];
   p.deepest = std::max(p.deepest, double(std::bit_cast<float>((*words)[deepest])));
   std::vector<Extent> bodies(sim.model->bodies.size());
@@ -152,7 +132,7 @@ void take_answer(Sim& sim) {
 void ask(Pairs& p) {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   p.lists.copy_to(p.answer, 0, 0, p.answer.bytes());
-  p.empty.copy_to(p.lists, 4 * overflown, 4 * overflown, 4 * (counters - overflown));
+  p.empty.copy_to(p.lists, 4 * touching, 4 * touching, 4 * (counters - touching));
   p.asked = Fence::here();
 }
 
@@ -169,6 +149,16 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     words.insert(words.end(), {vertex[0], vertex[1], beside[0], beside[1], body});
   const std::size_t vertices_at = words.size();
   for (const auto& [vertex, body] : surfaces.vertices) words.insert(words.end(), {vertex, body});
+  const std::size_t around_at = words.size();
+  std::vector<std::vector<std::uint32_t>> around(model.positions.size());
+  for (std::uint32_t t = 0; t < surfaces.triangles.size(); ++t)
+    for (std::size_t c = 0; c < 3; ++c) around[surfaces.triangles[t][c]].push_back(t);
+  std::size_t start = around_at + surfaces.vertices.size() + 1;
+  for (const auto& [vertex, body] : surfaces.vertices)
+    words.push_back(std::uint32_t(std::exchange(start, start + around[vertex].size())));
+  words.push_back(std::uint32_t(start));
+  for (const auto& [vertex, body] : surfaces.vertices)
+    words.insert(words.end(), around[vertex].begin(), around[vertex].end());
   const std::size_t leaves_at = words.size(), leaves = surfaces.leaves.size();
   for (const auto& [body, triangles, vertices, edges] : surfaces.leaves)
     words.insert(words.end(),
@@ -196,23 +186,20 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   p.margin = (settings.contact == "self" ? 1 : 2) * pair_margin(surfaces), p.thickness = surfaces.thickness;
   p.slices = slices, p.leaves = leaves, p.triangles = triangles, p.vertices = vertices, p.items = items;
   p.edges_at = edges_at, p.vertices_at = vertices_at, p.record_words = record;
-  p.cells = std::bit_ceil(2 * triangles + 1);
   p.mesh = Buffer("surfaces", words);
   if (settings.contact == "self") {
     std::vector<glm::vec4> rest;
     for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
     p.rest = Buffer("surfaces at rest", rest);
   }
-  const std::size_t most = entries_per_triangle * targets + 1024, records_at = counters + box * bodies;
-  const std::size_t entries_at = p.cells + 3 * model.positions.size();  // behind normals of vertices
-  p.cleared = 4 * entries_at, p.records_at = records_at;
-  p.grid = Buffer("grid of triangles", 4 * (entries_at + 3 * most));
-  p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + targets + 7 * leaves));
+  const std::size_t records_at = counters + box * bodies;
+  p.records_at = records_at;
+  p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * group / lanes + 7) * leaves));
   p.spheres = Buffer("spheres around triangles", 16 * targets);
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
-  for (const std::size_t three : {groups, lane_groups, insert_groups, query_groups, edge_groups})
+  for (const std::size_t three : {groups, lane_groups, query_groups, edge_groups})
     empty[three + 1] = empty[three + 2] = 1;
   for (std::size_t b = 0; b < bodies; ++b)
     for (const std::size_t low : {0, 6}) std::fill_n(&empty[counters + box * b + low], 3, ~0u);
@@ -233,9 +220,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                                     {"LEAVES", leaves},
                                     {"CANDIDATES", candidates},
                                     {"LANES", lanes},
-                                    {"CELLS", p.cells},
-                                    {"ENTRIES_AT", entries_at},
-                                    {"MOST_ENTRIES", most},
+                                    {"AROUND_AT", around_at},
                                     {"RECORDS_AT", records_at},
                                     {"GROUP_SIZE", group}})
     defines.push_back(fmt::format("{} {}u", name, value));
@@ -243,7 +228,6 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   defines.push_back(fmt::format("SHEETS {:d}", surfaces.thickness > 0));
   defines.push_back(fmt::format("VERTICES {}u", model.positions.size()));
   defines.push_back(fmt::format("EDGE {:.9g}", surfaces.edge));
-  defines.push_back(fmt::format("CELL {:.9g}", 2.1 * surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
   defines.push_back("QUERY_EDGES 0");
@@ -252,7 +236,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
         Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups, counted_by, {}};
   };
   p.boxes = kernel("boxes", slices + leaves), p.cull = kernel("cull", leaves);
-  p.insert = kernel("insert", 0, insert_groups), p.query = kernel("query", 0, query_groups);
+  p.query = kernel("query", 0, query_groups);
   p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
   defines.back() = "QUERY_EDGES 1";
   if (edges > 0) p.query_edges = kernel("query", 0, edge_groups);

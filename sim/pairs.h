@@ -50,7 +50,7 @@ struct PairNumbers {
 /// Part of a Sim.
 struct Pairs : PairNumbers {
   static constexpr long every = 2;  ///< steps from one look at the boxes to the next
-  Buffer mesh, rest, grid, spheres, lists, sums, empty, answer;
+  Buffer mesh, rest, spheres, lists, sums, empty, answer;
   Fence asked;
   struct Kernel {
     Program program;
@@ -58,22 +58,21 @@ struct Pairs : PairNumbers {
     int counted_by = 0;
     Timer timer;
   };
-  Kernel boxes, cull, insert, query, query_edges, meet, push;
+  Kernel boxes, cull, query, query_edges, meet, push;
   std::size_t slices = 0, leaves = 0, triangles = 0, vertices = 0,
               items = 0;  ///< vertices of surfaces and sharp edges
   std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
-  std::size_t cells = 0, cleared = 0;  ///< of the grid, bytes for each detection
-  double margin = 0;                   ///< m, of slow bodies
-  double thickness = 0;                ///< m, the largest of a vertex
-  bool near = true;                    ///< bodies may touch before the answer after the next
-  double overlap = 0;                  ///< m, how deep they start in each other
-  double fastest = 0, closing = 0;     ///< m/s, any body, and two that are near, by the last answer
-  long since = -1;                     ///< substeps since candidates were looked for; below 0: never
+  double margin = 0;                                                            ///< m, of slow bodies
+  double thickness = 0;             ///< m, the largest of a vertex
+  bool near = true;                 ///< bodies may touch before the answer after the next
+  double overlap = 0;               ///< m, how deep they start in each other
+  double fastest = 0, closing = 0;  ///< m/s, any body, and two that are near, by the last answer
+  long since = -1;                  ///< substeps since candidates were looked for; below 0: never
   explicit operator bool() const { return bool(mesh); }
 };
 Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,
                  const std::vector<std::string>& vertex_defines);
-/// Before a step: takes the last answer and asks again. Throws Error if contacts had no room.
+/// Before a step: takes the last answer and asks again.
 void look_around(Sim& sim);
 /// After a substep's last dispatch: changes positions, velocities and what neighbours see next.
 void touch(Sim& sim);

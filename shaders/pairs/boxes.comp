@@ -20,9 +20,11 @@ void reduce(uint lane, vec3 low, vec3 high, vec4 speed, bool sum) {
     barrier();
   }
 }
-void gather(uint i, inout vec3 low, inout vec3 high) {
-  vec3 x = positions[i].high;
-  low = min(low, x), high = max(high, x);
+void target(uint t, uvec3 corners, inout vec3 low, inout vec3 high) {
+  vec3 a = positions[corners.x].high, b = positions[corners.y].high, c = positions[corners.z].high;
+  vec3 lowest = min(a, min(b, c)), highest = max(a, max(b, c)), centre = 0.5 * (lowest + highest);
+  pair_spheres[t] = vec4(centre, max(distance(a, centre), max(distance(b, centre), distance(c, centre))));
+  low = min(low, lowest), high = max(high, highest);
 }
 void gather(uint s, inout float reach) {
   if (pair_lists[HELD + s] != NONE) reach = max(reach, reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])));
@@ -31,10 +33,10 @@ void leaf_box(uint leaf, uint lane) {
   vec3 low = vec3(1e30), high = vec3(-1e30);
   float reach = margin;
   for (uint t = of_leaf(leaf, 1u) + lane; t < of_leaf(leaf, 2u); t += GROUP_SIZE)
-    for (uint c = 0u; c < 3u; ++c) gather(triangle_vertex(t, c), low, high);
+    target(t, uvec3(triangle_vertex(t, 0u), triangle_vertex(t, 1u), triangle_vertex(t, 2u)), low, high);
   for (uint s = of_leaf(leaf, 3u) + lane; s < of_leaf(leaf, 4u); s += GROUP_SIZE) gather(s, reach);
   for (uint e = of_leaf(leaf, 5u) + lane; e < of_leaf(leaf, 6u); e += GROUP_SIZE) {
-    gather(edge_vertex(e, 0u), low, high), gather(edge_vertex(e, 1u), low, high);
+    target(TRIANGLES + e, uvec3(edge_vertex(e, 0u), edge_vertex(e, 1u), edge_vertex(e, 1u)), low, high);
     gather(SURFACE_VERTICES + e, reach);
   }
   reduce(lane, low, high, vec4(reach), false);

@@ -5,8 +5,8 @@
 #include "pair.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 // Vertices of each triangle (x 3) and its body; sharp edges of solids: ends, third vertices of the triangles beside them, body; vertices of surfaces,
-// each with its body; leaves (body, then first and end of their triangles, vertices and edges); of each body its thickness and its first leaf; slices
-// of the vertices that belong to one body (body, first, end).
+// each with its body; where the triangles around each vertex start, and these; leaves (body, then first and end of their triangles, vertices and
+// edges); of each body its thickness and its first leaf; slices of the vertices that belong to one body (body, first, end).
 layout(std430, binding = BIND_PAIR_MESH) restrict readonly buffer PairMesh { uint pair_mesh[]; };
 uint triangle_vertex(uint t, uint corner) { return pair_mesh[4u * t + corner]; }
 uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
@@ -19,7 +19,6 @@ uint first_leaf(uint body) { return pair_mesh[BODIES_AT + 2u * body + 1u]; }
 uint of_leaf(uint leaf, uint k) { return pair_mesh[LEAVES_AT + 7u * leaf + k]; }
 // What may be in something: an ITEM is a vertex of a surface or, behind these, an edge; what it is in, a TARGET, a triangle or an edge.
 #define ITEMS (SURFACE_VERTICES + EDGES)
-#define TARGETS (TRIANGLES + EDGES)
 bool item_is_edge(uint s) { return EDGES > 0u && s >= SURFACE_VERTICES; }
 uint item_body(uint s) { return item_is_edge(s) ? edge_body(s - SURFACE_VERTICES) : surface_body(s); }
 uint target_body(uint t) { return EDGES > 0u && t >= TRIANGLES ? edge_body(t - TRIANGLES) : triangle_body(t); }
@@ -39,26 +38,21 @@ uvec4 beside_of(uint s, uint t) {
   return uvec4(edge_vertex(own, 2u), edge_vertex(own, 3u), edge_vertex(other, 2u), edge_vertex(other, 3u));
 }
 #endif
-// First entry of each cell (a hash of where it is) plus 1; normals of vertices, of 4096 for each of their triangles; then entries (triangle; its body
-// and, along each axis, whether the cell is the first that it is in; the next plus 1). Their order is chance, and plays no part.
-layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_grid[]; };
+// Around each target: centre, radius (m).
+layout(std430, binding = BIND_PAIR_SPHERES) restrict buffer PairSpheres { vec4 pair_spheres[]; };
 // Counters; then of each body the box around its surface, that around the mean velocities of its slices, and how far from these the others are, as
 // numbers that sort like the floats; then records of vertices that have candidates.
-#define ENTRIES 0u        // of the grid
+#define NEAR_VERTICES 0u  // of leaves that are near another body, with what fills groups
 #define RECORDS 1u
-#define GROUPS 2u         // of work-groups for all records: three numbers for an indirect dispatch
-#define LANE_GROUPS 5u    // the same with CANDIDATES invocations per record
-#define INSERT_GROUPS 8u  // for targets of leaves that are near another body
-#define QUERY_GROUPS 11u  // for the vertices of these, LANES invocations each
-#define EDGE_GROUPS 14u   // for their edges
-#define NEAR_TARGETS 17u
-#define NEAR_VERTICES 18u
-#define NEAR_EDGES 19u
-#define MOST_REACH 20u  // m, of any leaf
-#define OVERFLOWN 21u   // entries that had no room
-#define TOUCHING 22u    // contacts, of all substeps since
-#define DEEPEST 23u     // m
-#define BOXES 24u
+#define GROUPS 2u        // of work-groups for all records: three numbers for an indirect dispatch
+#define LANE_GROUPS 5u   // the same with CANDIDATES invocations per record
+#define QUERY_GROUPS 8u  // for the vertices of leaves that are near another body, LANES invocations each
+#define EDGE_GROUPS 11u  // for their edges
+#define NEAR_EDGES 14u
+#define MOST_REACH 15u  // m, of any leaf
+#define TOUCHING 16u    // contacts, of all substeps since
+#define DEEPEST 17u     // m
+#define BOXES 18u
 #define BOX 13u
 #define RECORD (3u + CANDIDATES)  // item, the target it is in (NONE: none), the substep in which to look again, candidates
 #define CANDIDATE 3u
@@ -68,9 +62,12 @@ layout(std430, binding = BIND_PAIR_GRID) restrict buffer PairGrid { uint pair_gr
 #define TARGET 0x3fffffffu
 #define HELD (RECORDS_AT + RECORD * ITEMS)  // then, of each item, the target that it was in last, and how deep (m)
 #define DEPTHS (HELD + ITEMS)
-#define TARGETS_AT (DEPTHS + ITEMS)  // then the numbers of the targets, vertices and edges of leaves that are near another body, in any order
-#define NEAR_AT (TARGETS_AT + TARGETS)
-#define LEAF_BOXES (NEAR_AT + ITEMS)  // then low, high and reach of each leaf: how far its items look
+// Then the numbers of the vertices of leaves that are near another body, and of their edges; leaves in any order, each in work-groups of its own, filled
+// with NONE.
+#define PER_GROUP (GROUP_SIZE / LANES)
+#define NEAR_AT (DEPTHS + ITEMS)
+#define NEAR_EDGES_AT (NEAR_AT + SURFACE_VERTICES + LEAVES * PER_GROUP)
+#define LEAF_BOXES (NEAR_EDGES_AT + EDGES + LEAVES * PER_GROUP)  // then low, high and reach of each leaf: how far its items look
 layout(std430, binding = BIND_PAIR_LISTS) restrict buffer PairLists { uint pair_lists[]; };
 // By vertex: the sum of what stops it in 32nds of a quantum, how many contacts move it and, times READER, how many ask where it is, and the sum of what
 // pushes it beside.
@@ -85,12 +82,20 @@ uint sortable(float x) {
   return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
 }
 float unsorted(uint bits) { return uintBitsToFloat((bits & 0x80000000u) != 0u ? bits & 0x7fffffffu : ~bits); }
-ivec3 cell_of(vec3 x) { return ivec3(floor(x / CELL)); }
-#define FIRST_ALONG_X 0x20000000u
-#define BODY_OF_ENTRY 0x1fffffffu
-const ivec3 edge_cells = ivec3(1 << 20);  // edges are in cells of their own, so that they do not look through all triangles
-uint hash_of(ivec3 cell) {
-  uvec3 u = uvec3(cell) * uvec3(73856093u, 19349663u, 83492791u);
-  uint h = u.x ^ u.y ^ u.z;
-  return (h ^ (h >> 15)) & (CELLS - 1u);
+vec3 low_of_leaf(uint leaf) {
+  uint k = LEAF_BOXES + 7u * leaf;
+  return uintBitsToFloat(uvec3(pair_lists[k], pair_lists[k + 1u], pair_lists[k + 2u]));
+}
+vec3 high_of_leaf(uint leaf) {
+  uint k = LEAF_BOXES + 7u * leaf + 3u;
+  return uintBitsToFloat(uvec3(pair_lists[k], pair_lists[k + 1u], pair_lists[k + 2u]));
+}
+bool in_leaf(uint leaf, vec3 low, vec3 high) {
+  return all(lessThanEqual(low, high_of_leaf(leaf))) && all(greaterThanEqual(high, low_of_leaf(leaf)));
+}
+bool in_body(uint body, vec3 low, vec3 high) {
+  uint k = BOXES + BOX * body;
+  for (uint c = 0u; c < 3u; ++c)
+    if (high[c] < unsorted(pair_lists[k + c]) || low[c] > unsorted(pair_lists[k + 3u + c])) return false;
+  return true;
 }

@@ -1,11 +1,11 @@
 // The candidates of each vertex of a surface or, with QUERY_EDGES, of each sharp edge: the nearest targets within the margin, of equally near ones
 // those of the least number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES
-// invocations per item: each looks into some of the cells; then each looks at some of the targets found there, and their lists are merged.
+// invocations per item: a work-group, whose items are of one leaf, first lists the targets near it; then each invocation tests some of these by their
+// spheres, looks at some that pass, and lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
-layout(std430, binding = BIND_PAIR_SPHERES) restrict readonly buffer PairSpheres { vec4 pair_spheres[]; };  // around each target: centre, radius
 #if CONTACT_SELF
 layout(std430, binding = BIND_PAIR_REST) restrict readonly buffer PairRest { vec4 pair_rest[]; };  // places by vertex
 // Of its own body an item meets what is not its neighbour at rest either; of a sheet, what it has no vertex in common with.
@@ -19,14 +19,25 @@ bool is_neighbour(uint s, uint t) {
   return false;
 }
 #endif
+#if QUERY_EDGES == 0
+// Of the sum of the normals of the triangles around a vertex, one of LANES parts.
+vec3 part_of_normal(uint s, uint lane) {
+  vec3 sum = vec3(0.0);
+  for (uint k = pair_mesh[AROUND_AT + s] + lane; k < pair_mesh[AROUND_AT + s + 1u]; k += LANES) {
+    uint t = pair_mesh[k];
+    vec3 a = positions[triangle_vertex(t, 0u)].high, n = cross(positions[triangle_vertex(t, 1u)].high - a, positions[triangle_vertex(t, 2u)].high - a);
+    float area = length(n);
+    if (area > 0.0) sum += n / area;
+  }
+  return sum;
+}
+#endif
 uint found[CANDIDATES];
 float distances[CANDIDATES];
 void consider(uint t, float d) {
   uint at = CANDIDATES;
-  for (uint k = CANDIDATES; k-- > 0u;) {
-    if (found[k] == t) return;
+  for (uint k = CANDIDATES; k-- > 0u;)
     if (d < distances[k] || (d == distances[k] && t < found[k])) at = k;
-  }
   for (uint k = 0u; k < CANDIDATES; ++k) {
     if (k < at) continue;
     uint t_out = found[k];
@@ -70,36 +81,56 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
 }
 #endif
+#define STAGED (GROUP_SIZE * CANDIDATES)  // beyond, each item looks through the leaves itself
+shared uint lists[STAGED], staged_count;  // first of targets that any item of the work-group may meet, then what each invocation found
 #if LANES > 1
 #define WAITING 96u  // triangles per vertex; more are looked at at once, by lanes that wait for each other
-shared uint waiting[GROUP_SIZE / LANES][WAITING], waiting_count[GROUP_SIZE / LANES];
-shared uint lists[GROUP_SIZE][CANDIDATES];
+shared uint waiting[PER_GROUP][WAITING], waiting_count[PER_GROUP];
 shared float list_distances[GROUP_SIZE][CANDIDATES];
 // Leaves the nearest of all lists in that of the first lane.
 void merge(uint lane) {
   for (uint half_size = LANES / 2u; half_size > 0u; half_size /= 2u) {
-    for (uint k = 0u; k < CANDIDATES; ++k) lists[gl_LocalInvocationIndex][k] = found[k], list_distances[gl_LocalInvocationIndex][k] = distances[k];
+    for (uint k = 0u; k < CANDIDATES; ++k) lists[gl_LocalInvocationIndex * CANDIDATES + k] = found[k], list_distances[gl_LocalInvocationIndex][k] = distances[k];
     barrier();
     if (lane < half_size) {
       uint from = gl_LocalInvocationIndex + half_size;
       for (uint k = 0u; k < CANDIDATES; ++k)
-        if (lists[from][k] != NONE && list_distances[from][k] <= distances[CANDIDATES - 1u]) consider(lists[from][k], list_distances[from][k]);
+        if (lists[from * CANDIDATES + k] != NONE && list_distances[from][k] <= distances[CANDIDATES - 1u])
+          consider(lists[from * CANDIDATES + k], list_distances[from][k]);
     }
     barrier();
   }
 }
 #endif
+shared vec3 lows[PER_GROUP], highs[PER_GROUP];  // of what each item looks at
+#define MOST_LEAVES 512u                        // beyond, through all
+shared uint leaves[MOST_LEAVES], leaf_count;
+#define BODY_WORDS ((BODY_COUNT + 31u) / 32u)
+shared uint near_bodies[BODY_WORDS], own_body;  // bits; that of all items of the work-group
+#if QUERY_EDGES == 0
+shared vec3 normals[GROUP_SIZE];
+#endif
+#if QUERY_EDGES
+uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
+uint end_of_targets(uint leaf) { return TRIANGLES + of_leaf(leaf, 6u); }
+#else
+uint first_target(uint leaf) { return of_leaf(leaf, 1u); }
+uint end_of_targets(uint leaf) { return of_leaf(leaf, 2u); }
+#endif
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
-  uint number = group_index() * (GROUP_SIZE / LANES) + part;
+  uint number = group_index() * PER_GROUP + part;
 #if QUERY_EDGES
-  bool there = number < pair_lists[NEAR_EDGES];
-  uint s = there ? pair_lists[NEAR_AT + SURFACE_VERTICES + number] : SURFACE_VERTICES, e = s - SURFACE_VERTICES;
-  uint i = edge_vertex(e, 0u), body = edge_body(e);
+  uint s = number < pair_lists[NEAR_EDGES] ? pair_lists[NEAR_EDGES_AT + number] : NONE;
+  bool there = s != NONE;
+  if (!there) s = SURFACE_VERTICES;
+  uint e = s - SURFACE_VERTICES, i = edge_vertex(e, 0u), body = edge_body(e);
   vec3 end = positions[edge_vertex(e, 1u)].high, low = min(positions[i].high, end), high = max(positions[i].high, end);
 #else
-  bool there = number < pair_lists[NEAR_VERTICES];
-  uint s = there ? pair_lists[NEAR_AT + number] : 0u, i = surface_vertex(s), body = surface_body(s);
+  uint s = number < pair_lists[NEAR_VERTICES] ? pair_lists[NEAR_AT + number] : NONE;
+  bool there = s != NONE;
+  if (!there) s = 0u;
+  uint i = surface_vertex(s), body = surface_body(s);
   vec3 low = positions[i].high, high = low;
 #endif
   Pair own = Pair(positions[i].high, positions[i].low);
@@ -108,41 +139,71 @@ void main() {
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
 #if LANES > 1
   if (lane == 0u) waiting_count[part] = 0u;
+#endif
+  vec3 centre = 0.5 * (low + high), normal = vec3(0.0);
+  float reach = 0.5 * distance(low, high) + 1.01 * radius;
+  low -= radius, high += radius;
+  if (lane == 0u) lows[part] = there ? low : vec3(1e30), highs[part] = there ? high : vec3(-1e30);
+  if (gl_LocalInvocationIndex == 0u) leaf_count = staged_count = 0u, own_body = body;
+  for (uint w = gl_LocalInvocationIndex; w < BODY_WORDS; w += GROUP_SIZE) near_bodies[w] = 0u;
+#if QUERY_EDGES == 0
+  if (there) normal = part_of_normal(s, lane);
+  normals[gl_LocalInvocationIndex] = normal;
+#endif
   barrier();
+#if QUERY_EDGES == 0
+  normal = vec3(0.0);
+  for (uint k = 0u; k < LANES; ++k) normal += normals[part * LANES + k];
 #endif
-  vec3 normal = vec3(0.0);
-  if (there) {
-    if (QUERY_EDGES == 0) normal = vec3(ivec3(pair_grid[CELLS + 3u * i], pair_grid[CELLS + 3u * i + 1u], pair_grid[CELLS + 3u * i + 2u]));
-    ivec3 first = cell_of(low - radius), across = cell_of(high + radius) - first + 1;
-    for (int c = int(lane); c < across.x * across.y * across.z; c += int(LANES)) {
-      ivec3 cell = first + ivec3(c % across.x, c / across.x % across.y, c / (across.x * across.y));
-      // A triangle that is in several of these cells is looked at in one of them: along each axis in its first or in the vertex's.
-      uint known = (cell.x == first.x ? FIRST_ALONG_X : 0u) | (cell.y == first.y ? FIRST_ALONG_X << 1 : 0u) | (cell.z == first.z ? FIRST_ALONG_X << 2 : 0u);
-      for (uint entry = pair_grid[hash_of(cell + QUERY_EDGES * edge_cells)]; entry != 0u;) {
-        uint k = ENTRIES_AT + 3u * (entry - 1u), t = pair_grid[k], of_body = pair_grid[k + 1u];
-        entry = pair_grid[k + 2u];
-        if ((known | of_body | BODY_OF_ENTRY) != 0xffffffffu) continue;
+  vec3 lowest = lows[0], highest = highs[0];
+  for (uint k = 1u; k < PER_GROUP; ++k) lowest = min(lowest, lows[k]), highest = max(highest, highs[k]);
+  for (uint other = gl_LocalInvocationIndex; other < BODY_COUNT; other += GROUP_SIZE)
+    if ((CONTACT_SELF != 0 || other != own_body) && in_body(other, lowest, highest)) atomicOr(near_bodies[other / 32u], 1u << (other % 32u));
+  barrier();
+  for (uint other = 0u; other < BODY_COUNT; ++other) {
+    if ((near_bodies[other / 32u] >> (other % 32u) & 1u) == 0u) continue;
+    for (uint l = first_leaf(other) + gl_LocalInvocationIndex; l < first_leaf(other + 1u); l += GROUP_SIZE) {
+      if (!in_leaf(l, lowest, highest)) continue;
+      uint slot = atomicAdd(leaf_count, 1u);
+      if (slot < MOST_LEAVES) leaves[slot] = l;
+    }
+  }
+  barrier();
+  for (uint n = 0u; n < min(leaf_count, MOST_LEAVES); ++n)
+    for (uint t = first_target(leaves[n]) + gl_LocalInvocationIndex; t < end_of_targets(leaves[n]); t += GROUP_SIZE) {
+      vec4 sphere = pair_spheres[t];
+      if (any(lessThan(sphere.xyz + 1.01 * sphere.w, lowest)) || any(greaterThan(sphere.xyz - 1.01 * sphere.w, highest))) continue;
+      uint slot = atomicAdd(staged_count, 1u);
+      if (slot < STAGED) lists[slot] = t;
+    }
+  barrier();
+  bool listed = leaf_count <= MOST_LEAVES, staged = listed && staged_count <= STAGED;
+  uint turns = !there ? 0u : staged ? 1u : listed ? leaf_count : LEAVES;
+  for (uint n = 0u; n < turns; ++n) {
+    uint leaf = listed ? leaves[n] : n;
+    if (!staged && !in_leaf(leaf, low, high)) continue;
+    uint end = staged ? staged_count : end_of_targets(leaf);
+    for (uint j = lane + (staged ? 0u : first_target(leaf)); j < end; j += LANES) {
+      uint t = staged ? lists[j] : j;
+      vec4 sphere = pair_spheres[t];
+      if (distance(sphere.xyz, centre) > reach + 1.01 * sphere.w) continue;
 #if QUERY_EDGES
-        if (t <= TRIANGLES + e) continue;  // of two edges, the first looks for the second
-#elif EDGES
-        if (t >= TRIANGLES) continue;
+      if (t <= TRIANGLES + e) continue;  // of two edges, the first looks for the second
 #endif
-        of_body &= BODY_OF_ENTRY;
-        if (CONTACT_SELF == 0 && of_body == body) continue;
-        vec4 sphere = pair_spheres[t];
-        if (distance(sphere.xyz, 0.5 * (low + high)) > 0.5 * distance(low, high) + 1.01 * (radius + sphere.w)) continue;
+      bool same_body = target_body(t) == body;
 #if CONTACT_SELF
-        if (of_body == body && is_neighbour(s, t)) continue;
+      if (same_body && is_neighbour(s, t)) continue;
+#else
+      if (same_body) continue;
 #endif
 #if LANES > 1
-        uint slot = atomicAdd(waiting_count[part], 1u);
-        if (slot < WAITING) {
-          waiting[part][slot] = t;
-          continue;
-        }
-#endif
-        look_at(s, t, of_body == body, own, held, normal);
+      uint slot = atomicAdd(waiting_count[part], 1u);
+      if (slot < WAITING) {
+        waiting[part][slot] = t;
+        continue;
       }
+#endif
+      look_at(s, t, same_body, own, held, normal);
     }
   }
 #if LANES > 1

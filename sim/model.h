@@ -16,6 +16,12 @@ struct Settings;
 struct State {
   std::vector<glm::dvec3> positions;   ///< m
   std::vector<glm::dvec3> velocities;  ///< m/s
+  /// The triangle that a vertex was in last, if any, and on which side of a sheet it belongs.
+  struct Held {
+    std::uint32_t target = ~0u;
+    bool under = false;
+  };
+  std::vector<Held> held{};  ///< by vertex of a surface, of CPU modes where bodies touch
 };
 
 /// A contiguous part of the rest mesh.

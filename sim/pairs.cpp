@@ -193,7 +193,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     p.rest = Buffer("surfaces at rest", rest);
   }
   const std::size_t records_at = counters + box * bodies;
-  p.records_at = records_at;
+  p.records_at = records_at, p.handed_on = 4 * (records_at + (record + 2) * items);
   p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * group / lanes + 7) * leaves));
   p.spheres = Buffer("spheres around triangles", 16 * targets);
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),

@@ -41,10 +41,15 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh);
 /// m: how near a candidate is, of bodies that move slowly, beside the thickness.
 inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 
+/// What a step hands on to the next.
 struct PairNumbers {
-  long detections = 0;        ///< since the start
-  std::uint64_t touches = 0;  ///< contacts, summed over substeps, since the start
-  double deepest = 0;         ///< m, the largest depth that a vertex came to in a substep
+  long detections = 0;              ///< since the start
+  std::uint64_t touches = 0;        ///< contacts, summed over substeps, since the start
+  double deepest = 0;               ///< m, the largest depth that a vertex came to in a substep
+  bool near = true;                 ///< bodies may touch before the answer after the next
+  double overlap = 0;               ///< m, how deep they start in each other
+  double fastest = 0, closing = 0;  ///< m/s, any body, and two that are near, by the last answer
+  long since = -1;                  ///< substeps since candidates were looked for; below 0: never
 };
 
 /// Part of a Sim.
@@ -63,11 +68,8 @@ struct Pairs : PairNumbers {
               items = 0;  ///< vertices of surfaces and sharp edges
   std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
   double margin = 0;                                                            ///< m, of slow bodies
-  double thickness = 0;             ///< m, the largest of a vertex
-  bool near = true;                 ///< bodies may touch before the answer after the next
-  double overlap = 0;               ///< m, how deep they start in each other
-  double fastest = 0, closing = 0;  ///< m/s, any body, and two that are near, by the last answer
-  long since = -1;                  ///< substeps since candidates were looked for; below 0: never
+  double thickness = 0;       ///< m, the largest of a vertex
+  std::size_t handed_on = 0;  ///< first bytes of lists that a step hands on to the next
   explicit operator bool() const { return bool(mesh); }
 };
 Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,

@@ -22,6 +22,7 @@ std::vector<Part> parts_of(const Sim& sim) {
   for (const auto& [buffer, first, bytes] : sim.solver.handed_on)
     parts.push_back({&sim.solver.buffers[buffer], first, bytes});
   if (sim.watch.answer) add(sim.watch.answer), parts.push_back({&sim.check.words, 8, 8});
+  if (sim.pairs) parts.push_back({&sim.pairs.lists, 0, sim.pairs.handed_on}), add(sim.pairs.answer);
   return parts;
 }
 
@@ -42,7 +43,9 @@ std::size_t snapshot_bytes(const Sim& sim) {
 }
 
 std::size_t snapshot_memory(const Sim& sim) {
-  return sizeof(Snapshot) + (on_cpu(sim) ? sim.model->positions.size() * 2 * sizeof(glm::dvec3) : 0);
+  const std::size_t of_host =
+      sim.model->positions.size() * 2 * sizeof(glm::dvec3) + sim.host.held.size() * sizeof(State::Held);
+  return sizeof(Snapshot) + (on_cpu(sim) ? of_host : 0);
 }
 
 Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
@@ -54,7 +57,9 @@ Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at) {
                  sim.read_index,
                  sim.rigid_side,
                  sim.watch,
+                 sim.pairs,
                  bool(sim.watch.asked),
+                 bool(sim.pairs.asked),
                  sim.check.found,
                  {},
                  at};
@@ -93,11 +98,15 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   if (exact) {
     static_cast<WatchNumbers&>(sim.watch) = then.watch;
     sim.watch.asked = then.asked ? Fence::here() : Fence();
+    static_cast<PairNumbers&>(sim.pairs) = then.pairs;
+    sim.pairs.asked = then.pairs_asked ? Fence::here() : Fence();
     sim.needs_predict = then.needs_predict;
   } else {
     forget_answers(sim);
     sim.watch.stiffer = 1, sim.watch.calm = 0;
     retime_velocities(sim, then.settings);
+    if (sim.pairs) start_pairs(sim, read_state(sim));
+    if (is_implicit(sim.settings) && sim.pairs && sim.pairs.near) set_finer(sim, finer_times);
   }
   write_shapes(sim);
   start_check(sim, nullptr);

@@ -14,7 +14,8 @@ struct Snapshot {
   bool needs_predict = true;
   unsigned read_index = 0, rigid_side = 0;
   WatchNumbers watch{};
-  bool asked = false;
+  PairNumbers pairs{};
+  bool asked = false, pairs_asked = false;
   std::optional<NonFinite> found{};
   std::optional<State> host{};  ///< of a CPU mode
   std::size_t at = 0;           ///< first byte in the buffer

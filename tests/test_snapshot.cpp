@@ -115,3 +115,47 @@ TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of the
     CHECK(state_hash(sim) == hashes.back());
   }
 }
+
+TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and after contact") {
+  GlTest gl;
+  for (const SolverMode& mode : solver_modes()) {
+    if (!mode.pairs) continue;
+    const bool cloth = !mode.leapfrog && !mode.implicit;  // on itself and on a block
+    CAPTURE(mode.name);
+    auto model = std::make_shared<Model>();
+    const TetMesh block = make_block(glm::dvec3(0.5), {3, 3, 3});
+    for (const double side : {-1.0, 1.0}) {
+      auto start = block.positions;
+      for (auto& p : start) p += glm::dvec3(side * 0.3, side * 0.03, 0);
+      add_body(*model, "block", block, 1000, start, {-3 * side, 0, 0}, glm::dvec3(0), {});
+    }
+    if (cloth) {
+      const TetMesh sheet = make_sheet({0.8, 0.8}, {8, 8});
+      auto start = sheet.positions;
+      for (auto& p : start) p += glm::dvec3(0, 0.32, 0);
+      add_body(*model, "sheet", sheet, 300, start, {0, -3, 0}, glm::dvec3(0), {});
+    }
+    Settings settings{.iterations = 4, .substeps = 6};
+    settings.mode = mode.name, settings.contact = cloth ? "self" : "bodies", settings.gravity = 0,
+    settings.ground = false;
+    apply_preset(settings, material_presets(), "rubber");
+    if (cloth) settings.material = "none", settings.compliance = {};
+    Sim sim = create_sim(model, settings);
+    std::vector<Kept> kept;
+    std::vector<std::uint64_t> hashes;
+    for (int s = 0; s < 40; ++s) {
+      kept.push_back(keep(sim)), hashes.push_back(state_hash(sim));
+      step(sim);
+    }
+    if (!on_cpu(sim)) CHECK(touched(sim).touches > 0);
+    for (const std::size_t back : {7, 3, 11, 30, 0, 15}) {
+      CAPTURE(back);
+      restore_snapshot(sim, kept[back].snapshot, kept[back].buffer);
+      for (std::size_t s = back + 1; s < hashes.size(); ++s) {
+        step(sim);
+        if (s % 6 == 0) CHECK(state_hash(sim) == hashes[s]);
+      }
+      CHECK(state_hash(sim) == hashes.back());
+    }
+  }
+}

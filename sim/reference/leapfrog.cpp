@@ -123,7 +123,7 @@ void advance(Leapfrog& run, long steps) {
         touch(met.normal, -met.distance, shape.friction, way, run.h, x, run.v[i]);
       }
     });
-    pairs.resolve(run.x, run.v, run.input.inverse_masses, run.h);
+    pairs.resolve(run.x, run.v, run.held, run.input.inverse_masses, run.h);
   }
   for (std::size_t i = 0; i < run.x.size(); ++i)
     if (!std::isfinite(glm::dot(run.x[i], run.x[i]) + glm::dot(run.v[i], run.v[i])))

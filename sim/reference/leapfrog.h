@@ -23,6 +23,7 @@ struct Leapfrog {
   Points parts;                    ///< N, by constraint and vertex of it, all kinds one after the other
   Grouped at_vertex;               ///< which of them act on a vertex
   std::vector<double> time = {0};  ///< s, one number
+  std::vector<State::Held> held{};
 };
 /// From `start`, whose velocities are those of the same instant. Throws Error for compliances not above 0.
 Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);

@@ -349,7 +349,7 @@ class FastPbd {
           barrier.wait(thread);
           if (thread == 0) {
             for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = x[i].position();
-            pairs.resolve(state.positions, v, inverse_masses, substep.h);
+            pairs.resolve(state.positions, v, state.held, inverse_masses, substep.h);
             for (std::size_t i = 0; i < x.size(); ++i) move_to(i, state.positions[i]);
           }
           barrier.wait(thread);

@@ -158,7 +158,7 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0 && !contact.carries(i)) v[i] += (x[i] - predicted[i]) / substep.h;
-      pairs.resolve(x, v, inverse_masses, substep.h);
+      pairs.resolve(x, v, state.held, inverse_masses, substep.h);
     }
     return guards;
   }

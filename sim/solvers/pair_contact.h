@@ -22,13 +22,13 @@ class PairContact {
     if (wanted_) mesh_ = pair_mesh(model);
   }
   bool wanted() const { return wanted_; }
-  /// After a substep of `h`: of places `x` and velocities `v`.
-  void resolve(std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v,
+  /// After a substep of `h`: of places `x` and velocities `v`, and what vertices are `held` by.
+  void resolve(std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v, std::vector<State::Held>& held,
                const std::vector<double>& inverse_masses, double h) {
     if (!wanted_) return;
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
-    const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness);
+    const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness, held);
     std::vector<int> counts(x.size(), 0);
     for (const Contact& c : contacts)
       for (std::size_t j = 0; j < 4; ++j) counts[c.vertices[j]] += c.meeting.weights[j] != 0;
@@ -75,19 +75,19 @@ class PairContact {
   };
   // The triangle that each vertex is in, and the edge that each sharp one has crossed, if any: the nearest
   // within the margin.
-  std::vector<Contact> find(const std::vector<glm::dvec3>& x, double margin) {
+  std::vector<Contact> find(const std::vector<glm::dvec3>& x, double margin, std::vector<State::Held>& held) {
     Near near{std::vector<Bounds>(model_.bodies.size(), Bounds{glm::dvec3(1e30), glm::dvec3(-1e30)}), self_};
     for (const auto& [vertex, body] : mesh_.vertices) {
       near.boxes[body].low = glm::min(near.boxes[body].low, x[vertex]);
       near.boxes[body].high = glm::max(near.boxes[body].high, x[vertex]);
     }
     std::vector<Contact> contacts;
-    find_vertices(x, margin, near, contacts);
+    find_vertices(x, margin, near, held, contacts);
     find_edges(x, margin, near, contacts);
     return contacts;
   }
   void find_vertices(const std::vector<glm::dvec3>& x, double margin, const Near& near,
-                     std::vector<Contact>& contacts) {
+                     std::vector<State::Held>& all_held, std::vector<Contact>& contacts) const {
     CellGrid grid(1.2 * mesh_.edge);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto& [i, j, k, body] = mesh_.triangles[t];
@@ -101,7 +101,7 @@ class PairContact {
       if (const double area = glm::length(n); area > 0)
         for (const std::uint32_t v : {i, j, k}) normals[v] += n / area;
     }
-    std::vector<Held> held(mesh_.vertices.size());
+    std::vector<State::Held> held(mesh_.vertices.size());
     for (std::size_t s = 0; s < mesh_.vertices.size(); ++s) {
       const auto& [vertex, body] = mesh_.vertices[s];
       const glm::dvec3 own = x[vertex];
@@ -111,7 +111,7 @@ class PairContact {
       best.meeting.rank = margin;
       Meeting nearest = best.meeting;
       nearest.gap = margin;
-      const Held was = s < held_.size() ? held_[s] : Held{};
+      const State::Held was = s < all_held.size() ? all_held[s] : State::Held{};
       grid.for_each({own - margin, own + margin}, [&](std::uint32_t t) {
         const auto& [i, j, k, other] = mesh_.triangles[t];
         if (other == body && (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) ||
@@ -122,7 +122,7 @@ class PairContact {
         auto m = Formulas<double>{}.meet(a, b, c);
         bool under = false;
         if (other_thickness > 0) {  // query.comp
-          under = was.target != none && share_a_vertex(was.target, t) ? was.under : glm::dot(m.face, a) > 0;
+          under = was.target != ~0u && share_a_vertex(was.target, t) ? was.under : glm::dot(m.face, a) > 0;
           m = Formulas<double>{}.meet_sheet(a, b, c, under);
         }
         m.gap -= std::max(thickness, other_thickness);
@@ -136,7 +136,7 @@ class PairContact {
       else
         held[s] = {};
     }
-    held_ = std::move(held);
+    all_held = std::move(held);
   }
   void find_edges(const std::vector<glm::dvec3>& x, double margin, const Near& near,
                   std::vector<Contact>& contacts) const {
@@ -173,11 +173,6 @@ class PairContact {
       if (best.meeting.rank < margin) contacts.push_back(best);
     }
   }
-  static constexpr std::uint32_t none = ~0u;
-  struct Held {  // the triangle that a vertex was in last, and on which side of it it belongs
-    std::uint32_t target = none;
-    bool under = false;
-  };
   bool share_a_vertex(std::uint32_t a, std::uint32_t b) const {
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j)
@@ -185,7 +180,6 @@ class PairContact {
     return false;
   }
 
-  std::vector<Held> held_;  // by vertex of a surface
   const Model& model_;
   bool wanted_, self_;
   double friction_;

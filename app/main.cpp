@@ -198,7 +198,7 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
   add_overrides(command, a.overrides);
   command.add_option("--deform", a.overrides.deform,
                      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
-                     "twist:DEGREES, invert-one, coincident, fold");
+                     "twist:DEGREES, jitter:F, invert-one, coincident, fold");
   add_parameters(command, a.overrides);
   std::string solvers;
   for (const Preset& preset : solver_presets()) solvers += fmt::format("{} ({}), ", preset.name, preset.help);

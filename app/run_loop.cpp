@@ -88,8 +88,9 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     take(false);
     hold(s);
     if (touching && (s % steps_per_frame(sim.settings.dt) == 0 || s == steps))
-      run.errors.overlap = largest(run.errors.overlap, overlap_of(*sim.model, read_state(sim).positions,
-                                                                  sim.settings.contact == "self"));
+      run.errors.overlap =
+          largest(run.errors.overlap.value_or(Overlap{}),
+                  overlap_of(*sim.model, read_state(sim).positions, sim.settings.contact == "self"));
     if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }

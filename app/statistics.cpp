@@ -16,6 +16,9 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
   const auto count = [](double number) {
     return std::isfinite(number) ? ordered_json(long(number)) : nullptr;
   };
+  const auto overlap = [&](auto member) -> ordered_json {
+    return so_far.overlap ? ordered_json((*so_far.overlap).*member) : nullptr;
+  };
   return {{"step", now.step},
           {"time", now.time},
           {"volume_error_percent", m.volume_error_percent},
@@ -38,10 +41,10 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"contacts", count(m.contacts)},
           {"penetration_max", m.penetration_max},
           {"penetration_999", m.penetration_999},
-          {"overlap_max", so_far.overlap.largest},
-          {"overlap_999", so_far.overlap.part_999},
-          {"overlap_vertices", so_far.overlap.inside},
-          {"overlap_triangles", so_far.overlap.triangles},
+          {"overlap_max", overlap(&Overlap::largest)},
+          {"overlap_999", overlap(&Overlap::part_999)},
+          {"overlap_vertices", overlap(&Overlap::inside)},
+          {"overlap_triangles", overlap(&Overlap::triangles)},
           {"finite", int(now.finite())}};
 }
 

@@ -87,7 +87,7 @@ struct RunErrors {
   double angular_drift = std::numeric_limits<double>::quiet_NaN();
   double start_energy = 0, max_energy = 0;          ///< J
   double penetration_max = 0, penetration_999 = 0;  ///< largest
-  Overlap overlap;                                  ///< largest of each, where bodies touch
+  std::optional<Overlap> overlap;                   ///< largest of each, where bodies touch
   bool free = true;                                 ///< so far no contact and no fixed vertex
   std::optional<Measurement> first, last;           ///< of states that were finite
   bool finite = true;

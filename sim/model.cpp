@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 #include <span>
 
@@ -165,6 +166,9 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
   if (how.empty() || how == "none") return;
   const Bounds box = bounds(x);
   const glm::dvec3 centre = box.centre();
+  std::mt19937 generator(seed);
+  // Not std::uniform_real_distribution: its numbers differ from one standard library to the next.
+  const auto unit = [&] { return double(generator()) / 4294967296.0; };
   if (how == "flatten") {
     for (auto& p : x) p.y = centre.y;
   } else if (how == "line") {
@@ -172,9 +176,6 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
   } else if (how == "point") {
     for (auto& p : x) p = centre;
   } else if (how == "random") {
-    std::mt19937 generator(seed);
-    // Not std::uniform_real_distribution: its numbers differ from one standard library to the next.
-    const auto unit = [&] { return double(generator()) / 4294967296.0; };
     for (auto& p : x)
       for (int a = 0; a < 3; ++a) p[a] = box.low[a] + unit() * (box.high[a] - box.low[a]);
   } else if (how == "mirror") {
@@ -197,6 +198,13 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
       const double s = std::sin(angle), c = std::cos(angle), dx = p.x - centre.x, dz = p.z - centre.z;
       p.x = centre.x + c * dx + s * dz, p.z = centre.z - s * dx + c * dz;
     }
+  } else if (how.starts_with("jitter:")) {
+    const double most = factor_of(how);
+    glm::dvec3 move, axis;
+    for (int a = 0; a < 3; ++a) move[a] = (2 * unit() - 1) * most * box.size(), axis[a] = 2 * unit() - 1;
+    const double angle = (2 * unit() - 1) * most * glm::radians(360.0);
+    const glm::dmat3 turn(glm::rotate(glm::dmat4(1), angle, axis));
+    for (auto& p : x) p = centre + move + turn * (p - centre);
   } else if (how == "fold") {
     // The first surface hinge: one wing is laid onto the other triangle.
     const auto all = hinges(rest);
@@ -209,7 +217,7 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
   } else {
     throw Error("no such deformation", "--deform " + how,
                 "choose from none, flatten, line, point, random, mirror, stretch:F, squash:F, twist:DEGREES, "
-                "invert-one, coincident, fold");
+                "jitter:F, invert-one, coincident, fold");
   }
 }
 

@@ -86,7 +86,8 @@ inline std::vector<Tet> original_tets(const Model& model) {
 }
 
 /// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F,
-/// squash:F, twist:DEGREES, invert-one, coincident, fold. Throws Error for anything else.
+/// squash:F, twist:DEGREES, jitter:F (moved by up to F of its size along each axis and turned by up to F of a
+/// full turn), invert-one, coincident, fold. Throws Error for anything else.
 void deform(std::vector<glm::dvec3>& positions, const TetMesh& rest, const std::string& how, unsigned seed);
 
 }  // namespace tetpbd

@@ -34,11 +34,14 @@ void main() {
   }
   pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
   uvec4 vertices = vertices_of(s, t & TARGET);
-  for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * vertices[j] + 3u], READER + (m.weights[j] != 0.0 ? 1 : 0));
+  for (uint j = 0u; j < 4u; ++j) {
+    if (m.weights[j] != 0.0) atomicAdd(pair_sums[8u * vertices[j] + 3u], 1);
+    atomicAdd(pair_sums[8u * vertices[j] + 7u], 1);
+  }
 #if EDGES
   uvec4 beside = beside_of(s, t & TARGET);
   if (item_is_edge(s))
-    for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * beside[j] + 3u], READER);
+    for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * beside[j] + 7u], 1);
 #endif
   atomicAdd(pair_lists[TOUCHING], 1u);
   atomicMax(pair_lists[DEEPEST], floatBitsToUint(-m.gap));

@@ -23,7 +23,7 @@ void move(uint i) {
     stopped[c] = float(atomicExchange(pair_sums[8u * i + c], 0)) * (params.quantum / PARTS);
     pushed[c] = float(atomicExchange(pair_sums[8u * i + 4u + c], 0)) * (params.quantum / PARTS);
   }
-  atomicExchange(pair_sums[8u * i + 3u], 0);
+  pair_sums[8u * i + 3u] = 0;
   Position own = positions[i];
   if (!(own.inverse_mass > 0.0)) return;
   Pair x = pair_add(Pair(own.high, own.low), stopped + pushed), v = Pair(velocities[i].high, velocities[i].low);
@@ -43,8 +43,7 @@ void move(uint i) {
 shared uint moving[8u * GROUP_SIZE], moving_count;
 // Of all that ask where a vertex is the last leaves it to this work-group.
 void leave(uint i) {
-  int before = atomicAdd(pair_sums[8u * i + 3u], -READER);
-  if (before / READER == 1 && before > READER) moving[atomicAdd(moving_count, 1u)] = i;
+  if (atomicAdd(pair_sums[8u * i + 7u], -1) == 1 && pair_sums[8u * i + 3u] > 0) moving[atomicAdd(moving_count, 1u)] = i;
 }
 void push(uint k) {
   uint s = pair_lists[k], t = pair_lists[k + 1u];
@@ -55,7 +54,7 @@ void push(uint k) {
   float weight = 0.0;
   for (uint j = 0u; j < 4u; ++j) {
     way += m.weights[j] * params.h * velocities[vertices[j]].high;
-    weight += m.weights[j] * m.weights[j] * positions[vertices[j]].inverse_mass * float(pair_sums[8u * vertices[j] + 3u] & (READER - 1));
+    weight += m.weights[j] * m.weights[j] * positions[vertices[j]].inverse_mass * float(pair_sums[8u * vertices[j] + 3u]);
   }
   if (weight > 0.0) {
     Stop by = meeting_correction(m, way, push_most, params.friction);

@@ -18,8 +18,7 @@ struct State {
   std::vector<glm::dvec3> velocities;  ///< m/s
   /// The triangle that a vertex was in last, if any, and on which side of a sheet it belongs.
   struct Held {
-    std::uint32_t target = ~0u;
-    bool under = false;
+    std::uint32_t target = ~0u, under = 0;
   };
   std::vector<Held> held{};  ///< by vertex of a surface, of CPU modes where bodies touch
 };

@@ -41,7 +41,7 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh);
 /// m: how near a candidate is, of bodies that move slowly, beside the thickness.
 inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 
-/// What a step hands on to the next.
+/// What a step hands on to the next, beside `lists`.
 struct PairNumbers {
   long detections = 0;              ///< since the start
   std::uint64_t touches = 0;        ///< contacts, summed over substeps, since the start

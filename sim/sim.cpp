@@ -137,7 +137,7 @@ std::vector<RigidRecord> rigid_records(const Model& model) {
 Tuning within_limits(Tuning tuning) {
   GLint row = 0;
   glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &row);
-  if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // one knows no barriers
+  if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // there, one after the other
   if (tuning.lanes > 8 || !std::has_single_bit(tuning.lanes))
     throw Error("no such tuning", fmt::format("lanes={}", tuning.lanes), "a power of two up to 8");
   if (tuning.row == 0 || tuning.row > unsigned(row)) tuning.row = unsigned(row);

@@ -27,7 +27,8 @@ std::size_t snapshot_memory(const Sim& sim);
 /// Queued; `to` has room from `at` on.
 Snapshot take_snapshot(const Sim& sim, const Buffer& to, std::size_t at);
 /// Of the same model, in any mode, with the same vertices pinned; with other settings than then, the state
-/// alone, which goes on with those of now. Does not wait but where the mode wants it as another type.
+/// alone, which goes on with those of now. Waits only where the mode wants it as another type, or, with other
+/// settings, where bodies touch.
 void restore_snapshot(Sim& sim, const Snapshot& snapshot, const Buffer& from);
 
 }  // namespace tetpbd

@@ -19,17 +19,17 @@ void main() {
   gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none;
   barrier();
   uint nearest = first, least = first;
-  float apart = none;  // m, from where any candidate would be crossed
+  float apart = none;  // m, from the nearest; of one that is in any, 0
   for (uint c = first; c < first + CANDIDATES; ++c) {
     if (ranks[c] < ranks[nearest]) nearest = c;
     if (pushing[c] < pushing[least]) least = c;
-    apart = min(apart, gaps[c] < none ? abs(gaps[c]) : ranks[c]);
+    apart = min(apart, max(gaps[c], 0.0));
   }
   if (!there || own_lane != least) return;
   bool pushes = may_push && m.gap < 0.0 && (gaps[nearest] <= 0.0 || item_is_edge(s));
   pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
   if (!pushes) {
-    pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
+    if (!item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
     return;
   }
   pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);

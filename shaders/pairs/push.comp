@@ -41,7 +41,7 @@ void move(uint i) {
 #endif
 }
 shared uint moving[8u * GROUP_SIZE], moving_count;
-// Of all that ask where a vertex is the last leaves it to this work-group.
+// This invocation reads the vertex no more; if it is the last that does, its work-group moves it.
 void leave(uint i) {
   if (atomicAdd(pair_sums[8u * i + 7u], -1) == 1 && pair_sums[8u * i + 3u] > 0) moving[atomicAdd(moving_count, 1u)] = i;
 }
@@ -78,6 +78,7 @@ void main() {
   if (lane == 0u) moving_count = 0u;
   barrier();
   if (record < pair_lists[RECORDS]) push(RECORDS_AT + RECORD * record);
+  memoryBarrierBuffer();
   barrier();
   for (uint j = lane; j < moving_count; j += GROUP_SIZE) move(moving[j]);
 }

@@ -59,11 +59,12 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   vec3 a = from_own(triangle_vertex(t, 0u), own), b = from_own(triangle_vertex(t, 1u), own), c = from_own(triangle_vertex(t, 2u), own);
   vec3 beyond = max(max(min(a, min(b, c)), -max(a, max(b, c))), vec3(0.0));
-  if (dot(beyond, beyond) > 1.01 * distances[CANDIDATES - 1u] * distances[CANDIDATES - 1u]) return;
+  bool has_sides = SHEETS != 0 && thickness_of(triangle_body(t)) > 0.0;  // one that was crossed comes first, however far it is
+  if (!has_sides && dot(beyond, beyond) > 1.01 * distances[CANDIDATES - 1u] * distances[CANDIDATES - 1u]) return;
   Meeting m = meet(a, b, c);
   bool opposed = opposes(m, normal);
 #if SHEETS
-  if (thickness_of(triangle_body(t)) > 0.0) {  // it has two sides: that where the vertex is, or was before it went through
+  if (has_sides) {  // that where the vertex is, or was before it went through
     bool under = dot(m.face, a) > 0.0, was_near = false;
     for (uint j = 0u; j < 3u && held != NONE; ++j)
       for (uint l = 0u; l < 3u; ++l) was_near = was_near || triangle_vertex(held & TARGET, j) == triangle_vertex(t, l);
@@ -82,7 +83,7 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 }
 #endif
 #define STAGED (GROUP_SIZE * CANDIDATES)  // beyond, each item looks through the leaves itself
-shared uint lists[STAGED], staged_count;  // first of targets that any item of the work-group may meet, then what each invocation found
+shared uint lists[STAGED], staged_count;  // first the targets near the work-group's items, later what each invocation found
 #if LANES > 1
 #define WAITING 96u  // triangles per vertex; more are looked at at once, by lanes that wait for each other
 shared uint waiting[PER_GROUP][WAITING], waiting_count[PER_GROUP];
@@ -103,10 +104,10 @@ void merge(uint lane) {
 }
 #endif
 shared vec3 lows[PER_GROUP], highs[PER_GROUP];  // of what each item looks at
-#define MOST_LEAVES 512u                        // beyond, through all
+#define MOST_LEAVES 512u                        // if more are near, items look through all
 shared uint leaves[MOST_LEAVES], leaf_count;
 #define BODY_WORDS ((BODY_COUNT + 31u) / 32u)
-shared uint near_bodies[BODY_WORDS], own_body;  // bits; that of all items of the work-group
+shared uint near_bodies[BODY_WORDS], own_body;  // a bit per body; the body of this work-group's items
 #if QUERY_EDGES == 0
 shared vec3 normals[GROUP_SIZE];
 #endif

@@ -17,13 +17,13 @@ namespace tetpbd {
 struct Leapfrog {
   ReferenceInput input;
   Compliances compliances;
-  double h = 0;                    ///< s
-  Points x;                        ///< m, at the time reached
-  Points v;                        ///< m/s, half a step before
-  Points parts;                    ///< N, by constraint and vertex of it, all kinds one after the other
-  Grouped at_vertex;               ///< which of them act on a vertex
-  std::vector<double> time = {0};  ///< s, one number
-  std::vector<State::Held> held{};
+  double h = 0;                     ///< s
+  Points x;                         ///< m, at the time reached
+  Points v;                         ///< m/s, half a step before
+  Points parts;                     ///< N, by constraint and vertex of it, all kinds one after the other
+  Grouped at_vertex;                ///< which of them act on a vertex
+  std::vector<double> time = {0};   ///< s, one number
+  std::vector<State::Held> held{};  ///< as in State
 };
 /// From `start`, whose velocities are those of the same instant. Throws Error for compliances not above 0.
 Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);

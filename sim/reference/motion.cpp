@@ -109,7 +109,7 @@ Pair leapfrog_pair(const ReferenceInput& input, double stable) {
   return pair_of(
       input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
       [&](double h) { return leapfrog(input, compliances_of(input), start, h); },
-      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.time); });
+      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.held), each(run.time); });
 }
 
 Pair implicit_pair(const ReferenceInput& input) {
@@ -195,7 +195,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
   add(numbers);
-  if (bodies_touch(model, s)) add(s.contact + ", sharp edges too");
+  if (bodies_touch(model, s)) add(s.contact + ", sharp edges, held");
   return key;
 }
 
@@ -214,9 +214,9 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
                             : stable_step(input, compliances_of(input), input.model.rest.positions);
   const bool touching = bodies_touch(input.model, input.settings);
   if (method.empty())
-    motion.method = !soft                                                    ? "rigid body"
+    motion.method = !soft                                                   ? "rigid body"
                     : !touching && most_stable * stable < input.settings.dt ? "implicit"
-                                                                             : "leapfrog";
+                                                                            : "leapfrog";
   if (touching && motion.method != "leapfrog")
     throw Error("no right motion of bodies that touch each other", motion.method,
                 "give them a material, and use leapfrog");

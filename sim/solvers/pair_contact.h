@@ -122,14 +122,15 @@ class PairContact {
         auto m = Formulas<double>{}.meet(a, b, c);
         bool under = false;
         if (other_thickness > 0) {  // query.comp
-          under = was.target != ~0u && share_a_vertex(was.target, t) ? was.under : glm::dot(m.face, a) > 0;
+          under =
+              was.target != ~0u && share_a_vertex(was.target, t) ? was.under != 0 : glm::dot(m.face, a) > 0;
           m = Formulas<double>{}.meet_sheet(a, b, c, under);
         }
         m.gap -= std::max(thickness, other_thickness);
         if (m.rank < nearest.rank) nearest = m;
         const bool sheets = thickness > 0 || other_thickness > 0;
         if (m.rank < best.meeting.rank && (sheets || Formulas<double>{}.opposes(m, normals[vertex])))
-          best = {{vertex, i, j, k}, m}, held[s] = {t, under};
+          best = {{vertex, i, j, k}, m}, held[s] = {t, under ? 1u : 0u};
       });
       if (best.meeting.rank < margin && best.meeting.gap < 0 && nearest.gap <= 0)
         contacts.push_back(best);

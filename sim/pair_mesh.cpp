@@ -81,6 +81,43 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh) {
   }
 }
 
+void add_tets(const TetMesh& rest, PairMesh& mesh) {
+  std::vector<char> near(rest.positions.size(), 0);
+  for (const auto& [vertex, body] : mesh.vertices) near[vertex] = 1;
+  for (char ring = 1; ring < 3; ++ring)
+    for (const Tet& tet : rest.tets)
+      if (std::ranges::any_of(tet, [&](std::uint32_t v) { return near[v] > 0 && near[v] <= ring; }))
+        for (const std::uint32_t v : tet)
+          if (near[v] == 0) near[v] = char(ring + 1);
+  struct Face {
+    std::array<std::uint32_t, 3> sorted;
+    std::uint32_t* value;  // what is beyond it, or behind
+    std::uint32_t own;     // tet, or none
+  };
+  const auto face = [](std::array<std::uint32_t, 3> of, std::uint32_t* value, std::uint32_t own) {
+    std::ranges::sort(of);
+    return Face{of, value, own};
+  };
+  for (const Tet& tet : rest.tets)
+    if (std::ranges::all_of(tet, [&](std::uint32_t v) { return near[v] > 0; }))
+      mesh.tets.push_back({{tet[0], tet[1], tet[2], tet[3]}, {mesh.none, mesh.none, mesh.none, mesh.none}});
+  mesh.behind.assign(mesh.triangles.size(), mesh.none);
+  std::vector<Face> faces;
+  for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
+    auto& [v, beyond] = mesh.tets[t];
+    for (std::size_t k = 0; k < 4; ++k)
+      faces.push_back(face({v[(k + 1) % 4], v[(k + 2) % 4], v[(k + 3) % 4]}, &beyond[k], t));
+  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [i, j, k, body] = mesh.triangles[t];
+    faces.push_back(face({i, j, k}, &mesh.behind[t], mesh.none));
+  }
+  std::ranges::sort(faces, {}, &Face::sorted);
+  for (std::size_t k = 0; k + 1 < faces.size(); ++k)
+    if (faces[k].sorted == faces[k + 1].sorted)
+      *faces[k].value = faces[k + 1].own, *faces[k + 1].value = faces[k].own;
+}
+
 PairMesh pair_mesh(const Model& model) {
   PairMesh mesh;
   double length = 0;

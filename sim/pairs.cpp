@@ -26,14 +26,14 @@ float unsorted(std::uint32_t bits) {
   return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
 }
 
-void run(Pairs::Kernel& kernel, bool timed) {
+void run(Pairs::Kernel& kernel, const Sim& sim) {
   kernel.program.use();
-  if (timed) kernel.timer.begin();
+  if (sim.kernels_timed) kernel.timer.begin();
   if (kernel.work_groups)
-    glDispatchCompute(GLuint(kernel.work_groups), 1, 1);
+    dispatch(kernel.work_groups, sim.tuning.row);
   else
     glDispatchComputeIndirect(GLintptr(4 * kernel.counted_by));
-  if (timed) kernel.timer.end();
+  if (sim.kernels_timed) kernel.timer.end();
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
@@ -46,11 +46,12 @@ void bind_pairs(const Sim& sim) {
 }
 
 // Of bodies, and of leaves as well.
-void find_boxes(Pairs& p, bool leaves, bool timed) {
+void find_boxes(Sim& sim, bool leaves) {
+  Pairs& p = sim.pairs;
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   p.empty.copy_to(p.lists, 4 * counters, 4 * counters, p.empty.bytes() - 4 * counters);
   p.boxes.work_groups = p.slices + (leaves ? p.leaves : 0);
-  run(p.boxes, timed);
+  run(p.boxes, sim);
 }
 
 void find_candidates(Sim& sim, double margin) {
@@ -59,14 +60,14 @@ void find_candidates(Sim& sim, double margin) {
   p.empty.copy_to(p.lists, 0, 0, 4 * touching);
   p.boxes.program.use();
   p.boxes.program.set("margin", float(margin + p.thickness));
-  find_boxes(p, true, sim.kernels_timed);
-  run(p.cull, sim.kernels_timed);
+  find_boxes(sim, true);
+  run(p.cull, sim);
   glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
   for (Pairs::Kernel* kernel : {&p.query, &p.query_edges}) {
     if (!kernel->counted_by) continue;
     kernel->program.use();
     kernel->program.set("margin", float(margin + p.thickness));
-    run(*kernel, sim.kernels_timed);
+    run(*kernel, sim);
   }
   glMemoryBarrier(GL_COMMAND_BARRIER_BIT);
   ++p.detections, p.since = 0;
@@ -137,10 +138,11 @@ void ask(Pairs& p) {
 
 }  // namespace
 
-Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,
+Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tuning,
                  const std::vector<std::string>& vertex_defines) {
   PairMesh surfaces = pair_mesh(model);
   order_in_leaves(model.rest, surfaces);
+  add_tets(model.rest, surfaces);
   std::vector<std::uint32_t> words;
   for (const auto& triangle : surfaces.triangles) words.insert(words.end(), triangle.begin(), triangle.end());
   const std::size_t edges_at = words.size();
@@ -178,7 +180,14 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
     words.insert(words.end(), {body, std::uint32_t(first), std::uint32_t(end)});
     first = end;
   }
-  const std::size_t slices = (words.size() - slices_at) / 3, triangles = surfaces.triangles.size(),
+  const std::size_t behind_at = words.size();
+  words.insert(words.end(), surfaces.behind.begin(), surfaces.behind.end());
+  const std::size_t tets_at = words.size();
+  for (const auto& [v, beyond] : surfaces.tets) {
+    words.insert(words.end(), std::begin(v), std::end(v));
+    words.insert(words.end(), std::begin(beyond), std::end(beyond));
+  }
+  const std::size_t slices = (behind_at - slices_at) / 3, triangles = surfaces.triangles.size(),
                     edges = surfaces.edges.size(), vertices = surfaces.vertices.size(),
                     items = vertices + edges, targets = triangles + edges, bodies = model.bodies.size();
   Pairs p;
@@ -193,7 +202,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
   }
   const std::size_t records_at = counters + box * bodies;
   p.records_at = records_at, p.handed_on = 4 * (records_at + (record + 2) * items);
-  p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * group / lanes + 7) * leaves));
+  p.lists =
+      Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * group / tuning.lanes + 7) * leaves));
   p.spheres = Buffer("spheres around triangles", 16 * targets);
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
@@ -218,8 +228,11 @@ Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes
                                     {"LEAVES_AT", leaves_at},
                                     {"LEAVES", leaves},
                                     {"CANDIDATES", candidates},
-                                    {"LANES", lanes},
+                                    {"LANES", tuning.lanes},
+                                    {"ROW", tuning.row},
                                     {"AROUND_AT", around_at},
+                                    {"BEHIND_AT", behind_at},
+                                    {"TETS_AT", tets_at},
                                     {"RECORDS_AT", records_at},
                                     {"GROUP_SIZE", group}})
     defines.push_back(fmt::format("{} {}u", name, value));
@@ -248,7 +261,7 @@ void look_around(Sim& sim) {
   take_answer(sim);
   bind_pairs(sim);
   sim.positions.bind_storage(BIND_POSITIONS), sim.velocities.bind_storage(BIND_VELOCITIES);
-  if (!p.near || p.since < 0) find_boxes(p, false, sim.kernels_timed);
+  if (!p.near || p.since < 0) find_boxes(sim, false);
   ask(p);
 }
 
@@ -275,10 +288,10 @@ void touch(Sim& sim) {
   p.meet.program.set(
       "closed_most",
       is_implicit(s) ? 1e30f : float(std::max({closing, p.fastest + gained, margin / (2 * s.dt)}) * h));
-  // Implicit substeps are long, so what one pass leaves is much: rings sank in by 0.6 % after 1, 0.003
+  // Implicit substeps are long, so what one pass leaves is much: a stack sinks in by 0.7 % after 1, 0.02
   // after 8.
   for (int pass = 0; pass < (is_implicit(s) ? 8 : 1); ++pass)
-    for (Pairs::Kernel* kernel : {&p.meet, &p.push}) run(*kernel, sim.kernels_timed);
+    for (Pairs::Kernel* kernel : {&p.meet, &p.push}) run(*kernel, sim);
 }
 
 void start_pairs(Sim& sim, const State& state) {

@@ -10,6 +10,7 @@
 namespace tetpbd {
 
 struct Settings;
+struct Tuning;
 struct Sim;
 
 /// Whether anything can touch.
@@ -27,8 +28,15 @@ struct PairMesh {
   struct Leaf {
     std::uint32_t body, triangles[2], vertices[2], edges[2];  ///< first and end
   };
+  static constexpr std::uint32_t none = ~0u;
+  struct Tet {
+    std::uint32_t vertices[4],
+        beyond[4];  ///< the tet across the face that is opposite of each vertex, or none
+  };
   std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
   std::vector<Leaf> leaves;                             ///< none before order_in_leaves()
+  std::vector<Tet> tets;                                ///< those near the surface; none before add_tets()
+  std::vector<std::uint32_t> behind;                    ///< by triangle its tet, or none
   std::vector<Edge> edges;         ///< of solids, where they are convex and sharp at rest
   std::vector<Item> vertices;      ///< each once, by body
   std::vector<float> thicknesses;  ///< m, by body: how near a sheet lets others come; of solids 0
@@ -38,6 +46,8 @@ struct PairMesh {
 PairMesh pair_mesh(const Model& model);
 /// Triangles, vertices and edges that are near each other at rest come together, body by body.
 void order_in_leaves(const TetMesh& rest, PairMesh& mesh);
+/// To walk from a triangle to what is behind it.
+void add_tets(const TetMesh& rest, PairMesh& mesh);
 /// m: how near a candidate is, of bodies that move slowly, beside the thickness.
 inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 
@@ -72,7 +82,7 @@ struct Pairs : PairNumbers {
   std::size_t handed_on = 0;  ///< first bytes of lists that a step hands on to the next
   explicit operator bool() const { return bool(mesh); }
 };
-Pairs make_pairs(const Model& model, const Settings& settings, std::size_t lanes,
+Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tuning,
                  const std::vector<std::string>& vertex_defines);
 /// Before a step: takes the last answer and asks again.
 void look_around(Sim& sim);

@@ -334,7 +334,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
                          4 * count};
   }
   if (bodies_touch(*sim.model, settings))
-    sim.pairs = make_pairs(*sim.model, settings, sim.tuning.lanes, defines);
+    sim.pairs = make_pairs(*sim.model, settings, sim.tuning, defines);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);

@@ -31,9 +31,8 @@ struct Dispatcher {
         glUniform1ui(pass.locations[p], parameters[p]);
     pass.parameters = parameters;
     if (pass.records) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RECORDS, pass.records);
-    const std::size_t row = std::min<std::size_t>(pass.work_groups, sim.tuning.row);
     if (sim.kernels_timed) pass.timer.begin();
-    glDispatchCompute(GLuint(row), GLuint((pass.work_groups + row - 1) / row), 1);
+    dispatch(pass.work_groups, sim.tuning.row);
     // The next dispatch reads what this one wrote, and overwrites what it read (the other quantized
     // positions, the sums of corrections that average.comp clears).
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);

@@ -229,19 +229,33 @@ TEST_CASE("pairs: kernels do what the CPU does in double") {
   CHECK(off < 2e-3 * moved);
 }
 
-TEST_CASE("pairs: the same bits twice; nothing but boxes while bodies are far apart") {
+TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far apart") {
   GlTest gl;
   const auto near =
       blocks({{{0, 0, 0}, {1, 0, 0}}, {{0.52, 0.1, 0}, {-1, 0, 0}}, {{0.1, 0.55, 0.1}, {0, -1, 0}}});
   std::uint64_t bits = 0;
   for (const unsigned lanes : {1u, 1u, 2u, 8u}) {  // they share the search of a vertex
     Tuning tuning;
-    tuning.lanes = lanes;
+    tuning.lanes = lanes, tuning.row = lanes == 2 ? 3 : 0;
     Sim sim = create_sim(near, touching("node"), tuning);
     for (int s = 0; s < 20; ++s) step(sim);
     if (bits == 0) bits = state_hash(sim);
     CHECK(state_hash(sim) == bits);
     CHECK(touched(sim).detections > 10);
+  }
+  // More triangles near a few vertices than a work-group lists.
+  Placed coarse{{0.01, 0.33, 0.02}, {0, -10, 0}}, fine;
+  coarse.cells = glm::ivec3(1), fine.size = {0.6, 0.1, 0.6}, fine.cells = {20, 2, 20};
+  const auto dense = blocks({coarse, fine});
+  bits = 0;
+  for (const unsigned lanes : {1u, 8u}) {
+    Tuning tuning;
+    tuning.lanes = lanes;
+    Sim sim = create_sim(dense, touching("node"), tuning);
+    for (int s = 0; s < 3; ++s) step(sim);
+    CHECK(touched(sim).touches > 0);
+    if (bits == 0) bits = state_hash(sim);
+    CHECK(state_hash(sim) == bits);
   }
   const auto far = blocks({{{0, 0, 0}}, {{5, 0, 0}}});
   Settings settings = touching("node");
@@ -318,13 +332,18 @@ TEST_CASE("pairs: three blocks on each other come to rest") {
   Settings settings = touching("explicit", 1e6);
   settings.gravity = 9.81, settings.ground = true, settings.friction = 0.5, settings.damping = 0.2;
   settings.constraint_damping = 3e-3;
-  Sim sim = create_sim(model, settings);
-  for (int s = 0; s < 600; ++s) step(sim);
-  CHECK(motion_of(sim).energy < 0.02);  // J, of 375 kg: what each substep gives vertices and contact takes
-  CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.002);
-  const glm::dvec3 before = centre_of(*model, read_state(sim).positions);
-  for (int s = 0; s < 200; ++s) step(sim);
-  CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) < 3e-4);
+  for (const std::string mode : {"explicit", "newton"}) {
+    CAPTURE(mode);
+    settings.mode = mode;
+    if (mode == "newton") settings.iterations = 8, settings.substeps = 2;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 600; ++s) step(sim);
+    CHECK(motion_of(sim).energy < 0.02);  // J, of 375 kg: what each substep gives vertices and contact takes
+    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.002);
+    const glm::dvec3 before = centre_of(*model, read_state(sim).positions);
+    for (int s = 0; s < 200; ++s) step(sim);
+    CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) < 3e-4);
+  }
 }
 
 TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
@@ -349,6 +368,34 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
     for (int s = 0; s < 200; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
     CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.01);
+  }
+}
+
+TEST_CASE("pairs: a vertex leaves a body that is folded over itself") {
+  GlTest gl;
+  // Two blocks of one body, one a part in the other, and a small one in the first, near a side of the second.
+  Model both;
+  TetMesh mesh = make_block(glm::dvec3(0.5), glm::ivec3(4)), second = mesh;
+  for (Tet tet : second.tets) {
+    for (std::uint32_t& v : tet) v += std::uint32_t(second.positions.size());
+    mesh.tets.push_back(tet);
+  }
+  for (const glm::dvec3& p : second.positions) mesh.positions.push_back(p + glm::dvec3(0.33, 0.003, 0));
+  finish_tets(mesh, "fold");
+  add_body(both, "fold", mesh, 1000, mesh.positions, {}, {}, {});
+  TetMesh small = make_block({0.02, 0.03, 0.05}, glm::ivec3(1));
+  finish_tets(small, "small");
+  auto start = small.positions;
+  for (glm::dvec3& p : start) p += glm::dvec3(0.065, 0.206, 0.03);
+  add_body(both, "small", small, 1000, start, {}, {}, {});
+  const auto model = std::make_shared<const Model>(both);
+  REQUIRE(overlap_of(*model, model->positions, false).deepest > 0.02);
+  for (const std::string mode : {"explicit", "cpu-double"}) {
+    CAPTURE(mode);
+    Sim sim = create_sim(model, touching(mode));
+    for (int s = 0; s < 8; ++s) step(sim);
+    REQUIRE_FALSE(check_finite(sim, true));
+    CHECK(overlap_of(*model, read_state(sim).positions, false).deepest < 1e-3);
   }
 }
 

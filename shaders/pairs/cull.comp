@@ -29,8 +29,8 @@ void main() {
   if (lane == 0u) {
     first_vertex = atomicAdd(pair_lists[NEAR_VERTICES], vertices_filled);
     first_edge = atomicAdd(pair_lists[NEAR_EDGES], edges_filled);
-    atomicMax(pair_lists[QUERY_GROUPS], (first_vertex + vertices_filled) / PER_GROUP);
-    if (edges > 0u) atomicMax(pair_lists[EDGE_GROUPS], (first_edge + edges_filled) / PER_GROUP);
+    need_groups(QUERY_GROUPS, (first_vertex + vertices_filled) / PER_GROUP);
+    if (edges > 0u) need_groups(EDGE_GROUPS, (first_edge + edges_filled) / PER_GROUP);
   }
   barrier();
   for (uint j = lane; j < vertices_filled; j += GROUP_SIZE) pair_lists[NEAR_AT + first_vertex + j] = j < vertices ? vertex + j : NONE;

@@ -25,6 +25,20 @@ vec3 nearest_weights(vec3 a, vec3 b, vec3 c) {
   real whole = va + vb + vc;
   return whole > real(0) ? vec3(va / whole, vb / whole, vc / whole) : vec3(1, 0, 0);
 }
+// Volumes (x 6) of a tet with the origin in place of each vertex in turn: none is negative where the origin is inside; else the least belongs to the vertex
+// across from the face that the origin is beyond.
+struct Parts {
+  real volumes[4];
+};
+Parts tet_parts(vec3 a, vec3 b, vec3 c, vec3 d) {
+  Parts p;
+  vec3 ab = cross(a, b);
+  p.volumes[0] = dot(cross(b, c), d);
+  p.volumes[1] = dot(cross(c, a), d);
+  p.volumes[2] = dot(ab, d);
+  p.volumes[3] = -dot(ab, c);
+  return p;
+}
 // A vertex at the origin and a triangle. One without area meets nothing: gap is far, then.
 Meeting meet(vec3 a, vec3 b, vec3 c) {
   Meeting m;

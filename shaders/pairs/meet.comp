@@ -7,31 +7,10 @@ uniform uint substep;       // since candidates were looked for
 uniform float closed_most;  // m, by which an item and a candidate may come nearer in a substep
 const float none = 1e30;
 shared float ranks[GROUP_SIZE], pushing[GROUP_SIZE], gaps[GROUP_SIZE];  // pushing: ranks of those that may
-void main() {
-  uint own_lane = gl_LocalInvocationIndex, first = own_lane / CANDIDATES * CANDIDATES, lane = own_lane - first;
-  uint record = group_index() * (GROUP_SIZE / CANDIDATES) + own_lane / CANDIDATES, k = RECORDS_AT + RECORD * record;
-  bool there = record < pair_lists[RECORDS] && pair_lists[k + 2u] <= substep;
-  uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + CANDIDATE + lane] : NONE;
-  Meeting m;
-  m.gap = m.rank = none;
-  if (t != NONE) m = meeting_of(s, t);
-  bool may_push = t != NONE && (t & BESIDE) == 0u && (m.gap < 0.0 || !item_is_edge(s));
-  gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none;
-  barrier();
-  uint nearest = first, least = first;
-  float apart = none;  // m, from the nearest; of one that is in any, 0
-  for (uint c = first; c < first + CANDIDATES; ++c) {
-    if (ranks[c] < ranks[nearest]) nearest = c;
-    if (pushing[c] < pushing[least]) least = c;
-    apart = min(apart, max(gaps[c], 0.0));
-  }
-  if (!there || own_lane != least) return;
-  bool pushes = may_push && m.gap < 0.0 && (gaps[nearest] <= 0.0 || item_is_edge(s));
-  pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
-  if (!pushes) {
-    if (!item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
-    return;
-  }
+shared float folds[GROUP_SIZE];  // ranks of those that push in spite of a nearer one
+shared uint touching, deepest;  // of this work-group, so that not all contacts queue for two numbers
+// Item s is in target t.
+void touch(uint s, uint t, Meeting m) {
   pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
   uvec4 vertices = vertices_of(s, t & TARGET);
   for (uint j = 0u; j < 4u; ++j) {
@@ -43,6 +22,44 @@ void main() {
   if (item_is_edge(s))
     for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * beside[j] + 7u], 1);
 #endif
-  atomicAdd(pair_lists[TOUCHING], 1u);
-  atomicMax(pair_lists[DEEPEST], floatBitsToUint(-m.gap));
+  atomicAdd(touching, 1u);
+  atomicMax(deepest, floatBitsToUint(-m.gap));
+}
+void main() {
+  uint own_lane = gl_LocalInvocationIndex, first = own_lane / CANDIDATES * CANDIDATES, lane = own_lane - first;
+  uint record = group_index() * (GROUP_SIZE / CANDIDATES) + own_lane / CANDIDATES, k = RECORDS_AT + RECORD * record;
+  bool there = record < pair_lists[RECORDS] && pair_lists[k + 2u] <= substep;
+  uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + CANDIDATE + lane] : NONE;
+  Meeting m;
+  m.gap = m.rank = none;
+  if (t != NONE) m = meeting_of(s, t);
+  bool may_push = t != NONE && (t & BESIDE) == 0u && (m.gap < 0.0 || !item_is_edge(s));
+  gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none;
+  if (own_lane == 0u) touching = deepest = 0u;
+  barrier();
+  uint nearest = first, least = first, behind = first;
+  float apart = none;  // m, from the nearest; of one that is in any, 0
+  for (uint c = first; c < first + CANDIDATES; ++c) {
+    if (ranks[c] < ranks[nearest]) nearest = c;
+    if (pushing[c] < pushing[least]) least = c;
+    apart = min(apart, max(gaps[c], 0.0));
+  }
+  // Where bodies fold the nearest triangle may say that the vertex is outside, but a tet that it is in does not err.
+  bool vetoed = gaps[nearest] > 0.0 && there && !item_is_edge(s);
+  folds[own_lane] = vetoed && may_push && m.gap < 0.0 && is_behind(s, t & TARGET) ? m.rank : none;
+  barrier();
+  for (uint c = first; c < first + CANDIDATES; ++c)
+    if (folds[c] < folds[behind]) behind = c;
+  bool in_fold = folds[behind] < none;
+  if (in_fold) least = behind;
+  bool decides = there && own_lane == least;
+  bool pushes = decides && may_push && m.gap < 0.0 && (!vetoed || in_fold);
+  if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
+  if (decides && !pushes && !item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
+  if (pushes) touch(s, t, m);
+  barrier();
+  if (own_lane == 0u && touching > 0u) {
+    atomicAdd(pair_lists[TOUCHING], touching);
+    atomicMax(pair_lists[DEEPEST], deepest);
+  }
 }

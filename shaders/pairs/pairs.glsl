@@ -6,10 +6,14 @@
 layout(local_size_x = GROUP_SIZE) in;
 // Vertices of each triangle (x 3) and its body; sharp edges of solids: ends, third vertices of the triangles beside them, body; vertices of surfaces,
 // each with its body; where the triangles around each vertex start, and these; leaves (body, then first and end of their triangles, vertices and
-// edges); of each body its thickness and its first leaf; slices of the vertices that belong to one body (body, first, end).
+// edges); of each body its thickness and its first leaf; slices of the vertices that belong to one body (body, first, end); the tet behind each
+// triangle; tets: vertices, then the tets across from these.
 layout(std430, binding = BIND_PAIR_MESH) restrict readonly buffer PairMesh { uint pair_mesh[]; };
 uint triangle_vertex(uint t, uint corner) { return pair_mesh[4u * t + corner]; }
 uint triangle_body(uint t) { return pair_mesh[4u * t + 3u]; }
+uint tet_behind(uint t) { return pair_mesh[BEHIND_AT + t]; }
+uint tet_vertex(uint tet, uint k) { return pair_mesh[TETS_AT + 8u * tet + k]; }
+uint tet_beyond(uint tet, uint k) { return pair_mesh[TETS_AT + 8u * tet + 4u + k]; }
 uint edge_vertex(uint e, uint k) { return pair_mesh[EDGES_AT + 5u * e + k]; }
 uint edge_body(uint e) { return pair_mesh[EDGES_AT + 5u * e + 4u]; }
 uint surface_vertex(uint s) { return pair_mesh[VERTICES_AT + 2u * s]; }
@@ -75,6 +79,11 @@ layout(std430, binding = BIND_PAIR_SUMS) restrict buffer PairSums { int pair_sum
 uniform float margin;  // m, how near a candidate is
 float reach_of(float depth) { return max(margin, 1.05 * depth + 0.5 * margin); }  // of an item that is so deep in a body
 
+// An indirect dispatch is to have so many work-groups, ROW of them in a row.
+void need_groups(uint at, uint count) {
+  atomicMax(pair_lists[at], min(count, ROW));
+  if (count > ROW) atomicMax(pair_lists[at + 1u], (count + ROW - 1u) / ROW);
+}
 uint sortable(float x) {
   uint bits = floatBitsToUint(x);
   return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;

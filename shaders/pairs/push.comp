@@ -3,7 +3,6 @@
 #include "pairs/pairs.glsl"
 #if IMPLICIT
 #include "vertex_state.glsl"
-#include "newton/vectors.glsl"
 #else
 #include "quantized.glsl"
 #include "vertex.glsl"
@@ -30,10 +29,7 @@ void move(uint i) {
   v = pair_add(v, stopped * params.inverse_h);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
-#if IMPLICIT
-  vec4 way = at(WAY, i);
-  put(WAY, i, way.xyz + stopped, way.w);  // the history of BDF2 has what velocity has, and so keeps momentum
-#else
+#if !IMPLICIT  // the way that BDF2 goes on from stays what forces made it, or a stop takes back two thirds of the velocity that went in
 #if !LEAPFROG
   x = predict_position(x, predict_velocity(v));
 #endif

@@ -35,14 +35,11 @@ vec3 part_of_normal(uint s, uint lane) {
 uint found[CANDIDATES];
 float distances[CANDIDATES];
 void consider(uint t, float d) {
-  uint at = CANDIDATES;
-  for (uint k = CANDIDATES; k-- > 0u;)
-    if (d < distances[k] || (d == distances[k] && t < found[k])) at = k;
   for (uint k = 0u; k < CANDIDATES; ++k) {
-    if (k < at) continue;
-    uint t_out = found[k];
-    float d_out = distances[k];
-    found[k] = t, distances[k] = d;
+    bool before = d < distances[k] || (d == distances[k] && t < found[k]);
+    uint t_out = before ? found[k] : t;
+    float d_out = before ? distances[k] : d;
+    if (before) found[k] = t, distances[k] = d;
     t = t_out, d = d_out;
   }
 }
@@ -82,35 +79,31 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
 }
 #endif
+// Shared memory is what limits how many work-groups run at once, so each word serves in turn.
 #define STAGED (GROUP_SIZE * CANDIDATES)  // beyond, each item looks through the leaves itself
-shared uint lists[STAGED], staged_count;  // first the targets near the work-group's items, later what each invocation found
+shared uint lists[STAGED], staged_count;  // parts of normals (as floats' bits); targets near the work-group's items; what each invocation found
+#define MOST_LEAVES 768u                  // at least STAGED; if more are near, items look through all
+shared uint scratch[MOST_LEAVES], leaf_count;  // near leaves; what waits to be looked at, of each item; how far what is in lists is (floats' bits)
 #if LANES > 1
-#define WAITING 96u  // triangles per vertex; more are looked at at once, by lanes that wait for each other
-shared uint waiting[PER_GROUP][WAITING], waiting_count[PER_GROUP];
-shared float list_distances[GROUP_SIZE][CANDIDATES];
+#define WAITING (MOST_LEAVES / PER_GROUP)  // more are looked at as they are found, by lanes that wait for each other
+shared uint waiting_count[PER_GROUP];
 // Leaves the nearest of all lists in that of the first lane.
 void merge(uint lane) {
   for (uint half_size = LANES / 2u; half_size > 0u; half_size /= 2u) {
-    for (uint k = 0u; k < CANDIDATES; ++k) lists[gl_LocalInvocationIndex * CANDIDATES + k] = found[k], list_distances[gl_LocalInvocationIndex][k] = distances[k];
     barrier();
-    if (lane < half_size) {
-      uint from = gl_LocalInvocationIndex + half_size;
+    uint own = gl_LocalInvocationIndex * CANDIDATES, other = own + half_size * CANDIDATES;
+    for (uint k = 0u; k < CANDIDATES; ++k) lists[own + k] = found[k], scratch[own + k] = floatBitsToUint(distances[k]);
+    barrier();
+    if (lane < half_size)
       for (uint k = 0u; k < CANDIDATES; ++k)
-        if (lists[from * CANDIDATES + k] != NONE && list_distances[from][k] <= distances[CANDIDATES - 1u])
-          consider(lists[from * CANDIDATES + k], list_distances[from][k]);
-    }
-    barrier();
+        if (lists[other + k] != NONE && uintBitsToFloat(scratch[other + k]) <= distances[CANDIDATES - 1u])
+          consider(lists[other + k], uintBitsToFloat(scratch[other + k]));
   }
 }
 #endif
 shared vec3 lows[PER_GROUP], highs[PER_GROUP];  // of what each item looks at
-#define MOST_LEAVES 512u                        // if more are near, items look through all
-shared uint leaves[MOST_LEAVES], leaf_count;
 #define BODY_WORDS ((BODY_COUNT + 31u) / 32u)
 shared uint near_bodies[BODY_WORDS], own_body;  // a bit per body; the body of this work-group's items
-#if QUERY_EDGES == 0
-shared vec3 normals[GROUP_SIZE];
-#endif
 #if QUERY_EDGES
 uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
 uint end_of_targets(uint leaf) { return TRIANGLES + of_leaf(leaf, 6u); }
@@ -149,12 +142,13 @@ void main() {
   for (uint w = gl_LocalInvocationIndex; w < BODY_WORDS; w += GROUP_SIZE) near_bodies[w] = 0u;
 #if QUERY_EDGES == 0
   if (there) normal = part_of_normal(s, lane);
-  normals[gl_LocalInvocationIndex] = normal;
+  for (uint c = 0u; c < 3u; ++c) lists[3u * gl_LocalInvocationIndex + c] = floatBitsToUint(normal[c]);
 #endif
   barrier();
 #if QUERY_EDGES == 0
   normal = vec3(0.0);
-  for (uint k = 0u; k < LANES; ++k) normal += normals[part * LANES + k];
+  for (uint k = part * LANES; k < (part + 1u) * LANES; ++k)
+    normal += uintBitsToFloat(uvec3(lists[3u * k], lists[3u * k + 1u], lists[3u * k + 2u]));
 #endif
   vec3 lowest = lows[0], highest = highs[0];
   for (uint k = 1u; k < PER_GROUP; ++k) lowest = min(lowest, lows[k]), highest = max(highest, highs[k]);
@@ -166,12 +160,12 @@ void main() {
     for (uint l = first_leaf(other) + gl_LocalInvocationIndex; l < first_leaf(other + 1u); l += GROUP_SIZE) {
       if (!in_leaf(l, lowest, highest)) continue;
       uint slot = atomicAdd(leaf_count, 1u);
-      if (slot < MOST_LEAVES) leaves[slot] = l;
+      if (slot < MOST_LEAVES) scratch[slot] = l;
     }
   }
   barrier();
   for (uint n = 0u; n < min(leaf_count, MOST_LEAVES); ++n)
-    for (uint t = first_target(leaves[n]) + gl_LocalInvocationIndex; t < end_of_targets(leaves[n]); t += GROUP_SIZE) {
+    for (uint t = first_target(scratch[n]) + gl_LocalInvocationIndex; t < end_of_targets(scratch[n]); t += GROUP_SIZE) {
       vec4 sphere = pair_spheres[t];
       if (any(lessThan(sphere.xyz + 1.01 * sphere.w, lowest)) || any(greaterThan(sphere.xyz - 1.01 * sphere.w, highest))) continue;
       uint slot = atomicAdd(staged_count, 1u);
@@ -181,7 +175,7 @@ void main() {
   bool listed = leaf_count <= MOST_LEAVES, staged = listed && staged_count <= STAGED;
   uint turns = !there ? 0u : staged ? 1u : listed ? leaf_count : LEAVES;
   for (uint n = 0u; n < turns; ++n) {
-    uint leaf = listed ? leaves[n] : n;
+    uint leaf = staged ? 0u : listed ? scratch[n] : n;
     if (!staged && !in_leaf(leaf, low, high)) continue;
     uint end = staged ? staged_count : end_of_targets(leaf);
     for (uint j = lane + (staged ? 0u : first_target(leaf)); j < end; j += LANES) {
@@ -198,9 +192,9 @@ void main() {
       if (same_body) continue;
 #endif
 #if LANES > 1
-      uint slot = atomicAdd(waiting_count[part], 1u);
+      uint slot = staged ? atomicAdd(waiting_count[part], 1u) : WAITING;  // if not, scratch still has the leaves
       if (slot < WAITING) {
-        waiting[part][slot] = t;
+        scratch[part * WAITING + slot] = t;
         continue;
       }
 #endif
@@ -209,8 +203,10 @@ void main() {
   }
 #if LANES > 1
   barrier();
-  for (uint slot = lane; slot < min(waiting_count[part], WAITING); slot += LANES)
-    look_at(s, waiting[part][slot], target_body(waiting[part][slot]) == body, own, held, normal);
+  for (uint slot = lane; slot < min(waiting_count[part], WAITING); slot += LANES) {
+    uint t = scratch[part * WAITING + slot];
+    look_at(s, t, target_body(t) == body, own, held, normal);
+  }
   merge(lane);
 #endif
   if (lane != 0u) return;
@@ -220,8 +216,8 @@ void main() {
   for (uint k = 0u; k < CANDIDATES; ++k) opposed = opposed || (found[k] & BESIDE) == 0u;
   if (!opposed) return;
   uint record = atomicAdd(pair_lists[RECORDS], 1u), k = RECORDS_AT + RECORD * record;
-  atomicMax(pair_lists[GROUPS], record / GROUP_SIZE + 1u);
-  atomicMax(pair_lists[LANE_GROUPS], record / (GROUP_SIZE / CANDIDATES) + 1u);
+  need_groups(GROUPS, record / GROUP_SIZE + 1u);
+  need_groups(LANE_GROUPS, record / (GROUP_SIZE / CANDIDATES) + 1u);
   pair_lists[k] = s;
   pair_lists[k + 2u] = 0u;
   for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + CANDIDATE + c] = found[c];

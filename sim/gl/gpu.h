@@ -5,6 +5,7 @@
 
 #include <GL/glew.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <glm/glm.hpp>
@@ -213,5 +214,11 @@ class Program : public Owned<GLuint, delete_program> {
   std::string label_, text_;
   mutable std::map<std::string, GLint, std::less<>> locations_;
 };
+
+/// So many work-groups, at most `row` of them in a row (types.glsl: group_index).
+inline void dispatch(std::size_t work_groups, std::size_t row) {
+  row = std::min(work_groups, row);
+  glDispatchCompute(GLuint(row), GLuint((work_groups + row - 1) / row), 1);
+}
 
 }  // namespace tetpbd

@@ -8,7 +8,6 @@
 
 #include "sim/error.h"
 #include "sim/moving_shape.h"
-#include "sim/solvers/pair_contact.h"
 
 namespace tetpbd {
 
@@ -102,7 +101,6 @@ void advance(Leapfrog& run, long steps) {
   const Settings& settings = run.input.settings;
   const std::vector<glm::dvec4> planes = planes_of(run.input.model, settings);
   const double keep = std::exp(-settings.damping * run.h);
-  PairContact pairs(run.input.model, settings);
   std::vector<MovingShape> shapes;
   for (long s = 0; s < steps; ++s, run.time[0] += run.h) {
     if (s == 0 || std::ranges::any_of(run.input.model.shapes, moves))
@@ -123,7 +121,7 @@ void advance(Leapfrog& run, long steps) {
         touch(met.normal, -met.distance, shape.friction, way, run.h, x, run.v[i]);
       }
     });
-    pairs.resolve(run.x, run.v, run.held, run.input.inverse_masses, run.h);
+    run.pairs.resolve(settings, run.x, run.v, run.held, run.input.inverse_masses, run.h);
   }
   for (std::size_t i = 0; i < run.x.size(); ++i)
     if (!std::isfinite(glm::dot(run.x[i], run.x[i]) + glm::dot(run.v[i], run.v[i])))

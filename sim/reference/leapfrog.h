@@ -10,6 +10,7 @@
 #include "sim/parallel.h"
 #include "sim/reference/objective.h"
 #include "sim/reference/reference.h"
+#include "sim/solvers/pair_contact.h"
 
 namespace tetpbd {
 
@@ -24,6 +25,7 @@ struct Leapfrog {
   Grouped at_vertex;                ///< which of them act on a vertex
   std::vector<double> time = {0};   ///< s, one number
   std::vector<State::Held> held{};  ///< as in State
+  PairContact pairs{input.model};
 };
 /// From `start`, whose velocities are those of the same instant. Throws Error for compliances not above 0.
 Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);

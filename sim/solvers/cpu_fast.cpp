@@ -282,7 +282,7 @@ struct Turn {
 
 class FastPbd {
  public:
-  FastPbd(const SolverInput& input) : model_(input.model) {
+  FastPbd(const SolverInput& input) : model_(input.model), pairs_(input.model) {
     std::size_t all = 0;
     for_each_kind([&](auto is, int kind) {
       auto& batches = std::get<Batches<decltype(is)>>(work_.batches);
@@ -306,7 +306,6 @@ class FastPbd {
                    double time) {
     const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
-    PairContact pairs(model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
     x.resize(state.positions.size());
@@ -345,11 +344,11 @@ class FastPbd {
         for_each_free_vertex([&](std::size_t i) {
           if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;
         });
-        if (pairs.wanted()) {
+        if (bodies_touch(model_, settings)) {
           barrier.wait(thread);
           if (thread == 0) {
             for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = x[i].position();
-            pairs.resolve(state.positions, v, state.held, inverse_masses, substep.h);
+            pairs_.resolve(settings, state.positions, v, state.held, inverse_masses, substep.h);
             for (std::size_t i = 0; i < x.size(); ++i) move_to(i, state.positions[i]);
           }
           barrier.wait(thread);
@@ -410,6 +409,7 @@ class FastPbd {
   }
 
   const Model& model_;
+  PairContact pairs_;
   Work work_;
   std::vector<Turn> turns_;
   std::vector<glm::dvec3> predicted_;

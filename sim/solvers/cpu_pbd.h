@@ -98,7 +98,8 @@ enum class Sweep { jacobi, gauss_seidel };
 template <class real>
 class CpuPbd {
  public:
-  CpuPbd(const Model& model, const ConstraintSystem& system) : model_(model), at_vertex_(system.at_vertex) {
+  CpuPbd(const Model& model, const ConstraintSystem& system)
+      : model_(model), pairs_(model), at_vertex_(system.at_vertex) {
     for_each_kind([&](auto kind, int k) {
       constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
       const ConstraintList& list = system.lists[std::size_t(k)];
@@ -122,7 +123,6 @@ class CpuPbd {
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
     const Substep substep(model_, settings, time);
     RigidContact contact(model_, settings);
-    PairContact pairs(model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;
@@ -158,7 +158,7 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0 && !contact.carries(i)) v[i] += (x[i] - predicted[i]) / substep.h;
-      pairs.resolve(x, v, state.held, inverse_masses, substep.h);
+      pairs_.resolve(settings, x, v, state.held, inverse_masses, substep.h);
     }
     return guards;
   }
@@ -183,6 +183,7 @@ class CpuPbd {
   };
 
   const Model& model_;
+  PairContact pairs_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;
   std::array<std::vector<double>, kind_count> compliances_;  // of a material, else empty

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim/cell_grid.h"
 #include "sim/formulas.h"
@@ -14,18 +15,13 @@ namespace tetpbd {
 
 class PairContact {
  public:
-  PairContact(const Model& model, const Settings& settings)
-      : model_(model),
-        wanted_(bodies_touch(model, settings)),
-        self_(settings.contact == "self"),
-        friction_(settings.friction) {
-    if (wanted_) mesh_ = pair_mesh(model);
-  }
-  bool wanted() const { return wanted_; }
+  explicit PairContact(const Model& model) : model_(&model) {}
   /// After a substep of `h`: of places `x` and velocities `v`, and what vertices are `held` by.
-  void resolve(std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v, std::vector<State::Held>& held,
-               const std::vector<double>& inverse_masses, double h) {
-    if (!wanted_) return;
+  void resolve(const Settings& settings, std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v,
+               std::vector<State::Held>& held, const std::vector<double>& inverse_masses, double h) {
+    if (!bodies_touch(*model_, settings)) return;
+    self_ = settings.contact == "self";
+    if (mesh_.triangles.empty()) mesh_ = pair_mesh(*model_), add_tets(model_->rest, mesh_);
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
     const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness, held);
@@ -43,7 +39,7 @@ class PairContact {
       }
       if (!(weight > 0)) continue;
       const double push_most = mesh_.edge / 10;  // push.comp
-      const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, friction_);
+      const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, settings.friction);
       for (std::size_t j = 0; j < 4; ++j) {
         const double factor = m.weights[j] * inverse_masses[vertices[j]] / weight;
         x[vertices[j]] += factor * (by.stopped + by.pushed), stopped[vertices[j]] += factor * by.stopped;
@@ -60,7 +56,7 @@ class PairContact {
   };
   bool neighbours(std::uint32_t a, std::uint32_t b, std::uint32_t body) const {
     const double apart = mesh_.thicknesses[body] > 0 ? 0 : 2.4 * mesh_.edge;
-    return glm::distance(model_.rest.positions[a], model_.rest.positions[b]) <= apart;
+    return glm::distance(model_->rest.positions[a], model_->rest.positions[b]) <= apart;
   }
   struct Near {  // whether another body is there, or the same is asked for as well
     std::vector<Bounds> boxes;
@@ -76,7 +72,7 @@ class PairContact {
   // The triangle that each vertex is in, and the edge that each sharp one has crossed, if any: the nearest
   // within the margin.
   std::vector<Contact> find(const std::vector<glm::dvec3>& x, double margin, std::vector<State::Held>& held) {
-    Near near{std::vector<Bounds>(model_.bodies.size(), Bounds{glm::dvec3(1e30), glm::dvec3(-1e30)}), self_};
+    Near near{std::vector<Bounds>(model_->bodies.size(), Bounds{glm::dvec3(1e30), glm::dvec3(-1e30)}), self_};
     for (const auto& [vertex, body] : mesh_.vertices) {
       near.boxes[body].low = glm::min(near.boxes[body].low, x[vertex]);
       near.boxes[body].high = glm::max(near.boxes[body].high, x[vertex]);
@@ -111,6 +107,7 @@ class PairContact {
       best.meeting.rank = margin;
       Meeting nearest = best.meeting;
       nearest.gap = margin;
+      std::vector<std::pair<Contact, State::Held>> deeper;  // behind which it is
       const State::Held was = s < all_held.size() ? all_held[s] : State::Held{};
       grid.for_each({own - margin, own + margin}, [&](std::uint32_t t) {
         const auto& [i, j, k, other] = mesh_.triangles[t];
@@ -129,9 +126,19 @@ class PairContact {
         m.gap -= std::max(thickness, other_thickness);
         if (m.rank < nearest.rank) nearest = m;
         const bool sheets = thickness > 0 || other_thickness > 0;
-        if (m.rank < best.meeting.rank && (sheets || Formulas<double>{}.opposes(m, normals[vertex])))
-          best = {{vertex, i, j, k}, m}, held[s] = {t, under ? 1u : 0u};
+        if (m.rank >= margin || !(sheets || Formulas<double>{}.opposes(m, normals[vertex]))) return;
+        const Contact contact{{vertex, i, j, k}, m};
+        const State::Held by{t, under ? 1u : 0u};
+        if (m.gap < 0) deeper.push_back({contact, by});
+        if (m.rank < best.meeting.rank) best = contact, held[s] = by;
       });
+      if (nearest.gap > 0) {  // meet.comp, where only the eight nearest are known
+        std::ranges::sort(deeper, {},
+                          [](const auto& d) { return std::pair(d.first.meeting.rank, d.second.target); });
+        const auto found = std::ranges::find_if(
+            deeper, [&](const auto& d) { return is_behind(x, vertex, d.second.target); });
+        if (found != deeper.end()) nearest.gap = 0, best = found->first, held[s] = found->second;
+      }
       if (best.meeting.rank < margin && best.meeting.gap < 0 && nearest.gap <= 0)
         contacts.push_back(best);
       else
@@ -174,6 +181,21 @@ class PairContact {
       if (best.meeting.rank < margin) contacts.push_back(best);
     }
   }
+  bool is_behind(const std::vector<glm::dvec3>& x, std::uint32_t vertex, std::uint32_t triangle) const {
+    std::uint32_t tet = mesh_.behind[triangle];
+    for (int turn = 0; turn < 6 && tet != PairMesh::none; ++turn) {  // pairs/meeting.glsl
+      const auto& [v, beyond] = mesh_.tets[tet];
+      const auto at = [&](std::size_t k) { return x[v[k]] - x[vertex]; };
+      const auto [parts] = Formulas<double>{}.tet_parts(at(0), at(1), at(2), at(3));
+      const double whole = std::accumulate(parts, parts + 4, 0.0);
+      if (!(whole > 0)) return false;
+      const auto least = std::ranges::min_element(parts);
+      const auto small = std::ranges::count_if(parts, [&](double p) { return p <= 1e-3 * whole; });
+      tet = beyond[least - parts];
+      if (small == 0 || (small == 1 && tet != PairMesh::none && *least >= -1e-3 * whole)) return true;
+    }
+    return false;
+  }
   bool share_a_vertex(std::uint32_t a, std::uint32_t b) const {
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j)
@@ -181,10 +203,9 @@ class PairContact {
     return false;
   }
 
-  const Model& model_;
-  bool wanted_, self_;
-  double friction_;
-  PairMesh mesh_;
+  const Model* model_;
+  bool self_ = false;
+  PairMesh mesh_;  // made when something is to touch
 };
 
 }  // namespace tetpbd

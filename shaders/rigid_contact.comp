@@ -133,9 +133,12 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     barrier();
     if (worst_place == ~0u) break;
     int at = touching;
-    for (int k = touching - 1; k >= 0; --k)
-      if (contacts[k].impulse == vec3(0.0) || places[k] == worst_place) at = k;
-    if (at == MOST_TOUCHES) break;
+    bool known = false;  // then contacts contradict each other, as where a body is jammed, and more sweeps do not help
+    for (int k = touching - 1; k >= 0; --k) {
+      if (contacts[k].impulse == vec3(0.0)) at = k;
+      known = known || places[k] == worst_place;
+    }
+    if (known || at == MOST_TOUCHES) break;
     touching = max(touching, at + 1);
     barrier();
     if (lane == 0u) {

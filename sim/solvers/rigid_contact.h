@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -100,18 +101,22 @@ class RigidContact {
     const Rules::Rigid falling = body;
     // Contacts are taken in as the motion found so far breaks them, the worst first.
     Rules::Touch touches[MOST_TOUCHES], worst;
+    std::array<std::size_t, MOST_TOUCHES> places{};  // a number per vertex and obstacle
     for (int count = 0; count < MOST_TOUCHES; ++count) {
       const double loose = 1e-3 * fall + enough;
       double most = loose;
+      std::size_t place = 0;
       // Of vertex i at arm: a normal and the gap there, how the obstacle moves, brakes and rebounds.
       const auto consider = [&](const glm::dvec3& arm, const glm::dvec3& n, double gap,
                                 const glm::dvec3& surface, double friction, double restitution) {
         const double least =
             Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
                                    gap - Rules{}.closed_gap * model_.size, s.h, fall, restitution);
+        ++place;
         const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
         if (!(over > most)) return;
-        most = over, worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0));
+        most = over, places[std::size_t(count)] = place,
+        worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0));
         worst.surface = surface, worst.friction = friction;
       };
       for (const std::size_t i : near) {
@@ -128,7 +133,9 @@ class RigidContact {
                    shape.restitution);
         }
       }
-      if (most == loose) break;
+      const auto taken = places.begin() + count;
+      if (most == loose || std::find(places.begin(), taken, *taken) != taken)
+        break;  // where one is known contacts contradict each other, as where a body is jammed
       touches[count] = worst;
       body = Rules{}.settled(touches, body, count + 1, enough, 1e-4 * fall);
     }

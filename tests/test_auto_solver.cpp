@@ -29,7 +29,7 @@ Scene falling(const SceneOverrides& overrides) {
 
 }  // namespace
 
-TEST_CASE("a solver by name puts its settings in place of the scene's; flags go on top") {
+TEST_CASE("a solver by name puts its settings in place of the scene's, flags go on top") {
   const Settings paper = load_scene("bunny-drop", {.solver = "paper"}).settings;
   CHECK(paper.iterations == 25);
   CHECK(paper.substeps == 1);

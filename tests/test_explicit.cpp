@@ -96,7 +96,7 @@ std::shared_ptr<const Model> deformed_block(const glm::dvec3& by) {
 
 }  // namespace
 
-TEST_CASE("explicit: kernels note the stiffest constraint; it moves with the largest eigenvalue") {
+TEST_CASE("explicit: kernels note the stiffest constraint, it moves with the largest eigenvalue") {
   GlTest gl;
   for (const char* material : {"none", "springs", "neo-hookean"})
     for (const glm::dvec3 by : {glm::dvec3(1), glm::dvec3(2, 1, 1), glm::dvec3(0.3, 1.2, 1.2),

@@ -204,7 +204,7 @@ TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contai
         std::string::npos);  // quick: bunny alone
 }
 
-TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the reference; shards merge") {
+TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the reference, shards merge") {
   const Folder folder;
   const std::string common =
       "compare --hard-cases --cases coincident,mass-top --meshes tet --modes node,cpu-double --steps 30 ";

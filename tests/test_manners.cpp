@@ -46,7 +46,7 @@ TEST_CASE("manners: words that are not known get the one that was meant") {
   refused("run --replay x.jsonl --explain", "--explain");
 }
 
-TEST_CASE("manners: flags that change nothing say so, others do not; both spellings of scenes are known") {
+TEST_CASE("manners: flags that change nothing say so, others do not, both spellings of scenes are known") {
   const Folder folder;
   const std::string beam = "--scenes beam --steps 1 --set bodies.0.block.cells=[2,1,1] --out o ";
   const auto said = [&](const std::string& words) {

@@ -154,7 +154,7 @@ TEST_CASE("motion: a corner that hits turns the body by its arm times the impuls
   }
 }
 
-TEST_CASE("motion: a rigid block that three fixed vertices hold stays; on a line they leave it free to turn") {
+TEST_CASE("motion: a rigid block that three fixed vertices hold stays, on a line they leave it free to turn") {
   Scene scene = block_at({1, 1, 1}, {0, 2, 0});
   scene.model.inverse_masses[0] = scene.model.inverse_masses[1] = scene.model.inverse_masses[2] = 0;  // an edge
   CHECK_THROWS_WITH_AS(find_motion(scene.input(), 5), doctest::Contains("can turn about its fixed vertices"),

@@ -577,7 +577,7 @@ TEST_CASE("newton: a tet alone, thousands of them, and bodies without constraint
     }
 }
 
-TEST_CASE("newton: the same bits twice; other modes go on from where it is; what has no force is refused") {
+TEST_CASE("newton: the same bits twice, other modes go on from where it is, what has no force is refused") {
   GlTest gl;
   const auto model = irregular_block(0.01, true, {1, 0, 0}, {});
   std::uint64_t bits = 0;

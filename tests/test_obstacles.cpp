@@ -506,7 +506,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite")
   }
 }
 
-TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again; what is wrong is refused") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again, what is wrong is refused") {
   const auto file =
       std::filesystem::temp_directory_path() / ("tetpbd_obstacles_" + std::to_string(getpid()) + ".json");
   const auto load = [&](const std::string& obstacles) {

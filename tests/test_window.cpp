@@ -238,7 +238,7 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK(gl_error_count() == 0);
 }
 
-TEST_CASE("window: a history is all of it in even steps, and the newest; plots are copied and saved") {
+TEST_CASE("window: a history is all of it in even steps, and the newest, plots are copied and saved") {
   History history;
   for (int i = 0; i < 30000; ++i) {
     history.add(i, 0.5 * i);
@@ -435,7 +435,7 @@ TEST_CASE("window: obstacles come, move, turn and go while bodies go on, and all
   CHECK(gl_error_count() == 0);
 }
 
-TEST_CASE("window: a saved scene is loaded as it was; a file that fails leaves an error until one works") {
+TEST_CASE("window: a saved scene is loaded as it was, a file that fails leaves an error until one works") {
   GlTest gl;
   const run_program::Folder folder;
   const auto before = std::filesystem::current_path();
@@ -491,7 +491,7 @@ TEST_CASE("scene: every shipped one is written as it is read, and has a picture"
   }
 }
 
-TEST_CASE("window: what it keeps is kept; a damaged file is as none") {
+TEST_CASE("window: what it keeps is kept, a damaged file is as none") {
   const run_program::Folder folder;
   const auto file = folder.path / "new" / "window.json";
   CHECK(read_preferences(file) == Preferences());

@@ -8,6 +8,7 @@
 
 #include "sim/cell_grid.h"
 #include "sim/formulas.h"
+#include "sim/overlap.h"
 #include "sim/pairs.h"
 #include "sim/settings.h"
 
@@ -24,7 +25,9 @@ class PairContact {
     if (mesh_.triangles.empty()) mesh_ = pair_mesh(*model_), add_tets(model_->rest, mesh_);
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
-    const auto contacts = find(x, std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness, held);
+    double margin = std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness;
+    if (held.empty()) margin += 2 * overlap_of(*model_, x, self_).deepest;  // bodies that start in each other
+    const auto contacts = find(x, margin, held);
     std::vector<int> counts(x.size(), 0);
     for (const Contact& c : contacts)
       for (std::size_t j = 0; j < 4; ++j) counts[c.vertices[j]] += c.meeting.weights[j] != 0;
@@ -82,14 +85,29 @@ class PairContact {
     find_edges(x, margin, near, contacts);
     return contacts;
   }
+  // How far each vertex looks: one that is deep in a body, as far as its surface (reach_of, pairs.glsl).
+  std::vector<double> reaches_of(const std::vector<glm::dvec3>& x, double margin,
+                                 const std::vector<State::Held>& held) const {
+    std::vector<double> reaches(mesh_.vertices.size(), margin);
+    for (std::size_t s = 0; s < held.size(); ++s) {
+      if (held[s].target == ~0u) continue;
+      const auto& [i, j, k, body] = mesh_.triangles[held[s].target];
+      const glm::dvec3 own = x[mesh_.vertices[s].vertex];
+      const double far = std::abs(Formulas<double>{}.meet(x[i] - own, x[j] - own, x[k] - own).gap);
+      if (far < 1e29) reaches[s] = std::max(margin, 1.05 * far + 0.5 * margin);
+    }
+    return reaches;
+  }
   void find_vertices(const std::vector<glm::dvec3>& x, double margin, const Near& near,
                      std::vector<State::Held>& all_held, std::vector<Contact>& contacts) const {
+    const std::vector<double> reaches = reaches_of(x, margin, all_held);
+    const double most = std::ranges::max(reaches);
     CellGrid grid(1.2 * mesh_.edge);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto& [i, j, k, body] = mesh_.triangles[t];
       const glm::dvec3 low = glm::min(x[i], glm::min(x[j], x[k])),
                        high = glm::max(x[i], glm::max(x[j], x[k]));
-      if (near(body, low - margin, high + margin)) grid.add({low, high}, t);
+      if (near(body, low - most, high + most)) grid.add({low, high}, t);
     }
     std::vector<glm::dvec3> normals(x.size(), glm::dvec3(0));
     for (const auto& [i, j, k, body] : mesh_.triangles) {
@@ -101,15 +119,16 @@ class PairContact {
     for (std::size_t s = 0; s < mesh_.vertices.size(); ++s) {
       const auto& [vertex, body] = mesh_.vertices[s];
       const glm::dvec3 own = x[vertex];
-      if (!near(body, own - margin, own + margin)) continue;
+      const double reach = reaches[s];
+      if (!near(body, own - reach, own + reach)) continue;
       const double thickness = double(mesh_.thicknesses[body]);
       Contact best{};
-      best.meeting.rank = margin;
+      best.meeting.rank = reach;
       Meeting nearest = best.meeting;
-      nearest.gap = margin;
+      nearest.gap = reach;
       std::vector<std::pair<Contact, State::Held>> deeper;  // behind which it is
       const State::Held was = s < all_held.size() ? all_held[s] : State::Held{};
-      grid.for_each({own - margin, own + margin}, [&](std::uint32_t t) {
+      grid.for_each({own - reach, own + reach}, [&](std::uint32_t t) {
         const auto& [i, j, k, other] = mesh_.triangles[t];
         if (other == body && (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) ||
                               neighbours(vertex, k, body)))
@@ -126,7 +145,7 @@ class PairContact {
         m.gap -= std::max(thickness, other_thickness);
         if (m.rank < nearest.rank) nearest = m;
         const bool sheets = thickness > 0 || other_thickness > 0;
-        if (m.rank >= margin || !(sheets || Formulas<double>{}.opposes(m, normals[vertex]))) return;
+        if (m.rank >= reach || !(sheets || Formulas<double>{}.opposes(m, normals[vertex]))) return;
         const Contact contact{{vertex, i, j, k}, m};
         const State::Held by{t, under ? 1u : 0u};
         if (m.gap < 0) deeper.push_back({contact, by});
@@ -139,7 +158,7 @@ class PairContact {
             deeper, [&](const auto& d) { return is_behind(x, vertex, d.second.target); });
         if (found != deeper.end()) nearest.gap = 0, best = found->first, held[s] = found->second;
       }
-      if (best.meeting.rank < margin && best.meeting.gap < 0 && nearest.gap <= 0)
+      if (best.meeting.rank < reach && best.meeting.gap < 0 && nearest.gap <= 0)
         contacts.push_back(best);
       else
         held[s] = {};

@@ -182,8 +182,7 @@ TEST_CASE("sheets: masses are area times thickness times density") {
 
 constexpr const char* two_triangles = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nf 1 3 2\nf 2 3 4\n";
 
-TEST_CASE(
-    "sheets: an open surface is read as one, its triangles turned alike; two faces of a solid are not") {
+TEST_CASE("sheets: an open surface is read as one, its triangles turned alike, two faces of a solid not") {
   const samples::Folder folder;
   const auto file = folder.write("sheet_test.obj", two_triangles);
   SurfaceMesh surface = load_surface(file);

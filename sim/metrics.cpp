@@ -63,9 +63,17 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.bend_rms_rad = rms(sums[M_BEND_SQUARES], m.counts[1]);
   result.rigid_distance = std::sqrt(sums[M_RIGID_SQUARES] / m.mass) / (m.mass_sizes / m.mass);
   result.momentum = vector(M_MOMENTUM);
-  result.angular_momentum = vector(M_ANGULAR);
   result.speed = sums[M_SPEED];
   result.centre /= m.mass;
+  result.angular_momentum = vector(M_ANGULAR);
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const auto of_body = [&](std::size_t at) {
+      const float* row = rows.data() + b * M_STRIDE + at;
+      return glm::dvec3(row[0], row[1], row[2]);
+    };
+    result.angular_momentum +=
+        glm::cross(of_body(M_ORIGIN) + of_body(M_CENTRE) - result.centre, of_body(M_MOMENTUM));
+  }
   result.kinetic = sums[M_KINETIC];
   result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
   result.elastic = sums[M_ELASTIC];

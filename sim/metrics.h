@@ -28,7 +28,7 @@ struct Measurement {
   double bend_rms_rad = 0;    ///< of the angle error over hinges
   double rigid_distance = 0;  ///< RMS (by mass) distance to the rigidly aligned rest shape, over the size
   glm::dvec3 momentum{0};     ///< kg m/s
-  glm::dvec3 angular_momentum{0};     ///< kg m^2/s about each body's centre, summed
+  glm::dvec3 angular_momentum{0};     ///< kg m^2/s about the centre of mass of all
   double speed = 0;                   ///< sum m |v|, kg m/s: what drift is relative to
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)

@@ -250,7 +250,8 @@ const std::vector<PlotRow>& plot_rows() {
   static const std::vector<PlotRow> rows = {
       {"frames per second", "fps", nullptr},      {"time per step", "ms", &Lane::step_ms, true},
       {"volume error", "%", &Lane::volume_error}, {"energy", "J", &Lane::energy},
-      {"distance", "%", &Lane::distance, true},   {"distance", "%", &Lane::distance, true, true}};
+      {"distance", "%", &Lane::distance, true},   {"distance", "%", &Lane::distance, true, true},
+      {"depth of contacts", "%", &Lane::depth}};
   return rows;
 }
 

@@ -28,7 +28,7 @@ void start_afresh(Session& s) {
   for (Lane& lane : s.loaded.lanes) {
     while (lane.metrics && collect(*lane.metrics, true)) {
     }
-    lane.step_ms = lane.volume_error = lane.energy = lane.distance = {};
+    lane.step_ms = lane.volume_error = lane.energy = lane.distance = lane.depth = {};
     lane.apart = {};
   }
   s.loaded.disturbed = false;
@@ -608,6 +608,10 @@ void measure_frame(Session& s, bool stepped) {
     while (const auto now = collect(*lane.metrics)) {
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
+      const Pairs& pairs = lane.sim.pairs;
+      const double in_bodies = pairs ? pairs.depth / lane.sim.model->size : std::nan(""),
+                   depth = std::fmax(now->penetration_max, in_bodies);  // of what there is
+      if (!std::isnan(depth)) lane.depth.add(100 * depth, now->time);
     }
     // Half the ring of results: with more under way, asking again would wait for the oldest.
     if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim);

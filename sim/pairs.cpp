@@ -115,7 +115,8 @@ void take_answer(Sim& sim) {
   const auto words = take<std::uint32_t>(p.asked, p.answer, "contacts", true);
   if (!words) return;
   p.touches += (*words)[touching];
-  p.deepest = std::max(p.deepest, double(std::bit_cast<float>((*words)[deepest])));
+  p.depth = double(std::bit_cast<float>((*words)[deepest]));
+  p.deepest = std::max(p.deepest, p.depth);
   std::vector<Extent> bodies(sim.model->bodies.size());
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const std::uint32_t* of_body = &(*words)[counters + box * b];

@@ -56,6 +56,7 @@ struct PairNumbers {
   long detections = 0;              ///< since the start
   std::uint64_t touches = 0;        ///< contacts, summed over substeps, since the start
   double deepest = 0;               ///< m, the largest depth that a vertex came to in a substep
+  double depth = 0;                 ///< m, the same between the last two looks at boxes
   bool near = true;                 ///< bodies may touch before the answer after the next
   double overlap = 0;               ///< m, how deep they start in each other
   double fastest = 0, closing = 0;  ///< m/s, any body, and two that are near, by the last answer

@@ -277,8 +277,16 @@ TEST_CASE("window: a history is all of it in even steps, and the newest, plots a
   CHECK(std::ranges::count(csv, '\n') == 1 + 2 * std::ssize(chart.series[0].points));
   const Measurement now = measure_now(*s.loaded.lanes[0].metrics, s.loaded.lanes[0].sim);
   CHECK(double(s.loaded.lanes[0].energy.values.back()) == doctest::Approx(now.energy()).epsilon(0.2));
+  const PlotRow& depth = plot_rows().back();
+  for (const float depth : s.loaded.lane().depth.values) CHECK(depth == 0);  // far from the ground
   restart(s);
   CHECK(plot_chart(s, distance).series.empty());
+  take_over(s, load("stack", {}, load_scene("stack")), false);
+  for (int i = 0; i < 24; ++i) single_step(s), glFinish();
+  const auto depths = plot_chart(s, depth).series.at(0).points;
+  const glm::dvec2 deepest = *std::ranges::max_element(depths, {}, &glm::dvec2::y);
+  CHECK(deepest.y > 0);
+  CHECK(deepest.y < 0.5);  // % of a cube
 }
 
 TEST_CASE("window: a map is filled a little in every frame, each cell as a run of its own comes out") {

@@ -127,6 +127,7 @@ bool restore_checkpoint(Sim& sim) {
   sim.needs_predict = true;
   write_shapes(sim);
   forget_answers(sim);
+  if (sim.pairs) start_pairs(sim, read_state(sim));
   start_check(sim, nullptr);
   return true;
 }

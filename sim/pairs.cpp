@@ -275,7 +275,8 @@ void touch(Sim& sim) {
   // Candidates serve while bodies cannot have crossed the margin, or twice it if one of two is stopped by
   // something else; a body that crosses it in a substep gets a wider one, and so do bodies that start deep in
   // each other.
-  const double margin = std::max(p.margin, 1.1 * closing * h) + 2 * std::exchange(p.overlap, 0);
+  const double margin =
+      std::min(std::max(p.margin, 1.1 * closing * h), sim.model->size) + 2 * std::exchange(p.overlap, 0);
   const double serve =
       std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
   bind_pairs(sim);
@@ -312,6 +313,7 @@ void start_pairs(Sim& sim, const State& state) {
   std::vector<std::uint32_t> words(p.lists.bytes() / 4, ~0u);  // nothing is held
   p.empty.read(0, p.empty.bytes(), words.data());
   p.lists.write(0, p.lists.bytes(), words.data());
+  if (is_implicit(sim.settings) && p.near) set_finer(sim, finer_times);
 }
 
 PairNumbers touched(Sim& sim) {

@@ -333,8 +333,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
     sim.rigid_contact = {Program::compute("rigid_contact.comp", {}, defines), work_groups(count, group_size),
                          4 * count};
   }
-  if (bodies_touch(*sim.model, settings))
-    sim.pairs = make_pairs(*sim.model, settings, sim.tuning, defines);
+  if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(*sim.model, settings, sim.tuning, defines);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -515,7 +514,6 @@ void write_state(Sim& sim, const State& state) {
   write_step_block(sim);
   start_check(sim, &state);
   start_pairs(sim, state);
-  if (is_implicit(sim.settings) && sim.pairs && sim.pairs.near) set_finer(sim, finer_times);
 }
 
 void apply_settings(Sim& sim, const Settings& settings) {

@@ -106,7 +106,6 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
     sim.watch.stiffer = 1, sim.watch.calm = 0;
     retime_velocities(sim, then.settings);
     if (sim.pairs) start_pairs(sim, read_state(sim));
-    if (is_implicit(sim.settings) && sim.pairs && sim.pairs.near) set_finer(sim, finer_times);
   }
   write_shapes(sim);
   start_check(sim, nullptr);

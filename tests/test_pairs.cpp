@@ -281,6 +281,9 @@ TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") 
   CHECK(overlap.inside == 32);  // 4 x 4 vertices of each face
   CHECK(overlap.largest == doctest::Approx(0.05 / (0.5 * std::sqrt(3.0))));
   CHECK(overlap.part_999 <= overlap.largest);
+  auto blown_up = model->positions;  // where cells cannot be counted
+  blown_up[0].x = 1e12, blown_up[1].y = NAN, blown_up[130].z = -1e30;
+  CHECK(overlap_of(*model, blown_up, true).inside > 20);
   // Edges that cross where no vertex is inside.
   const double r = std::sqrt(0.5);
   Placed ridge{}, keel{{0.07, 0.7, 0.09}};
@@ -365,11 +368,28 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
     const auto model = blocks(all);
     Settings settings = touching(modes[round % 4], 1e5);
     settings.constraint_damping = 3e-3;
+    if (round >= 4) settings.contact = "self";
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < 200; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
     CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.01);
   }
+}
+
+TEST_CASE("pairs: a body that another is deep in does not meet its own far sides") {
+  GlTest gl;
+  const auto model = blocks({{{0, 0, 0}}, {{0.24, 0.02, 0.03}, {0, 0, 0}, {0.3, 0.2, 0.9}}});
+  REQUIRE(overlap_of(*model, model->positions, true).deepest > 0.15);
+  std::vector<State> ends;
+  for (const char* contact : {"bodies", "self"}) {
+    Settings settings = touching("cpu-double");
+    settings.contact = contact;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 5; ++s) step(sim);
+    ends.push_back(read_state(sim));
+  }
+  for (std::size_t i = 0; i < model->positions.size(); ++i)
+    REQUIRE(glm::distance(ends[0].positions[i], ends[1].positions[i]) < 1e-9);
 }
 
 TEST_CASE("pairs: a vertex leaves a body that is folded over itself") {

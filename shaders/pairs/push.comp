@@ -52,7 +52,7 @@ void push(uint k) {
     way += m.weights[j] * params.h * velocities[vertices[j]].high;
     weight += m.weights[j] * m.weights[j] * positions[vertices[j]].inverse_mass * float(pair_sums[8u * vertices[j] + 3u]);
   }
-  if (weight > 0.0) {
+  if (weight > 0.0 && m.gap < 0.0) {  // another program found it, and may round otherwise
     Stop by = meeting_correction(m, way, push_most, params.friction);
     for (uint j = 0u; j < 4u; ++j) {
       if (m.weights[j] == 0.0) continue;

@@ -50,6 +50,9 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   vec3 p = from_own(vertices.y, own), q = from_own(vertices.z, own), r = from_own(vertices.w, own);
   vec3 left = from_own(beside.x, own), right = from_own(beside.y, own), other_left = from_own(beside.z, own), other_right = from_own(beside.w, own);
   float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
+#if CONTACT_SELF
+  if (same_body && far > SELF_MARGIN) return;
+#endif
   if (far <= distances[CANDIDATES - 1u] && edges_oppose(p, left, right, q, r, other_left, other_right)) consider(t, far);
 }
 #else

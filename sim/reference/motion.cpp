@@ -195,7 +195,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
   add(numbers);
-  if (bodies_touch(model, s)) add(s.contact + ", sharp edges, held, folds");
+  if (bodies_touch(model, s)) add(s.contact + ", sharp edges, held, folds, deep starts");
   return key;
 }
 

@@ -20,12 +20,12 @@ class PairContact {
   /// After a substep of `h`: of places `x` and velocities `v`, and what vertices are `held` by.
   void resolve(const Settings& settings, std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v,
                std::vector<State::Held>& held, const std::vector<double>& inverse_masses, double h) {
-    if (!bodies_touch(*model_, settings)) return;
+    if (!bodies_touch(*model_, settings)) return held.clear();
     self_ = settings.contact == "self";
     if (mesh_.triangles.empty()) mesh_ = pair_mesh(*model_), add_tets(model_->rest, mesh_);
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
-    double margin = std::max(pair_margin(mesh_), 2.2 * fastest * h) + mesh_.thickness;
+    double margin = std::min(std::max(pair_margin(mesh_), 2.2 * fastest * h), model_->size) + mesh_.thickness;
     if (held.empty()) margin += 2 * overlap_of(*model_, x, self_).deepest;  // bodies that start in each other
     const auto contacts = find(x, margin, held);
     std::vector<int> counts(x.size(), 0);
@@ -142,6 +142,7 @@ class PairContact {
               was.target != ~0u && share_a_vertex(was.target, t) ? was.under != 0 : glm::dot(m.face, a) > 0;
           m = Formulas<double>{}.meet_sheet(a, b, c, under);
         }
+        if (other == body && std::abs(m.gap) > pair_margin(mesh_)) return;  // a thin part's other side
         m.gap -= std::max(thickness, other_thickness);
         if (m.rank < nearest.rank) nearest = m;
         const bool sheets = thickness > 0 || other_thickness > 0;
@@ -194,6 +195,7 @@ class PairContact {
         Formulas<double> f;
         const auto m = f.meet_edges(p, left, right, q, r, other_left, other_right);
         if (!(m.gap < 0 && m.rank < best.meeting.rank)) return;
+        if (other.body == own.body && -m.gap > pair_margin(mesh_)) return;
         if (f.edges_oppose(p, left, right, q, r, other_left, other_right))
           best = {{own.vertex[0], own.vertex[1], other.vertex[0], other.vertex[1]}, m};
       });

@@ -40,8 +40,10 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
     result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
     result.penetration_max = largest(result.penetration_max, double(row[M_PENETRATION]) / m.bodies[b].size);
     result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
-    for (int a = 0; a < 3; ++a)
-      result.centre[a] += m.bodies[b].mass * (double(row[M_ORIGIN + a]) + double(row[M_CENTRE + a]));
+    const auto of_body = [&](std::size_t at) { return glm::dvec3(row[at], row[at + 1], row[at + 2]); };
+    const glm::dvec3 centre = of_body(M_ORIGIN) + of_body(M_CENTRE);
+    result.centre += m.bodies[b].mass * centre;
+    result.angular_momentum += of_body(M_ANGULAR) + glm::cross(centre, of_body(M_MOMENTUM));
   }
   const auto rms = [](double squares, std::size_t count) {
     return count ? std::sqrt(squares / double(count)) : 0.0;
@@ -65,15 +67,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.momentum = vector(M_MOMENTUM);
   result.speed = sums[M_SPEED];
   result.centre /= m.mass;
-  result.angular_momentum = vector(M_ANGULAR);
-  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
-    const auto of_body = [&](std::size_t at) {
-      const float* row = rows.data() + b * M_STRIDE + at;
-      return glm::dvec3(row[0], row[1], row[2]);
-    };
-    result.angular_momentum +=
-        glm::cross(of_body(M_ORIGIN) + of_body(M_CENTRE) - result.centre, of_body(M_MOMENTUM));
-  }
+  result.angular_momentum -= glm::cross(result.centre, result.momentum);
   result.kinetic = sums[M_KINETIC];
   result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
   result.elastic = sums[M_ELASTIC];

@@ -278,7 +278,8 @@ TEST_CASE("window: a history is all of it in even steps, and the newest, plots a
   const Measurement now = measure_now(*s.loaded.lanes[0].metrics, s.loaded.lanes[0].sim);
   CHECK(double(s.loaded.lanes[0].energy.values.back()) == doctest::Approx(now.energy()).epsilon(0.2));
   const PlotRow& depth = plot_rows().back();
-  for (const float depth : s.loaded.lane().depth.values) CHECK(depth == 0);  // far from the ground
+  REQUIRE(!s.loaded.lane().depth.values.empty());
+  for (const float d : s.loaded.lane().depth.values) CHECK(d == 0);  // far from the ground
   restart(s);
   CHECK(plot_chart(s, distance).series.empty());
   take_over(s, load("stack", {}, load_scene("stack")), false);

@@ -138,6 +138,9 @@ struct RigidRecord {
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_WATCH 16u   // mode explicit: notes how stiff constraints are
 #define PHASE_CHANGED 32u // mode explicit: the substeps before were longer or shorter
+#define PHASE_TOUCHED 64u       // contacts of bodies corrected the substep before; it is not in yet
+#define PHASE_SHARED_SIDE 128u  // which numbers of contacts are of this substep (pairs/sums.glsl)
+#define PHASE_SHARED_LAST 256u  // the next look at contacts counts exactly, so these begin at 0 as well
 
 // Storage bindings of the simulation; a kernel has 8 at most.
 #define BIND_POSITIONS 0

@@ -55,6 +55,26 @@ Pair resolve_contacts(Pair x, vec3 moved) {
 #if RIGID_CONTACT
 #include "rigid.glsl"
 #endif
+#if CONTACTS
+#include "pairs/sums.glsl"
+// What contact with other bodies found after the last substep: where it stops the vertex, its velocity changes as well.
+void take_contacts(uint i, inout Position own, inout Velocity speed) {
+  uint side = (phases & PHASE_SHARED_SIDE) != 0u ? 1u : 0u, now = sharing(i, side), then = sharing(i, 1u - side), k = sums_of(i);
+  int shared_now = pair_sums[now], shared_then = pair_sums[then];
+  vec3 stopped, pushed;
+  for (uint c = 0u; c < 3u; ++c) {
+    stopped[c] = float(pair_sums[k + c]) * (params.quantum / PARTS);
+    pushed[c] = float(pair_sums[k + PUSHED + c]) * (params.quantum / PARTS);
+  }
+  if (shared_then != 0) pair_sums[then] = 0;
+  if (shared_now == 0) return;
+  if ((phases & PHASE_SHARED_LAST) != 0u) pair_sums[now] = 0;
+  for (uint c = 0u; c < 3u; ++c) pair_sums[k + c] = pair_sums[k + PUSHED + c] = 0;
+  if (!(own.inverse_mass > 0.0)) return;
+  Pair x = pair_add(Pair(own.high, own.low), stopped + pushed), v = pair_add(Pair(speed.high, speed.low), stopped * params.inverse_h);
+  own.high = x.high, own.low = x.low, speed.high = v.high, speed.low = v.low;
+}
+#endif
 
 // Moves vertex i, which is not fixed; returns where its neighbours see it.
 Pair moved(uint i, Position own, Velocity speed, vec3 correction) {
@@ -136,6 +156,9 @@ Pair leapt(uint i, Position own, Velocity speed, vec3 correction) {
 // Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases
 // predict or finish.
 void advance(uint i, Position own, Velocity speed, vec3 correction) {
+#if CONTACTS
+  if ((phases & PHASE_TOUCHED) != 0u) take_contacts(i, own, speed);
+#endif
   Pair x = Pair(own.high, own.low);
   if (own.inverse_mass > 0.0) {
 #if LEAPFROG

@@ -77,10 +77,10 @@ Explanation explain(Sim& sim, int timed_steps) {
     }
     kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
   }
-  for (Pairs::Kernel* k : {&p.boxes, &p.cull, &p.query, &p.query_edges, &p.meet, &p.push})
+  for (Pairs::Kernel* k : {&p.boxes, &p.cull, &p.query, &p.query_edges, &p.meet, &p.push, &p.meet_and_push})
     if (const auto [ms, count] = mean(k->timer); ms) {
       const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
-      const std::string what = k == &p.query_edges ? " of edges" : "";
+      const std::string what = k == &p.query_edges ? " of edges" : k == &p.meet_and_push ? ", and push" : "";
       result.dispatches.push_back({k->program.label() + what, k->work_groups, per_step, 0, ms});
       result.ms_per_step += *ms * count / std::max(timed_steps, 1), result.dispatches_per_step += per_step;
     }

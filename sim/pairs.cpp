@@ -16,6 +16,10 @@ bool bodies_touch(const Model& model, const Settings& settings) {
   return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
 }
 
+bool contacts_lag(const SolverInput& input) {
+  return bodies_touch(input.model, input.settings) && !is_implicit(input.settings) && !input.rigid;
+}
+
 namespace {
 
 // pairs.glsl
@@ -206,7 +210,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   p.lists =
       Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * group / tuning.lanes + 7) * leaves));
   p.spheres = Buffer("spheres around triangles", 16 * targets);
-  p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(8 * model.positions.size(), 0),
+  p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(9 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
   for (const std::size_t three : {groups, lane_groups, query_groups, edge_groups})
@@ -243,7 +247,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   defines.push_back(fmt::format("EDGE {:.9g}", surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
-  defines.push_back("QUERY_EDGES 0");
+  defines.push_back("QUERY_EDGES 0"), defines.push_back("LAGGED 0");
   const auto kernel = [&](const char* name, std::size_t work_groups, int counted_by = 0) {
     return Pairs::Kernel{
         Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups, counted_by, {}};
@@ -251,7 +255,10 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   p.boxes = kernel("boxes", slices + leaves), p.cull = kernel("cull", leaves);
   p.query = kernel("query", 0, query_groups);
   p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
-  defines.back() = "QUERY_EDGES 1";
+  p.lag = std::ranges::find(vertex_defines, "CONTACTS 1") != vertex_defines.end();
+  defines.back() = "LAGGED 1";
+  if (p.lag) p.meet_and_push = kernel("meet", 0, lane_groups);
+  *(defines.end() - 2) = "QUERY_EDGES 1";
   if (edges > 0) p.query_edges = kernel("query", 0, edge_groups);
   return p;
 }
@@ -266,7 +273,7 @@ void look_around(Sim& sim) {
   ask(p);
 }
 
-void touch(Sim& sim) {
+void touch(Sim& sim, int left) {
   Pairs& p = sim.pairs;
   if (!p || !p.near) return;
   const Settings& s = sim.settings;
@@ -279,21 +286,34 @@ void touch(Sim& sim) {
       std::min(std::max(p.margin, 1.1 * closing * h), sim.model->size) + 2 * std::exchange(p.overlap, 0);
   const double serve =
       std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
+  // Numbers of contacts that share a vertex, where the next substep wants those that this one sees coming.
+  const bool ahead = p.lag && s.substeps * sim.watch.finer > 1,
+             lagged = ahead && left > 0 && p.counted && p.since >= 0;
+  if (p.since < 0 || (!lagged && p.counted && (p.phases & PHASE_SHARED_LAST) == 0)) p.sums.clear();
   bind_pairs(sim);
   if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
   if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer)))
     find_candidates(sim, margin);
   ++p.since;
-  p.meet.program.use();
-  p.meet.program.set("substep", std::uint32_t(p.since));
+  Pairs::Kernel& meet = lagged ? p.meet_and_push : p.meet;
+  for (Program* program : {&meet.program, &p.push.program}) program->use(), program->set("side", p.side);
+  meet.program.use();
+  meet.program.set("ahead", std::uint32_t(ahead));
+  meet.program.set("substep", std::uint32_t(p.since));
   // Corrections of one pass bring things nearer to those of the next.
-  p.meet.program.set(
+  meet.program.set(
       "closed_most",
       is_implicit(s) ? 1e30f : float(std::max({closing, p.fastest + gained, margin / (2 * s.dt)}) * h));
   // Implicit substeps are long, so what one pass leaves is much: a stack sinks in by 0.7 % after 1, 0.02
   // after 8.
-  for (int pass = 0; pass < (is_implicit(s) ? 8 : 1); ++pass)
-    for (Pairs::Kernel* kernel : {&p.meet, &p.push}) run(*kernel, sim);
+  for (int pass = 0; pass < (is_implicit(s) ? 8 : 1); ++pass) {
+    run(meet, sim);
+    if (!lagged) run(p.push, sim);
+  }
+  p.counted = ahead;
+  if (ahead) p.side = 1 - p.side;
+  p.phases =
+      lagged ? PHASE_TOUCHED | (p.side ? PHASE_SHARED_SIDE : 0u) | (left == 1 ? PHASE_SHARED_LAST : 0u) : 0u;
 }
 
 void start_pairs(Sim& sim, const State& state) {

@@ -10,11 +10,14 @@
 namespace tetpbd {
 
 struct Settings;
+struct SolverInput;
 struct Tuning;
 struct Sim;
 
 /// Whether anything can touch.
 bool bodies_touch(const Model& model, const Settings& settings);
+/// Whether kernels that move vertices take in what contact found after the substep before.
+bool contacts_lag(const SolverInput& input);
 
 /// Surfaces of all bodies.
 struct PairMesh {
@@ -61,6 +64,8 @@ struct PairNumbers {
   double overlap = 0;               ///< m, how deep they start in each other
   double fastest = 0, closing = 0;  ///< m/s, any body, and two that are near, by the last answer
   long since = -1;                  ///< substeps since candidates were looked for; below 0: never
+  unsigned side = 0;     ///< of the numbers of contacts that share a vertex, that of the next substep
+  bool counted = false;  ///< and it is known
 };
 
 /// Part of a Sim.
@@ -74,7 +79,9 @@ struct Pairs : PairNumbers {
     int counted_by = 0;
     Timer timer;
   };
-  Kernel boxes, cull, query, query_edges, meet, push;
+  Kernel boxes, cull, query, query_edges, meet, push, meet_and_push;
+  bool lag = false;     ///< within a step, what contact corrects comes in with the next substep's forces
+  unsigned phases = 0;  ///< of the next dispatch that moves vertices
   std::size_t slices = 0, leaves = 0, triangles = 0, vertices = 0,
               items = 0;  ///< vertices of surfaces and sharp edges
   std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
@@ -87,8 +94,9 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
                  const std::vector<std::string>& vertex_defines);
 /// Before a step: takes the last answer and asks again.
 void look_around(Sim& sim);
-/// After a substep's last dispatch: changes positions, velocities and what neighbours see next.
-void touch(Sim& sim);
+/// After a substep's last dispatch, with so many substeps of the step `left`: changes positions, velocities
+/// and what neighbours see next, at once if none is.
+void touch(Sim& sim, int left);
 /// Of a state that is given.
 void start_pairs(Sim& sim, const State& state);
 /// As of the last step. Waits.

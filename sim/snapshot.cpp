@@ -22,7 +22,11 @@ std::vector<Part> parts_of(const Sim& sim) {
   for (const auto& [buffer, first, bytes] : sim.solver.handed_on)
     parts.push_back({&sim.solver.buffers[buffer], first, bytes});
   if (sim.watch.answer) add(sim.watch.answer), parts.push_back({&sim.check.words, 8, 8});
-  if (sim.pairs) parts.push_back({&sim.pairs.lists, 0, sim.pairs.handed_on}), add(sim.pairs.answer);
+  if (sim.pairs) {
+    const Buffer& sums = sim.pairs.sums;
+    parts.push_back({&sim.pairs.lists, 0, sim.pairs.handed_on}), add(sim.pairs.answer);
+    if (sim.pairs.lag) parts.push_back({&sums, sums.bytes() / 9 * 7, sums.bytes() / 9 * 2});
+  }
   return parts;
 }
 

@@ -52,6 +52,7 @@ void bind(Sim& sim) {
   if (sim.predicted) sim.predicted.bind_storage(BIND_PREDICTED);
   sim.check.words.bind_storage(BIND_CHECK);
   if (sim.rigid_bodies) sim.rigid_bodies.bind_storage(BIND_RIGID);
+  if (sim.pairs) sim.pairs.sums.bind_storage(BIND_PAIR_SUMS);
   for (const auto& [binding, buffer] : sim.solver.bindings)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
   if (!sim.guard_counts) return;
@@ -79,16 +80,18 @@ void step_on_gpu(Sim& sim, bool moving) {
   }
   dispatcher.bind_quantized();
   sim.needs_predict = false;
-  for (int substep = 0; substep < sim.settings.substeps * sim.watch.finer; ++substep) {
+  const int substeps = sim.settings.substeps * sim.watch.finer;
+  for (int substep = 0; substep < substeps; ++substep) {
     if (moving) bind_shapes(sim, ++sim.shapes_now);
     if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
     for (const Dispatch& dispatch : sim.substep)
       if (dispatch.pass + 1 == sim.solver.iteration.size())
-        dispatcher.move(dispatch.phases | (substep == 0 ? watched : 0));
+        dispatcher.move(dispatch.phases | (substep == 0 ? watched : 0) |
+                        (dispatch.phases & PHASE_PREDICT ? sim.pairs.phases : 0));
       else
         dispatcher.run(sim.solver.iteration[dispatch.pass], dispatch.phases);
     if (sim.pairs && sim.pairs.near) {
-      touch(sim);
+      touch(sim, substeps - 1 - substep);
       dispatcher.program = 0, dispatcher.bind_quantized();
     }
   }

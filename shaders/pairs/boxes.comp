@@ -58,11 +58,17 @@ void main() {
   uint body = pair_mesh[SLICES_AT + 3u * slice], first = pair_mesh[SLICES_AT + 3u * slice + 1u], end = pair_mesh[SLICES_AT + 3u * slice + 2u];
   vec3 low = vec3(1e30), high = vec3(-1e30);
   vec4 speed = vec4(0.0);
-  for (uint s = first + lane; s < end; s += GROUP_SIZE) {
-    uint i = surface_vertex(s);
-    vec3 x = positions[i].high, v = velocities[i].high;
-    low = min(low, x), high = max(high, x);
-    speed += vec4(v, dot(v, v));
+  const uint at_once = 4u;  // what is read does not wait for each other
+  for (uint s = first + lane; s < end; s += at_once * GROUP_SIZE) {
+    vec3 x[at_once], v[at_once];
+    for (uint j = 0u; j < at_once; ++j) {
+      uint i = surface_vertex(min(s + j * GROUP_SIZE, end - 1u));
+      x[j] = positions[i].high, v[j] = velocities[i].high;
+    }
+    for (uint j = 0u; j < at_once; ++j) {
+      low = min(low, x[j]), high = max(high, x[j]);
+      if (s + j * GROUP_SIZE < end) speed += vec4(v[j], dot(v[j], v[j]));
+    }
   }
   reduce(lane, low, high, speed, true);
   uint k = BOXES + BOX * body;

@@ -1,26 +1,34 @@
-// Which of its candidates each item is in, and how many contacts every vertex is part of. CANDIDATES invocations per record, one for each candidate.
+// Which of its candidates each item is in, and how many contacts share every vertex. CANDIDATES invocations per record, one for each candidate. LAGGED: the
+// corrections as well, by how many contacts the substep before saw coming; vertex.glsl adds them. Else push.comp does so by exact numbers.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
+layout(std430, binding = BIND_VELOCITIES) restrict readonly buffer Velocities { Velocity velocities[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
+#include "pairs/correct.glsl"
+uniform bool ahead;         // the next substep may be LAGGED
 uniform uint substep;       // since candidates were looked for
 uniform float closed_most;  // m, by which an item and a candidate may come nearer in a substep
 const float none = 1e30;
 shared float ranks[GROUP_SIZE], pushing[GROUP_SIZE], gaps[GROUP_SIZE];  // pushing: ranks of those that may
 shared float folds[GROUP_SIZE];  // ranks of those that push in spite of a nearer one
 shared uint touching, deepest;  // of this work-group, so that not all contacts queue for two numbers
+void share(Meeting m, uvec4 vertices, uint of_side) {
+  for (uint j = 0u; j < 4u; ++j)
+    if (m.weights[j] != 0.0) atomicAdd(pair_sums[sharing(vertices[j], of_side)], 1);
+}
 // Item s is in target t.
 void touch(uint s, uint t, Meeting m) {
   pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
+#if !LAGGED
   uvec4 vertices = vertices_of(s, t & TARGET);
-  for (uint j = 0u; j < 4u; ++j) {
-    if (m.weights[j] != 0.0) atomicAdd(pair_sums[8u * vertices[j] + 3u], 1);
-    atomicAdd(pair_sums[8u * vertices[j] + 7u], 1);
-  }
+  share(m, vertices, side);
+  for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[sums_of(vertices[j]) + ASKS], 1);
 #if EDGES
   uvec4 beside = beside_of(s, t & TARGET);
   if (item_is_edge(s))
-    for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[8u * beside[j] + 7u], 1);
+    for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[sums_of(beside[j]) + ASKS], 1);
+#endif
 #endif
   atomicAdd(touching, 1u);
   atomicMax(deepest, floatBitsToUint(-m.gap));
@@ -57,6 +65,17 @@ void main() {
   if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
   if (decides && !pushes && !item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
   if (pushes) touch(s, t, m);
+  if (ahead && (pushes || (decides && may_push && m.gap < 2.0 * closed_most))) {
+    uvec4 vertices = vertices_of(s, t & TARGET);
+    vec3 way = way_of(m, vertices);
+#if LAGGED
+    float split = split_mass(m, vertices);
+#endif
+    if (pushes || m.gap + 2.0 * dot(way, m.normal) < 0.0) share(m, vertices, 1u - side);  // in this substep, in the next or after it
+#if LAGGED
+    if (pushes) correct(m, vertices, way, split);
+#endif
+  }
   barrier();
   if (own_lane == 0u && touching > 0u) {
     atomicAdd(pair_lists[TOUCHING], touching);

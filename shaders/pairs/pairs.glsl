@@ -73,9 +73,7 @@ layout(std430, binding = BIND_PAIR_SPHERES) restrict buffer PairSpheres { vec4 p
 #define NEAR_EDGES_AT (NEAR_AT + SURFACE_VERTICES + LEAVES * PER_GROUP)
 #define LEAF_BOXES (NEAR_EDGES_AT + EDGES + LEAVES * PER_GROUP)  // then low, high and reach of each leaf: how far its items look
 layout(std430, binding = BIND_PAIR_LISTS) restrict buffer PairLists { uint pair_lists[]; };
-// By vertex: the sum of what stops it in 32nds of a quantum, how many contacts move it, the sum of what pushes it beside, and how many ask where it is.
-#define PARTS 32.0
-layout(std430, binding = BIND_PAIR_SUMS) restrict buffer PairSums { int pair_sums[]; };
+#include "pairs/sums.glsl"
 uniform float margin;  // m, how near a candidate is
 float reach_of(float depth) { return max(margin, 1.05 * depth + 0.5 * margin); }  // of an item that is so deep in a body
 

@@ -9,6 +9,7 @@
 
 #include "sim/error.h"
 #include "sim/layout.h"
+#include "sim/pairs.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -110,10 +111,9 @@ Tuning tuning_from_environment() {
   const char* variable = std::getenv("TETPBD_TUNE");
   for (const std::string& assignment : split(variable ? variable : "", ',')) {
     unsigned* target = nullptr;
-    for (const auto& [name, member] :
-         {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
-          std::pair("row=", &tuning.row), std::pair("lanes=", &tuning.lanes),
-          std::pair("threads=", &tuning.threads)})
+    for (const auto& [name, member] : {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
+                                       std::pair("row=", &tuning.row), std::pair("lanes=", &tuning.lanes),
+                                       std::pair("threads=", &tuning.threads)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
@@ -148,7 +148,8 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
 std::vector<std::string> vertex_defines(const SolverInput& input) {
   return {define("COMPLIANT", input.compliant),        define("RIGID_CONTACT", input.rigid),
           define("LEAPFROG", input.leapfrog),          define("BODY_COUNT", input.model.bodies.size()),
-          define("SHAPES", input.model.shapes.size()), define("FIELDS", has_fields(input.model))};
+          define("SHAPES", input.model.shapes.size()), define("FIELDS", has_fields(input.model)),
+          define("CONTACTS", contacts_lag(input))};
 }
 
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {

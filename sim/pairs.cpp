@@ -23,8 +23,9 @@ bool contacts_lag(const SolverInput& input) {
 namespace {
 
 // pairs.glsl
-constexpr std::uint32_t counters = 18, box = 13, candidates = 8, record = 3 + candidates, group = 64;
-enum Counter { groups = 2, lane_groups = 5, query_groups = 8, edge_groups = 11, touching = 16, deepest };
+constexpr std::uint32_t counters = 18, box = 13, candidates = 8, record = 3 + candidates, group = 64,
+                        near_leaves = 63;
+enum Counter { touching, deepest, found, groups = 4, lane_groups = 7, query_groups = 10, edge_groups = 13 };
 
 float unsorted(std::uint32_t bits) {
   return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
@@ -49,19 +50,18 @@ void bind_pairs(const Sim& sim) {
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, p.lists.id());
 }
 
-// Of bodies, and of leaves as well.
+// Of bodies; of leaves as well, with what is counted for candidates at 0.
 void find_boxes(Sim& sim, bool leaves) {
   Pairs& p = sim.pairs;
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  p.empty.copy_to(p.lists, 4 * counters, 4 * counters, p.empty.bytes() - 4 * counters);
+  const std::size_t first = leaves ? 4 * found : 4 * counters;
+  p.empty.copy_to(p.lists, first, first, p.empty.bytes() - first);
   p.boxes.work_groups = p.slices + (leaves ? p.leaves : 0);
   run(p.boxes, sim);
 }
 
 void find_candidates(Sim& sim, double margin) {
   Pairs& p = sim.pairs;
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  p.empty.copy_to(p.lists, 0, 0, 4 * touching);
   p.boxes.program.use();
   p.boxes.program.set("margin", float(margin + p.thickness));
   find_boxes(sim, true);
@@ -137,7 +137,7 @@ void take_answer(Sim& sim) {
 void ask(Pairs& p) {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   p.lists.copy_to(p.answer, 0, 0, p.answer.bytes());
-  p.empty.copy_to(p.lists, 4 * touching, 4 * touching, 4 * (counters - touching));
+  p.empty.copy_to(p.lists, 4 * touching, 4 * touching, 8);
   p.asked = Fence::here();
 }
 
@@ -158,7 +158,9 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   const std::size_t around_at = words.size();
   std::vector<std::vector<std::uint32_t>> around(model.positions.size());
   for (std::uint32_t t = 0; t < surfaces.triangles.size(); ++t)
-    for (std::size_t c = 0; c < 3; ++c) around[surfaces.triangles[t][c]].push_back(t);
+    for (std::size_t c = 0; c < 3; ++c)
+      for (const std::size_t other : {1, 2})
+        around[surfaces.triangles[t][c]].push_back(surfaces.triangles[t][(c + other) % 3]);
   std::size_t start = around_at + surfaces.vertices.size() + 1;
   for (const auto& [vertex, body] : surfaces.vertices)
     words.push_back(std::uint32_t(std::exchange(start, start + around[vertex].size())));
@@ -206,9 +208,10 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
     p.rest = Buffer("surfaces at rest", rest);
   }
   const std::size_t records_at = counters + box * bodies;
+  const std::size_t per_group = group / tuning.lanes;
   p.records_at = records_at, p.handed_on = 4 * (records_at + (record + 2) * items);
-  p.lists =
-      Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * group / tuning.lanes + 7) * leaves));
+  p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * per_group + 7) * leaves +
+                                    (near_leaves + 1) * leaves + items / per_group + 2 * leaves));
   p.spheres = Buffer("spheres around triangles", 16 * targets);
   p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(9 * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
@@ -233,6 +236,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
                                     {"LEAVES_AT", leaves_at},
                                     {"LEAVES", leaves},
                                     {"CANDIDATES", candidates},
+                                    {"NEAR_LEAVES", near_leaves},
                                     {"LANES", tuning.lanes},
                                     {"ROW", tuning.row},
                                     {"AROUND_AT", around_at},

@@ -5,7 +5,7 @@
 #include "pair.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 // Vertices of each triangle (x 3) and its body; sharp edges of solids: ends, third vertices of the triangles beside them, body; vertices of surfaces,
-// each with its body; where the triangles around each vertex start, and these; leaves (body, then first and end of their triangles, vertices and
+// each with its body; where the triangles around each vertex start, and of these the other two vertices in order; leaves (body, then first and end of their triangles, vertices and
 // edges); of each body its thickness and its first leaf; slices of the vertices that belong to one body (body, first, end); the tet behind each
 // triangle; tets: vertices, then the tets across from these.
 layout(std430, binding = BIND_PAIR_MESH) restrict readonly buffer PairMesh { uint pair_mesh[]; };
@@ -46,16 +46,16 @@ uvec4 beside_of(uint s, uint t) {
 layout(std430, binding = BIND_PAIR_SPHERES) restrict buffer PairSpheres { vec4 pair_spheres[]; };
 // Counters; then of each body the box around its surface, that around the mean velocities of its slices, and how far from these the others are, as
 // numbers that sort like the floats; then records of vertices that have candidates.
-#define NEAR_VERTICES 0u  // of leaves that are near another body, with what fills groups
-#define RECORDS 1u
-#define GROUPS 2u        // of work-groups for all records: three numbers for an indirect dispatch
-#define LANE_GROUPS 5u   // the same with CANDIDATES invocations per record
-#define QUERY_GROUPS 8u  // for the vertices of leaves that are near another body, LANES invocations each
-#define EDGE_GROUPS 11u  // for their edges
-#define NEAR_EDGES 14u
-#define MOST_REACH 15u  // m, of any leaf
-#define TOUCHING 16u    // contacts, of all substeps since
-#define DEEPEST 17u     // m
+#define TOUCHING 0u       // contacts, of all substeps since
+#define DEEPEST 1u        // m
+#define NEAR_VERTICES 2u  // of leaves that are near another body, with what fills groups
+#define RECORDS 3u
+#define GROUPS 4u         // of work-groups for all records: three numbers for an indirect dispatch
+#define LANE_GROUPS 7u    // the same with CANDIDATES invocations per record
+#define QUERY_GROUPS 10u  // for the vertices of leaves that are near another body, LANES invocations each
+#define EDGE_GROUPS 13u   // for their edges
+#define NEAR_EDGES 16u
+#define MOST_REACH 17u  // m, of any leaf
 #define BOXES 18u
 #define BOX 13u
 #define RECORD (3u + CANDIDATES)  // item, the target it is in (NONE: none), the substep in which to look again, candidates
@@ -72,6 +72,10 @@ layout(std430, binding = BIND_PAIR_SPHERES) restrict buffer PairSpheres { vec4 p
 #define NEAR_AT (DEPTHS + ITEMS)
 #define NEAR_EDGES_AT (NEAR_AT + SURFACE_VERTICES + LEAVES * PER_GROUP)
 #define LEAF_BOXES (NEAR_EDGES_AT + EDGES + LEAVES * PER_GROUP)  // then low, high and reach of each leaf: how far its items look
+// Then of each leaf how many are near it, and the first of these; and the leaf of each work-group of vertices and of edges.
+#define NEAR_LEAVES_AT (LEAF_BOXES + 7u * LEAVES)
+#define LEAF_OF_GROUP (NEAR_LEAVES_AT + (NEAR_LEAVES + 1u) * LEAVES)
+#define LEAF_OF_EDGE_GROUP (LEAF_OF_GROUP + SURFACE_VERTICES / PER_GROUP + LEAVES)
 layout(std430, binding = BIND_PAIR_LISTS) restrict buffer PairLists { uint pair_lists[]; };
 #include "pairs/sums.glsl"
 uniform float margin;  // m, how near a candidate is
@@ -100,7 +104,7 @@ bool in_leaf(uint leaf, vec3 low, vec3 high) {
 }
 bool in_body(uint body, vec3 low, vec3 high) {
   uint k = BOXES + BOX * body;
-  for (uint c = 0u; c < 3u; ++c)
-    if (high[c] < unsorted(pair_lists[k + c]) || low[c] > unsorted(pair_lists[k + 3u + c])) return false;
-  return true;
+  vec3 lowest, highest;
+  for (uint c = 0u; c < 3u; ++c) lowest[c] = unsorted(pair_lists[k + c]), highest[c] = unsorted(pair_lists[k + 3u + c]);
+  return all(lessThanEqual(lowest, high)) && all(greaterThanEqual(highest, low));
 }

@@ -22,10 +22,9 @@ bool is_neighbour(uint s, uint t) {
 #if QUERY_EDGES == 0
 // Of the sum of the normals of the triangles around a vertex, one of LANES parts.
 vec3 part_of_normal(uint s, uint lane) {
-  vec3 sum = vec3(0.0);
-  for (uint k = pair_mesh[AROUND_AT + s] + lane; k < pair_mesh[AROUND_AT + s + 1u]; k += LANES) {
-    uint t = pair_mesh[k];
-    vec3 a = positions[triangle_vertex(t, 0u)].high, n = cross(positions[triangle_vertex(t, 1u)].high - a, positions[triangle_vertex(t, 2u)].high - a);
+  vec3 sum = vec3(0.0), a = positions[surface_vertex(s)].high;
+  for (uint k = pair_mesh[AROUND_AT + s] + 2u * lane; k < pair_mesh[AROUND_AT + s + 1u]; k += 2u * LANES) {
+    vec3 n = cross(positions[pair_mesh[k]].high - a, positions[pair_mesh[k + 1u]].high - a);
     float area = length(n);
     if (area > 0.0) sum += n / area;
   }
@@ -85,10 +84,13 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 // Shared memory is what limits how many work-groups run at once, so each word serves in turn.
 #define STAGED (GROUP_SIZE * CANDIDATES)  // beyond, each item looks through the leaves itself
 shared uint lists[STAGED], staged_count;  // parts of normals (as floats' bits); targets near the work-group's items; what each invocation found
-#define MOST_LEAVES 768u                  // at least STAGED; if more are near, items look through all
-shared uint scratch[MOST_LEAVES], leaf_count;  // near leaves; what waits to be looked at, of each item; how far what is in lists is (floats' bits)
+#define SCRATCH 768u                  // at least STAGED
+#define MOST_PIECES (SCRATCH / 2u)
+shared uint scratch[SCRATCH], piece_count;  // first and end of near leaves' targets, in pieces of GROUP_SIZE; what waits to be looked at, of each item; how
+                                            // far what is in lists is (floats' bits)
+#define AT_ONCE 4u                          // what is read does not wait for each other
 #if LANES > 1
-#define WAITING (MOST_LEAVES / PER_GROUP)  // more are looked at as they are found, by lanes that wait for each other
+#define WAITING (SCRATCH / PER_GROUP)  // more are looked at as they are found, by lanes that wait for each other
 shared uint waiting_count[PER_GROUP];
 // Leaves the nearest of all lists in that of the first lane.
 void merge(uint lane) {
@@ -105,29 +107,30 @@ void merge(uint lane) {
 }
 #endif
 shared vec3 lows[PER_GROUP], highs[PER_GROUP];  // of what each item looks at
-#define BODY_WORDS ((BODY_COUNT + 31u) / 32u)
-shared uint near_bodies[BODY_WORDS], own_body;  // a bit per body; the body of this work-group's items
+shared uint found_count, first_record;
 #if QUERY_EDGES
 uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
 uint end_of_targets(uint leaf) { return TRIANGLES + of_leaf(leaf, 6u); }
+#define LEAVES_OF_GROUPS LEAF_OF_EDGE_GROUP
 #else
 uint first_target(uint leaf) { return of_leaf(leaf, 1u); }
 uint end_of_targets(uint leaf) { return of_leaf(leaf, 2u); }
+#define LEAVES_OF_GROUPS LEAF_OF_GROUP
 #endif
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
-  uint number = group_index() * PER_GROUP + part;
+  uint number = group_index() * PER_GROUP + part, own_leaf = pair_lists[LEAVES_OF_GROUPS + group_index()], body = of_leaf(own_leaf, 0u);
 #if QUERY_EDGES
   uint s = number < pair_lists[NEAR_EDGES] ? pair_lists[NEAR_EDGES_AT + number] : NONE;
   bool there = s != NONE;
   if (!there) s = SURFACE_VERTICES;
-  uint e = s - SURFACE_VERTICES, i = edge_vertex(e, 0u), body = edge_body(e);
+  uint e = s - SURFACE_VERTICES, i = edge_vertex(e, 0u);
   vec3 end = positions[edge_vertex(e, 1u)].high, low = min(positions[i].high, end), high = max(positions[i].high, end);
 #else
   uint s = number < pair_lists[NEAR_VERTICES] ? pair_lists[NEAR_AT + number] : NONE;
   bool there = s != NONE;
   if (!there) s = 0u;
-  uint i = surface_vertex(s), body = surface_body(s);
+  uint i = surface_vertex(s);
   vec3 low = positions[i].high, high = low;
 #endif
   Pair own = Pair(positions[i].high, positions[i].low);
@@ -141,8 +144,7 @@ void main() {
   float reach = 0.5 * distance(low, high) + 1.01 * radius;
   low -= radius, high += radius;
   if (lane == 0u) lows[part] = there ? low : vec3(1e30), highs[part] = there ? high : vec3(-1e30);
-  if (gl_LocalInvocationIndex == 0u) leaf_count = staged_count = 0u, own_body = body;
-  for (uint w = gl_LocalInvocationIndex; w < BODY_WORDS; w += GROUP_SIZE) near_bodies[w] = 0u;
+  if (gl_LocalInvocationIndex == 0u) piece_count = staged_count = found_count = 0u;
 #if QUERY_EDGES == 0
   if (there) normal = part_of_normal(s, lane);
   for (uint c = 0u; c < 3u; ++c) lists[3u * gl_LocalInvocationIndex + c] = floatBitsToUint(normal[c]);
@@ -155,72 +157,93 @@ void main() {
 #endif
   vec3 lowest = lows[0], highest = highs[0];
   for (uint k = 1u; k < PER_GROUP; ++k) lowest = min(lowest, lows[k]), highest = max(highest, highs[k]);
-  for (uint other = gl_LocalInvocationIndex; other < BODY_COUNT; other += GROUP_SIZE)
-    if ((CONTACT_SELF != 0 || other != own_body) && in_body(other, lowest, highest)) atomicOr(near_bodies[other / 32u], 1u << (other % 32u));
-  barrier();
-  for (uint other = 0u; other < BODY_COUNT; ++other) {
-    if ((near_bodies[other / 32u] >> (other % 32u) & 1u) == 0u) continue;
-    for (uint l = first_leaf(other) + gl_LocalInvocationIndex; l < first_leaf(other + 1u); l += GROUP_SIZE) {
-      if (!in_leaf(l, lowest, highest)) continue;
-      uint slot = atomicAdd(leaf_count, 1u);
-      if (slot < MOST_LEAVES) scratch[slot] = l;
+  uint near = NEAR_LEAVES_AT + (NEAR_LEAVES + 1u) * own_leaf, near_count = pair_lists[near];
+  bool all_leaves = near_count > NEAR_LEAVES;
+  for (uint n = gl_LocalInvocationIndex; n < (all_leaves ? LEAVES : near_count); n += GROUP_SIZE) {
+    uint l = all_leaves ? n : pair_lists[near + 1u + n], end = end_of_targets(l);
+    if (!in_leaf(l, lowest, highest) || (CONTACT_SELF == 0 && all_leaves && of_leaf(l, 0u) == body)) continue;
+    for (uint first = first_target(l); first < end; first += GROUP_SIZE) {
+      uint slot = atomicAdd(piece_count, 1u);
+      if (slot < MOST_PIECES) scratch[2u * slot] = first, scratch[2u * slot + 1u] = min(first + GROUP_SIZE, end);
     }
   }
   barrier();
-  for (uint n = 0u; n < min(leaf_count, MOST_LEAVES); ++n)
-    for (uint t = first_target(scratch[n]) + gl_LocalInvocationIndex; t < end_of_targets(scratch[n]); t += GROUP_SIZE) {
-      vec4 sphere = pair_spheres[t];
-      if (any(lessThan(sphere.xyz + 1.01 * sphere.w, lowest)) || any(greaterThan(sphere.xyz - 1.01 * sphere.w, highest))) continue;
-      uint slot = atomicAdd(staged_count, 1u);
-      if (slot < STAGED) lists[slot] = t;
+  uint pieces = min(piece_count, MOST_PIECES);
+  for (uint n = 0u; n < pieces; n += AT_ONCE) {
+    uint targets[AT_ONCE];
+    vec4 spheres[AT_ONCE];
+    for (uint j = 0u; j < AT_ONCE; ++j) {
+      uint piece = min(n + j, pieces - 1u), t = scratch[2u * piece] + gl_LocalInvocationIndex;
+      targets[j] = n + j < pieces && t < scratch[2u * piece + 1u] ? t : NONE;
+      spheres[j] = pair_spheres[min(t, TRIANGLES + EDGES - 1u)];
     }
+    for (uint j = 0u; j < AT_ONCE; ++j) {
+      vec3 centre = spheres[j].xyz;
+      float radius = 1.01 * spheres[j].w;
+      if (targets[j] == NONE || any(lessThan(centre + radius, lowest)) || any(greaterThan(centre - radius, highest))) continue;
+      uint slot = atomicAdd(staged_count, 1u);
+      if (slot < STAGED) lists[slot] = targets[j];
+    }
+  }
   barrier();
-  bool listed = leaf_count <= MOST_LEAVES, staged = listed && staged_count <= STAGED;
-  uint turns = !there ? 0u : staged ? 1u : listed ? leaf_count : LEAVES;
+  bool listed = piece_count <= MOST_PIECES, staged = listed && staged_count <= STAGED;
+  uint turns = !there ? 0u : staged ? 1u : listed ? pieces : LEAVES;
   for (uint n = 0u; n < turns; ++n) {
-    uint leaf = staged ? 0u : listed ? scratch[n] : n;
-    if (!staged && !in_leaf(leaf, low, high)) continue;
-    uint end = staged ? staged_count : end_of_targets(leaf);
-    for (uint j = lane + (staged ? 0u : first_target(leaf)); j < end; j += LANES) {
-      uint t = staged ? lists[j] : j;
-      vec4 sphere = pair_spheres[t];
-      if (distance(sphere.xyz, centre) > reach + 1.01 * sphere.w) continue;
+    if (!listed && (!in_leaf(n, low, high) || (CONTACT_SELF == 0 && of_leaf(n, 0u) == body))) continue;
+    uint first = staged ? 0u : listed ? scratch[2u * n] : first_target(n), end = staged ? staged_count : listed ? scratch[2u * n + 1u] : end_of_targets(n);
+    for (uint k = first + lane; k < end; k += AT_ONCE * LANES) {
+      uint targets[AT_ONCE];
+      vec4 spheres[AT_ONCE];
+      for (uint j = 0u; j < AT_ONCE; ++j) {
+        uint at = min(k + j * LANES, end - 1u);
+        targets[j] = staged ? lists[at] : at;
+        spheres[j] = pair_spheres[targets[j]];
+      }
+      for (uint j = 0u; j < AT_ONCE; ++j) {
+        uint t = targets[j];
+        vec4 sphere = spheres[j];
+        if (k + j * LANES >= end || distance(sphere.xyz, centre) > reach + 1.01 * sphere.w) continue;
 #if QUERY_EDGES
-      if (t <= TRIANGLES + e) continue;  // of two edges, the first looks for the second
+        if (t <= TRIANGLES + e) continue;  // of two edges, the first looks for the second
 #endif
-      bool same_body = target_body(t) == body;
+        bool same_body = CONTACT_SELF != 0 && target_body(t) == body;
 #if CONTACT_SELF
-      if (same_body && is_neighbour(s, t)) continue;
-#else
-      if (same_body) continue;
+        if (same_body && is_neighbour(s, t)) continue;
 #endif
 #if LANES > 1
-      uint slot = staged ? atomicAdd(waiting_count[part], 1u) : WAITING;  // if not, scratch still has the leaves
-      if (slot < WAITING) {
-        scratch[part * WAITING + slot] = t;
-        continue;
-      }
+        uint slot = staged ? atomicAdd(waiting_count[part], 1u) : WAITING;  // if not, scratch still has the leaves
+        if (slot < WAITING) {
+          scratch[part * WAITING + slot] = t;
+          continue;
+        }
 #endif
-      look_at(s, t, same_body, own, held, normal);
+        look_at(s, t, same_body, own, held, normal);
+      }
     }
   }
 #if LANES > 1
   barrier();
   for (uint slot = lane; slot < min(waiting_count[part], WAITING); slot += LANES) {
     uint t = scratch[part * WAITING + slot];
-    look_at(s, t, target_body(t) == body, own, held, normal);
+    look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
   }
   merge(lane);
 #endif
-  if (lane != 0u) return;
-  if (there) pair_lists[HELD + s] = NONE;
-  if (found[0] == NONE) return;
   bool opposed = false;
   for (uint k = 0u; k < CANDIDATES; ++k) opposed = opposed || (found[k] & BESIDE) == 0u;
-  if (!opposed) return;
-  uint record = atomicAdd(pair_lists[RECORDS], 1u), k = RECORDS_AT + RECORD * record;
-  need_groups(GROUPS, record / GROUP_SIZE + 1u);
-  need_groups(LANE_GROUPS, record / (GROUP_SIZE / CANDIDATES) + 1u);
+  bool keeps = lane == 0u && there && opposed;
+  uint record = keeps ? atomicAdd(found_count, 1u) : 0u;
+  barrier();
+  if (gl_LocalInvocationIndex == 0u && found_count > 0u) {
+    first_record = atomicAdd(pair_lists[RECORDS], found_count);
+    uint last = first_record + found_count - 1u;
+    need_groups(GROUPS, last / GROUP_SIZE + 1u);
+    need_groups(LANE_GROUPS, last / (GROUP_SIZE / CANDIDATES) + 1u);
+  }
+  barrier();
+  if (lane == 0u && there) pair_lists[HELD + s] = NONE;
+  if (!keeps) return;
+  uint k = RECORDS_AT + RECORD * (first_record + record);
   pair_lists[k] = s;
   pair_lists[k + 2u] = 0u;
   for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + CANDIDATE + c] = found[c];

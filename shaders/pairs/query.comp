@@ -83,7 +83,10 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 #endif
 // Shared memory is what limits how many work-groups run at once, so each word serves in turn.
 #define STAGED (GROUP_SIZE * CANDIDATES)  // beyond, each item looks through the leaves itself
-shared uint lists[STAGED], staged_count;  // parts of normals (as floats' bits); targets near the work-group's items; what each invocation found
+shared uint lists[STAGED], staged_count;  // targets near the work-group's items; what each invocation found
+#if QUERY_EDGES == 0
+shared vec3 normals[GROUP_SIZE];
+#endif
 #define SCRATCH 768u                  // at least STAGED
 #define MOST_PIECES (SCRATCH / 2u)
 shared uint scratch[SCRATCH], piece_count;  // first and end of near leaves' targets, in pieces of GROUP_SIZE; what waits to be looked at, of each item; how
@@ -100,9 +103,8 @@ void merge(uint lane) {
     for (uint k = 0u; k < CANDIDATES; ++k) lists[own + k] = found[k], scratch[own + k] = floatBitsToUint(distances[k]);
     barrier();
     if (lane < half_size)
-      for (uint k = 0u; k < CANDIDATES; ++k)
-        if (lists[other + k] != NONE && uintBitsToFloat(scratch[other + k]) <= distances[CANDIDATES - 1u])
-          consider(lists[other + k], uintBitsToFloat(scratch[other + k]));
+      for (uint k = 0u; k < CANDIDATES && lists[other + k] != NONE && uintBitsToFloat(scratch[other + k]) <= distances[CANDIDATES - 1u]; ++k)
+        consider(lists[other + k], uintBitsToFloat(scratch[other + k]));
   }
 }
 #endif
@@ -140,21 +142,12 @@ void main() {
 #if LANES > 1
   if (lane == 0u) waiting_count[part] = 0u;
 #endif
-  vec3 centre = 0.5 * (low + high), normal = vec3(0.0);
+  vec3 centre = 0.5 * (low + high);
   float reach = 0.5 * distance(low, high) + 1.01 * radius;
   low -= radius, high += radius;
   if (lane == 0u) lows[part] = there ? low : vec3(1e30), highs[part] = there ? high : vec3(-1e30);
   if (gl_LocalInvocationIndex == 0u) piece_count = staged_count = found_count = 0u;
-#if QUERY_EDGES == 0
-  if (there) normal = part_of_normal(s, lane);
-  for (uint c = 0u; c < 3u; ++c) lists[3u * gl_LocalInvocationIndex + c] = floatBitsToUint(normal[c]);
-#endif
   barrier();
-#if QUERY_EDGES == 0
-  normal = vec3(0.0);
-  for (uint k = part * LANES; k < (part + 1u) * LANES; ++k)
-    normal += uintBitsToFloat(uvec3(lists[3u * k], lists[3u * k + 1u], lists[3u * k + 2u]));
-#endif
   vec3 lowest = lows[0], highest = highs[0];
   for (uint k = 1u; k < PER_GROUP; ++k) lowest = min(lowest, lows[k]), highest = max(highest, highs[k]);
   uint near = NEAR_LEAVES_AT + (NEAR_LEAVES + 1u) * own_leaf, near_count = pair_lists[near];
@@ -187,6 +180,16 @@ void main() {
   }
   barrier();
   bool listed = piece_count <= MOST_PIECES, staged = listed && staged_count <= STAGED;
+  if (staged && staged_count == 0u) {
+    if (lane == 0u && there) pair_lists[HELD + s] = NONE;
+    return;
+  }
+  vec3 normal = vec3(0.0);
+#if QUERY_EDGES == 0
+  normals[gl_LocalInvocationIndex] = there ? part_of_normal(s, lane) : vec3(0.0);
+  barrier();
+  for (uint k = part * LANES; k < (part + 1u) * LANES; ++k) normal += normals[k];
+#endif
   uint turns = !there ? 0u : staged ? 1u : listed ? pieces : LEAVES;
   for (uint n = 0u; n < turns; ++n) {
     if (!listed && (!in_leaf(n, low, high) || (CONTACT_SELF == 0 && of_leaf(n, 0u) == body))) continue;

@@ -1,7 +1,7 @@
 // The candidates of each vertex of a surface or, with QUERY_EDGES, of each sharp edge: the nearest targets within the margin, of equally near ones
 // those of the least number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES
-// invocations per item: a work-group, whose items are of one leaf, first lists the targets near it; then each invocation tests some of these by their
-// spheres, looks at some that pass, and lists are merged.
+// invocations per item: a work-group, whose items are of one leaf, first tests targets of near leaves by their spheres, each invocation one of these
+// against all items; then each looks at some of what passed for its item, and lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
@@ -82,19 +82,44 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 }
 #endif
 // Shared memory is what limits how many work-groups run at once, so each word serves in turn.
-#define STAGED (GROUP_SIZE * CANDIDATES)  // beyond, each item looks through the leaves itself
-shared uint lists[STAGED], staged_count;  // targets near the work-group's items; what each invocation found
-#if QUERY_EDGES == 0
+#define WAITING 96u  // of an item whose targets are more, each is looked at as it is found
+#define MOST_PIECES (GROUP_SIZE * CANDIDATES / 2u)
+shared uint lists[max(PER_GROUP * WAITING, GROUP_SIZE * CANDIDATES)];  // targets that wait to be looked at, of each item; what each invocation found
+shared uint scratch[2u * MOST_PIECES];  // first and end of near leaves' targets, in pieces of GROUP_SIZE; how far what is in lists is (floats' bits)
+shared uint piece_count, waiting_count[PER_GROUP], items[PER_GROUP], found_count, first_record;
+shared vec4 balls[PER_GROUP];  // around what each item looks at: centre, radius, below 0 where there is none
+#if QUERY_EDGES
+uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
+uint end_of_targets(uint leaf) { return TRIANGLES + of_leaf(leaf, 6u); }
+#define LEAVES_OF_GROUPS LEAF_OF_EDGE_GROUP
+#else
 shared vec3 normals[GROUP_SIZE];
+uint first_target(uint leaf) { return of_leaf(leaf, 1u); }
+uint end_of_targets(uint leaf) { return of_leaf(leaf, 2u); }
+#define LEAVES_OF_GROUPS LEAF_OF_GROUP
 #endif
-#define SCRATCH 768u                  // at least STAGED
-#define MOST_PIECES (SCRATCH / 2u)
-shared uint scratch[SCRATCH], piece_count;  // first and end of near leaves' targets, in pieces of GROUP_SIZE; what waits to be looked at, of each item; how
-                                            // far what is in lists is (floats' bits)
-#define AT_ONCE 4u                          // what is read does not wait for each other
+// Whether item s, of that body, and target t may meet at all.
+bool may_meet(uint s, uint t, uint body) {
+#if QUERY_EDGES
+  if (t <= TRIANGLES + s - SURFACE_VERTICES) return false;  // of two edges, the first looks for the second
+#endif
+#if CONTACT_SELF
+  return target_body(t) != body || !is_neighbour(s, t);
+#else
+  return true;  // leaves of the same body are not looked through
+#endif
+}
+bool is_near(vec4 ball, vec4 sphere) { return distance(sphere.xyz, ball.xyz) <= ball.w + 1.01 * sphere.w; }
+// What invocations found of target t and each item.
+void list_target(uint t, vec4 sphere, vec3 lowest, vec3 highest, uint body) {
+  if (any(lessThan(sphere.xyz + 1.01 * sphere.w, lowest)) || any(greaterThan(sphere.xyz - 1.01 * sphere.w, highest))) return;
+  for (uint p = 0u; p < PER_GROUP; ++p)
+    if (is_near(balls[p], sphere) && may_meet(items[p], t, body)) {
+      uint slot = atomicAdd(waiting_count[p], 1u);
+      if (slot < WAITING) lists[p * WAITING + slot] = t;
+    }
+}
 #if LANES > 1
-#define WAITING (SCRATCH / PER_GROUP)  // more are looked at as they are found, by lanes that wait for each other
-shared uint waiting_count[PER_GROUP];
 // Leaves the nearest of all lists in that of the first lane.
 void merge(uint lane) {
   for (uint half_size = LANES / 2u; half_size > 0u; half_size /= 2u) {
@@ -108,17 +133,6 @@ void merge(uint lane) {
   }
 }
 #endif
-shared vec3 lows[PER_GROUP], highs[PER_GROUP];  // of what each item looks at
-shared uint found_count, first_record;
-#if QUERY_EDGES
-uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
-uint end_of_targets(uint leaf) { return TRIANGLES + of_leaf(leaf, 6u); }
-#define LEAVES_OF_GROUPS LEAF_OF_EDGE_GROUP
-#else
-uint first_target(uint leaf) { return of_leaf(leaf, 1u); }
-uint end_of_targets(uint leaf) { return of_leaf(leaf, 2u); }
-#define LEAVES_OF_GROUPS LEAF_OF_GROUP
-#endif
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
   uint number = group_index() * PER_GROUP + part, own_leaf = pair_lists[LEAVES_OF_GROUPS + group_index()], body = of_leaf(own_leaf, 0u);
@@ -126,30 +140,26 @@ void main() {
   uint s = number < pair_lists[NEAR_EDGES] ? pair_lists[NEAR_EDGES_AT + number] : NONE;
   bool there = s != NONE;
   if (!there) s = SURFACE_VERTICES;
-  uint e = s - SURFACE_VERTICES, i = edge_vertex(e, 0u);
-  vec3 end = positions[edge_vertex(e, 1u)].high, low = min(positions[i].high, end), high = max(positions[i].high, end);
+  uint i = edge_vertex(s - SURFACE_VERTICES, 0u);
+  vec3 end = positions[edge_vertex(s - SURFACE_VERTICES, 1u)].high;
 #else
   uint s = number < pair_lists[NEAR_VERTICES] ? pair_lists[NEAR_AT + number] : NONE;
   bool there = s != NONE;
   if (!there) s = 0u;
   uint i = surface_vertex(s);
-  vec3 low = positions[i].high, high = low;
+  vec3 end = positions[i].high;
 #endif
   Pair own = Pair(positions[i].high, positions[i].low);
   uint held = there ? pair_lists[HELD + s] : NONE;
   float radius = held != NONE ? reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])) : margin;
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
-#if LANES > 1
-  if (lane == 0u) waiting_count[part] = 0u;
-#endif
-  vec3 centre = 0.5 * (low + high);
-  float reach = 0.5 * distance(low, high) + 1.01 * radius;
-  low -= radius, high += radius;
-  if (lane == 0u) lows[part] = there ? low : vec3(1e30), highs[part] = there ? high : vec3(-1e30);
-  if (gl_LocalInvocationIndex == 0u) piece_count = staged_count = found_count = 0u;
+  vec4 ball = there ? vec4(0.5 * (own.high + end), 0.5 * distance(own.high, end) + 1.01 * radius) : vec4(vec3(0.0), -1e30);
+  if (lane == 0u) waiting_count[part] = 0u, items[part] = s, balls[part] = ball;
+  if (gl_LocalInvocationIndex == 0u) piece_count = found_count = 0u;
   barrier();
-  vec3 lowest = lows[0], highest = highs[0];
-  for (uint k = 1u; k < PER_GROUP; ++k) lowest = min(lowest, lows[k]), highest = max(highest, highs[k]);
+  vec3 lowest = vec3(1e30), highest = vec3(-1e30);
+  for (uint p = 0u; p < PER_GROUP; ++p)
+    if (balls[p].w > 0.0) lowest = min(lowest, balls[p].xyz - balls[p].w), highest = max(highest, balls[p].xyz + balls[p].w);
   uint near = NEAR_LEAVES_AT + (NEAR_LEAVES + 1u) * own_leaf, near_count = pair_lists[near];
   bool all_leaves = near_count > NEAR_LEAVES;
   for (uint n = gl_LocalInvocationIndex; n < (all_leaves ? LEAVES : near_count); n += GROUP_SIZE) {
@@ -162,25 +172,22 @@ void main() {
   }
   barrier();
   uint pieces = min(piece_count, MOST_PIECES);
-  for (uint n = 0u; n < pieces; n += AT_ONCE) {
-    uint targets[AT_ONCE];
-    vec4 spheres[AT_ONCE];
-    for (uint j = 0u; j < AT_ONCE; ++j) {
+  const uint at_once = 4u;  // what is read does not wait for each other
+  for (uint n = 0u; n < pieces; n += at_once) {
+    uint targets[at_once];
+    vec4 spheres[at_once];
+    for (uint j = 0u; j < at_once; ++j) {
       uint piece = min(n + j, pieces - 1u), t = scratch[2u * piece] + gl_LocalInvocationIndex;
       targets[j] = n + j < pieces && t < scratch[2u * piece + 1u] ? t : NONE;
       spheres[j] = pair_spheres[min(t, TRIANGLES + EDGES - 1u)];
     }
-    for (uint j = 0u; j < AT_ONCE; ++j) {
-      vec3 centre = spheres[j].xyz;
-      float radius = 1.01 * spheres[j].w;
-      if (targets[j] == NONE || any(lessThan(centre + radius, lowest)) || any(greaterThan(centre - radius, highest))) continue;
-      uint slot = atomicAdd(staged_count, 1u);
-      if (slot < STAGED) lists[slot] = targets[j];
-    }
+    for (uint j = 0u; j < at_once; ++j)
+      if (targets[j] != NONE) list_target(targets[j], spheres[j], lowest, highest, body);
   }
   barrier();
-  bool listed = piece_count <= MOST_PIECES, staged = listed && staged_count <= STAGED;
-  if (staged && staged_count == 0u) {
+  bool listed = piece_count <= MOST_PIECES, any_waits = !listed;
+  for (uint p = 0u; p < PER_GROUP; ++p) any_waits = any_waits || waiting_count[p] > 0u;
+  if (!any_waits) {
     if (lane == 0u && there) pair_lists[HELD + s] = NONE;
     return;
   }
@@ -190,46 +197,21 @@ void main() {
   barrier();
   for (uint k = part * LANES; k < (part + 1u) * LANES; ++k) normal += normals[k];
 #endif
-  uint turns = !there ? 0u : staged ? 1u : listed ? pieces : LEAVES;
-  for (uint n = 0u; n < turns; ++n) {
-    if (!listed && (!in_leaf(n, low, high) || (CONTACT_SELF == 0 && of_leaf(n, 0u) == body))) continue;
-    uint first = staged ? 0u : listed ? scratch[2u * n] : first_target(n), end = staged ? staged_count : listed ? scratch[2u * n + 1u] : end_of_targets(n);
-    for (uint k = first + lane; k < end; k += AT_ONCE * LANES) {
-      uint targets[AT_ONCE];
-      vec4 spheres[AT_ONCE];
-      for (uint j = 0u; j < AT_ONCE; ++j) {
-        uint at = min(k + j * LANES, end - 1u);
-        targets[j] = staged ? lists[at] : at;
-        spheres[j] = pair_spheres[targets[j]];
-      }
-      for (uint j = 0u; j < AT_ONCE; ++j) {
-        uint t = targets[j];
-        vec4 sphere = spheres[j];
-        if (k + j * LANES >= end || distance(sphere.xyz, centre) > reach + 1.01 * sphere.w) continue;
-#if QUERY_EDGES
-        if (t <= TRIANGLES + e) continue;  // of two edges, the first looks for the second
-#endif
-        bool same_body = CONTACT_SELF != 0 && target_body(t) == body;
-#if CONTACT_SELF
-        if (same_body && is_neighbour(s, t)) continue;
-#endif
-#if LANES > 1
-        uint slot = staged ? atomicAdd(waiting_count[part], 1u) : WAITING;  // if not, scratch still has the leaves
-        if (slot < WAITING) {
-          scratch[part * WAITING + slot] = t;
-          continue;
-        }
-#endif
-        look_at(s, t, same_body, own, held, normal);
-      }
+  if (listed && waiting_count[part] <= WAITING) {
+    for (uint slot = lane; slot < waiting_count[part]; slot += LANES) {
+      uint t = lists[part * WAITING + slot];
+      look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
+    }
+  } else {
+    for (uint n = 0u; n < (!there ? 0u : listed ? pieces : LEAVES); ++n) {
+      if (!listed && CONTACT_SELF == 0 && of_leaf(n, 0u) == body) continue;
+      uint end = listed ? scratch[2u * n + 1u] : end_of_targets(n);
+      for (uint t = (listed ? scratch[2u * n] : first_target(n)) + lane; t < end; t += LANES)
+        if (is_near(ball, pair_spheres[t]) && may_meet(s, t, body))
+          look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
     }
   }
 #if LANES > 1
-  barrier();
-  for (uint slot = lane; slot < min(waiting_count[part], WAITING); slot += LANES) {
-    uint t = scratch[part * WAITING + slot];
-    look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
-  }
   merge(lane);
 #endif
   bool opposed = false;

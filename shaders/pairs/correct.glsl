@@ -6,26 +6,16 @@ void add(uint sum, vec3 correction) {
   for (uint c = 0u; c < 3u; ++c)
     if (quanta[c] != 0) atomicAdd(pair_sums[sum + c], quanta[c]);
 }
-// m, in this substep, of the item relative to the target.
-vec3 way_of(Meeting m, uvec4 vertices) {
-  vec3 way = vec3(0.0);
-  for (uint j = 0u; j < 4u; ++j) way += m.weights[j] * params.h * velocities[vertices[j]].high;
-  return way;
+// Of a contact's vertex: what it adds to the way of the item relative to the target in this substep (m), and to their inverse mass (1/kg). Masses are split
+// among the contacts of a vertex, the same for all of them, so that momentum is kept.
+vec4 part_of(uint vertex, float weight) {
+  float split = positions[vertex].inverse_mass * float(max(pair_sums[sharing(vertex, side)], 1));
+  return vec4(weight * params.h * velocities[vertex].high, weight * weight * split);
 }
-// 1/kg, of the item beside the target: masses are split among the contacts of a vertex, the same for all of them, so that momentum is kept.
-float split_mass(Meeting m, uvec4 vertices) {
-  float sum = 0.0;
-  for (uint j = 0u; j < 4u; ++j)
-    sum += m.weights[j] * m.weights[j] * positions[vertices[j]].inverse_mass * float(max(pair_sums[sharing(vertices[j], side)], 1));
-  return sum;
-}
-void correct(Meeting m, uvec4 vertices, vec3 way, float split) {
-  if (!(split > 0.0)) return;
-  Stop by = meeting_correction(m, way, push_most, params.friction);
-  for (uint j = 0u; j < 4u; ++j) {
-    if (m.weights[j] == 0.0) continue;
-    float factor = m.weights[j] * positions[vertices[j]].inverse_mass / split;
-    add(sums_of(vertices[j]), factor * by.stopped);
-    add(sums_of(vertices[j]) + PUSHED, factor * by.pushed);
-  }
+// `sum`: of all parts.
+void correct(uint vertex, float weight, Stop by, vec4 sum) {
+  if (weight == 0.0 || !(sum.w > 0.0)) return;
+  float factor = weight * positions[vertex].inverse_mass / sum.w;
+  add(sums_of(vertex), factor * by.stopped);
+  add(sums_of(vertex) + PUSHED, factor * by.pushed);
 }

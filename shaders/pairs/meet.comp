@@ -13,26 +13,14 @@ const float none = 1e30;
 shared float ranks[GROUP_SIZE], pushing[GROUP_SIZE], gaps[GROUP_SIZE];  // pushing: ranks of those that may
 shared float folds[GROUP_SIZE];  // ranks of those that push in spite of a nearer one
 shared uint touching, deepest;  // of this work-group, so that not all contacts queue for two numbers
-void share(Meeting m, uvec4 vertices, uint of_side) {
-  for (uint j = 0u; j < 4u; ++j)
-    if (m.weights[j] != 0.0) atomicAdd(pair_sums[sharing(vertices[j], of_side)], 1);
-}
-// Item s is in target t.
-void touch(uint s, uint t, Meeting m) {
-  pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
-#if !LAGGED
-  uvec4 vertices = vertices_of(s, t & TARGET);
-  share(m, vertices, side);
-  for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[sums_of(vertices[j]) + ASKS], 1);
-#if EDGES
-  uvec4 beside = beside_of(s, t & TARGET);
-  if (item_is_edge(s))
-    for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[sums_of(beside[j]) + ASKS], 1);
-#endif
-#endif
-  atomicAdd(touching, 1u);
-  atomicMax(deepest, floatBitsToUint(-m.gap));
-}
+// Item s is in target t, or may be before long: what the invocations of its record need for its vertices, one each.
+#define RECORDS_HERE (GROUP_SIZE / CANDIDATES)
+#define TOUCHES 1u
+#define COMES 2u
+shared Meeting meetings[RECORDS_HERE];
+shared uvec4 vertices_met[RECORDS_HERE];
+shared uint what_happens[RECORDS_HERE];
+shared vec4 parts[GROUP_SIZE];
 void main() {
   uint own_lane = gl_LocalInvocationIndex, first = own_lane / CANDIDATES * CANDIDATES, lane = own_lane - first;
   uint record = group_index() * (GROUP_SIZE / CANDIDATES) + own_lane / CANDIDATES, k = RECORDS_AT + RECORD * record;
@@ -44,6 +32,7 @@ void main() {
   bool may_push = t != NONE && (t & BESIDE) == 0u && (m.gap < 0.0 || !item_is_edge(s));
   gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none;
   if (own_lane == 0u) touching = deepest = 0u;
+  if (lane == 0u) what_happens[own_lane / CANDIDATES] = 0u;
   barrier();
   uint nearest = first, least = first, behind = first;
   float apart = none;  // m, from the nearest; of one that is in any, 0
@@ -64,16 +53,36 @@ void main() {
   bool pushes = decides && may_push && m.gap < 0.0 && (!vetoed || in_fold);
   if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
   if (decides && !pushes && !item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
-  if (pushes) touch(s, t, m);
-  if (ahead && (pushes || (decides && may_push && m.gap < 2.0 * closed_most))) {
-    uvec4 vertices = vertices_of(s, t & TARGET);
-    vec3 way = way_of(m, vertices);
-#if LAGGED
-    float split = split_mass(m, vertices);
+  uint here = own_lane / CANDIDATES;
+  bool comes = ahead && decides && may_push && m.gap < 2.0 * closed_most;
+  if (pushes || comes) what_happens[here] = (pushes ? TOUCHES : 0u) | (comes ? COMES : 0u), meetings[here] = m, vertices_met[here] = vertices_of(s, t & TARGET);
+  if (pushes) {
+    pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
+    atomicAdd(touching, 1u);
+    atomicMax(deepest, floatBitsToUint(-m.gap));
+#if !LAGGED && EDGES
+    uvec4 beside = beside_of(s, t & TARGET);
+    if (item_is_edge(s))
+      for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[sums_of(beside[j]) + ASKS], 1);
 #endif
-    if (pushes || m.gap + 2.0 * dot(way, m.normal) < 0.0) share(m, vertices, 1u - side);  // in this substep, in the next or after it
+  }
+  barrier();
+  bool serves = lane < 4u && what_happens[here] != 0u;
+  m = meetings[here];
+  uint vertex = serves ? vertices_met[here][lane] : 0u;
+  float weight = m.weights[min(lane, 3u)];
+  if (serves) parts[own_lane] = part_of(vertex, weight);
+  barrier();
+  if (serves) {
+    bool touches = (what_happens[here] & TOUCHES) != 0u;
+    vec4 sum = parts[first] + parts[first + 1u] + parts[first + 2u] + parts[first + 3u];
+    // In this substep, in the next or after it.
+    if (ahead && weight != 0.0 && (touches || m.gap + 2.0 * dot(sum.xyz, m.normal) < 0.0)) atomicAdd(pair_sums[sharing(vertex, 1u - side)], 1);
 #if LAGGED
-    if (pushes) correct(m, vertices, way, split);
+    if (touches) correct(vertex, weight, meeting_correction(m, sum.xyz, push_most, params.friction), sum);
+#else
+    if (touches && weight != 0.0) atomicAdd(pair_sums[sharing(vertex, side)], 1);
+    if (touches) atomicAdd(pair_sums[sums_of(vertex) + ASKS], 1);
 #endif
   }
   barrier();

@@ -43,7 +43,12 @@ void push(uint k) {
   if (t == NONE) return;
   uvec4 vertices = vertices_of(s, t & TARGET);
   Meeting m = meeting_of(s, t);
-  if (m.gap < 0.0) correct(m, vertices, way_of(m, vertices), split_mass(m, vertices));  // another program found it, and may round otherwise
+  if (m.gap < 0.0) {  // another program found it, and may round otherwise
+    vec4 sum = vec4(0.0);
+    for (uint j = 0u; j < 4u; ++j) sum += part_of(vertices[j], m.weights[j]);
+    Stop by = meeting_correction(m, sum.xyz, push_most, params.friction);
+    for (uint j = 0u; j < 4u; ++j) correct(vertices[j], m.weights[j], by, sum);
+  }
   memoryBarrierBuffer();
   leave(vertices);
 #if EDGES

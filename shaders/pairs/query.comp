@@ -1,7 +1,7 @@
 // The candidates of each vertex of a surface or, with QUERY_EDGES, of each sharp edge: the nearest targets within the margin, of equally near ones
 // those of the least number, so that the order in which they are found plays no part. One that is deep in a body looks as far as its surface. LANES
 // invocations per item: a work-group, whose items are of one leaf, first tests targets of near leaves by their spheres, each invocation one of these
-// against all items; then each looks at some of what passed for its item, and counts how much of the rest is nearer.
+// against all items; then each looks at some of what passed for its item, and lists are merged.
 #include "pairs/pairs.glsl"
 layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
@@ -31,73 +31,62 @@ vec3 part_of_normal(uint s, uint lane) {
   return sum;
 }
 #endif
-// An item as it looks at targets.
-struct Look {
-  uint s, body, held;  // the target that it was in
-  Pair own;            // where it is
-  float radius;
-  vec3 normal;  // of a vertex
-};
-const float nothing = 1e30;
-// How far target t is, which is given its bits; nothing: it is no candidate.
+uint found[CANDIDATES];
+float distances[CANDIDATES];
+void consider(uint t, float d) {
+  for (uint k = 0u; k < CANDIDATES; ++k) {
+    bool before = d < distances[k] || (d == distances[k] && t < found[k]);
+    uint t_out = before ? found[k] : t;
+    float d_out = before ? distances[k] : d;
+    if (before) found[k] = t, distances[k] = d;
+    t = t_out, d = d_out;
+  }
+}
+// Item s, at `own`, that was in `held`, and target t, of the same body or not; `normal` is that of a vertex.
 #if QUERY_EDGES
-float look_at(Look look, inout uint t) {
-  uint s = look.s;
-  Pair own = look.own;
+void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   uvec4 vertices = vertices_of(s, t), beside = beside_of(s, t);
   vec3 p = from_own(vertices.y, own), q = from_own(vertices.z, own), r = from_own(vertices.w, own);
   vec3 left = from_own(beside.x, own), right = from_own(beside.y, own), other_left = from_own(beside.z, own), other_right = from_own(beside.w, own);
   float far = meet_edges(p, left, right, q, r, other_left, other_right).rank;
 #if CONTACT_SELF
-  if (target_body(t) == look.body && far > SELF_MARGIN) return nothing;
+  if (same_body && far > SELF_MARGIN) return;
 #endif
-  return far <= look.radius && edges_oppose(p, left, right, q, r, other_left, other_right) ? far : nothing;
+  if (far <= distances[CANDIDATES - 1u] && edges_oppose(p, left, right, q, r, other_left, other_right)) consider(t, far);
 }
 #else
-float look_at(Look look, inout uint t) {
-  Pair own = look.own;
+void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
   vec3 a = from_own(triangle_vertex(t, 0u), own), b = from_own(triangle_vertex(t, 1u), own), c = from_own(triangle_vertex(t, 2u), own);
   vec3 beyond = max(max(min(a, min(b, c)), -max(a, max(b, c))), vec3(0.0));
   bool has_sides = SHEETS != 0 && thickness_of(triangle_body(t)) > 0.0;  // one that was crossed comes first, however far it is
-  if (!has_sides && dot(beyond, beyond) > 1.01 * look.radius * look.radius) return nothing;
+  if (!has_sides && dot(beyond, beyond) > 1.01 * distances[CANDIDATES - 1u] * distances[CANDIDATES - 1u]) return;
   Meeting m = meet(a, b, c);
-  bool opposed = opposes(m, look.normal);
-#if CONTACT_SELF
-  bool same_body = target_body(t) == look.body;
-#endif
+  bool opposed = opposes(m, normal);
 #if SHEETS
   if (has_sides) {  // that where the vertex is, or was before it went through
     bool under = dot(m.face, a) > 0.0, was_near = false;
-    for (uint j = 0u; j < 3u && look.held != NONE; ++j)
-      for (uint l = 0u; l < 3u; ++l) was_near = was_near || triangle_vertex(look.held & TARGET, j) == triangle_vertex(t, l);
-    if (was_near) under = (look.held & UNDER) != 0u;
+    for (uint j = 0u; j < 3u && held != NONE; ++j)
+      for (uint l = 0u; l < 3u; ++l) was_near = was_near || triangle_vertex(held & TARGET, j) == triangle_vertex(t, l);
+    if (was_near) under = (held & UNDER) != 0u;
     if (under) t |= UNDER;
     m = meet_sheet(a, b, c, under);
     opposed = true;
-  } else if (thickness_of(look.body) > 0.0) {
+  } else if (thickness_of(surface_body(s)) > 0.0) {
     opposed = true;
   }
 #endif
 #if CONTACT_SELF
-  if (same_body && abs(m.gap) > SELF_MARGIN) return nothing;  // a thin part's other side is no contact
+  if (same_body && abs(m.gap) > SELF_MARGIN) return;  // a thin part's other side is no contact
 #endif
-  if (!(m.rank <= look.radius)) return nothing;
-  if (!opposed) t |= BESIDE;
-  return m.rank;
+  if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
 }
 #endif
-#if LANES > 1
-#define WAITING 96u  // at least LANES * CANDIDATES; of an item near which are more, each invocation keeps the CANDIDATES nearest that it finds
-#else
-#define WAITING 32u
-#endif
-#define MOST_PIECES 256u
-shared uint lists[PER_GROUP * WAITING];  // targets near each item
-shared float distances[PER_GROUP * WAITING];
-shared uint nearest[PER_GROUP * CANDIDATES];  // of each item
-shared uvec2 pieces[MOST_PIECES];             // first and end of near leaves' targets, by GROUP_SIZE
+// Shared memory is what limits how many work-groups run at once, so each word serves in turn.
+#define WAITING 96u  // of an item whose targets are more, each is looked at as it is found
+#define MOST_PIECES (GROUP_SIZE * CANDIDATES / 2u)
+shared uint lists[max(PER_GROUP * WAITING, GROUP_SIZE * CANDIDATES)];  // targets that wait to be looked at, of each item; what each invocation found
+shared uint scratch[2u * MOST_PIECES];  // first and end of near leaves' targets, in pieces of GROUP_SIZE; how far what is in lists is (floats' bits)
 shared uint piece_count, waiting_count[PER_GROUP], items[PER_GROUP], found_count, first_record;
-shared bool may_push[PER_GROUP];
 shared vec4 balls[PER_GROUP];  // around what each item looks at: centre, radius, below 0 where there is none
 #if QUERY_EDGES
 uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
@@ -130,17 +119,20 @@ void list_target(uint t, vec4 sphere, vec3 lowest, vec3 highest, uint body) {
       if (slot < WAITING) lists[p * WAITING + slot] = t;
     }
 }
-bool before(float d, uint t, uint slot) { return d < distances[slot] || (d == distances[slot] && t < lists[slot]); }
-// Into the CANDIDATES nearest from a slot on.
-void keep(uint first, uint t, float d) {
-  for (uint slot = first; slot < first + CANDIDATES; ++slot) {
-    if (!before(d, t, slot)) continue;
-    uint t_out = lists[slot];
-    float d_out = distances[slot];
-    lists[slot] = t, distances[slot] = d;
-    t = t_out, d = d_out;
+#if LANES > 1
+// Leaves the nearest of all lists in that of the first lane.
+void merge(uint lane) {
+  for (uint half_size = LANES / 2u; half_size > 0u; half_size /= 2u) {
+    barrier();
+    uint own = gl_LocalInvocationIndex * CANDIDATES, other = own + half_size * CANDIDATES;
+    for (uint k = 0u; k < CANDIDATES; ++k) lists[own + k] = found[k], scratch[own + k] = floatBitsToUint(distances[k]);
+    barrier();
+    if (lane < half_size)
+      for (uint k = 0u; k < CANDIDATES && lists[other + k] != NONE && uintBitsToFloat(scratch[other + k]) <= distances[CANDIDATES - 1u]; ++k)
+        consider(lists[other + k], uintBitsToFloat(scratch[other + k]));
   }
 }
+#endif
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
   uint number = group_index() * PER_GROUP + part, own_leaf = pair_lists[LEAVES_OF_GROUPS + group_index()], body = of_leaf(own_leaf, 0u);
@@ -160,9 +152,9 @@ void main() {
   Pair own = Pair(positions[i].high, positions[i].low);
   uint held = there ? pair_lists[HELD + s] : NONE;
   float radius = held != NONE ? reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])) : margin;
+  for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
   vec4 ball = there ? vec4(0.5 * (own.high + end), 0.5 * distance(own.high, end) + 1.01 * radius) : vec4(vec3(0.0), -1e30);
-  if (lane == 0u) waiting_count[part] = 0u, items[part] = s, balls[part] = ball, may_push[part] = false;
-  for (uint k = lane; k < CANDIDATES; k += LANES) nearest[part * CANDIDATES + k] = NONE;
+  if (lane == 0u) waiting_count[part] = 0u, items[part] = s, balls[part] = ball;
   if (gl_LocalInvocationIndex == 0u) piece_count = found_count = 0u;
   barrier();
   vec3 lowest = vec3(1e30), highest = vec3(-1e30);
@@ -175,19 +167,18 @@ void main() {
     if (!in_leaf(l, lowest, highest) || (CONTACT_SELF == 0 && all_leaves && of_leaf(l, 0u) == body)) continue;
     for (uint first = first_target(l); first < end; first += GROUP_SIZE) {
       uint slot = atomicAdd(piece_count, 1u);
-      if (slot < MOST_PIECES) pieces[slot] = uvec2(first, min(first + GROUP_SIZE, end));
+      if (slot < MOST_PIECES) scratch[2u * slot] = first, scratch[2u * slot + 1u] = min(first + GROUP_SIZE, end);
     }
   }
   barrier();
-  uint listed_count = min(piece_count, MOST_PIECES);
+  uint pieces = min(piece_count, MOST_PIECES);
   const uint at_once = 4u;  // what is read does not wait for each other
-  for (uint n = 0u; n < listed_count; n += at_once) {
+  for (uint n = 0u; n < pieces; n += at_once) {
     uint targets[at_once];
     vec4 spheres[at_once];
     for (uint j = 0u; j < at_once; ++j) {
-      uvec2 piece = pieces[min(n + j, listed_count - 1u)];
-      uint t = piece.x + gl_LocalInvocationIndex;
-      targets[j] = n + j < listed_count && t < piece.y ? t : NONE;
+      uint piece = min(n + j, pieces - 1u), t = scratch[2u * piece] + gl_LocalInvocationIndex;
+      targets[j] = n + j < pieces && t < scratch[2u * piece + 1u] ? t : NONE;
       spheres[j] = pair_spheres[min(t, TRIANGLES + EDGES - 1u)];
     }
     for (uint j = 0u; j < at_once; ++j)
@@ -206,42 +197,27 @@ void main() {
   barrier();
   for (uint k = part * LANES; k < (part + 1u) * LANES; ++k) normal += normals[k];
 #endif
-  Look look = Look(s, body, held, own, radius, normal);
-  uint list = part * WAITING, count = waiting_count[part];
-  if (listed && count <= WAITING) {
-    for (uint slot = list + lane; slot < list + count; slot += LANES) {
-      uint t = lists[slot];
-      distances[slot] = look_at(look, t);
-      lists[slot] = t;
+  if (listed && waiting_count[part] <= WAITING) {
+    for (uint slot = lane; slot < waiting_count[part]; slot += LANES) {
+      uint t = lists[part * WAITING + slot];
+      look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
     }
   } else {
-    uint first = list + lane * CANDIDATES;
-    for (uint slot = first; slot < first + CANDIDATES; ++slot) lists[slot] = NONE, distances[slot] = nothing;
-    for (uint n = 0u; n < (!there ? 0u : listed ? listed_count : LEAVES); ++n) {
+    for (uint n = 0u; n < (!there ? 0u : listed ? pieces : LEAVES); ++n) {
       if (!listed && CONTACT_SELF == 0 && of_leaf(n, 0u) == body) continue;
-      uvec2 targets = listed ? pieces[n] : uvec2(first_target(n), end_of_targets(n));
-      for (uint k = targets.x + lane; k < targets.y; k += LANES) {
-        uint t = k;
-        float d = nothing;
-        if (is_near(ball, pair_spheres[t]) && may_meet(s, t, body)) d = look_at(look, t);
-        if (d < nothing) keep(first, t, d);
-      }
+      uint end = listed ? scratch[2u * n + 1u] : end_of_targets(n);
+      for (uint t = (listed ? scratch[2u * n] : first_target(n)) + lane; t < end; t += LANES)
+        if (is_near(ball, pair_spheres[t]) && may_meet(s, t, body))
+          look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
     }
-    count = LANES * CANDIDATES;
   }
-  barrier();
-  for (uint slot = list + lane; slot < list + count; slot += LANES) {
-    uint t = lists[slot], nearer = 0u;
-    float d = distances[slot];
-    if (!(d < nothing)) continue;
-    for (uint other = list; other < list + count; ++other)
-      if (other != slot && !before(d, t, other)) ++nearer;
-    if (nearer >= CANDIDATES) continue;
-    nearest[part * CANDIDATES + nearer] = t;
-    if ((t & BESIDE) == 0u) may_push[part] = true;
-  }
-  barrier();
-  uint record = lane == 0u && may_push[part] ? atomicAdd(found_count, 1u) : 0u;
+#if LANES > 1
+  merge(lane);
+#endif
+  bool opposed = false;
+  for (uint k = 0u; k < CANDIDATES; ++k) opposed = opposed || (found[k] & BESIDE) == 0u;
+  bool keeps = lane == 0u && there && opposed;
+  uint record = keeps ? atomicAdd(found_count, 1u) : 0u;
   barrier();
   if (gl_LocalInvocationIndex == 0u && found_count > 0u) {
     first_record = atomicAdd(pair_lists[RECORDS], found_count);
@@ -251,9 +227,9 @@ void main() {
   }
   barrier();
   if (lane == 0u && there) pair_lists[HELD + s] = NONE;
-  if (lane != 0u || !may_push[part]) return;
+  if (!keeps) return;
   uint k = RECORDS_AT + RECORD * (first_record + record);
   pair_lists[k] = s;
   pair_lists[k + 2u] = 0u;
-  for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + CANDIDATE + c] = nearest[part * CANDIDATES + c];
+  for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + CANDIDATE + c] = found[c];
 }

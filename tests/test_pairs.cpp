@@ -442,6 +442,36 @@ TEST_CASE("pairs: a vertex leaves a body that is folded over itself") {
   }
 }
 
+TEST_CASE("pairs: a vertex behind the crease of a sharp valley is pushed out through it") {
+  GlTest gl;
+  auto model = std::make_shared<Model>();
+  TetMesh valley = make_block({0.6, 0.5, 0.5}, {12, 5, 6}),
+          spike = make_block(glm::dvec3(0.1), glm::ivec3(2));
+  for (glm::dvec3& p : valley.positions) p.y -= 0.8 * (p.y + 0.25) * (1 - std::abs(p.x) / 0.3);
+  const glm::dvec3 up = glm::normalize(glm::dvec3(1)), side = glm::normalize(glm::dvec3(1, 0, -1));
+  for (glm::dvec3& p : spike.positions)
+    p = {glm::dot(p, side), 3 * glm::dot(p, up), glm::dot(p, glm::cross(side, up))};
+  auto above = spike.positions;
+  for (glm::dvec3& p : above)
+    p += glm::dvec3(0.0005, -0.154 + 0.15 * std::sqrt(3.0), 0.06);  // 4 mm behind the crease
+  std::vector<std::uint32_t> all(valley.positions.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  finish_tets(valley, "valley"), finish_tets(spike, "spike");
+  add_body(*model, "valley", valley, 1000, valley.positions, {}, {}, all);
+  add_body(*model, "spike", spike, 1000, above, {}, {}, {});
+  REQUIRE(overlap_of(*model, model->positions, false).inside == 1);
+  for (const std::string mode : {"explicit", "newton", "cpu-double"}) {
+    CAPTURE(mode);
+    Settings settings = touching(mode, 1e6);
+    if (mode == "newton") settings.iterations = 8, settings.substeps = 5;
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 10; ++s) step(sim);
+    REQUIRE_FALSE(check_finite(sim, true));
+    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.001);
+    CHECK(std::abs(speed_of(sim, 1, 1)) < 0.5);  // it is put out, not shot
+  }
+}
+
 TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end finite and out of each other") {
   GlTest gl;
   std::mt19937 random(5);

@@ -5,6 +5,7 @@ struct Meeting {
   real gap;         // m, negative inside
   vec3 face;        // the triangle's own normal, unit
   real rank;     // by distance; of triangles as near as each other the sign of that which faces the vertex most is right, and comes first
+  bool in_doubt;  // a triangle's edge is nearest and the vertex behind its plane, but gap is not below 0
 };
 // Weights of the corners at the point of a triangle that is nearest to the origin (Ericson 2005, Real-Time Collision Detection, 5.1.5).
 vec3 nearest_weights(vec3 a, vec3 b, vec3 c) {
@@ -51,12 +52,14 @@ Meeting meet(vec3 a, vec3 b, vec3 c) {
   m.gap = real(1e30);
   m.rank = real(1e30);
   m.face = m.normal;
+  m.in_doubt = false;
   if (!(area > real(0))) return m;
   n /= area;
   m.face = n;
   real along = dot(to, n);
   // Inside, the nearest point is in a face, or on an edge that is all but flat or bent inwards; a stale triangle's edge says nothing.
   m.gap = along < real(-0.7) * far ? -far : far;
+  m.in_doubt = along < real(-0.05) * far && m.gap > real(0);
   m.rank = far - real(1e-3) * abs(along);
   // Beside the face, away from or towards the edge; a vertex on it has no such direction.
   bool beside = far > real(1e-6) * sqrt(area) && abs(along) < real(0.999999) * far;
@@ -73,6 +76,7 @@ Meeting meet_sheet(vec3 a, vec3 b, vec3 c, bool under) {
   bool crossed = dot(to, m.face) > real(0.7) * far;  // not beside its rim
   m.normal = crossed || !(far > real(0)) ? m.face : -to / far;
   m.gap = crossed ? -far : far;
+  m.in_doubt = false;
   m.rank = crossed ? real(1e-3) * far : far;  // first of all it is to come back
   return m;
 }
@@ -94,6 +98,7 @@ Meeting meet_edges(vec3 p, vec3 left, vec3 right, vec3 q, vec3 r, vec3 other_lef
   real pp = dot(p, p), ee = dot(e, e), pe = dot(p, e), pq = dot(p, q), eq = dot(e, q), across = dot(between, between);
   m.gap = m.rank = real(1e30);
   m.normal = m.face = vec3(0, 1, 0);
+  m.in_doubt = false;
   for (int j = 0; j < 4; ++j) m.weights[j] = real(0);
   if (!(pp > real(0) && ee > real(0))) return m;
   // Ericson 2005, 5.1.9. The ends of edges that are all but parallel meet triangles instead.

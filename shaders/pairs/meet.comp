@@ -11,6 +11,7 @@ uniform uint substep;       // since candidates were looked for
 uniform float closed_most;  // m, by which an item and a candidate may come nearer in a substep
 const float none = 1e30;
 shared float ranks[GROUP_SIZE], pushing[GROUP_SIZE], gaps[GROUP_SIZE];  // pushing: ranks of those that may
+shared bool doubts[GROUP_SIZE];
 shared float folds[GROUP_SIZE];  // ranks of those that push in spite of a nearer one
 shared uint touching, deepest;  // of this work-group, so that not all contacts queue for two numbers
 // Item s is in target t, or may be before long: what the invocations of its record need for its vertices, one each.
@@ -28,9 +29,10 @@ void main() {
   uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + CANDIDATE + lane] : NONE;
   Meeting m;
   m.gap = m.rank = none;
+  m.in_doubt = false;
   if (t != NONE) m = meeting_of(s, t);
   bool may_push = t != NONE && (t & BESIDE) == 0u && (m.gap < 0.0 || !item_is_edge(s));
-  gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none;
+  gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none, doubts[own_lane] = m.in_doubt;
   if (own_lane == 0u) touching = deepest = 0u;
   if (lane == 0u) what_happens[own_lane / CANDIDATES] = 0u;
   barrier();
@@ -41,14 +43,16 @@ void main() {
     if (pushing[c] < pushing[least]) least = c;
     apart = min(apart, max(gaps[c], 0.0));
   }
-  // Where bodies fold the nearest triangle may say that the vertex is outside, but a tet that it is in does not err.
+  // Where bodies fold or are bent inwards the nearest triangle may say that the vertex is outside, but a tet that it is in does not err.
   bool vetoed = gaps[nearest] > 0.0 && there && !item_is_edge(s);
-  folds[own_lane] = vetoed && may_push && m.gap < 0.0 && is_behind(s, t & TARGET) ? m.rank : none;
+  bool asks = vetoed && may_push && (m.gap < 0.0 || (m.in_doubt && doubts[nearest]));
+  folds[own_lane] = asks && is_behind(s, t & TARGET) ? m.rank : none;
   barrier();
   for (uint c = first; c < first + CANDIDATES; ++c)
     if (folds[c] < folds[behind]) behind = c;
   bool in_fold = folds[behind] < none;
   if (in_fold) least = behind;
+  if (in_fold && m.gap > 0.0) m = inside(m), t |= INSIDE;
   bool decides = there && own_lane == least;
   bool pushes = decides && may_push && m.gap < 0.0 && (!vetoed || in_fold);
   if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;

@@ -30,6 +30,11 @@ Meeting meeting_of(uint s, uint t) {
   return meet(b, c, d);
 #endif
 }
+Meeting inside(Meeting m) {
+  m.gap = -m.gap;
+  m.normal = -m.normal;
+  return m;
+}
 // Whether the vertex is in a tet of the body that triangle t belongs to, a few tets behind it; where a body is inverted that is not known.
 bool is_behind(uint s, uint t) {
   vec3 own = positions[surface_vertex(s)].high;

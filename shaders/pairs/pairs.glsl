@@ -62,6 +62,7 @@ layout(std430, binding = BIND_PAIR_SPHERES) restrict buffer PairSpheres { vec4 p
 #define CANDIDATE 3u
 #define NONE 0xffffffffu
 #define BESIDE 0x80000000u  // of a candidate: it says whether the vertex is in the body, but does not push it
+#define INSIDE BESIDE         // of a target that an item is in: tets say so, while its gap says that it is not
 #define UNDER 0x40000000u   // of a sheet's triangle: the vertex belongs on the side where it winds clockwise
 #define TARGET 0x3fffffffu
 #define HELD (RECORDS_AT + RECORD * ITEMS)  // then, of each item, the target that it was in last, and how deep (m)

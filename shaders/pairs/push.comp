@@ -43,6 +43,7 @@ void push(uint k) {
   if (t == NONE) return;
   uvec4 vertices = vertices_of(s, t & TARGET);
   Meeting m = meeting_of(s, t);
+  if ((t & INSIDE) != 0u && m.gap > 0.0) m = inside(m);
   if (m.gap < 0.0) {  // another program found it, and may round otherwise
     vec4 sum = vec4(0.0);
     for (uint j = 0u; j < 4u; ++j) sum += part_of(vertices[j], m.weights[j]);

@@ -78,7 +78,9 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 #if CONTACT_SELF
   if (same_body && abs(m.gap) > SELF_MARGIN) return;  // a thin part's other side is no contact
 #endif
-  if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
+  // Of what only says whether the vertex is inside, less is needed: it is taken for further than it is.
+  float d = opposed ? m.rank : 1.5 * m.rank;
+  if (d <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, d);
 }
 #endif
 // Shared memory is what limits how many work-groups run at once, so each word serves in turn.

@@ -149,15 +149,20 @@ class PairContact {
         if (m.rank >= reach || !(sheets || Formulas<double>{}.opposes(m, normals[vertex]))) return;
         const Contact contact{{vertex, i, j, k}, m};
         const State::Held by{t, under ? 1u : 0u};
-        if (m.gap < 0) deeper.push_back({contact, by});
+        if (m.gap < 0 || m.in_doubt) deeper.push_back({contact, by});
         if (m.rank < best.meeting.rank) best = contact, held[s] = by;
       });
       if (nearest.gap > 0) {  // meet.comp, where only the eight nearest are known
         std::ranges::sort(deeper, {},
                           [](const auto& d) { return std::pair(d.first.meeting.rank, d.second.target); });
-        const auto found = std::ranges::find_if(
-            deeper, [&](const auto& d) { return is_behind(x, vertex, d.second.target); });
-        if (found != deeper.end()) nearest.gap = 0, best = found->first, held[s] = found->second;
+        const auto found = std::ranges::find_if(deeper, [&](const auto& d) {
+          return (d.first.meeting.gap < 0 || nearest.in_doubt) && is_behind(x, vertex, d.second.target);
+        });
+        if (found != deeper.end()) {
+          nearest.gap = 0, best = found->first, held[s] = found->second;
+          Meeting& m = best.meeting;
+          if (m.gap > 0) m.gap = -m.gap, m.normal = -m.normal;
+        }
       }
       if (best.meeting.rank < reach && best.meeting.gap < 0 && nearest.gap <= 0)
         contacts.push_back(best);

@@ -1,5 +1,6 @@
 // The correction of a contact: needs positions, velocities, pairs/formulas.glsl and pairs/sums.glsl.
 const float push_most = EDGE / 10.0;  // m, in a substep: so bodies that are deep in each other leave each other
+#define UNSEEN 4                      // contacts that may share a vertex of which none was seen coming: too few would shoot it away
 uniform uint side;                    // of the numbers of contacts that share a vertex, that of this substep
 void add(uint sum, vec3 correction) {
   ivec3 quanta = ivec3(round(clamp(correction, -params.body_size / PARTS, params.body_size / PARTS) * (params.inverse_quantum * PARTS)));
@@ -9,7 +10,8 @@ void add(uint sum, vec3 correction) {
 // Of a contact's vertex: what it adds to the way of the item relative to the target in this substep (m), and to their inverse mass (1/kg). Masses are split
 // among the contacts of a vertex, the same for all of them, so that momentum is kept.
 vec4 part_of(uint vertex, float weight) {
-  float split = positions[vertex].inverse_mass * float(max(pair_sums[sharing(vertex, side)], 1));
+  int sharing_it = pair_sums[sharing(vertex, side)];
+  float split = positions[vertex].inverse_mass * float(sharing_it > 0 ? sharing_it : UNSEEN);
   return vec4(weight * params.h * velocities[vertex].high, weight * weight * split);
 }
 // `sum`: of all parts.

@@ -142,7 +142,7 @@ struct RigidRecord {
 #define PHASE_SHARED_SIDE 128u  // which numbers of contacts are of this substep (pairs/sums.glsl)
 #define PHASE_SHARED_LAST 256u  // the next look at contacts counts exactly, so these begin at 0 as well
 
-// Storage bindings of the simulation; a kernel has 8 at most.
+// Storage bindings of the simulation; a kernel has 8 at most, but for contact of bodies, where it may have 10.
 #define BIND_POSITIONS 0
 #define BIND_VELOCITIES 1
 #define BIND_PREDICTED 2

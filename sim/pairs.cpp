@@ -16,8 +16,8 @@ bool bodies_touch(const Model& model, const Settings& settings) {
   return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
 }
 
-bool contacts_lag(const SolverInput& input) {
-  return bodies_touch(input.model, input.settings) && !is_implicit(input.settings) && !input.rigid;
+bool contacts_lag(const Model& model, const Settings& settings) {
+  return bodies_touch(model, settings) && !is_implicit(settings);
 }
 
 namespace {
@@ -259,7 +259,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   p.boxes = kernel("boxes", slices + leaves), p.cull = kernel("cull", leaves);
   p.query = kernel("query", 0, query_groups);
   p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
-  p.lag = std::ranges::find(vertex_defines, "CONTACTS 1") != vertex_defines.end();
+  p.lag = contacts_lag(model, settings);
   defines.back() = "LAGGED 1";
   if (p.lag) p.meet_and_push = kernel("meet", 0, lane_groups);
   *(defines.end() - 2) = "QUERY_EDGES 1";

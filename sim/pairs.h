@@ -10,14 +10,13 @@
 namespace tetpbd {
 
 struct Settings;
-struct SolverInput;
 struct Tuning;
 struct Sim;
 
 /// Whether anything can touch.
 bool bodies_touch(const Model& model, const Settings& settings);
 /// Whether kernels that move vertices take in what contact found after the substep before.
-bool contacts_lag(const SolverInput& input);
+bool contacts_lag(const Model& model, const Settings& settings);
 
 /// Surfaces of all bodies.
 struct PairMesh {
@@ -95,7 +94,7 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
 /// Before a step: takes the last answer and asks again.
 void look_around(Sim& sim);
 /// After a substep's last dispatch, with so many substeps of the step `left`: changes positions, velocities
-/// and what neighbours see next, at once if none is.
+/// and what neighbours see next, at once if none is or contacts were not counted ahead.
 void touch(Sim& sim, int left);
 /// Of a state that is given.
 void start_pairs(Sim& sim, const State& state);

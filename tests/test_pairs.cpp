@@ -472,6 +472,20 @@ TEST_CASE("pairs: a vertex behind the crease of a sharp valley is pushed out thr
   }
 }
 
+TEST_CASE("pairs: thin plates above each other do not touch") {
+  GlTest gl;
+  Placed upper, lower;
+  upper.size = lower.size = {1, 0.02, 1}, upper.cells = lower.cells = {5, 1, 5};
+  for (const double apart : {0.1, 0.14, 0.16}) {
+    CAPTURE(apart);
+    lower.at.y = -apart;
+    Sim sim = create_sim(blocks({upper, lower}), touching("explicit"));
+    for (int s = 0; s < 3; ++s) step(sim);
+    CHECK(touched(sim).detections > 0);
+    CHECK(touched(sim).touches == 0);
+  }
+}
+
 TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end finite and out of each other") {
   GlTest gl;
   std::mt19937 random(5);

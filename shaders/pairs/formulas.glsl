@@ -104,10 +104,11 @@ Meeting meet_edges(vec3 p, vec3 left, vec3 right, vec3 q, vec3 r, vec3 other_lef
   // Ericson 2005, 5.1.9. The ends of edges that are all but parallel meet triangles instead.
   bool cross_each_other = across > real(1e-3) * pp * ee;
   real s = cross_each_other ? (pq * ee - eq * pe) / across : real(0);
-  bool in_both = cross_each_other && s > real(0) && s < real(1);
+  // At their ends rounding would decide.
+  bool in_both = cross_each_other && s > real(1e-3) && s < real(0.999);
   s = clamp(s, real(0), real(1));
   real t = (s * pe - eq) / ee;
-  in_both = in_both && t > real(0) && t < real(1);
+  in_both = in_both && t > real(1e-3) && t < real(0.999);
   if (!(t > real(0) && t < real(1))) {
     t = t > real(0) ? real(1) : real(0);
     s = clamp((pq + t * pe) / pp, real(0), real(1));

@@ -58,7 +58,7 @@ void main() {
   if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
   if (decides && !pushes && !item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
   uint here = own_lane / CANDIDATES;
-  bool comes = ahead && decides && may_push && m.gap < 2.0 * closed_most;
+  bool comes = ahead && decides && may_push && m.gap >= 0.0 && m.gap < 2.0 * closed_most;
   if (pushes || comes) what_happens[here] = (pushes ? TOUCHES : 0u) | (comes ? COMES : 0u), meetings[here] = m, vertices_met[here] = vertices_of(s, t & TARGET);
   if (pushes) {
     pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
@@ -72,10 +72,14 @@ void main() {
   }
   barrier();
   bool serves = lane < 4u && what_happens[here] != 0u;
-  m = meetings[here];
-  uint vertex = serves ? vertices_met[here][lane] : 0u;
-  float weight = m.weights[min(lane, 3u)];
-  if (serves) parts[own_lane] = part_of(vertex, weight);
+  uint vertex = 0u;
+  float weight = 0.0;
+  if (serves) {
+    m = meetings[here];
+    vertex = vertices_met[here][lane];
+    weight = m.weights[lane];
+    parts[own_lane] = part_of(vertex, weight);
+  }
   barrier();
   if (serves) {
     bool touches = (what_happens[here] & TOUCHES) != 0u;

@@ -24,7 +24,9 @@ Meeting meeting_of(uint s, uint t) {
     m = meet_sheet(b, c, d, under);
   else
     m = meet(b, c, d);
-  m.gap -= max(thickness, thickness_of(surface_body(s)));
+  float apart = max(thickness, thickness_of(surface_body(s)));
+  m.gap -= apart;
+  m.in_doubt = m.in_doubt && apart == 0.0;
   return m;
 #else
   return meet(b, c, d);

@@ -78,9 +78,7 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 #if CONTACT_SELF
   if (same_body && abs(m.gap) > SELF_MARGIN) return;  // a thin part's other side is no contact
 #endif
-  // Of what only says whether the vertex is inside, less is needed: it is taken for further than it is.
-  float d = opposed ? m.rank : 1.5 * m.rank;
-  if (d <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, d);
+  if (m.rank <= distances[CANDIDATES - 1u]) consider(opposed ? t : t | BESIDE, m.rank);
 }
 #endif
 // Shared memory is what limits how many work-groups run at once, so each word serves in turn.
@@ -137,6 +135,11 @@ void merge(uint lane) {
 #endif
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
+#if QUERY_EDGES
+  if (group_index() * PER_GROUP >= pair_lists[NEAR_EDGES]) return;  // rows of work-groups are whole
+#else
+  if (group_index() * PER_GROUP >= pair_lists[NEAR_VERTICES]) return;
+#endif
   uint number = group_index() * PER_GROUP + part, own_leaf = pair_lists[LEAVES_OF_GROUPS + group_index()], body = of_leaf(own_leaf, 0u);
 #if QUERY_EDGES
   uint s = number < pair_lists[NEAR_EDGES] ? pair_lists[NEAR_EDGES_AT + number] : NONE;

@@ -41,7 +41,7 @@ class PairContact {
         weight += b * b * inverse_masses[vertices[j]] * counts[vertices[j]];
       }
       if (!(weight > 0)) continue;
-      const double push_most = mesh_.edge / 10;  // push.comp
+      const double push_most = mesh_.edge / 10;  // correct.glsl
       const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, settings.friction);
       for (std::size_t j = 0; j < 4; ++j) {
         const double factor = m.weights[j] * inverse_masses[vertices[j]] / weight;
@@ -144,6 +144,7 @@ class PairContact {
         }
         if (other == body && std::abs(m.gap) > pair_margin(mesh_)) return;  // a thin part's other side
         m.gap -= std::max(thickness, other_thickness);
+        m.in_doubt = m.in_doubt && thickness == 0 && other_thickness == 0;
         if (m.rank < nearest.rank) nearest = m;
         const bool sheets = thickness > 0 || other_thickness > 0;
         if (m.rank >= reach || !(sheets || Formulas<double>{}.opposes(m, normals[vertex]))) return;

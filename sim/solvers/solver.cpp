@@ -149,7 +149,7 @@ std::vector<std::string> vertex_defines(const SolverInput& input) {
   return {define("COMPLIANT", input.compliant),        define("RIGID_CONTACT", input.rigid),
           define("LEAPFROG", input.leapfrog),          define("BODY_COUNT", input.model.bodies.size()),
           define("SHAPES", input.model.shapes.size()), define("FIELDS", has_fields(input.model)),
-          define("CONTACTS", contacts_lag(input))};
+          define("CONTACTS", contacts_lag(input.model, input.settings))};
 }
 
 Buffer record_buffer(const ConstraintList& list, const std::string& kind) {

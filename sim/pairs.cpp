@@ -213,7 +213,8 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   p.lists = Buffer("contacts", 4 * (records_at + (record + 3) * items + (2 * per_group + 7) * leaves +
                                     (near_leaves + 1) * leaves + items / per_group + 2 * leaves));
   p.spheres = Buffer("spheres around triangles", 16 * targets);
-  p.sums = Buffer("corrections by contacts", std::vector<std::int32_t>(9 * model.positions.size(), 0),
+  p.sums = Buffer("corrections by contacts",
+                  std::vector<std::int32_t>((p.sum_words + p.sharing_words) * model.positions.size(), 0),
                   GL_DYNAMIC_COPY);
   std::vector<std::uint32_t> empty(records_at, 0);
   for (const std::size_t three : {groups, lane_groups, query_groups, edge_groups})
@@ -251,19 +252,19 @@ Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tun
   defines.push_back(fmt::format("EDGE {:.9g}", surfaces.edge));
   defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
   defines.push_back(fmt::format("CONTACT_SELF {}", settings.contact == "self" ? 1 : 0));
-  defines.push_back("QUERY_EDGES 0"), defines.push_back("LAGGED 0");
-  const auto kernel = [&](const char* name, std::size_t work_groups, int counted_by = 0) {
+  const auto kernel = [&](const char* name, std::size_t work_groups, int counted_by = 0,
+                          const char* variant = nullptr) {
+    std::vector<std::string> all = defines;
+    if (variant) all.push_back(variant);
     return Pairs::Kernel{
-        Program::compute(fmt::format("pairs/{}.comp", name), {}, defines), work_groups, counted_by, {}};
+        Program::compute(fmt::format("pairs/{}.comp", name), {}, all), work_groups, counted_by, {}};
   };
   p.boxes = kernel("boxes", slices + leaves), p.cull = kernel("cull", leaves);
-  p.query = kernel("query", 0, query_groups);
-  p.meet = kernel("meet", 0, lane_groups), p.push = kernel("push", 0, groups);
+  p.query = kernel("query", 0, query_groups, "QUERY_EDGES 0");
+  if (edges > 0) p.query_edges = kernel("query", 0, edge_groups, "QUERY_EDGES 1");
+  p.meet = kernel("meet", 0, lane_groups, "LAGGED 0"), p.push = kernel("push", 0, groups);
   p.lag = contacts_lag(model, settings);
-  defines.back() = "LAGGED 1";
-  if (p.lag) p.meet_and_push = kernel("meet", 0, lane_groups);
-  *(defines.end() - 2) = "QUERY_EDGES 1";
-  if (edges > 0) p.query_edges = kernel("query", 0, edge_groups);
+  if (p.lag) p.meet_and_push = kernel("meet", 0, lane_groups, "LAGGED 1");
   return p;
 }
 

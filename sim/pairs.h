@@ -70,6 +70,7 @@ struct PairNumbers {
 /// Part of a Sim.
 struct Pairs : PairNumbers {
   static constexpr long every = 2;  ///< steps from one look at the boxes to the next
+  static constexpr std::size_t sum_words = 7, sharing_words = 2;  ///< of a vertex in `sums` (sums.glsl)
   Buffer mesh, rest, spheres, lists, sums, empty, answer;
   Fence asked;
   struct Kernel {

@@ -23,9 +23,10 @@ std::vector<Part> parts_of(const Sim& sim) {
     parts.push_back({&sim.solver.buffers[buffer], first, bytes});
   if (sim.watch.answer) add(sim.watch.answer), parts.push_back({&sim.check.words, 8, 8});
   if (sim.pairs) {
-    const Buffer& sums = sim.pairs.sums;
+    const std::size_t words = 4 * sim.model->positions.size();
     parts.push_back({&sim.pairs.lists, 0, sim.pairs.handed_on}), add(sim.pairs.answer);
-    if (sim.pairs.lag) parts.push_back({&sums, sums.bytes() / 9 * 7, sums.bytes() / 9 * 2});
+    if (sim.pairs.lag)
+      parts.push_back({&sim.pairs.sums, Pairs::sum_words * words, Pairs::sharing_words * words});
   }
   return parts;
 }

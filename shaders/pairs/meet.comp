@@ -23,8 +23,8 @@ shared uvec4 vertices_met[RECORDS_HERE];
 shared uint what_happens[RECORDS_HERE];
 shared vec4 parts[GROUP_SIZE];
 void main() {
-  uint own_lane = gl_LocalInvocationIndex, first = own_lane / CANDIDATES * CANDIDATES, lane = own_lane - first;
-  uint record = group_index() * (GROUP_SIZE / CANDIDATES) + own_lane / CANDIDATES, k = RECORDS_AT + RECORD * record;
+  uint own_lane = gl_LocalInvocationIndex, here = own_lane / CANDIDATES, first = here * CANDIDATES, lane = own_lane - first;
+  uint record = group_index() * RECORDS_HERE + here, k = RECORDS_AT + RECORD * record;
   bool there = record < pair_lists[RECORDS] && pair_lists[k + 2u] <= substep;
   uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + CANDIDATE + lane] : NONE;
   Meeting m;
@@ -34,7 +34,7 @@ void main() {
   bool may_push = t != NONE && (t & BESIDE) == 0u && (m.gap < 0.0 || !item_is_edge(s));
   gaps[own_lane] = m.gap, ranks[own_lane] = m.rank, pushing[own_lane] = may_push ? m.rank : none, doubts[own_lane] = m.in_doubt;
   if (own_lane == 0u) touching = deepest = 0u;
-  if (lane == 0u) what_happens[own_lane / CANDIDATES] = 0u;
+  if (lane == 0u) what_happens[here] = 0u;
   barrier();
   uint nearest = first, least = first, behind = first;
   float apart = none;  // m, from the nearest; of one that is in any, 0
@@ -57,7 +57,6 @@ void main() {
   bool pushes = decides && may_push && m.gap < 0.0 && (!vetoed || in_fold);
   if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
   if (decides && !pushes && !item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
-  uint here = own_lane / CANDIDATES;
   bool comes = ahead && decides && may_push && m.gap >= 0.0 && m.gap < 2.0 * closed_most;
   if (pushes || comes) what_happens[here] = (pushes ? TOUCHES : 0u) | (comes ? COMES : 0u), meetings[here] = m, vertices_met[here] = vertices_of(s, t & TARGET);
   if (pushes) {

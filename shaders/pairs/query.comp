@@ -98,15 +98,16 @@ uint first_target(uint leaf) { return of_leaf(leaf, 1u); }
 uint end_of_targets(uint leaf) { return of_leaf(leaf, 2u); }
 #define LEAVES_OF_GROUPS LEAF_OF_GROUP
 #endif
+bool is_own(uint t, uint body) { return CONTACT_SELF != 0 && target_body(t) == body; }  // else leaves of the same body are not looked through
 // Whether item s, of that body, and target t may meet at all.
 bool may_meet(uint s, uint t, uint body) {
 #if QUERY_EDGES
   if (t <= TRIANGLES + s - SURFACE_VERTICES) return false;  // of two edges, the first looks for the second
 #endif
 #if CONTACT_SELF
-  return target_body(t) != body || !is_neighbour(s, t);
+  return !is_own(t, body) || !is_neighbour(s, t);
 #else
-  return true;  // leaves of the same body are not looked through
+  return true;
 #endif
 }
 bool is_near(vec4 ball, vec4 sphere) { return distance(sphere.xyz, ball.xyz) <= ball.w + 1.01 * sphere.w; }
@@ -205,7 +206,7 @@ void main() {
   if (listed && waiting_count[part] <= WAITING) {
     for (uint slot = lane; slot < waiting_count[part]; slot += LANES) {
       uint t = lists[part * WAITING + slot];
-      look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
+      look_at(s, t, is_own(t, body), own, held, normal);
     }
   } else {
     for (uint n = 0u; n < (!there ? 0u : listed ? pieces : LEAVES); ++n) {
@@ -213,7 +214,7 @@ void main() {
       uint end = listed ? scratch[2u * n + 1u] : end_of_targets(n);
       for (uint t = (listed ? scratch[2u * n] : first_target(n)) + lane; t < end; t += LANES)
         if (is_near(ball, pair_spheres[t]) && may_meet(s, t, body))
-          look_at(s, t, CONTACT_SELF != 0 && target_body(t) == body, own, held, normal);
+          look_at(s, t, is_own(t, body), own, held, normal);
     }
   }
 #if LANES > 1

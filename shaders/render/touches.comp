@@ -15,7 +15,7 @@ vec3 place(uint at) { return positions[pair_mesh[at]].high; }
 void main() {
   uint record = gl_GlobalInvocationID.x, k = records_at + record_words * record;
   if (record >= count) return;
-  uint t = record < pair_lists[3] ? pair_lists[k + 1u] : 0xffffffffu, s = pair_lists[k];
+  uint t = record < pair_lists[3u /* RECORDS */] ? pair_lists[k + 1u] : 0xffffffffu, s = pair_lists[k];
   arrows[record] = TouchArrow(vec3(0.0), -1.0, vec3(0.0), 0.0);
   if (t == 0xffffffffu) return;
   bool under = (t & 0x40000000u) != 0u;

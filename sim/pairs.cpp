@@ -297,7 +297,8 @@ void touch(Sim& sim, int left) {
   if (p.since < 0 || (!lagged && p.counted && (p.phases & PHASE_SHARED_LAST) == 0)) p.sums.clear();
   bind_pairs(sim);
   if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
-  if (p.since < 0 || double(p.since) >= std::min(serve, double(s.substeps * sim.watch.finer)))
+  const long steps = s.contact == "self" || p.depth > 0.1 * p.margin ? 1 : Pairs::serve_most;
+  if (p.since < 0 || double(p.since) >= std::min(serve, double(steps * s.substeps * sim.watch.finer)))
     find_candidates(sim, margin);
   ++p.since;
   Pairs::Kernel& meet = lagged ? p.meet_and_push : p.meet;

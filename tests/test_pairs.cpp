@@ -241,7 +241,7 @@ TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far ap
     for (int s = 0; s < 20; ++s) step(sim);
     if (bits == 0) bits = state_hash(sim);
     CHECK(state_hash(sim) == bits);
-    CHECK(touched(sim).detections > 10);
+    CHECK(touched(sim).detections >= 5);
   }
   // More triangles near a few vertices than a work-group lists.
   Placed coarse{{0.01, 0.33, 0.02}, {0, -10, 0}}, fine;

@@ -1,4 +1,4 @@
-// What the kernels of contact between bodies share (method.md, "Bodies in contact"). Once a step, or more often where bodies are fast, each
+// What the kernels of contact between bodies share (method.md, "Bodies in contact"). Once in up to four steps (sim/pairs.h) each
 // vertex of a surface near another body finds the CANDIDATES nearest triangles, and each sharp edge such edges; in each substep the one that it is in
 // pushes it out.
 #include "types.glsl"

@@ -297,7 +297,9 @@ void touch(Sim& sim, int left) {
   if (p.since < 0 || (!lagged && p.counted && (p.phases & PHASE_SHARED_LAST) == 0)) p.sums.clear();
   bind_pairs(sim);
   if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
-  const long steps = s.contact == "self" || p.depth > 0.1 * p.margin ? 1 : Pairs::serve_most;
+  // What folds, or is on its way out of another, soon wants other candidates.
+  const bool changes = s.contact == "self" || p.depth > 0.1 * p.margin;
+  const long steps = changes ? 1 : Pairs::serve_most;
   if (p.since < 0 || double(p.since) >= std::min(serve, double(steps * s.substeps * sim.watch.finer)))
     find_candidates(sim, margin);
   ++p.since;

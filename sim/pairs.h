@@ -1,6 +1,6 @@
 // Contact of bodies with each other and with themselves (method.md, "Bodies in contact"): once in up to four
-// steps, or more often where bodies are fast, deep in each other or folded, each vertex of a surface finds the
-// triangles near it; in each substep the one that it is in pushes it out. On the GPU here, in double in
+// steps, or more often where bodies are fast, deep in each other or folded, each vertex of a surface finds
+// the triangles near it; in each substep the one that it is in pushes it out. On the GPU here, in double in
 // solvers/pair_contact.h. A scene whose bodies are far apart pays for their boxes alone.
 #pragma once
 
@@ -69,9 +69,8 @@ struct PairNumbers {
 
 /// Part of a Sim.
 struct Pairs : PairNumbers {
-  static constexpr long every = 2;  ///< steps from one look at the boxes to the next
-  static constexpr long serve_most =
-      4;  ///< steps that candidates serve, of slow bodies that are not deep in others
+  static constexpr long every = 2;       ///< steps from one look at the boxes to the next
+  static constexpr long serve_most = 4;  ///< steps that candidates serve, of slow bodies not deep in others
   static constexpr std::size_t sum_words = 7, sharing_words = 2;  ///< of a vertex in `sums` (sums.glsl)
   Buffer mesh, rest, spheres, lists, sums, empty, answer;
   Fence asked;

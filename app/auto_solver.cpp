@@ -29,8 +29,8 @@ constexpr double fitting = 1.05;   // of the budget: times differ by as much fro
 // One iteration per substep first, which is on the front wherever it was measured (docs/results.md).
 std::vector<Settings> candidates(const Settings& own) {
   Settings base = own;
-  base.iterations = base.substeps = 1;
   set_mode(base, "node", "auto");
+  base.iterations = base.substeps = 1;
   std::vector<Settings> all;
   if (compliant(own)) {
     all = {base};  // masses are split; over-relaxation leaves their compliance alone and gains little
@@ -68,7 +68,7 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
     const MeasuredRun run =
         run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
     if (interrupted()) throw Interrupted();
-    const double substeps = settings.substeps * budget_ms / step_ms(run);
+    const double substeps = sim.plan.substeps * budget_ms / step_ms(run);
     settings.substeps = int(std::clamp(substeps, 1.0, double(most_substeps)));
     apply_settings(sim, settings);
   }
@@ -78,13 +78,13 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
 /// takes no longer, else more substeps.
 Sim finer_than(const Settings& settings, const std::shared_ptr<const Model>& model) {
   Settings fine = settings;
-  fine.substeps = int(std::min(finer * fine.substeps, double(most_substeps)));
+  fine.substeps = int(std::min(finer * plan_for(fine).substeps, double(most_substeps)));
   if (has_forces(settings)) {
     Settings leapfrog = settings;
     set_mode(leapfrog, "explicit", "auto");
     leapfrog.stability = 0.1;
     Sim sim = create_sim(model, leapfrog);
-    if (sim.settings.substeps <= fine.substeps) return sim;
+    if (sim.plan.substeps <= fine.substeps) return sim;
   }
   return create_sim(model, fine);
 }
@@ -120,7 +120,6 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     Sim sim = create_sim(model, candidate);
     if (first) warm_up(sim);
     step(sim);  // the first of a new solver is not like the others
-    trial.settings = sim.settings;
     if (!as_it_is) fit_substeps(sim, trial.settings, budget_ms);
     if (first && !right) {
       if (const auto found = rigid_motion(*model, settings, steps)) {
@@ -128,7 +127,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       } else if (compliant(settings) || hard(settings)) {
         Sim fine = finer_than(trial.settings, model);
         // What a slow machine can afford: the reference takes as long as all trials together.
-        const double seconds = 1e-3 * fine.settings.substeps / double(trial.settings.substeps) * budget_ms;
+        const double seconds = 1e-3 * fine.plan.substeps / double(sim.plan.substeps) * budget_ms;
         choice.steps = std::clamp(long(2 * most_seconds() / seconds), 2L, steps);
         right = motion_of_run(fine, choice.steps), choice.judged = "finer steps";
       } else {
@@ -138,6 +137,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     for (int attempt = 1;; ++attempt) {
       apply_settings(sim, trial.settings);
       reset(sim);
+      trial.plan = sim.plan;
       Metrics metrics = create_metrics(*model, sim.system);
       const double enough = first ? most_seconds() : 2e-3 * budget_ms * double(choice.steps) + 0.5;
       const MeasuredRun run =
@@ -213,10 +213,11 @@ std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const
 std::string describe(const SolverChoice& choice) {
   const SolverTrial& best = choice.trials[choice.best];
   const Settings& s = best.settings;
+  const Plan& plan = best.plan;
   return fmt::format(
       "{}, {} iteration{} x {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps",
-      s.mode, s.iterations, s.iterations == 1 ? "" : "s", s.substeps, s.substeps == 1 ? "" : "s", s.omega,
-      s.mass_splitting && !compliant(s) ? ", masses split" : "", best.ms, choice.budget_ms,
+      s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps, plan.substeps == 1 ? "" : "s",
+      s.omega, s.mass_splitting && !compliant(s) ? ", masses split" : "", best.ms, choice.budget_ms,
       fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the right motion"
                                : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
                                                                 : "loss {:.3g} %"),
@@ -230,8 +231,8 @@ nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {
     trials.push_back({{"mode", trial.settings.mode},
                       {"omega", trial.settings.omega},
                       {"mass_splitting", trial.settings.mass_splitting},
-                      {"iterations", trial.settings.iterations},
-                      {"substeps", trial.settings.substeps},
+                      {"iterations", trial.plan.iterations},
+                      {"substeps", trial.plan.substeps},
                       {"ms_per_step", trial.ms},
                       {"fits", trial.fits},
                       {"error_percent", trial.error}});

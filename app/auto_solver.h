@@ -17,6 +17,7 @@ namespace tetpbd {
 /// What came of a candidate: as many substeps as fit the budget, over the first steps of the scene.
 struct SolverTrial {
   Settings settings;
+  Plan plan{};
   double ms = 0;     ///< a step, median; GPU time, of modes on the CPU wall time
   double error = 0;  ///< as `judged` says, percent; infinite if the state did not stay finite
   bool fits = true;  ///< the budget

@@ -18,7 +18,7 @@ using std::chrono::steady_clock;
 MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
                          const std::function<void()>& advance, const std::function<State()>& state) {
   MeasuredRun run;
-  run.substeps = settings.substeps;
+  run.substeps = plan_for(settings).substeps;
   for (long s = 0; s <= steps && !interrupted(); ++s) {
     if (s > 0) {
       const auto begin = steady_clock::now();
@@ -54,8 +54,9 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
   return baseline_run(
       model, settings, steps, right,
       [&] {
-        const Substep substep(model, settings, std::exchange(time, time + settings.dt));
-        for (int s = 0; s < settings.substeps; ++s) {
+        const Plan plan = plan_for(settings);
+        const Substep substep(model, settings, plan, std::exchange(time, time + settings.dt));
+        for (int s = 0; s < plan.substeps; ++s) {
           contact.prepare(substep, s, model.inverse_masses, Place{now.positions}, now.velocities);
           for (RigidBody& body : bodies) {
             const bool touches = contact.carries(body.first);
@@ -77,13 +78,13 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
 
 /// Newton steps with sparse Cholesky factors, `iterations` of them in each implicit step.
 MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+  const Plan plan = plan_for(settings);
   const ConstraintSystem system = build_constraints(model.rest, settings);
   const ReferenceInput input{model, system, settings, model.inverse_masses};
-  Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities},
-                          settings.dt / settings.substeps);
-  run.most = settings.iterations;
+  Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities}, plan.h);
+  run.most = plan.iterations;
   return baseline_run(
-      model, settings, steps, right, [&] { advance(run, settings.substeps); }, [&] { return run.now; });
+      model, settings, steps, right, [&] { advance(run, plan.substeps); }, [&] { return run.now; });
 }
 
 }  // namespace

@@ -47,7 +47,8 @@ Settings settings_of(const Scene& scene, std::string mode) {
   const std::string suffix = "-substeps", where = "--modes " + mode;
   if (mode.ends_with(suffix)) {
     mode.resize(mode.size() - suffix.size());
-    std::swap(settings.substeps, settings.iterations);
+    const Plan plan = plan_for(settings);
+    settings.substeps = plan.iterations, settings.iterations = plan.substeps;
   }
   if (compliant(settings)) settings.omega = std::min(settings.omega, 2.0);  // soft variants of any case
   set_mode(settings, mode, where);

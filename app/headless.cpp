@@ -119,6 +119,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
+  j["settings"]["iterations"] = sim.plan.iterations, j["settings"]["substeps"] = sim.plan.substeps;
   if (choice) j["solver_choice"] = solver_choice_json(*choice);
   j["mesh"] = mesh_json(report(sim.model->rest));
   j["device"] = device_json(device);
@@ -217,8 +218,9 @@ int run_headless(Scene scene, const RunOptions& options) {
   if (frames && frames->video) frames->video->close();
   if (files) close(*files, sim);
   const auto& found = run.errors.non_finite;
-  const bool good = !found || restore_checkpoint(sim);
-  while (good && found && sim.steps < found->step - 1) step(sim);  // the last good one: the same bits again
+  bool good = !found || restore_checkpoint(sim);
+  while (good && found && sim.steps < found->step - 1) step(sim);  // to the last good one, by the same bits
+  if (good && found) good = !check_finite(sim, true);
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
   auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
   statistics["error"]["measured_every"] = options.measure_every;

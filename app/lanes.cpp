@@ -21,7 +21,9 @@ namespace {
 long compared_every(const Model& model) { return std::max(4l, long(model.positions.size() / 1000)); }
 
 // How far its iterations go, about.
-double effort(const Settings& s) { return leaps(s) ? 1e9 / s.stability : double(s.iterations) * s.substeps; }
+double effort(const Sim& sim) {
+  return leaps(sim.settings) ? 1e9 / sim.settings.stability : double(sim.plan.iterations) * sim.plan.substeps;
+}
 
 GLuint patch_words(const Sim& sim) {
   for (const auto& [binding, buffer] : sim.solver.bindings)
@@ -37,8 +39,8 @@ std::string describe(const Lane& lane, bool material) {
   const auto add = [&](int count, const char* what) {
     if (count != 1) text += fmt::format(", {} {}s", count, what);
   };
-  add(s.substeps, "substep");
-  add(s.iterations, "iteration");
+  add(lane.sim.plan.substeps, "substep");
+  add(lane.sim.plan.iterations, "iteration");
   if (material && s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
   if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
   return text;
@@ -159,7 +161,7 @@ long steps_of(const std::vector<Lane>& lanes) {
 }
 
 std::size_t yardstick(const std::vector<Lane>& lanes) {
-  const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane.sim.settings); };
+  const auto worth = [](const Lane& lane) { return lane.stopped() ? -1 : effort(lane.sim); };
   return std::size_t(std::ranges::max_element(lanes, {}, worth) - lanes.begin());
 }
 

@@ -77,7 +77,7 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   if (name == "mass_splitting") return averaged && !compliant(settings);  // which brings it with it
   if (name == "omega") return averaged && !leaps(settings) && !is_implicit(settings);
   if (name == "stability") return leaps(settings);
-  if (name == "substeps" || name == "iterations") return !leaps(settings);
+  if (name == "iterations") return !leaps(settings);
   if (name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;
@@ -92,6 +92,21 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   return !of || (!material && uses(settings, constraint_kinds[of->kind]));
 }
 
+// Beside the number stands whether the mode decides it; then the number shows what it decided.
+void count_widget(Session& s, const Parameter& row, const std::string& id, int& value) {
+  const Plan& plan = s.loaded.sim().plan;
+  const int decided = row.name == "iterations" ? plan.iterations : plan.substeps;
+  const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x +
+                    ImGui::CalcTextSize("auto").x + ImGui::GetStyle().ItemSpacing.x;
+  int shown = value == automatic ? decided : value;
+  ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - box);
+  if (number_widget(row, id, shown)) value = shown;
+  ImGui::SameLine();
+  bool by_mode = value == automatic;
+  if (ImGui::Checkbox(("auto" + id).c_str(), &by_mode)) value = by_mode ? automatic : decided;
+  mark(s, row.name + " auto");
+}
+
 bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
   const std::string usual = parameter_text(s.loaded.own, row), before = parameter_text(settings, row),
                     back = before == usual ? "" : usual;
@@ -99,10 +114,13 @@ bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
     std::string& value = settings.**word;
     if (row.name == "constraints") return words_widget(s, row, value, s.loaded.own.**word);
     const auto chosen = combo(s, row.name, value, choices(row), help_text(row), usual);
-    return chosen && value != std::exchange(value, *chosen);
+    if (chosen) set_parameter(settings, row, *chosen, row.name);
+    return value != before;
   }
   const std::string id = begin_row(s, label_of(row.name.c_str()), !back.empty());
   with_value(settings, row, [&]<class T>(T& value) {
+    if constexpr (std::is_same_v<T, int>)
+      if (row.automatic) return count_widget(s, row, id, value);
     if constexpr (std::is_same_v<T, bool>)
       ImGui::Checkbox(id.c_str(), &value);
     else if constexpr (!std::is_same_v<T, std::string>)
@@ -197,7 +215,7 @@ void draw_solver(Session& s) {
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
   const Watch& watch = s.loaded.sim().watch;
   if (leaps(now))
-    ImGui::TextWrapped("%d substeps%s", now.substeps,
+    ImGui::TextWrapped("%d substeps%s", s.loaded.sim().plan.substeps,
                        watch.stiffening > 1
                            ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
                            : "");

@@ -100,7 +100,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   }
   take(true);
   run.errors.non_finite = check_finite(sim, true);
-  run.substeps = std::max(sim.settings.substeps, sim.watch.most_substeps);
+  run.substeps = std::max(sim.plan.substeps, sim.watch.most_substeps);
   run.errors.finite = run.errors.finite && !run.errors.non_finite;
   return run;
 }

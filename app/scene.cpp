@@ -126,11 +126,9 @@ void check(const json& value, const json& allowed, const std::string& path, cons
 }
 
 void read_settings(const json& section, Settings& settings, const std::string& file) {
-  for (const auto& [key, value] : section.items()) {
-    const Parameter* row = find_parameter(key);
-    if (!row) continue;  // obstacles
-    set_parameter(settings, *row, setting_text(*row, value), file);
-  }
+  for (const Parameter& row : parameters())  // the mode first, which decides what others mean
+    if (const auto value = section.find(row.name); value != section.end())
+      set_parameter(settings, row, setting_text(row, *value), file);
 }
 
 // By name, or its model and moduli, which are settings; all bodies have the same.
@@ -258,6 +256,23 @@ void set_path(json& document, const std::string& assignment) {
   *at = std::move(value);
 }
 
+bool names_mode(const std::string& assignment) { return assignment.starts_with("solver.mode="); }
+
+// As the flag does: iterations and substeps of the file were meant for a mode of its own kind.
+void set_mode_in(json& document, const std::string& assignment) {
+  const auto mode = [&] {
+    const json* said = &document;
+    for (const char* key : {"solver", "mode"})
+      if (said->is_object() && said->contains(key)) said = &(*said)[key];
+    const SolverMode* found = said->is_string() ? find_solver_mode(said->get<std::string>()) : nullptr;
+    return found ? found : find_solver_mode(Settings().mode);
+  };
+  const SolverMode* before = mode();
+  set_path(document, assignment);
+  if (solved_alike(*before, *mode()) || !document.is_object() || !document["solver"].is_object()) return;
+  document["solver"].erase("iterations"), document["solver"].erase("substeps");
+}
+
 // Puts a named solver's settings in place; whether it is auto, which chooses them later.
 bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   const std::string name = overrides.solver.empty() && overrides.budget_ms ? "auto" : overrides.solver;
@@ -366,7 +381,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   if (document.is_object() && document.contains("state_hash"))
     throw Error("these are the numbers of a run, not its scene", file.string(),
                 fmt::format("give {}", (file.parent_path() / "scene.json").string()));
-  for (const std::string& assignment : overrides.set) set_path(document, assignment);
+  for (const std::string& assignment : overrides.set)
+    if (names_mode(assignment)) set_mode_in(document, assignment);
+  for (const std::string& assignment : overrides.set)
+    if (!names_mode(assignment)) set_path(document, assignment);
   std::string where = file.string();
   if (!overrides.set.empty()) where += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));
   Scene scene = read_scene(document, where, file);
@@ -418,7 +436,7 @@ namespace {
 std::string why_unused(const Settings& s, const std::string& name) {
   const auto is = [&](auto... names) { return ((name == names) || ...); };
   const bool jacobi = s.mode == "node" || s.mode == "constraint" || s.mode == "paper";
-  if (leaps(s) && is("iterations", "substeps")) return "mode explicit takes as many substeps as stay stable";
+  if (leaps(s) && is("iterations")) return "mode explicit has no iterations";
   if (!leaps(s) && is("stability")) return "it is of mode explicit";
   if (!jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
@@ -477,7 +495,12 @@ ordered_json scene_json(const Scene& scene) {
   ordered_json result = {{"name", scene.name}, {"description", scene.description}};
   for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
   for (const Parameter& row : parameters())
-    with_value(scene.settings, row, [&](const auto& value) { result[row.section][row.name] = value; });
+    with_value(scene.settings, row, [&]<class T>(const T& value) {
+      if (row.automatic && parameter_text(scene.settings, row) == "auto")
+        result[row.section][row.name] = "auto";
+      else
+        result[row.section][row.name] = value;
+    });
   std::vector<std::string> kinds = split(scene.settings.constraints, ',');
   if (scene.settings.constraints.empty()) kinds.clear();
   result["solver"]["constraints"] = kinds;

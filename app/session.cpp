@@ -275,7 +275,10 @@ void change_settings(Session& s, const Settings& wanted) {
   const Settings old = s.loaded.sim().settings;
   // Nothing ends a step early, so a slider does not go where one takes minutes.
   constexpr long most = 10000;
-  const auto passes = [](const Settings& settings) { return long(settings.iterations) * settings.substeps; };
+  const auto passes = [](const Settings& settings) {
+    const Plan plan = plan_for(settings);
+    return long(plan.iterations) * plan.substeps;
+  };
   if (passes(wanted) > std::max(most, passes(old)))
     return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more",
                               most));
@@ -559,7 +562,8 @@ std::optional<Advice> faster_way(const Session& s) {
   const bool with_forces = leaps(own) || is_implicit(own);
   if (own.mode != "cpu-fast" && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
     return Advice{"mode cpu-fast", "mode=cpu-fast"};
-  if (hard(own) && own.iterations * own.substeps > 5) return Advice{"solver hard", "hard,mode=" + own.mode};
+  if (const Plan& plan = s.loaded.sim().plan; hard(own) && plan.iterations * plan.substeps > 5)
+    return Advice{"solver hard", "hard,mode=" + own.mode};
   return Advice{"a smaller scene", ""};
 }
 

@@ -108,7 +108,7 @@ ordered_json row_of(const Scene& scene, const Model& model, const Settings& sett
                       {"mode", settings.mode},
                       {"omega", settings.omega},
                       {"constraints", kinds},
-                      {"iterations", settings.iterations},
+                      {"iterations", plan_for(settings).iterations},
                       {"substeps", run.substeps},
                       {"vertices", model.positions.size()},
                       {"tets", model.rest.tets.size()},

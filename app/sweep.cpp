@@ -143,7 +143,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   std::vector<Settings> chosen;
   for (Settings& settings : all) {
     if (leaps(settings)) {  // iterations and substeps are its own choice
-      settings.iterations = settings.substeps = 1;
+      settings.iterations = settings.substeps = automatic;
       if (std::ranges::find(chosen, settings) != chosen.end()) continue;
     }
     chosen.push_back(settings);

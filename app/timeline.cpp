@@ -89,12 +89,12 @@ void forget_from(Session& s, long step) {
 
 void keep_moment(Session& s) {
   Timeline& t = s.timeline;
-  const auto& lanes = s.loaded.lanes;
+  auto& lanes = s.loaded.lanes;
   const long now = steps_of(lanes);
   forget_from(s, now);
   if (t.budget == 0 || t.off || (t.wanted && !t.wanted->contains(now))) return;
   std::size_t on_gpu = 0, bytes = 0;
-  for (const Lane& lane : lanes) on_gpu += snapshot_bytes(lane.sim), bytes += snapshot_memory(lane.sim);
+  for (Lane& lane : lanes) on_gpu += snapshot_bytes(lane.sim), bytes += snapshot_memory(lane.sim);
   bytes += on_gpu;
   if (bytes > t.budget / 4)
     say(s, fmt::format("no history: a state of {:.0f} MB is too large for it (--history-mb)",
@@ -109,7 +109,7 @@ void keep_moment(Session& s) {
             if (on_gpu && !states) states = Buffer("moment", on_gpu);
             auto moment = std::make_unique<Moment>(now);
             std::size_t at = 0;
-            for (const Lane& lane : lanes) {
+            for (Lane& lane : lanes) {
               moment->lanes.push_back(take_snapshot(lane.sim, states, at));
               at += snapshot_bytes(lane.sim);
               History& last = moment->distances.emplace_back();

@@ -24,8 +24,7 @@ Explanation explain(Sim& sim, int timed_steps) {
                                &sim.guard_counts,
                                &sim.check.words,
                                &sim.check.read_back,
-                               &sim.check.positions,
-                               &sim.check.velocities,
+                               &sim.check.checkpoint,
                                &sim.rigid_bodies,
                                &sim.shapes,
                                &sim.fields,
@@ -60,7 +59,7 @@ Explanation explain(Sim& sim, int timed_steps) {
     result.bytes_per_step += (pass.bytes + more) * std::size_t(per_step);
   };
   kernel(sim.predict, "", 0, 0);
-  if (sim.rigid_bodies) kernel(sim.rigid_contact, "", sim.settings.substeps, 0);
+  if (sim.rigid_bodies) kernel(sim.rigid_contact, "", sim.plan.substeps, 0);
   std::map<std::pair<std::size_t, unsigned>, long> times;  // of a pass with these phases, per substep
   for (const Dispatch& dispatch : sim.substep)
     ++times[{dispatch.pass, sim.solver.schedule ? 0 : dispatch.phases}];
@@ -75,7 +74,7 @@ Explanation explain(Sim& sim, int timed_steps) {
       if (predicts || finishes)
         more = sim.model->positions.size() * sizeof(Velocity) * (predicts && finishes ? 2 : 3);
     }
-    kernel(sim.solver.iteration[pass], what, count * sim.settings.substeps, more);
+    kernel(sim.solver.iteration[pass], what, count * sim.plan.substeps, more);
   }
   for (Pairs::Kernel* k : {&p.boxes, &p.cull, &p.query, &p.query_edges, &p.meet, &p.push, &p.meet_and_push})
     if (const auto [ms, count] = mean(k->timer); ms) {

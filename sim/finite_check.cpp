@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "sim/sim.h"
+#include "sim/snapshot.h"
 
 namespace tetpbd {
 
@@ -48,13 +49,20 @@ std::optional<NonFinite> non_finite(const State& state, long step) {
 // On the GPU unless it has seen a vertex that was not finite.
 void keep_checkpoint(Sim& sim) {
   FiniteCheck& check = sim.check;
-  if (on_cpu(sim)) {
-    check.host = sim.host;
-    return;
-  }
-  const Buffer &x = sim.positions, &v = sim.velocities;
-  copy_parts(check, {{&x, 0, &check.positions, 0, x.bytes()}, {&v, 0, &check.velocities, 0, v.bytes()}},
-             true);
+  const std::size_t bytes = snapshot_bytes(sim);
+  if (check.checkpoint.bytes() != bytes) check.checkpoint = Buffer("checkpoint", bytes);
+  check.kept.push_back(take_snapshot(sim, check.checkpoint, 0, true));
+  // The CPU is at most two questions ahead of what it knows.
+  constexpr std::size_t most = 2 + 2 * FiniteCheck::ask_every / FiniteCheck::checkpoint_every;
+  if (check.kept.size() > most) check.kept.pop_front();
+}
+
+// Since the checkpoint others may have been pinned.
+void restore_pins(Sim& sim) {
+  const auto positions = sim.positions.read_all<Position>();
+  for (std::uint32_t i = 0; i < positions.size(); ++i)
+    if (positions[i].inverse_mass != float(sim.inverse_masses[i]))
+      is_pinned(sim, i) ? pin(sim, i) : unpin(sim, i);
 }
 
 void take_answer(FiniteCheck& check, bool wait) {
@@ -82,6 +90,7 @@ void start_check(Sim& sim, const State* given) {
   check.asked = {};
   check.first = check.known = sim.steps;
   check.found = given ? non_finite(*given, sim.steps) : std::nullopt;
+  check.kept.clear();
   if (!on_cpu(sim)) check.words.write(0, 8, std::array{~0u, ~0u}.data());
   if (!check.found) keep_checkpoint(sim);
 }
@@ -112,23 +121,14 @@ const std::optional<NonFinite>& check_finite(Sim& sim, bool wait) {
 bool restore_checkpoint(Sim& sim) {
   FiniteCheck& check = sim.check;
   if (!check.found || check.found->step == check.first) return false;
-  constexpr long every = FiniteCheck::checkpoint_every;
-  sim.steps = std::max(check.first, (check.found->step - 1) / every * every);
-  if (on_cpu(sim)) {
-    write_state(sim, State(check.host));
-    return true;
-  }
-  // Not through State: a double holds fewer bits than a pair of floats can. Pins may have changed since.
-  auto positions = check.positions.read_all<Position>();
-  for (std::size_t i = 0; i < positions.size(); ++i) positions[i].inverse_mass = float(sim.inverse_masses[i]);
-  const auto velocities = check.velocities.read_all<Velocity>();
-  sim.positions.write(0, sim.positions.bytes(), positions.data());
-  sim.velocities.write(0, sim.velocities.bytes(), velocities.data());
-  sim.needs_predict = true;
-  write_shapes(sim);
-  forget_answers(sim);
-  if (sim.pairs) start_pairs(sim, read_state(sim));
-  start_check(sim, nullptr);
+  const auto after = std::ranges::find_if(
+      check.kept, [&](const Snapshot& kept) { return kept.step.steps >= check.found->step; });
+  if (after == check.kept.begin()) return false;
+  // Both are made anew while it is gone back to.
+  const Snapshot then = *std::prev(after);
+  const Buffer from = std::exchange(check.checkpoint, {});
+  restore_snapshot(sim, then, from);
+  restore_pins(sim);
   return true;
 }
 

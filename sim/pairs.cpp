@@ -282,8 +282,8 @@ void touch(Sim& sim, int left) {
   Pairs& p = sim.pairs;
   if (!p || !p.near) return;
   const Settings& s = sim.settings;
-  const double h = s.dt / (s.substeps * sim.watch.finer),
-               gained = std::abs(s.gravity) * 2 * double(Pairs::every) * s.dt, closing = p.closing + gained;
+  const double h = sim.plan.h, gained = std::abs(s.gravity) * 2 * double(Pairs::every) * s.dt,
+               closing = p.closing + gained;
   // Candidates serve while bodies cannot have crossed the margin, or twice it if one of two is stopped by
   // something else; a body that crosses it in a substep gets a wider one, and so do bodies that start deep in
   // each other.
@@ -292,15 +292,14 @@ void touch(Sim& sim, int left) {
   const double serve =
       std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
   // Numbers of contacts that share a vertex, where the next substep wants those that this one sees coming.
-  const bool ahead = p.lag && s.substeps * sim.watch.finer > 1,
-             lagged = ahead && left > 0 && p.counted && p.since >= 0;
+  const bool ahead = p.lag && sim.plan.substeps > 1, lagged = ahead && left > 0 && p.counted && p.since >= 0;
   if (p.since < 0 || (!lagged && p.counted && (p.phases & PHASE_SHARED_LAST) == 0)) p.sums.clear();
   bind_pairs(sim);
   if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
   // What folds, or is on its way out of another, soon wants other candidates.
   const bool changes = s.contact == "self" || p.depth > 0.1 * p.margin;
   const long steps = changes ? 1 : Pairs::serve_most;
-  if (p.since < 0 || double(p.since) >= std::min(serve, double(steps * s.substeps * sim.watch.finer)))
+  if (p.since < 0 || double(p.since) >= std::min(serve, double(steps * sim.plan.substeps)))
     find_candidates(sim, margin);
   ++p.since;
   Pairs::Kernel& meet = lagged ? p.meet_and_push : p.meet;
@@ -342,6 +341,15 @@ void start_pairs(Sim& sim, const State& state) {
   p.empty.read(0, p.empty.bytes(), words.data());
   p.lists.write(0, p.lists.bytes(), words.data());
   if (is_implicit(sim.settings) && p.near) set_finer(sim, finer_times);
+}
+
+void add_carried(Carried& all, Pairs& p) {
+  if (!p) return;
+  const std::size_t words = p.sums.bytes() / (p.sum_words + p.sharing_words);  // bytes of one word by vertex
+  all.ranges.push_back({&p.lists, 0, p.handed_on}), all.add(p.answer);
+  if (p.lag) all.ranges.push_back({&p.sums, Pairs::sum_words * words, Pairs::sharing_words * words});
+  all.add_values(static_cast<PairNumbers&>(p));
+  all.add_readback(p.asked);
 }
 
 PairNumbers touched(Sim& sim) {

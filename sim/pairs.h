@@ -9,6 +9,7 @@
 
 namespace tetpbd {
 
+struct Carried;
 struct Settings;
 struct Tuning;
 struct Sim;
@@ -98,6 +99,7 @@ void look_around(Sim& sim);
 /// After a substep's last dispatch, with so many substeps of the step `left`: changes positions, velocities
 /// and what neighbours see next, at once if none is or contacts were not counted ahead.
 void touch(Sim& sim, int left);
+void add_carried(Carried& all, Pairs& pairs);
 /// Of a state that is given.
 void start_pairs(Sim& sim, const State& state);
 /// As of the last step. Waits.

@@ -65,12 +65,13 @@ const std::vector<Parameter>& parameters() {
          "averaged, as in the paper (modes node, constraint); with compliance always on"},
         {"iterations", "solver", &S::iterations,
          "passes over all constraints in each substep; more substeps of one iteration are mostly better. "
-         "Mode newton: of conjugate gradients, 2 to 32 as the material is stiff",
-         0, 100000, "", true},
+         "Mode newton: of conjugate gradients, 2 to 32 as the material is stiff. auto: 1, in newton 4",
+         0, 100000, "", true, Effect::live, true},
         {"substeps", "solver", &S::substeps,
          "parts into which a step is cut: more are more accurate and stiffer, and cost as much more. 5 for "
-         "hard bodies, 20 to be sure",
-         1, 100000, "", true},
+         "hard bodies, 20 to be sure. auto: 20, in newton 1, in explicit as many as stay stable, which also "
+         "takes more where more are asked for",
+         1, 100000, "", true, Effect::live, true},
         {"stability", "solver", &S::stability,
          "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower it if "
          "a body that is much deformed fails",
@@ -181,8 +182,15 @@ void set_parameter(Settings& settings, const Parameter& row, const std::string& 
       if (text.empty()) refuse(row, text, where, list ? "write none for no constraints" : "name one");
       const std::string value = text == "none" && list ? "" : text;
       check_words(row, value, where);
-      target = value;
+      if (row.name == "mode")
+        set_mode(settings, value, where);
+      else
+        target = value;
     } else {
+      if (row.automatic && text == "auto") {
+        target = T(automatic);
+        return;
+      }
       T value{};
       const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
       if (error != std::errc() || end != text.data() + text.size() || !in_range(row, double(value)))
@@ -193,13 +201,13 @@ void set_parameter(Settings& settings, const Parameter& row, const std::string& 
 }
 
 std::string parameter_text(const Settings& settings, const Parameter& row) {
-  return with_value(settings, row, []<class T>(const T& value) -> std::string {
+  return with_value(settings, row, [&]<class T>(const T& value) -> std::string {
     if constexpr (std::is_same_v<T, bool>)
       return value ? "true" : "false";
     else if constexpr (std::is_same_v<T, std::string>)
       return value.empty() ? "none" : value;
     else
-      return fmt::format("{}", value);
+      return row.automatic && value == T(automatic) ? "auto" : fmt::format("{}", value);
   });
 }
 
@@ -208,6 +216,8 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
   if (!find_solver_mode(word))
     refuse(row, "'" + word + "'", where,
            did_you_mean(word, choices(row)) + fmt::format("choose from {}", fmt::join(choices(row), ", ")));
+  if (!solved_alike(*find_solver_mode(settings.mode), *find_solver_mode(word)))
+    settings.iterations = settings.substeps = automatic;
   settings.mode = word;
 }
 
@@ -285,7 +295,7 @@ void check_settings(const Settings& settings, const std::string& where) {
     with_value(settings, row, [&]<class T>(const T& value) {
       if constexpr (std::is_same_v<T, std::string>) {
         if (row.name != "mode" || !find_solver_mode(value)) check_words(row, value, where);  // also "paper"
-      } else if (!in_range(row, double(value)))
+      } else if (!in_range(row, double(value)) && !(row.automatic && value == T(automatic)))
         refuse(row, parameter_text(settings, row), where, range_text(row));
     });
   const SolverMode& mode = *find_solver_mode(settings.mode);

@@ -13,6 +13,10 @@
 
 namespace tetpbd {
 
+/// Of a count that the mode decides: nothing was asked for.
+inline constexpr int automatic = -1;
+
+/// What was asked for. Nothing but the user changes it; what a step takes of it is a Plan.
 struct Settings {
   std::string mode = "node";
   std::string constraints = "stretch,bend,volume";
@@ -28,8 +32,8 @@ struct Settings {
   double constraint_damping = 0;
   double omega = 1.5;
   bool mass_splitting = true;
-  int iterations = 1;
-  int substeps = 20;
+  int iterations = automatic;
+  int substeps = automatic;
   double stability = 0.4;
   double dt = 0.005;
   double damping = 0;
@@ -43,6 +47,16 @@ struct Settings {
   int seed = 1;
   bool operator==(const Settings&) const = default;
 };
+
+/// What a step takes: of `dt`, so many substeps of h seconds, each of so many iterations.
+struct Plan {
+  int substeps = 1, iterations = 1;
+  double h = 0;  ///< s
+  bool operator==(const Plan&) const = default;
+};
+/// What the mode makes of the settings before anything is known of the bodies: what was asked for, or its own
+/// numbers where nothing was.
+Plan plan_for(const Settings& settings);
 
 /// Live: takes effect at the next step. Rebuild: the solver is made again, the state stays. Restart: the
 /// scene starts anew.
@@ -64,6 +78,7 @@ struct Parameter {
   const char* unit = "";
   bool logarithmic = false;  ///< slider scale
   Effect effect = Effect::live;
+  bool automatic = false;  ///< also takes the word auto: the mode decides
 };
 /// Calls f with a reference to the parameter's value in `settings`: double, int, bool or std::string.
 template <class S, class F>
@@ -90,7 +105,9 @@ std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
 /// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of
 /// them.
 std::vector<std::string> choices(const Parameter& parameter);
-/// Also the modes that are not offered elsewhere. Throws Error naming `where` if there is none.
+/// Also the modes that are not offered elsewhere. Between corrections, leapfrog and implicit steps a number
+/// of iterations or substeps means something else, so both become automatic. Throws Error naming `where` if
+/// there is no such mode.
 void set_mode(Settings& settings, const std::string& word, const std::string& where);
 
 /// Settings by name: a way to solve (--solver), a material (material.h).

@@ -50,10 +50,8 @@ double longest_substep(const Sim& sim, const Settings& settings) {
                      sim.model->rest.positions, 30);
 }
 
-// In mode explicit a step has one iteration in each of as many substeps as stay stable at rest, or are
-// `stiffening` times as short.
-Settings fitted(Settings settings, double longest, double stiffening) {
-  if (!leaps(settings)) return settings;
+// How many substeps of mode explicit stay stable, `stiffening` times as short as at rest.
+int stable_substeps(const Settings& settings, double longest, double stiffening) {
   const double at_rest = longest > 0 ? settings.dt / (settings.stability * longest) : 0;
   constexpr double most = 100000;
   const double wanted = at_rest > most ? at_rest : std::min(at_rest * stiffening, most);
@@ -61,45 +59,16 @@ Settings fitted(Settings settings, double longest, double stiffening) {
     throw Error("the body is too stiff for mode explicit",
                 fmt::format("a step takes {:.3g} substeps", wanted),
                 fmt::format("at most {:g}: use another mode, a softer material or a shorter dt", most));
-  settings.iterations = 1, settings.substeps = std::max(1, int(std::ceil(wanted)));
-  return settings;
+  return int(std::ceil(wanted));
 }
 
-// `before`: substeps of the last step, if others.
-void write_step_block(Sim& sim, int before = 0) {
-  const Settings& s = sim.settings;
-  const double h = s.dt / (s.substeps * sim.watch.finer);
-  const bool soft = compliant(s);
-  Step block{};
-  block.gravity = {0.0f, float(-s.gravity), 0.0f};
-  block.h = float(h);
-  block.inverse_h = float(1 / h);
-  block.omega = soft ? 1.0f : float(s.omega);
-  block.share = leaps(s) ? 0.0f : float(1 / s.omega);
-  block.friction = float(s.friction);
-  block.drag = float(s.damping);
-  block.kick = before ? float(0.5 * (1 + double(s.substeps) / before)) : 1;
-  block.restitution = float(s.restitution);
-  block.body_size = float(sim.model->size);
-  block.velocity_scale = float(std::exp(-s.damping * h));
-  block.max_correction = float(longest_correction(*sim.model, s));
-  block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
-  block.mass_splitting = splits_masses(s);
-  block.quantum = float(sim.quantum);
-  block.inverse_quantum = float(1 / sim.quantum);
-  block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
-  block.vertex_count = unsigned(sim.model->positions.size());
-  block.damping = float(s.constraint_damping / h);
-  block.turn_limit = float(TURN_LIMIT / sim.watch.finer);
-  for (const glm::dvec4& plane : planes_of(*sim.model, s))
-    block.planes[block.plane_count++] = glm::vec4(plane);
-  for (std::size_t k = 0; k < kind_count; ++k) {
-    block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.stiffness[k]);
-    block.compliance[k / 4][glm::length_t(k % 4)] = float(s.compliance[k] / (h * h));
-  }
-  sim.step_block.write(0, sizeof block, &block);
-  write_shapes(sim);
-  sim.needs_predict = true;  // the quantized positions hold a prediction with the old h and gravity
+Plan planned(const Settings& settings, double longest, const Watch& watch) {
+  Plan plan = plan_for(settings);
+  if (leaps(settings))
+    plan.substeps = std::max(plan.substeps, stable_substeps(settings, longest, watch.stiffening));
+  plan.substeps *= watch.finer;
+  plan.h = settings.dt / plan.substeps;
+  return plan;
 }
 
 // The quantum: a power of two, so that multiplying by it is exact, and small, with room for vertices
@@ -148,7 +117,7 @@ Tuning within_limits(Tuning tuning) {
 }
 
 void schedule(Sim& sim) {
-  if (!on_cpu(sim)) sim.substep = substep_dispatches(sim.solver, sim.settings.iterations);
+  if (!on_cpu(sim)) sim.substep = substep_dispatches(sim.solver, sim.plan.iterations);
 }
 
 // As kernels note it (project.glsl), in mode explicit.
@@ -185,24 +154,27 @@ double fastest_spin(const Model& model, const State& state) {
 void start_watch(Sim& sim, const State& state) {
   forget_answers(sim);
   Watch& w = sim.watch;
-  w.most_substeps = 0, w.stiffer = 1, w.calm = 0;
-  w.residual = w.largest_residual = 0, w.health = w.least_health = 1;
-  w.mending = 0;
+  const double at_rest = w.at_rest;
+  const int finer = w.finer;
+  static_cast<WatchNumbers&>(w) = {};
+  w.at_rest = at_rest, w.finer = finer;
   if (is_implicit(sim.settings)) {
-    const double turn = fastest_spin(*sim.model, state) * sim.settings.dt / sim.settings.substeps;
+    const double turn = fastest_spin(*sim.model, state) * plan_for(sim.settings).h;
     set_finer(sim, turn > TURN_LIMIT ? finer_times : 1);
   }
-  if (!(w.at_rest > 0)) return;
+  if (!(w.at_rest > 0)) return make_plan(sim);
   const double now = stiffest(sim, sim.settings, state.positions) / w.at_rest;
   w.stiffer = std::isfinite(now) ? now : 1;
   w.stiffening = stiffening_for(w.stiffer, sim.settings.stability);
-  sim.settings = fitted(sim.settings, sim.longest_substep, w.stiffening);
+  make_plan(sim);
 }
 
-SolverInput solver_input(const Sim& sim, const Settings& s) {
+SolverInput solver_input(const Sim& sim) {
+  const Settings& s = sim.settings;
   return {*sim.model,
           sim.system,
           s,
+          sim.plan,
           sim.tuning,
           is_software_renderer(),
           compliant(s),
@@ -215,11 +187,8 @@ void renew(Sim& sim) {
   Renewal& r = sim.renewal;
   r.again = r.words.valid();
   if (r.again) return;
-  Settings settings = sim.settings;
-  settings.substeps *= sim.watch.finer;
-  r.words = std::async(
-      std::launch::async,
-      [model = sim.model, job = sim.solver.renewed(solver_input(sim, settings))] { return job(); });
+  r.words = std::async(std::launch::async,
+                       [model = sim.model, job = sim.solver.renewed(solver_input(sim))] { return job(); });
   r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as it takes, at real time
 }
 
@@ -297,11 +266,12 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.shader_version = shader_folder_version();
   sim.model = std::move(model);
   sim.settings = settings;
+  sim.plan = plan_for(settings);
   sim.tuning = within_limits(tuning);
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
   const std::size_t count = sim.model->positions.size();
-  const SolverInput input = solver_input(sim, settings);
+  const SolverInput input = solver_input(sim);
   const auto defines = vertex_defines(input);
   if (has_fields(*sim.model)) make_fields(sim);
   sim.solver = find_solver_mode(settings.mode)->create(input);
@@ -311,7 +281,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
     sim.predict = {Program::compute("predict.comp", {}, defines), work_groups(count, group_size),
                    count * (sizeof(Position) + sizeof(Velocity) + 16)};
   sim.longest_substep = longest_substep(sim, settings);
-  sim.settings = fitted(settings, sim.longest_substep, 1);
+  make_plan(sim);
   sim.watch.at_rest = stiffest(sim, settings, sim.model->rest.positions);
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
@@ -338,8 +308,6 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.check.words = Buffer("check", 16);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
   sim.check.copy = Program::compute("checkpoint.comp");
-  sim.check.positions = buffer("checkpoint positions", sim.positions.bytes());
-  sim.check.velocities = buffer("checkpoint velocities", sim.velocities.bytes());
   if (leaps(settings) || is_implicit(settings)) {
     sim.watch.answer = Buffer("watch read-back", 8, nullptr, GL_STREAM_READ);
     sim.watch.nothing = Buffer("nothing", 8, std::array{0.0f, 1.0f}.data());
@@ -372,7 +340,7 @@ bool take_constraints(Sim& sim, const Settings& settings) {
 // Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
 void remake(Sim& sim, const Settings& settings) {
   if (check_finite(sim, true)) restore_checkpoint(sim);  // it has nothing better to start from
-  const State state = read_state(sim);
+  State state = read_state(sim);
   Sim fresh =
       make_sim(sim.model, settings, sim.tuning,
                kinds_of(settings) == kinds_of(sim.settings) ? sim.system
@@ -380,18 +348,12 @@ void remake(Sim& sim, const Settings& settings) {
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps, fresh.origin = sim.origin;
   fresh.timed = sim.timed;
-  start_watch(fresh, state);
-  write_state(fresh, state);
+  start_with(fresh, std::move(state), half_substep_fall(sim.settings, sim.plan));
   sim = std::move(fresh);
 }
 
-// Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
-// constant acceleration is integrated exactly (method.md eq. 3).
-double half_substep_fall(const Settings& s) {
-  return is_implicit(s) ? 0 : 0.5 * s.dt / s.substeps * s.gravity;
-}
-
 void add_upwards(const Sim& sim, State& state, double speed) {
+  if (speed == 0) return;
   for (std::size_t i = 0; i < state.velocities.size(); ++i)
     if (sim.inverse_masses[i] > 0) state.velocities[i].y += speed;
 }
@@ -404,15 +366,22 @@ void write_velocities(const Sim& sim, const State& state) {
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
-}  // namespace
-
-void retime_velocities(Sim& sim, const Settings& then) {
-  const double upwards = half_substep_fall(sim.settings) - half_substep_fall(then);
+// Velocities of mid-substep that were `fall` behind become those with the settings and the plan of now.
+void retime_velocities(Sim& sim, double fall) {
+  const double upwards = half_substep_fall(sim.settings, sim.plan) - fall;
   if (upwards == 0) return;
   State state = read_state(sim);
   add_upwards(sim, state, upwards);
   write_velocities(sim, state);
   if (on_cpu(sim)) sim.host = std::move(state);
+}
+
+}  // namespace
+
+// Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
+// constant acceleration is integrated exactly (method.md eq. 3).
+double half_substep_fall(const Settings& settings, const Plan& plan) {
+  return is_implicit(settings) ? 0 : 0.5 * plan.h * settings.gravity;
 }
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
@@ -436,6 +405,44 @@ double explicit_substeps(const Model& model, const Settings& s) {
   return std::max(1.0, std::ceil(s.dt / (s.stability * longest)));
 }
 
+void make_plan(Sim& sim) { sim.plan = planned(sim.settings, sim.longest_substep, sim.watch); }
+
+void write_step_block(Sim& sim, int substeps_before) {
+  const Settings& s = sim.settings;
+  const double h = sim.plan.h;
+  const bool soft = compliant(s);
+  Step block{};
+  block.gravity = {0.0f, float(-s.gravity), 0.0f};
+  block.h = float(h);
+  block.inverse_h = float(1 / h);
+  block.omega = soft ? 1.0f : float(s.omega);
+  block.share = leaps(s) ? 0.0f : float(1 / s.omega);
+  block.friction = float(s.friction);
+  block.drag = float(s.damping);
+  block.kick = substeps_before ? float(0.5 * (1 + double(sim.plan.substeps) / substeps_before)) : 1;
+  block.restitution = float(s.restitution);
+  block.body_size = float(sim.model->size);
+  block.velocity_scale = float(std::exp(-s.damping * h));
+  block.max_correction = float(longest_correction(*sim.model, s));
+  block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
+  block.mass_splitting = splits_masses(s);
+  block.quantum = float(sim.quantum);
+  block.inverse_quantum = float(1 / sim.quantum);
+  block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
+  block.vertex_count = unsigned(sim.model->positions.size());
+  block.damping = float(s.constraint_damping / h);
+  block.turn_limit = float(TURN_LIMIT / sim.watch.finer);
+  for (const glm::dvec4& plane : planes_of(*sim.model, s))
+    block.planes[block.plane_count++] = glm::vec4(plane);
+  for (std::size_t k = 0; k < kind_count; ++k) {
+    block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.stiffness[k]);
+    block.compliance[k / 4][glm::length_t(k % 4)] = float(s.compliance[k] / (h * h));
+  }
+  sim.step_block.write(0, sizeof block, &block);
+  write_shapes(sim);
+  sim.needs_predict = true;  // the quantized positions hold a prediction with the old h and gravity
+}
+
 void forget_answers(Sim& sim) {
   sim.watch.asked = {};
   if (sim.watch.answer) sim.watch.nothing.copy_to(sim.check.words, 8, 0, 8);
@@ -449,10 +456,9 @@ void forget_contacts(Sim& sim) {
 
 void write_shapes(Sim& sim) {
   if (sim.model->shapes.empty()) return;
-  const Settings& s = sim.settings;
-  const int substeps = on_cpu(sim) ? 0 : s.substeps * sim.watch.finer;
-  const double h = s.dt / (s.substeps * sim.watch.finer);
-  const auto lists = shapes_of(*sim.model, s, time_of(sim) - h, h, substeps + 1);
+  const int substeps = on_cpu(sim) ? 0 : sim.plan.substeps;
+  const double h = sim.plan.h;
+  const auto lists = shapes_of(*sim.model, sim.settings, time_of(sim) - h, h, substeps + 1);
   const std::size_t stride = shapes_stride(sim);
   const std::vector<int> first = first_values(*sim.model);
   std::vector<char> bytes(lists.size() * stride);
@@ -485,16 +491,36 @@ void bind_shapes(const Sim& sim, int list) {
 }
 
 void reset(Sim& sim) {
-  sim.steps = 0, sim.origin = {};
   if (sim.guard_counts) sim.guard_counts.clear();
   sim.guards = {};
-  static_cast<PairNumbers&>(sim.pairs) = {};
   sim.inverse_masses = sim.model->inverse_masses;
   finish_renewal(sim);
-  State state{sim.model->positions, sim.model->velocities};
+  forget_all(sim);
+  start_with(sim, {sim.model->positions, sim.model->velocities}, 0);
+}
+
+void forget_all(Sim& sim) {
+  static_cast<StepValues&>(sim) = {};
+  static_cast<PairNumbers&>(sim.pairs) = {};
+}
+
+void start_with(Sim& sim, State state, double fall) {
   start_watch(sim, state);
-  add_upwards(sim, state, half_substep_fall(sim.settings));
+  add_upwards(sim, state, half_substep_fall(sim.settings, sim.plan) - fall);
   write_state(sim, state);
+}
+
+Carried carried(Sim& sim) {
+  Carried all;
+  if (on_cpu(sim)) return all;
+  all.add(sim.positions), all.add(sim.velocities);
+  if (sim.quantized[0]) all.add(sim.quantized[sim.read_index]);
+  if (sim.rigid_bodies) all.add(sim.rigid_bodies);
+  for (const auto& [buffer, first, bytes] : sim.solver.handed_on)
+    all.ranges.push_back({&sim.solver.buffers[buffer], first, bytes});
+  add_carried(all, sim.watch, sim.check.words);
+  add_carried(all, sim.pairs);
+  return all;
 }
 
 void upload(Sim& sim, const State& state) {
@@ -521,38 +547,43 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const auto made_for = [&](const Settings& s) {
     return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s), s.contact);
   };
-  const auto substep = [](const Settings& s) { return s.dt / s.substeps; };
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping); };
-  const auto renewed_for = [&](const Settings& s) { return std::tuple(kinds_of(s), forces(s), substep(s)); };
+  const auto renewed_for = [&](const Settings& s) {
+    return std::tuple(kinds_of(s), forces(s), plan_for(s).h);
+  };
   const Settings before = sim.settings;
+  const double fall = half_substep_fall(before, sim.plan);
   if (settings.dt != before.dt) sim.origin = {sim.steps, time_of(sim)};
   const bool anew = made_for(settings) != made_for(before) || !take_constraints(sim, settings);
   if (anew) remake(sim, settings);
   const bool same = forces(settings) == forces(sim.settings);
   const double longest = same ? sim.longest_substep : longest_substep(sim, settings);
-  const Settings now = fitted(settings, longest, sim.watch.stiffening);
+  const Plan plan = planned(settings, longest, sim.watch);
   if (!same) sim.watch.at_rest = stiffest(sim, settings, sim.model->rest.positions);
   sim.longest_substep = longest;
   forget_answers(sim);
-  sim.settings = now;
-  if (!anew && renewed_for(now) != renewed_for(before)) renew(sim);
+  sim.settings = settings, sim.plan = plan;
+  if (!anew && renewed_for(settings) != renewed_for(before)) renew(sim);
   schedule(sim);
   write_step_block(sim);
-  retime_velocities(sim, before);
+  if (!anew) retime_velocities(sim, fall);
 }
 
 void set_stiffening(Sim& sim, double stiffening) {
-  const int before = sim.settings.substeps;
+  const int before = sim.plan.substeps;
   sim.watch.stiffening = stiffening;
-  sim.settings = fitted(sim.settings, sim.longest_substep, stiffening);
-  if (sim.settings.substeps == before) return;
+  make_plan(sim);
+  if (sim.plan.substeps == before) return;
   sim.watch.changed = true;
   write_step_block(sim, before);
 }
 
+void refresh_preconditioner(Sim& sim) { renew(sim), finish_renewal(sim); }
+
 void set_finer(Sim& sim, int times) {
   if (std::exchange(sim.watch.finer, times) == times) return;
-  renew(sim), finish_renewal(sim);
+  make_plan(sim);
+  refresh_preconditioner(sim);
   write_step_block(sim);
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/carried.h"
 #include "sim/finite_check.h"
 #include "sim/gl/gpu.h"
 #include "sim/layout.h"
@@ -29,15 +30,10 @@ struct Renewal {
   bool again = false;  ///< settings have changed since
 };
 
-/// When it was at a step; time runs on from there by dt.
-struct TimeOrigin {
-  long step = 0;
-  double time = 0;  ///< s
-};
-
-struct Sim {
+struct Sim : StepValues {
   std::shared_ptr<const Model> model;
-  Settings settings;
+  Settings settings;  ///< what was asked for
+  Plan plan;          ///< what a step takes
   ConstraintSystem system;
   std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
 
@@ -57,17 +53,11 @@ struct Sim {
   Buffer
       rigid_bodies;    ///< RigidRecord, of hard bodies in contact (rigid.glsl), and vertices near half spaces
   Pass rigid_contact;  ///< before each substep, where there are any
-  unsigned rigid_side = 0;  ///< of their records, which was written last
-  Pairs pairs;   ///< contact between bodies, where there is any
-  Pass predict;             ///< makes the quantized positions of the next step, after a change from outside
+  Pairs pairs;         ///< contact between bodies, where there is any
+  Pass predict;        ///< makes the quantized positions of the next step, after a change from outside
   std::vector<Dispatch> substep;  ///< the dispatches of a substep
   Tuning tuning;
-  double quantum = 1;          ///< m, of quantized positions
-  double longest_substep = 0;  ///< s, that is stable at rest, of mode explicit: it decides settings.substeps
-  bool needs_predict = true;   ///< the quantized positions are not those of the next step
-  unsigned read_index = 0;     ///< which of `quantized` is read next
-  long steps = 0;              ///< taken since the start
-  TimeOrigin origin;           ///< ask time_of()
+  double longest_substep = 0;       ///< s, that is stable at rest, of mode explicit
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
   State host;   ///< state of a CPU mode; the GPU buffers follow it
@@ -106,14 +96,27 @@ inline double time_of(const Sim& sim) {
 }
 /// The shapes at and after the present, for kernels; a list of them for the next kernels.
 void write_shapes(Sim& sim);
-/// After those of its model have changed, which the lanes of a window share; `others`: also in number, kind or
-/// field. The state stays.
+/// After those of its model have changed, which the lanes of a window share; `others`: also in number, kind
+/// or field. The state stays.
 void take_obstacles(Sim& sim, bool others);
 void bind_shapes(const Sim& sim, int list);
+/// All that a step hands on to the next, as the mode of now has it.
+Carried carried(Sim& sim);
+/// Of steps so far nothing is known any more.
+void forget_all(Sim& sim);
+/// Goes on from a state whose velocities were `fall` behind (half_substep_fall()).
+void start_with(Sim& sim, State state, double fall);
+/// Settings and plan, for the kernels of the next steps.
+void write_step_block(Sim& sim, int substeps_before = 0);
+/// At once, for the plan of now.
+void refresh_preconditioner(Sim& sim);
 /// What is known of hard bodies in contact, before something else moves them.
 void forget_contacts(Sim& sim);
-/// Velocities of mid-substep with the settings `then` become those with the settings of now.
-void retime_velocities(Sim& sim, const Settings& then);
+/// m/s that velocities of mid-substep are behind of those at the substep's end, by gravity; 0 where they are
+/// of the end.
+double half_substep_fall(const Settings& settings, const Plan& plan);
+/// Decides the plan anew from settings, and from what is known of the bodies.
+void make_plan(Sim& sim);
 State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);

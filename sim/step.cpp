@@ -57,8 +57,7 @@ void bind(Sim& sim) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
   if (!sim.guard_counts) return;
   // Counters have 32 bits: read before they can wrap.
-  const Settings& s = sim.settings;
-  const double per_step = 4.0 * double(sim.system.count()) * s.iterations * s.substeps;
+  const double per_step = 4.0 * double(sim.system.count()) * sim.plan.iterations * sim.plan.substeps;
   if (sim.steps % std::max(1L, long(2e9 / std::max(per_step, 1.0))) == 0) guard_counts(sim);
   glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
 }
@@ -80,7 +79,7 @@ void step_on_gpu(Sim& sim, bool moving) {
   }
   dispatcher.bind_quantized();
   sim.needs_predict = false;
-  const int substeps = sim.settings.substeps * sim.watch.finer;
+  const int substeps = sim.plan.substeps;
   for (int substep = 0; substep < substeps; ++substep) {
     if (moving) bind_shapes(sim, ++sim.shapes_now);
     if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;

@@ -31,7 +31,7 @@ std::optional<std::vector<float>> look(Sim& sim) {
 
 void watch_stiffness(Sim& sim) {
   Watch& w = sim.watch;
-  const double h = sim.settings.dt / sim.settings.substeps;
+  const double h = sim.plan.h;
   const auto answer = look(sim);
   const double asked_h = std::exchange(w.asked_h, h);
   if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front()))
@@ -56,9 +56,10 @@ bool watch_convergence(Sim& sim) {
   return true;
 }
 
-// Four times the substeps while the body is unhealthy, or near another that it may touch, and some answers longer. Of a block of 100 MPa and
-// Poisson's ratio 0.495, by 8 iterations, 28 of 37 hard cases end well so, and 7 without. A block that spins
-// at 100 rad/s loses 20 % of its spin in half a second in two substeps of 5 ms, 1 % so.
+// Four times the substeps while the body is unhealthy, or near another that it may touch, and some answers
+// longer. Of a block of 100 MPa and Poisson's ratio 0.495, by 8 iterations, 28 of 37 hard cases end well so,
+// and 7 without. A block that spins at 100 rad/s loses 20 % of its spin in half a second in two substeps of 5
+// ms, 1 % so.
 void mend(Sim& sim) {
   constexpr int enough = 8, most = 100;  // answers
   Watch& w = sim.watch;
@@ -75,17 +76,24 @@ void mend(Sim& sim) {
 
 }  // namespace
 
+void add_carried(Carried& all, Watch& watch, const Buffer& words) {
+  if (!watch.answer) return;
+  all.add(watch.answer), all.ranges.push_back({&words, 8, 8});
+  all.add_values(static_cast<WatchNumbers&>(watch));
+  all.add_readback(watch.asked);
+}
+
 unsigned watch(Sim& sim) {
   Watch& w = sim.watch;
   if (!w.answer) return 0;
   const bool now = sim.steps % Watch::every == 0;
   if (is_implicit(sim.settings)) {
     if (now && watch_convergence(sim) && !sim.renewal.words.valid()) mend(sim);
-    w.most_substeps = std::max(w.most_substeps, sim.settings.substeps * w.finer);
+    w.most_substeps = std::max(w.most_substeps, sim.plan.substeps);
     return 0;
   }
   if (now && w.at_rest > 0) watch_stiffness(sim);
-  w.most_substeps = std::max(w.most_substeps, sim.settings.substeps);
+  w.most_substeps = std::max(w.most_substeps, sim.plan.substeps);
   return PHASE_WATCH | (std::exchange(w.changed, false) ? PHASE_CHANGED : 0u);
 }
 

@@ -5,7 +5,7 @@
 // shorter substeps for a while.
 #pragma once
 
-#include "sim/gl/gpu.h"
+#include "sim/carried.h"
 
 namespace tetpbd {
 
@@ -36,6 +36,9 @@ struct Watch : WatchNumbers {
   Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
   Fence asked;
 };
+
+/// `words`: the kernels' block that holds what they noted.
+void add_carried(Carried& all, Watch& watch, const Buffer& words);
 
 /// By how much shorter a substep is, of `stability` times the longest stable at rest, where the stiffest
 /// constraint is `stiffer` times as stiff as at rest: enough to stay within 0.7 of what is stable, in steps

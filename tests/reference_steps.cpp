@@ -73,8 +73,8 @@ State rigid_step(const ReferenceInput& input, State state) {
   for (std::size_t i = 0; i < state.positions.size(); ++i)
     if (!(input.inverse_masses[i] > 0))
       throw Error("the rigid step needs free bodies", fmt::format("vertex {} is fixed", i), "unpin it");
-  const double h = input.settings.dt / input.settings.substeps;
-  for (int s = 0; s < input.settings.substeps; ++s) {
+  const double h = plan_for(input.settings).h;
+  for (int s = 0; s < plan_for(input.settings).substeps; ++s) {
     predict(input, state, h);
     refuse_contact(input, state.positions);
     Points placed = state.positions;
@@ -124,9 +124,9 @@ Objective static_objective(const ReferenceInput& input, const Points& positions,
 
 ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, const Compliances& compliances,
                                   const Points* guess) {
-  const double h = input.settings.dt / input.settings.substeps;
+  const double h = plan_for(input.settings).h;
   ReferenceStep step;
-  for (int s = 0; s < input.settings.substeps; ++s) {
+  for (int s = 0; s < plan_for(input.settings).substeps; ++s) {
     const Objective objective = step_objective(input, state, compliances, h);
     predict(input, state, h);
     refuse_contact(input, state.positions);

@@ -54,7 +54,8 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
     Scene scene = falling({.parameters = std::move(parameters)});
     const auto said = choose_by_rule(scene, *build_model(scene));
     CHECK_FALSE(scene.mode_open);
-    return fmt::format("{} {}x{} {}", scene.settings.mode, scene.settings.substeps, scene.settings.iterations,
+    const Plan plan = plan_for(scene.settings);
+    return fmt::format("{} {}x{} {}", scene.settings.mode, plan.substeps, plan.iterations,
                        said.value_or("-"));
   };
   CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e4"}}).starts_with("explicit"));
@@ -71,7 +72,7 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
       falling({.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e8"}, {"mode", "explicit"}}});
   const auto model = build_model(scene);
   const Sim sim = create_sim(model, scene.settings);
-  CHECK(explicit_substeps(*model, scene.settings) == doctest::Approx(sim.settings.substeps).epsilon(0.08));
+  CHECK(explicit_substeps(*model, scene.settings) == doctest::Approx(sim.plan.substeps).epsilon(0.08));
 }
 
 TEST_CASE("auto takes what moves most nearly right, and as many substeps as the budget holds") {
@@ -128,4 +129,29 @@ TEST_CASE("auto: a lane with a budget takes what fits it") {
   const auto model = samples::block_model({2, 1, 1}, 0.01);
   const Settings chosen = lane_settings(paper, "budget_ms=5", "--lane", model);
   CHECK(chosen.iterations == 1);  // in as many substeps as fit; 400 iterations do not
+}
+
+TEST_CASE("each mode has its own substeps and iterations, where nobody asks for others") {
+  const auto plan = [](std::vector<std::pair<std::string, std::string>> parameters,
+                       std::vector<std::string> set = {}) {
+    const Plan p =
+        plan_for(load_scene("beam", {.parameters = std::move(parameters), .set = std::move(set)}).settings);
+    return fmt::format("{}x{}", p.substeps, p.iterations);
+  };
+  CHECK(plan({}) == "20x1");  // the scene's own
+  CHECK(plan({{"mode", "constraint"}}) == "20x1");
+  CHECK(plan({{"mode", "newton"}}) == "1x4");  // those of a scene for corrections mean nothing to it
+  CHECK(plan({{"mode", "newton"}, {"substeps", "2"}}) == "2x4");
+  CHECK(plan({{"mode", "newton"}, {"iterations", "8"}}) == "1x8");
+  CHECK(plan({{"iterations", "auto"}, {"substeps", "auto"}}, {"solver.mode=newton"}) == "1x4");
+  CHECK(plan({}, {"solver.iterations=16", "solver.mode=newton"}) == "1x16");
+  CHECK(plan({}, {"solver.mode=cpu"}) == "20x1");
+  Settings settings;
+  settings.substeps = 23, settings.iterations = 5;
+  set_mode(settings, "newton", "test");
+  CHECK(plan_for(settings) == Plan{1, 4, settings.dt});
+  CHECK(settings.substeps == automatic);
+  CHECK(parameter_text(settings, *find_parameter("substeps")) == "auto");
+  CHECK_THROWS_WITH_AS(set_parameter(settings, *find_parameter("substeps"), "-1", "test"),
+                       doctest::Contains("substeps"), Error);
 }

@@ -119,8 +119,7 @@ struct Beam {
   State at(const std::vector<glm::dvec3>& positions) const {
     State state{positions, std::vector<glm::dvec3>(positions.size())};
     for (std::size_t i = 0; i < positions.size(); ++i)
-      if (model.inverse_masses[i] > 0)
-        state.velocities[i].y = 0.5 * settings.gravity * settings.dt / settings.substeps;
+      if (model.inverse_masses[i] > 0) state.velocities[i].y = 0.5 * settings.gravity * plan_for(settings).h;
     return state;
   }
 };

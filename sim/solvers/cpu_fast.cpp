@@ -304,7 +304,8 @@ class FastPbd {
   /// As CpuPbd::step, in another order.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    double time) {
-    const Substep substep(model_, settings, time);
+    const Plan plan = plan_for(settings);
+    const Substep substep(model_, settings, plan, time);
     RigidContact contact(model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
@@ -324,7 +325,7 @@ class FastPbd {
           if (inverse_masses[i] > 0) act(i);
       };
       GuardCounts counts{};
-      for (int s = 0; s < settings.substeps; ++s) {
+      for (int s = 0; s < plan.substeps; ++s) {
         if (damped(settings)) std::copy(&x[begin], &x[end], &work_.starts[begin]);
         if (contact.wanted()) {
           barrier.wait(thread);
@@ -335,8 +336,8 @@ class FastPbd {
           predicted_[i] = contact.predict(substep, i, x[i].position(), v[i]);
           move_to(i, predicted_[i]);
         });
-        for (int iteration = 0; iteration < settings.iterations; ++iteration) {
-          solve(settings, thread, threads, iteration == 0, barrier, counts);
+        for (int iteration = 0; iteration < plan.iterations; ++iteration) {
+          solve(settings, plan.h, thread, threads, iteration == 0, barrier, counts);
           for_each_free_vertex([&](std::size_t i) {
             move_to(i, substep.out_of_obstacles(s, x[i].position(), predicted_[i], v[i]));
           });
@@ -391,8 +392,8 @@ class FastPbd {
 
   // One iteration's constraints, colour after colour. Small colours are left to the first thread: neighbours
   // among them then need no barrier.
-  void solve(const Settings& settings, std::size_t thread, std::size_t threads, bool first, Barrier& barrier,
-             GuardCounts& guards) {
+  void solve(const Settings& settings, double h, std::size_t thread, std::size_t threads, bool first,
+             Barrier& barrier, GuardCounts& guards) {
     bool shared_before = true;
     for (const Turn& turn : turns_) {
       const std::size_t count = turn.end - turn.begin;
@@ -402,7 +403,7 @@ class FastPbd {
       if (!shared && thread > 0) continue;
       const std::size_t begin = turn.begin + (shared ? count * thread / threads : 0);
       const std::size_t end = turn.begin + (shared ? count * (thread + 1) / threads : count);
-      const Rule<float> rule(settings, std::size_t(turn.kind), model_.size);
+      const Rule<float> rule(settings, h, std::size_t(turn.kind), model_.size);
       project_kind(work_, turn.kind, begin, end, rule, first, guards);
     }
     barrier.wait(thread);

@@ -20,9 +20,8 @@ template <class real>
 struct Rule {
   real k, limit, a, gamma, share;
   double softness;  ///< of a material's compliance: 1/s^2, of rates 1/s
-  Rule(const Settings& settings, std::size_t kind, double longest, double omega = 1)
+  Rule(const Settings& settings, double h, std::size_t kind, double longest, double omega = 1)
       : k(real(settings.stiffness[kind])), limit(real(longest)) {
-    const double h = settings.dt / settings.substeps;
     const bool rate = constraint_kinds[kind].rate;
     softness = rate ? 1 / h : 1 / (h * h);
     a = real(settings.compliance[kind] / (h * h));
@@ -114,14 +113,15 @@ class CpuPbd {
     });
   }
 
-  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26), `settings.substeps` substeps. Returns
-  /// how often each guard triggered.
+  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26). Returns how often each guard
+  /// triggered.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    Sweep sweep, double time = 0) {
     const bool jacobi = sweep == Sweep::jacobi, soft = compliant(settings);
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
-    const Substep substep(model_, settings, time);
+    const Plan plan = plan_for(settings);
+    const Substep substep(model_, settings, plan, time);
     RigidContact contact(model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
@@ -131,16 +131,17 @@ class CpuPbd {
       for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
     GuardCounts guards{};
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
-    for (int s = 0; s < settings.substeps; ++s) {
+    for (int s = 0; s < plan.substeps; ++s) {
       if (damped(settings)) start = x;
       contact.prepare(substep, s, inverse_masses, vertices, v);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
       predicted = x;
-      for (int iteration = 0; iteration < settings.iterations; ++iteration) {
+      for (int iteration = 0; iteration < plan.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
         for_each_kind([&](auto kind, int k) {
-          const Rule<real> rule(settings, std::size_t(k), longest, jacobi && soft ? settings.omega : 1);
+          const Rule<real> rule(settings, plan.h, std::size_t(k), longest,
+                                jacobi && soft ? settings.omega : 1);
           const std::vector<double>& own = compliances_[std::size_t(k)];
           const double* compliance = own.empty() ? nullptr : own.data();
           for (auto& item : std::get<Items<decltype(kind)>>(items_)) {

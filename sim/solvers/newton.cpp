@@ -219,7 +219,7 @@ struct Levels {
 
 std::vector<glm::vec4> coarse_words(const SolverInput& input, const Levels& levels) {
   const auto& [graph, aggregates] = levels;
-  const double h = input.settings.dt / input.settings.substeps * 2 / 3;  // BDF2's
+  const double h = input.plan.h * 2 / 3;  // BDF2's
   std::vector<double> inertia;
   for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
   const std::vector<glm::dmat3> blocks = blocks_at_rest(input, graph, h);
@@ -319,8 +319,8 @@ Solver create_newton_solver(const SolverInput& input) {
       bodies > 0 ? +[](int k) { return schedule(k, true); } : +[](int k) { return schedule(k, false); };
   solver.renewable = 3;
   solver.renewed = [levels](const SolverInput& now) -> MakeWords {
-    return [levels, &model = now.model, system = now.system, settings = now.settings] {
-      return coarse_words({model, system, settings, {}}, *levels);
+    return [levels, &model = now.model, system = now.system, settings = now.settings, plan = now.plan] {
+      return coarse_words({model, system, settings, plan, {}}, *levels);
     };
   };
   solver.take_numbers = [records](const Solver& made, const ConstraintSystem& system) {

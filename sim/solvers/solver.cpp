@@ -53,13 +53,16 @@ const std::vector<SolverMode> rows = {
              "for what is soft",
      .create = create_node_solver,
      .leapfrog = true,
-     .pairs = true},
+     .pairs = true,
+     .substeps = 1},
     {.name = "newton",
      .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
              "levels: for what is stiff, has small tets or starts badly deformed",
      .create = create_newton_solver,
      .implicit = true,
-     .pairs = true},
+     .pairs = true,
+     .iterations = 4,
+     .substeps = 1},
     {.name = "paper",
      .help = "the paper's GPU pipeline: a kernel per kind, floats added by compare-and-swap",
      .create = create_paper_solver,
@@ -85,6 +88,14 @@ const SolverMode* find_solver_mode(const std::string& name) {
   const auto row =
       std::find_if(rows.begin(), rows.end(), [&](const SolverMode& mode) { return name == mode.name; });
   return row == rows.end() ? nullptr : &*row;
+}
+
+Plan plan_for(const Settings& s) {
+  const SolverMode& mode = *find_solver_mode(s.mode);
+  Plan plan{s.substeps == automatic ? mode.substeps : s.substeps,
+            s.iterations == automatic || mode.leapfrog ? mode.iterations : s.iterations};
+  plan.h = s.dt / plan.substeps;
+  return plan;
 }
 
 bool leaps(const Settings& settings) { return find_solver_mode(settings.mode)->leapfrog; }
@@ -146,9 +157,12 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
 }
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {
-  return {define("COMPLIANT", input.compliant),        define("RIGID_CONTACT", input.rigid),
-          define("LEAPFROG", input.leapfrog),          define("BODY_COUNT", input.model.bodies.size()),
-          define("SHAPES", input.model.shapes.size()), define("FIELDS", has_fields(input.model)),
+  return {define("COMPLIANT", input.compliant),
+          define("RIGID_CONTACT", input.rigid),
+          define("LEAPFROG", input.leapfrog),
+          define("BODY_COUNT", input.model.bodies.size()),
+          define("SHAPES", input.model.shapes.size()),
+          define("FIELDS", has_fields(input.model)),
           define("CONTACTS", contacts_lag(input.model, input.settings))};
 }
 

@@ -92,6 +92,7 @@ struct SolverInput {
   const Model& model;
   const ConstraintSystem& system;
   const Settings& settings;
+  Plan plan;
   Tuning tuning;           ///< `row` and `storage` filled in
   bool software = false;   ///< the "GPU" is a CPU
   bool compliant = false;  ///< settings.h
@@ -104,12 +105,17 @@ struct SolverMode {
   const char* name;
   const char* help;
   Solver (*create)(const SolverInput&);
-  bool compliance = true;  ///< and compliance
-  bool implicit = false;   ///< forces, in implicit steps
-  bool leapfrog = false;   ///< forces in place of corrections: substeps are as many as stay stable
-  bool pairs = false;      ///< and contact between bodies
-  bool offered = true;     ///< in --mode and the window; else in bench and compare alone
+  bool compliance = true;             ///< and compliance
+  bool implicit = false;              ///< forces, in implicit steps
+  bool leapfrog = false;              ///< forces in place of corrections: substeps are as many as stay stable
+  bool pairs = false;                 ///< and contact between bodies
+  int iterations = 1, substeps = 20;  ///< where nothing is asked for; of leapfrog the least, 1
+  bool offered = true;                ///< in --mode and the window; else in bench and compare alone
 };
+/// Whether iterations and substeps mean the same in both: corrections, leapfrog or implicit steps.
+inline bool solved_alike(const SolverMode& a, const SolverMode& b) {
+  return a.leapfrog == b.leapfrog && a.implicit == b.implicit;
+}
 /// Those that are offered.
 const std::vector<SolverMode>& solver_modes();
 /// Of all modes; nullptr if there is none.

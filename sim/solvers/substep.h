@@ -22,13 +22,13 @@ struct Substep {
   std::vector<glm::dvec4> planes;                ///< half spaces n.x >= d as (n, d)
   std::vector<std::vector<MovingShape>> shapes;  ///< of each substep of the step, or of all
 
-  Substep(const Model& model, const Settings& settings, double time)
-      : h(settings.dt / settings.substeps),
+  Substep(const Model& model, const Settings& settings, const Plan& plan, double time)
+      : h(plan.h),
         velocity_scale(std::exp(-settings.damping * h)),
         friction(settings.friction),
         gravity(0, -settings.gravity, 0),
         planes(planes_of(model, settings)),
-        shapes(shapes_of(model, settings, time, h, settings.substeps)) {}
+        shapes(shapes_of(model, settings, time, h, plan.substeps)) {}
   const std::vector<MovingShape>& shapes_in(int substep) const {
     return shapes[std::min(std::size_t(substep), shapes.size() - 1)];
   }

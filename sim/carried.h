@@ -1,0 +1,73 @@
+// What a step hands on to the next. Each owner names its ranges of buffers and one plain struct; snapshots,
+// checkpoints and the timeline copy what that list names and know of nothing else.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sim/gl/gpu.h"
+#include "sim/model.h"
+#include "sim/settings.h"
+
+namespace tetpbd {
+
+/// Bytes of a buffer, multiples of four.
+struct CarriedRange {
+  const Buffer* buffer;
+  std::size_t first, bytes;
+};
+
+/// In a GPU mode; a CPU mode carries its State.
+struct Carried {
+  std::vector<CarriedRange> ranges;                ///< positions and velocities first
+  std::vector<std::span<std::byte>> values;        ///< of plain structs
+  std::vector<std::pair<Fence*, bool>> readbacks;  ///< of buffers among the ranges; whether one is under way
+  /// All of a buffer.
+  void add(const Buffer& buffer) { ranges.push_back({&buffer, 0, buffer.bytes()}); }
+  template <class Values>
+  void add_values(Values& plain) {
+    static_assert(std::is_trivially_copyable_v<Values>);
+    values.push_back(std::as_writable_bytes(std::span(&plain, 1)));
+  }
+  void add_readback(Fence& fence) { readbacks.emplace_back(&fence, bool(fence)); }
+};
+
+/// When it was at a step; time runs on from there by dt.
+struct TimeOrigin {
+  long step = 0;
+  double time = 0;  ///< s
+};
+
+/// The numbers of a Sim itself that a step hands on.
+struct StepValues {
+  long steps = 0;             ///< taken since the start
+  TimeOrigin origin;          ///< ask time_of()
+  double quantum = 1;         ///< m, of quantized positions
+  bool needs_predict = true;  ///< the quantized positions are not those of the next step
+  unsigned read_index = 0;    ///< which of `quantized` is read next
+  unsigned rigid_side = 0;    ///< which side of hard bodies' records was written last
+};
+
+/// The first state that is not finite: its step, and the lowest of its vertices that are not.
+struct NonFinite {
+  long step = 0;
+  std::uint32_t vertex = 0;
+};
+
+/// All that a step hands on, copied: whoever goes back to it goes on with the same bits. What lies in buffers
+/// was copied to one that the owner of the snapshot keeps.
+struct Snapshot {
+  Settings settings;  ///< as asked
+  Plan plan;
+  StepValues step;
+  std::vector<std::byte> values{};  ///< those of Carried, one after the other
+  std::vector<bool> readbacks{};    ///< under way
+  std::optional<NonFinite> found{};
+  std::optional<State> host{};  ///< of a CPU mode
+  std::size_t at = 0;           ///< first byte in the buffer
+};
+
+}  // namespace tetpbd

@@ -115,7 +115,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   std::optional<Motion> right = right_motion(*model, settings);
   if (right) choice.judged = "motion";
   for (const Settings& candidate : candidates(settings)) {
-    const bool first = choice.trials.empty(), as_it_is = candidate == settings || leaps(candidate);
+    const bool first = choice.trials.empty(), as_it_is = candidate == settings || mode_of(candidate).leapfrog;
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
     Sim sim = create_sim(model, candidate);
     if (first) warm_up(sim);

@@ -104,19 +104,17 @@ ordered_json launch_and_bandwidth_limits(bool software) {
   const std::size_t bytes = std::size_t(software ? 16 : 512) << 20, work_groups = bytes / 16 / 8 / 256;
   const Buffer from("probe, from", bytes), to("probe, to", bytes);
   from.clear();
-  from.bind_storage(0);
-  to.bind_storage(1);
+  Recorder recorder;
+  recorder.give("From", from), recorder.give("To", to);
   const auto seconds_each = [&](const char* copy, std::size_t groups, int times) {
-    const Program program = Program::compute("probe.comp", {{{"COPY", copy}}, {}});
-    program.use();
+    Pass pass{Program::compute("probe.comp", {{{"COPY", copy}}, {}}), groups};
     std::chrono::steady_clock::time_point begin;
     for (int k = -times; k < times; ++k) {  // the first half to warm up
       if (k == 0) {
         glFinish();
         begin = std::chrono::steady_clock::now();
       }
-      glDispatchCompute(unsigned(groups), 1, 1);
-      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+      recorder.run(pass);
     }
     glFinish();
     return seconds_since(begin) / times;

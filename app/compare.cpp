@@ -72,7 +72,7 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   stretched->positions = model->rest.positions;
   for (glm::dvec3& p : stretched->positions) p.y *= 1.05;
   std::ranges::fill(stretched->velocities, glm::dvec3(0));
-  stretched->obstacles.clear(), stretched->shapes.clear();
+  stretched->obstacles.clear();
   settings.gravity = 0;
   settings.ground = false;
   const MeasuredRun run = run_model(stretched, settings, 1, nullptr, false);

@@ -5,8 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/obstacles.h"
-#include "sim/error.h"
-#include "sim/moving_shape.h"
+#include "sim/contact/moving_obstacle.h"
 
 namespace tetpbd {
 
@@ -16,27 +15,14 @@ bool moves_alike(const Obstacle& a, const Obstacle& b) {
   return a.velocity == b.velocity && a.spin == b.spin && a.keyframes.empty() == b.keyframes.empty();
 }
 
-// What kernels are made for.
-auto layout_of(const Model& model) {
-  std::vector<const void*> shapes;
-  for (const Obstacle& o : model.shapes) shapes.push_back(o.field.get());
-  return std::pair(model.obstacles.size(), shapes);
-}
-
-void take(Session& s, const std::vector<Obstacle>& wanted) {
-  Model& model = *s.loaded.model;
-  const auto before = layout_of(model);
-  model.obstacles.clear(), model.shapes.clear();
-  for (const Obstacle& o : wanted) add_obstacle(model, o);
-  if (model.obstacles.size() >= MAX_PLANES || model.shapes.size() > MAX_SHAPES)
-    throw Error("too many obstacles", fmt::format("{} of them", wanted.size()),
-                fmt::format("keep to {} half spaces and {} others", MAX_PLANES - 1, MAX_SHAPES));
-  const bool others = layout_of(model) != before;
+// Of all lanes. What still reads the model of before, as the map's thread does, goes on with that.
+void adopt_model(Session& s, const std::shared_ptr<const Model>& model) {
+  const bool same_kernels = share_kernels(*s.loaded.model, *model);
+  s.loaded.model = model;
   for (Lane& lane : s.loaded.lanes) {
-    take_obstacles(lane.sim, others);
-    if (others) lane.metrics.reset();
+    change_obstacles(lane.sim, model);
+    if (!same_kernels) lane.metrics.reset();
   }
-  if (others) s.loaded.map.reset();
 }
 
 }  // namespace
@@ -45,10 +31,13 @@ void put_obstacles(Session& s, std::vector<Obstacle> wanted) {
   for (Obstacle& o : wanted)
     if (!o.field) load_field(o);
   const std::vector<Obstacle> before = s.loaded.scene.obstacles;
+  const auto old_model = s.loaded.model;
+  auto model = std::make_shared<Model>(*old_model);
+  model->obstacles = wanted;
   try {
-    take(s, wanted);
+    adopt_model(s, model);
   } catch (...) {
-    take(s, before);
+    adopt_model(s, old_model);
     throw;
   }
   ordered_json list = ordered_json::array();
@@ -74,18 +63,17 @@ void choose_obstacle(Session& s, int number) {
   if (std::exchange(s.obstacle, number) != number) s.log("obstacle {} chosen", number + 1);
 }
 
-void add_obstacle(Session& s, int shape) {
+void add_obstacle(Session& s, const ObstacleKind& kind) {
   Obstacle o;
-  o.shape = shape;
+  o.kind = &kind;
   const double size = 0.2 * s.loaded.sim().model->size;
   o.normal = {0, 1, 0};
-  o.radius = o.half_length = size;
-  o.half = glm::dvec3(size, shape == SHAPE_HEIGHTS ? 0.4 * size : size, size) *
-           (shape == SHAPE_HEIGHTS ? 2.0 : 1.0);
-  if (shape == SHAPE_CAPSULE || shape == SHAPE_CYLINDER) o.radius = 0.5 * size;
-  o.height = shape == SHAPE_GRID ? 2 * size : 0;
-  if (shape == SHAPE_GRID) o.mesh = found_file(s.ui.mesh, {});
-  for (int k = 0; shape == SHAPE_HEIGHTS && k < 24; ++k)
+  o.radius = kind.has("half_length") ? 0.5 * size : size;
+  o.half_length = size;
+  o.half = kind.has("heights") ? size * glm::dvec3(2, 0.8, 2) : glm::dvec3(size);
+  o.height = kind.has("mesh") ? 2 * size : 0;
+  if (kind.has("mesh")) o.mesh = found_file(s.ui.mesh, {});
+  for (int k = 0; kind.has("heights") && k < 24; ++k)
     for (int i = 0; i < 24; ++i) {
       if (i == 0) o.heights.emplace_back();
       o.heights.back().push_back(std::round(50 + 25 * (std::sin(0.6 * i) + std::cos(0.5 * k))) / 100);
@@ -93,11 +81,8 @@ void add_obstacle(Session& s, int shape) {
   const Settings& world = s.loaded.sim().settings;
   const double angle = glm::radians(double(s.camera.azimuth) + 60);
   o.centre = glm::dvec3(s.camera.target) +
-             (shape == SHAPE_HEIGHTS ? 5 : 3) * size * glm::dvec3(std::sin(angle), 0, std::cos(angle));
-  const double low = shape == SHAPE_CAPSULE   ? o.radius + o.half_length
-                     : shape == SHAPE_HEIGHTS ? o.half.y
-                                              : size;
-  if (world.ground) o.centre.y = world.ground_height + (shape == SHAPE_PLANE ? 0 : low);
+             (kind.has("heights") ? 5 : 3) * size * glm::dvec3(std::sin(angle), 0, std::cos(angle));
+  if (world.ground) o.centre.y = world.ground_height + (kind.half ? kind.half(o).y : 0);
   std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
   wanted.push_back(std::move(o));
   const std::size_t count = wanted.size();
@@ -133,10 +118,10 @@ std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
   const double size = s.loaded.model->size, far = 100 * (size + double(s.camera.distance));
   const auto& all = s.loaded.scene.obstacles;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const MovingShape shape = moving_shape(all[i], time_of(s.loaded.sim()), 0, 0, 0);
+    const MovingObstacle obstacle = moving_obstacle(all[i], time_of(s.loaded.sim()), 0, 0, 0);
     double t = 0, gap = 0;
     for (int turn = 0; turn < 400 && t < far; ++turn) {
-      gap = shape.surface_at(glm::dvec3(ray.origin) + t * glm::dvec3(ray.direction)).distance;
+      gap = obstacle.surface_at(glm::dvec3(ray.origin) + t * glm::dvec3(ray.direction)).distance;
       if (gap < 1e-4 * size) break;
       t += std::max(gap * all[i].trust, 1e-4 * size);
     }
@@ -144,12 +129,6 @@ std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
       first = ObstacleHit{int(i), t};
   }
   return first;
-}
-
-int shape_of(const Session& s, int obstacle) {
-  const auto& all = s.loaded.scene.obstacles;
-  if (obstacle < 0 || is_plane(all[std::size_t(obstacle)])) return -1;
-  return obstacle - int(std::count_if(all.begin(), all.begin() + obstacle, is_plane));
 }
 
 }  // namespace tetpbd

@@ -14,7 +14,7 @@ void change_obstacles(Session& session, std::vector<Obstacle> wanted);
 void put_obstacles(Session& session, std::vector<Obstacle> wanted);
 void choose_obstacle(Session& session, int number);
 /// One more, at the right of the bodies as they are seen, and chosen; a mesh from the path in the panel.
-void add_obstacle(Session& session, int shape);
+void add_obstacle(Session& session, const ObstacleKind& kind);
 void remove_obstacle(Session& session);
 
 void move_by(Obstacle& obstacle, const glm::dvec3& way);
@@ -26,7 +26,5 @@ struct ObstacleHit {
 };
 /// The first that a ray meets from outside.
 std::optional<ObstacleHit> obstacle_on(const Session& session, const Ray& ray);
-/// In the model's shapes; -1: a half space, or none.
-int shape_of(const Session& session, int obstacle);
 
 }  // namespace tetpbd

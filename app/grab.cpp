@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "sim/contact/moving_obstacle.h"
+
 namespace tetpbd {
 
 namespace {

@@ -128,9 +128,9 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"wall_ms_per_step", times(run.wall_ms)},
                  {"fps", double(sim.steps) / run.seconds}};
   const Watch& watch = watched(sim);
-  if (leaps(sim.settings))
+  if (mode_of(sim.settings).leapfrog)
     j["watch"] = {{"longest_substep_at_rest", sim.longest_substep}, {"most_substeps", watch.most_substeps}};
-  if (is_implicit(sim.settings))
+  if (mode_of(sim.settings).implicit)
     j["watch"] = {{"largest_residual", watch.largest_residual},
                   {"least_health", watch.least_health},
                   {"most_substeps", watch.most_substeps}};
@@ -251,7 +251,7 @@ int print_explanation(Scene scene, int gpu, long steps) {
   long before = 0;
   if (!on_cpu(sim)) {
     run_loop(sim, nullptr, steps);
-    before = sim.steps, sim.kernels_timed = true;
+    before = sim.steps, sim.recorder.timing = true;
     run_loop(sim, nullptr, 10, {.most_seconds = 10});
   }
   const Explanation e = explain(sim, int(sim.steps - before));

@@ -22,12 +22,13 @@ long compared_every(const Model& model) { return std::max(4l, long(model.positio
 
 // How far its iterations go, about.
 double effort(const Sim& sim) {
-  return leaps(sim.settings) ? 1e9 / sim.settings.stability : double(sim.plan.iterations) * sim.plan.substeps;
+  return mode_of(sim.settings).leapfrog ? 1e9 / sim.settings.stability
+                                        : double(sim.plan.iterations) * sim.plan.substeps;
 }
 
 GLuint patch_words(const Sim& sim) {
   for (const auto& [binding, buffer] : sim.solver.bindings)
-    if (binding == BIND_PATCHES && sim.solver.double_buffered) return buffer;
+    if (binding == "Patches" && sim.solver.vertex_patches > 0) return buffer;
   return 0;
 }
 
@@ -74,7 +75,7 @@ GLuint patch_numbers(Lane& lane) {
   const GLuint words = patch_words(lane.sim);
   if (!words || lane.patches) return lane.patches.id();
   const auto& present = lane.sim.system.present;
-  const std::size_t patches = lane.sim.solver.iteration[0].work_groups,
+  const std::size_t patches = lane.sim.solver.vertex_patches,
                     each = 4 + 2 * std::size_t(std::ranges::count(present, true));
   std::vector<std::uint32_t> chunks(patches * each);
   read_buffer(words, 0, chunks.size() * 4, chunks.data());

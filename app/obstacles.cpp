@@ -8,6 +8,7 @@
 
 #include "app/files.h"
 #include "app/scene.h"
+#include "sim/contact/obstacle_kinds.h"
 #include "sim/did_you_mean.h"
 #include "sim/error.h"
 
@@ -17,20 +18,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 namespace {
-
-/// Keys of a shape beside those that all have; those before "|" must be there.
-struct ShapeKeys {
-  std::vector<std::string> needed, allowed;
-};
-const std::array<ShapeKeys, shape_names.size()> keys_of_shape = {{
-    {{"normal"}, {"point"}},
-    {{"radius"}, {"centre"}},
-    {{"radius", "half_length"}, {"centre", "rotation"}},
-    {{"half"}, {"centre", "rotation"}},
-    {{"radius", "half_length"}, {"centre", "rotation"}},
-    {{"half"}, {"centre", "rotation", "image", "heights"}},
-    {{"mesh"}, {"centre", "rotation", "scale", "height", "voxels"}},
-}};
 
 void make_heights(Obstacle& o) {
   if (o.image.empty()) return set_heights(o, o.heights);
@@ -79,20 +66,20 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
     throw Error(fmt::format("'{}.{}' {}", where, key, what), file, mend);
   };
   Obstacle o;
-  const std::string shape = value.value("shape", shape_names[0]);
-  const auto found = std::ranges::find(shape_names, shape);
-  if (found == shape_names.end())
-    refuse("shape", fmt::format("is no shape; there are {}", fmt::join(shape_names, ", ")),
-           did_you_mean(shape, {shape_names.begin(), shape_names.end()}) + "see docs/guide.md");
-  o.shape = int(found - shape_names.begin());
-  const ShapeKeys& keys = keys_of_shape[std::size_t(o.shape)];
-  for (const std::string& key : keys.needed)
+  const std::string shape = value.value("shape", o.kind->name);
+  o.kind = find_obstacle_kind(shape);
+  if (!o.kind) {
+    std::vector<std::string> names;
+    for (const ObstacleKind& kind : obstacle_kinds()) names.push_back(kind.name);
+    refuse("shape", fmt::format("is no shape; there are {}", fmt::join(names, ", ")),
+           did_you_mean(shape, names) + "see docs/guide.md");
+  }
+  for (const std::string& key : o.kind->needs)
     if (!value.contains(key)) refuse(key, fmt::format("is missing: a {} needs it", shape));
   static const std::vector<std::string> all = {"shape",    "friction", "restitution",
                                                "velocity", "spin",     "keyframes"};
   for (const auto& [key, held] : value.items())
-    if (!std::ranges::count(keys.needed, key) && !std::ranges::count(keys.allowed, key) &&
-        !std::ranges::count(all, key))
+    if (!o.kind->has(key) && !std::ranges::count(all, key))
       refuse(key, fmt::format("is nothing that a {} has", shape));
   const auto get = [&](const char* key, auto& to) {
     if (value.contains(key)) value[key].get_to(to);
@@ -103,8 +90,8 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
   get("velocity", o.velocity), get("spin", o.spin);
   if (value.contains("friction")) o.friction = value["friction"];
   if (value.contains("restitution")) o.restitution = value["restitution"];
-  if (o.shape == SHAPE_PLANE && !(glm::length(o.normal) > 1e-9)) refuse("normal", "must not be zero");
-  if (o.shape == SHAPE_HEIGHTS && value.contains("image") == value.contains("heights"))
+  if (o.kind->has("normal") && !(glm::length(o.normal) > 1e-9)) refuse("normal", "must not be zero");
+  if (o.kind->has("heights") && value.contains("image") == value.contains("heights"))
     refuse("heights", "or an image, one of the two, must be there");
   for (const auto& row : o.heights)
     if (row.size() != o.heights[0].size()) refuse("heights", "must be rows of the same length");
@@ -133,19 +120,15 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
 
 json obstacle_json(const Obstacle& o) {
   json result = json::object();
-  const auto has = [&](const char* key) {
-    const ShapeKeys& keys = keys_of_shape[std::size_t(o.shape)];
-    return std::ranges::count(keys.needed, key) + std::ranges::count(keys.allowed, key) > 0;
-  };
   const auto put = [&](const char* key, const auto& held) {
-    if (has(key)) result[key] = held;
+    if (o.kind->has(key)) result[key] = held;
   };
-  if (o.shape != SHAPE_PLANE) result["shape"] = shape_names[std::size_t(o.shape)];
+  if (o.kind != default_obstacle_kind()) result["shape"] = o.kind->name;
   put("point", o.centre), put("centre", o.centre), put("normal", o.normal), put("rotation", o.rotation);
   put("radius", o.radius), put("half_length", o.half_length), put("half", o.half);
   if (!o.image.empty()) result["image"] = file_name(o.image);
   if (!o.heights.empty()) result["heights"] = o.heights;
-  if (o.shape == SHAPE_GRID) result["mesh"] = file_name(o.mesh);
+  if (o.kind->has("mesh")) result["mesh"] = file_name(o.mesh);
   put("scale", o.scale), put("voxels", o.voxels);
   if (o.height > 0) result["height"] = o.height;
   if (o.friction) result["friction"] = *o.friction;
@@ -158,8 +141,8 @@ json obstacle_json(const Obstacle& o) {
 }
 
 void load_field(Obstacle& o) {
-  if (o.shape == SHAPE_HEIGHTS) make_heights(o);
-  if (o.shape != SHAPE_GRID) return;
+  if (o.kind->has("heights")) make_heights(o);
+  if (!o.kind->has("mesh")) return;
   SurfaceMesh surface = load_surface(o.mesh);
   for (glm::dvec3& p : surface.positions) p *= o.scale;
   const Bounds box = bounds(surface.positions);

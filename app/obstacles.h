@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "sim/obstacle.h"
+#include "sim/contact/obstacle.h"
 
 namespace glm {
 template <class T>

@@ -73,11 +73,12 @@ bool words_widget(Session& s, const Parameter& row, std::string& value, const st
 // What has no effect, as the stiffness of a kind that is switched off, is not shown.
 bool has_effect(const Session& s, const Settings& settings, const Parameter& row) {
   const std::string_view name = row.name;
-  const bool material = settings.material != "none", averaged = settings.mode.substr(0, 3) != "cpu";
-  if (name == "mass_splitting") return averaged && !compliant(settings);  // which brings it with it
-  if (name == "omega") return averaged && !leaps(settings) && !is_implicit(settings);
-  if (name == "stability") return leaps(settings);
-  if (name == "iterations") return !leaps(settings);
+  const SolverMode& mode = mode_of(settings);
+  const bool material = settings.material != "none";
+  if (name == "mass_splitting") return mode.jacobi && !compliant(settings);  // which brings it with it
+  if (name == "omega") return mode.jacobi;
+  if (name == "stability") return mode.leapfrog;
+  if (name == "iterations") return !mode.leapfrog;
   if (name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;
@@ -214,12 +215,12 @@ void draw_solver(Session& s) {
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
   const Watch& watch = s.loaded.sim().watch;
-  if (leaps(now))
+  if (mode_of(now).leapfrog)
     ImGui::TextWrapped("%d substeps%s", s.loaded.sim().plan.substeps,
                        watch.stiffening > 1
                            ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
                            : "");
-  if (is_implicit(now))
+  if (mode_of(now).implicit)
     ImGui::TextWrapped(
         "residual %.1e of the start's, health %.2f%s", watch.residual, watch.health,
         watch.finer > 1 ? fmt::format("; {} times the substeps until no tet is inverted", watch.finer).c_str()

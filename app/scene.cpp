@@ -12,7 +12,7 @@
 #include "app/auto_solver.h"
 #include "app/obstacles.h"
 #include "app/run_loop.h"
-#include "render/shapes.h"
+#include "render/obstacles.h"
 #include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/layout.h"
@@ -68,7 +68,7 @@ json schema() {
       "density": [1e-6, 1e9], "velocity": {"three": [-1e5, 1e5]}, "spin": {"three": [-1e5, 1e5]},
       "fixed": {"least": 0, "most": 100, "of": "at most 100 boxes {\"low\": [x,y,z], \"high\": [x,y,z]}",
         "each": {"low": {"three": [-1, 2]}, "high": {"three": [-1, 2]}}}}},
-    "world": {"obstacles": {"least": 0, "of": "obstacles, few enough for the GPU"}},
+    "world": {"obstacles": {"least": 0}},
     "solver": {},
     "camera": {"target": {"three": [-1e6, 1e6]}, "distance": [1e-4, 1e6],
       "azimuth": [-360, 360], "elevation": [-89, 89], "fov": [5, 120]}
@@ -76,7 +76,9 @@ json schema() {
   json& body = result["bodies"]["each"];
   body["heavy"] = body["fixed"];
   body["heavy"]["each"].update({{"ratio", {1e-9, 1e9}}, {"share", {0, 1}}});
-  result["world"]["obstacles"].update({{"most", MAX_PLANES - 1 + MAX_SHAPES}, {"each", obstacle_schema()}});
+  constexpr int most = MAX_OBSTACLES - 1;  // beside the ground
+  result["world"]["obstacles"].update(
+      {{"most", most}, {"of", fmt::format("at most {} obstacles", most)}, {"each", obstacle_schema()}});
   for (const Parameter& row : parameters()) result[row.section][row.name] = nullptr;
   return result;
 }
@@ -269,7 +271,7 @@ void set_mode_in(json& document, const std::string& assignment) {
   };
   const SolverMode* before = mode();
   set_path(document, assignment);
-  if (solved_alike(*before, *mode()) || !document.is_object() || !document["solver"].is_object()) return;
+  if (before->solves_like(*mode()) || !document.is_object() || !document["solver"].is_object()) return;
   document["solver"].erase("iterations"), document["solver"].erase("substeps");
 }
 
@@ -435,10 +437,10 @@ namespace {
 // Nothing where it may change something.
 std::string why_unused(const Settings& s, const std::string& name) {
   const auto is = [&](auto... names) { return ((name == names) || ...); };
-  const bool jacobi = s.mode == "node" || s.mode == "constraint" || s.mode == "paper";
-  if (leaps(s) && is("iterations")) return "mode explicit has no iterations";
-  if (!leaps(s) && is("stability")) return "it is of mode explicit";
-  if (!jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
+  const SolverMode& mode = mode_of(s);
+  if (mode.leapfrog && is("iterations")) return "mode explicit has no iterations";
+  if (!mode.leapfrog && is("stability")) return "it is of mode explicit";
+  if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
   if (s.material == "none" && is("young_modulus", "poisson_ratio")) return "there is no material";
   if (s.material != "none" &&
@@ -567,8 +569,8 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
   }
   if (!carries) model->carried = {};
   for (const Obstacle& obstacle : scene.obstacles) {
-    add_obstacle(*model, obstacle);
-    if (!is_plane(obstacle)) load_field(model->shapes.back());
+    model->obstacles.push_back(obstacle);
+    load_field(model->obstacles.back());
   }
   renumber(*model);
   return model;
@@ -580,7 +582,7 @@ Camera scene_camera(const Scene& scene, const Model& model, float aspect) {
   const Bounds rest = bounds(model.rest.positions);
   box.low = glm::min(box.low, rest.low);
   box.high = glm::max(box.high, rest.high);
-  box = with_shapes(box, model, 0, 2 * box.size());
+  box = with_obstacles(box, model, 0, 2 * box.size());
   if (scene.settings.ground) box.low.y = std::min(box.low.y, scene.settings.ground_height);
   Camera camera;
   frame_box(camera, glm::vec3(box.low), glm::vec3(box.high), aspect);

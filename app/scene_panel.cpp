@@ -10,6 +10,7 @@
 #include "app/files.h"
 #include "app/ui.h"
 #include "app/widgets.h"
+#include "sim/contact/obstacle_kinds.h"
 #include "sim/error.h"
 
 namespace tetpbd {
@@ -104,30 +105,28 @@ bool own_or_worlds(Session& s, const char* label, std::optional<double>& own, do
 bool obstacle_fields(Session& s, Obstacle& o) {
   const Settings& world = s.loaded.sim().settings;
   const double step = 0.005 * s.loaded.sim().model->size, least = 1e-3 * s.loaded.sim().model->size;
-  const int shape = o.shape;
-  const bool sized = shape == SHAPE_BOX || shape == SHAPE_HEIGHTS, flat = shape == SHAPE_PLANE;
+  const ObstacleKind& kind = *o.kind;
   bool changed = false, others = false;
   glm::dvec3 centre = o.centre, rotation = o.rotation;
   if (drag_field(s, "centre", &centre.x, 3, step, -1e6, "%.3f", "m, at the start"))
     move_by(o, centre - o.centre), changed = true;
-  if (!flat &&
+  if (kind.has("rotation") &&
       drag_field(s, "rotation", &rotation.x, 3, 1, -3600, "%.1f", "degrees about x, then y, then z")) {
     for (Obstacle::Key& key : o.keyframes) key.rotation += rotation - o.rotation;
     o.rotation = rotation, changed = true;
   }
-  if (flat) {
+  if (kind.has("normal")) {
     const glm::dvec3 before = o.normal;
     if (drag_field(s, "normal", &o.normal.x, 3, 0.01, -1e3, "%.2f", "points to where bodies may be"))
       glm::length(o.normal) > 1e-3 ? void(changed = true) : void(o.normal = before);
   }
-  if (shape == SHAPE_SPHERE || shape == SHAPE_CAPSULE || shape == SHAPE_CYLINDER)
-    changed |= drag_field(s, "radius", &o.radius, 1, step, least, "%.3f m", "m");
-  if (shape == SHAPE_CAPSULE || shape == SHAPE_CYLINDER)
+  if (kind.has("radius")) changed |= drag_field(s, "radius", &o.radius, 1, step, least, "%.3f m", "m");
+  if (kind.has("half_length"))
     changed |=
         drag_field(s, "half length", &o.half_length, 1, step, least, "%.3f m", "m, along its own y axis");
-  if (sized)
+  if (kind.has("half"))
     others |= drag_field(s, "half", &o.half.x, 3, step, least, "%.3f", "m, half lengths along its own axes");
-  if (shape == SHAPE_GRID && o.height > 0)
+  if (kind.has("mesh") && o.height > 0)
     others |= drag_field(s, "height", &o.height, 1, step, least, "%.3f m", "m");
   changed |= own_or_worlds(s, "its friction", o.friction, world.friction, 2);
   changed |= own_or_worlds(s, "its restitution", o.restitution, world.restitution, 1);
@@ -172,15 +171,15 @@ void draw_scene(Session& s) {
 }
 
 void draw_obstacles(Session& s) {
-  const Words shapes(shape_names.begin(), shape_names.end());
-  if (const auto chosen = combo(s, "add obstacle", "", shapes,
+  Words kinds;
+  for (const ObstacleKind& kind : obstacle_kinds()) kinds.push_back(kind.name);
+  if (const auto chosen = combo(s, "add obstacle", "", kinds,
                                 "one more, beside the bodies; a mesh: the file of the path above. Click on "
                                 "one in the view to choose it, then drag to move, Ctrl + drag to turn"))
-    add_obstacle(s, int(std::ranges::find(shapes, *chosen) - shapes.begin()));
+    add_obstacle(s, *find_obstacle_kind(*chosen));
   for (int i = 0; i < int(s.loaded.scene.obstacles.size()); ++i) {
     const Obstacle& o = s.loaded.scene.obstacles[std::size_t(i)];
-    const std::string name =
-        fmt::format("{} {}{}", i + 1, shape_names[std::size_t(o.shape)], moves(o) ? ", moving" : "");
+    const std::string name = fmt::format("{} {}{}", i + 1, o.kind->name, moves(o) ? ", moving" : "");
     if (ImGui::Selectable(name.c_str(), i == s.obstacle)) choose_obstacle(s, i == s.obstacle ? -1 : i);
     mark(s, fmt::format("obstacle {}", i + 1));
   }

@@ -161,9 +161,7 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
   if (const auto rule = choose_by_rule(scene, *model)) fmt::print("solver: {}\n", *rule);
   auto choice = choose_for(scene, model);
   Loaded loaded{name, overrides, scene, scene.settings, model, {}, {}, {}, choice};
-  auto field = model->shapes.begin();
-  for (Obstacle& o : loaded.scene.obstacles)
-    if (!is_plane(o)) o = *field++;
+  loaded.scene.obstacles = model->obstacles;  // with their fields
   loaded.lanes.push_back({create_sim(model, scene.settings)});
   loaded.renderer = make_renderer(*model);
   loaded.picker = make_picker(model->rest);
@@ -559,7 +557,7 @@ std::optional<Advice> faster_way(const Session& s) {
   const auto& ms = s.loaded.lanes[s.loaded.chosen].step_ms.values;
   // Less than half of the time goes into steps.
   if (!ms.empty() && double(ms.back()) * clock.factor / own.dt < 500) return Advice{"a smaller window", ""};
-  const bool with_forces = leaps(own) || is_implicit(own);
+  const bool with_forces = mode_of(own).leapfrog || mode_of(own).implicit;
   if (own.mode != "cpu-fast" && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
     return Advice{"mode cpu-fast", "mode=cpu-fast"};
   if (const Plan& plan = s.loaded.sim().plan; hard(own) && plan.iterations * plan.substeps > 5)

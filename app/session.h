@@ -33,9 +33,9 @@ struct Loaded {
   std::string name;  ///< as it was asked for
   SceneOverrides overrides;
   Scene scene;
-  Settings own{};                  ///< of the scene as it was asked for: what a setting goes back to
-  std::shared_ptr<Model> model{};  ///< of all lanes; its obstacles may change (edit_obstacles.h)
-  std::vector<Lane> lanes;         ///< one, or several side by side
+  Settings own{};                        ///< of the scene as it was asked for: what a setting goes back to
+  std::shared_ptr<const Model> model{};  ///< of all lanes
+  std::vector<Lane> lanes;               ///< one, or several side by side
   Renderer renderer;
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window

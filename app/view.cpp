@@ -55,7 +55,7 @@ void draw_lanes(Session& s, const Target& target) {
       frame.grabbed.push_back(s.hold->caught());
       std::erase_if(frame.pinned, [&](std::uint32_t v) { return s.hold->has(v); });
     }
-    frame.chosen_shape = shape_of(s, s.obstacle);
+    frame.chosen_obstacle = s.obstacle;
     frame.options.follow = s.view.follow && i == s.loaded.chosen;
     frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
     if (s.view.worst && i == s.loaded.chosen)

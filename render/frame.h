@@ -106,12 +106,11 @@ struct Frame {
   Viewport viewport;
   ViewOptions options;
   std::optional<float> ground;         ///< height, metres
-  std::vector<glm::vec4> planes;       ///< walls: dot(xyz, x) = w, xyz of unit length towards the bodies
-  std::shared_ptr<const Model> model;  ///< whose shapes are drawn, as they stand at `time`; none: none
+  std::shared_ptr<const Model> model;  ///< whose obstacles are drawn, as they stand at `time`; none: none
   double time = 0;                     ///< s
-  int chosen_shape = -1;               ///< shown in another colour
+  int chosen_obstacle = -1;            ///< of the model; shown in another colour
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
-  std::vector<std::uint32_t> touching;         ///< shapes, also through the body
+  std::vector<std::uint32_t> touching;         ///< obstacles, also through the body
   std::vector<std::uint32_t> worst;            ///< as rings, also through the body
   std::string caption;                         ///< upper left
   bool over = false;                           ///< the bodies alone, into what is drawn already

@@ -37,20 +37,15 @@ void draw_touches(Renderer& renderer, const Frame& frame) {
   const float size = glm::length(renderer.rest_high - renderer.rest_low);
   const std::size_t count = pairs.items, bytes = count * sizeof(TouchArrow);
   if (renderer.touches.bytes() != bytes) renderer.touches = Buffer("arrows of contacts", bytes);
-  const Program& fill = use(renderer, "touches");
-  for (const auto& [name, value] : {std::pair("count", count),
-                                    {"triangles", pairs.triangles},
-                                    {"vertices", pairs.vertices},
-                                    {"edges_at", pairs.edges_at},
-                                    {"vertices_at", pairs.vertices_at},
-                                    {"records_at", pairs.records_at},
-                                    {"record_words", pairs.record_words}})
-    fill.set(name, unsigned(value));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
-  pairs.mesh.bind_storage(BIND_RENDER_TRIANGLES), pairs.lists.bind_storage(BIND_RENDER_OFFSETS);
-  renderer.touches.bind_storage(BIND_RENDER_VALUES);
-  glDispatchCompute(GLuint((count + 127) / 128), 1, 1);
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
+  if (renderer.touches_sizes != pairs.sizes) {
+    renderer.passes["touches"] = {Program::compute("render/touches.comp", {}, pairs.sizes)};
+    renderer.touches_sizes = pairs.sizes;
+  }
+  Recorder& recorder = renderer.recorder;
+  recorder.give("Positions", frame.positions), recorder.give("Arrows", renderer.touches);
+  recorder.give("PairMesh", pairs.mesh), recorder.give("PairLists", pairs.lists);
+  run_over(renderer, kernel(renderer, "touches"), count);
+  recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
   const GLuint arrows = renderer.touches.id();
   attribute(ATTRIBUTE_HIGH, arrows, 3, sizeof(TouchArrow), offsetof(TouchArrow, from));
   attribute(ATTRIBUTE_VALUE, arrows, 1, sizeof(TouchArrow), offsetof(TouchArrow, depth));

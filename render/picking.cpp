@@ -14,7 +14,7 @@ constexpr std::uint32_t none = ~0u;
 
 Picker make_picker(const TetMesh& mesh) {
   Picker picker;
-  picker.kernel = Program::compute("render/pick.comp");
+  picker.kernel = {Program::compute("render/pick.comp")};
   picker.triangles = Buffer("pick triangles", mesh.surface);
   picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
   return picker;
@@ -22,22 +22,24 @@ Picker make_picker(const TetMesh& mesh) {
 
 namespace {
 
-void ask(Picker& picker, const Program& kernel, GLuint positions, const Buffer& elements, std::size_t count,
+void ask(Picker& picker, Pass& pass, GLuint positions, const Buffer& elements, std::size_t count,
          const Ray& ray) {
   picker.ray = ray;
   const std::array<std::uint32_t, 3> start{none, none, none};
   picker.result.write(0, sizeof start, start.data());
-  kernel.use();
+  Recorder& recorder = picker.recorder;
+  recorder.begin();
+  const Program& kernel = recorder.use(pass.program);
   kernel.set("count", unsigned(count));
   kernel.set("origin", ray.origin);
   kernel.set("direction", ray.direction);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
-  elements.bind_storage(BIND_PICK_TRIANGLES);
-  picker.result.bind_storage(BIND_PICK_RESULT);
+  recorder.give("Positions", positions), recorder.give("Triangles", elements);
+  recorder.give("Result", picker.result);
+  recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   for (int stage = 0; stage < 3; ++stage) {
     kernel.set("stage", stage);
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions, then the stage before
-    glDispatchCompute(stage < 2 ? unsigned(work_groups(count, 128)) : 1, 1, 1);
+    pass.work_groups = stage < 2 ? work_groups(count, 128) : 1;
+    recorder.run(pass);
   }
   picker.answered = Fence::here();
 }
@@ -52,9 +54,9 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
 void request(Picker& picker, Renderer& renderer, const Frame& frame, const Ray& ray) {
   picker.inside = frame.options.look == Look::tets || frame.options.is_cut();
   if (!picker.inside) return request(picker, frame.positions, ray);
-  if (!picker.tets_kernel) picker.tets_kernel = Program::compute("render/pick.comp", {}, {"TETS"});
+  if (!picker.tets_kernel) picker.tets_kernel = {Program::compute("render/pick.comp", {}, {"TETS"})};
   bind_view(renderer, frame);
-  rest_of(renderer).bind_storage(BIND_PICK_REST);
+  picker.recorder.give("Rest", rest_of(renderer));
   ask(picker, picker.tets_kernel, frame.positions, tets_of(renderer), renderer.mesh.tets.size(), ray);
 }
 

@@ -21,7 +21,8 @@ struct Pick {
 
 /// One question at a time: a new one replaces one that has not been answered.
 struct Picker {
-  Program kernel, tets_kernel;  ///< the latter made when first asked for
+  Recorder recorder;
+  Pass kernel, tets_kernel;  ///< the latter made when first asked for
   bool inside = false;
   Buffer triangles, result;
   Ray ray;

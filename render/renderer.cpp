@@ -13,9 +13,9 @@
 #include "render/carried.h"
 #include "render/layout.h"
 #include "render/marks.h"
+#include "sim/contact/moving_obstacle.h"
 #include "sim/layout.h"
 #include "sim/material.h"
-#include "sim/moving_shape.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -39,11 +39,10 @@ const std::map<std::string, Recipe> recipes = {
     {"caps shadow", {{"render/body.vert", "render/caps.geom", "render/depth.frag"}, {"SHADOW"}}},
     {"background", {{"render/background.vert", "render/background.frag"}, {}}},
     {"plane", {{"render/plane.vert", "render/plane.frag"}, {}}},
-    {"shapes", {{"render/shape.vert", "render/body.frag"}, {"SHAPE"}}},
-    {"shapes shadow", {{"render/shape.vert", "render/depth.frag"}, {"SHADOW"}}},
+    {"obstacles", {{"render/obstacle.vert", "render/body.frag"}, {"SHAPE"}}},
+    {"obstacles shadow", {{"render/obstacle.vert", "render/depth.frag"}, {"SHADOW"}}},
     {"graph", {{"render/body.vert", "render/graph.geom", "render/graph.frag"}, {}}},
     {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
-    {"touches", {{"render/touches.comp"}, {}}},
     {"contact arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {"CONTACTS"}}},
     {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},
     {"dots", {{"render/dots.vert", "render/dots.frag"}, {}}},
@@ -75,26 +74,22 @@ VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint3
   return {Buffer(label + " offsets", grouped.first), Buffer(label + " items", items), Buffer(label, bytes)};
 }
 
-// Dispatches the program in use over all vertices; `values` by vertex. What it reads is behind a barrier.
-void fill(const Renderer& renderer, const Program& program, GLuint positions, const Buffer& values) {
-  const std::size_t count = renderer.mesh.positions.size();
-  program.set("count", unsigned(count));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, positions);
-  if (renderer.rest) renderer.rest.bind_storage(BIND_RENDER_REST);  // not all need it
-  values.bind_storage(BIND_RENDER_VALUES);
-  glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
+// Dispatches a kernel over all vertices; `values` by vertex. What it reads is behind a barrier.
+void fill(Renderer& renderer, Pass& pass, GLuint positions, const Buffer& values) {
+  renderer.recorder.give("Positions", positions);
+  renderer.recorder.give("Rest", renderer.rest);  // not all need it
+  renderer.recorder.give("Values", values);
+  run_over(renderer, pass, renderer.mesh.positions.size());
 }
 
 // The other corners of a tet, by corner; even permutations, which keep the sign of the volume.
 constexpr std::array<std::array<std::size_t, 3>, 4> even{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 // The name of the buffer of values, made when first asked for and filled by their program.
-GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, const Program& program,
-                const auto& make) {
+GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, Pass& pass, const auto& make) {
   if (!values) values = make(renderer.mesh);
-  values.offsets.bind_storage(BIND_RENDER_OFFSETS);
-  values.items.bind_storage(BIND_RENDER_ITEMS);
-  fill(renderer, program, frame.positions, values.values);
+  renderer.recorder.give("Offsets", values.offsets), renderer.recorder.give("Items", values.items);
+  fill(renderer, pass, frame.positions, values.values);
   return values.values.id();
 }
 
@@ -109,19 +104,18 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   const std::string label = std::string("vertex values, ") + colour_names[std::size_t(colour)];
   if (colour == Colour::velocity) {
     if (!values) values.values = Buffer(label, bytes);
-    const Program& program = use(renderer, "speeds");
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_ANSWERS, frame.velocities);
-    fill(renderer, program, frame.positions, values.values);
+    renderer.recorder.give("Velocities", frame.velocities);
+    fill(renderer, kernel(renderer, "speeds"), frame.positions, values.values);
     return values.values.id();
   }
   if (colour == Colour::stretch)
-    return gathered(renderer, frame, values, use(renderer, "edge strains"), [&](const TetMesh& mesh) {
+    return gathered(renderer, frame, values, kernel(renderer, "edge strains"), [&](const TetMesh& mesh) {
       return gather<2>(mesh, tet_edges(mesh), {{{1}, {0}}}, label, bytes);
     });
-  const Program& program = use(renderer, "tet values");
-  program.set("kind", int(colour));
-  program.set("material", frame.material);
-  return gathered(renderer, frame, values, program,
+  Pass& pass = kernel(renderer, "tet values");
+  pass.program.set("kind", int(colour));
+  pass.program.set("material", frame.material);
+  return gathered(renderer, frame, values, pass,
                   [&](const TetMesh& mesh) { return gather<4>(mesh, mesh.tets, even, label, bytes); });
 }
 
@@ -129,7 +123,7 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
 void fill_cofactors(Renderer& renderer, const Frame& frame) {
   if (!renderer.carried_array) make_carried(renderer);
   rest_of(renderer), tets_of(renderer);
-  gathered(renderer, frame, renderer.cofactors, use(renderer, "cofactors"), [](const TetMesh& mesh) {
+  gathered(renderer, frame, renderer.cofactors, kernel(renderer, "cofactors"), [](const TetMesh& mesh) {
     return gather<4>(mesh, mesh.tets, even, "cofactors", mesh.positions.size() * 3 * sizeof(glm::vec4));
   });
 }
@@ -148,22 +142,7 @@ glm::vec4 cut_plane(const Renderer& renderer, const ViewOptions& options) {
 }
 
 // Farther from the bodies, in their size, obstacles play no part in the light.
-constexpr float shape_reach = 3;
-
-bool has_shapes(const Frame& frame) { return frame.model && !frame.model->shapes.empty(); }
-
-std::vector<glm::vec4> planes_of(const Frame& frame) {
-  std::vector<glm::vec4> planes = frame.planes;
-  if (frame.ground) planes.insert(planes.begin(), glm::vec4(0, 1, 0, *frame.ground));
-  for (std::size_t i = 0; frame.model && i < frame.model->shapes.size(); ++i) {
-    const Obstacle& shape = frame.model->shapes[i];
-    if (shape.shape != SHAPE_PLANE) continue;
-    const Pose pose = pose_at(shape, frame.time);
-    planes.emplace_back(glm::vec3(pose.axes[1]), float(glm::dot(pose.axes[1], pose.centre)));
-  }
-  planes.resize(std::min<std::size_t>(planes.size(), MAX_PLANES));
-  return planes;
-}
+constexpr float obstacle_reach = 3;
 
 View view_block(const Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
@@ -182,10 +161,9 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   view.material = glm::vec4(glm::vec3(frame.material), frame.opacity);
   const Viewport& window = frame.viewport;
   view.window = glm::vec4(window.x, window.y, window.width, window.height);
-  const std::vector<glm::vec4> planes = planes_of(frame);
+  const std::vector<glm::vec4> planes = find_planes(frame);
   view.scene = glm::vec4(planes.size(), frame.ground ? 1 : 0, 0, 0);
-  for (std::size_t i = 0; i < MAX_PLANES; ++i)  // no body is below -1e30 m
-    view.planes[i] = i < planes.size() ? planes[i] : glm::vec4(0, 0, 0, -1e30f);
+  std::ranges::copy(planes, view.planes);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {
     const glm::vec3 colour = glm::convertSRGBToLinear(turned(options.body_colour, turns[i % turns.size()]));
@@ -228,18 +206,18 @@ void fill_corners(Renderer& renderer, const Frame& frame, GLuint values) {
     part(ATTRIBUTE_VALUE, 1, offsetof(SurfaceCorner, value));
   }
   const bool rested = frame.options.is_cut() || renderer.bodies.size() > 1;
-  const Program& program = use(renderer, "corners");
-  program.set("count", unsigned(count));
-  program.set("valued", values ? 1 : 0);
-  program.set("rested", rested ? 1 : 0);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
-  if (rested) rest_of(renderer).bind_storage(BIND_RENDER_REST);
-  if (values) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_VALUES, values);
-  renderer.triangles.bind_storage(BIND_RENDER_TRIANGLES);
-  corners.offsets.bind_storage(BIND_RENDER_OFFSETS);
-  corners.items.bind_storage(BIND_RENDER_ITEMS);
-  corners.values.bind_storage(BIND_RENDER_CORNERS);
-  glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
+  Pass& pass = kernel(renderer, "corners");
+  pass.program.set("valued", values ? 1 : 0);
+  pass.program.set("rested", rested ? 1 : 0);
+  Recorder& recorder = renderer.recorder;
+  recorder.give("Positions", frame.positions);
+  // What is not asked for is not read, but GL wants some buffer in every block.
+  recorder.give("Rest", rested ? rest_of(renderer) : renderer.triangles);
+  recorder.give("Values", values ? values : renderer.triangles.id());
+  recorder.give("Triangles", renderer.triangles);
+  recorder.give("Offsets", corners.offsets), recorder.give("Items", corners.items);
+  recorder.give("Corners", corners.values);
+  run_over(renderer, pass, count);
 }
 
 // To the image or, with `shadow`, to the map.
@@ -288,21 +266,23 @@ void fit_light(Renderer& renderer, const Frame& frame) {
   }
   const std::size_t count = renderer.mesh.positions.size();
   const float rest_size = glm::length(renderer.rest_high - renderer.rest_low);
-  shadow.size = has_shapes(frame) ? 1536 : 512;  // obstacles are larger than bodies
-  const Program& kernel = use(renderer, "shadow fit");
-  kernel.set("count", unsigned(count));
-  kernel.set("map_size", float(shadow.size));
+  shadow.size = has_surfaces(frame) ? 1536 : 512;  // obstacles are larger than bodies
+  Pass& pass = kernel(renderer, "shadow fit");
+  const Program& program = pass.program;
+  program.set("map_size", float(shadow.size));
   const Bounds nothing{glm::dvec3(1e30), glm::dvec3(-1e30)};
-  const Bounds shapes = frame.model ? with_shapes(nothing, *frame.model, frame.time, INFINITY) : nothing;
-  kernel.set("shapes_low", glm::vec3(shapes.low)), kernel.set("shapes_high", glm::vec3(shapes.high));
-  kernel.set("reach", shape_reach * rest_size);
+  const Bounds obstacles =
+      frame.model ? with_obstacles(nothing, *frame.model, frame.time, INFINITY) : nothing;
+  program.set("obstacles_low", glm::vec3(obstacles.low));
+  program.set("obstacles_high", glm::vec3(obstacles.high));
+  program.set("reach", obstacle_reach * rest_size);
   // Centre and radius of what is worth a shadow: a blown-up vertex must not take the whole map.
-  kernel.set("limit", glm::vec4(frame.camera.target, 4.0f * std::max(frame.camera.distance, rest_size)));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_POSITIONS, frame.positions);
-  shadow.bounds.bind_storage(BIND_RENDER_BOUNDS);
-  shadow.light.bind_storage(BIND_RENDER_FIT);
-  glDispatchCompute(unsigned(work_groups(count, 128)), 1, 1);
-  glMemoryBarrier(GL_UNIFORM_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  program.set("limit", glm::vec4(frame.camera.target, 4.0f * std::max(frame.camera.distance, rest_size)));
+  Recorder& recorder = renderer.recorder;
+  recorder.give("Positions", frame.positions);
+  recorder.give("Bounds", shadow.bounds), recorder.give("Fit", shadow.light);
+  run_over(renderer, pass, count);
+  recorder.barrier(GL_UNIFORM_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   if (!options.follow || shadow.centre_copied) return;
   shadow.light.copy_to(shadow.centre, 0, offsetof(Light, centre), sizeof(glm::vec4));
   shadow.centre_copied = Fence::here();
@@ -348,8 +328,8 @@ void draw_shadow_map(Renderer& renderer, const Frame& frame, GLuint values) {
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.5f, 2.0f);
   draw_bodies(renderer, frame, values, true);
-  glEnable(GL_DEPTH_CLAMP);  // shapes may reach farther than the map
-  draw_shapes(renderer, frame, true);
+  glEnable(GL_DEPTH_CLAMP);  // obstacles may reach farther than the map
+  draw_obstacles(renderer, frame, true);
   glDisable(GL_DEPTH_CLAMP);
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
@@ -369,7 +349,7 @@ void bind_shadows(const Shadow& shadow) {
 // As fine as the picture needs it.
 void light_planes(Renderer& renderer, const Frame& frame, int count) {
   Shadow& shadow = renderer.shadow;
-  const int part = has_shapes(frame) ? 16 : 32;
+  const int part = has_surfaces(frame) ? 16 : 32;
   const int size = std::clamp(frame.viewport.height / part * 16, 128, 512);  // whole work-groups
   if (shadow.planes_size != size || shadow.planes_count != count) {
     shadow.planes = Texture("light on planes");
@@ -383,13 +363,14 @@ void light_planes(Renderer& renderer, const Frame& frame, int count) {
     shadow.planes_size = size, shadow.planes_count = count;
   }
   bind_shadows(shadow);
-  const Program& program = use(renderer, "plane light");
-  program.set("triangles", unsigned(renderer.mesh.surface.size()));
-  program.set("map_size", size);
-  renderer.corners.values.bind_storage(BIND_RENDER_CORNERS);
+  Pass& pass = kernel(renderer, "plane light");
+  pass.program.set("triangles", unsigned(renderer.mesh.surface.size()));
+  pass.program.set("map_size", size);
+  renderer.recorder.give("Corners", renderer.corners.values);
   glBindImageTexture(IMAGE_PLANES, shadow.planes.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG8);
-  glDispatchCompute(unsigned(size) / 16, unsigned(size) / 16, unsigned(count));
-  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+  pass.grid = glm::uvec3(size / 16, size / 16, count);
+  renderer.recorder.run(pass);
+  renderer.recorder.barrier(GL_TEXTURE_FETCH_BARRIER_BIT);
 }
 
 bool is_behind(const glm::vec4& plane, const Camera& camera) {
@@ -418,7 +399,7 @@ void draw_plane(Renderer& renderer, const Frame& frame, int number, const glm::v
 // The ground hides the background, and both are hidden by bodies drawn before. Walls, and a ground seen from
 // below, let what is behind them through.
 void draw_surroundings(Renderer& renderer, const Frame& frame) {
-  const std::vector<glm::vec4> planes = planes_of(frame);
+  const std::vector<glm::vec4> planes = find_planes(frame);
   const bool solid = frame.ground && !is_behind(planes[0], frame.camera);
   glDisable(GL_BLEND);
   if (solid) draw_plane(renderer, frame, 0, planes[0]);
@@ -458,11 +439,18 @@ void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std
                         reinterpret_cast<const void*>(offset));
 }
 
-const Program& use(Renderer& renderer, const std::string& name) {
-  if (!renderer.programs.contains(name)) renderer.programs.emplace(name, compile(name));
-  const Program& program = renderer.programs.at(name);
-  program.use();
-  return program;
+Pass& kernel(Renderer& renderer, const std::string& name) {
+  if (!renderer.passes.contains(name)) renderer.passes.emplace(name, Pass{compile(name)});
+  Pass& pass = renderer.passes.at(name);
+  renderer.recorder.use(pass.program);
+  return pass;
+}
+
+const Program& use(Renderer& renderer, const std::string& name) { return kernel(renderer, name).program; }
+
+void run_over(Renderer& renderer, Pass& pass, std::size_t count) {
+  pass.work_groups = work_groups(count, 128);
+  renderer.recorder.run(pass, {{"count", unsigned(count)}});
 }
 
 void bind_vertices(Renderer& renderer, const Frame& frame, GLuint values) {
@@ -490,6 +478,7 @@ const Buffer& rest_of(Renderer& renderer) {
 }
 
 void bind_view(Renderer& renderer, const Frame& frame) {
+  renderer.recorder.begin();
   const View view = view_block(renderer, frame);
   renderer.view.write(0, sizeof view, &view);
   renderer.view.bind_uniform(BIND_RENDER_VIEW);
@@ -522,18 +511,19 @@ Renderer make_renderer(const Model& model) {
   return renderer;
 }
 
-// Vertices within 10^-5 of the size of a shape, as metrics count them. Waits for the GPU.
-static std::vector<std::uint32_t> touching_shapes(const Sim& sim) {
-  if (sim.model->shapes.empty()) return {};
-  const auto shapes = shapes_of(*sim.model, sim.settings, time_of(sim), 0, 1)[0];
+// Vertices within 10^-5 of the size of an obstacle that is no half space (the GPU finds those on planes), as
+// metrics count them. Waits for the GPU.
+static std::vector<std::uint32_t> find_touching(const Sim& sim) {
+  auto obstacles = obstacles_at(*sim.model, sim.settings, time_of(sim));
+  std::erase_if(obstacles, [](const MovingObstacle& o) { return o.kind->flat; });
+  if (obstacles.empty()) return {};
   const double near = 1e-5 * sim.model->size;
   std::vector<std::uint32_t> touching;
   const State state = read_state(sim);
   for (std::uint32_t v = 0; v < state.positions.size(); ++v) {
     const glm::dvec3& x = state.positions[v];
-    if (std::ranges::any_of(shapes, [&](const MovingShape& shape) {
-          return glm::distance(x, shape.pose.centre) < 1.01 * shape.reach() + near &&
-                 shape.surface_at(x).distance < near;
+    if (std::ranges::any_of(obstacles, [&](const MovingObstacle& o) {
+          return glm::distance(x, o.pose.centre) < 1.01 * o.reach + near && o.surface_at(x).distance < near;
         }))
       touching.push_back(v);
   }
@@ -543,7 +533,7 @@ static std::vector<std::uint32_t> touching_shapes(const Sim& sim) {
 void renew(Frame& frame, const Sim& sim) {
   frame.time = time_of(sim);
   frame.pairs = sim.pairs && sim.pairs.near ? &sim.pairs : nullptr;
-  if (frame.options.contacts) frame.touching = touching_shapes(sim);
+  if (frame.options.contacts) frame.touching = find_touching(sim);
 }
 
 Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target) {
@@ -556,7 +546,6 @@ Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options,
   if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
   frame.material = energy_material(sim.settings);
   frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
-  frame.planes.assign(sim.model->obstacles.begin(), sim.model->obstacles.end());
   frame.model = sim.model;
   renew(frame, sim);
   const auto held = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };
@@ -576,7 +565,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
-  const int planes = options.backdrop && !frame.over ? int(planes_of(frame).size()) : 0;
+  const int planes = options.backdrop && !frame.over ? int(find_planes(frame).size()) : 0;
   const bool lit_planes = options.shadow && planes > 0, tets = options.look == Look::tets;
   if (tets || options.look == Look::graph || options.is_cut() || renderer.bodies.size() > 1)
     rest_of(renderer);
@@ -606,7 +595,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
   const bool surroundings = options.backdrop && !frame.over, mixed = options.look == Look::graph;
   glDisable(GL_BLEND);
-  if (!frame.over) draw_shapes(renderer, frame, false);
+  if (!frame.over) draw_obstacles(renderer, frame, false);
   if (surroundings && mixed) draw_surroundings(renderer, frame);
   if (frame.opacity == 1)
     glDisable(GL_BLEND);
@@ -634,6 +623,7 @@ std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait) {
 }
 
 std::vector<float> read_values(Renderer& renderer, const Frame& frame) {
+  renderer.recorder.begin();
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
   const GLuint values = vertex_values(renderer, frame);
   std::vector<float> result(values ? renderer.mesh.positions.size() : 0);
@@ -647,17 +637,20 @@ std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait) {
 
 void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, double size, Buffer& distances) {
   if (!distances) distances = Buffer("vertex values, motion", renderer.mesh.positions.size() * sizeof(float));
-  const Program& program = use(renderer, "distances");
-  program.set("scale", float(1 / size));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RENDER_ANSWERS, answers);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
-  fill(renderer, program, positions, distances);
+  renderer.recorder.begin();
+  Pass& pass = kernel(renderer, "distances");
+  pass.program.set("scale", float(1 / size));
+  renderer.recorder.give("Answers", answers);
+  renderer.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
+  fill(renderer, pass, positions, distances);
 }
 
 void reload_shaders(Renderer& renderer) {
-  std::map<std::string, Program> fresh;
-  for (const auto& [name, program] : renderer.programs) fresh[name] = compile(name);
-  renderer.programs = std::move(fresh);
+  std::map<std::string, Pass> fresh;
+  for (const auto& [name, pass] : renderer.passes)
+    if (recipes.contains(name)) fresh[name] = {compile(name)};
+  renderer.passes = std::move(fresh);
+  renderer.touches_sizes.clear();
 }
 
 }  // namespace tetpbd

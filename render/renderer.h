@@ -11,7 +11,8 @@
 
 #include "render/frame.h"
 #include "render/legend.h"
-#include "render/shapes.h"
+#include "render/obstacles.h"
+#include "sim/gl/pass.h"
 #include "sim/model.h"
 
 namespace tetpbd {
@@ -43,12 +44,14 @@ struct Renderer {
   std::vector<std::size_t> bodies;  ///< the first vertex of each
   std::vector<glm::ivec2> sheets;  ///< corners of triangles, the first and how many, of each that has no tets
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
-  std::map<std::string, Program> programs;
+  std::map<std::string, Pass> passes;
+  Recorder recorder;
   VertexArray vertex_array, surface_array, empty_array;
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer graph;            ///< edges' vertices
   Buffer arrow_vertices, touches;
+  std::vector<std::string> touches_sizes;  ///< ... these Pairs::sizes
   Buffer rest;             ///< vec4: rest position and body
   CarriedSurface carried;  ///< of all bodies, or empty
   Buffer carried_vertices, carried_triangles;
@@ -59,7 +62,7 @@ struct Renderer {
   std::map<Colour, VertexGather> values;
   Buffer values_copy;  ///< on its way back
   Fence values_copied;
-  ShapeSurfaces shapes;
+  ObstacleSurfaces obstacles;
   Shadow shadow;
   Legend legend;
 };
@@ -75,8 +78,11 @@ void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std
                GLenum type = GL_FLOAT);
 /// The vertex attributes of all but the surface; `values` by vertex, 0: none.
 void bind_vertices(Renderer& renderer, const Frame& frame, GLuint values = 0);
-/// The program of that name, made when first asked for, in use.
+/// The program or kernel of that name, made when first asked for, in use.
 const Program& use(Renderer& renderer, const std::string& name);
+Pass& kernel(Renderer& renderer, const std::string& name);
+/// Dispatches a kernel over so many items, in work-groups of 128.
+void run_over(Renderer& renderer, Pass& pass, std::size_t count);
 /// The tetrahedra's vertices, rest positions with bodies: made when first asked for.
 const Buffer& tets_of(Renderer& renderer);
 const Buffer& rest_of(Renderer& renderer);

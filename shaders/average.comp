@@ -4,8 +4,8 @@
 #include "pair.glsl"
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
-layout(std430, binding = BIND_SUMS) buffer Sums { ivec4 correction_sums[]; };
-#include "vertex.glsl"
+layout(std430) buffer Sums { ivec4 correction_sums[]; };
+#include "solvers/corrections.glsl"
 
 void average(uint i) {
   Position own = positions[i];

@@ -2,9 +2,9 @@
 // answer. A dispatch of some microseconds, where NVIDIA's driver takes 0.1 to 0.5 ms to turn to glCopyBufferSubData and back.
 #include "layout.glsl"
 layout(local_size_x = 256) in;
-layout(std430, binding = BIND_CHECKPOINT_FROM) readonly buffer From { uint from[]; };
-layout(std430, binding = BIND_CHECKPOINT_TO) writeonly buffer To { uint to[]; };
-layout(std430, binding = BIND_CHECK) readonly buffer Check { uint bad_step, bad_vertex; };
+layout(std430) readonly buffer From { uint from[]; };
+layout(std430) writeonly buffer To { uint to[]; };
+layout(std430) readonly buffer Check { uint bad_step, bad_vertex; };
 uniform uint count, from_at, to_at, good_only;
 
 void main() {

@@ -23,9 +23,8 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
-#define MAX_PLANES 8
-#define MAX_SHAPES 16
-#define MAX_OBSTACLES 32  // half spaces and shapes: bits of a word, beside one
+#define MAX_OBSTACLES 31  // of a step, the ground among them: bits of a word, beside one (newton/vectors.glsl)
+#define MAX_PLANES 8      // of them half spaces at rest that are no more than their planes
 #define RIGID_SUMS 21
 #define RIGID_SPEED 1024.0  // m/s, the fastest that sums hold
 #define RIGID_PARTS 256.0  // of a quantum: of 2^23 vertices they do not overflow
@@ -62,17 +61,10 @@ struct Step {
   vec4 compliance[2];       // over h^2, by constraint kind
 };
 
-// An obstacle that is no half space at rest, at the end of a substep (a uniform block, std140). Its own coordinates are from its centre.
-#define SHAPE_PLANE 0     // below y = 0
-#define SHAPE_SPHERE 1
-#define SHAPE_CAPSULE 2   // about a part of the y axis
-#define SHAPE_BOX 3
-#define SHAPE_CYLINDER 4  // along the y axis
-#define SHAPE_HEIGHTS 5   // below heights over a grid of x and z
-#define SHAPE_GRID 6      // distances at the points of a grid
-struct Shape {
+// Any other obstacle at the end of a substep (a uniform block, std140). Its own coordinates are from its centre.
+struct ObstacleRecord {
   vec3 centre;
-  int kind;
+  int kind;         // the row of the table of kinds
   vec3 centre_low;  // what `centre` drops
   float friction;
   vec3 right;       // its x axis
@@ -86,18 +78,18 @@ struct Shape {
   vec3 velocity;    // of the centre over the substep
   int first;        // of a field's values
   vec3 spin;        // rad/s
-  int _0;
+  int convex;       // 1: lies behind the plane at any nearest point
   vec3 origin;      // of a field's points
-  int _1;
+  int _0;
   ivec3 cells;      // points of a field along each axis
-  int _2;
+  int _1;
 };
 
-// A hard body that touches half spaces (rigid.glsl). Momenta and impulses per mass of the body.
+// A hard body that touches obstacles (contact/rigid.glsl). Momenta and impulses per mass of the body.
 struct RigidSide {
   int sums[RIGID_SUMS];   // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and products; then what is
                           // finer than a quantum of velocity and arm x velocity
-  uint near;              // how many vertices would be in a half space next
+  uint near;              // how many vertices would touch an obstacle next
   uint fixed_vertices;
   uint carried;           // 1: all velocities are the body's in this substep
   uint touching;          // how many contacts carried it
@@ -134,7 +126,7 @@ struct RigidRecord {
 // What a dispatch does (a dispatch parameter); bits.
 #define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v
 #define PHASE_SOLVE 2u    // corrections, then contacts
-#define PHASE_SIDE 8u     // which side of hard bodies' records (rigid.glsl)
+#define PHASE_SIDE 8u     // which side of hard bodies' records (contact/rigid.glsl)
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_WATCH 16u   // mode explicit: notes how stiff constraints are
 #define PHASE_CHANGED 32u // mode explicit: the substeps before were longer or shorter
@@ -142,36 +134,11 @@ struct RigidRecord {
 #define PHASE_SHARED_SIDE 128u  // which numbers of contacts are of this substep (pairs/sums.glsl)
 #define PHASE_SHARED_LAST 256u  // the next look at contacts counts exactly, so these begin at 0 as well
 
-// Storage bindings of the simulation; a kernel has 8 at most, but for contact of bodies, where it may have 10.
-#define BIND_POSITIONS 0
-#define BIND_VELOCITIES 1
-#define BIND_PREDICTED 2
-#define BIND_QUANTIZED 3      // what the neighbours of a vertex see of it (quantized.glsl)
-#define BIND_QUANTIZED_OUT 4
-#define BIND_CHECK 5          // the first state that is not finite, and the stiffest constraint
-#define BIND_PATCHES 6        // sim/solvers/patches.h
-#define BIND_MULTIPLIERS 7    // with compliance, of each of the patches' records
-#define BIND_SUMS 8           // constraint modes: sums of corrections
-#define BIND_RECORDS 9        // mode paper: of one constraint kind
-#define BIND_CHECKPOINT_FROM 10
-#define BIND_CHECKPOINT_TO 11
-#define BIND_RIGID 12         // hard bodies in contact
-// Mode newton (newton/newton.glsl).
-#define BIND_NEWTON_VECTORS 6
-#define BIND_NEWTON_BLOCKS 7
-#define BIND_NEWTON_SUMS 8
-#define BIND_NEWTON_MESH 9
-#define BIND_NEWTON_COARSE 13
-// Contact between bodies (pairs/pairs.glsl).
-#define BIND_PAIR_MESH 14
-#define BIND_PAIR_SPHERES 15
-#define BIND_PAIR_LISTS 16
-#define BIND_PAIR_SUMS 17
-#define BIND_PAIR_REST 18
+// Storage blocks have names alone: sim/gl/pass.h gives them binding points.
 // Uniform blocks.
 #define BIND_STEP 0
-#define BIND_SHAPES 1
-// Texture units of the simulation: the fields of all shapes, one after the other.
+#define BIND_OBSTACLES 1
+// Texture units of the simulation: the fields of all obstacles, one after the other.
 #define UNIT_FIELDS 15
 // Atomic counters.
 #define BIND_GUARDS 0

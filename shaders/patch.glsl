@@ -4,22 +4,14 @@
 // params.correction_quantum times the vertex's number of constraints, and no correction exceeds params.max_correction = 2^30 quanta over
 // that number: no sum can overflow.
 // All of patches.h's words in pairs: headers of chunks, their vertices, their records.
-layout(std430, binding = BIND_PATCHES) restrict readonly buffer Patches { uvec2 patch_words[]; };
+layout(std430) restrict readonly buffer Patches { uvec2 patch_words[]; };
 #if COMPLIANT
-#if !LEAPFROG
-layout(std430, binding = BIND_MULTIPLIERS) restrict buffer Multipliers { float multipliers[]; };  // of records, in this substep
-#endif
 shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
 #endif
 shared ivec4 local_positions[MAX_VERTICES];  // quantized
 shared uint global_ids[MAX_VERTICES];
 shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];
-#if LEAPFROG
-shared uint stiffest_here;
-// Of a constraint, h^2 b.
-void note_stiffness(float value) { atomicMax(stiffest_here, floatBitsToUint(value)); }
-#endif
 // Bytes of a record: its vertices' numbers in the chunk.
 uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
 #define Ids uint
@@ -58,9 +50,6 @@ Chunk chunk_at(uint number) {
 
 void clear_sums() {
   for (uint k = gl_LocalInvocationIndex; k < 3 * MAX_OWNED; k += GROUP_SIZE) sums[k] = 0;
-#if LEAPFROG
-  if (gl_LocalInvocationIndex == 0u) stiffest_here = 0u;
-#endif
 }
 /// A chunk's vertices as their neighbours see them. Needs a barrier behind it.
 void load_chunk(uint number) {

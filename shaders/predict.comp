@@ -4,19 +4,15 @@
 #include "pair.glsl"
 #include "quantized.glsl"
 layout(local_size_x = 256) in;
-#include "vertex.glsl"
+#include "solvers/$SCHEME.glsl"
 
 void predict(uint i) {
   Position own = positions[i];
   Pair x = Pair(own.high, own.low);
-  Pair here = x, start = x, v = Pair(velocities[i].high, velocities[i].low);
-#if LEAPFROG
-  start = predict_position(x, Pair(-v.high, -v.low));  // where it was a substep before
-#else
-  if (own.inverse_mass > 0.0) x = predict_position(x, predict_velocity(v));
-#endif
+  Pair here = x, v = Pair(velocities[i].high, velocities[i].low);
+  if (own.inverse_mass > 0.0) x = seen_by_neighbours(x, v);
 #if COMPLIANT
-  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(start, 0.0);
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(here, v), 0.0);
 #endif
 #if RIGID_CONTACT
   RigidState body = state_at(i);

@@ -1,7 +1,7 @@
 // What a GPU asks for at least: a dispatch that does next to nothing ($COPY 0), and bytes read and written (1). Used by bench.
 layout(local_size_x = 256) in;
-layout(std430, binding = 0) restrict readonly buffer From { uvec4 from[]; };
-layout(std430, binding = 1) restrict writeonly buffer To { uvec4 to[]; };
+layout(std430) restrict readonly buffer From { uvec4 from[]; };
+layout(std430) restrict writeonly buffer To { uvec4 to[]; };
 void main() {
   uint i = gl_WorkGroupID.y * gl_NumWorkGroups.x * 256u + gl_GlobalInvocationID.x;
 #if $COPY

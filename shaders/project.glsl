@@ -23,10 +23,7 @@ void project_$KIND(uint number, uint owned) {
 #else
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
 #endif
-  float before = 0.0, gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
-#if !LEAPFROG
-  if ((phases & PHASE_PREDICT) == 0u) before = multipliers[number];
-#endif
+  float before = last_multiplier(number), gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
   if (gamma > 0.0) {
     vec3 start[$ARITY];
     ivec4 first_start = start_positions[record.x & 255u];
@@ -44,11 +41,11 @@ void project_$KIND(uint number, uint owned) {
   const float a = 0.0, share = 1.0;
 #endif
   Multiplier m = multiplier(c, w, k, params.max_correction, a, share);
-#if COMPLIANT && !LEAPFROG
-  if ((phases & PHASE_FINISH) == 0u) multipliers[number] = before + m.lambda;
+#if COMPLIANT
+  keep_multiplier(number, before + m.lambda);
 #endif
-#if LEAPFROG && !$RATE
-  if ((phases & PHASE_WATCH) != 0u) note_stiffness(weighted(c, w).sum / a);
+#if !$RATE
+  NOTE_STIFFNESS(weighted(c, w).sum / a);
 #endif
 #if COUNT_GUARDS
   if (local_id(record.x, 0) < owned) count_guards(m.guards);  // in one patch of those that have it

@@ -1,5 +1,12 @@
 // As project.glsl, of a kind of two components, which only a material has: they are solved together (method.md eq. 32).
 float word_of_$KIND(uint number, uint word) { return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2][word % 2]); }
+// b of method.md eq. 39b, times h^2.
+float stiffness_of_$KIND(Constraint4x2 c, float w[4], float a[2]) {
+  float b = 0.0;
+  for (int j = 0; j < 4; ++j)
+    b += w[j] * (dot(c.gradient[0][j], c.gradient[0][j]) / a[0] + dot(c.gradient[1][j], c.gradient[1][j]) / a[1]);
+  return b;
+}
 void project_$KIND(uint number, uint owned) {
   uint ids = patch_words[RECORDS_AT + number].x;  // its vertices, a byte each
   vec3 x[4];
@@ -12,26 +19,15 @@ void project_$KIND(uint number, uint owned) {
   }
   for (uint v = 0u; v < $VALUES; ++v) rest[v] = word_of_$KIND(number, 1u + v);
   Constraint4x2 c = $KIND(x, rest, ids);
-  float a[2], before[2] = float[2](0.0, 0.0);
+  float a[2], before[2];
   for (uint k = 0u; k < 2u; ++k) {
     a[k] = word_of_$KIND(number, 1u + $VALUES + k) * params.inverse_h * params.inverse_h;
-#if !LEAPFROG
-    if ((phases & PHASE_PREDICT) == 0u) before[k] = multipliers[number + k];  // a record has several words, the first is theirs
-#endif
+    before[k] = last_multiplier(number + k);  // a record has several words, the first is theirs
     c.C[k] += a[k] * before[k];
   }
   Multiplier2 m = multiplier(c, w, params.max_correction, a, params.share);
-#if LEAPFROG
-  if ((phases & PHASE_WATCH) != 0u) {
-    float b = 0.0;
-    for (int j = 0; j < 4; ++j)
-      b += w[j] * (dot(c.gradient[0][j], c.gradient[0][j]) / a[0] + dot(c.gradient[1][j], c.gradient[1][j]) / a[1]);
-    note_stiffness(b);
-  }
-#else
-  if ((phases & PHASE_FINISH) == 0u)
-    for (uint k = 0u; k < 2u; ++k) multipliers[number + k] = before[k] + m.lambda[k];
-#endif
+  for (uint k = 0u; k < 2u; ++k) keep_multiplier(number + k, before[k] + m.lambda[k]);
+  NOTE_STIFFNESS(stiffness_of_$KIND(c, w, a));
 #if COUNT_GUARDS
   if (local_id(ids, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
 #endif

@@ -5,7 +5,8 @@
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 uniform uint phases;
-layout(std430, binding = BIND_SUMS) buffer Sums { int correction_sums[]; };
+layout(std430) buffer Sums { int correction_sums[]; };
+#include "solvers/multipliers.glsl"
 #include "patch.glsl"
 
 void main() {

@@ -5,7 +5,8 @@
 #include "pair.glsl"
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
-#include "vertex.glsl"
+#include "solvers/corrections.glsl"
+#include "solvers/multipliers.glsl"
 #include "patch.glsl"
 
 void main() {
@@ -35,9 +36,6 @@ void main() {
       project_chunk(chunk_at(next), exists);
       barrier();
     }
-#endif
-#if LEAPFROG
-    if (lane == 0u && (phases & PHASE_WATCH) != 0u) atomicMax(largest, stiffest_here);
 #endif
     if (mine) correction = vec3(sums[3u * lane], sums[3u * lane + 1u], sums[3u * lane + 2u]) * (params.correction_quantum * params.omega);
   }

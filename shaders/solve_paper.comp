@@ -5,8 +5,8 @@
 #include "pair.glsl"
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
-layout(std430, binding = BIND_SUMS) buffer Sums { uint correction_sums[]; };
-layout(std430, binding = BIND_RECORDS) restrict readonly buffer Records { Record$ARITY records[]; };
+layout(std430) buffer Sums { uint correction_sums[]; };
+layout(std430) restrict readonly buffer Records { Record$ARITY records[]; };
 #define Ids uint  // the record
 uint id_of(Ids record, int j) { return records[record].vertices[j]; }
 #include "constraints/types.glsl"

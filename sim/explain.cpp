@@ -1,11 +1,26 @@
 // What a simulation allocates and dispatches.
 #include <algorithm>
 #include <cmath>
-#include <map>
 
-#include "sim/sim.h"
+#include "sim/snapshot.h"
 
 namespace tetpbd {
+
+namespace {
+
+// The second of two steps, because only the first after a change from outside predicts; then all is as it
+// was.
+void count_step(Sim& sim) {
+  const Buffer kept("explained", snapshot_bytes(sim));
+  const Snapshot before = take_snapshot(sim, kept, 0);
+  step(sim);
+  sim.recorder.counting = true;
+  step(sim);
+  sim.recorder.counting = false;
+  restore_snapshot(sim, before, kept);
+}
+
+}  // namespace
 
 Explanation explain(Sim& sim, int timed_steps) {
   Pairs& p = sim.pairs;
@@ -26,8 +41,8 @@ Explanation explain(Sim& sim, int timed_steps) {
                                &sim.check.read_back,
                                &sim.check.checkpoint,
                                &sim.rigid_bodies,
-                               &sim.shapes,
-                               &sim.fields,
+                               &sim.obstacles.records,
+                               &sim.obstacles.fields,
                                &p.mesh,
                                &p.rest,
                                &p.spheres,
@@ -39,50 +54,21 @@ Explanation explain(Sim& sim, int timed_steps) {
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 
-  std::map<Pass*, std::optional<double>> times_of;
-  const auto mean = [](Timer& timer) {
+  if (timed_steps == 0) count_step(sim);
+  const double steps = std::max(timed_steps, 1);
+  for (DispatchCount& counted : sim.recorder.counted) {
     double sum = 0;
-    int count = 0;
-    for (; const auto ms = timer.poll(true); ++count) sum += *ms;
-    return std::pair(count > 0 ? std::optional(sum / count) : std::nullopt, count);
-  };
-  const auto time_of = [&](Pass& pass) {
-    if (const auto known = times_of.find(&pass); known != times_of.end()) return known->second;
-    return times_of[&pass] = mean(pass.timer).first;
-  };
-  const auto kernel = [&](Pass& pass, const std::string& what, long per_step, std::size_t more) {
-    const auto ms = time_of(pass);
+    int times = 0;
+    for (; const auto ms = counted.timer.poll(true); ++times) sum += *ms;
+    const std::optional<double> ms = times > 0 ? std::optional(sum / times) : std::nullopt;
+    const double per_step = double(counted.dispatches) / steps;
     result.dispatches.push_back(
-        {pass.program.label() + what, pass.work_groups, per_step, pass.bytes + more, ms});
-    result.ms_per_step += ms.value_or(0) * double(per_step);
-    result.dispatches_per_step += per_step;
-    result.bytes_per_step += (pass.bytes + more) * std::size_t(per_step);
-  };
-  kernel(sim.predict, "", 0, 0);
-  if (sim.rigid_bodies) kernel(sim.rigid_contact, "", sim.plan.substeps, 0);
-  std::map<std::pair<std::size_t, unsigned>, long> times;  // of a pass with these phases, per substep
-  for (const Dispatch& dispatch : sim.substep)
-    ++times[{dispatch.pass, sim.solver.schedule ? 0 : dispatch.phases}];
-  for (const auto& [dispatch, count] : times) {
-    const auto& [pass, phases] = dispatch;
-    std::string what;
-    std::size_t more = 0;  // velocities and predicted positions, there or back
-    if (pass + 1 == sim.solver.iteration.size() && !sim.solver.schedule) {
-      const bool predicts = phases & PHASE_PREDICT, finishes = phases & PHASE_FINISH;
-      for (const auto& [does, name] : {std::pair(predicts, ", predict"), std::pair(finishes, ", finish")})
-        if (does) what += name;
-      if (predicts || finishes)
-        more = sim.model->positions.size() * sizeof(Velocity) * (predicts && finishes ? 2 : 3);
-    }
-    kernel(sim.solver.iteration[pass], what, count * sim.plan.substeps, more);
+        {counted.name, counted.work_groups, std::lround(per_step), counted.bytes, ms});
+    result.ms_per_step += ms.value_or(0) * per_step;
+    result.dispatches_per_step += std::lround(per_step);
+    result.bytes_per_step += std::size_t(double(counted.bytes) * per_step);
   }
-  for (Pairs::Kernel* k : {&p.boxes, &p.cull, &p.query, &p.query_edges, &p.meet, &p.push, &p.meet_and_push})
-    if (const auto [ms, count] = mean(k->timer); ms) {
-      const long per_step = std::lround(double(count) / std::max(timed_steps, 1));
-      const std::string what = k == &p.query_edges ? " of edges" : k == &p.meet_and_push ? ", and push" : "";
-      result.dispatches.push_back({k->program.label() + what, k->work_groups, per_step, 0, ms});
-      result.ms_per_step += *ms * count / std::max(timed_steps, 1), result.dispatches_per_step += per_step;
-    }
+  sim.recorder.counted.clear();
   return result;
 }
 

@@ -17,21 +17,20 @@ Error error_of(const NonFinite& found, const std::string& where) {
       "use a smaller dt, more substeps or a lower stiffness", 1);
 }
 
-void copy_parts(const FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only) {
-  check.copy.use();
-  check.copy.set("good_only", unsigned(good_only));
-  check.words.bind_storage(BIND_CHECK);
+void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only) {
+  Recorder& recorder = check.recorder;
+  recorder.begin();
+  recorder.give("Check", check.words);
   for (const auto& [from, first, to, at, bytes] : parts) {
-    const std::size_t words = bytes / 4;
-    check.copy.set("count", unsigned(words));
-    check.copy.set("from_at", unsigned(first / 4));
-    check.copy.set("to_at", unsigned(at / 4));
-    from->bind_storage(BIND_CHECKPOINT_FROM);
-    to->bind_storage(BIND_CHECKPOINT_TO);
-    glDispatchCompute(GLuint(std::min<std::size_t>(work_groups(words, 256), 1024)), 1, 1);
+    const unsigned words = unsigned(bytes / 4);
+    recorder.give("From", *from), recorder.give("To", *to);
+    check.copy.work_groups = std::min<std::size_t>(work_groups(words, 256), 1024);
+    recorder.run(check.copy, {{"count", words},
+                              {"from_at", unsigned(first / 4)},
+                              {"to_at", unsigned(at / 4)},
+                              {"good_only", unsigned(good_only)}});
   }
-  // The next step overwrites what was read; restoring reads what was written.
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  recorder.barrier(GL_BUFFER_UPDATE_BARRIER_BIT);  // restoring reads what was written
 }
 
 namespace {

@@ -9,6 +9,7 @@
 
 #include "sim/carried.h"
 #include "sim/error.h"
+#include "sim/gl/pass.h"
 
 namespace tetpbd {
 
@@ -20,7 +21,8 @@ struct FiniteCheck {
   static constexpr long ask_every = 32, checkpoint_every = 64;  ///< steps
   Buffer words, read_back;  ///< the kernels' block, and its copy for an answer under way
   Fence asked;
-  Program copy;               ///< checkpoint.comp
+  Pass copy;  ///< checkpoint.comp
+  Recorder recorder;
   Buffer checkpoint;          ///< of the last snapshot before a state that is not finite
   std::deque<Snapshot> kept;  ///< the last ones: which of them `checkpoint` holds, the answer tells
   long first = 0;             ///< step of the state that was last given, the first checkpoint if it is finite
@@ -37,6 +39,6 @@ struct CopiedPart {
   std::size_t at, bytes;
 };
 /// Of what kernels wrote, by a kernel; `good_only`: unless a state was not finite. Queued.
-void copy_parts(const FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only);
+void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only);
 
 }  // namespace tetpbd

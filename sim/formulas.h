@@ -37,27 +37,38 @@ struct Formulas {
   static real atan(real y, real x) { return Math::atan(y, x); }
   static real pow(real x, real y) { return Math::pow(x, y); }
   static real log(real x) { return Math::log(x); }
-  const float* texels = nullptr;  // of a shape's field
+  const float* texels = nullptr;  // of an obstacle's field
+  struct Surface;
+  struct Solid;
+  using Distance = Surface (Formulas::*)(Solid, vec3);
+  Distance distance = nullptr;  // of the obstacle's kind
   real texel(int i) const { return real(texels[i]); }
   using Ids = const uint*;
   static uint id_of(Ids ids, int j) { return ids[j]; }
+  // Here GCC 12 takes the initialised `distance` for one that is not.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+  Surface surface_of(Solid s, vec3 p) { return (this->*distance)(s, p); }
+#pragma GCC diagnostic pop
   // in order of use
   // clang-format off
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #include "shaders/constraints/types.glsl"
 #include "constraint_formulas.inc"  // CMake's: every other file there
-#include "shaders/contact.glsl"
+#include "shaders/contact/plane.glsl"
 #include "shaders/pairs/formulas.glsl"
-#include "shaders/shapes.glsl"
-#define SHAPES 1
+#include "shaders/contact/solid.glsl"
+#include "obstacle_formulas.inc"  // CMake's: every file of shaders/contact/obstacles
+#include "shaders/contact/find_contact.glsl"
+#define SOLIDS 1
 #define SHARED_TOUCHES  // a work-group's in GLSL, the caller's here
 #define TOUCHES Touch *contacts,
-#include "shaders/impulses.glsl"
+#include "shaders/contact/impulses.glsl"
 #undef TOUCHES
 #undef SHARED_TOUCHES
 #undef SLIP_OF
-#undef SHAPES
+#undef SOLIDS
 #pragma GCC diagnostic pop
   // clang-format on
 };

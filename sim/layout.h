@@ -12,12 +12,12 @@ using glm::vec3;
 using glm::vec4;
 #include "shaders/layout.glsl"
 }  // namespace layout
+using layout::ObstacleRecord;
 using layout::Position;
 using layout::RigidRecord;
-using layout::Shape;
 using layout::Step;
 using layout::Velocity;
 static_assert(sizeof(Position) == 32 && sizeof(Velocity) == 32 && sizeof(layout::Record4) == 20);
-static_assert(sizeof(Shape) == 160);
+static_assert(sizeof(ObstacleRecord) == 160);
 static_assert(sizeof(Step) == 96 + 32 + 16 * MAX_PLANES + 32);
 }  // namespace tetpbd

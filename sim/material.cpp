@@ -10,10 +10,10 @@ Lame lame(double young_modulus, double poisson_ratio) {
           young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))};
 }
 
-glm::vec4 energy_material(const Settings& settings) {
-  if (settings.material == "none") return glm::vec4(0);
-  const Lame own = lame(settings.young_modulus, settings.poisson_ratio);
-  return glm::vec4(own.mu, own.lambda, settings.material == "springs" ? 2 : 1, 0);
+glm::vec4 energy_material(const Material& material) {
+  if (material.material == "none") return glm::vec4(0);
+  const Lame own = lame(material.young_modulus, material.poisson_ratio);
+  return glm::vec4(own.mu, own.lambda, material.material == "springs" ? 2 : 1, 0);
 }
 
 namespace {
@@ -68,18 +68,18 @@ void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame
 
 }  // namespace
 
-ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings) {
-  if (mesh.thickness > 0 && settings.material != "none")
-    throw Error("a sheet has no material", "material " + settings.material,
+ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material) {
+  if (mesh.thickness > 0 && material.material != "none")
+    throw Error("a sheet has no material", "material " + material.material,
                 "give constraints stretch and isobend their compliance, and material none");
-  ConstraintSystem system = build_constraints(mesh, kinds_in_use(settings));
-  const Lame m = lame(settings.young_modulus, settings.poisson_ratio);
-  if (settings.material == "springs")
+  ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
+  const Lame m = lame(material.young_modulus, material.poisson_ratio);
+  if (material.material == "springs")
     make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
-  if (settings.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
   if (system.present[index_of<Dashpot>])
     make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m,
-                  settings.constraint_damping);
+                  material.constraint_damping);
   return system;
 }
 

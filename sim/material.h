@@ -16,11 +16,11 @@ struct Lame {
 Lame lame(double young_modulus, double poisson_ratio);
 
 /// What tet_energy of shaders/energy.glsl is told of it.
-glm::vec4 energy_material(const Settings& settings);
+glm::vec4 energy_material(const Material& material);
 
-/// The constraints of a mesh of the kinds that settings use, with their material's compliances if they have
+/// The constraints of a mesh of the kinds that its material uses, with the compliances of its model if it has
 /// one.
-ConstraintSystem build_constraints(const TetMesh& mesh, const Settings& settings);
+ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material);
 
 /// Materials by name: what a scene's "material": "rubber" puts in place.
 const std::vector<Preset>& material_presets();

@@ -9,12 +9,15 @@
 #include <ranges>
 
 #include "shaders/metrics/layout.glsl"
+#include "sim/contact/moving_obstacle.h"
 #include "sim/material.h"
 
 namespace tetpbd {
 
 namespace {
 
+// Of the kinds that are measured, in the order of the table.
+constexpr std::array record_blocks = {"Stretch", "Bend", "Volume"};
 constexpr std::size_t ring_size = 16, measured_kinds = std::tuple_size_v<decltype(Metrics::counts)>;
 
 // Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
@@ -79,7 +82,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
 }  // namespace
 
 Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
-  // Those that are measured, in the order of their bindings; further kinds have no measure.
+  // Those that are measured; further kinds have no measure.
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
   const bool all_made = made.present.size() >= measured_kinds &&
                         std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
@@ -121,9 +124,8 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
                         GL_STREAM_READ);
   for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
-    m.kernels.push_back(Program::compute(
-        fmt::format("metrics/{}.comp", name), {},
-        {fmt::format("SHAPES {}", model.shapes.size()), fmt::format("FIELDS {:d}", has_fields(model))}));
+    m.passes.push_back(
+        {Program::compute(fmt::format("metrics/{}.comp", name), {}, obstacle_defines(model))});
   m.vertices = double(model.positions.size());
   return m;
 }
@@ -132,34 +134,30 @@ void measure(Metrics& m, const Sim& sim) {
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
-  bind_shapes(sim, sim.shapes_now);
-  sim.positions.bind_storage(BIND_M_POSITIONS);
-  sim.velocities.bind_storage(BIND_M_VELOCITIES);
-  m.rest.bind_storage(BIND_M_REST);
-  for (std::size_t k = 0; k < m.records.size(); ++k) m.records[k].bind_storage(BIND_M_STRETCH + int(k));
-  m.partials.bind_storage(BIND_M_PARTIALS);
+  bind_obstacles(sim.obstacles, sim.obstacles.present);
+  Recorder& recorder = m.recorder;
+  recorder.begin();
+  recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
+  recorder.give("Rest", m.rest), recorder.give("Partials", m.partials);
+  for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_M_ROW, m.rows[slot].id(),
-                      GLintptr(b * M_STRIDE * sizeof(float)), M_STRIDE * sizeof(float));
+    recorder.give("Row", m.rows[slot].id(), b * M_STRIDE * sizeof(float), M_STRIDE * sizeof(float));
     // About four tets per invocation before there are more groups; of a sheet, edges.
     const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
     const unsigned groups =
         unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
-    for (const Program& kernel : m.kernels) {
-      kernel.use();
-      kernel.set("groups", groups);
+    for (Pass& pass : m.passes) {
+      const Program& kernel = recorder.use(pass.program);
       kernel.set("vertex_range", body.vertices);
       kernel.set("edge_range", body.edges), kernel.set("hinge_range", body.hinges);
       kernel.set("tet_range", body.tets);
       kernel.set("mass", float(body.mass));
-      if (&kernel == &m.kernels[0]) kernel.set("material", energy_material(sim.settings));
+      if (&pass == &m.passes[0]) kernel.set("material", energy_material(sim.settings));
       kernel.set("touching", float(1e-5 * body.size));
-      const bool one_group =
-          &kernel == &m.kernels[2] || &kernel == &m.kernels[4];  // these add the groups' sums
-      glDispatchCompute(one_group ? 1 : groups, 1, 1);
-      // The next kernel reads these sums; the next body's first overwrites what this body's last read.
-      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+      const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // these add the groups' sums
+      pass.work_groups = one_group ? 1 : groups;
+      recorder.run(pass, {{"groups", groups}});
     }
   }
   m.pending.push_back({Fence::here(),

@@ -33,7 +33,7 @@ struct Measurement {
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
   double elastic = 0;                 ///< J, of a material
-  double contacts = 0;  ///< pairs of a vertex and a half space (ground, obstacle) that it touches
+  double contacts = 0;                ///< pairs of a vertex and an obstacle, or the ground, that it touches
   double penetration_max =
       0;  ///< of the vertex deepest in an obstacle, over the body's size; NaN without one
   double penetration_999 = 0;  ///< that 99.9 % of vertices are under
@@ -62,9 +62,10 @@ struct Metrics {
   std::vector<Buffer> records;          ///< by kind
   std::array<std::size_t, 3> counts{};  ///< constraints, by kind
   Buffer rest, partials;
-  std::vector<Program> kernels;  ///< in order of dispatch
-  std::vector<Buffer> rows;      ///< a ring: a row per body in each
-  std::deque<Pending> pending;   ///< in order
+  std::vector<Pass> passes;  ///< in order of dispatch
+  Recorder recorder;
+  std::vector<Buffer> rows;     ///< a ring: a row per body in each
+  std::deque<Pending> pending;  ///< in order
   std::size_t measured = 0;
 };
 

@@ -12,55 +12,9 @@
 #include "sim/constraint_kinds.h"
 #include "sim/error.h"
 #include "sim/hilbert.h"
-#include "sim/moving_shape.h"
 #include "sim/parallel.h"
-#include "sim/settings.h"
 
 namespace tetpbd {
-
-std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings) {
-  std::vector<glm::dvec4> planes = model.obstacles;
-  if (settings.ground) planes.insert(planes.begin(), glm::dvec4(0, 1, 0, settings.ground_height));
-  return planes;
-}
-
-std::vector<std::vector<MovingShape>> shapes_of(const Model& model, const Settings& settings, double start,
-                                                double h, int substeps) {
-  std::vector<std::vector<MovingShape>> all;
-  for (int s = 0; s < (std::ranges::any_of(model.shapes, moves) ? substeps : 1); ++s) {
-    all.emplace_back();
-    for (const Obstacle& shape : model.shapes)
-      all.back().push_back(moving_shape(shape, start + s * h, h, settings.friction, settings.restitution));
-  }
-  return all;
-}
-
-bool has_fields(const Model& model) {
-  return std::ranges::any_of(model.shapes, [](const Obstacle& shape) { return bool(shape.field); });
-}
-
-bool has_obstacles(const Model& model, const Settings& settings) {
-  return settings.ground || !model.obstacles.empty() || !model.shapes.empty();
-}
-
-glm::dvec3 out_of_obstacles(const Model& model, const Settings& settings, double time, glm::dvec3 x) {
-  for (const glm::dvec4& plane : planes_of(model, settings))
-    x += glm::dvec3(plane) * std::max(0.0, plane.w - glm::dot(glm::dvec3(plane), x));
-  const auto shapes = shapes_of(model, settings, time, 0, 1);
-  for (const MovingShape& shape : shapes[0]) {
-    const auto surface = shape.surface_at(x);
-    x -= surface.normal * std::min(0.0, surface.distance);
-  }
-  return x;
-}
-
-void add_obstacle(Model& model, const Obstacle& obstacle) {
-  const glm::dvec3 normal = glm::normalize(obstacle.normal);
-  if (is_plane(obstacle))
-    model.obstacles.emplace_back(normal, glm::dot(normal, obstacle.centre));
-  else
-    model.shapes.push_back(obstacle);
-}
 
 void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
               const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,

@@ -4,13 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "sim/contact/obstacle.h"
 #include "sim/mesh/carry.h"
 #include "sim/mesh/tet_mesh.h"
-#include "sim/obstacle.h"
 
 namespace tetpbd {
-
-struct Settings;
 
 /// State on the CPU, in double: what CPU modes step and what tests compare.
 struct State {
@@ -38,23 +36,13 @@ struct Model {
   std::vector<double> masses;          ///< kg, also of fixed vertices
   std::vector<glm::dvec3> positions;   ///< m, where the run starts
   std::vector<glm::dvec3> velocities;  ///< m/s
-  std::vector<glm::dvec4> obstacles;   ///< half spaces at rest, n.x >= d as (n, d), beside the ground
-  std::vector<Obstacle> shapes;        ///< all other obstacles
+  std::vector<Obstacle> obstacles;     ///< beside the ground
   double size = 1;                     ///< m, diagonal of the largest body at rest
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
   /// Where a body has a fine surface: of all bodies, what is drawn and exported in place of `rest.surface`.
   CarriedSurface carried;
 };
-
-/// The half spaces of a step, n.x >= d as (n, d): the ground of the settings first, then obstacles.
-std::vector<glm::dvec4> planes_of(const Model& model, const Settings& settings);
-
-bool has_fields(const Model& model);  ///< any of its shapes
-bool has_obstacles(const Model& model, const Settings& settings);
-/// The nearest place to x outside each in turn.
-glm::dvec3 out_of_obstacles(const Model& model, const Settings& settings, double time, glm::dvec3 x);
-void add_obstacle(Model& model, const Obstacle& obstacle);
 
 /// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices;
 /// `mass_factors`, if not empty, multiply the masses of its vertices.

@@ -73,7 +73,7 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh) {
   std::ranges::stable_sort(mesh.edges, {}, [&](const PairMesh::Edge& e) { return leaf_of[e.vertex[0]]; });
   std::size_t v = 0, e = 0;
   for (std::uint32_t l = 0; l < mesh.leaves.size(); ++l) {
-    PairMesh::Leaf& leaf = mesh.leaves[l];
+    pair_layout::SurfaceLeaf& leaf = mesh.leaves[l];
     leaf.vertices[0] = std::uint32_t(v), leaf.edges[0] = std::uint32_t(e);
     while (v < mesh.vertices.size() && leaf_of[mesh.vertices[v].vertex] == l) ++v;
     while (e < mesh.edges.size() && leaf_of[mesh.edges[e].vertex[0]] == l) ++e;

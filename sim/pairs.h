@@ -4,14 +4,15 @@
 // solvers/pair_contact.h. A scene whose bodies are far apart pays for their boxes alone.
 #pragma once
 
-#include "sim/gl/gpu.h"
+#include "sim/gl/pass.h"
 #include "sim/model.h"
+#include "sim/pair_layout.h"
 
 namespace tetpbd {
 
 struct Carried;
 struct Settings;
-struct Tuning;
+struct SolverInput;
 struct Sim;
 
 /// Whether anything can touch.
@@ -27,17 +28,13 @@ struct PairMesh {
   struct Edge {
     std::uint32_t vertex[2], beside[2], body;  ///< ends; third vertices of the triangles left and right of it
   };
-  /// Some 64 triangles that are together at rest, with the vertices and edges that no leaf before has.
-  struct Leaf {
-    std::uint32_t body, triangles[2], vertices[2], edges[2];  ///< first and end
-  };
-  static constexpr std::uint32_t none = ~0u;
+  static constexpr std::uint32_t none = pair_layout::NONE;
   struct Tet {
     std::uint32_t vertices[4],
         beyond[4];  ///< the tet across the face that is opposite of each vertex, or none
   };
   std::vector<std::array<std::uint32_t, 4>> triangles;  ///< vertices, body
-  std::vector<Leaf> leaves;                             ///< none before order_in_leaves()
+  std::vector<pair_layout::SurfaceLeaf> leaves;         ///< none before order_in_leaves()
   std::vector<Tet> tets;                                ///< those near the surface; none before add_tets()
   std::vector<std::uint32_t> behind;                    ///< by triangle its tet, or none
   std::vector<Edge> edges;         ///< of solids, where they are convex and sharp at rest
@@ -54,7 +51,7 @@ void add_tets(const TetMesh& rest, PairMesh& mesh);
 /// m: how near a candidate is, of bodies that move slowly, beside the thickness.
 inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 
-/// What a step hands on to the next, beside `lists`.
+/// What a step hands on to the next, beside parts of buffers.
 struct PairNumbers {
   long detections = 0;              ///< since the start
   std::uint64_t touches = 0;        ///< contacts, summed over substeps, since the start
@@ -72,33 +69,24 @@ struct PairNumbers {
 struct Pairs : PairNumbers {
   static constexpr long every = 2;       ///< steps from one look at the boxes to the next
   static constexpr long serve_most = 4;  ///< steps that candidates serve, of slow bodies not deep in others
-  static constexpr std::size_t sum_words = 7, sharing_words = 2;  ///< of a vertex in `sums` (sums.glsl)
   Buffer mesh, rest, spheres, lists, sums, empty, answer;
   Fence asked;
-  struct Kernel {
-    Program program;
-    std::size_t work_groups = 0;  ///< 0: as many as this counter of `lists` says
-    int counted_by = 0;
-    Timer timer;
-  };
-  Kernel boxes, cull, query, query_edges, meet, push, meet_and_push;
+  Pass boxes, cull, query, query_edges, meet, push, meet_and_push;  ///< some as often as `lists` counts
   bool lag = false;     ///< within a step, what contact corrects comes in with the next substep's forces
   unsigned phases = 0;  ///< of the next dispatch that moves vertices
-  std::size_t slices = 0, leaves = 0, triangles = 0, vertices = 0,
-              items = 0;  ///< vertices of surfaces and sharp edges
-  std::size_t edges_at = 0, vertices_at = 0, records_at = 0, record_words = 0;  ///< in mesh and lists
-  double margin = 0;                                                            ///< m, of slow bodies
-  double thickness = 0;       ///< m, the largest of a vertex
-  std::size_t handed_on = 0;  ///< first bytes of lists that a step hands on to the next
+  std::size_t slices = 0, leaves = 0, items = 0;  ///< items: vertices of surfaces and sharp edges
+  double margin = 0;                              ///< m, of slow bodies
+  double thickness = 0;                           ///< m, the largest of a vertex
+  PairRanges ranges;
+  std::vector<std::string> sizes;  ///< definitions for kernels that read `mesh` and `lists` (surfaces.glsl)
   explicit operator bool() const { return bool(mesh); }
 };
-Pairs make_pairs(const Model& model, const Settings& settings, const Tuning& tuning,
-                 const std::vector<std::string>& vertex_defines);
+Pairs make_pairs(const SolverInput& input);
 /// Before a step: takes the last answer and asks again.
-void look_around(Sim& sim);
+void plan_body_contacts(Sim& sim);
 /// After a substep's last dispatch, with so many substeps of the step `left`: changes positions, velocities
 /// and what neighbours see next, at once if none is or contacts were not counted ahead.
-void touch(Sim& sim, int left);
+void resolve_body_contacts(Sim& sim, int left);
 void add_carried(Carried& all, Pairs& pairs);
 /// Of a state that is given.
 void start_pairs(Sim& sim, const State& state);

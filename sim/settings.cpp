@@ -216,7 +216,7 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
   if (!find_solver_mode(word))
     refuse(row, "'" + word + "'", where,
            did_you_mean(word, choices(row)) + fmt::format("choose from {}", fmt::join(choices(row), ", ")));
-  if (!solved_alike(*find_solver_mode(settings.mode), *find_solver_mode(word)))
+  if (!mode_of(settings).solves_like(*find_solver_mode(word)))
     settings.iterations = settings.substeps = automatic;
   settings.mode = word;
 }
@@ -250,42 +250,42 @@ std::vector<std::string> names_of(const std::vector<Preset>& presets) {
   return names;
 }
 
-bool damped(const Settings& settings) { return settings.constraint_damping > 0; }
+bool damped(const Material& material) { return material.constraint_damping > 0; }
 
-std::string kinds_in_use(const Settings& settings) {
-  if (settings.material == "springs") return "stretch,volume";
-  if (settings.material == "none") return settings.constraints;
-  return damped(settings) ? "neo_hookean,dashpot" : "neo_hookean";
+std::string kinds_in_use(const Material& material) {
+  if (material.material == "springs") return "stretch,volume";
+  if (material.material == "none") return material.constraints;
+  return damped(material) ? "neo_hookean,dashpot" : "neo_hookean";
 }
 
-bool uses(const Settings& settings, const ConstraintKind& kind) {
-  const auto names = split(kinds_in_use(settings), ',');
+bool uses(const Material& material, const ConstraintKind& kind) {
+  const auto names = split(kinds_in_use(material), ',');
   return std::find(names.begin(), names.end(), kind.name) != names.end();
 }
 
 bool rigid_in_contact(const Settings& settings) {
   return settings.rigid_contact && settings.contact == "none" && hard(settings) &&
-         uses(settings, Stretch::row) && settings.mode != "paper";
+         uses(settings, Stretch::row) && !mode_of(settings).published;
 }
 
-bool hard(const Settings& settings) {
-  bool all = !compliant(settings);
+bool hard(const Material& material) {
+  bool all = !compliant(material);
   for (std::size_t k = 0; k < kind_count; ++k)
-    all = all && (settings.stiffness[k] == 1 || !uses(settings, constraint_kinds[k]));
+    all = all && (material.stiffness[k] == 1 || !uses(material, constraint_kinds[k]));
   return all;
 }
 
-bool compliant(const Settings& settings) {
-  bool any = damped(settings) || settings.material != "none";
+bool compliant(const Material& material) {
+  bool any = damped(material) || material.material != "none";
   for (std::size_t k = 0; k < kind_count; ++k)
-    any = any || (settings.compliance[k] > 0 && uses(settings, constraint_kinds[k]));
+    any = any || (material.compliance[k] > 0 && uses(material, constraint_kinds[k]));
   return any;
 }
 
-std::optional<std::string> kind_without_force(const Settings& settings) {
+std::optional<std::string> kind_without_force(const Material& material) {
   for (std::size_t k = 0; k < kind_count; ++k)
-    if (settings.material == "none" && uses(settings, constraint_kinds[k]) &&
-        !(settings.compliance[k] > 0 && settings.stiffness[k] == 1))
+    if (material.material == "none" && uses(material, constraint_kinds[k]) &&
+        !(material.compliance[k] > 0 && material.stiffness[k] == 1))
       return constraint_kinds[k].name;
   return std::nullopt;
 }

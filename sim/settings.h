@@ -16,9 +16,24 @@ namespace tetpbd {
 /// Of a count that the mode decides: nothing was asked for.
 inline constexpr int automatic = -1;
 
-/// What was asked for. Nothing but the user changes it; what a step takes of it is a Plan.
-struct Settings {
-  std::string mode = "node";
+/// What surrounds all bodies, beside the obstacles of the model.
+struct World {
+  double gravity = 9.81;  ///< m/s^2, downwards
+  bool ground = true;
+  double ground_height = 0;      ///< m
+  double friction = 0.5;         ///< where an obstacle has none of its own
+  double restitution = 0;        ///< of hard bodies
+  std::string contact = "none";  ///< of bodies with each other: none, bodies, self (pairs.h)
+  bool operator==(const World&) const = default;
+};
+
+/// What a body is made of: a material model and its moduli, or kinds of constraint and their numbers.
+struct Material {
+  std::string material =
+      "none";                  ///< the model; else in place of kinds, stiffness and compliance (material.h)
+  double young_modulus = 1e6;  ///< Pa
+  double poisson_ratio = 0.3;
+  double constraint_damping = 0;  ///< s
   std::string constraints = "stretch,bend,volume";
   std::array<double, kind_count> stiffness = [] {  ///< k_NAME by kind, 0 to 1
     std::array<double, kind_count> hard;
@@ -26,25 +41,27 @@ struct Settings {
     return hard;
   }();
   std::array<double, kind_count> compliance{};  ///< compliance_NAME by kind
-  std::string material = "none";                ///< in place of kinds, stiffness and compliance (material.h)
-  double young_modulus = 1e6;
-  double poisson_ratio = 0.3;
-  double constraint_damping = 0;
-  double omega = 1.5;
-  bool mass_splitting = true;
+  bool operator==(const Material&) const = default;
+};
+
+/// How a step is solved.
+struct SolverSettings {
+  std::string mode = "node";
   int iterations = automatic;
   int substeps = automatic;
-  double stability = 0.4;
-  double dt = 0.005;
-  double damping = 0;
-  double gravity = 9.81;
-  bool ground = true;
-  double ground_height = 0;
-  double friction = 0.5;
-  std::string contact = "none";  ///< of bodies with each other: none, bodies, self (pairs.h)
+  double dt = 0.005;       ///< s
+  double stability = 0.4;  ///< of mode explicit: a substep over the longest that is stable at rest
+  double omega = 1.5;
+  bool mass_splitting = true;
+  double damping = 0;  ///< 1/s
   bool rigid_contact = true;
-  double restitution = 0;
   int seed = 1;
+  bool operator==(const SolverSettings&) const = default;
+};
+
+/// What was asked for, with one material for all bodies. Nothing but the user changes it; what a step takes
+/// of it is a Plan.
+struct Settings : World, Material, SolverSettings {
   bool operator==(const Settings&) const = default;
 };
 
@@ -120,23 +137,23 @@ const std::vector<Preset>& solver_presets();
 bool apply_preset(Settings& settings, const std::vector<Preset>& presets, const std::string& name);
 std::vector<std::string> names_of(const std::vector<Preset>& presets);
 
-/// Whether constraints are XPBD's (method.md eq. 25): there is a material or damping, or a kind in use has
+/// Whether constraints are XPBD's (method.md eq. 25): there is a model or damping, or a kind in use has
 /// compliance.
-bool compliant(const Settings& settings);
+bool compliant(const Material& material);
 /// A kind in use whose constraints have no force, but move as far as iterations do: k below 1, or no
 /// compliance.
-std::optional<std::string> kind_without_force(const Settings& settings);
+std::optional<std::string> kind_without_force(const Material& material);
 /// Whether constraints resist their rate.
-bool damped(const Settings& settings);
+bool damped(const Material& material);
 /// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use hold a
 /// shape, all with k = 1.
 bool rigid_in_contact(const Settings& settings);
 /// All kinds in use have k = 1 and nothing has compliance: the exact answer is a rigid body, if they include
 /// stretch.
-bool hard(const Settings& settings);
-/// The kinds in use, as the setting `constraints` lists them: the material's, if there is one.
-std::string kinds_in_use(const Settings& settings);
-bool uses(const Settings& settings, const ConstraintKind& kind);  ///< whether it is one of them
+bool hard(const Material& material);
+/// The kinds in use, as `constraints` lists them: the model's, if there is one.
+std::string kinds_in_use(const Material& material);
+bool uses(const Material& material, const ConstraintKind& kind);  ///< whether it is one of them
 
 /// Throws Error for values out of range, and for those that do not go together; `where` names the file or
 /// flag.

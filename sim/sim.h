@@ -4,13 +4,13 @@
 // write them.
 #pragma once
 
-#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "sim/carried.h"
+#include "sim/contact/obstacles.h"
 #include "sim/finite_check.h"
 #include "sim/gl/gpu.h"
 #include "sim/layout.h"
@@ -20,15 +20,6 @@
 #include "sim/watch.h"
 
 namespace tetpbd {
-
-/// Of what the solver makes for certain forces and substeps, for those of now, in a thread; what it had
-/// serves meanwhile. Taken over so many steps later, waiting if need be: runs are the same whatever the
-/// machine does.
-struct Renewal {
-  std::future<std::vector<glm::vec4>> words;
-  long steps = 0;      ///< until then
-  bool again = false;  ///< settings have changed since
-};
 
 struct Sim : StepValues {
   std::shared_ptr<const Model> model;
@@ -43,19 +34,13 @@ struct Sim : StepValues {
   Buffer quantized[2];  ///< what neighbours see (quantized.glsl); a double-buffered solver reads one and
                         ///< writes the other
   Buffer step_block;    ///< Step
-  Buffer shapes;  ///< Shape: of each obstacle with a shape as it is at the step's start, then at the end of
-                  ///< each substep; one list where nothing moves
-  Buffer fields;  ///< of shapes, one after the other
-  Texture fields_texture;
-  int shapes_now = 0;   ///< which list of `shapes` is of the present
+  Obstacles obstacles;
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
-  Buffer
-      rigid_bodies;    ///< RigidRecord, of hard bodies in contact (rigid.glsl), and vertices near half spaces
-  Pass rigid_contact;  ///< before each substep, where there are any
-  Pairs pairs;         ///< contact between bodies, where there is any
-  Pass predict;        ///< makes the quantized positions of the next step, after a change from outside
-  std::vector<Dispatch> substep;  ///< the dispatches of a substep
+  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies in contact (contact/rigid.glsl), and their vertices
+                        ///< that touch
+  Pass rigid_contact;   ///< before each substep, where there are any
+  Pairs pairs;          ///< contact between bodies, where there is any
   Tuning tuning;
   double longest_substep = 0;       ///< s, that is stable at rest, of mode explicit
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
@@ -63,11 +48,10 @@ struct Sim : StepValues {
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
-  bool kernels_timed = false;  ///< each dispatch by the timer of its pass
-  GuardCounts guards{};        ///< since the last reset; ask guard_counts()
-  FiniteCheck check;           ///< ask check_finite()
-  Watch watch;                 ///< ask watched()
-  Renewal renewal;
+  Recorder recorder;
+  GuardCounts guards{};  ///< since the last reset; ask guard_counts()
+  FiniteCheck check;     ///< ask check_finite()
+  Watch watch;           ///< ask watched()
 };
 
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
@@ -88,18 +72,15 @@ void step(Sim& sim);
 void reset(Sim& sim);
 
 /// Whether the mode steps on the CPU: then `host` is the state.
-inline bool on_cpu(const Sim& sim) { return bool(sim.solver.step_on_cpu); }
+inline bool on_cpu(const Sim& sim) { return mode_of(sim.settings).cpu; }
 
 /// s, since the start.
 inline double time_of(const Sim& sim) {
   return sim.origin.time + double(sim.steps - sim.origin.step) * sim.settings.dt;
 }
-/// The shapes at and after the present, for kernels; a list of them for the next kernels.
-void write_shapes(Sim& sim);
-/// After those of its model have changed, which the lanes of a window share; `others`: also in number, kind
-/// or field. The state stays.
-void take_obstacles(Sim& sim, bool others);
-void bind_shapes(const Sim& sim, int list);
+/// Goes on with a model that differs in its obstacles alone; the state stays. Throws Error where there are
+/// too many, and leaves the simulation as it was.
+void change_obstacles(Sim& sim, std::shared_ptr<const Model> model);
 /// All that a step hands on to the next, as the mode of now has it.
 Carried carried(Sim& sim);
 /// Of steps so far nothing is known any more.
@@ -108,20 +89,26 @@ void forget_all(Sim& sim);
 void start_with(Sim& sim, State state, double fall);
 /// Settings and plan, for the kernels of the next steps.
 void write_step_block(Sim& sim, int substeps_before = 0);
-/// At once, for the plan of now.
-void refresh_preconditioner(Sim& sim);
+/// For solvers. A kernel of a substep; kernels find the quantized positions that are read now, after others
+/// were given or after vertices moved; what a CPU mode counted.
+void run_kernel(Sim& sim, Pass& pass, unsigned phases = 0, const char* what = "", std::size_t bytes = 0);
+void give_quantized(Sim& sim);
+void turn_quantized(Sim& sim);
+void add_guards(Sim& sim, const GuardCounts& counts);
 /// What is known of hard bodies in contact, before something else moves them.
 void forget_contacts(Sim& sim);
 /// m/s that velocities of mid-substep are behind of those at the substep's end, by gravity; 0 where they are
 /// of the end.
 double half_substep_fall(const Settings& settings, const Plan& plan);
-/// Decides the plan anew from settings, and from what is known of the bodies.
-void make_plan(Sim& sim);
+/// Whether both make the same constraints.
+bool same_constraints(const Settings& a, const Settings& b);
 State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 /// A state that is not finite is taken, and found by check_finite() at once.
 void write_state(Sim& sim, const State& state);
+/// A value as the sum of two floats.
+void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low);
 /// The GPU's buffers of a state that CPU code stepped.
 void upload(Sim& sim, const State& state);
 /// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.
@@ -138,20 +125,6 @@ void check_step(Sim& sim);
 /// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
 /// ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
-/// Before a step: asks what kernels noted; in modes explicit and newton takes as many substeps as the last
-/// answer needs.
-/// Phases of the step's first substep.
-unsigned watch(Sim& sim);
-void set_stiffening(Sim& sim, double stiffening);
-void set_finer(Sim& sim, int times);
-/// What kernels noted of other settings or another state.
-void forget_answers(Sim& sim);
-/// Before a step; and at once, waiting.
-void count_down_renewal(Sim& sim);
-void finish_renewal(Sim& sim);
-/// As of the last step. Waits.
-const Watch& watched(Sim& sim);
-
 /// Back to the last good state that was kept, at most 64 steps before the one found, and to its step; false
 /// where there is none.
 bool restore_checkpoint(Sim& sim);

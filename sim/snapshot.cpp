@@ -16,13 +16,12 @@ State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
 
 // Everything, so that the next steps are those that followed then.
 void restore_all(Sim& sim, const Snapshot& then, const Buffer& from) {
-  const double h = sim.plan.h;
   const std::byte* byte = then.values.data();
   for (const std::span<std::byte> values : carried(sim).values)
     std::copy_n(byte, values.size(), values.data()), byte += values.size();
   static_cast<StepValues&>(sim) = then.step;
   sim.plan = then.plan;
-  if (sim.plan.h != h) refresh_preconditioner(sim);
+  sim.solver.refresh(sim);
   write_step_block(sim);
   if (then.host) sim.host = *then.host, upload(sim, *then.host);
   Carried now = carried(sim);  // of the sides that were read then
@@ -70,7 +69,6 @@ Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_onl
 }
 
 void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
-  finish_renewal(sim);
   if (then.settings == sim.settings) return restore_all(sim, then, from);
   State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
   forget_all(sim);

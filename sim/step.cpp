@@ -1,60 +1,40 @@
 // A step (method.md, "A step"): dt / substeps at a time, predict, solve x iterations, finish.
 #include <algorithm>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
 
+void give_quantized(Sim& sim) {
+  const int count = sim.solver.quantized_buffers;
+  if (count == 0) return;
+  sim.recorder.give("Quantized", sim.quantized[sim.read_index]);
+  sim.recorder.give("QuantizedOut", sim.quantized[count == 2 ? 1 - sim.read_index : sim.read_index]);
+}
+
+void turn_quantized(Sim& sim) {
+  if (sim.solver.quantized_buffers < 2) return;
+  sim.read_index = 1 - sim.read_index;
+  give_quantized(sim);
+}
+
+void run_kernel(Sim& sim, Pass& pass, unsigned phases, const char* what, std::size_t bytes) {
+  if (sim.rigid_side) phases |= PHASE_SIDE;
+  sim.recorder.run(pass, {{"phases", phases}, {"step_number", unsigned(sim.steps + 1)}}, what, bytes);
+}
+
 namespace {
 
-// Dispatches one after the other. Whatever does not change from one to the next is not set again: at a few
-// microseconds per dispatch, every call counts.
-struct Dispatcher {
-  Sim& sim;
-  GLuint program = 0;
-  void bind_quantized() const {  // read these, write the others
-    if (!sim.quantized[0]) return;
-    sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED);
-    sim.quantized[sim.solver.double_buffered ? 1 - sim.read_index : sim.read_index].bind_storage(
-        BIND_QUANTIZED_OUT);
-  }
-  void run(Pass& pass, unsigned phases) {
-    if (sim.rigid_side) phases |= PHASE_SIDE;
-    if (pass.program.id() != program) pass.program.use(), program = pass.program.id();
-    constexpr std::array names = {"phases", "step_number"};
-    const std::array<unsigned, 2> parameters = {phases, unsigned(sim.steps + 1)};
-    if (pass.parameters[0] == ~0u)
-      for (std::size_t p = 0; p < names.size(); ++p)
-        pass.locations[p] = glGetUniformLocation(program, names[p]);
-    for (std::size_t p = 0; p < names.size(); ++p)
-      if (pass.locations[p] >= 0 && parameters[p] != pass.parameters[p])
-        glUniform1ui(pass.locations[p], parameters[p]);
-    pass.parameters = parameters;
-    if (pass.records) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, BIND_RECORDS, pass.records);
-    if (sim.kernels_timed) pass.timer.begin();
-    dispatch(pass.work_groups, sim.tuning.row);
-    // The next dispatch reads what this one wrote, and overwrites what it read (the other quantized
-    // positions, the sums of corrections that average.comp clears).
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    if (sim.kernels_timed) pass.timer.end();
-  }
-  // The pass that moves the vertices: what it wrote is read from then on.
-  void move(unsigned phases) {
-    run(sim.solver.iteration.back(), phases);
-    if (sim.solver.double_buffered) sim.read_index = 1 - sim.read_index, bind_quantized();
-  }
-};
-
-void bind(Sim& sim) {
+void give_buffers(Sim& sim) {
+  Recorder& recorder = sim.recorder;
+  recorder.begin();
   sim.step_block.bind_uniform(BIND_STEP);
-  sim.positions.bind_storage(BIND_POSITIONS);
-  sim.velocities.bind_storage(BIND_VELOCITIES);
-  if (sim.predicted) sim.predicted.bind_storage(BIND_PREDICTED);
-  sim.check.words.bind_storage(BIND_CHECK);
-  if (sim.rigid_bodies) sim.rigid_bodies.bind_storage(BIND_RIGID);
-  if (sim.pairs) sim.pairs.sums.bind_storage(BIND_PAIR_SUMS);
-  for (const auto& [binding, buffer] : sim.solver.bindings)
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), buffer);
+  recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
+  recorder.give("Predicted", sim.predicted), recorder.give("Check", sim.check.words);
+  recorder.give("RigidBodies", sim.rigid_bodies), recorder.give("PairSums", sim.pairs.sums);
+  for (const auto& [block, buffer] : sim.solver.bindings) recorder.give(block, buffer);
+  give_quantized(sim);
   if (!sim.guard_counts) return;
   // Counters have 32 bits: read before they can wrap.
   const double per_step = 4.0 * double(sim.system.count()) * sim.plan.iterations * sim.plan.substeps;
@@ -62,57 +42,54 @@ void bind(Sim& sim) {
   glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
 }
 
-void step_on_gpu(Sim& sim, bool moving) {
-  count_down_renewal(sim);
-  const unsigned watched = watch(sim);
-  if (moving) write_shapes(sim);
-  look_around(sim);
-  bind(sim);
-  bind_shapes(sim, 0);
+void begin_on_gpu(Sim& sim, bool moving) {
+  if (moving) write_obstacles(sim);
+  give_buffers(sim);
+  plan_body_contacts(sim);
+  bind_obstacles(sim.obstacles, 0);
   if (sim.timed) sim.timer.begin();
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
-  Dispatcher dispatcher{sim};
-  if (sim.needs_predict) {
-    forget_contacts(sim);
-    if (sim.quantized[0]) sim.quantized[sim.read_index].bind_storage(BIND_QUANTIZED_OUT);
-    dispatcher.run(sim.predict, 0);
-  }
-  dispatcher.bind_quantized();
+  sim.recorder.barrier(
+      GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
+  if (!sim.needs_predict) return;
+  forget_contacts(sim);
+  sim.solver.predict(sim);
   sim.needs_predict = false;
-  const int substeps = sim.plan.substeps;
-  for (int substep = 0; substep < substeps; ++substep) {
-    if (moving) bind_shapes(sim, ++sim.shapes_now);
-    if (sim.rigid_bodies) dispatcher.run(sim.rigid_contact, 0), sim.rigid_side = 1 - sim.rigid_side;
-    for (const Dispatch& dispatch : sim.substep)
-      if (dispatch.pass + 1 == sim.solver.iteration.size())
-        dispatcher.move(dispatch.phases | (substep == 0 ? watched : 0) |
-                        (dispatch.phases & PHASE_PREDICT ? sim.pairs.phases : 0));
-      else
-        dispatcher.run(sim.solver.iteration[dispatch.pass], dispatch.phases);
-    if (sim.pairs && sim.pairs.near) {
-      touch(sim, substeps - 1 - substep);
-      dispatcher.program = 0, dispatcher.bind_quantized();
-    }
-  }
+}
+
+void end_on_gpu(Sim& sim) {
   // Vertex fetches and copies read the state next.
-  glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   if (sim.timed) sim.timer.end();
+}
+
+void move_rigid_bodies(Sim& sim) {
+  if (!sim.rigid_bodies) return;
+  sim.recorder.give("QuantizedOut", sim.quantized[sim.read_index]);  // in place
+  run_kernel(sim, sim.rigid_contact);
+  give_quantized(sim);
+  sim.rigid_side = 1 - sim.rigid_side;
 }
 
 }  // namespace
 
 void step(Sim& sim) {
-  const bool moving = std::ranges::any_of(sim.model->shapes, moves);
+  sim.solver.prepare(sim);  // late answers, number of substeps, preconditioner
+  const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
   if (on_cpu(sim)) {
-    const GuardCounts counts =
-        sim.solver.step_on_cpu(sim.host, sim.settings, sim.inverse_masses, time_of(sim));
-    for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += counts[g];
+    sim.solver.substep(sim, 0);  // all of them, for its threads meet at the end of each
     upload(sim, sim.host);
   } else {
-    step_on_gpu(sim, moving);
+    begin_on_gpu(sim, moving);
+    for (int k = 0; k < sim.plan.substeps; ++k) {
+      if (moving) bind_obstacles(sim.obstacles, ++sim.obstacles.present);
+      move_rigid_bodies(sim);
+      sim.solver.substep(sim, k);
+      resolve_body_contacts(sim, sim.plan.substeps - 1 - k);
+    }
+    end_on_gpu(sim);
   }
   ++sim.steps;
-  if (on_cpu(sim) && moving) write_shapes(sim);
+  if (on_cpu(sim) && moving) write_obstacles(sim);
   check_step(sim);
 }
 

@@ -1,13 +1,15 @@
-// Modes explicit and newton, watched while they run. A body that deforms becomes stiffer than it is at rest,
-// and a substep of mode explicit that was stable is too long then: kernels note the stiffest constraint of a
-// step; the answer comes back some steps later, always as many, so that a run is the same every time. Of mode
-// newton they note how far it converges, and whether a tet is inverted or the body spins fast: then it takes
-// shorter substeps for a while.
+// What the kernels of modes explicit and newton note of a step, which decides how many substeps the next ones
+// take; the answer comes back some steps later, always as many, so that a run is the same every time.
 #pragma once
+
+#include <optional>
+#include <vector>
 
 #include "sim/carried.h"
 
 namespace tetpbd {
+
+struct Sim;
 
 struct WatchNumbers {
   // Mode explicit.
@@ -30,13 +32,22 @@ struct WatchNumbers {
 
 constexpr int finer_times = 4;  ///< as many substeps
 
-/// Part of a Sim (sim.h), whose steps keep it up to date.
+/// Part of a Sim (sim.h), whose solver keeps it up to date.
 struct Watch : WatchNumbers {
   static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
   Buffer answer, nothing;           ///< of words of the kernels' block (vertex_state.glsl)
   Fence asked;
+  Watch& operator=(const WatchNumbers& numbers) { return static_cast<WatchNumbers&>(*this) = numbers, *this; }
 };
 
+/// What kernels noted since it was last asked, and asks again; none the first time.
+std::optional<std::vector<float>> read_watch(Sim& sim);
+/// The same in mode newton; whether there was an answer.
+bool read_convergence(Sim& sim);
+/// As of the last step. Waits.
+const Watch& watched(Sim& sim);
+/// What kernels noted of other settings or another state.
+void forget_answers(Sim& sim);
 /// `words`: the kernels' block that holds what they noted.
 void add_carried(Carried& all, Watch& watch, const Buffer& words);
 

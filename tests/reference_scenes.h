@@ -29,7 +29,11 @@ inline glm::dvec3 noise(double amplitude) {
 struct Scene {
   Model model;
   ConstraintSystem system;
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings = [] {
+    Settings published;
+    published.iterations = 25, published.substeps = 1;
+    return published;
+  }();
   ReferenceInput input() const { return {model, system, settings, model.inverse_masses}; }
   State start() const { return {model.positions, model.velocities}; }
 };

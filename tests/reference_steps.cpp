@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/moving_shape.h"
 #include "sim/rotation.h"
 
 namespace tetpbd {
@@ -15,11 +15,9 @@ namespace tetpbd {
 namespace {
 
 void refuse_contact(const ReferenceInput& input, const Points& positions) {
-  const std::vector<glm::dvec4> planes = planes_of(input.model, input.settings);
-  const std::vector<MovingShape> shapes = shapes_of(input.model, input.settings, 0, 0, 1)[0];
+  const auto obstacles = obstacles_at(input.model, input.settings, 0);
   const auto inside = [&](const glm::dvec3& x) {
-    return std::ranges::any_of(planes, [&](auto& p) { return glm::dot(glm::dvec3(p), x) < p.w; }) ||
-           std::ranges::any_of(shapes, [&](auto& s) { return s.surface_at(x).distance < 0; });
+    return std::ranges::any_of(obstacles, [&](auto& o) { return o.surface_at(x).distance < 0; });
   };
   for (std::size_t i = 0; i < positions.size(); ++i)
     if (input.inverse_masses[i] > 0 && inside(positions[i]))

@@ -32,8 +32,17 @@ inline std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, do
   return model;
 }
 
+/// n.x >= d, of a unit normal.
+inline Obstacle half_space(const glm::dvec3& normal, double d = 0) {
+  Obstacle o;
+  o.normal = normal, o.centre = d * normal;
+  return o;
+}
+
 inline Settings quick(const std::string& mode, int iterations = 10, int substeps = 1) {
-  return {.mode = mode, .iterations = iterations, .substeps = substeps};
+  Settings settings;
+  settings.mode = mode, settings.iterations = iterations, settings.substeps = substeps;
+  return settings;
 }
 
 inline State reference_after(const Sim& sim, int steps, Sweep sweep) {

@@ -11,6 +11,7 @@
 #include "sim/solvers/cpu_pbd.h"
 #include "tests/gl_test.h"
 #include "tests/reference_steps.h"
+#include "tests/sim_samples.h"
 
 using namespace tetpbd;
 
@@ -22,7 +23,7 @@ constexpr double pi = 3.14159265358979323846;
 struct Spring {
   Model model;
   ConstraintSystem system;
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings = samples::quick("node", 25);
   State state;
   explicit Spring(double mass) {
     model.rest.positions = model.positions = {glm::dvec3(0), glm::dvec3(1, 0, 0)};
@@ -64,7 +65,8 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, double height, const 
 }
 
 Settings soft(const std::string& mode, int iterations, int substeps, double tau = 0) {
-  Settings s{.iterations = 25, .substeps = 1};
+  Settings s;
+  s.iterations = 25, s.substeps = 1;
   s.mode = mode, s.iterations = iterations, s.substeps = substeps;
   s.compliance[index_of<Stretch>] = 1e-6, s.compliance[index_of<Bend>] = 1e-4,
   s.compliance[index_of<Volume>] = 1e-10;
@@ -88,7 +90,7 @@ State jacobi_after(const Sim& sim) {
 struct Beam {
   Model model;
   ConstraintSystem system;
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings = samples::quick("node", 25);
   std::vector<glm::dvec3> equilibrium;
   double sag = 0;
   Beam() {

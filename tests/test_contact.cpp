@@ -9,6 +9,7 @@
 #include "sim/rotation.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
+#include "tests/sim_samples.h"
 
 using namespace tetpbd;
 
@@ -56,7 +57,9 @@ glm::dmat3 tilted() {
 }
 
 Settings in_mode(const std::string& mode, int substeps = 20) {
-  return {.mode = mode, .iterations = 1, .substeps = substeps};
+  Settings settings;
+  settings.mode = mode, settings.iterations = 1, settings.substeps = substeps;
+  return settings;
 }
 
 struct Totals {
@@ -137,7 +140,7 @@ TEST_CASE_FIXTURE(GlTest,
       const auto model = std::make_shared<Model>();
       add(*model, make_block({0.4, 0.2, 0.4}, {4, 2, 4}), 0.1 * normal,
           glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
-      model->obstacles = {glm::dvec4(normal, 0)};
+      model->obstacles = {samples::half_space(normal)};
       Settings settings = in_mode(mode);
       settings.ground = false;
       const glm::dvec3 moved = totals(*model, after(model, settings, 100)).centre - 0.1 * normal;

@@ -27,7 +27,8 @@ std::shared_ptr<const Model> skewed_block(glm::ivec3 cells, double height, const
 }
 
 Settings fast(int iterations, int substeps) {
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
   settings.mode = "cpu-fast", settings.iterations = iterations, settings.substeps = substeps;
   return settings;
 }

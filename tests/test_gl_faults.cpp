@@ -33,7 +33,8 @@ std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::d
 }
 
 Settings quick(const std::string& mode) {
-  Settings s{.iterations = 25, .substeps = 1};
+  Settings s;
+  s.iterations = 25, s.substeps = 1;
   s.mode = mode;
   s.iterations = 3;
   return s;
@@ -395,12 +396,12 @@ TEST_CASE("shader faults name file and line, or the uniform") {
     CHECK(has(unlinked, "shader program does not link: surface: "));  // others may link it
   // A kernel that goes wrong in a certain step: blamed, and the last good state stands.
   {
-    std::ifstream stream(folder / "vertex.glsl");
+    std::ifstream stream(folder / "solvers/corrections.glsl");
     std::string text{std::istreambuf_iterator<char>(stream), {}};
     const std::string end = "positions[i] = Position(";
     REQUIRE(has(text, end));
     text.insert(text.find(end), "if (i == 12u && x.high.y < 0.45) x.high.x = sqrt(x.high.y - 1.0);\n  ");
-    std::ofstream(folder / "vertex.glsl") << text;
+    std::ofstream(folder / "solvers/corrections.glsl") << text;
   }
   set_shader_folder(folder.string());
   for (const char* mode : {"node", "constraint"}) {

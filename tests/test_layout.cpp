@@ -5,12 +5,16 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 
 #include "sim/error.h"
 #include "sim/layout.h"
-#include "sim/solvers/solver.h"
+#include "sim/material.h"
+#include "sim/pair_layout.h"
+#include "sim/solvers/newton_buffers.h"
 #include "tests/gl_test.h"
+#include "tests/sim_samples.h"
 
 using namespace tetpbd;
 
@@ -24,11 +28,46 @@ GLint property(const Program& program, GLenum interface, const std::string& name
   return value;
 }
 
+// That each member of a storage block lies where the layout says, and has its size, where it has one.
+void check_block(const Program& program, const char* block, const BufferLayout& layout) {
+  CAPTURE(program.label());
+  CAPTURE(block);
+  const GLuint index = glGetProgramResourceIndex(program.id(), GL_SHADER_STORAGE_BLOCK, block);
+  if (index == GL_INVALID_INDEX) return;  // the kernel does not use it
+  struct Member {
+    std::size_t at, bytes;
+  };
+  std::map<std::string, Member> members;  // those of structs come apart
+  GLint variables = 0;
+  glGetProgramInterfaceiv(program.id(), GL_BUFFER_VARIABLE, GL_ACTIVE_RESOURCES, &variables);
+  for (GLuint v = 0; v < GLuint(variables); ++v) {
+    std::string name(100, '\0');
+    GLsizei length = 0;
+    glGetProgramResourceName(program.id(), GL_BUFFER_VARIABLE, v, GLsizei(name.size()), &length, name.data());
+    name.resize(std::size_t(length));
+    const auto ask = [&](GLenum what) { return property(program, GL_BUFFER_VARIABLE, name, what); };
+    if (GLuint(ask(GL_BLOCK_INDEX)) != index) continue;
+    const Member part{std::size_t(ask(GL_OFFSET)),
+                      std::size_t(ask(GL_TOP_LEVEL_ARRAY_SIZE) * ask(GL_TOP_LEVEL_ARRAY_STRIDE))};
+    Member& member = members.emplace(name.substr(0, name.find_first_of("[.")), part).first->second;
+    member.at = std::min(member.at, part.at);
+  }
+  CHECK(members.size() == layout.members.size());
+  for (const auto& [name, at, bytes] : layout.members) {
+    CAPTURE(name);
+    REQUIRE(members.contains(name));
+    CHECK(members[name].at == at);
+    if (members[name].bytes > 0) CHECK(members[name].bytes == bytes);
+  }
+  CHECK(std::size_t(property(program, GL_SHADER_STORAGE_BLOCK, block, GL_BUFFER_DATA_SIZE)) <= layout.bytes);
+}
+
 }  // namespace
 
 TEST_CASE("struct offsets and strides are GL's") {
   GlTest gl;
-  const Program predict = Program::compute("predict.comp", {}, {"COMPLIANT 1"});
+  const Program predict =
+      Program::compute("predict.comp", {{{"SCHEME", "corrections"}}, {}}, {"COMPLIANT 1", "SOLIDS 0"});
   const auto variable = [&](const std::string& name) {
     return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET);
   };
@@ -75,6 +114,64 @@ TEST_CASE("struct offsets and strides are GL's") {
   CHECK(nested("compliance[0]") == offsetof(Step, compliance));
   CHECK(nested("damping") == offsetof(Step, damping));
   CHECK(property(predict, GL_UNIFORM_BLOCK, "StepBlock", GL_BUFFER_DATA_SIZE) == sizeof(Step));
+}
+
+TEST_CASE("members of mode newton's blocks lie where GL reads them, and no array is empty") {
+  GlTest gl;
+  const auto model = samples::block_model({3, 2, 1});
+  for (const bool material : {false, true}) {
+    Settings settings;
+    if (material) settings.material = "neo-hookean", settings.constraint_damping = 0.01;
+    const ConstraintSystem system = build_constraints(model->rest, settings);
+    const SolverInput input{*model, system, settings, plan_for(settings), {}};
+    NewtonSizes all = measure_newton(input, build_newton_levels(*model, system));
+    NewtonSizes odd = all, none = all;  // what is behind a list of odd length may have to be aligned
+    odd.aggregates = 3, odd.members = 7, odd.uses = 5, odd.free_bodies = 1, odd.parts = 3,
+    odd.product_groups = 1;
+    none.aggregates = none.members = none.uses = none.free_bodies = none.edges = 0;
+    for (const NewtonSizes& sizes : {all, odd, none}) {
+      const NewtonBuffers layout = lay_out_newton_buffers(sizes, system);
+      for (const char* name : {"begin", "predict", "start", "linearise", "residual", "update", "coarse",
+                               "prolong", "product", "finish", "momentum"}) {
+        const Program program = Program::compute(std::string("newton/") + name + ".comp",
+                                                 {{}, kind_words(system)}, newton_defines(sizes, input));
+        check_block(program, "Mesh", layout.mesh);
+        check_block(program, "Coarse", layout.coarse);
+        check_block(program, "Sums", layout.sums);
+      }
+    }
+  }
+}
+
+TEST_CASE("members of the blocks of contact lie where GL reads them, and no array is empty") {
+  GlTest gl;
+  const PairSizes sheet{.triangles = 7,
+                        .edges = 0,
+                        .vertices = 9,
+                        .leaves = 1,
+                        .slices = 1,
+                        .tets = 0,
+                        .bodies = 1,
+                        .all_vertices = 9,
+                        .lanes = 8};
+  PairSizes solid = sheet;
+  solid.edges = 5, solid.tets = 3, solid.bodies = 2, solid.slices = 3, solid.leaves = 3, solid.lanes = 1;
+  for (const PairSizes& sizes : {sheet, solid}) {
+    const PairRanges layout = lay_out_pairs(sizes);
+    std::vector<std::string> defines = pair_defines(sizes);
+    defines.insert(defines.end(),
+                   {"COMPLIANT 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1", "IMPLICIT 0",
+                    "SHEETS 1", "CONTACT_SELF 1", "LAGGED 1", "QUERY_EDGES 0", "ROW 9u", "EDGE 1.0",
+                    "SELF_MARGIN 1.0", "VERTICES " + std::to_string(sizes.all_vertices)});
+    for (const char* name : {"pairs/boxes", "pairs/cull", "pairs/query", "pairs/meet", "pairs/push",
+                             "render/touches", "average"}) {
+      const Program program =
+          Program::compute(std::string(name) + ".comp", {{{"SCHEME", "leapfrog"}}, {}}, defines, 10);
+      check_block(program, "PairMesh", layout.mesh);
+      check_block(program, "PairLists", layout.lists);
+      check_block(program, "PairSums", layout.sums);
+    }
+  }
 }
 
 TEST_CASE("a shader that does not compile names its file and line") {

@@ -59,9 +59,9 @@ TEST_CASE("manners: flags that change nothing say so, others do not, both spelli
   CHECK(said("--mode cpu --omega 1.2") == "tetpbd: --omega changes nothing: mode cpu averages nothing\n");
   CHECK(said("--mode node --stability 0.3").find("--stability changes nothing: it is of mode explicit") !=
         std::string::npos);
-  CHECK(said("--mode explicit --material springs --substeps 3 --k-stretch 0.5") ==
+  CHECK(said("--mode explicit --material springs --iterations 3 --substeps 3 --k-stretch 0.5") ==
         "tetpbd: --k-stretch changes nothing: the material stands in its place\n"
-        "tetpbd: --substeps changes nothing: mode explicit takes as many substeps as stay stable\n");
+        "tetpbd: --iterations changes nothing: mode explicit has no iterations\n");
   CHECK(said("--mode node --young-modulus 1e5").find("there is no material") != std::string::npos);
   CHECK(said("--mode node --constraints stretch --k-bend 0.5").find("bend is not among") !=
         std::string::npos);

@@ -302,7 +302,8 @@ TEST_CASE("material: modes node and constraint give the same bits, and momentum 
   auto model = std::make_shared<Model>();
   const TetMesh mesh = make_block({1, 0.5, 0.4}, {5, 3, 2});
   add_body(*model, "block", mesh, 1000, mesh.positions, {1, 0, 0}, {2, 5, 1}, {});
-  Settings settings{.material = "neo-hookean", .young_modulus = 1e5, .gravity = 0};
+  Settings settings;
+  settings.material = "neo-hookean", settings.young_modulus = 1e5, settings.gravity = 0;
   settings.ground = false;
   std::array<std::uint64_t, 2> hashes;
   for (std::size_t i = 0; i < 2; ++i) {

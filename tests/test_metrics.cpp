@@ -27,7 +27,8 @@ TetMesh one_tet() {
 }
 
 Measurement measure_state(const std::shared_ptr<Model>& model, const State& state) {
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
   settings.ground = false;
   Sim sim = create_sim(model, settings);
   write_state(sim, state);
@@ -65,7 +66,8 @@ TEST_CASE("elastic energy is what the material says, and becomes motion") {
   const auto model = model_of(make_block({1, 0.7, 0.5}, {4, 3, 3}));
   for (const char* material : {"neo-hookean", "springs"}) {
     CAPTURE(material);
-    Settings settings{.mode = "explicit"};
+    Settings settings;
+    settings.mode = "explicit";
     settings.material = material, settings.young_modulus = 1e5, settings.poisson_ratio = 0.3;
     settings.ground = false, settings.gravity = 0;
     settings.stability = 0.1;  // leapfrog swings about the energy by the square of its step
@@ -144,7 +146,8 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
     if (model->positions[i].y < 1e-9) state.positions[i].y = 0;
     state.velocities[i] = {std::cos(t), 1 + std::cos(2 * t), 0.3 * t / 140};
   }
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
   Sim sim = create_sim(model, settings);
   write_state(sim, state);
   Metrics metrics = create_metrics(*model);
@@ -219,7 +222,8 @@ TEST_CASE("what is not finite is counted, and no drift is reported for a body th
   state.positions[5].y = std::numeric_limits<double>::quiet_NaN();
   state.velocities[6].x = std::numeric_limits<double>::infinity();
   CHECK(measure_state(model, state).non_finite == 2);
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
   settings.ground = false;
   Sim sim = create_sim(model, settings);
   RunErrors errors;
@@ -239,7 +243,9 @@ TEST_CASE("what is not finite is counted, and no drift is reported for a body th
 TEST_CASE("measurements come back in order and none is lost when the ring is full") {
   GlTest gl;
   const auto model = model_of(make_block({1, 1, 1}, {1, 1, 1}));
-  Sim sim = create_sim(model, Settings{.iterations = 25, .substeps = 1});
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
+  Sim sim = create_sim(model, settings);
   Metrics metrics = create_metrics(*model);
   std::vector<long> seen;
   for (int s = 0; s < 100; ++s) {

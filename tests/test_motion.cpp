@@ -11,6 +11,7 @@
 #include "sim/reference/rigid.h"
 #include "tests/reference_scenes.h"
 #include "tests/run_program.h"
+#include "tests/sim_samples.h"
 
 using namespace reference_scenes;
 using namespace run_program;
@@ -79,7 +80,7 @@ TEST_CASE("motion: a rigid block on a slope slides by g (sin - friction cos) t^2
     Scene scene = block_at({1, 0.2, 0.6}, 0.1 * normal, glm::dvec3(0), glm::dvec3(0), rotation);
     scene.settings.ground = false;
     scene.settings.friction = 0.5;
-    scene.model.obstacles = {glm::dvec4(normal, 0)};
+    scene.model.obstacles = {samples::half_space(normal)};
     RigidBody b = rigid_of(scene);
     const double h = 1e-3, t = 0.5;
     for (int s = 0; s < 500; ++s) advance(b, scene.model, scene.settings, h);
@@ -98,13 +99,14 @@ TEST_CASE(
   for (const double restitution : {0.0, 0.5, 0.9}) {
     CAPTURE(restitution);
     Scene scene = block_at({1, 0.2, 0.6}, {0, 1.1, 0});  // lands flat, its lower side 1 m up
+    scene.settings.restitution = restitution;
     RigidBody b = rigid_of(scene);
     const double h = 1e-4;
     double apex = 0, before = energy_of(b, 9.81);
     bool hit = false;
     for (int s = 0; s < 9000; ++s) {
       const double speed = b.velocity.y;
-      advance(b, scene.model, scene.settings, h, restitution);
+      advance(b, scene.model, scene.settings, h);
       hit = hit || b.velocity.y > speed;
       if (hit) apex = std::max(apex, b.centre.y);
       const double now = energy_of(b, 9.81);
@@ -154,9 +156,11 @@ TEST_CASE("motion: a corner that hits turns the body by its arm times the impuls
   }
 }
 
-TEST_CASE("motion: a rigid block that three fixed vertices hold stays, on a line they leave it free to turn") {
+TEST_CASE(
+    "motion: a rigid block that three fixed vertices hold stays, on a line they leave it free to turn") {
   Scene scene = block_at({1, 1, 1}, {0, 2, 0});
-  scene.model.inverse_masses[0] = scene.model.inverse_masses[1] = scene.model.inverse_masses[2] = 0;  // an edge
+  scene.model.inverse_masses[0] = scene.model.inverse_masses[1] = scene.model.inverse_masses[2] =
+      0;  // an edge
   CHECK_THROWS_WITH_AS(find_motion(scene.input(), 5), doctest::Contains("can turn about its fixed vertices"),
                        Error);
   scene.model.inverse_masses[3] = 0;

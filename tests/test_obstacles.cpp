@@ -9,10 +9,10 @@
 #include <random>
 
 #include "app/scene.h"
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
 #include "sim/material.h"
 #include "sim/metrics.h"
-#include "sim/moving_shape.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"
@@ -27,24 +27,21 @@ namespace {
 
 const std::vector<std::string> all_modes = {"node", "constraint", "cpu", "cpu-double", "cpu-fast"};
 
-Obstacle half_space(const glm::dvec3& normal) {
-  Obstacle o;
-  o.normal = normal;
-  return o;
-}
+using samples::half_space;
 Obstacle box(const glm::dvec3& half, const glm::dvec3& centre = glm::dvec3(0)) {
   Obstacle o;
-  o.shape = SHAPE_BOX, o.half = half, o.centre = centre;
+  o.kind = find_obstacle_kind("box"), o.half = half, o.centre = centre;
   return o;
 }
-Obstacle round_shape(int shape, double radius, double half_length, const glm::dvec3& centre = glm::dvec3(0)) {
+Obstacle round_shape(const char* kind, double radius, double half_length,
+                     const glm::dvec3& centre = glm::dvec3(0)) {
   Obstacle o;
-  o.shape = shape, o.radius = radius, o.half_length = half_length, o.centre = centre;
+  o.kind = find_obstacle_kind(kind), o.radius = radius, o.half_length = half_length, o.centre = centre;
   return o;
 }
 Obstacle hills(double height = 0.2, int points = 41) {
   Obstacle o;
-  o.shape = SHAPE_HEIGHTS, o.half = {1, height, 1};
+  o.kind = find_obstacle_kind("height-field"), o.half = {1, height, 1};
   for (int k = 0; k < points; ++k) {
     o.heights.emplace_back();
     for (int i = 0; i < points; ++i)
@@ -57,7 +54,7 @@ Obstacle hills(double height = 0.2, int points = 41) {
 // A sphere as distances at the points of a grid.
 Obstacle grid_sphere(double radius, int cells) {
   Obstacle o;
-  o.shape = SHAPE_GRID;
+  o.kind = find_obstacle_kind("mesh");
   auto field = std::make_shared<DistanceField>();
   field->spacing = 2 * radius / cells, field->size = glm::ivec3(cells + 7);
   field->origin = glm::dvec3(-radius - 3 * field->spacing);
@@ -70,12 +67,12 @@ Obstacle grid_sphere(double radius, int cells) {
   return o;
 }
 std::vector<Obstacle> every_shape() {
-  return {half_space({0, 1, 0}), round_shape(SHAPE_SPHERE, 0.7, 0),     round_shape(SHAPE_CAPSULE, 0.3, 0.5),
-          box({0.7, 0.4, 0.5}),  round_shape(SHAPE_CYLINDER, 0.5, 0.4), hills(),
+  return {half_space({0, 1, 0}), round_shape("sphere", 0.7, 0),     round_shape("capsule", 0.3, 0.5),
+          box({0.7, 0.4, 0.5}),  round_shape("cylinder", 0.5, 0.4), hills(),
           grid_sphere(0.7, 28)};
 }
 
-MovingShape still(const Obstacle& o) { return moving_shape(o, 0, 0, 0.5, 0); }
+MovingObstacle still(const Obstacle& o) { return moving_obstacle(o, 0, 0, 0.5, 0); }
 
 double unit(std::mt19937& random) { return double(random()) / 4294967296.0; }
 glm::dvec3 within(std::mt19937& random, double reach) {
@@ -103,8 +100,8 @@ TetMesh ball_mesh(double radius) {
 
 struct Setup {
   std::shared_ptr<Model> model = std::make_shared<Model>();
-  Settings settings{.iterations = 1, .substeps = 20};
-  Setup() { settings.ground = false; }
+  Settings settings;
+  Setup() { settings.iterations = 1, settings.substeps = 20, settings.ground = false; }
 };
 void add(Setup& to, const TetMesh& mesh, const glm::dvec3& centre, const glm::dmat3& turn = glm::dmat3(1),
          const glm::dvec3& velocity = glm::dvec3(0)) {
@@ -131,8 +128,8 @@ glm::dvec3 centre_of(const Model& model, const std::vector<glm::dvec3>& values) 
 double deepest(const Sim& sim) {
   double most = 0;
   const State state = read_state(sim);
-  for (const Obstacle& o : sim.model->shapes) {
-    const MovingShape shape = moving_shape(o, time_of(sim), 0, 0, 0);
+  for (const Obstacle& o : sim.model->obstacles) {
+    const MovingObstacle shape = moving_obstacle(o, time_of(sim), 0, 0, 0);
     for (const glm::dvec3& x : state.positions) most = std::max(most, -shape.surface_at(x).distance);
   }
   return most / sim.model->size;
@@ -148,9 +145,9 @@ Sim run(const Setup& setup, int steps) {
 TEST_CASE("obstacles: a distance's gradient is its normal, and its sign says inside") {
   std::mt19937 random(1);
   for (const Obstacle& o : every_shape()) {
-    CAPTURE(o.shape);
-    const MovingShape shape = still(o);
-    const bool closed = o.shape < SHAPE_HEIGHTS;
+    CAPTURE(o.kind->name);
+    const MovingObstacle shape = still(o);
+    const bool closed = o.kind->convex;
     int inside = 0, tested = 0;
     double wrong = 0;
     for (int k = 0; k < 2000; ++k) {
@@ -181,8 +178,8 @@ TEST_CASE("obstacles: a distance's gradient is its normal, and its sign says ins
   const auto at = [](const Obstacle& o, const glm::dvec3& x) { return still(o).surface_at(x).distance; };
   CHECK(at(box({1, 2, 3}), {4, 6, 3}) == doctest::Approx(5));
   CHECK(at(box({1, 2, 3}), {0.75, 0, 0}) == doctest::Approx(-0.25));
-  CHECK(at(round_shape(SHAPE_CAPSULE, 1, 2), {3, 6, 0}) == doctest::Approx(4));
-  CHECK(at(round_shape(SHAPE_CYLINDER, 1, 2), {4, 6, 0}) == doctest::Approx(5));
+  CHECK(at(round_shape("capsule", 1, 2), {3, 6, 0}) == doctest::Approx(4));
+  CHECK(at(round_shape("cylinder", 1, 2), {4, 6, 0}) == doctest::Approx(5));
   for (int k = 0; k < 200; ++k) {
     const glm::dvec3 x = within(random, 1.5);
     CHECK(at(grid_sphere(0.7, 28), x) <= glm::length(x) - 0.7 + 2e-3);
@@ -194,8 +191,8 @@ TEST_CASE("obstacles: a distance's gradient is its normal, and its sign says ins
 TEST_CASE("obstacles: a way meets a shape where it goes in, and nothing where it passes by") {
   std::mt19937 random(2);
   for (const Obstacle& o : every_shape()) {
-    CAPTURE(o.shape);
-    const MovingShape shape = still(o);
+    CAPTURE(o.kind->name);
+    const MovingObstacle shape = still(o);
     int hits = 0, misses = 0, wrong = 0;
     for (int k = 0; k < 1000; ++k) {
       const glm::dvec3 from = within(random, 1.5), to = within(random, 1.5);
@@ -205,12 +202,12 @@ TEST_CASE("obstacles: a way meets a shape where it goes in, and nothing where it
         const glm::dvec3 x = from + n / 400.0 * (to - from);
         least = std::min(least, shape.surface_at(x).distance);
       }
-      const auto met = shape.meeting(to, to - from);
+      const auto met = shape.surface_met(to, to - from);
       const double cell = o.field ? 0.05 : 0.01;
       if (least < -cell) ++hits, wrong += !(met.distance < 0);
       if (least > cell) ++misses, wrong += !(met.distance > 0);
       // The plane is outside: what it stops at has not gone in.
-      if (met.distance < 0 && o.shape < SHAPE_HEIGHTS)
+      if (met.distance < 0 && o.kind->convex)
         wrong += shape.surface_at(to - met.distance * met.normal).distance < -1e-6;
     }
     CHECK(hits > 50);
@@ -222,13 +219,13 @@ TEST_CASE("obstacles: a way meets a shape where it goes in, and nothing where it
 TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in every kind of mode") {
   std::vector<std::vector<Obstacle>> grounds = {{half_space({0, 1, 0})},
                                                 {box({1, 0.5, 1}, {0, -0.5, 0})},
-                                                {round_shape(SHAPE_CYLINDER, 1, 0.5, {0, -0.5, 0})}};
+                                                {round_shape("cylinder", 1, 0.5, {0, -0.5, 0})}};
   grounds[0][0].friction = 0.5;
   std::vector<Obstacle> rails, balls;
   for (const double x : {-0.1, 0.1}) {
-    rails.push_back(round_shape(SHAPE_CAPSULE, 0.05, 0.5, {x, -0.05, 0}));
+    rails.push_back(round_shape("capsule", 0.05, 0.5, {x, -0.05, 0}));
     rails.back().rotation = {90, 0, 0};
-    for (const double z : {-0.1, 0.1}) balls.push_back(round_shape(SHAPE_SPHERE, 0.05, 0, {x, -0.05, z}));
+    for (const double z : {-0.1, 0.1}) balls.push_back(round_shape("sphere", 0.05, 0, {x, -0.05, z}));
   }
   grounds.push_back(rails), grounds.push_back(balls);
   Obstacle flat = hills(1e-3);
@@ -237,12 +234,12 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in eve
   for (const std::string mode : {"node", "cpu-double", "newton", "explicit"})
     for (const auto& ground : grounds) {
       const bool soft = mode == "newton" || mode == "explicit";
-      if (soft && ground[0].shape != (mode == "newton" ? SHAPE_SPHERE : SHAPE_BOX)) continue;
+      if (soft && ground[0].kind->name != std::string(mode == "newton" ? "sphere" : "box")) continue;
       CAPTURE(mode);
-      CAPTURE(ground[0].shape);
+      CAPTURE(ground[0].kind->name);
       Setup setup;
       add(setup, slab, {0, 0.11, 0});
-      setup.model->shapes = ground;
+      setup.model->obstacles = ground;
       in_mode(setup, mode);
       if (soft) setup.settings.constraint_damping = 2e-3;
       const Sim sim = run(setup, 60);
@@ -266,7 +263,7 @@ TEST_CASE_FIXTURE(GlTest,
       add(setup, slab, 0.1 * normal, glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
       Obstacle slope = box({2, 0.5, 1}, -0.5 * normal);
       slope.rotation = {0, 0, degrees}, slope.friction = 0.5;
-      setup.model->shapes = {slope};
+      setup.model->obstacles = {slope};
       in_mode(setup, mode);
       Setup plane = setup;
       setup.settings.friction = 0.9;  // the obstacle's own counts
@@ -277,8 +274,7 @@ TEST_CASE_FIXTURE(GlTest,
       const double way = slid(setup), pull = 9.81 * (std::sin(angle) - 0.5 * std::cos(angle));
       if (mode == "newton") {  // whose friction is smoothed: as on a half space
         plane.model = std::make_shared<Model>(*plane.model);
-        plane.model->shapes.clear();
-        plane.model->obstacles = {glm::dvec4(normal, 0)};
+        plane.model->obstacles = {half_space(normal)};
         CHECK(way == doctest::Approx(slid(plane)).epsilon(0.01));
       } else if (pull > 0) {
         CHECK(way / (pull * 0.5 * 0.5 / 2) == doctest::Approx(1).epsilon(0.02));
@@ -296,8 +292,8 @@ TEST_CASE_FIXTURE(GlTest,
       CAPTURE(restitution);
       Setup setup;
       add(setup, ball_mesh(0.25), {0, 0.75, 0});
-      setup.model->shapes = {round_shape(SHAPE_SPHERE, 0.6, 0, {0, -0.6, 0})};
-      setup.model->shapes[0].restitution = restitution;
+      setup.model->obstacles = {round_shape("sphere", 0.6, 0, {0, -0.6, 0})};
+      setup.model->obstacles[0].restitution = restitution;
       in_mode(setup, mode);
       Sim sim = create_sim(setup.model, setup.settings);
       double apex = 0, worst = 0;
@@ -325,7 +321,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt
       Obstacle floor = half_space({0, 1, 0}), pusher = box({0.2, 0.5, 0.5}, {-0.41, 0.55, 0});
       pusher.velocity = {0.5, 0, 0};
       floor.friction = soft ? 0.3 : 0, pusher.friction = 0;
-      setup.model->shapes = {floor, pusher};
+      setup.model->obstacles = {floor, pusher};
       in_mode(setup, mode);
       setup.settings.constraint_damping = setup.settings.material == "none" ? 0 : 2e-3;
       const Sim sim = run(setup, 120);
@@ -339,7 +335,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt
       add(setup, slab, {0, 0.1, 0});
       Obstacle belt = half_space({0, 1, 0});
       belt.velocity = {1, 0, 0};
-      setup.model->shapes = {belt};
+      setup.model->obstacles = {belt};
       in_mode(setup, mode);
       const Sim sim = run(setup, 100);
       // Pulled by mu g to the belt's speed.
@@ -351,9 +347,9 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt
     {
       Setup setup;
       add(setup, slab, {0.5, 0.1, 0}, glm::dmat3(1), {0, 0, -1});  // at the speed of the plate there
-      Obstacle plate = round_shape(SHAPE_CYLINDER, 2, 0.5, {0, -0.5, 0});
+      Obstacle plate = round_shape("cylinder", 2, 0.5, {0, -0.5, 0});
       plate.spin = {0, 2, 0}, plate.friction = 1;
-      setup.model->shapes = {plate};
+      setup.model->obstacles = {plate};
       in_mode(setup, mode);
       const Sim sim = run(setup, 100);
       const glm::dvec3 end = centre_of(*setup.model, read_state(sim).positions);
@@ -368,7 +364,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as a
     CAPTURE(mode);
     Setup setup;
     add(setup, slab, {0, 0.5, 0}, glm::dmat3(1), {0, -50, 0});
-    setup.model->shapes = {box({0.5, 0.05, 0.5}, {0, -0.05, 0})};
+    setup.model->obstacles = {box({0.5, 0.05, 0.5}, {0, -0.05, 0})};
     in_mode(setup, mode.substr(0, mode.find(' ')));
     if (mode == "node 20") setup.settings.iterations = 20, setup.settings.substeps = 1;
     Sim sim = create_sim(setup.model, setup.settings);
@@ -388,12 +384,12 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as a
 TEST_CASE_FIXTURE(GlTest,
                   "obstacles: the GPU steps as the same method in double, and to the same bits again") {
   for (const Obstacle& o : every_shape()) {
-    CAPTURE(o.shape);
+    CAPTURE(o.kind->name);
     Setup setup;
     add(setup, ball_mesh(0.25), {0.1, 0.7 + 0.27, 0.05}, glm::dmat3(1), {0.5, -3, 0.2});
     Obstacle moving = o;
     moving.velocity = {0.3, 0.5, 0}, moving.spin = {0, 0, 2};
-    setup.model->shapes = {moving};
+    setup.model->obstacles = {moving};
     setup.settings.rigid_contact = false;
     Sim sim = create_sim(setup.model, setup.settings), again = create_sim(setup.model, setup.settings);
     double worst = 0;
@@ -414,7 +410,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: time goes with the state: back, anew, and 
     add(setup, slab, {0, 0.12, 0});
     Obstacle lift = box({1, 0.5, 1}, {0, -0.5, 0});
     lift.keyframes = {{0.1, {0, -0.4, 0}, {0, 0, 10}}, {0.3, {0, -0.5, 0}, {0, 90, 0}}};
-    setup.model->shapes = {lift};
+    setup.model->obstacles = {lift};
     in_mode(setup, mode);
     Sim sim = create_sim(setup.model, setup.settings);
     for (int s = 0; s < 15; ++s) step(sim);
@@ -451,7 +447,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: references meet them too") {
   add(setup, slab, {0, 0.35, 0});
   Obstacle belt = box({3, 0.5, 1}, {0, -0.5, 0});
   belt.velocity = {0.2, 0, 0};
-  setup.model->shapes = {belt};
+  setup.model->obstacles = {belt};
   RigidBody body = rigid_bodies(*setup.model).at(0);
   for (int s = 0; s < 6000; ++s) advance(body, *setup.model, setup.settings, 1e-4);
   CHECK(body.centre.y == doctest::Approx(0.1).epsilon(1e-3));
@@ -461,8 +457,8 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: references meet them too") {
 
   Setup soft;
   add(soft, ball_mesh(0.25), {0, 0.3, 0});
-  soft.model->shapes = {round_shape(SHAPE_SPHERE, 0.6, 0, {0, -0.6, 0}), belt};
-  soft.model->shapes[1].centre.y = -0.6;
+  soft.model->obstacles = {round_shape("sphere", 0.6, 0, {0, -0.6, 0}), belt};
+  soft.model->obstacles[1].centre.y = -0.6;
   in_mode(soft, "explicit");
   soft.settings.young_modulus = 1e5, soft.settings.constraint_damping = 2e-3;
   const Sim sim = create_sim(soft.model, soft.settings);
@@ -473,19 +469,71 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: references meet them too") {
   advance(leaps, 3000), advance(implicits, 150);
   const double apart = samples::distance(state_of(leaps), state_of(implicits));
   CHECK(apart < 5e-3);
-  CHECK(-still(soft.model->shapes[0]).surface_at(state_of(leaps).positions[2]).distance < 1e-4);
+  CHECK(-still(soft.model->obstacles[0]).surface_at(state_of(leaps).positions[2]).distance < 1e-4);
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: penetration is measured over planes and shapes") {
   Setup setup;
   add(setup, slab, {0, 0.1, 0});
-  setup.model->shapes = {box({1, 0.5, 1}, {0, -0.49, 0})};
+  setup.model->obstacles = {box({1, 0.5, 1}, {0, -0.49, 0})};
   const Sim sim = create_sim(setup.model, setup.settings);
   Metrics metrics = create_metrics(*sim.model);
   const Measurement now = measure_now(metrics, sim);
   CHECK(now.penetration_max == doctest::Approx(0.01 / setup.model->size));
   CHECK(now.penetration_999 == doctest::Approx(0.01 / setup.model->size).epsilon(0.5));
   CHECK(now.contacts == 25);
+}
+
+TEST_CASE_FIXTURE(
+    GlTest, "obstacles: half spaces beyond the planes of a step stop bodies too, and too many are refused") {
+  for (const char* mode : {"node", "cpu-double"}) {
+    CAPTURE(mode);
+    Setup setup;
+    add(setup, slab, {0, 0.2, 0});
+    for (int k = 0; k < 12; ++k) setup.model->obstacles.push_back(half_space({0, 1, 0}, 0.005 * k));
+    CHECK(solid_obstacles(*setup.model).size() == 13 - MAX_PLANES);
+    in_mode(setup, mode);
+    const State end = read_state(run(setup, 60));
+    CHECK(bounds(end.positions).low.y == doctest::Approx(0.055).epsilon(1e-3));  // on the highest, the last
+  }
+  Setup setup;
+  add(setup, slab, {0, 0.2, 0});
+  setup.model->obstacles.resize(MAX_OBSTACLES, half_space({0, 1, 0}));
+  CHECK_THROWS_WITH_AS(create_sim(setup.model, setup.settings),
+                       doctest::Contains("too many obstacles: 31 of them: at most 30 beside the ground"),
+                       Error);
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "obstacles: others are taken over without new kernels where these would be the same") {
+  for (const char* mode : {"node", "newton", "cpu-double", "cpu-fast"}) {
+    CAPTURE(mode);
+    Setup setup;
+    add(setup, slab, {0, 0.1, 0});
+    setup.model->obstacles = {half_space({0, 1, 0}), box({1, 0.5, 1}, {0, -0.7, 0})};
+    in_mode(setup, mode);
+    Sim sim = create_sim(setup.model, setup.settings);
+    for (int s = 0; s < 10; ++s) step(sim);
+    const GLuint buffer = sim.positions.id();  // that of another simulation, where it is made again
+    auto other = std::make_shared<Model>(*setup.model);
+    other->obstacles = {half_space({0, 1, 0}, -0.1), half_space({1, 0, 0}, -5),
+                        box({1, 0.5, 1}, {0, -0.58, 0})};
+    change_obstacles(sim, other);
+    setup.model.reset();  // nothing reads it any more
+    CHECK(sim.positions.id() == buffer);
+    Settings grounded = sim.settings;
+    grounded.ground = true, grounded.ground_height = -5;
+    apply_settings(sim, grounded);
+    CHECK(sim.positions.id() == buffer);
+    for (int s = 0; s < 60; ++s) step(sim);
+    CHECK(bounds(read_state(sim).positions).low.y == doctest::Approx(-0.08).epsilon(0.05));  // now on the box
+    auto ball = std::make_shared<Model>(*other);
+    ball->obstacles.back() = round_shape("sphere", 1, 0, {0, -1.2, 0});  // a distance that these kernels lack
+    change_obstacles(sim, ball);
+    CHECK(sim.positions.id() != buffer);
+    CHECK(sim.model == ball);
+    CHECK(!check_finite(sim, true));
+  }
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite") {
@@ -497,7 +545,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite")
     for (Obstacle o : every_shape()) {
       o.centre = within(random, 0.8), o.rotation = within(random, 180);
       o.velocity = within(random, 5), o.spin = within(random, 20);
-      if (unit(random) < 0.4) setup.model->shapes.push_back(o);
+      if (unit(random) < 0.4) setup.model->obstacles.push_back(o);
     }
     in_mode(setup, std::array{"node", "newton", "explicit", "cpu-fast"}[std::size_t(round % 4)]);
     if (round % 3 == 0) setup.settings.substeps = 1;
@@ -525,8 +573,8 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again, what i
     {"shape": "height-field", "half": [1, 0.2, 1], "heights": [[0, 0.5], [1, 0.1], [0.2, 0.3]]})";
   const Scene scene = load(all);
   const auto model = build_model(scene);
-  CHECK(model->obstacles.size() == 1);
-  CHECK(model->shapes.size() == 6);
+  CHECK(model->obstacles.size() == 7);
+  CHECK(solid_obstacles(*model).size() == 6);
   Sim sim = create_sim(model, scene.settings);
   for (int s = 0; s < 20; ++s) step(sim);
   const auto written = scene_json(scene);

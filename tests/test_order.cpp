@@ -114,7 +114,8 @@ std::shared_ptr<const Model> falling(glm::ivec3 cells, int bodies = 1) {
 }
 
 Settings settings_of(const std::string& mode) {
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
   settings.mode = mode;
   settings.iterations = 4;
   settings.substeps = 2;

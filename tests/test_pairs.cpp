@@ -7,11 +7,13 @@
 
 #include "app/run_loop.h"
 #include "render/renderer.h"
+#include "sim/contact/obstacle_kinds.h"
 #include "sim/overlap.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 #include "tests/reference_scenes.h"
+#include "tests/sim_samples.h"
 
 using namespace tetpbd;
 using reference_scenes::centre_of;
@@ -45,7 +47,8 @@ std::shared_ptr<const Model> blocks(const std::vector<Placed>& all) {
 Settings touching(const std::string& mode, double young_modulus = 2e5) {
   Settings s;
   s.mode = mode, s.contact = "bodies", s.material = "neo-hookean", s.young_modulus = young_modulus;
-  s.poisson_ratio = 0.4, s.gravity = 0, s.ground = false, s.friction = 0, s.substeps = 20;
+  s.poisson_ratio = 0.4, s.gravity = 0, s.ground = false, s.friction = 0;
+  s.substeps = mode_of(s).leapfrog ? automatic : 20;
   return s;
 }
 
@@ -505,7 +508,8 @@ TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end fin
     Model model = *blocks(all);
     for (int side = 0; side < 4; ++side) {  // a funnel without a hole
       const double angle = glm::half_pi<double>() * side;
-      model.obstacles.emplace_back(glm::normalize(glm::dvec3(std::cos(angle), 1.5, std::sin(angle))), -0.25);
+      model.obstacles.push_back(
+          samples::half_space(glm::normalize(glm::dvec3(std::cos(angle), 1.5, std::sin(angle))), -0.25));
     }
     Settings settings = touching("explicit", 5e4);
     settings.gravity = 9.81, settings.damping = 1, settings.friction = 0.3;
@@ -567,6 +571,17 @@ TEST_CASE("pairs: a run says how deep bodies came to be in each other, where the
   }
 }
 
+TEST_CASE("pairs: buffers of contact are no larger than the driver allows") {
+  GlTest gl;
+  Placed left{{-0.24, 0, 0}}, right{{0.24, 0, 0}};
+  left.cells = right.cells = glm::ivec3(1);  // all surface
+  const auto model = blocks({left, right});
+  const Sim sim = create_sim(model, touching("explicit"));
+  for (const Buffer& other : sim.solver.buffers) REQUIRE(other.bytes() < sim.pairs.lists.bytes());
+  CHECK_THROWS_WITH_AS(create_sim(model, touching("explicit"), {.storage = sim.pairs.lists.bytes() - 1}),
+                       doctest::Contains("'contacts' of"), Error);
+}
+
 TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
   GlTest gl;
   const auto model = blocks({{{-0.24, 0, 0}}, {{0.24, 0, 0}}});  // two centimetres in each other
@@ -591,8 +606,8 @@ TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
   // Vertices on an obstacle are known as well.
   Model other = *blocks({{{0, 0, 0}}});
   Obstacle ball;
-  ball.shape = SHAPE_SPHERE, ball.radius = 0.25, ball.centre = {0, -0.5, 0};
-  add_obstacle(other, ball);
+  ball.kind = find_obstacle_kind("sphere"), ball.radius = 0.25, ball.centre = {0, -0.5, 0};
+  other.obstacles.push_back(ball);
   Settings settings = touching("explicit");
   settings.gravity = 9.81;
   Sim on_ball = create_sim(std::make_shared<const Model>(other), settings);

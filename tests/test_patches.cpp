@@ -148,7 +148,8 @@ TEST_CASE("patches: a vertex with too many neighbours for one part is solved as 
   auto start = mesh.positions;
   for (auto& p : start) p.x *= 1.2, p.y += 2;
   add_body(*model, "wheel", mesh, 1000, start, glm::dvec3(0), glm::dvec3(0), {});
-  Settings settings{.iterations = 25, .substeps = 1};
+  Settings settings;
+  settings.iterations = 25, settings.substeps = 1;
   settings.iterations = 5;
   std::uint64_t bits = 0;
   for (const char* mode : {"constraint", "node"}) {

@@ -224,13 +224,13 @@ TEST_CASE("a driver that is not there, or too old, gets one line and status 1") 
 TEST_CASE("a run that stops being numbers leaves those of the last good step, and says where and why") {
   const Folder folder;
   fs::copy(TEST_MODELS "/../shaders", folder.path / "shaders", fs::copy_options::recursive);
-  std::string text = read(folder.path / "shaders/vertex.glsl");
+  std::string text = read(folder.path / "shaders/solvers/corrections.glsl");
   const std::string end = "positions[i] = Position(";
   REQUIRE(text.find(end) != std::string::npos);
   // The free end of the beam falls: at a certain speed its numbers end.
   text.insert(text.find(end),
               "if ((phases & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
-  std::ofstream(folder.path / "shaders/vertex.glsl") << text;
+  std::ofstream(folder.path / "shaders/solvers/corrections.glsl") << text;
   const std::string common = "--scene beam --mode node --iterations 2 --substeps 1 ";
   const Outcome bad = program("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
   CAPTURE(bad.err);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/scene.h"
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
 #include "sim/metrics.h"
 #include "tests/gl_test.h"
@@ -185,7 +186,7 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
   CHECK(bounds(second).low.y == doctest::Approx(2));
   CHECK(bounds(second).high.y == doctest::Approx(5));
   CHECK(bounds(second).centre().x == doctest::Approx(4));
-  CHECK(model->obstacles[0] == glm::dvec4(1, 0, 0, -3));
+  CHECK(obstacles_at(*model, Settings{}, 0).back().plane == glm::dvec4(1, 0, 0, -3));
   glm::dvec3 momentum(0);
   double mass = 0;
   for (std::size_t i = model->bodies[1].first_vertex; i < model->positions.size(); ++i)

@@ -365,7 +365,7 @@ TEST_CASE("sheets: one that folds onto itself does not go through itself where t
       p = {p.x + (s > 0 ? 0.2 * (s - half) : 0), s > 0 ? 0.23 : 0.03, std::abs(s) - half};
   }
   add_body(*model, "sheet", sheet, 300, start, glm::dvec3(0), glm::dvec3(0), {});
-  model->obstacles.emplace_back(glm::dvec3(0, 1, 0), 0);
+  model->obstacles.push_back(samples::half_space({0, 1, 0}));
   int through = 0;
   for (const std::string contact : {"none", "self"}) {
     CAPTURE(contact);

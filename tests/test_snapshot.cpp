@@ -36,7 +36,8 @@ TEST_CASE("snapshot: from one on, every mode takes the same steps again, bit by 
   GlTest gl;
   for (const SolverMode& mode : solver_modes())
     for (const bool soft : {false, true}) {
-      Settings settings{.iterations = 2, .substeps = 3};
+      Settings settings;
+      settings.iterations = 2, settings.substeps = 3;
       settings.mode = mode.name;
       if (soft || mode.leapfrog || mode.implicit) apply_preset(settings, material_presets(), "rubber");
       if (soft) settings.constraint_damping = 1e-3;
@@ -93,7 +94,8 @@ TEST_CASE("snapshot: with other settings the state goes on with those") {
 
 TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of them") {
   GlTest gl;
-  Settings settings{.iterations = 4, .substeps = 1};
+  Settings settings;
+  settings.iterations = 4, settings.substeps = 1;
   settings.mode = "newton", settings.material = "neo-hookean";
   settings.young_modulus = 1e8, settings.poisson_ratio = 0.495;
   Sim sim = create_sim(thrown_block(), settings);
@@ -135,7 +137,8 @@ TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and
       for (auto& p : start) p += glm::dvec3(0, 0.32, 0);
       add_body(*model, "sheet", sheet, 300, start, {0, -3, 0}, glm::dvec3(0), {});
     }
-    Settings settings{.iterations = 4, .substeps = 6};
+    Settings settings;
+    settings.iterations = 4, settings.substeps = 6;
     settings.mode = mode.name, settings.contact = cloth ? "self" : "bodies", settings.gravity = 0,
     settings.ground = false;
     apply_preset(settings, material_presets(), "rubber");
@@ -171,8 +174,8 @@ TEST_CASE(
     add_body(*model, "block", block, 1000, start, {-3 * side, -1, 0}, {0, 0, 2 * side}, {});
   }
   const auto in_mode = [](const char* mode, bool touching) {
-    Settings settings{.iterations = 1,
-                      .substeps = 3};  // odd: a double-buffered solver ends on its other side
+    Settings settings;
+    settings.iterations = 1, settings.substeps = 3;  // odd: a double-buffered solver ends on its other side
     settings.mode = mode, settings.contact = touching ? "bodies" : "none";
     if (touching) apply_preset(settings, material_presets(), "rubber");
     return settings;

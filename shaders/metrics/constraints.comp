@@ -5,11 +5,11 @@ uint id_of(Ids ids, int j) { return 0u; }
 #include "constraints/types.glsl"
 #include "constraints/bend.glsl"
 #include "energy.glsl"
-layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
+layout(std430) readonly buffer Rest { vec4 rest[]; };
 uniform vec4 material;  // energy.glsl
-layout(std430, binding = BIND_M_STRETCH) readonly buffer Stretch { Record2 edges[]; };
-layout(std430, binding = BIND_M_BEND) readonly buffer Bend { Record4 hinges[]; };
-layout(std430, binding = BIND_M_VOLUME) readonly buffer Volume { Record4 tets[]; };
+layout(std430) readonly buffer Stretch { Record2 edges[]; };
+layout(std430) readonly buffer Bend { Record4 hinges[]; };
+layout(std430) readonly buffer Volume { Record4 tets[]; };
 
 void main() {
   uint start = gl_GlobalInvocationID.x;

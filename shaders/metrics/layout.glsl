@@ -2,14 +2,6 @@
 #define METRICS_GROUPS 64      // most work-groups of a reduction; a mesh always gets the same number: sums keep their order
 #define METRICS_SIZE 256       // their size
 
-#define BIND_M_POSITIONS 0
-#define BIND_M_VELOCITIES 1
-#define BIND_M_REST 2          // vec4: rest position about the centre of mass, mass
-#define BIND_M_STRETCH 3
-#define BIND_M_BEND 4
-#define BIND_M_VOLUME 5
-#define BIND_M_PARTIALS 6
-#define BIND_M_ROW 7
 
 // Sums over one body, in this order in a row. The first group comes from constraints, the second from vertices, the third
 // from vertices once the centre and rotation are known.

@@ -2,9 +2,9 @@
 #include "pair.glsl"
 #include "metrics/layout.glsl"
 layout(local_size_x = METRICS_SIZE) in;
-layout(std430, binding = BIND_M_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_M_PARTIALS) buffer Partials { float partials[]; };  // [quantity][group]
-layout(std430, binding = BIND_M_ROW) buffer Row { float row[]; };
+layout(std430) readonly buffer Positions { Position positions[]; };
+layout(std430) buffer Partials { float partials[]; };  // [quantity][group]
+layout(std430) buffer Row { float row[]; };
 uniform uint groups;                // of the kernels that write partials
 uniform uvec2 vertex_range, edge_range, hinge_range, tet_range;  // of the body: first and end
 uniform float mass;      // kg, of the body

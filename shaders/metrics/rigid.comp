@@ -1,7 +1,7 @@
 // Distance to the rigidly aligned rest shape (method.md eq. 20), and angular momentum about the centre of mass, of one body.
 #include "metrics/reduce.glsl"
-layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
-layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
+layout(std430) readonly buffer Velocities { Velocity velocities[]; };
+layout(std430) readonly buffer Rest { vec4 rest[]; };
 
 void main() {
   vec3 centre = vec3(row[M_CENTRE], row[M_CENTRE + 1], row[M_CENTRE + 2]);

@@ -1,12 +1,9 @@
 // Moments of one body: mass, momentum, energy, and the covariance that gives its best-fitting rotation.
 #include "metrics/reduce.glsl"
 #include "finite.glsl"
-#if SHAPES
-#include "contact.glsl"
-#include "shape_contact.glsl"
-#endif
-layout(std430, binding = BIND_M_VELOCITIES) readonly buffer Velocities { Velocity velocities[]; };
-layout(std430, binding = BIND_M_REST) readonly buffer Rest { vec4 rest[]; };
+#include "contact/obstacles.glsl"
+layout(std430) readonly buffer Velocities { Velocity velocities[]; };
+layout(std430) readonly buffer Rest { vec4 rest[]; };
 
 shared uint depths[DEPTHS];
 
@@ -31,18 +28,11 @@ void main() {
     height += m * p.high.y;
     covariance += m * outerProduct(x, at_rest.xyz);
     float outside_by = 0.0;
-    for (int k = 0; k < params.plane_count; ++k) {
-      float gap = (dot(params.planes[k].xyz, p.high) - params.planes[k].w) + dot(params.planes[k].xyz, p.low);
+    for (int k = 0; k < obstacle_count(); ++k) {
+      float gap = obstacle_distance(k, Pair(p.high, p.low));
       if (gap < touching) contacts += 1.0;
       outside_by = min(outside_by, gap);
     }
-#if SHAPES
-    for (int k = 0; k < SHAPES; ++k) {
-      float gap = gap_to(k, Pair(p.high, p.low));
-      if (gap < touching) contacts += 1.0;
-      outside_by = min(outside_by, gap);
-    }
-#endif
     deepest = max(deepest, -outside_by);
     int octaves = int(-2.0 * log2(-outside_by * 1e-5 / touching));
     if (outside_by < 0.0 && octaves < DEPTHS) atomicAdd(depths[max(octaves, 0)], 1u);

@@ -6,6 +6,5 @@ void main() {
     put(WAY, i, vec3(0.0), 0.0);
     put(GAIN, i, vec3(0.0), 0.0);
   }
-  if (i < AGGREGATES)
-    for (uint k = 0; k < 4; ++k) sums[ROTATIONS_AT + 4 * i + k] = k == 3 ? 1.0 : 0.0;
+  if (i < AGGREGATES) rotations[i] = vec4(0.0, 0.0, 0.0, 1.0);
 }

@@ -6,9 +6,8 @@ void main() {
   float sum = 0.0;
   if (row < UNKNOWNS)
     for (uint k = lane % ROW_LANES; k < COARSE_ROW; k += ROW_LANES) {
-      vec4 m = coarse_words[row * COARSE_ROW + k];
-      for (uint c = 0u; c < 4u; ++c)  // filled up with zeros
-        sum += m[c] * sums[COARSE_R + 4u * k + c];
+      vec4 m = coarse_inverse[row * COARSE_ROW + k];
+      for (uint c = 0u; c < 4u; ++c) sum += m[c] * coarse_r[4u * k + c];
     }
   parts[lane] = sum;
   barrier();
@@ -16,5 +15,5 @@ void main() {
     if (lane % ROW_LANES < half_size) parts[lane] += parts[lane + half_size];
     barrier();
   }
-  if (lane % ROW_LANES == 0u && row < UNKNOWNS) sums[COARSE_Y + row] = sums[FREE_AT + row / 6u] * parts[lane];
+  if (lane % ROW_LANES == 0u && row < UNKNOWNS) coarse_y[row] = is_free[row / 6u] * parts[lane];
 }

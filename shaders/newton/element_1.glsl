@@ -1,11 +1,13 @@
 // A constraint with one value: its energy is C^2 / (2 a), and its rate is resisted by tau / a.
-void add_$KIND(uint record, uint part, int i, int j, inout mat3 block, inout vec3 force) {
+void add_$KIND(uint number, uint part, int i, int j, inout mat3 block, inout vec3 force) {
   vec3 x[$ARITY];
-  ivec4 first = start_at(part, mesh[record]);
-  for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(part, mesh[record + k]), first);
-  Constraint$ARITY c = $KIND(x, rest_$KIND(record), record);
+  uvec4 ids = uvec4(0u);
+  for (uint k = 0u; k < $ARITY; ++k) ids[k] = vertices_$KIND[number][k];
+  ivec4 first = start_at(part, ids[0]);
+  for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(part, ids[k]), first);
+  Constraint$ARITY c = $KIND(x, rest_$KIND(number), ids);
 #if $MATERIAL
-  float a = uintBitsToFloat(mesh[record + $ARITY + $VALUES]);
+  float a = compliances_$KIND[number];
 #else
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN] * (params.h * params.h);
 #endif
@@ -13,9 +15,9 @@ void add_$KIND(uint record, uint part, int i, int j, inout mat3 block, inout vec
   float tau = $RATE == 1 ? 1.0 : params.damping * params.h;
   if (tau > 0.0) {
     // Along the way since z.
-    float h = at(OFFSET, mesh[record]).w, rate = 0.0;
+    float h = at(OFFSET, ids[0]).w, rate = 0.0;
     for (int k = 0; k < $ARITY; ++k) {
-      uint v = mesh[record + uint(k)];
+      uint v = ids[k];
       Position own = positions[v];
       vec3 moved = own.inverse_mass > 0.0 ? start_of(v, Pair(own.high, own.low)) - at(OFFSET, v).xyz : vec3(0.0);
       rate += dot(c.gradient[k], moved) / h;

@@ -1,24 +1,23 @@
 // The last iteration's step, then where each vertex is and how fast (method.md eq. 40). One invocation per vertex.
 #include "newton/newton.glsl"
 #include "newton/advance.glsl"
-vec3 numbers(uint k) { return vec3(sums[k], sums[k + 1u], sums[k + 2u]); }
 // What the correction of its body's momentum moves a vertex by.
 vec3 rigid_way(uint i, Pair x, vec3 u) {
   uint body = floatBitsToUint(at(REST, i).w);
   if (body == 0u) return vec3(0.0);
-  uint k = MOTIONS_AT + MOTION_WORDS * (body - 1u);
-  vec3 arm = relative(x, Pair(numbers(k + 7u), numbers(k + 10u))) + u;
-  vec3 q = numbers(k + 3u);
-  return numbers(k) + 2.0 * cross(q, cross(q, arm) + sums[k + 6u] * arm);  // not the place turned less the place, which rounds
+  BodyMotion m = motions[body - 1u];
+  vec3 arm = relative(x, Pair(m.centre_high, m.centre_low)) + u;
+  vec3 q = m.turn.xyz;
+  return m.way + 2.0 * cross(q, cross(q, arm) + m.turn.w * arm);  // not the place turned less the place, which rounds
 }
 void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);
   if (phases > 0u) l = lengths(phases);
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (i == 0u && phases > 0u) {
-    float first = phases > 1u && sums[FIRST_AT] > 0.0 ? sums[FIRST_AT] : l.rz;
-    if (sums[DOTS_AT] > 0.0) atomicMax(largest, floatBitsToUint(first > 0.0 ? sqrt(l.rz / first) : 1.0));
-    if (phases == 1u && sums[DOTS_AT] > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
+    float first = phases > 1u && first_rz > 0.0 ? first_rz : l.rz;
+    if (dots.x > 0.0) atomicMax(largest, floatBitsToUint(first > 0.0 ? sqrt(l.rz / first) : 1.0));
+    if (phases == 1u && dots.x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
   }
   if (i >= VERTICES) return;
   Position own = positions[i];
@@ -37,9 +36,9 @@ void main() {
     bool known = (floatBitsToUint(at(WAY, i).w) & KNOWN) != 0u;
     v = (u - offset.xyz) / offset.w;
     if (!known) v += (0.5 * params.h) * params.gravity;
-    for (int k = 0; k < OBSTACLES; ++k) {
-      Surface plane = plane_of(k, x, free);
-      vec3 n = (holds & (1u << k)) != 0u ? normal_of(uint(k), i) : plane.normal;
+    for (int k = 0; k < obstacle_count(); ++k) {
+      Surface plane = surface_ahead(k, x, free, free);
+      vec3 n = (holds & (1u << k)) != 0u ? normal_of(k, i) : plane.normal;
       bool clamped = plane.distance < 0.0;
       if ((holds & (1u << k)) != 0u || clamped) {
         float force = -dot(n, last.residual);
@@ -47,12 +46,8 @@ void main() {
         push = max(push, force);
       }
     }
-#if SHAPES
-    vec3 carried = velocity_of(touched, x);
+    vec3 carried = obstacle_velocity(findLSB(touched), x);  // by the first of them
     v = carried + free_part(v - carried, touched, i);
-#else
-    v = free_part(v, touched, i);
-#endif
     way = free_part(u, touched, i);
     gain = free_part(v - before, touched, i);
   }

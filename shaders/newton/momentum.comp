@@ -3,8 +3,7 @@
 #define SUMS_ARE coherent
 #include "newton/newton.glsl"
 #include "newton/advance.glsl"
-// Force in excess and mass; its moment and what is held; first moments of mass; second ones, their diagonal first.
-#define COLUMNS 5
+#define COLUMNS MOMENTUM_COLUMNS
 shared vec4 columns[COLUMNS][GROUP_SIZE];
 shared bool last;
 
@@ -26,21 +25,15 @@ void write_motion(uint body, Pair origin) {
   vec3 w = inverse(inertia) * moment;
   float angle = length(w), most = 0.5;
   bool good = columns[1][0].w == 0.0 && angle < most;
-  uint k = MOTIONS_AT + MOTION_WORDS * body;
   Pair middle = pair_add(origin, centre);
-  for (int c = 0; c < 3; ++c) {
-    sums[k + uint(c)] = good ? way[c] : 0.0;
-    sums[k + 3u + uint(c)] = good && angle > 0.0 ? w[c] * (sin(0.5 * angle) / angle) : 0.0;
-    sums[k + 7u + uint(c)] = middle.high[c];
-    sums[k + 10u + uint(c)] = middle.low[c];
-  }
-  sums[k + 6u] = good ? cos(0.5 * angle) : 1.0;
+  vec4 turn = vec4(good && angle > 0.0 ? w * (sin(0.5 * angle) / angle) : vec3(0.0), good ? cos(0.5 * angle) : 1.0);
+  motions[body] = BodyMotion(turn, good ? way : vec3(0.0), 0.0, middle.high, 0.0, middle.low, 0.0);
 }
 
 void main() {
   uint lane = gl_LocalInvocationIndex, body = group_index() / PARTS, part = group_index() % PARTS;
   if (body >= FREE_BODIES) return;
-  uint first = mesh[BODIES_AT + 2u * body], end = mesh[BODIES_AT + 2u * body + 1u], slice = (end - first + PARTS - 1u) / PARTS;
+  uint first = free_bodies[body].first, end = free_bodies[body].end, slice = (end - first + PARTS - 1u) / PARTS;
   Pair origin = Pair(positions[first].high, positions[first].low);
   Lengths l = lengths(phases);
   for (int c = 0; c < COLUMNS; ++c) columns[c][lane] = vec4(0.0);
@@ -58,8 +51,7 @@ void main() {
   add_up();
   if (PARTS > 1u) {
     if (lane == 0u) {
-      for (uint c = 0u; c < COLUMNS; ++c)
-        for (uint k = 0u; k < 4u; ++k) sums[PARTS_AT + 4u * (COLUMNS * group_index() + c) + k] = columns[c][0][k];
+      for (uint c = 0u; c < COLUMNS; ++c) momentum_sums[group_index()].columns[c] = columns[c][0];
       memoryBarrierBuffer();
       last = atomicAdd(parts_done[body], 1u) + 1u == PARTS;
     }
@@ -67,8 +59,7 @@ void main() {
     if (!last) return;
     memoryBarrierBuffer();
     for (uint c = 0u; c < COLUMNS; ++c)
-      for (uint k = 0u; k < 4u; ++k)
-        columns[c][lane][k] = lane < PARTS ? sums[PARTS_AT + 4u * (COLUMNS * (body * PARTS + lane) + c) + k] : 0.0;
+      columns[c][lane] = lane < PARTS ? momentum_sums[body * PARTS + lane].columns[c] : vec4(0.0);
     add_up();
   }
   if (lane == 0u) {

@@ -1,57 +1,67 @@
-// What the kernels of mode newton share (method.md, "Implicit steps"): a step of BDF2 is one Newton step for the displacement u of each
-// vertex over it, solved by conjugate gradients with two levels of preconditioner: 3x3 blocks of vertices, and rigid motions of aggregates.
+// What the kernels of mode newton share (method.md, "Implicit steps"): a step of BDF2 is one Newton step for the
+// displacement u of each vertex over it, solved by conjugate gradients with two levels of preconditioner: 3x3 blocks of
+// vertices, and rigid motions of aggregates.
 #include "types.glsl"
 #include "pair.glsl"
-#include "quantized.glsl"
+#include "quantize.glsl"
 #include "vertex_state.glsl"
-#include "contact.glsl"
-#if SHAPES
-#include "shape_contact.glsl"
-#define OBSTACLES (params.plane_count + SHAPES)
-#else
-#define OBSTACLES params.plane_count
-#endif
+#include "contact/obstacles.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 
-#include "newton/vectors.glsl"
-// Newton's start is a part of the way to `aim`; places after each of four parts, quantized, lie where r, z, p and q come later.
+#include "newton/layout.glsl"
+layout(std430) restrict buffer Vectors { vec4 vectors[]; };  // by slot, then vertex
+vec4 at(uint slot, uint i) { return vectors[slot * VERTICES + i]; }
+void put(uint slot, uint i, vec3 v, float w) { vectors[slot * VERTICES + i] = vec4(v, w); }
+// Newton's start is a part of the way to `aim`; places after each of four parts, quantized, lie where r, z, p and q
+// come later.
 const float start_parts[4] = float[4](1.0, 0.5, 0.25, 0.0);
 ivec4 start_at(uint part, uint i) { return floatBitsToInt(at(RESIDUAL + part, i)); }
 
-// By edge, 3: columns of the block of its first vertex's row and second one's column; and a component each of the force on the first.
 #ifndef BLOCKS_ARE
 #define BLOCKS_ARE readonly
 #endif
-layout(std430, binding = BIND_NEWTON_BLOCKS) restrict BLOCKS_ARE buffer Blocks { vec4 blocks[]; };
+layout(std430) restrict BLOCKS_ARE buffer Blocks { EdgeBlock blocks[]; };
 
-// Numbers: the first entry of each edge, entries (constraint << 7 | kind << 4 | i << 2 | j), the first neighbour of each
-// vertex, neighbours (edge * 2 + 1 where the vertex is its second, vertex), records of each kind, 4 aggregates of each vertex
-// (number << 16 | weight * 65535), the first vertex of each aggregate, its vertices (vertex, weight * 65535).
-layout(std430, binding = BIND_NEWTON_MESH) restrict readonly buffer Mesh { uint mesh[]; };
+// Of several arrays in a block all but the last need a size, which is not 0. Long ones are of numbers or vectors, for
+// Mesa's linker goes through a sized array of structs or arrays element by element. Those that begin with `first_` have
+// an end as well.
+layout(std430) restrict readonly buffer Mesh {
+  uint first_use[EDGES + 1u];  // by edge
+  uint uses[max(USES, 1u)];    // PACKED_USE
+  uint first_neighbour[VERTICES + 1u];
+  uvec2 neighbours[max(2u * EDGES, 1u)];  // edge * 2, and 1 where the row's vertex is its second; vertex
+  uvec4 shares[VERTICES];                 // PACKED_SHARE
+  uint first_member[AGGREGATES + 1u];
+  uvec2 members[max(MEMBERS, 1u)];  // vertex; weight in WEIGHT_UNITs
+  FreeBody free_bodies[max(FREE_BODIES, 1u)];
+  // Of constraints: vertices, values at rest, compliances of a material.
+  #foreach uvec$ARITY vertices_$KIND[max(COUNT_$KIND, 1u)];
+  #foreach float values_$KIND[max($VALUESu * COUNT_$KIND, 1u)];
+  #foreach float compliances_$KIND[max($MATERIALu * $COMPONENTSu * COUNT_$KIND, 1u)];
+};
 
-// The inverse of the coarse matrix by rows, then centre and reach of each aggregate.
-layout(std430, binding = BIND_NEWTON_COARSE) restrict readonly buffer Coarse { vec4 coarse_words[]; };
-#define UNKNOWNS (6 * AGGREGATES)
-vec4 centre_of(uint aggregate) { return coarse_words[CENTRES_AT + aggregate]; }
+#define UNKNOWNS (6u * AGGREGATES)
+layout(std430) restrict readonly buffer Coarse {
+  vec4 centres[max(AGGREGATES, 1u)];  // of mass at rest; reach
+  vec4 coarse_inverse[];              // of the coarse matrix: rows of COARSE_ROW, filled up with zeros
+};
 
-// How many tets each part of the way turns over or blows up; then floats: two dot products of every work-group of the matrix's product, their sums, three
-// numbers of this and the last iteration, of coarse unknowns r, q and y, rotations as quaternions, whether an aggregate is free (0 or 1), and
-// what follows.
 #ifndef SUMS_ARE
 #define SUMS_ARE
 #endif
-layout(std430, binding = BIND_NEWTON_SUMS) restrict SUMS_ARE buffer Sums { uint bad_starts[3], products_done, parts_done[FREE_BODIES + 1u]; float sums[]; };
-#define DOTS_AT (2 * PRODUCT_GROUPS)
-#define SCALARS_AT (DOTS_AT + 2)
-#define COARSE_R (SCALARS_AT + 6)
-#define COARSE_Q (COARSE_R + UNKNOWNS)
-#define COARSE_Y (COARSE_Q + UNKNOWNS)
-#define ROTATIONS_AT (COARSE_Y + UNKNOWNS)
-#define FREE_AT (ROTATIONS_AT + 4 * AGGREGATES)
-#define FIRST_AT (FREE_AT + AGGREGATES)  // r . z of the first iteration
-#define MOTIONS_AT (FIRST_AT + 1u)       // of each free body: way, turn (a quaternion), centre (momentum.comp)
-#define MOTION_WORDS 13u
-#define PARTS_AT (MOTIONS_AT + MOTION_WORDS * FREE_BODIES)
+layout(std430) restrict SUMS_ARE buffer Sums {
+  vec4 rotations[max(AGGREGATES, 1u)];  // quaternions
+  BodyMotion motions[max(FREE_BODIES, 1u)];
+  MomentumSums momentum_sums[max(FREE_BODIES * PARTS, 1u)];
+  vec2 group_dots[PRODUCT_GROUPS];  // r . z and z . A z, by work-group of product.comp
+  vec2 dots;                        // their sums
+  Iteration iterations[2];          // this and the last one, in turn
+  float coarse_r[max(4u * COARSE_ROW, 1u)], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
+  float is_free[max(AGGREGATES, 1u)];  // 1: no obstacle holds the aggregate, else 0
+  float first_rz;                      // r . z of the first iteration that was healthy
+  uint bad_starts[3];                  // how many tets each part of the way turns over or blows up
+  uint products_done, parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
+};
 
 // The largest part that a hundredth of all tets at most bears badly: contact crushes a few at any start, and they recover.
 uint start_part() {
@@ -59,47 +69,29 @@ uint start_part() {
     if (100u * bad_starts[part] <= TETS) return part;
   return 3u;
 }
-vec4 rotation_of(uint aggregate) {
-  uint k = ROTATIONS_AT + 4 * aggregate;
-  return vec4(sums[k], sums[k + 1], sums[k + 2], sums[k + 3]);
-}
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 vec4 opposite(vec4 q) { return vec4(-q.xyz, q.w); }
 
-// The plane of obstacle k that a vertex at x meets on the way u, and the distance of x + u from it.
-Surface plane_of(int k, Pair x, vec3 u) {
-#if SHAPES
-  if (k >= params.plane_count) {
-    int s = k - params.plane_count;
-    if (!may_meet(s, x, length(u), 1.0)) return Surface(vec3(0.0), 1e9);
-    return met(s, pair_add(x, u), u - params.h * shape_velocity(s, x));
-  }
-#endif
-  return Surface(params.planes[k].xyz, depth_of(x, params.planes[k]) + dot(params.planes[k].xyz, u));
-}
 // u, moved out of the obstacles that x + u is in.
 vec3 kept_out(Pair x, vec3 u) {
-  for (int k = 0; k < OBSTACLES; ++k) {
-    Surface plane = plane_of(k, x, u);
+  for (int k = 0; k < obstacle_count(); ++k) {
+    Surface plane = surface_ahead(k, x, u, u);
     u -= plane.normal * min(plane.distance, 0.0);
   }
   return u;
 }
 vec3 aimed(uint i) { return start_parts[start_part()] * at(AIM, i).xyz; }
 vec3 start_of(uint i, Pair x) { return kept_out(x, aimed(i)); }
-// In a step a shape holds vertex i at the plane that it meets on its way to the start.
-vec3 normal_of(uint k, uint i) {
-#if SHAPES
-  return plane_of(int(k), Pair(positions[i].high, positions[i].low), aimed(i)).normal;
-#else
-  return params.planes[k].xyz;
-#endif
+// In a step an obstacle holds vertex i at the plane that it meets on its way to the start.
+vec3 normal_of(int k, uint i) {
+  vec3 aim = aimed(i);
+  return surface_ahead(k, Pair(positions[i].high, positions[i].low), aim, aim).normal;
 }
 // Without what the obstacles of `bits` hold of vertex i: their normals, made orthogonal to each other.
 vec3 free_part(vec3 v, uint bits, uint i) {
   if ((bits & (bits - 1u)) == 0u) {
     if (bits != 0u) {
-      vec3 n = normal_of(uint(findLSB(bits)), i);
+      vec3 n = normal_of(findLSB(bits), i);
       v -= n * dot(n, v);
     }
     return v;
@@ -107,28 +99,13 @@ vec3 free_part(vec3 v, uint bits, uint i) {
   vec3 held[3] = vec3[3](vec3(0.0), vec3(0.0), vec3(0.0));
   int count = 0;
   for (; bits != 0u && count < 3; bits &= bits - 1u) {
-    vec3 n = normal_of(uint(findLSB(bits)), i);
+    vec3 n = normal_of(findLSB(bits), i);
     for (int k = 0; k < count; ++k) n -= held[k] * dot(held[k], n);
     float l = length(n);
     if (l > 1e-3) held[count++] = n / l;
   }
   for (int k = 0; k < count; ++k) v -= held[k] * dot(held[k], v);
   return v;
-}
-// Of the first obstacle of `bits`.
-float friction_of(uint bits) {
-#if SHAPES
-  int k = findLSB(bits) - params.plane_count;
-  if (k >= 0) return shapes[k].friction;
-#endif
-  return params.friction;
-}
-vec3 velocity_of(uint bits, Pair x) {
-#if SHAPES
-  int k = findLSB(bits) - params.plane_count;
-  if (k >= 0) return shape_velocity(k, x);
-#endif
-  return vec3(0.0);
 }
 uint held_by(vec4 residual) { return floatBitsToUint(residual.w); }
 
@@ -156,16 +133,14 @@ struct Lengths {
 // The first iteration of a healthy step has alpha near 1: below LEAST_HEALTH the second level knows nothing of this body, and is left out
 // of the rest of the step.
 Lengths lengths(uint iteration) {
-  vec2 dots = vec2(sums[DOTS_AT], sums[DOTS_AT + 1u]);
-  uint last = SCALARS_AT + 3u * ((iteration - 1u) & 1u);
-  float rz_before = sums[last], alpha_before = sums[last + 1u];
-  Lengths l = Lengths(0.0, 0.0, dots.x, sums[last + 2u] > 0.0);
-  float curvature = dots.y;
-  if (rz_before > 0.0) {
-    l.beta = dots.x / rz_before;
-    curvature -= l.beta * dots.x / alpha_before;
+  Iteration before = iterations[(iteration - 1u) & 1u];
+  float rz = dots.x, curvature = dots.y;
+  Lengths l = Lengths(0.0, 0.0, rz, before.coarse != 0u);
+  if (before.rz > 0.0) {
+    l.beta = rz / before.rz;
+    curvature -= l.beta * rz / before.alpha;
   }
-  if (dots.x > 0.0 && curvature > 0.0) l.alpha = dots.x / curvature;
+  if (rz > 0.0 && curvature > 0.0) l.alpha = rz / curvature;
   if (l.coarse && iteration == 1u && !(l.alpha >= LEAST_HEALTH)) {
     l.coarse = false;
     l.alpha = 0.0;

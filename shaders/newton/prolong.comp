@@ -11,10 +11,11 @@ void main() {
   if (at(AIM, i).w > 0.0 && AGGREGATES > 0) {
     vec3 rest = at(REST, i).xyz;
     for (uint k = 0u; k < 4u; ++k) {
-      uint word = mesh[WEIGHTS_AT + 4u * i + k], aggregate = word >> 16, y = COARSE_Y + 6u * aggregate;
-      vec4 centre = centre_of(aggregate);
-      vec3 way = vec3(sums[y], sums[y + 1u], sums[y + 2u]), turn = vec3(sums[y + 3u], sums[y + 4u], sums[y + 5u]);
-      z += turned(rotation_of(aggregate), way + cross(turn, (rest - centre.xyz) / centre.w)) * (float(word & 65535u) * (1.0 / 65535.0));
+      uint share = shares[i][k], aggregate = SHARE_AGGREGATE(share), y = 6u * aggregate;
+      vec4 centre = centres[aggregate];
+      vec3 way = vec3(coarse_y[y], coarse_y[y + 1u], coarse_y[y + 2u]);
+      vec3 turn = vec3(coarse_y[y + 3u], coarse_y[y + 4u], coarse_y[y + 5u]), arm = (rest - centre.xyz) / centre.w;
+      z += turned(rotations[aggregate], way + cross(turn, arm)) * (float(SHARE_WEIGHT(share)) * WEIGHT_UNIT);
     }
   }
   put(SEARCH, i, free_part(z, holds, i), 0.0);

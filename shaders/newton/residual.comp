@@ -1,4 +1,4 @@
-// The residual at Newton's start, the inverse diagonal blocks, and which half spaces hold a vertex. LANES invocations per vertex.
+// The residual at Newton's start, the inverse diagonal blocks, and which obstacles hold a vertex. LANES invocations per vertex.
 #include "newton/newton.glsl"
 shared vec3 parts[3][GROUP_SIZE];
 
@@ -21,13 +21,10 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
     r = -force - aim.w * (u - aim.xyz);
     mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z, diagonal.z + aim.w);
     float push = at(GAIN, i).w;
-    if (push > 0.0 && touched != 0u && friction_of(touched) > 0.0) {
-#if SHAPES
-      vec3 slid = free_part(u - params.h * velocity_of(touched, x), touched, i);
-#else
-      vec3 slid = free_part(u, touched, i);
-#endif
-      slides = resistance(friction_of(touched), push, slid);
+    float friction = obstacle_friction(findLSB(touched));  // of the first of them
+    if (push > 0.0 && touched != 0u && friction > 0.0) {
+      vec3 slid = free_part(u - params.h * obstacle_velocity(findLSB(touched), x), touched, i);
+      slides = resistance(friction, push, slid);
       r -= slides * slid;
       for (int c = 0; c < 3; ++c) {
         vec3 axis = vec3(0.0);
@@ -35,16 +32,10 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
         D[c] += free_part(axis, touched, i);
       }
     }
-    for (int k = 0; k < OBSTACLES; ++k) {
-#if SHAPES
-      Surface plane = plane_of(k, x, aimed(i));
-      vec3 n = plane.normal;
-      bool there = plane.distance + dot(n, u - aimed(i)) <= 2.0 * params.quantum;
-#else
-      vec3 n = params.planes[k].xyz;
-      bool there = depth_of(x, params.planes[k]) + dot(n, u) <= 2.0 * params.quantum;
-#endif
-      if (there && (dot(n, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
+    for (int k = 0; k < obstacle_count(); ++k) {
+      Surface plane = surface_ahead(k, x, aimed(i), u);
+      bool there = plane.distance <= 2.0 * params.quantum;
+      if (there && (dot(plane.normal, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
     }
     mat3 B = inverse(D);
     inverse_diagonal = vec3(B[0][0], B[1][1], B[2][2]);
@@ -62,10 +53,10 @@ void main() {
   uint lane = gl_LocalInvocationIndex, row = lane / LANES, i = group_index() * (GROUP_SIZE / LANES) + row;
   vec3 force = vec3(0.0), diagonal = vec3(0.0), across = vec3(0.0);
   if (i < VERTICES) {
-    uint end = mesh[ROWS_AT + i + 1u];
-    for (uint k = mesh[ROWS_AT + i] + lane % LANES; k < end; k += LANES) {
-      uint edge = mesh[NEIGHBOURS_AT + 2u * k];
-      vec4 c0 = blocks[3u * (edge >> 1)], c1 = blocks[3u * (edge >> 1) + 1u], c2 = blocks[3u * (edge >> 1) + 2u];
+    uint end = first_neighbour[i + 1u];
+    for (uint k = first_neighbour[i] + lane % LANES; k < end; k += LANES) {
+      uint edge = neighbours[k].x, e = edge >> 1;
+      vec4 c0 = blocks[e].columns[0], c1 = blocks[e].columns[1], c2 = blocks[e].columns[2];
       vec3 f = vec3(c0.w, c1.w, c2.w);
       force += (edge & 1u) == 0u ? f : -f;
       diagonal -= vec3(c0.x, c1.y, c2.z);

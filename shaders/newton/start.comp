@@ -5,21 +5,21 @@
 uint id_of(Ids ids, int j) { return 0u; }
 #include "constraints/types.glsl"
 #foreach #include "constraints/$KIND.glsl"
-#include "newton/records.glsl"
+#foreach #include "newton/rest.glsl"
 shared vec4 columns[3][GROUP_SIZE];
 shared uint bad_here[3];
 
 #foreach #include "newton/start_$TETS.glsl"
 
 void turn(uint aggregate) {
-  uint lane = gl_LocalInvocationIndex, first = mesh[AGGREGATES_AT + aggregate], end = mesh[AGGREGATES_AT + aggregate + 1u];
-  vec4 centre = centre_of(aggregate);
-  ivec4 origin = start_at(3u, mesh[MEMBERS_AT + 2u * first]);
+  uint lane = gl_LocalInvocationIndex, first = first_member[aggregate], end = first_member[aggregate + 1u];
+  vec4 centre = centres[aggregate];
+  ivec4 origin = start_at(3u, members[first].x);
   mat3 A = mat3(0.0);
   float mass = 0.0;
   for (uint k = first + lane; k < end; k += GROUP_SIZE) {
-    uint i = mesh[MEMBERS_AT + 2u * k];
-    float m = float(mesh[MEMBERS_AT + 2u * k + 1u]) * at(AIM, i).w;
+    uint i = members[k].x;
+    float m = float(members[k].y) * at(AIM, i).w;
     A += outerProduct(m * between(start_at(3u, i), origin), at(REST, i).xyz - centre.xyz);
     mass += m;
   }
@@ -31,7 +31,7 @@ void turn(uint aggregate) {
     barrier();
   }
   if (lane != 0u) return;
-  vec4 before = rotation_of(aggregate), q = before;
+  vec4 before = rotations[aggregate], q = before;
   float small = 0.02 * columns[0][0].w * centre.w * centre.w;  // where points lie on a line, as it was
   for (int c = 0; c < 3; ++c) {
     vec3 axis = vec3(0.0);
@@ -55,8 +55,8 @@ void turn(uint aggregate) {
     float r = cos(0.5 * angle);
     q = normalize(vec4(r * q.xyz + q.w * n + cross(n, q.xyz), r * q.w - dot(n, q.xyz)));
   }
-  for (uint k = 0u; k < 4u; ++k) sums[ROTATIONS_AT + 4u * aggregate + k] = q[k];
-  bool known = (floatBitsToUint(at(WAY, mesh[MEMBERS_AT + 2u * first]).w) & KNOWN) != 0u;
+  rotations[aggregate] = q;
+  bool known = (floatBitsToUint(at(WAY, members[first].x).w) & KNOWN) != 0u;
   if (known && abs(dot(before, q)) < cos(0.5 * params.turn_limit)) atomicMin(least, floatBitsToUint(HEALTH_TURNING));
 }
 

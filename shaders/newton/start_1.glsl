@@ -1,13 +1,13 @@
 void start_$KIND(uint c, inout uint bad) {
   if (c >= COUNT_$KIND) return;
-  uint record = RECORDS_$KIND + WORDS_$KIND * c;
+  uvec$ARITY ids = vertices_$KIND[c];
   float before = 1.0;
   for (uint k = 0u; k < 4u; ++k) {
     uint part = 3u - k;  // where it is, first
     vec3 x[$ARITY];
-    ivec4 first = start_at(part, mesh[record]);
-    for (uint j = 0u; j < $ARITY; ++j) x[j] = between(start_at(part, mesh[record + j]), first);
-    float now = $KIND_jacobian(x, rest_$KIND(record));
+    ivec4 first = start_at(part, ids[0]);
+    for (uint j = 0u; j < $ARITY; ++j) x[j] = between(start_at(part, ids[j]), first);
+    float now = $KIND_jacobian(x, rest_$KIND(c));
     if (part == 3u) {
       before = now;
       if (!(now > 0.0)) atomicMin(least, 0u);

@@ -7,15 +7,16 @@ shared vec3 forces[GROUP_SIZE], torques[GROUP_SIZE];
 // The coarse residual of the vectors in `slot`, by its rotated rigid motions. An aggregate that a half space holds has none: it cannot
 // move as one, and the coarse matrix does not know.
 void restrict_to(uint aggregate, uint slot, Lengths l) {
-  uint lane = gl_LocalInvocationIndex, end = mesh[AGGREGATES_AT + aggregate + 1u];
-  vec4 centre = centre_of(aggregate), back = opposite(rotation_of(aggregate));
+  uint lane = gl_LocalInvocationIndex, end = first_member[aggregate + 1u];
+  vec4 centre = centres[aggregate], back = opposite(rotations[aggregate]);
   vec3 force = vec3(0.0), torque = vec3(0.0);
   float held = 0.0;
-  for (uint k = mesh[AGGREGATES_AT + aggregate] + lane; k < end; k += GROUP_SIZE) {
-    uint i = mesh[MEMBERS_AT + 2u * k];
-    float weight = float(mesh[MEMBERS_AT + 2u * k + 1u]) * (1.0 / 65535.0);
+  for (uint k = first_member[aggregate] + lane; k < end; k += GROUP_SIZE) {
+    uint i = members[k].x;
+    float weight = float(members[k].y) * WEIGHT_UNIT;
     vec3 f = weight * turned(back, at(slot, i).xyz);
-    if (held_by(at(RESIDUAL, i)) != 0u) held = 1.0;
+    // Only at the beginning: in later iterations other work-groups rewrite residuals meanwhile.
+    if (slot == RESIDUAL && held_by(at(RESIDUAL, i)) != 0u) held = 1.0;
     force += f;
     torque += cross((at(REST, i).xyz - centre.xyz) / centre.w, f);
   }
@@ -29,18 +30,18 @@ void restrict_to(uint aggregate, uint slot, Lengths l) {
     }
     barrier();
   }
-  held = slot == RESIDUAL ? group_sum(vec2(held, 0.0)).x : 1.0 - sums[FREE_AT + aggregate];
+  held = slot == RESIDUAL ? group_sum(vec2(held, 0.0)).x : 1.0 - is_free[aggregate];
   if (lane >= 6u) return;
-  if (slot == RESIDUAL && lane == 0u) sums[FREE_AT + aggregate] = held > 0.0 ? 0.0 : 1.0;
+  if (slot == RESIDUAL && lane == 0u) is_free[aggregate] = held > 0.0 ? 0.0 : 1.0;
   float value = held > 0.0 ? 0.0 : lane < 3u ? forces[0][lane] : torques[0][lane - 3u];
   uint k = 6u * aggregate + lane;
   if (slot == RESIDUAL) {
-    sums[COARSE_Q + k] = 0.0;
-    sums[COARSE_R + k] = value;
+    coarse_q[k] = 0.0;
+    coarse_r[k] = value;
   } else {
-    float q = value + l.beta * sums[COARSE_Q + k];
-    sums[COARSE_Q + k] = q;
-    sums[COARSE_R + k] = l.coarse ? sums[COARSE_R + k] - l.alpha * q : 0.0;
+    float q = value + l.beta * coarse_q[k];
+    coarse_q[k] = q;
+    coarse_r[k] = l.coarse ? coarse_r[k] - l.alpha * q : 0.0;
   }
 }
 
@@ -49,13 +50,10 @@ void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, AGGREGATES > 0);
   if (phases > 0u) l = lengths(phases);
   if (group == 0u && gl_LocalInvocationIndex == 0u) {
-    uint k = SCALARS_AT + 3u * (phases & 1u);
-    sums[k] = l.rz;
-    sums[k + 1u] = l.alpha;
-    sums[k + 2u] = l.coarse ? 1.0 : 0.0;
-    if (phases == 0u) sums[FIRST_AT] = 0.0;
-    else if (!(sums[FIRST_AT] > 0.0)) sums[FIRST_AT] = l.rz;  // of the first that was healthy
-    if (phases == 1u && sums[DOTS_AT] > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
+    iterations[phases & 1u] = Iteration(l.rz, l.alpha, l.coarse ? 1u : 0u);
+    if (phases == 0u) first_rz = 0.0;
+    else if (!(first_rz > 0.0)) first_rz = l.rz;
+    if (phases == 1u && dots.x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
   }
   if (group < AGGREGATES) {
     restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, l);

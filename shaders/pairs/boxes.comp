@@ -2,8 +2,8 @@
 // what a slice deviates from its mean. A single vertex that shakes changes little of this. A work-group per slice; behind these, where candidates are
 // looked for, one per leaf for its box and how far its items look.
 #include "pairs/pairs.glsl"
-layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_VELOCITIES) restrict readonly buffer Velocities { Velocity velocities[]; };
+layout(std430) restrict readonly buffer Positions { Position positions[]; };
+layout(std430) restrict readonly buffer Velocities { Velocity velocities[]; };
 shared vec3 lows[GROUP_SIZE], highs[GROUP_SIZE];
 shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares, or reaches
 // Leaves the box of all invocations, and the sum of their speeds or the largest, at 0.
@@ -27,26 +27,25 @@ void target(uint t, uvec3 corners, inout vec3 low, inout vec3 high) {
   low = min(low, lowest), high = max(high, highest);
 }
 void gather(uint s, inout float reach) {
-  if (pair_lists[HELD + s] != NONE) reach = max(reach, reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])));
+  if (held_by[s] != NONE) reach = max(reach, reach_of(depths[s]));
 }
 void leaf_box(uint leaf, uint lane) {
   vec3 low = vec3(1e30), high = vec3(-1e30);
   float reach = margin;
-  for (uint t = of_leaf(leaf, 1u) + lane; t < of_leaf(leaf, 2u); t += GROUP_SIZE)
+  for (uint t = leaves[leaf].triangles[0] + lane; t < leaves[leaf].triangles[1]; t += GROUP_SIZE)
     target(t, uvec3(triangle_vertex(t, 0u), triangle_vertex(t, 1u), triangle_vertex(t, 2u)), low, high);
-  for (uint s = of_leaf(leaf, 3u) + lane; s < of_leaf(leaf, 4u); s += GROUP_SIZE) gather(s, reach);
-  for (uint e = of_leaf(leaf, 5u) + lane; e < of_leaf(leaf, 6u); e += GROUP_SIZE) {
+  for (uint s = leaves[leaf].vertices[0] + lane; s < leaves[leaf].vertices[1]; s += GROUP_SIZE) gather(s, reach);
+  for (uint e = leaves[leaf].edges[0] + lane; e < leaves[leaf].edges[1]; e += GROUP_SIZE) {
     target(TRIANGLES + e, uvec3(edge_vertex(e, 0u), edge_vertex(e, 1u), edge_vertex(e, 1u)), low, high);
     gather(SURFACE_VERTICES + e, reach);
   }
   reduce(lane, low, high, vec4(reach), false);
-  uint k = LEAF_BOXES + 7u * leaf;
   if (lane < 3u) {
-    pair_lists[k + lane] = floatBitsToUint(lows[0][lane]);
-    pair_lists[k + 3u + lane] = floatBitsToUint(highs[0][lane]);
+    leaf_boxes[leaf].low[lane] = lows[0][lane];
+    leaf_boxes[leaf].high[lane] = highs[0][lane];
   } else if (lane == 3u) {
-    pair_lists[k + 6u] = floatBitsToUint(speeds[0].x);
-    atomicMax(pair_lists[MOST_REACH], floatBitsToUint(speeds[0].x));
+    leaf_boxes[leaf].reach = speeds[0].x;
+    atomicMax(counts.most_reach, floatBitsToUint(speeds[0].x));
   }
 }
 void main() {
@@ -55,7 +54,7 @@ void main() {
     if (slice < SLICES + LEAVES) leaf_box(slice - SLICES, lane);
     return;
   }
-  uint body = pair_mesh[SLICES_AT + 3u * slice], first = pair_mesh[SLICES_AT + 3u * slice + 1u], end = pair_mesh[SLICES_AT + 3u * slice + 2u];
+  uint body = slices[slice].body, first = slices[slice].first, end = slices[slice].end;
   vec3 low = vec3(1e30), high = vec3(-1e30);
   vec4 speed = vec4(0.0);
   const uint at_once = 4u;  // what is read does not wait for each other
@@ -71,14 +70,13 @@ void main() {
     }
   }
   reduce(lane, low, high, speed, true);
-  uint k = BOXES + BOX * body;
   vec4 mean = speeds[0] / float(end - first);
   if (lane < 3u) {
-    atomicMin(pair_lists[k + lane], sortable(lows[0][lane]));
-    atomicMax(pair_lists[k + 3u + lane], sortable(highs[0][lane]));
-    atomicMin(pair_lists[k + 6u + lane], sortable(mean[lane]));
-    atomicMax(pair_lists[k + 9u + lane], sortable(mean[lane]));
+    atomicMin(boxes[body].low[lane], sortable(lows[0][lane]));
+    atomicMax(boxes[body].high[lane], sortable(highs[0][lane]));
+    atomicMin(boxes[body].slowest[lane], sortable(mean[lane]));
+    atomicMax(boxes[body].fastest[lane], sortable(mean[lane]));
   } else if (lane == 3u) {
-    atomicMax(pair_lists[k + 12u], floatBitsToUint(sqrt(max(mean.w - dot(mean.xyz, mean.xyz), 0.0))));
+    atomicMax(boxes[body].spread, floatBitsToUint(sqrt(max(mean.w - dot(mean.xyz, mean.xyz), 0.0))));
   }
 }

@@ -2,15 +2,14 @@
 const float push_most = EDGE / 10.0;  // m, in a substep: so bodies that are deep in each other leave each other
 #define UNSEEN 4                      // contacts that may share a vertex of which none was seen coming: too few would shoot it away
 uniform uint side;                    // of the numbers of contacts that share a vertex, that of this substep
-void add(uint sum, vec3 correction) {
-  ivec3 quanta = ivec3(round(clamp(correction, -params.body_size / PARTS, params.body_size / PARTS) * (params.inverse_quantum * PARTS)));
-  for (uint c = 0u; c < 3u; ++c)
-    if (quanta[c] != 0) atomicAdd(pair_sums[sum + c], quanta[c]);
+ivec3 to_quanta(vec3 correction) {
+  float most = params.body_size / SUM_PARTS;
+  return ivec3(round(clamp(correction, -most, most) * (params.inverse_quantum * SUM_PARTS)));
 }
 // Of a contact's vertex: what it adds to the way of the item relative to the target in this substep (m), and to their inverse mass (1/kg). Masses are split
 // among the contacts of a vertex, the same for all of them, so that momentum is kept.
 vec4 part_of(uint vertex, float weight) {
-  int sharing_it = pair_sums[sharing(vertex, side)];
+  int sharing_it = sharing[shared_at(vertex, side)];
   float split = positions[vertex].inverse_mass * float(sharing_it > 0 ? sharing_it : UNSEEN);
   return vec4(weight * params.h * velocities[vertex].high, weight * weight * split);
 }
@@ -18,6 +17,9 @@ vec4 part_of(uint vertex, float weight) {
 void correct(uint vertex, float weight, Stop by, vec4 sum) {
   if (weight == 0.0 || !(sum.w > 0.0)) return;
   float factor = weight * positions[vertex].inverse_mass / sum.w;
-  add(sums_of(vertex), factor * by.stopped);
-  add(sums_of(vertex) + PUSHED, factor * by.pushed);
+  ivec3 stopped = to_quanta(factor * by.stopped), pushed = to_quanta(factor * by.pushed);
+  for (uint c = 0u; c < 3u; ++c) {
+    if (stopped[c] != 0) atomicAdd(contact_sums[vertex].stopped[c], stopped[c]);
+    if (pushed[c] != 0) atomicAdd(contact_sums[vertex].pushed[c], pushed[c]);
+  }
 }

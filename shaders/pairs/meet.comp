@@ -1,8 +1,8 @@
 // Which of its candidates each item is in, and how many contacts share every vertex. CANDIDATES invocations per record, one for each candidate. LAGGED: the
 // corrections as well, by how many contacts the substep before saw coming; vertex.glsl adds them. Else push.comp does so by exact numbers.
 #include "pairs/pairs.glsl"
-layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_VELOCITIES) restrict readonly buffer Velocities { Velocity velocities[]; };
+layout(std430) restrict readonly buffer Positions { Position positions[]; };
+layout(std430) restrict readonly buffer Velocities { Velocity velocities[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
 #include "pairs/correct.glsl"
@@ -24,9 +24,9 @@ shared uint what_happens[RECORDS_HERE];
 shared vec4 parts[GROUP_SIZE];
 void main() {
   uint own_lane = gl_LocalInvocationIndex, here = own_lane / CANDIDATES, first = here * CANDIDATES, lane = own_lane - first;
-  uint record = group_index() * RECORDS_HERE + here, k = RECORDS_AT + RECORD * record;
-  bool there = record < pair_lists[RECORDS] && pair_lists[k + 2u] <= substep;
-  uint s = there ? pair_lists[k] : 0u, t = there ? pair_lists[k + CANDIDATE + lane] : NONE;
+  uint record = group_index() * RECORDS_HERE + here;
+  bool there = record < counts.records && records[record].next <= substep;
+  uint s = there ? records[record].item : 0u, t = there ? records[record].candidates[lane] : NONE;
   Meeting m;
   m.gap = m.rank = none;
   m.in_doubt = false;
@@ -55,18 +55,18 @@ void main() {
   if (in_fold && m.gap > 0.0) m = inside(m), t |= INSIDE;
   bool decides = there && own_lane == least;
   bool pushes = decides && may_push && m.gap < 0.0 && (!vetoed || in_fold);
-  if (decides) pair_lists[k + 1u] = pair_lists[HELD + s] = pushes ? t : NONE;
-  if (decides && !pushes && !item_is_edge(s)) pair_lists[k + 2u] = substep + uint(min(apart / closed_most, 1e6));
+  if (decides) records[record].target = held_by[s] = pushes ? t : NONE;
+  if (decides && !pushes && !item_is_edge(s)) records[record].next = substep + uint(min(apart / closed_most, 1e6));
   bool comes = ahead && decides && may_push && m.gap >= 0.0 && m.gap < 2.0 * closed_most;
   if (pushes || comes) what_happens[here] = (pushes ? TOUCHES : 0u) | (comes ? COMES : 0u), meetings[here] = m, vertices_met[here] = vertices_of(s, t & TARGET);
   if (pushes) {
-    pair_lists[DEPTHS + s] = floatBitsToUint(-m.gap);
+    depths[s] = -m.gap;
     atomicAdd(touching, 1u);
     atomicMax(deepest, floatBitsToUint(-m.gap));
 #if !LAGGED && EDGES
     uvec4 beside = beside_of(s, t & TARGET);
     if (item_is_edge(s))
-      for (uint j = 0u; j < 4u; ++j) atomicAdd(pair_sums[sums_of(beside[j]) + ASKS], 1);
+      for (uint j = 0u; j < 4u; ++j) atomicAdd(contact_sums[beside[j]].asks, 1);
 #endif
   }
   barrier();
@@ -84,17 +84,17 @@ void main() {
     bool touches = (what_happens[here] & TOUCHES) != 0u;
     vec4 sum = parts[first] + parts[first + 1u] + parts[first + 2u] + parts[first + 3u];
     // In this substep, in the next or after it.
-    if (ahead && weight != 0.0 && (touches || m.gap + 2.0 * dot(sum.xyz, m.normal) < 0.0)) atomicAdd(pair_sums[sharing(vertex, 1u - side)], 1);
+    if (ahead && weight != 0.0 && (touches || m.gap + 2.0 * dot(sum.xyz, m.normal) < 0.0)) atomicAdd(sharing[shared_at(vertex, 1u - side)], 1);
 #if LAGGED
     if (touches) correct(vertex, weight, meeting_correction(m, sum.xyz, push_most, params.friction), sum);
 #else
-    if (touches && weight != 0.0) atomicAdd(pair_sums[sharing(vertex, side)], 1);
-    if (touches) atomicAdd(pair_sums[sums_of(vertex) + ASKS], 1);
+    if (touches && weight != 0.0) atomicAdd(sharing[shared_at(vertex, side)], 1);
+    if (touches) atomicAdd(contact_sums[vertex].asks, 1);
 #endif
   }
   barrier();
   if (own_lane == 0u && touching > 0u) {
-    atomicAdd(pair_lists[TOUCHING], touching);
-    atomicMax(pair_lists[DEEPEST], deepest);
+    atomicAdd(totals.touching, touching);
+    atomicMax(totals.deepest, deepest);
   }
 }

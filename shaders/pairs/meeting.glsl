@@ -40,10 +40,11 @@ Meeting inside(Meeting m) {
 // Whether the vertex is in a tet of the body that triangle t belongs to, a few tets behind it; where a body is inverted that is not known.
 bool is_behind(uint s, uint t) {
   vec3 own = positions[surface_vertex(s)].high;
-  uint tet = tet_behind(t);
+  uint tet = behind[t];
   for (uint turn = 0u; turn < 6u && tet != NONE; ++turn) {
-    Parts parts = tet_parts(positions[tet_vertex(tet, 0u)].high - own, positions[tet_vertex(tet, 1u)].high - own,
-                            positions[tet_vertex(tet, 2u)].high - own, positions[tet_vertex(tet, 3u)].high - own);
+    uvec4 v = tet_vertices[tet];
+    Parts parts = tet_parts(positions[v.x].high - own, positions[v.y].high - own, positions[v.z].high - own,
+                            positions[v.w].high - own);
     uint least = 0u, small = 0u;
     float whole = parts.volumes[0] + parts.volumes[1] + parts.volumes[2] + parts.volumes[3], least_share = 1e-3 * whole;
     if (!(whole > 0.0)) return false;
@@ -51,7 +52,7 @@ bool is_behind(uint s, uint t) {
       if (parts.volumes[k] < parts.volumes[least]) least = k;
       if (parts.volumes[k] <= least_share) ++small;
     }
-    uint beyond = tet_beyond(tet, least);
+    uint beyond = tet_beyond[tet][least];
     // One on the surface is not inside, but one on a face between two tets is.
     if (small == 0u || (small == 1u && beyond != NONE && parts.volumes[least] >= -least_share)) return true;
     tet = beyond;

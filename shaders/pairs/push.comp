@@ -4,7 +4,7 @@
 #include "vertex_state.glsl"
 #else
 #include "quantized.glsl"
-#include "vertex.glsl"
+#include "solvers/$SCHEME.glsl"
 #endif
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
@@ -13,10 +13,10 @@
 void move(uint i) {
   vec3 stopped, pushed;
   for (uint c = 0u; c < 3u; ++c) {
-    stopped[c] = float(atomicExchange(pair_sums[sums_of(i) + c], 0)) * (params.quantum / PARTS);
-    pushed[c] = float(atomicExchange(pair_sums[sums_of(i) + PUSHED + c], 0)) * (params.quantum / PARTS);
+    stopped[c] = float(atomicExchange(contact_sums[i].stopped[c], 0)) * (params.quantum / SUM_PARTS);
+    pushed[c] = float(atomicExchange(contact_sums[i].pushed[c], 0)) * (params.quantum / SUM_PARTS);
   }
-  pair_sums[sharing(i, side)] = 0;
+  sharing[shared_at(i, side)] = 0;
   Position own = positions[i];
   if (!(own.inverse_mass > 0.0)) return;
   Pair x = pair_add(Pair(own.high, own.low), stopped + pushed), v = Pair(velocities[i].high, velocities[i].low);
@@ -24,9 +24,7 @@ void move(uint i) {
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
 #if !IMPLICIT  // the way that BDF2 goes on from stays what forces made it, or a stop takes back two thirds of the velocity that went in
-#if !LEAPFROG
-  x = predict_position(x, predict_velocity(v));
-#endif
+  x = seen_by_neighbours(x, v);
   quantized_out[i] = quantize(x, weight_of(own));
 #endif
 }
@@ -34,12 +32,12 @@ shared uint moving[8u * GROUP_SIZE], moving_count;
 // This invocation reads the vertices no more; of which it is the last that does, its work-group moves them.
 void leave(uvec4 vertices) {
   int asks[4];
-  for (uint j = 0u; j < 4u; ++j) asks[j] = atomicAdd(pair_sums[sums_of(vertices[j]) + ASKS], -1);
+  for (uint j = 0u; j < 4u; ++j) asks[j] = atomicAdd(contact_sums[vertices[j]].asks, -1);
   for (uint j = 0u; j < 4u; ++j)
-    if (asks[j] == 1 && pair_sums[sharing(vertices[j], side)] > 0) moving[atomicAdd(moving_count, 1u)] = vertices[j];
+    if (asks[j] == 1 && sharing[shared_at(vertices[j], side)] > 0) moving[atomicAdd(moving_count, 1u)] = vertices[j];
 }
-void push(uint k) {
-  uint s = pair_lists[k], t = pair_lists[k + 1u];
+void push(uint record) {
+  uint s = records[record].item, t = records[record].target;
   if (t == NONE) return;
   uvec4 vertices = vertices_of(s, t & TARGET);
   Meeting m = meeting_of(s, t);
@@ -60,7 +58,7 @@ void main() {
   uint lane = gl_LocalInvocationIndex, record = group_index() * GROUP_SIZE + lane;
   if (lane == 0u) moving_count = 0u;
   barrier();
-  if (record < pair_lists[RECORDS]) push(RECORDS_AT + RECORD * record);
+  if (record < counts.records) push(record);
   memoryBarrierBuffer();
   barrier();
   for (uint j = lane; j < moving_count; j += GROUP_SIZE) move(moving[j]);

@@ -3,11 +3,11 @@
 // invocations per item: a work-group, whose items are of one leaf, first tests targets of near leaves by their spheres, each invocation one of these
 // against all items; then each looks at some of what passed for its item, and lists are merged.
 #include "pairs/pairs.glsl"
-layout(std430, binding = BIND_POSITIONS) restrict readonly buffer Positions { Position positions[]; };
+layout(std430) restrict readonly buffer Positions { Position positions[]; };
 #include "pairs/formulas.glsl"
 #include "pairs/meeting.glsl"
 #if CONTACT_SELF
-layout(std430, binding = BIND_PAIR_REST) restrict readonly buffer PairRest { vec4 pair_rest[]; };  // places by vertex
+layout(std430) restrict readonly buffer PairRest { vec4 pair_rest[]; };  // places by vertex
 // Of its own body an item meets what is not its neighbour at rest either; of a sheet, what it has no vertex in common with.
 bool is_neighbour(uint s, uint t) {
   uvec4 vertices = vertices_of(s, t);
@@ -23,8 +23,8 @@ bool is_neighbour(uint s, uint t) {
 // Of the sum of the normals of the triangles around a vertex, one of LANES parts.
 vec3 part_of_normal(uint s, uint lane) {
   vec3 sum = vec3(0.0), a = positions[surface_vertex(s)].high;
-  for (uint k = pair_mesh[AROUND_AT + s] + 2u * lane; k < pair_mesh[AROUND_AT + s + 1u]; k += 2u * LANES) {
-    vec3 n = cross(positions[pair_mesh[k]].high - a, positions[pair_mesh[k + 1u]].high - a);
+  for (uint k = first_around[s] + lane; k < first_around[s + 1u]; k += LANES) {
+    vec3 n = cross(positions[around[k].x].high - a, positions[around[k].y].high - a);
     float area = length(n);
     if (area > 0.0) sum += n / area;
   }
@@ -89,14 +89,18 @@ shared uint scratch[2u * MOST_PIECES];  // first and end of near leaves' targets
 shared uint piece_count, waiting_count[PER_GROUP], items[PER_GROUP], found_count, first_record;
 shared vec4 balls[PER_GROUP];  // around what each item looks at: centre, radius, below 0 where there is none
 #if QUERY_EDGES
-uint first_target(uint leaf) { return TRIANGLES + of_leaf(leaf, 5u); }
-uint end_of_targets(uint leaf) { return TRIANGLES + of_leaf(leaf, 6u); }
-#define LEAVES_OF_GROUPS LEAF_OF_EDGE_GROUP
+uint first_target(uint leaf) { return TRIANGLES + leaves[leaf].edges[0]; }
+uint end_of_targets(uint leaf) { return TRIANGLES + leaves[leaf].edges[1]; }
+#define NEAR_COUNT counts.near_edges
+#define NEAR_ITEMS near_edges
+#define LEAVES_OF_GROUPS leaf_of_edge_group
 #else
 shared vec3 normals[GROUP_SIZE];
-uint first_target(uint leaf) { return of_leaf(leaf, 1u); }
-uint end_of_targets(uint leaf) { return of_leaf(leaf, 2u); }
-#define LEAVES_OF_GROUPS LEAF_OF_GROUP
+uint first_target(uint leaf) { return leaves[leaf].triangles[0]; }
+uint end_of_targets(uint leaf) { return leaves[leaf].triangles[1]; }
+#define NEAR_COUNT counts.near_vertices
+#define NEAR_ITEMS near_vertices
+#define LEAVES_OF_GROUPS leaf_of_group
 #endif
 bool is_own(uint t, uint body) { return CONTACT_SELF != 0 && target_body(t) == body; }  // else leaves of the same body are not looked through
 // Whether item s, of that body, and target t may meet at all.
@@ -136,28 +140,22 @@ void merge(uint lane) {
 #endif
 void main() {
   uint lane = gl_LocalInvocationIndex % LANES, part = gl_LocalInvocationIndex / LANES;
-#if QUERY_EDGES
-  if (group_index() * PER_GROUP >= pair_lists[NEAR_EDGES]) return;  // rows of work-groups are whole
-#else
-  if (group_index() * PER_GROUP >= pair_lists[NEAR_VERTICES]) return;
-#endif
-  uint number = group_index() * PER_GROUP + part, own_leaf = pair_lists[LEAVES_OF_GROUPS + group_index()], body = of_leaf(own_leaf, 0u);
-#if QUERY_EDGES
-  uint s = number < pair_lists[NEAR_EDGES] ? pair_lists[NEAR_EDGES_AT + number] : NONE;
+  if (group_index() * PER_GROUP >= NEAR_COUNT) return;  // rows of work-groups are whole
+  uint number = group_index() * PER_GROUP + part, own_leaf = LEAVES_OF_GROUPS[group_index()], body = leaves[own_leaf].body;
+  uint s = number < NEAR_COUNT ? NEAR_ITEMS[number] : NONE;
   bool there = s != NONE;
+#if QUERY_EDGES
   if (!there) s = SURFACE_VERTICES;
   uint i = edge_vertex(s - SURFACE_VERTICES, 0u);
   vec3 end = positions[edge_vertex(s - SURFACE_VERTICES, 1u)].high;
 #else
-  uint s = number < pair_lists[NEAR_VERTICES] ? pair_lists[NEAR_AT + number] : NONE;
-  bool there = s != NONE;
   if (!there) s = 0u;
   uint i = surface_vertex(s);
   vec3 end = positions[i].high;
 #endif
   Pair own = Pair(positions[i].high, positions[i].low);
-  uint held = there ? pair_lists[HELD + s] : NONE;
-  float radius = held != NONE ? reach_of(uintBitsToFloat(pair_lists[DEPTHS + s])) : margin;
+  uint held = there ? held_by[s] : NONE;
+  float radius = held != NONE ? reach_of(depths[s]) : margin;
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
   vec4 ball = there ? vec4(0.5 * (own.high + end), 0.5 * distance(own.high, end) + 1.01 * radius) : vec4(vec3(0.0), -1e30);
   if (lane == 0u) waiting_count[part] = 0u, items[part] = s, balls[part] = ball;
@@ -166,11 +164,11 @@ void main() {
   vec3 lowest = vec3(1e30), highest = vec3(-1e30);
   for (uint p = 0u; p < PER_GROUP; ++p)
     if (balls[p].w > 0.0) lowest = min(lowest, balls[p].xyz - balls[p].w), highest = max(highest, balls[p].xyz + balls[p].w);
-  uint near = NEAR_LEAVES_AT + (NEAR_LEAVES + 1u) * own_leaf, near_count = pair_lists[near];
+  uint near_count = near_leaves[own_leaf].count;
   bool all_leaves = near_count > NEAR_LEAVES;
   for (uint n = gl_LocalInvocationIndex; n < (all_leaves ? LEAVES : near_count); n += GROUP_SIZE) {
-    uint l = all_leaves ? n : pair_lists[near + 1u + n], end = end_of_targets(l);
-    if (!in_leaf(l, lowest, highest) || (CONTACT_SELF == 0 && all_leaves && of_leaf(l, 0u) == body)) continue;
+    uint l = all_leaves ? n : near_leaves[own_leaf].leaves[n], end = end_of_targets(l);
+    if (!in_leaf(l, lowest, highest) || (CONTACT_SELF == 0 && all_leaves && leaves[l].body == body)) continue;
     for (uint first = first_target(l); first < end; first += GROUP_SIZE) {
       uint slot = atomicAdd(piece_count, 1u);
       if (slot < MOST_PIECES) scratch[2u * slot] = first, scratch[2u * slot + 1u] = min(first + GROUP_SIZE, end);
@@ -194,7 +192,7 @@ void main() {
   bool listed = piece_count <= MOST_PIECES, any_waits = !listed;
   for (uint p = 0u; p < PER_GROUP; ++p) any_waits = any_waits || waiting_count[p] > 0u;
   if (!any_waits) {
-    if (lane == 0u && there) pair_lists[HELD + s] = NONE;
+    if (lane == 0u && there) held_by[s] = NONE;
     return;
   }
   vec3 normal = vec3(0.0);
@@ -210,7 +208,7 @@ void main() {
     }
   } else {
     for (uint n = 0u; n < (!there ? 0u : listed ? pieces : LEAVES); ++n) {
-      if (!listed && CONTACT_SELF == 0 && of_leaf(n, 0u) == body) continue;
+      if (!listed && CONTACT_SELF == 0 && leaves[n].body == body) continue;
       uint end = listed ? scratch[2u * n + 1u] : end_of_targets(n);
       for (uint t = (listed ? scratch[2u * n] : first_target(n)) + lane; t < end; t += LANES)
         if (is_near(ball, pair_spheres[t]) && may_meet(s, t, body))
@@ -226,16 +224,16 @@ void main() {
   uint record = keeps ? atomicAdd(found_count, 1u) : 0u;
   barrier();
   if (gl_LocalInvocationIndex == 0u && found_count > 0u) {
-    first_record = atomicAdd(pair_lists[RECORDS], found_count);
+    first_record = atomicAdd(counts.records, found_count);
     uint last = first_record + found_count - 1u;
-    need_groups(GROUPS, last / GROUP_SIZE + 1u);
+    need_groups(RECORD_GROUPS, last / GROUP_SIZE + 1u);
     need_groups(LANE_GROUPS, last / (GROUP_SIZE / CANDIDATES) + 1u);
   }
   barrier();
-  if (lane == 0u && there) pair_lists[HELD + s] = NONE;
+  if (lane == 0u && there) held_by[s] = NONE;
   if (!keeps) return;
-  uint k = RECORDS_AT + RECORD * (first_record + record);
-  pair_lists[k] = s;
-  pair_lists[k + 2u] = 0u;
-  for (uint c = 0u; c < CANDIDATES; ++c) pair_lists[k + CANDIDATE + c] = found[c];
+  record += first_record;
+  records[record].item = s;
+  records[record].next = 0u;
+  for (uint c = 0u; c < CANDIDATES; ++c) records[record].candidates[c] = found[c];
 }

@@ -4,7 +4,7 @@
 #include "render/layout.glsl"
 #include "render/finite.glsl"
 #include "render/gathered.glsl"
-layout(std430, binding = BIND_RENDER_VALUES) writeonly buffer Cofactors { vec4 cofactors[]; };
+layout(std430) writeonly buffer Values { vec4 cofactors[]; };
 
 void main() {
   uint v = gl_GlobalInvocationID.x;

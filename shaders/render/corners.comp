@@ -3,9 +3,9 @@
 // shader; GPUs made for computing have few units for those.
 #include "render/view.glsl"
 #include "render/gathered.glsl"
-layout(std430, binding = BIND_RENDER_TRIANGLES) readonly buffer Triangles { uint triangles[]; };
-layout(std430, binding = BIND_RENDER_VALUES) readonly buffer Values { float values[]; };
-layout(std430, binding = BIND_RENDER_CORNERS) writeonly buffer Corners { SurfaceCorner corners[]; };
+layout(std430) readonly buffer Triangles { uint triangles[]; };
+layout(std430) readonly buffer Values { float values[]; };
+layout(std430) writeonly buffer Corners { SurfaceCorner corners[]; };
 uniform int valued, rested;  // whether there are values, and rest positions with bodies
 
 vec3 normal_at(uint v, vec3 face) {

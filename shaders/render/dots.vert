@@ -8,7 +8,8 @@ uniform float size;  // pixels
 uniform float touching;  // metres
 bool is_marked(vec3 p) {
   bool any_plane = false;
-  for (int i = 0; i < MAX_PLANES; ++i) any_plane = any_plane || dot(view.planes[i].xyz, p) - view.planes[i].w <= touching;
+  for (int i = 0; i < int(view.scene.x); ++i)
+    any_plane = any_plane || dot(view.planes[i].xyz, p) - view.planes[i].w <= touching;
   return any_plane;
 }
 #else

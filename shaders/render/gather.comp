@@ -4,7 +4,7 @@
 #include "render/layout.glsl"
 #include "render/finite.glsl"
 #include "render/gathered.glsl"
-layout(std430, binding = BIND_RENDER_VALUES) writeonly buffer Values { float values[]; };
+layout(std430) writeonly buffer Values { float values[]; };
 
 #ifdef TETS
 #include "render/values.glsl"

@@ -1,19 +1,5 @@
 // Binding numbers and uniform blocks of the renderer, read by GLSL and by C++ (render/layout.h). Lengths in metres,
-// colours linear. Storage bindings overlap the simulation's: 8 is all that GL 4.3 guarantees, so each side binds its
-// own buffers before it dispatches.
-#define BIND_RENDER_POSITIONS 0
-#define BIND_RENDER_REST 1
-#define BIND_RENDER_TRIANGLES 2
-#define BIND_RENDER_OFFSETS 3  // where a vertex's items begin; one more at the end
-#define BIND_RENDER_ITEMS 4
-#define BIND_RENDER_ANSWERS 4  // where vertices should be, or their velocities
-#define BIND_RENDER_VALUES 5
-#define BIND_RENDER_CORNERS 6
-#define BIND_RENDER_BOUNDS 6
-#define BIND_RENDER_FIT 7
-#define BIND_PICK_TRIANGLES 1
-#define BIND_PICK_RESULT 2
-#define BIND_PICK_REST 3
+// colours linear.
 // Uniform blocks; 0 is the simulation's step.
 #define BIND_RENDER_VIEW 1
 #define BIND_RENDER_LIGHT 2
@@ -64,7 +50,7 @@ struct View {
   vec4 material;                // Lame's mu and lambda, Pa; z: which (values.glsl); w: opacity
   vec4 window;                  // the viewport in pixels: lower left, width, height
   vec4 scene;                   // how many planes there are; y: 1 if the first is the ground, on which light bounces
-  vec4 planes[MAX_PLANES];      // dot(xyz, x) = w
+  vec4 planes[MAX_OBSTACLES];   // dot(xyz, x) = w
   vec4 palette[PALETTE_SIZE];   // body colours
 };
 

@@ -4,9 +4,9 @@
 #include "render/layout.glsl"
 #include "render/view.glsl"
 layout(local_size_x = 128) in;
-layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_PICK_TRIANGLES) readonly buffer Triangles { uint triangles[]; };
-layout(std430, binding = BIND_PICK_RESULT) buffer Result {
+layout(std430) readonly buffer Positions { Position positions[]; };
+layout(std430) readonly buffer Triangles { uint triangles[]; };
+layout(std430) buffer Result {
   uint distance_bits;
   uint triangle;
   uint vertex;
@@ -20,7 +20,7 @@ vec3 position(uint v) { return positions[v].high + positions[v].low; }
 
 #ifdef TETS
 #define CORNERS 4u
-layout(std430, binding = BIND_PICK_REST) readonly buffer Rest { vec4 rest[]; };
+layout(std430) readonly buffer Rest { vec4 rest[]; };
 
 // Where the ray comes into what the cut leaves of the tetrahedron, or a negative number. All that bounds it is a + b t >= 0: its
 // coordinates, and the cut's plane, which is one of the rest shape and so one of these.

@@ -4,7 +4,7 @@
 #include "render/light.glsl"
 layout(local_size_x = 16, local_size_y = 16) in;
 layout(rg8, binding = IMAGE_PLANES) writeonly uniform image2D arrived;
-layout(std430, binding = BIND_RENDER_CORNERS) readonly buffer Corners { SurfaceCorner corners[]; };
+layout(std430) readonly buffer Corners { SurfaceCorner corners[]; };
 uniform uint triangles;
 uniform int map_size;  // texels of a map's side
 

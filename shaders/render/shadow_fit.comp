@@ -5,16 +5,16 @@
 #include "layout.glsl"
 #include "render/view.glsl"
 layout(local_size_x = 128) in;
-layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
-layout(std430, binding = BIND_RENDER_BOUNDS) coherent buffer Bounds {
+layout(std430) readonly buffer Positions { Position positions[]; };
+layout(std430) coherent buffer Bounds {
   uint bounds[6];
   uint done;  // work-groups
 };
-layout(std430, binding = BIND_RENDER_FIT) writeonly buffer Fit { Light fitted; };
+layout(std430) writeonly buffer Fit { Light fitted; };
 uniform uint count;
 uniform float map_size;  // texels
 uniform vec4 limit;      // centre and radius of what is worth a shadow
-uniform vec3 shapes_low, shapes_high;  // bounds of obstacles; the other way round where there are none
+uniform vec3 obstacles_low, obstacles_high;  // bounds of obstacles; the other way round where there are none
 uniform float reach;     // how far from the bodies these matter
 
 shared uint low_bits[3], high_bits[3];
@@ -57,9 +57,9 @@ void fit_light() {
   done = 0u;
   vec3 centre = 0.5 * (low + high), bodies = centre;
   vec3 half_size = max(0.5 * (high - low) * (1.0 + view.tets.y), vec3(1e-4 * limit.w));
-  if (shapes_low.x <= shapes_high.x) {
-    low = min(centre - half_size, clamp(shapes_low, low - reach, high + reach));
-    high = max(centre + half_size, clamp(shapes_high, low - reach, high + reach));
+  if (obstacles_low.x <= obstacles_high.x) {
+    low = min(centre - half_size, clamp(obstacles_low, low - reach, high + reach));
+    high = max(centre + half_size, clamp(obstacles_high, low - reach, high + reach));
     centre = 0.5 * (low + high);
     half_size = 0.5 * (high - low);
   }

@@ -2,13 +2,13 @@
 #include "layout.glsl"
 #include "render/layout.glsl"
 layout(local_size_x = 128) in;
-layout(std430, binding = BIND_RENDER_POSITIONS) readonly buffer Positions { Position positions[]; };
+layout(std430) readonly buffer Positions { Position positions[]; };
 #ifdef SPEED
-layout(std430, binding = BIND_RENDER_ANSWERS) readonly buffer Velocities { Velocity velocities[]; };
+layout(std430) readonly buffer Velocities { Velocity velocities[]; };
 #else
-layout(std430, binding = BIND_RENDER_ANSWERS) readonly buffer Answers { Position answers[]; };
+layout(std430) readonly buffer Answers { Position answers[]; };
 #endif
-layout(std430, binding = BIND_RENDER_VALUES) writeonly buffer Values { float values[]; };
+layout(std430) writeonly buffer Values { float values[]; };
 uniform uint count;
 uniform float scale;
 

@@ -125,7 +125,6 @@ class Buffer : public Owned<GLuint, delete_buffer> {
     copy_buffer(id(), offset, to.id(), at, bytes);
   }
   void clear() const;  ///< to zero bytes
-  void bind_storage(int binding) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(binding), id()); }
   void bind_uniform(int binding) const { glBindBufferBase(GL_UNIFORM_BUFFER, GLuint(binding), id()); }
 
   template <class T>
@@ -194,31 +193,33 @@ class Program : public Owned<GLuint, delete_program> {
  public:
   Program() = default;
   /// A stage of each file by its ending, after `#version 430 core` and `#define`s.
+  /// Throws Error where it uses more storage blocks than `most_blocks`: GL 4.3 guarantees 8 of a kernel.
   Program(std::string label, const std::vector<std::string>& stages, const ShaderWords& words = {},
-          const std::vector<std::string>& defines = {});
+          const std::vector<std::string>& defines = {}, std::size_t most_blocks = 8);
   static Program compute(const std::string& file, const ShaderWords& words = {},
-                         const std::vector<std::string>& defines = {});
+                         const std::vector<std::string>& defines = {}, std::size_t most_blocks = 8);
 
   const std::string& label() const { return label_; }
+  /// The names of the storage blocks that it uses; the k-th has binding point k.
+  const std::vector<std::string>& storage_blocks() const { return storage_blocks_; }
   void use() const { glUseProgram(id()); }
   /// Of the program in use. A uniform that the linker dropped is ignored; one not declared throws Error.
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }
+  /// Of a dispatch: the same value again costs nothing, nor does a uniform that the kernel does not have.
+  void set_changed(const char* name, unsigned value) const;
   void set(const char* name, const glm::uvec2& value) const { glUniform2uiv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec4& value) const { glUniform4fv(location(name), 1, &value.x); }
 
  private:
   GLint location(const char* name) const;
+  void number_storage_blocks(std::size_t most);
   std::string label_, text_;
+  std::vector<std::string> storage_blocks_;
   mutable std::map<std::string, GLint, std::less<>> locations_;
+  mutable std::map<std::string, std::pair<GLint, unsigned>, std::less<>> last_;  // location, value
 };
-
-/// So many work-groups, at most `row` of them in a row (types.glsl: group_index).
-inline void dispatch(std::size_t work_groups, std::size_t row) {
-  row = std::min(work_groups, row);
-  glDispatchCompute(GLuint(row), GLuint((work_groups + row - 1) / row), 1);
-}
 
 }  // namespace tetpbd

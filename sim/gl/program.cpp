@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <optional>
 #include <regex>
@@ -57,7 +58,7 @@ Shader compile(const std::string& stage, const std::string& text, const std::vec
 }  // namespace
 
 Program::Program(std::string label, const std::vector<std::string>& stages, const ShaderWords& words,
-                 const std::vector<std::string>& defines)
+                 const std::vector<std::string>& defines, std::size_t most_blocks)
     : Owned(glCreateProgram()), label_(std::move(label)) {
   std::string head = "#version 430 core\n";
   for (const std::string& define : defines) head += "#define " + define + "\n";
@@ -74,15 +75,45 @@ Program::Program(std::string label, const std::vector<std::string>& stages, cons
   if (const auto log = fault(id(), GL_LINK_STATUS))
     throw Error("shader program does not link", label_, name_files(*log, {}), 1);
   label_object(GL_PROGRAM, id(), label_);
+  number_storage_blocks(most_blocks);
 }
 
 Program Program::compute(const std::string& file, const ShaderWords& words,
-                         const std::vector<std::string>& defines) {
+                         const std::vector<std::string>& defines, std::size_t most_blocks) {
   std::string label = file.substr(0, file.rfind('.'));
   if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
   for (const Substitutions& item : words.each)
     if (const auto kind = item.find("KIND"); kind != item.end()) label += " " + kind->second;
-  return Program(label, {file}, words, defines);
+  return Program(label, {file}, words, defines, most_blocks);
+}
+
+void Program::number_storage_blocks(std::size_t most) {
+  GLint count = 0;
+  glGetProgramInterfaceiv(id(), GL_SHADER_STORAGE_BLOCK, GL_ACTIVE_RESOURCES, &count);
+  for (GLint k = 0; k < count; ++k) {
+    std::string name(256, '\0');
+    GLsizei length = 0;
+    glGetProgramResourceName(id(), GL_SHADER_STORAGE_BLOCK, GLuint(k), GLsizei(name.size()), &length,
+                             name.data());
+    storage_blocks_.push_back(name.substr(0, std::size_t(length)));
+    glShaderStorageBlockBinding(id(), GLuint(k), GLuint(k));
+  }
+  if (storage_blocks_.size() > most)
+    throw Error(
+        "a kernel has too many storage blocks",
+        fmt::format("{} of at most {}: {}", storage_blocks_.size(), most, fmt::join(storage_blocks_, ", ")),
+        "merge some, or leave out what it does not need", 1);
+}
+
+void Program::set_changed(const char* name, unsigned value) const {
+  const auto found = last_.find(std::string_view(name));
+  if (found == last_.end()) {
+    const GLint location = glGetUniformLocation(id(), name);
+    last_.emplace(name, std::pair(location, value));
+    if (location >= 0) glUniform1ui(location, value);
+  } else if (auto& [location, last] = found->second; location >= 0 && last != value) {
+    glUniform1ui(location, value), last = value;
+  }
 }
 
 GLint Program::location(const char* name) const {

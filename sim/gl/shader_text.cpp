@@ -33,6 +33,17 @@ std::string read_shader_file(const std::string& name) {
   throw Error("no such shader", name, "it is not one of the files of shaders/", 1);
 }
 
+// Itself; of "FOLDER/*.ENDING" all such files inside the program, by name.
+std::vector<std::string> expand_pattern(const std::string& pattern) {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string::npos) return {pattern};
+  std::vector<std::string> names;
+  for (const auto& [key, text] : embedded_shaders())
+    if (key.starts_with(pattern.substr(0, star)) && key.ends_with(pattern.substr(star + 1)))
+      names.push_back(key);
+  return names;
+}
+
 std::string substitute(std::string text, const Substitutions& words) {
   for (const auto& [key, value] : words | std::views::reverse)  // KIND_ROW before KIND
     for (std::size_t at; (at = text.find("$" + key)) != std::string::npos;)
@@ -78,7 +89,8 @@ std::string shader_text(const std::string& name, const ShaderWords& words, std::
       const std::string filled = substitute(line, local.words);
       if (filled.starts_with(include)) {
         const std::string inner = filled.substr(include.size(), filled.rfind('"') - include.size());
-        result += shader_text(inner, local, files) + resume;
+        for (const std::string& file : expand_pattern(inner)) result += shader_text(file, local, files);
+        result += resume;
       } else {
         result += filled + "\n";
       }

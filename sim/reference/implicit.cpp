@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/moving_shape.h"
 
 namespace tetpbd {
 
@@ -38,7 +38,6 @@ Objective objective_of(const Implicit& run, const Start& start) {
   const Settings& settings = run.input.settings;
   Objective o{.system = run.input.system, .compliances = run.compliances};
   o.inertia = 1 / (run.h * run.h);
-  o.planes = planes_of(run.input.model, settings);
   double mass = 0;
   for (std::size_t i = 0; i < start.z.size(); ++i) {
     const double h = start.h[i], w = run.input.inverse_masses[i], drag = 1 + settings.damping * h;
@@ -59,45 +58,42 @@ Objective objective_of(const Implicit& run, const Start& start) {
   return o;
 }
 
-// The planes of shapes over the step, as each vertex meets them that goes from where it is to `to`. Returns
-// by how much they have changed there, m.
-double meet_shapes(const Implicit& run, const std::vector<MovingShape>& shapes, const Points& to,
+// The planes of obstacles over the step, as each vertex meets them that goes from where it is to `to`.
+// Returns by how much they have changed there, m.
+double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obstacles, const Points& to,
                    Objective& o) {
-  const std::vector<glm::dvec4> before = std::move(o.own_planes);
-  o.own = shapes.size(), o.own_planes.clear();
+  const std::vector<glm::dvec4> before = std::move(o.planes);
+  o.plane_count = obstacles.size(), o.planes.clear();
   double most = 0;
   for (std::size_t i = 0; i < to.size(); ++i)
-    for (const MovingShape& shape : shapes) {
-      const glm::dvec3 from = run.now.positions[i], way = to[i] - from - run.h * shape.velocity_at(from);
-      const auto met = shape.meeting(to[i], way);
-      const bool near = o.masses[i] > 0 && met.distance < glm::length(way) + 1e-3 * run.input.model.size;
-      o.own_planes.push_back(near ? glm::dvec4(met.normal, glm::dot(met.normal, to[i]) - met.distance)
-                                  : glm::dvec4(0, 0, 0, -1));
+    for (const MovingObstacle& obstacle : obstacles) {
+      const glm::dvec3 from = run.now.positions[i], way = to[i] - from - run.h * obstacle.velocity_at(from);
+      const auto met = obstacle.surface_met(to[i], way);
+      const bool near = obstacle.kind->flat || met.distance < glm::length(way) + 1e-3 * run.input.model.size;
+      o.planes.push_back(near && o.masses[i] > 0
+                             ? glm::dvec4(met.normal, glm::dot(met.normal, to[i]) - met.distance)
+                             : glm::dvec4(0, 0, 0, -1));
       if (before.empty()) continue;
-      const glm::dvec4 was = before[o.own_planes.size() - 1];
+      const glm::dvec4 was = before[o.planes.size() - 1];
       const double gap = glm::dot(glm::dvec3(was), to[i]) - was.w;
       if (std::min(gap, met.distance) < 1e-6 * run.input.model.size)
         most = std::max(most, std::abs(std::max(gap, -1.0) - met.distance));
     }
   return most;
 }
-double friction_of(const Implicit& run, const std::vector<MovingShape>& shapes, const Objective& o,
-                   std::size_t plane) {
-  return plane < o.planes.size() ? run.input.settings.friction : shapes[plane - o.planes.size()].friction;
-}
 
 // What the last solution's forces and the way since z make of friction.
-std::vector<Objective::Drag> drags(const Implicit& run, const Objective& o, const Start& start,
-                                   const std::vector<MovingShape>& shapes,
+std::vector<Objective::Drag> drags(const Objective& o, const Start& start,
+                                   const std::vector<MovingObstacle>& obstacles,
                                    const std::vector<Touching>& touching) {
   std::vector<Objective::Drag> list;
   for (const Touching& t : touching)
     if (t.force > 0) {
-      glm::dvec3 from = start.z[t.vertex];
-      if (t.plane >= o.planes.size())
-        from += start.h[t.vertex] * shapes[t.plane - o.planes.size()].velocity_at(from);
-      list.push_back({t.vertex, glm::dvec3(o.plane(t.vertex, t.plane)), from,
-                      friction_of(run, shapes, o, t.plane) * t.force, least_slip * start.h[t.vertex]});
+      const MovingObstacle& obstacle = obstacles[t.plane];
+      const double h = start.h[t.vertex];
+      const glm::dvec3 at = start.z[t.vertex], from = at + h * obstacle.velocity_at(at);
+      list.push_back({t.vertex, glm::dvec3(o.plane(t.vertex, t.plane)), from, obstacle.friction * t.force,
+                      least_slip * h});
     }
   return list;
 }
@@ -106,19 +102,20 @@ std::vector<Objective::Drag> drags(const Implicit& run, const Objective& o, cons
 // all of them.
 Minimum solve(const Implicit& run, const Start& start) {
   Objective o = objective_of(run, start);
-  const auto shapes = shapes_of(run.input.model, run.input.settings, run.time[0], run.h, 1)[0];
-  meet_shapes(run, shapes, o.predicted, o);
-  o.drags = drags(run, o, start, shapes, run.touching);
+  const auto obstacles = obstacles_at(run.input.model, run.input.settings, run.time[0], run.h);
+  const bool rubs = std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; });
+  find_planes(run, obstacles, o.predicted, o);
+  o.drags = drags(o, start, obstacles, run.touching);
   const int most_rounds = run.most > 0 ? 0 : 50;
   Minimum minimum = minimise(o, o.predicted, run.most);
-  for (int round = 0; o.plane_count() > 0 && round < most_rounds; ++round) {
+  for (int round = 0; o.plane_count > 0 && round < most_rounds; ++round) {
     if (!minimum.converged) break;
-    const bool moved = meet_shapes(run, shapes, minimum.positions, o) > 1e-9 * run.input.model.size;
-    if (!moved && !(run.input.settings.friction > 0) && shapes.empty()) break;
+    const bool moved = find_planes(run, obstacles, minimum.positions, o) > 1e-9 * run.input.model.size;
+    if (!moved && !rubs) break;
     std::vector<double> change(run.now.positions.size(), 0);
     double all = 0, most = 0;
     for (const Objective::Drag& d : o.drags) all += d.force;
-    const std::vector<Objective::Drag> next = drags(run, o, start, shapes, minimum.touching);
+    const std::vector<Objective::Drag> next = drags(o, start, obstacles, minimum.touching);
     for (const Objective::Drag& d : o.drags) change[d.vertex] -= d.force;
     for (const Objective::Drag& d : next) change[d.vertex] += d.force;
     for (const double c : change) most = std::max(most, std::abs(c));

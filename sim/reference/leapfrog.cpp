@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/moving_shape.h"
 
 namespace tetpbd {
 
@@ -99,12 +99,11 @@ Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, c
 
 void advance(Leapfrog& run, long steps) {
   const Settings& settings = run.input.settings;
-  const std::vector<glm::dvec4> planes = planes_of(run.input.model, settings);
   const double keep = std::exp(-settings.damping * run.h);
-  std::vector<MovingShape> shapes;
+  std::vector<MovingObstacle> obstacles;
   for (long s = 0; s < steps; ++s, run.time[0] += run.h) {
-    if (s == 0 || std::ranges::any_of(run.input.model.shapes, moves))
-      shapes = shapes_of(run.input.model, settings, run.time[0], run.h, 1)[0];
+    if (s == 0 || std::ranges::any_of(run.input.model.obstacles, moves))
+      obstacles = obstacles_at(run.input.model, settings, run.time[0], run.h);
     const Points a = accelerations(run);
     parallel_for(a.size(), 4096, [&](std::size_t i) {
       if (run.input.inverse_masses[i] == 0) return;
@@ -112,13 +111,10 @@ void advance(Leapfrog& run, long steps) {
       run.v[i] = (run.v[i] + run.h * a[i]) * keep;
       run.x[i] += run.h * run.v[i];
       glm::dvec3& x = run.x[i];
-      for (const glm::dvec4& plane : planes)
-        touch(glm::dvec3(plane), plane.w - glm::dot(glm::dvec3(plane), x), settings.friction, x - before,
-              run.h, x, run.v[i]);
-      for (const MovingShape& shape : shapes) {
-        const glm::dvec3 way = x - before - run.h * shape.velocity_at(x);
-        const auto met = shape.meeting(x, way);
-        touch(met.normal, -met.distance, shape.friction, way, run.h, x, run.v[i]);
+      for (const MovingObstacle& obstacle : obstacles) {
+        const glm::dvec3 way = x - before - run.h * obstacle.velocity_at(x);
+        const auto met = obstacle.surface_met(x, way);
+        touch(met.normal, -met.distance, obstacle.friction, way, run.h, x, run.v[i]);
       }
     });
     run.pairs.resolve(settings, run.x, run.v, run.held, run.input.inverse_masses, run.h);

@@ -73,8 +73,7 @@ Pair rigid_pair(const ReferenceInput& input) {
     for (Run& run : *runs)
       for (RigidBody& body : run.bodies)
         for (long s = 0; s < run.steps; ++s)
-          advance(body, input.model, input.settings, input.settings.dt / double(run.steps),
-                  input.settings.restitution);
+          advance(body, input.model, input.settings, input.settings.dt / double(run.steps));
   };
   pair.coarse = [runs, input] { return state_of(input.model, (*runs)[0].bodies); };
   pair.fine = [runs, input] { return state_of(input.model, (*runs)[1].bodies); };
@@ -181,11 +180,11 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const auto add = [&](const auto& values) { key = hash_values(values, key); };
   const Model& model = input.model;
   add(model.rest.positions), add(model.rest.tets), add(model.positions), add(model.velocities);
-  add(model.masses), add(model.obstacles), add(input.inverse_masses);
+  add(model.masses), add(input.inverse_masses);
   if (model.rest.thickness > 0) add(model.rest.surface);
-  for (const Obstacle& shape : model.shapes) {
-    add(numbers_of(shape));
-    if (shape.field) add(shape.field->values);
+  for (const Obstacle& obstacle : model.obstacles) {
+    add(numbers_of(obstacle));
+    if (obstacle.field) add(obstacle.field->values);
   }
   const Settings& s = input.settings;
   if (s.material == "none")

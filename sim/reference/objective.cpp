@@ -230,8 +230,8 @@ struct ActiveSet {
   std::pair<glm::dmat3, glm::dvec3> freedom(std::size_t i) const {
     glm::dmat3 free(1);
     glm::dvec3 way(0);
-    for (std::size_t p = 0; p < o.plane_count(); ++p) {
-      if (!held[i * o.plane_count() + p]) continue;
+    for (std::size_t p = 0; p < o.plane_count; ++p) {
+      if (!held[i * o.plane_count + p]) continue;
       const glm::dvec3 n(o.plane(i, p)), e = free * n;
       if (glm::dot(e, e) < 1e-12) continue;
       way -= e * (gap(i, p, way) / glm::dot(n, e));
@@ -244,8 +244,8 @@ struct ActiveSet {
   bool update(const Points& step, const Points& forces) {
     bool changed = false;
     for (std::size_t i = 0; i < x.size(); ++i)
-      for (std::size_t p = 0; p < o.plane_count() && o.masses[i] > 0; ++p) {
-        char& now = held[i * o.plane_count() + p];
+      for (std::size_t p = 0; p < o.plane_count && o.masses[i] > 0; ++p) {
+        char& now = held[i * o.plane_count + p];
         const char next =
             now ? glm::dot(glm::dvec3(o.plane(i, p)), forces[i]) > 0 : gap(i, p, step[i]) < -slack;
         changed = changed || next != now;
@@ -317,7 +317,7 @@ bool newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
     } else {
       flat(result.step) = factor.solve(-flat(g));
     }
-    if (o.plane_count() == 0 || !set.update(result.step, result.forces)) break;
+    if (o.plane_count == 0 || !set.update(result.step, result.forces)) break;
   }
   result.descent = flat(g).dot(flat(result.step));
   return true;
@@ -329,16 +329,16 @@ constexpr int newton_limit = 1000;
 Minimum newton(const Objective& o, Points start, int most) {
   Minimum result;
   Points& x = result.positions = std::move(start);
-  ActiveSet set{o, x, std::vector<char>(x.size() * o.plane_count(), 0)};
+  ActiveSet set{o, x, std::vector<char>(x.size() * o.plane_count, 0)};
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (!(o.masses[i] > 0)) x[i] = o.predicted[i];
     set.slack = std::max(set.slack, 1e-14 * glm::length(x[i]));
   }
   for (std::size_t i = 0; i < x.size(); ++i)
-    for (std::size_t p = 0; p < o.plane_count() && o.masses[i] > 0; ++p) {
+    for (std::size_t p = 0; p < o.plane_count && o.masses[i] > 0; ++p) {
       const double gap = set.gap(i, p, glm::dvec3(0));
       if (gap < 0) x[i] -= gap * glm::dvec3(o.plane(i, p));
-      set.held[i * o.plane_count() + p] = gap <= set.slack;
+      set.held[i * o.plane_count + p] = gap <= set.slack;
     }
   Factor factor;
   NewtonStep newton;
@@ -366,8 +366,8 @@ Minimum newton(const Objective& o, Points start, int most) {
     if (++result.iterations == most) result.converged = true;
   }
   for (std::size_t i = 0; i < x.size(); ++i)
-    for (std::size_t p = 0; p < o.plane_count(); ++p)
-      if (set.held[i * o.plane_count() + p])
+    for (std::size_t p = 0; p < o.plane_count; ++p)
+      if (set.held[i * o.plane_count + p])
         result.touching.push_back(
             {std::uint32_t(i), std::uint32_t(p), glm::dot(glm::dvec3(o.plane(i, p)), newton.forces[i])});
   return result;
@@ -380,8 +380,7 @@ Minimum minimise(Objective o, Points start, int most) {
   const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
   for (Points* list : {&o.predicted, &start})
     for (glm::dvec3& p : *list) p -= origin;
-  for (auto* list : {&o.planes, &o.own_planes})
-    for (glm::dvec4& plane : *list) plane.w -= glm::dot(glm::dvec3(plane), origin);
+  for (glm::dvec4& plane : o.planes) plane.w -= glm::dot(glm::dvec3(plane), origin);
   for (Objective::Drag& drag : o.drags) drag.from -= origin;
   Minimum result = newton(o, std::move(start), most);
   for (glm::dvec3& p : result.positions) p += origin;

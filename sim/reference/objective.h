@@ -34,14 +34,11 @@ struct Objective {
   /// counts, and `damping` in place of per_step of the others. Empty: none.
   std::vector<double> before{};      ///< by component (constraint_values)
   double damping = 0, per_step = 0;  ///< constraint_damping over the step's length; 1/s
-  /// Vertices with mass are kept in these half spaces (n, d), n . x >= d.
+  /// Each vertex with mass is kept in `plane_count` half spaces (n, d), n . x >= d; by vertex.
   std::vector<glm::dvec4> planes{};
-  /// And each in `own` of these, by vertex.
-  std::vector<glm::dvec4> own_planes{};
-  std::size_t own = 0;
-  std::size_t plane_count() const { return planes.size() + own; }
-  glm::dvec4 plane(std::size_t vertex, std::size_t p) const {
-    return p < planes.size() ? planes[p] : own_planes[vertex * own + p - planes.size()];
+  std::size_t plane_count = 0;
+  const glm::dvec4& plane(std::size_t vertex, std::size_t p) const {
+    return planes[vertex * plane_count + p];
   }
   /// Resists moving along a plane: |t| force, where the way t from `from` is longer than `reach`, and
   /// smoothly below.

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/moving_shape.h"
 #include "sim/rotation.h"
 
 namespace tetpbd {
@@ -34,23 +34,20 @@ void move(RigidBody& b, double h) {
   b.moved += h * (glm::length(b.velocity) + glm::length(spin) * b.radius);
 }
 
-// A body has many vertices, of which few come near a plane within many steps.
-void find_near(RigidBody& b, const std::vector<glm::dvec4>& planes, const std::vector<MovingShape>& shapes,
-               bool moving) {
+// A body has many vertices, of which few come near an obstacle within many steps.
+void find_near(RigidBody& b, const std::vector<MovingObstacle>& obstacles, bool moving) {
   if (b.moved <= 0.9 * b.reach && !moving) return;
   b.near.clear(), b.reach = 0.01 * b.radius, b.moved = 0;
   for (std::uint32_t i = 0; i < b.rest.size(); ++i) {
     const glm::dvec3 x = b.centre + b.rotation * b.rest[i];
-    if (std::ranges::any_of(
-            planes, [&](const glm::dvec4& p) { return glm::dot(glm::dvec3(p), x) - p.w < b.reach; }) ||
-        std::ranges::any_of(shapes, [&](const MovingShape& s) { return s.surface_at(x).distance < b.reach; }))
-      b.near.push_back(i);
+    const auto is_near = [&](const MovingObstacle& o) { return o.surface_at(x).distance < b.reach; };
+    if (std::ranges::any_of(obstacles, is_near)) b.near.push_back(i);
   }
 }
 
-/// A vertex that touches a plane.
+/// A vertex that touches an obstacle.
 struct Contact {
-  std::size_t number;   ///< of all pairs of planes and vertices
+  std::size_t number;   ///< of all pairs of obstacles and vertices
   glm::dvec3 arm;       ///< m, from the centre
   glm::dmat3 axes;      ///< columns: normal, two tangents
   glm::dmat3 response;  ///< change of the contact's velocity by an impulse there, in those axes
@@ -61,39 +58,30 @@ struct Contact {
   glm::dvec3 impulse{0};  ///< N s, in those axes
 };
 
-std::vector<Contact> contacts_of(const RigidBody& b, const std::vector<glm::dvec4>& planes,
-                                 const std::vector<MovingShape>& shapes, const glm::dmat3& inverse,
-                                 double friction, double restitution) {
+std::vector<Contact> find_contacts(const RigidBody& b, const std::vector<MovingObstacle>& obstacles,
+                                   const glm::dmat3& inverse) {
   std::vector<Contact> found;
   const glm::dvec3 spin = angular_velocity(b);
   const auto add = [&](std::size_t number, const glm::dvec3& arm, const glm::dvec3& n,
-                       const glm::dvec3& surface, double own_friction, double own_restitution) {
+                       const MovingObstacle& o) {
     const glm::dvec3 side = std::abs(n.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
     const glm::dvec3 t = glm::normalize(glm::cross(n, side));
     Contact c;
-    c.number = number, c.arm = arm, c.surface = surface;
-    c.friction = own_friction, c.restitution = own_restitution;
+    c.number = number, c.arm = arm, c.surface = o.velocity_at(b.centre + arm);
+    c.friction = o.friction, c.restitution = o.restitution;
     c.axes = glm::dmat3(n, t, glm::cross(n, t));
     const glm::dmat3 cross(glm::cross(c.arm, c.axes[0]), glm::cross(c.arm, c.axes[1]),
                            glm::cross(c.arm, c.axes[2]));
     c.response = glm::dmat3(1 / b.mass) + glm::transpose(cross) * inverse * cross;
     c.scale = 1 / (c.response[0][0] + c.response[1][1] + c.response[2][2]);
-    c.approach = glm::dot(n, b.velocity + glm::cross(spin, c.arm) - surface);
+    c.approach = glm::dot(n, b.velocity + glm::cross(spin, c.arm) - c.surface);
     found.push_back(c);
   };
-  for (std::size_t p = 0; p < planes.size(); ++p) {
-    const glm::dvec3 n(planes[p]), local = glm::transpose(b.rotation) * n;
-    for (const std::uint32_t i : b.near)
-      if (glm::dot(n, b.centre) + glm::dot(local, b.rest[i]) <= planes[p].w)
-        add(p * b.rest.size() + i, b.rotation * b.rest[i], n, glm::dvec3(0), friction, restitution);
-  }
-  for (std::size_t k = 0; k < shapes.size(); ++k)
+  for (std::size_t k = 0; k < obstacles.size(); ++k)
     for (const std::uint32_t i : b.near) {
-      const glm::dvec3 arm = b.rotation * b.rest[i], x = b.centre + arm;
-      const auto surface = shapes[k].surface_at(x);
-      if (surface.distance <= 0)
-        add((planes.size() + k) * b.rest.size() + i, arm, surface.normal, shapes[k].velocity_at(x),
-            shapes[k].friction, shapes[k].restitution);
+      const glm::dvec3 arm = b.rotation * b.rest[i];
+      const auto surface = obstacles[k].surface_at(b.centre + arm);
+      if (surface.distance <= 0) add(k * b.rest.size() + i, arm, surface.normal, obstacles[k]);
     }
   return found;
 }
@@ -166,15 +154,14 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
   return bodies;
 }
 
-void advance(RigidBody& b, const Model& model, const Settings& settings, double h, double restitution) {
+void advance(RigidBody& b, const Model& model, const Settings& settings, double h) {
   if (b.held) return;
   move(b, h / 2);
   const glm::dmat3 inverse = b.rotation * glm::inverse(b.inertia) * glm::transpose(b.rotation);
-  const std::vector<glm::dvec4> planes = planes_of(model, settings);
-  const std::vector<MovingShape> shapes = shapes_of(model, settings, b.time, h, 1)[0];
+  const std::vector<MovingObstacle> obstacles = obstacles_at(model, settings, b.time, h);
   b.time += h;
-  find_near(b, planes, shapes, std::ranges::any_of(model.shapes, moves));
-  std::vector<Contact> contacts = contacts_of(b, planes, shapes, inverse, settings.friction, restitution);
+  find_near(b, obstacles, std::ranges::any_of(model.obstacles, moves));
+  std::vector<Contact> contacts = find_contacts(b, obstacles, inverse);
   b.velocity.y -= h * settings.gravity;
   glm::dvec3 spin = angular_velocity(b);
   // They begin with the last step's, and so with little to do for a body that lies.

@@ -1,4 +1,4 @@
-// The right motion of k = 1: rigid bodies on half spaces, with Coulomb friction and restitution, in double.
+// The right motion of k = 1: rigid bodies on obstacles, with Coulomb friction and restitution, in double.
 // Moreau's time stepping (Moreau 1988; Jean 1999): all contacts of a step at once, by nonsmooth Gauss-Seidel
 // to convergence. Bodies do not touch each other.
 #pragma once
@@ -22,7 +22,7 @@ struct RigidBody {
   glm::dvec3 angular{0};   ///< kg m^2/s
   double radius = 0;       ///< m, of the vertices about the centre
   bool held = false;       ///< by fixed vertices: it stays where it is
-  /// Of `rest`, those within `reach` of a plane when they were found, and how far any has moved since, m.
+  /// Of `rest`, those within `reach` of an obstacle when they were found, and how far any has moved since, m.
   std::vector<std::uint32_t> near{};
   double reach = 0, moved = 1;
   double time = 0;                                             ///< s
@@ -32,10 +32,10 @@ struct RigidBody {
 /// The model's bodies at their start. Throws Error for fixed vertices that leave a body free to turn (all on
 /// a line), and for starts that are not the rest shape in rigid motion.
 std::vector<RigidBody> rigid_bodies(const Model& model);
-/// Moves a body on by `h` seconds under the settings' gravity, ground and friction and the model's obstacles:
-/// second order in h in flight, first in contact. `restitution`: of Newton, normal velocity after an impact
-/// over before.
-void advance(RigidBody& body, const Model& model, const Settings& settings, double h, double restitution = 0);
+/// Moves a body on by `h` seconds under the settings' gravity, ground, friction and restitution (Newton's:
+/// normal velocity after an impact over before) and the model's obstacles: second order in h in flight, first
+/// in contact.
+void advance(RigidBody& body, const Model& model, const Settings& settings, double h);
 /// The model's vertices, moved with the bodies.
 State state_of(const Model& model, const std::vector<RigidBody>& bodies);
 

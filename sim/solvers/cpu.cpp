@@ -2,6 +2,7 @@
 // inlined: in float the paper's baseline, in double what stability is held against.
 #include <memory>
 
+#include "sim/sim.h"
 #include "sim/solvers/cpu_pbd.h"
 
 namespace tetpbd {
@@ -12,9 +13,9 @@ template <class real>
 Solver create(const SolverInput& input) {
   Solver solver;
   const auto pbd = std::make_shared<CpuPbd<real>>(input.model, input.system);
-  solver.step_on_cpu = [pbd](State& state, const Settings& settings,
-                             const std::vector<double>& inverse_masses, double time) {
-    return pbd->step(state, settings, inverse_masses, Sweep::gauss_seidel, time);
+  solver.substep = [pbd](Sim& sim, int) {
+    pbd->change_model(*sim.model);
+    add_guards(sim, pbd->step(sim.host, sim.settings, sim.inverse_masses, Sweep::gauss_seidel, time_of(sim)));
   };
   return solver;
 }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <thread>
 
+#include "sim/sim.h"
 #include "sim/solvers/colours.h"
 #include "sim/solvers/cpu_pbd.h"
 #include "sim/solvers/lane_math.h"
@@ -282,7 +283,7 @@ struct Turn {
 
 class FastPbd {
  public:
-  FastPbd(const SolverInput& input) : model_(input.model), pairs_(input.model) {
+  FastPbd(const SolverInput& input) : model_(&input.model), pairs_(input.model) {
     std::size_t all = 0;
     for_each_kind([&](auto is, int kind) {
       auto& batches = std::get<Batches<decltype(is)>>(work_.batches);
@@ -301,12 +302,14 @@ class FastPbd {
     threads_ = input.tuning.threads ? input.tuning.threads : std::clamp<std::size_t>(useful, 1, cores);
   }
 
+  void change_model(const Model& model) { model_ = &model, pairs_.change_model(model); }
+
   /// As CpuPbd::step, in another order.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    double time) {
     const Plan plan = plan_for(settings);
-    const Substep substep(model_, settings, plan, time);
-    RigidContact contact(model_, settings);
+    const Substep substep(*model_, settings, plan, time);
+    RigidContact contact(*model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
     x.resize(state.positions.size());
@@ -345,7 +348,7 @@ class FastPbd {
         for_each_free_vertex([&](std::size_t i) {
           if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;
         });
-        if (bodies_touch(model_, settings)) {
+        if (bodies_touch(*model_, settings)) {
           barrier.wait(thread);
           if (thread == 0) {
             for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = x[i].position();
@@ -403,13 +406,13 @@ class FastPbd {
       if (!shared && thread > 0) continue;
       const std::size_t begin = turn.begin + (shared ? count * thread / threads : 0);
       const std::size_t end = turn.begin + (shared ? count * (thread + 1) / threads : count);
-      const Rule<float> rule(settings, h, std::size_t(turn.kind), model_.size);
+      const Rule<float> rule(settings, h, std::size_t(turn.kind), model_->size);
       project_kind(work_, turn.kind, begin, end, rule, first, guards);
     }
     barrier.wait(thread);
   }
 
-  const Model& model_;
+  const Model* model_;
   PairContact pairs_;
   Work work_;
   std::vector<Turn> turns_;
@@ -421,9 +424,10 @@ class FastPbd {
 
 Solver create_cpu_fast_solver(const SolverInput& input) {
   Solver solver;
-  solver.step_on_cpu = [pbd = std::make_shared<FastPbd>(input)](
-                           State& state, const Settings& settings, const std::vector<double>& inverse_masses,
-                           double time) { return pbd->step(state, settings, inverse_masses, time); };
+  solver.substep = [pbd = std::make_shared<FastPbd>(input)](Sim& sim, int) {
+    pbd->change_model(*sim.model);
+    add_guards(sim, pbd->step(sim.host, sim.settings, sim.inverse_masses, time_of(sim)));
+  };
   return solver;
 }
 

@@ -98,7 +98,7 @@ template <class real>
 class CpuPbd {
  public:
   CpuPbd(const Model& model, const ConstraintSystem& system)
-      : model_(model), pairs_(model), at_vertex_(system.at_vertex) {
+      : model_(&model), pairs_(model), at_vertex_(system.at_vertex) {
     for_each_kind([&](auto kind, int k) {
       constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
       const ConstraintList& list = system.lists[std::size_t(k)];
@@ -113,16 +113,19 @@ class CpuPbd {
     });
   }
 
+  /// Goes on with one that differs in its obstacles alone.
+  void change_model(const Model& model) { model_ = &model, pairs_.change_model(model); }
+
   /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26). Returns how often each guard
   /// triggered.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    Sweep sweep, double time = 0) {
     const bool jacobi = sweep == Sweep::jacobi, soft = compliant(settings);
     const double omega = soft ? 1 : settings.omega;
-    const double longest = jacobi ? longest_correction(model_, settings) : model_.size;
+    const double longest = jacobi ? longest_correction(*model_, settings) : model_->size;
     const Plan plan = plan_for(settings);
-    const Substep substep(model_, settings, plan, time);
-    RigidContact contact(model_, settings);
+    const Substep substep(*model_, settings, plan, time);
+    RigidContact contact(*model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;
@@ -183,7 +186,7 @@ class CpuPbd {
     void move(std::uint32_t v, const glm::dvec3& by) const { moved[v] += by; }
   };
 
-  const Model& model_;
+  const Model* model_;
   PairContact pairs_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;

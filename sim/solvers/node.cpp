@@ -1,13 +1,14 @@
 // Node-centric Jacobi: one dispatch per iteration, whatever the number of constraint kinds (paper algorithm
 // 2).
+#include "sim/solvers/node.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
 #include "sim/layout.h"
-#include "sim/solvers/patches.h"
-#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 
@@ -17,11 +18,11 @@ namespace {
 // small mesh needs a patch for every part of the GPU, and an invocation for each of its constraints; a large
 // one gains from large patches, in which fewer constraints belong to two, and from small work-groups, of
 // which a part of the GPU runs many.
-// A kernel that knows shapes needs so many registers that fewer work-groups run side by side.
-Cut cut_for(std::size_t vertices, bool shapes, bool software) {
+// A kernel that knows more than planes needs so many registers that fewer work-groups run side by side.
+Cut cut_for(std::size_t vertices, bool solids, bool software) {
   if (software) return {64, 64};
-  if (shapes && vertices <= 4000) return {32, 512};
-  if (shapes && vertices <= 14000) return {32, 256};
+  if (solids && vertices <= 4000) return {32, 512};
+  if (solids && vertices <= 14000) return {32, 256};
   if (vertices <= 4000) return {16, 512};
   if (vertices <= 8000) return {16, 256};
   if (vertices <= 14000) return {24, 256};
@@ -31,17 +32,27 @@ Cut cut_for(std::size_t vertices, bool shapes, bool software) {
 
 }  // namespace
 
-Solver create_node_solver(const SolverInput& input) {
+Pass make_vertex_patch_pass(Solver& solver, const SolverInput& input, const char* shader, bool multipliers) {
   const std::size_t vertices = input.model.positions.size();
-  const Cut cut = tuned(cut_for(vertices, !input.model.shapes.empty(), input.software), input.tuning);
+  const Cut cut =
+      tuned(cut_for(vertices, !solid_obstacles(input.model).empty(), input.software), input.tuning);
   if (cut.patch > std::min<std::size_t>(cut.group, Patches::most_vertices - 4))
     throw Error("a patch does not fit a work-group",
                 fmt::format("{} vertices, work-groups of {}", cut.patch, cut.group),
                 "an invocation for each vertex, 252 at most");
+  solver.quantized_buffers = 2;
+  Pass pass =
+      make_patch_pass(solver, input, vertex_patches(input.system, cut.patch), shader, cut.group, multipliers);
+  pass.bytes += vertices * (2 * sizeof(Position) + 16);
+  solver.vertex_patches = pass.work_groups;
+  return pass;
+}
+
+Solver create_node_solver(const SolverInput& input) {
   Solver solver;
-  solver.double_buffered = true;
-  add_patches(solver, input, vertex_patches(input.system, cut.patch), "solve_node.comp", cut.group);
-  solver.iteration.back().bytes += vertices * (2 * sizeof(Position) + 16);
+  JacobiPasses jacobi;
+  jacobi.passes.push_back(make_vertex_patch_pass(solver, input, "solve_node.comp", true));
+  add_jacobi(solver, input, std::move(jacobi));
   return solver;
 }
 

@@ -17,6 +17,7 @@ namespace tetpbd {
 class PairContact {
  public:
   explicit PairContact(const Model& model) : model_(&model) {}
+  void change_model(const Model& model) { model_ = &model; }
   /// After a substep of `h`: of places `x` and velocities `v`, and what vertices are `held` by.
   void resolve(const Settings& settings, std::vector<glm::dvec3>& x, std::vector<glm::dvec3>& v,
                std::vector<State::Held>& held, const std::vector<double>& inverse_masses, double h) {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "sim/layout.h"
-#include "sim/solvers/solver.h"
+#include "sim/solvers/jacobi.h"
 
 namespace tetpbd {
 
@@ -30,7 +30,8 @@ ConstraintList shuffled(const ConstraintList& list) {
 Solver create_paper_solver(const SolverInput& input) {
   constexpr unsigned group = 1024;
   Solver solver;
-  solver.unfused = true;
+  solver.quantized_buffers = 1;
+  JacobiPasses jacobi{.unfused = true};
   const std::vector<Substitutions> kinds = kind_words(input.system);
   for (std::size_t k = 0, index = 0; k < kind_count; ++k) {
     if (!input.system.present[k]) continue;
@@ -39,13 +40,16 @@ Solver create_paper_solver(const SolverInput& input) {
     check_storage(input.tuning, records.label(), records.bytes());
     const std::size_t bytes =
         count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
-    solver.iteration.push_back(
-        {Program::compute("solve_paper.comp", {kinds[index++], {}},
-                          {fmt::format("GROUP_SIZE {}", group), fmt::format("COUNT {}", count)}),
-         work_groups(count, group), bytes, records.id()});
+    jacobi.passes.push_back(
+        {.program = Program::compute("solve_paper.comp", {kinds[index++], {}},
+                                     {fmt::format("GROUP_SIZE {}", group), fmt::format("COUNT {}", count)}),
+         .work_groups = work_groups(count, group),
+         .bytes = bytes,
+         .records = records.id()});
     solver.buffers.push_back(std::move(records));
   }
-  add_average(solver, input, group, true);
+  jacobi.passes.push_back(make_average_pass(solver, input, group, true));
+  add_jacobi(solver, input, std::move(jacobi));
   return solver;
 }
 

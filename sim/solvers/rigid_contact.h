@@ -1,5 +1,5 @@
 // Contact of hard bodies on the CPU (method.md, "Contact of a hard body"): while a body touches, it moves as
-// a rigid one. GPU modes: shaders/rigid_contact.comp.
+// a rigid one. GPU modes: shaders/contact/rigid_contact.comp.
 #pragma once
 
 #include <algorithm>
@@ -19,10 +19,7 @@ inline bool touches_rigidly(const Model& model, const Settings& settings) {
 class RigidContact {
  public:
   RigidContact(const Model& model, const Settings& settings)
-      : model_(model),
-        wanted_(touches_rigidly(model, settings)),
-        restitution_(settings.restitution),
-        carried_(model.positions.size()) {}
+      : model_(model), wanted_(touches_rigidly(model, settings)), carried_(model.positions.size()) {}
 
   bool wanted() const { return wanted_; }  ///< else prepare() does nothing
   /// Whether vertex i belongs to a body that touches: then its velocity is the body's in the whole substep.
@@ -33,7 +30,7 @@ class RigidContact {
     return carried_[i] ? x + s.h * v : s.predict(x, v);
   }
 
-  /// At the start of a substep, by number: finds bodies that would get into a half space, and sets their
+  /// At the start of a substep, by number: finds bodies that would touch an obstacle, and sets their
   /// velocities v. `place.at(i)`: of vertex i, m.
   template <class Place>
   void prepare(const Substep& s, int substep, const std::vector<double>& inverse_masses, const Place& place,
@@ -51,7 +48,7 @@ class RigidContact {
  private:
   using Rules = Formulas<double>;
 
-  // The vertices that would be in a half space next; none if one is fixed.
+  // The vertices that would touch an obstacle next; none if one is fixed.
   template <class Place>
   std::vector<std::size_t> near_contacts(const Substep& s, int substep,
                                          const std::vector<double>& inverse_masses, const Place& place,
@@ -62,13 +59,10 @@ class RigidContact {
       if (!(inverse_masses[i] > 0)) return {};
       glm::dvec3 speed = v[i];
       const glm::dvec3 here = place.at(std::uint32_t(i)), next = s.predict(here, speed);
-      const auto meets = [&](const MovingShape& shape) {
-        return shape.meeting(next, next - here - s.h * shape.velocity_at(here)).distance < 0;
+      const auto stops = [&](const MovingObstacle& o) {
+        return o.surface_met(next, next - here - s.h * o.velocity_at(here)).distance < 0;
       };
-      if (std::ranges::any_of(s.planes,
-                              [&](const glm::dvec4& p) { return glm::dot(glm::dvec3(p), next) < p.w; }) ||
-          std::ranges::any_of(s.shapes_in(substep), meets))
-        found.push_back(i);
+      if (std::ranges::any_of(s.obstacles_in(substep), stops)) found.push_back(i);
     }
     return found;
   }
@@ -108,29 +102,23 @@ class RigidContact {
       std::size_t place = 0;
       // Of vertex i at arm: a normal and the gap there, how the obstacle moves, brakes and rebounds.
       const auto consider = [&](const glm::dvec3& arm, const glm::dvec3& n, double gap,
-                                const glm::dvec3& surface, double friction, double restitution) {
+                                const glm::dvec3& surface, const MovingObstacle& o) {
         const double least =
             Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
-                                   gap - Rules{}.closed_gap * model_.size, s.h, fall, restitution);
+                                   gap - Rules{}.closed_gap * model_.size, s.h, fall, o.restitution);
         ++place;
         const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
         if (!(over > most)) return;
         most = over, places[std::size_t(count)] = place,
-        worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0));
-        worst.surface = surface, worst.friction = friction;
+        worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, o.friction);
       };
       for (const std::size_t i : near) {
         const glm::dvec3 arm = at(i) - body.centre;
-        for (const glm::dvec4& plane : s.planes) {
-          const glm::dvec3 n(plane);
-          consider(arm, n, glm::dot(n, at(i)) - plane.w, glm::dvec3(0), s.friction, restitution_);
-        }
-        for (const MovingShape& shape : s.shapes_in(substep)) {
-          const glm::dvec3 surface = shape.velocity_at(at(i)),
+        for (const MovingObstacle& o : s.obstacles_in(substep)) {
+          const glm::dvec3 surface = o.velocity_at(at(i)),
                            way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
-          const auto met = shape.meeting(at(i) + s.h * surface + way, way);
-          consider(arm, met.normal, met.distance - glm::dot(met.normal, way), surface, shape.friction,
-                   shape.restitution);
+          const auto ahead = o.surface_ahead(at(i), s.h * surface + way, way);
+          consider(arm, ahead.normal, ahead.distance, surface, o);
         }
       }
       const auto taken = places.begin() + count;
@@ -145,7 +133,6 @@ class RigidContact {
 
   const Model& model_;
   bool wanted_;
-  double restitution_;
   std::vector<char> carried_;
 };
 

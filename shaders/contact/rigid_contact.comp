@@ -1,15 +1,13 @@
-// Contact of hard bodies (method.md, "Contact of a hard body"), before each substep: a body of which a vertex would get into a half space
+// Contact of hard bodies (method.md, "Contact of a hard body"), before each substep: a body of which a vertex would get into an obstacle
 // gets the velocities of a rigid body in inelastic frictional contact. Every work-group finds them for itself.
 #include "types.glsl"
 #include "pair.glsl"
-#undef BIND_QUANTIZED_OUT  // in place
-#define BIND_QUANTIZED_OUT BIND_QUANTIZED
 #include "quantized.glsl"
 layout(local_size_x = 256) in;
-#include "vertex.glsl"
+#include "solvers/corrections.glsl"
 #define SHARED_TOUCHES shared Touch contacts[MOST_TOUCHES];
 #define TOUCHES
-#include "impulses.glsl"
+#include "contact/impulses.glsl"
 shared Rigid before, body;  // the centre from the body's origin; momenta per mass
 shared uint worst, worst_place;
 shared uint places[MOST_TOUCHES];  // of the touches: vertex * MAX_OBSTACLES + obstacle
@@ -47,46 +45,24 @@ struct Meeting {
   vec3 velocity;
   float friction, restitution;
 };
-#if SHAPES
-#define OBSTACLES (uint(params.plane_count) + uint(SHAPES))
-#else
-#define OBSTACLES uint(params.plane_count)
-#endif
-Meeting meeting_with(uint p, Pair x, vec3 arm) {
-#if SHAPES
-  if (p >= uint(params.plane_count)) {
-    int k = int(p) - params.plane_count;
-    vec3 speed = shape_velocity(k, x), way = params.h * ((velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale - speed);
-    Surface plane = met(k, pair_add(x, params.h * speed + way), way);
-    return Meeting(plane.normal, plane.distance - dot(plane.normal, way), speed, shapes[k].friction, shapes[k].restitution);
-  }
-#endif
-  return Meeting(params.planes[p].xyz, depth_of(x, params.planes[p]), vec3(0.0), params.friction, params.restitution);
-}
-vec3 slip_at(Meeting m, vec3 velocity) {
-#if SHAPES
-  return velocity - m.velocity;
-#else
-  return velocity;
-#endif
+Meeting meeting_with(int k, Pair x, vec3 arm) {
+  vec3 velocity = (velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale;
+  Surface surface = surface_before(k, x, velocity);
+  return Meeting(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k), obstacle_restitution(k));
 }
 // The normal velocity at a contact may not be under this.
 float least_at(Meeting m, vec3 arm) {
-  return least_velocity(dot(m.normal, slip_at(m, velocity_at(before, arm))), m.gap - closed_gap * params.body_size, params.h, params.h * length(params.gravity), m.restitution);
+  return least_velocity(dot(m.normal, velocity_at(before, arm) - m.velocity), m.gap - closed_gap * params.body_size, params.h, params.h * length(params.gravity), m.restitution);
 }
 void take_in(int k, uint place, vec3 origin, vec3 impulse) {
   Pair x = position_of(place / MAX_OBSTACLES);
   vec3 arm = arm_of(x, origin) - before.centre;
-  Meeting m = meeting_with(place % MAX_OBSTACLES, x, arm);
-  contacts[k] = touch_at(before, m.normal, arm, least_at(m, arm), impulse);
-#if SHAPES
-  contacts[k].surface = m.velocity;
-  contacts[k].friction = m.friction;
-#endif
+  Meeting m = meeting_with(int(place % MAX_OBSTACLES), x, arm);
+  contacts[k] = touch_at(before, m.normal, arm, least_at(m, arm), impulse, m.velocity, m.friction);
   places[k] = place;
 }
 
-// Of body b, with `count` of its vertices near half spaces; false if it has no inertia. Side s is read, the other written.
+// Of body b, with `count` of its vertices that touch; false if it has no inertia. Side s is read, the other written.
 bool find_motion(uint b, uint s, uint count, bool writes) {
   uint lane = gl_LocalInvocationIndex;
   int touching = int(rigid_bodies[b].sides[s].touching);
@@ -118,12 +94,12 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
       uint vertex = near[s * params.vertex_count + rigid_bodies[b].first + k];
       Pair x = position_of(vertex);
       vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
-      for (uint p = 0u; p < OBSTACLES; ++p) {
+      for (int p = 0; p < obstacle_count(); ++p) {
         Meeting m = meeting_with(p, x, arm);
-        float over = least_at(m, arm) - dot(m.normal, slip_at(m, speed));
-        if (over > most || (over == most && vertex * MAX_OBSTACLES + p < place)) {
+        float over = least_at(m, arm) - dot(m.normal, speed - m.velocity);
+        if (over > most || (over == most && vertex * MAX_OBSTACLES + uint(p) < place)) {
           most = over;
-          place = vertex * MAX_OBSTACLES + p;
+          place = vertex * MAX_OBSTACLES + uint(p);
         }
       }
     }

@@ -1,8 +1,8 @@
 // Hard bodies that touch (method.md, "Contact of a hard body"): what a vertex tells of itself at the end of a substep, for
 // rigid_contact.comp, and whether its body is carried as a rigid one in this substep. Two sides take turns: one is read, the other written.
-layout(std430, binding = BIND_RIGID) buffer RigidBodies {
+layout(std430) buffer RigidBodies {
   RigidRecord rigid_bodies[BODY_COUNT];
-  uint near[];  // by side and body: vertices that would be in a half space next, in any order
+  uint near[];  // by side and body: vertices that would touch an obstacle next, in any order
 };
 shared int rigid_sums[RIGID_SUMS];
 
@@ -54,28 +54,11 @@ void add_rigid_sum(uint b, int which, int rest, float value) {
   add_quanta(b, rest, round((quanta - whole) * RIGID_PARTS));
 }
 void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u); }
-#if SHAPES
-// Whether a vertex at x meets a shape on so many times its way over a substep.
-bool meets_shapes(Pair x, vec3 way, float times) {
-  bool any = false;
-  for (uint left = shapes_near(x, length(way), times); left != 0u && !any; left &= left - 1u) {
-    int k = findLSB(left);
-    vec3 relative_way = times * (way - params.h * shape_velocity(k, x));
-    any = met(k, pair_add(x, relative_way), relative_way).distance < 0.0;
-  }
-  return any;
-}
-#endif
 // Vertex i is at x with velocity v and will be at `next`.
 void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
   uint b = state.body, s = side_now();
-  vec3 way = relative(next, x);
-  bool inside = touches(next);
-#if SHAPES
-  inside = inside || meets_shapes(x, way, 1.0);
-  if (meets_shapes(x, way, 4.0)) rigid_bodies[b].sides[s].soon = 1u;
-#endif
-  if (inside || touches(pair_add(next, 3.0 * way))) rigid_bodies[b].sides[s].soon = 1u;
+  bool inside = will_touch(x, next, 1.0);
+  if (inside || will_touch(x, next, 4.0)) rigid_bodies[b].sides[s].soon = 1u;
   if (inside) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
   if (!state.summed) return;
   float weight = 1.0 / (inverse_mass * state.mass);

@@ -1,4 +1,4 @@
-// A rigid body on half spaces: inelastic impacts and Coulomb friction by impulses, each contact in turn (method.md eqs. 34-37). GLSL and
+// A rigid body on obstacles: inelastic impacts and Coulomb friction by impulses, each contact in turn (method.md eqs. 34-37). GLSL and
 // C++ (sim/formulas.h). Impulses and momenta per mass of the body.
 struct Rigid {
   vec3 centre;
@@ -13,7 +13,7 @@ struct Touch {
   vec3 impulse;
   mat3 response;  // velocity there per impulse there
   mat3 stopping;  // its inverse
-#if SHAPES
+#if SOLIDS  // else obstacles rest, and have the world's friction
   vec3 surface;   // the obstacle's velocity there
   real friction;
 #endif
@@ -32,11 +32,11 @@ const real closed_gap = real(1e-6);  // of the body's size
 real least_velocity(real approach, real gap, real h, real fall, real restitution) {
   return restitution > real(0) && approach < real(-2) * fall ? -restitution * approach : -max(gap, real(0)) / h;
 }
-Touch touch_at(Rigid b, vec3 normal, vec3 arm, real least, vec3 impulse) {
+Touch touch_at(Rigid b, vec3 normal, vec3 arm, real least, vec3 impulse, vec3 surface, real friction) {
   mat3 turn = mat3(real(0), arm.z, -arm.y, -arm.z, real(0), arm.x, arm.y, -arm.x, real(0));  // turn * p = cross(arm, p)
   mat3 response = mat3(real(1)) + transpose(turn) * b.inverse_inertia * turn;
-#if SHAPES
-  return Touch(normal, arm, least, impulse, response, inverse(response), vec3(real(0)), real(0));
+#if SOLIDS
+  return Touch(normal, arm, least, impulse, response, inverse(response), surface, friction);
 #else
   return Touch(normal, arm, least, impulse, response, inverse(response));
 #endif
@@ -68,7 +68,7 @@ vec3 impulse_at(Touch t, vec3 velocity, real friction) {
   }
   return impulse;
 }
-#if SHAPES
+#if SOLIDS
 #define SLIP_OF(k, v) (v - contacts[k].surface), contacts[k].friction
 #else
 #define SLIP_OF(k, v) v, params.friction

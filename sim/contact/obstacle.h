@@ -1,30 +1,28 @@
-// Obstacles: what bodies touch and never move. Half spaces at rest are planes of the model (planes_of); all
-// others are shapes with a signed distance (shaders/shapes.glsl), which may move.
+// What bodies touch and never move, as a scene describes it: half spaces, and all that has a signed distance
+// (obstacle_kinds.h), at rest or moving.
 #pragma once
 
-#include <array>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "sim/layout.h"
 #include "sim/mesh/distance_field.h"
 
 namespace tetpbd {
 
-/// By number: SHAPE_ of layout.glsl.
-inline constexpr std::array shape_names = {"half-space", "sphere",       "capsule", "box",
-                                           "cylinder",   "height-field", "mesh"};
+struct ObstacleKind;
+/// The first row of the table: a half space.
+const ObstacleKind* default_obstacle_kind();
 
-/// As a scene describes it; what its shape does not ask for plays no part.
+/// What its kind does not ask for plays no part.
 struct Obstacle {
   struct Key {
     double time = 0;                    ///< s
     glm::dvec3 centre{0}, rotation{0};  ///< m, degrees
   };
-  int shape = SHAPE_PLANE;
+  const ObstacleKind* kind = default_obstacle_kind();
   glm::dvec3 centre{0};    ///< m; of a half space, a point of its surface
   glm::dvec3 normal{0};    ///< of a half space, of any length but 0
   glm::dvec3 rotation{0};  ///< degrees about x, then y, then z
@@ -48,11 +46,9 @@ struct Obstacle {
 /// The field of a height field, from rows as `heights`.
 void set_heights(Obstacle& obstacle, const std::vector<std::vector<double>>& rows);
 
-/// Whether it needs no more than a plane does.
-bool is_plane(const Obstacle& obstacle);
 bool moves(const Obstacle& obstacle);
 
-/// All that its motion and its touch depend on, beside the values of its field.
+/// All that its motion and contact with it depend on, beside the values of its field.
 std::vector<double> numbers_of(const Obstacle& obstacle);
 
 struct Pose {

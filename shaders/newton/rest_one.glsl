@@ -1,1 +1,0 @@
-float rest_$KIND(uint record) { return uintBitsToFloat(mesh[record + $ARITY]); }

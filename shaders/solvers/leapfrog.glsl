@@ -1,0 +1,26 @@
+// A vertex in a substep of mode explicit (method.md eq. 39).
+#include "vertex.glsl"
+
+Pair seen_by_neighbours(Pair x, Pair v) { return x; }
+// A substep before, for damping.
+Pair place_before(Pair x, Pair v) { return predict_position(x, Pair(-v.high, -v.low)); }
+
+// The force where the vertex is, then the displacement.
+Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
+  Pair start = Pair(own.high, own.low), v = Pair(speed.high, speed.low);
+  // From the middle of the last substep to the middle of this.
+  float time = (phases & PHASE_CHANGED) != 0u ? params.h * params.kick : params.h;
+  v = pair_add(pair_add(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
+  v = Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
+  Pair x = predict_position(start, v);
+  if (may_touch(x, length(params.h * v.high))) {
+    Pair free = x;
+    x = resolve_contacts(x, params.h * v.high);
+    v = pair_add(v, relative(x, free) * params.inverse_h);
+  }
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
+  velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+  note_unless_finite(i, x.high + x.low, v.high + v.low);
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(start, 0.0);
+  return x;
+}

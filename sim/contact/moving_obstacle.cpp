@@ -1,0 +1,116 @@
+#include "sim/contact/moving_obstacle.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+
+#include "sim/error.h"
+#include "sim/settings.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Numbers into planes and solids, in the order of the model's list. The ground's place among planes is kept
+// free, so that kernels stay the same where it comes and goes.
+struct Order {
+  std::vector<const Obstacle*> planes, solids;
+};
+Order order_obstacles(const Model& model) {
+  Order order;
+  for (const Obstacle& o : model.obstacles) {
+    const bool plain = o.kind->flat && !moves(o) && !o.friction && !o.restitution;
+    (plain && order.planes.size() + 1 < MAX_PLANES ? order.planes : order.solids).push_back(&o);
+  }
+  return order;
+}
+
+MovingObstacle plane_obstacle(const glm::dvec3& normal, double d, const Settings& settings) {
+  MovingObstacle o;
+  o.is_plane = true, o.plane = glm::dvec4(normal, d);
+  o.friction = settings.friction, o.restitution = settings.restitution;
+  o.reach = bound_reach({});
+  return o;
+}
+
+}  // namespace
+
+MovingObstacle::Surface MovingObstacle::find_surface(const glm::dvec3& x) const {
+  Surface surface = Formulas<double>{texels, kind->distance}.surface_of(
+      solid, glm::transpose(pose.axes) * (x - pose.centre));
+  surface.normal = pose.axes * surface.normal;
+  return surface;
+}
+
+MovingObstacle::Surface MovingObstacle::find_contact(const glm::dvec3& x, const glm::dvec3& way) const {
+  const glm::dmat3 back = glm::transpose(pose.axes);
+  const glm::dvec3 to = back * (x - pose.centre);
+  Surface surface = Formulas<double>{texels, kind->distance}.find_contact(solid, to - back * way, to);
+  surface.normal = pose.axes * surface.normal;
+  return surface;
+}
+
+MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double friction,
+                               double restitution) {
+  MovingObstacle moving;
+  moving.kind = o.kind, moving.solid = describe_solid(o), moving.reach = bound_reach(o);
+  if (o.field) moving.texels = o.field->values.data();
+  const Pose before = pose_at(o, start);
+  moving.pose = pose_at(o, start + h);
+  if (moves(o) && h > 0) {
+    moving.velocity = (moving.pose.centre - before.centre) / h;
+    const glm::dquat turn = glm::quat_cast(moving.pose.axes * glm::transpose(before.axes));
+    const glm::dvec3 axis(turn.x, turn.y, turn.z);
+    const double sine = glm::length(axis);
+    if (sine > 0) moving.spin = axis / sine * (2 * std::atan2(sine, turn.w) / h);
+  }
+  moving.friction = o.friction.value_or(friction), moving.restitution = o.restitution.value_or(restitution);
+  return moving;
+}
+
+std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start,
+                                         double h) {
+  const Order order = order_obstacles(model);
+  std::vector<MovingObstacle> list;
+  if (settings.ground) list.push_back(plane_obstacle({0, 1, 0}, settings.ground_height, settings));
+  for (const Obstacle* o : order.planes) {
+    const glm::dvec3 normal = glm::normalize(o->normal);
+    list.push_back(plane_obstacle(normal, glm::dot(normal, o->centre), settings));
+  }
+  for (const Obstacle* o : order.solids)
+    list.push_back(moving_obstacle(*o, start, h, settings.friction, settings.restitution));
+  return list;
+}
+
+ObstacleLists obstacles_over(const Model& model, const Settings& settings, double start, double h,
+                             int substeps) {
+  ObstacleLists lists;
+  for (int s = 0; s < (std::ranges::any_of(model.obstacles, moves) ? substeps : 1); ++s)
+    lists.push_back(obstacles_at(model, settings, start + s * h, h));
+  return lists;
+}
+
+std::vector<const Obstacle*> solid_obstacles(const Model& model) { return order_obstacles(model).solids; }
+
+bool has_obstacles(const Model& model, const Settings& settings) {
+  return settings.ground || !model.obstacles.empty();
+}
+
+void check_obstacles(const Model& model) {
+  constexpr std::size_t most = MAX_OBSTACLES - 1;
+  if (model.obstacles.size() > most)
+    throw Error("too many obstacles", fmt::format("{} of them", model.obstacles.size()),
+                fmt::format("at most {} beside the ground", most));
+}
+
+glm::dvec3 out_of_obstacles(const Model& model, const Settings& settings, double time, glm::dvec3 x) {
+  for (const MovingObstacle& o : obstacles_at(model, settings, time)) {
+    const auto surface = o.surface_at(x);
+    x -= surface.normal * std::min(0.0, surface.distance);
+  }
+  return x;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,140 @@
+#include "sim/contact/obstacles.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "sim/contact/moving_obstacle.h"
+#include "sim/error.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+namespace {
+
+// How far from its centre it is met by what it carries on `times` its displacement over h, |way - h (v + w x
+// arm)| <= |way| + h (|v| + |w| |arm|): |arm| (1 - times h |w|) <= radius + times h |v| + times |way|.
+glm::vec4 reach_block(const MovingObstacle& o, double h) {
+  constexpr double times = 4;
+  const double left = 1 - times * h * glm::length(o.spin), size = glm::length(o.pose.centre);
+  const double reach = 1.01 * (o.reach + times * h * glm::length(o.velocity)) / left + 1e-6 * size;
+  return {glm::vec3(o.pose.centre), left < 0.5 ? 1e18f : float(std::min(reach, 1e18))};  // squares are finite
+}
+
+ObstacleRecord record_block(const MovingObstacle& o, int first) {
+  const auto& s = o.solid;
+  ObstacleRecord block{};
+  split_pair(o.pose.centre, block.centre, block.centre_low);
+  block.right = glm::vec3(o.pose.axes[0]), block.up = glm::vec3(o.pose.axes[1]);
+  block.front = glm::vec3(o.pose.axes[2]);
+  block.kind = s.kind, block.convex = s.convex, block.first = first, block.cells = s.cells;
+  block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
+  block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
+  block.velocity = glm::vec3(o.velocity), block.spin = glm::vec3(o.spin);
+  block.friction = float(o.friction), block.restitution = float(o.restitution);
+  return block;
+}
+
+std::vector<std::shared_ptr<const DistanceField>> fields_of(const Model& model) {
+  std::vector<std::shared_ptr<const DistanceField>> fields;
+  for (const Obstacle* o : solid_obstacles(model)) fields.push_back(o->field);
+  return fields;
+}
+
+void make_fields(Obstacles& obstacles, const std::vector<float>& values) {
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
+  if (values.size() > std::size_t(most))
+    throw Error("the fields of obstacles are too large",
+                fmt::format("{} values, the driver allows {}", values.size(), most),
+                "give their meshes fewer voxels", 1);
+  obstacles.fields = Buffer("fields of obstacles", values);
+  obstacles.fields_texture = Texture("fields of obstacles", GL_TEXTURE_BUFFER);
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_R32F, obstacles.fields.id());
+  glBindTexture(GL_TEXTURE_BUFFER, 0);
+}
+
+}  // namespace
+
+std::vector<std::string> obstacle_defines(const Model& model) {
+  const auto solids = solid_obstacles(model);
+  std::set<std::pair<int, std::string>> kinds;
+  for (const Obstacle* o : solids) kinds.emplace(o->kind->number(), o->kind->function());
+  std::string rows;
+  for (const auto& [number, function] : kinds) rows += fmt::format(" ROW({}, {})", number, function);
+  const bool fields = std::ranges::any_of(solids, [](const Obstacle* o) { return bool(o->field); });
+  return {fmt::format("SOLIDS {}", solids.size()), fmt::format("FIELDS {:d}", fields),
+          "OBSTACLE_KINDS(ROW)" + rows};
+}
+
+bool share_kernels(const Model& model, const Model& other) {
+  return obstacle_defines(model) == obstacle_defines(other) && fields_of(model) == fields_of(other) &&
+         model.obstacles.empty() == other.obstacles.empty();
+}
+
+Obstacles make_obstacles(const Model& model) {
+  check_obstacles(model);
+  Obstacles obstacles;
+  const std::size_t count = solid_obstacles(model).size();
+  if (count == 0) return obstacles;
+  GLint alignment = 256;
+  glGetIntegerv(GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT, &alignment);
+  const std::size_t unit = std::size_t(alignment);
+  obstacles.bytes = count * (sizeof(glm::vec4) + sizeof(ObstacleRecord));
+  obstacles.stride = (obstacles.bytes + unit - 1) / unit * unit;
+  std::vector<float> values;
+  for (const auto& field : fields_of(model))
+    if (field) values.insert(values.end(), field->values.begin(), field->values.end());
+  if (!values.empty()) make_fields(obstacles, values);
+  return obstacles;
+}
+
+void write_planes(const Model& model, const Settings& settings, Step& block) {
+  for (const MovingObstacle& o : obstacles_at(model, settings, 0))
+    if (o.is_plane) block.planes[block.plane_count++] = glm::vec4(o.plane);
+}
+
+void write_obstacles(Sim& sim) {
+  Obstacles& obstacles = sim.obstacles;
+  if (obstacles.bytes == 0) return;
+  const int substeps = on_cpu(sim) ? 0 : sim.plan.substeps;
+  const double h = sim.plan.h;
+  const auto lists = obstacles_over(*sim.model, sim.settings, time_of(sim) - h, h, substeps + 1);
+  const auto fields = fields_of(*sim.model);
+  std::vector<char> bytes(lists.size() * obstacles.stride);
+  for (std::size_t l = 0; l < lists.size(); ++l) {
+    char* reaches = &bytes[l * obstacles.stride];
+    char* records = reaches + fields.size() * sizeof(glm::vec4);
+    int first = 0, k = 0;
+    for (const MovingObstacle& o : lists[l]) {
+      if (o.is_plane) continue;
+      const ObstacleRecord record = record_block(o, first);
+      const glm::vec4 reach = reach_block(o, h);
+      std::memcpy(reaches + std::size_t(k) * sizeof reach, &reach, sizeof reach);
+      std::memcpy(records + std::size_t(k) * sizeof record, &record, sizeof record);
+      if (const auto& field = fields[std::size_t(k++)]) first += int(field->values.size());
+    }
+  }
+  if (obstacles.records.bytes() == bytes.size())
+    obstacles.records.write(0, bytes.size(), bytes.data());
+  else
+    obstacles.records = Buffer("obstacles", bytes, GL_STREAM_DRAW);
+  obstacles.present = 0;
+}
+
+void bind_obstacles(const Obstacles& obstacles, int list) {
+  if (!obstacles.records) return;
+  const std::size_t last = obstacles.records.bytes() / obstacles.stride - 1;
+  glBindBufferRange(GL_UNIFORM_BUFFER, BIND_OBSTACLES, obstacles.records.id(),
+                    GLintptr(std::min(std::size_t(list), last) * obstacles.stride),
+                    GLsizeiptr(obstacles.bytes));
+  if (!obstacles.fields) return;
+  glActiveTexture(GL_TEXTURE0 + UNIT_FIELDS);
+  glBindTexture(GL_TEXTURE_BUFFER, obstacles.fields_texture.id());
+  glActiveTexture(GL_TEXTURE0);
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,40 @@
+// The obstacles of a simulation on the GPU: planes in the step's block, records of all others for each
+// substep, and the values of their fields. Kernels: shaders/contact/obstacles.glsl.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim/gl/gpu.h"
+#include "sim/layout.h"
+#include "sim/model.h"
+
+namespace tetpbd {
+
+struct Settings;
+struct Sim;
+
+struct Obstacles {
+  Buffer records;  ///< ObstacleRecord, and before them how far each is met: a list of the step's start, then
+                   ///< one of the end of each substep; a single list where nothing moves
+  Buffer fields;   ///< one after the other
+  Texture fields_texture;
+  std::size_t bytes = 0, stride = 0;  ///< of a list; from one to the next
+  int present = 0;                    ///< which list is of now
+};
+
+/// Definitions for kernels that include contact/obstacles.glsl: what these are made for.
+std::vector<std::string> obstacle_defines(const Model& model);
+/// Whether kernels and fields that are made for one model serve the other, which has other obstacles.
+bool share_kernels(const Model& model, const Model& other);
+/// Throws Error where there are too many, or their fields are too large.
+Obstacles make_obstacles(const Model& model);
+
+/// Those that are planes.
+void write_planes(const Model& model, const Settings& settings, Step& block);
+/// All others at and after the present.
+void write_obstacles(Sim& sim);
+/// A list of them for the next kernels; the last where there are fewer.
+void bind_obstacles(const Obstacles& obstacles, int list);
+
+}  // namespace tetpbd

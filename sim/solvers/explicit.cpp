@@ -1,0 +1,135 @@
+// Leapfrog on the GPU (method.md, "Explicit steps"): a substep is one dispatch, and there are as many as stay
+// stable. A body that deforms becomes stiffer than it is at rest, and a substep that was stable is too long
+// then: kernels note the stiffest constraint of a step, and the answer comes back some steps later, always as
+// many, so that a run is the same every time.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "sim/error.h"
+#include "sim/material.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/sim.h"
+#include "sim/solvers/node.h"
+
+namespace tetpbd {
+
+double stiffening_for(double stiffer, double stability) {
+  // The bound moves with the largest eigenvalue but not exactly, and the body goes on deforming until the
+  // answer comes.
+  constexpr double safe = 0.7, most = 32;
+  const double needed = std::sqrt(stiffer) * stability / std::max(safe, stability);
+  if (!(needed > 1)) return 1;
+  return std::min(most, std::exp2(std::ceil(4 * std::log2(needed)) / 4));
+}
+
+double explicit_substeps(const Model& model, const Settings& s) {
+  const ConstraintSystem system = build_constraints(model.rest, s);
+  const ReferenceInput input{model, system, s, model.inverse_masses};
+  const double longest = stable_step(input, s.compliance, model.rest.positions, 12);
+  return std::max(1.0, std::ceil(s.dt / (s.stability * longest)));
+}
+
+namespace {
+
+ReferenceInput reference_input(const Sim& sim) {
+  return {*sim.model, sim.system, sim.settings, sim.inverse_masses};
+}
+
+// As kernels note it (project.glsl).
+double stiffest(const Sim& sim, const std::vector<glm::dvec3>& positions) {
+  return stiffest_constraint(reference_input(sim), sim.settings.compliance, positions);
+}
+
+// As many substeps as are asked for, or as stay stable, `stiffening` times as short as at rest.
+Plan make_plan(const Settings& settings, double longest, double stiffening) {
+  const double at_rest = longest > 0 ? settings.dt / (settings.stability * longest) : 0;
+  constexpr double most = 100000;
+  const double wanted = at_rest > most ? at_rest : std::min(at_rest * stiffening, most);
+  if (wanted > most)
+    throw Error("the body is too stiff for mode explicit",
+                fmt::format("a step takes {:.3g} substeps", wanted),
+                fmt::format("at most {:g}: use another mode, a softer material or a shorter dt", most));
+  Plan plan = plan_for(settings);
+  plan.substeps = std::max(plan.substeps, int(std::ceil(wanted)));
+  plan.h = settings.dt / plan.substeps;
+  return plan;
+}
+
+// Other accelerations come in by halves where the length of a substep changes (PHASE_CHANGED).
+void set_stiffening(Sim& sim, double stiffening) {
+  const int before = sim.plan.substeps;
+  sim.watch.stiffening = stiffening;
+  sim.plan = make_plan(sim.settings, sim.longest_substep, stiffening);
+  if (sim.plan.substeps == before) return;
+  sim.watch.changed = true;
+  write_step_block(sim, before);
+}
+
+void watch_stiffness(Sim& sim) {
+  Watch& w = sim.watch;
+  const auto answer = read_watch(sim);
+  const double asked_h = std::exchange(w.asked_h, sim.plan.h);
+  if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front()))
+    return;  // 0: nothing was noted yet
+  const double stiffer = answer->front() / (asked_h * asked_h * w.at_rest);
+  const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next answer, if it goes on so
+  w.stiffer = stiffer;
+  const double needed = stiffening_for(next, sim.settings.stability);
+  // Up at once; down a quarter at a time, as bodies swing.
+  w.calm = needed < w.stiffening ? w.calm + 1 : 0;
+  if (needed > w.stiffening) set_stiffening(sim, needed);
+  if (w.calm == 16) w.calm = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
+}
+
+void start(Sim& sim, const State& state) {
+  Watch& w = sim.watch;
+  w = WatchNumbers{.at_rest = w.at_rest};
+  if (w.at_rest > 0) {
+    const double now = stiffest(sim, state.positions) / w.at_rest;
+    w.stiffer = std::isfinite(now) ? now : 1;
+    w.stiffening = stiffening_for(w.stiffer, sim.settings.stability);
+  }
+  sim.plan = make_plan(sim.settings, sim.longest_substep, w.stiffening);
+}
+
+void retune(Sim& sim, const Settings* before) {
+  const bool same = before && before->compliance == sim.settings.compliance &&
+                    before->constraint_damping == sim.settings.constraint_damping;
+  const double longest =
+      same ? sim.longest_substep
+           : stable_step(reference_input(sim), sim.settings.compliance, sim.model->rest.positions, 30);
+  sim.plan = make_plan(sim.settings, longest, sim.watch.stiffening);
+  if (!same) sim.watch.at_rest = stiffest(sim, sim.model->rest.positions);
+  sim.longest_substep = longest;
+}
+
+}  // namespace
+
+Solver create_explicit_solver(const SolverInput& input) {
+  Solver solver;
+  const auto pass =
+      std::make_shared<Pass>(make_vertex_patch_pass(solver, input, "solvers/explicit.comp", false));
+  add_prediction(solver, input);
+  solver.watches = true;
+  solver.start = start;
+  solver.retune = retune;
+  solver.prepare = [](Sim& sim) {
+    Watch& w = sim.watch;
+    if (!w.answer) return;
+    if (sim.steps % Watch::every == 0 && w.at_rest > 0) watch_stiffness(sim);
+    w.most_substeps = std::max(w.most_substeps, sim.plan.substeps);
+  };
+  solver.substep = [pass](Sim& sim, int substep) {
+    unsigned phases = PHASE_PREDICT | PHASE_SOLVE | PHASE_FINISH | sim.pairs.phases;
+    if (substep == 0 && sim.watch.answer)
+      phases |= PHASE_WATCH | (std::exchange(sim.watch.changed, false) ? PHASE_CHANGED : 0u);
+    const std::size_t velocities = 2 * sim.model->positions.size() * sizeof(Velocity);
+    run_kernel(sim, *pass, phases, "", velocities);
+    turn_quantized(sim);
+  };
+  return solver;
+}
+
+}  // namespace tetpbd

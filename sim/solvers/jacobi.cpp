@@ -1,0 +1,116 @@
+#include "sim/solvers/jacobi.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "sim/pairs.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+namespace {
+
+std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
+
+// What it wrote is read from then on.
+void move_vertices(Sim& sim, Pass& pass, unsigned phases) {
+  const bool predicts = phases & PHASE_PREDICT, finishes = phases & PHASE_FINISH;
+  // Velocities and predicted positions, there or back.
+  const std::size_t bytes = sim.model->positions.size() * sizeof(Velocity) *
+                            (predicts && finishes   ? 2
+                             : predicts || finishes ? 3
+                                                    : 0);
+  run_kernel(sim, pass, phases | (predicts ? sim.pairs.phases : 0),
+             predicts && finishes ? ", predict, finish"
+             : predicts           ? ", predict"
+             : finishes           ? ", finish"
+                                  : "",
+             bytes);
+  turn_quantized(sim);
+}
+
+// Prediction and velocities ride on the first and last iteration, but where the mode has them apart.
+void take_substep(Sim& sim, JacobiPasses& jacobi) {
+  const int iterations = sim.plan.iterations;
+  const bool apart = jacobi.unfused || iterations == 0;
+  Pass& last = jacobi.passes.back();
+  if (apart) move_vertices(sim, last, PHASE_PREDICT);
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    unsigned phases = PHASE_SOLVE;
+    if (!apart && iteration == 0) phases |= PHASE_PREDICT;
+    if (!apart && iteration + 1 == iterations) phases |= PHASE_FINISH;
+    for (std::size_t pass = 0; pass + 1 < jacobi.passes.size(); ++pass)
+      run_kernel(sim, jacobi.passes[pass], phases);
+    move_vertices(sim, last, phases);
+  }
+  if (apart) move_vertices(sim, last, PHASE_FINISH);
+}
+
+}  // namespace
+
+void add_jacobi(Solver& solver, const SolverInput& input, JacobiPasses passes) {
+  solver.keeps_prediction = true;
+  add_prediction(solver, input);
+  solver.substep = [jacobi = std::make_shared<JacobiPasses>(std::move(passes))](Sim& sim, int) {
+    take_substep(sim, *jacobi);
+  };
+}
+
+void add_prediction(Solver& solver, const SolverInput& input) {
+  constexpr unsigned group = 256;
+  const std::size_t count = input.model.positions.size();
+  const auto pass =
+      std::make_shared<Pass>(Program::compute("predict.comp", scheme_words(input), vertex_defines(input)),
+                             work_groups(count, group), count * (sizeof(Position) + sizeof(Velocity) + 16));
+  solver.predict = [pass](Sim& sim) {
+    sim.recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
+    run_kernel(sim, *pass);
+    give_quantized(sim);
+  };
+}
+
+Pass make_patch_pass(Solver& solver, const SolverInput& input, const Patches& patches, const char* shader,
+                     unsigned group, bool multipliers) {
+  const std::size_t chunk_bytes = patches.chunks.size() * 4, vertex_bytes = patches.vertices.size() * 8,
+                    record_bytes = patches.records.size() * 8;
+  check_storage(input.tuning, "patches", chunk_bytes + vertex_bytes + record_bytes);
+  Buffer words("patches", chunk_bytes + vertex_bytes + record_bytes);
+  words.write(0, chunk_bytes, patches.chunks.data());
+  words.write(chunk_bytes, vertex_bytes, patches.vertices.data());
+  words.write(chunk_bytes + vertex_bytes, record_bytes, patches.records.data());
+  std::size_t bytes = words.bytes() + 16 * patches.vertices.size();  // and quantized positions
+  add_buffer(solver, input.tuning, "Patches", std::move(words));
+  if (input.compliant && multipliers) {
+    add_buffer(solver, input.tuning, "Multipliers",
+               Buffer("multipliers", std::vector<float>(patches.records.size())));
+    bytes += 2 * 4 * patches.records.size();  // read and written
+  }
+  const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
+                    vertices = std::max<std::size_t>(patches.largest, 1);
+  std::vector<std::string> defines = vertex_defines(input);
+  defines.insert(defines.end(),
+                 {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
+                  define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
+                  define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8), define("MAX_VERTICES", vertices),
+                  define("MAX_OWNED", owned), define("CHUNKED", patches.chunked),
+                  define("COUNT_GUARDS", input.tuning.count_guards)});
+  const std::size_t most_blocks = contacts_lag(input.model, input.settings) ? 10 : 8;
+  return {Program::compute(shader, {{}, kind_words(input.system)}, defines, most_blocks), patches.count,
+          bytes};
+}
+
+Pass make_average_pass(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {
+  const std::size_t vertices = input.model.positions.size();
+  // Itself, its sum there and back, what neighbours see of it.
+  const std::size_t bytes = vertices * (2 * sizeof(Position) + 3 * 16);
+  std::vector<std::string> defines = vertex_defines(input);
+  defines.insert(defines.end(), {define("GROUP_SIZE", group), define("FLOAT_SUMS", float_sums)});
+  Buffer sums("correction sums", vertices * 16);
+  sums.clear();
+  add_buffer(solver, input.tuning, "Sums", std::move(sums));
+  return {Program::compute("average.comp", {}, defines), work_groups(vertices, group), bytes};
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,189 @@
+#include "sim/solvers/newton_buffers.h"
+
+#include "sim/contact/obstacles.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+
+namespace tetpbd {
+
+namespace {
+
+// Enough to carry what 3x3 blocks alone do not in a few iterations, and few enough to invert.
+std::size_t choose_aggregates(std::size_t vertices) {
+  return std::size_t(std::clamp(1.3 * std::sqrt(double(vertices)), 1.0, double(most_aggregates)));
+}
+
+}  // namespace
+
+NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system) {
+  const std::size_t vertices = model.positions.size();
+  NewtonLevels levels{build_newton_graph(system, vertices), {}, {}};
+  levels.aggregates = make_aggregates(model, levels.graph.neighbours, choose_aggregates(vertices));
+  for (const Body& body : model.bodies) {
+    const auto begin = model.inverse_masses.begin() + std::ptrdiff_t(body.first_vertex);
+    if (std::all_of(begin, begin + std::ptrdiff_t(body.vertices), [](double w) { return w != 0; }))
+      levels.free_bodies.push_back(
+          {std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices)});
+  }
+  return levels;
+}
+
+NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels) {
+  const std::size_t group =
+      std::max<std::size_t>(tuned({0, 128}, input.tuning).group, NewtonSizes::row_lanes);
+  const std::size_t rows = group / NewtonSizes::lanes, vertices = input.model.positions.size();
+  std::size_t largest = 0, tets = 0;
+  for (const auto& [first, end] : levels.free_bodies) largest = std::max<std::size_t>(largest, end - first);
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (constraint_kinds[k].tet) tets = std::max(tets, input.system.lists[k].count());
+  return {.vertices = vertices,
+          .edges = levels.graph.edges(),
+          .uses = levels.graph.uses.size(),
+          .members = levels.aggregates.members.values.size(),
+          .aggregates = levels.aggregates.all.size(),
+          .free_bodies = levels.free_bodies.size(),
+          .group = group,
+          .product_groups = (vertices + rows - 1) / rows,
+          .parts = std::clamp<std::size_t>(largest / 256, 1, 32),
+          .tets = tets};
+}
+
+std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverInput& input) {
+  std::vector<std::string> defines = obstacle_defines(input.model);
+  for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"GROUP_SIZE", sizes.group},
+                                    {"LANES", sizes.lanes},
+                                    {"ROW_LANES", sizes.row_lanes},
+                                    {"VERTICES", sizes.vertices},
+                                    {"EDGES", sizes.edges},
+                                    {"USES", sizes.uses},
+                                    {"TETS", sizes.tets},
+                                    {"AGGREGATES", sizes.aggregates},
+                                    {"MEMBERS", sizes.members},
+                                    {"PRODUCT_GROUPS", sizes.product_groups},
+                                    {"FREE_BODIES", sizes.free_bodies},
+                                    {"PARTS", sizes.parts},
+                                    {"COARSE_ROW", sizes.coarse_row()}})
+    defines.push_back(fmt::format("{} {}u", name, value));
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (input.system.present[k])
+      defines.push_back(fmt::format("COUNT_{} {}u", constraint_kinds[k].name, input.system.lists[k].count()));
+  return defines;
+}
+
+NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system) {
+  NewtonBuffers to;
+  for (Range<glm::vec4>& slot : to.slots) slot = to.vectors.add<glm::vec4>("vectors", sizes.vertices);
+
+  to.first_use = to.mesh.add<std::uint32_t>("first_use", sizes.edges + 1);
+  to.uses = to.mesh.add<std::uint32_t>("uses", sizes.uses);
+  to.first_neighbour = to.mesh.add<std::uint32_t>("first_neighbour", sizes.vertices + 1);
+  to.neighbours = to.mesh.add<glm::uvec2>("neighbours", 2 * sizes.edges);
+  to.shares = to.mesh.add<glm::uvec4>("shares", sizes.vertices);
+  to.first_member = to.mesh.add<std::uint32_t>("first_member", sizes.aggregates + 1);
+  to.members = to.mesh.add<glm::uvec2>("members", sizes.members);
+  to.free_bodies = to.mesh.add<newton::FreeBody>("free_bodies", sizes.free_bodies);
+  const auto add_by_kind = [&](const char* what, auto&& add) {
+    for (std::size_t k = 0; k < kind_count; ++k)
+      if (system.present[k])
+        add(fmt::format("{}_{}", what, constraint_kinds[k].name), system.lists[k], to.constraints[k]);
+  };
+  using List = const ConstraintList&;
+  add_by_kind("vertices", [&](const std::string& name, List list, auto& of_kind) {
+    const std::size_t at = list.arity == 2 ? to.mesh.add<glm::uvec2>(name, list.count()).at
+                                           : to.mesh.add<glm::uvec4>(name, list.count()).at;
+    of_kind.vertices = {at, list.vertices.size()};
+  });
+  add_by_kind("values", [&](const std::string& name, List list, auto& of_kind) {
+    of_kind.values = to.mesh.add<float>(name, list.rest.size());
+  });
+  add_by_kind("compliances", [&](const std::string& name, List list, auto& of_kind) {
+    of_kind.compliances = to.mesh.add<float>(name, list.compliance.size());
+  });
+
+  to.centres = to.coarse.add<glm::vec4>("centres", sizes.aggregates);
+  to.coarse_inverse = to.coarse.add<glm::vec4>("coarse_inverse", sizes.unknowns() * sizes.coarse_row());
+
+  to.rotations = to.sums.add<glm::vec4>("rotations", sizes.aggregates);
+  to.sums.add<newton::BodyMotion>("motions", sizes.free_bodies);
+  to.sums.add<newton::MomentumSums>("momentum_sums", sizes.free_bodies * sizes.parts);
+  to.sums.add<glm::vec2>("group_dots", sizes.product_groups);
+  to.sums.add<glm::vec2>("dots");
+  to.sums.add<newton::Iteration>("iterations", 2);
+  to.sums.add<float>("coarse_r", 4 * sizes.coarse_row());
+  to.sums.add<float>("coarse_q", sizes.unknowns());
+  to.sums.add<float>("coarse_y", sizes.unknowns());
+  to.sums.add<float>("is_free", sizes.aggregates);
+  to.sums.add<float>("first_rz");
+  to.sums.add<std::uint32_t>("bad_starts", 3);
+  to.sums.add<std::uint32_t>("products_done");
+  to.sums.add<std::uint32_t>("parts_done", sizes.free_bodies);
+  return to;
+}
+
+std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels,
+                                           const NewtonBuffers& layout) {
+  std::vector<glm::vec4> vectors(layout.vectors.bytes / sizeof(glm::vec4), glm::vec4(0)), rest;
+  for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
+  std::uint32_t number = 0;
+  for (const auto& [first, end] : levels.free_bodies) {
+    ++number;
+    for (std::uint32_t v = first; v < end; ++v) rest[v].w = std::bit_cast<float>(number);
+  }
+  put(std::as_writable_bytes(std::span(vectors)), layout.slots[newton::REST], rest);
+  return vectors;
+}
+
+std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
+                                        const NewtonBuffers& layout) {
+  const auto& [graph, aggregates, free_bodies] = levels;
+  std::vector<std::uint32_t> uses;
+  std::vector<glm::uvec2> neighbours;
+  std::vector<glm::uvec4> shares;
+  std::vector<glm::uvec2> members;
+  for (const NewtonGraph::Use& use : graph.uses) uses.push_back(use.packed);
+  for (std::size_t n = 0; n < graph.edge_of.size(); ++n)
+    neighbours.push_back({graph.edge_of[n], graph.neighbours.values[n]});
+  for (const auto& of_vertex : aggregates.of_vertex) {
+    shares.emplace_back();
+    for (glm::length_t k = 0; k < 4; ++k)
+      shares.back()[k] = PACKED_SHARE(of_vertex[std::size_t(k)].aggregate, of_vertex[std::size_t(k)].weight);
+  }
+  for (const std::uint32_t m : aggregates.members.values)
+    members.push_back({m / 4, aggregates.of_vertex[m / 4][m % 4].weight});
+  std::vector<std::byte> contents(layout.mesh.bytes);
+  put(contents, layout.first_use, graph.first_use);
+  put(contents, layout.uses, uses);
+  put(contents, layout.first_neighbour, graph.neighbours.first);
+  put(contents, layout.neighbours, neighbours);
+  put(contents, layout.shares, shares);
+  put(contents, layout.first_member, aggregates.members.first);
+  put(contents, layout.members, members);
+  put(contents, layout.free_bodies, free_bodies);
+  for (std::size_t k = 0; k < kind_count; ++k) {
+    put(contents, layout.constraints[k].vertices, system.lists[k].vertices);
+    put(contents, layout.constraints[k].values, to_floats(system.lists[k].rest));
+    put(contents, layout.constraints[k].compliances, to_floats(system.lists[k].compliance));
+  }
+  return contents;
+}
+
+std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const NewtonLevels& levels,
+                                          const NewtonBuffers& layout) {
+  const double h = input.plan.h * 2 / 3;  // BDF2's
+  std::vector<double> inertia;
+  for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
+  const std::vector<glm::dmat3> blocks = compute_blocks_at_rest(input, levels.graph, h);
+  const std::vector<float> inverse =
+      coarse_inverse(input.model, levels.aggregates, {levels.graph.neighbours, inertia, blocks});
+  std::vector<glm::vec4> contents(layout.coarse.bytes / sizeof(glm::vec4), glm::vec4(0)), centres;
+  for (const Aggregate& a : levels.aggregates.all) centres.emplace_back(glm::vec3(a.centre), float(a.reach));
+  put(std::as_writable_bytes(std::span(contents)), layout.centres, centres);
+  put(std::as_writable_bytes(std::span(contents)), Range<float>{layout.coarse_inverse.at, inverse.size()},
+      inverse);
+  return contents;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,67 @@
+// The buffers of mode newton (newton/newton.glsl): how many of what is in them, where it lies, and what it is
+// at the start.
+#pragma once
+
+#include <array>
+
+#include "sim/buffer_layout.h"
+#include "sim/solvers/aggregates.h"
+#include "sim/solvers/newton_graph.h"
+
+namespace tetpbd {
+
+template <>
+inline constexpr std::size_t std430_alignment<newton::BodyMotion> = 16;
+template <>
+inline constexpr std::size_t std430_alignment<newton::MomentumSums> = 16;
+
+/// What stays when forces or the length of a substep change.
+struct NewtonLevels {
+  NewtonGraph graph;
+  Aggregates aggregates;
+  std::vector<newton::FreeBody> free_bodies;  ///< those that nothing holds
+};
+NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system);
+
+/// Sizes of work-groups and of what kernels work on.
+struct NewtonSizes {
+  std::size_t vertices, edges, uses, members, aggregates, free_bodies;
+  std::size_t group;           ///< invocations of a work-group
+  std::size_t product_groups;  ///< work-groups of a product with the matrix
+  std::size_t parts;           ///< work-groups that add up a free body's momentum
+  std::size_t tets;            ///< of the kind that has most, which Newton's start is checked for
+  std::size_t unknowns() const { return 6 * aggregates; }
+  std::size_t coarse_row() const { return (unknowns() + 3) / 4; }  ///< vec4s of a row of the coarse matrix
+  static constexpr std::size_t lanes = 4;                          ///< invocations for a row of the matrix
+  static constexpr std::size_t row_lanes = 32;                     ///< and for one of the coarse matrix
+};
+NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels);
+std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverInput& input);
+
+struct NewtonBuffers {
+  BufferLayout vectors, mesh, coarse, sums;
+  std::array<Range<glm::vec4>, newton::SLOTS> slots;  ///< of vectors
+  Range<std::uint32_t> first_use, uses, first_neighbour, first_member;
+  Range<glm::uvec2> neighbours, members;
+  Range<glm::uvec4> shares;
+  Range<newton::FreeBody> free_bodies;
+  struct Constraints {
+    Range<std::uint32_t> vertices;
+    Range<float> values, compliances;
+  };
+  std::array<Constraints, kind_count> constraints;
+  Range<glm::vec4> centres, coarse_inverse;
+  Range<glm::vec4> rotations;
+};
+NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system);
+
+/// The contents of `vectors`, at rest.
+std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels,
+                                           const NewtonBuffers& layout);
+std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
+                                        const NewtonBuffers& layout);
+/// The contents of `coarse`.
+std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const NewtonLevels& levels,
+                                          const NewtonBuffers& layout);
+
+}  // namespace tetpbd

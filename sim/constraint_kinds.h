@@ -1,5 +1,5 @@
 // The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and
-// a row here, named in the list at the end; its stiffness k_NAME and compliance compliance_NAME (unless it is
+// a row here; its stiffness k_NAME and compliance compliance_NAME (unless it is
 // a material's), its kernels and its CPU loops follow. Order is the order of projection in Gauss-Seidel.
 #pragma once
 
@@ -36,6 +36,16 @@ struct ConstraintKind {
   constexpr bool of_material() const { return most_compliance == 0; }
 };
 
+/// The kinds by number, in the order of their rows.
+template <int>
+struct KindAt;
+constexpr int first_kind = __COUNTER__ + 1;
+#define ADD_KIND(Kind)                      \
+  template <>                               \
+  struct KindAt<__COUNTER__ - first_kind> { \
+    using type = Kind;                      \
+  };
+
 // A row: what it is called, its formula, the vertices of each, and what these measure at rest.
 struct Stretch {
   static constexpr ConstraintKind row{.name = "stretch",
@@ -51,6 +61,7 @@ struct Stretch {
   static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
+ADD_KIND(Stretch)
 struct Bend {
   static constexpr ConstraintKind row{"bend", 4, "hinges", "rad^2/J", 1e4};
   template <class real, class Math = glsl::LibraryMath>
@@ -61,6 +72,7 @@ struct Bend {
   // The clamp of the formula to 1 rad is for errors, not for rest angles.
   static double rest(glm::dvec3* x) { return Formulas<double>{}.hinge_angle(x); }
 };
+ADD_KIND(Bend)
 struct Volume {
   static constexpr ConstraintKind row{.name = "volume",
                                       .arity = 4,
@@ -75,6 +87,7 @@ struct Volume {
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
+ADD_KIND(Volume)
 struct NeoHookean {
   static constexpr ConstraintKind row{.name = "neo_hookean",
                                       .arity = 4,
@@ -92,6 +105,7 @@ struct NeoHookean {
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then
 };
+ADD_KIND(NeoHookean)
 struct Dashpot {
   static constexpr ConstraintKind row{.name = "dashpot",
                                       .arity = 2,
@@ -106,6 +120,7 @@ struct Dashpot {
   static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
+ADD_KIND(Dashpot)
 struct Isobend {
   static constexpr ConstraintKind row{.name = "isobend",
                                       .arity = 4,
@@ -120,10 +135,12 @@ struct Isobend {
   static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
   static std::array<double, 4> rest(glm::dvec3* x);
 };
+ADD_KIND(Isobend)
 // The next row goes here.
 
-using Kinds = std::tuple<Stretch, Bend, Volume, NeoHookean, Dashpot, Isobend  // and its name here
-                         >;
+template <int... I>
+std::tuple<typename KindAt<I>::type...> list_kinds(std::integer_sequence<int, I...>);
+using Kinds = decltype(list_kinds(std::make_integer_sequence<int, __COUNTER__ - first_kind>()));
 
 /// A constraint's rest values as its formula takes them: a number, or where there are several.
 template <class Kind, class real>

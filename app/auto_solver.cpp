@@ -68,7 +68,7 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
     const MeasuredRun run =
         run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
     if (interrupted()) throw Interrupted();
-    const double substeps = sim.plan.substeps * budget_ms / step_ms(run);
+    const double substeps = plan_for(settings).substeps * budget_ms / step_ms(run);
     settings.substeps = int(std::clamp(substeps, 1.0, double(most_substeps)));
     apply_settings(sim, settings);
   }

@@ -60,8 +60,10 @@ void keep_checkpoint(Sim& sim) {
 void restore_pins(Sim& sim) {
   const auto positions = sim.positions.read_all<Position>();
   for (std::uint32_t i = 0; i < positions.size(); ++i)
-    if (positions[i].inverse_mass != float(sim.inverse_masses[i]))
-      is_pinned(sim, i) ? pin(sim, i) : unpin(sim, i);
+    if (is_pinned(sim, i) && sim.model->inverse_masses[i] > 0)
+      pin(sim, i);
+    else if (positions[i].inverse_mass != float(sim.inverse_masses[i]))
+      unpin(sim, i);
 }
 
 void take_answer(FiniteCheck& check, bool wait) {

@@ -168,7 +168,8 @@ void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Mode
       model, settings, sim.tuning,
       same_constraints(settings, sim.settings) ? sim.system : build_constraints(sim.model->rest, settings));
   fresh.inverse_masses = sim.inverse_masses;
-  fresh.steps = sim.steps, fresh.origin = sim.origin;
+  fresh.steps = sim.steps;
+  fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, time_of(sim)};
   fresh.timed = sim.timed;
   start_with(fresh, std::move(state), half_substep_fall(sim.settings, sim.plan));
   sim = std::move(fresh);
@@ -305,8 +306,7 @@ void start_with(Sim& sim, State state, double fall) {
 }
 
 void write_state(Sim& sim, const State& state) {
-  start_from(sim, state);
-  adopt(sim, state);
+  start_with(sim, state, half_substep_fall(sim.settings, sim.plan));
 }
 
 Carried carried(Sim& sim) {
@@ -335,13 +335,15 @@ namespace {
 
 // The kernels stay. Throws where the solver cannot take the settings.
 void take_settings(Sim& sim, const Settings& settings) {
+  const TimeOrigin origin = sim.origin;
+  if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, time_of(sim)};
   const Settings before = std::exchange(sim.settings, settings);
   const double fall = half_substep_fall(before, sim.plan);
   const Plan plan = std::exchange(sim.plan, plan_for(settings));
   try {
     sim.solver.retune(sim, &before);
   } catch (...) {
-    sim.settings = before, sim.plan = plan;
+    sim.settings = before, sim.plan = plan, sim.origin = origin;
     throw;
   }
   forget_answers(sim);
@@ -356,17 +358,10 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const auto made_for = [&](const Settings& s) {
     return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s), s.contact);
   };
-  const TimeOrigin origin = sim.origin;
-  if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, time_of(sim)};
-  try {
-    if (made_for(settings) == made_for(sim.settings) && take_constraints(sim, settings))
-      take_settings(sim, settings);
-    else
-      remake(sim, settings, sim.model);
-  } catch (...) {
-    sim.origin = origin;
-    throw;
-  }
+  if (made_for(settings) == made_for(sim.settings) && take_constraints(sim, settings))
+    take_settings(sim, settings);
+  else
+    remake(sim, settings, sim.model);
 }
 
 void rebuild_shaders(Sim& sim) { remake(sim, sim.settings, sim.model); }

@@ -72,7 +72,9 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   if (then.settings == sim.settings) return restore_all(sim, then, from);
   State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
   forget_all(sim);
-  sim.steps = then.step.steps, sim.origin = then.step.origin;
+  const auto& [step, time] = then.step.origin;
+  sim.steps = then.step.steps;
+  sim.origin = {sim.steps, time + double(sim.steps - step) * then.settings.dt};
   start_with(sim, std::move(state), half_substep_fall(then.settings, then.plan));
 }
 

@@ -70,7 +70,7 @@ TEST_CASE("snapshot: with other settings the state goes on with those") {
   const Kept kept = keep(sim);
   const State then = read_state(sim);
   for (const std::string words :
-       {"mode=cpu-double", "mode=constraint", "substeps=1", "gravity=0", "mode=node"}) {
+       {"mode=cpu-double", "mode=constraint", "substeps=1", "gravity=0", "mode=node", "dt=0.01"}) {
     CAPTURE(words);
     Settings other = sim.settings;
     const std::size_t equals = words.find('=');
@@ -79,6 +79,7 @@ TEST_CASE("snapshot: with other settings the state goes on with those") {
     step(sim);
     const Kept again = keep(sim);  // also of the other mode
     for (const Kept* of : {&kept, &again, &kept}) restore_snapshot(sim, of->snapshot, of->buffer);
+    CHECK(time_of(sim) == doctest::Approx(20 * settings.dt));
     const State now = read_state(sim);
     const double h = 0.5 * other.dt / other.substeps * other.gravity;  // mid-substep
     const double upwards = h - 0.5 * plan_for(settings).h * settings.gravity;

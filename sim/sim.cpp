@@ -148,7 +148,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 }
 
 // The constraints of other settings, if the solver needs only be told their numbers.
-bool take_constraints(Sim& sim, const Settings& settings) {
+bool adopt_constraints(Sim& sim, const Settings& settings) {
   if (same_constraints(settings, sim.settings)) return true;
   if (!sim.solver.takes_constraints) return false;
   ConstraintSystem system = build_constraints(sim.model->rest, settings);
@@ -334,7 +334,7 @@ void upload(Sim& sim, const State& state) {
 namespace {
 
 // The kernels stay. Throws where the solver cannot take the settings.
-void take_settings(Sim& sim, const Settings& settings) {
+void adopt_settings(Sim& sim, const Settings& settings) {
   const TimeOrigin origin = sim.origin;
   if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, time_of(sim)};
   const Settings before = std::exchange(sim.settings, settings);
@@ -358,8 +358,8 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const auto made_for = [&](const Settings& s) {
     return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s), s.contact);
   };
-  if (made_for(settings) == made_for(sim.settings) && take_constraints(sim, settings))
-    take_settings(sim, settings);
+  if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))
+    adopt_settings(sim, settings);
   else
     remake(sim, settings, sim.model);
 }

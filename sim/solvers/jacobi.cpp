@@ -32,7 +32,7 @@ void move_vertices(Sim& sim, Pass& pass, unsigned phases) {
 }
 
 // Prediction and velocities ride on the first and last iteration, but where the mode has them apart.
-void take_substep(Sim& sim, JacobiPasses& jacobi) {
+void run_substep(Sim& sim, JacobiPasses& jacobi) {
   const int iterations = sim.plan.iterations;
   const bool apart = jacobi.unfused || iterations == 0;
   Pass& last = jacobi.passes.back();
@@ -54,7 +54,7 @@ void add_jacobi(Solver& solver, const SolverInput& input, JacobiPasses passes) {
   solver.keeps_prediction = true;
   add_prediction(solver, input);
   solver.substep = [jacobi = std::make_shared<JacobiPasses>(std::move(passes))](Sim& sim, int) {
-    take_substep(sim, *jacobi);
+    run_substep(sim, *jacobi);
   };
 }
 

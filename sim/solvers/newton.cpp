@@ -58,7 +58,7 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   return n;
 }
 
-void take_substep(Sim& sim, Newton& n) {
+void run_substep(Sim& sim, Newton& n) {
   const unsigned iterations = unsigned(sim.plan.iterations);
   run_kernel(sim, n.predict), run_kernel(sim, n.start);
   run_kernel(sim, n.linearise), run_kernel(sim, n.residual);
@@ -207,7 +207,7 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.start = [made](Sim& sim, const State& state) { start(sim, *made, state); };
   solver.predict = [made](Sim& sim) { run_kernel(sim, made->begin); };
   solver.prepare = [made](Sim& sim) { prepare(sim, *made); };
-  solver.substep = [made](Sim& sim, int) { take_substep(sim, *made); };
+  solver.substep = [made](Sim& sim, int) { run_substep(sim, *made); };
   solver.retune = [made](Sim& sim, const Settings* before) { retune(sim, *made, before); };
   solver.refresh = [made](Sim& sim) { refresh(sim, *made); };
   solver.carried = [made](Sim& sim, Carried& all) {

@@ -79,7 +79,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
 /// Newton steps with sparse Cholesky factors, `iterations` of them in each implicit step.
 MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
   const Plan plan = plan_for(settings);
-  const ConstraintSystem system = build_constraints(model.rest, settings);
+  const ConstraintSystem system = build_constraints(model, settings);
   const ReferenceInput input{model, system, settings, model.inverse_masses};
   Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities}, plan.h);
   run.most = plan.iterations;

@@ -67,12 +67,12 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
   };
   std::vector<glm::vec3> moved = rows_of(model, model.rest.positions);
   std::ranges::transform(positions, moved, moved.begin(), std::minus{});
-  const glm::vec4 material = energy_material(sim.settings);
   std::array<std::vector<float>, 3> values;
   std::vector<std::uint32_t> ends;
   for (std::size_t t = 0; t < tets; ++t) {
     const auto [a, b, c, d] = model.rest.tets[t];
     const auto& x = state.positions;
+    const glm::vec4 material = energy_material(body_material(body_at(model, a), sim.settings));
     const TetValues now = tet_values(model, t, {x[a], x[b], x[c], x[d]}, material);
     values[0].push_back(now.volume), values[1].push_back(now.strain), values[2].push_back(now.energy);
     ends.push_back(std::uint32_t(4 * (t + 1)));
@@ -103,7 +103,7 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
   text += array("Float32", "velocity", rows_of(model, state.velocities));
   text += array("Int32", "body", body_numbers(model)) + "</PointData>\n<CellData>\n";
   text += array("Float32", "volume_error", values[0]) + array("Float32", "strain", values[1]);
-  if (material.z > 0) text += array("Float32", "energy_density", values[2]);
+  if (any_material(model, sim.settings, has_energy)) text += array("Float32", "energy_density", values[2]);
   return text + "</CellData>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_" + data +
          "\n</AppendedData>\n</VTKFile>\n";
 }

@@ -101,7 +101,7 @@ std::optional<Motion> answer_for(const Model& model, const Settings& settings, l
   if (auto known = right_motion(model, settings); known && known->kept.back() >= steps) return known;
   if (!compliant(settings)) return rigid_motion(model, settings, steps);
   if (kind_without_force(settings)) return std::nullopt;
-  const ConstraintSystem system = build_constraints(model.rest, settings);
+  const ConstraintSystem system = build_constraints(model, settings);
   return find_motion({model, system, settings, model.inverse_masses}, steps, {}, {}, progress);
 }
 

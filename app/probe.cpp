@@ -55,7 +55,8 @@ Reading reading_of(Reading reading, const Lane& lane, const std::vector<float>& 
     if (tet[i] == reading.vertex) reading.position = now[i];
   }
   reading.speed = glm::length(pair(of_velocity));
-  const glm::vec4 material = energy_material(lane.sim.settings);
+  const glm::vec4 material =
+      energy_material(body_material(body_at(model, reading.vertex), lane.sim.settings));
   const TetValues measured = tet_values(model, reading.tet, now, material);
   reading.volume = double(measured.volume), reading.strain = double(measured.strain);
   if (material.z > 0) reading.energy = double(measured.energy);

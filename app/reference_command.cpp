@@ -101,7 +101,7 @@ Motion read_motion(const std::filesystem::path& file, const Model& model, std::u
 }
 
 std::filesystem::path find_and_keep(const Scene& scene, const Model& model, const ReferenceOptions& options) {
-  const ConstraintSystem system = build_constraints(model.rest, scene.settings);
+  const ConstraintSystem system = build_constraints(model, scene.settings);
   const ReferenceInput input{model, system, scene.settings, model.inverse_masses};
   const std::filesystem::path file = options.out.empty() ? cached_motion(scene_key(input)) : options.out;
   if (file.empty()) throw Error("nowhere to keep it", "there is no cache folder", "give --out FILE");

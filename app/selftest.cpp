@@ -81,7 +81,7 @@ void check_motions(Checks& checks) {
     const Scene scene = falling_block(soft);
     const auto model = build_model(scene);
     constexpr long steps = 60;
-    const ConstraintSystem system = build_constraints(model->rest, scene.settings);
+    const ConstraintSystem system = build_constraints(*model, scene.settings);
     const Motion right = find_motion({*model, system, scene.settings, model->inverse_masses}, steps);
     for (const SolverMode& mode : solver_modes()) {
       if (!soft && (mode.leapfrog || mode.implicit)) continue;

@@ -558,8 +558,9 @@ std::optional<Advice> faster_way(const Session& s) {
   // Less than half of the time goes into steps.
   if (!ms.empty() && double(ms.back()) * clock.factor / own.dt < 500) return Advice{"a smaller window", ""};
   const bool with_forces = mode_of(own).leapfrog || mode_of(own).implicit;
-  if (own.mode != "cpu-fast" && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
-    return Advice{"mode cpu-fast", "mode=cpu-fast"};
+  const SolverMode& fast = *std::ranges::find_if(solver_modes(), &SolverMode::all_cores);
+  if (!mode_of(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
+    return Advice{fmt::format("mode {}", fast.name), fmt::format("mode={}", fast.name)};
   if (const Plan& plan = s.loaded.sim().plan; hard(own) && plan.iterations * plan.substeps > 5)
     return Advice{"solver hard", "hard,mode=" + own.mode};
   return Advice{"a smaller scene", ""};

@@ -80,9 +80,9 @@ struct ObstacleRecord {
   vec3 spin;        // rad/s
   int convex;       // 1: lies behind the plane at any nearest point
   vec3 origin;      // of a field's points
-  int _0;
+  int own_friction; // 1: not the world's, which gives way to a body's
   ivec3 cells;      // points of a field along each axis
-  int _1;
+  int _0;
 };
 
 // A hard body that touches obstacles (contact/rigid.glsl). Momenta and impulses per mass of the body.
@@ -140,5 +140,7 @@ struct RigidRecord {
 #define BIND_OBSTACLES 1
 // Texture units of the simulation: the fields of all obstacles, one after the other.
 #define UNIT_FIELDS 15
+// The friction of each vertex, where bodies have their own.
+#define UNIT_FRICTION 14
 // Atomic counters.
 #define BIND_GUARDS 0

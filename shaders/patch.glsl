@@ -14,6 +14,8 @@ shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];
 // Bytes of a record: its vertices' numbers in the chunk.
 uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
+// A record's words: its vertices, values at rest, compliances of a material, k and damping of a body's own.
+float record_value(uint number, uint word) { return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2u][word % 2u]); }
 #define Ids uint
 uint id_of(Ids record, int j) { return global_ids[local_id(record, j)]; }
 #include "constraints/types.glsl"

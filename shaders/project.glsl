@@ -13,17 +13,21 @@ void project_$KIND(uint number, uint owned) {
   float rest = uintBitsToFloat(record.y);
 #else
   float rest[$VALUES];
-  for (uint v = 0u; v < $VALUES; ++v) rest[v] = uintBitsToFloat(patch_words[RECORDS_AT + number + (v + 1u) / 2u][(v + 1u) % 2u]);
+  for (uint v = 0u; v < $VALUES; ++v) rest[v] = record_value(number, 1u + v);
 #endif
   Constraint$ARITY c = $KIND(x, rest, record.x);
-  float k = params.stiffness[$KIND_ROW][$KIND_COLUMN];
+#if $OWN
+  float k = record_value(number, 1u + $VALUES + $COMPONENTS), gamma = record_value(number, 2u + $VALUES + $COMPONENTS) * params.inverse_h;
+#else
+  float k = params.stiffness[$KIND_ROW][$KIND_COLUMN], gamma = params.damping;
+#endif
 #if COMPLIANT
 #if $MATERIAL
-  float a = uintBitsToFloat(patch_words[RECORDS_AT + number + 1].x) * ($RATE == 1 ? params.inverse_h : params.inverse_h * params.inverse_h);
+  float a = record_value(number, 1u + $VALUES) * ($RATE == 1 ? params.inverse_h : params.inverse_h * params.inverse_h);
 #else
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
 #endif
-  float before = last_multiplier(number), gamma = params.damping, share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
+  float before = last_multiplier(number), share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
   if (gamma > 0.0) {
     vec3 start[$ARITY];
     ivec4 first_start = start_positions[record.x & 255u];

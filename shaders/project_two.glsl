@@ -1,5 +1,4 @@
 // As project.glsl, of a kind of two components, which only a material has: they are solved together (method.md eq. 32).
-float word_of_$KIND(uint number, uint word) { return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2][word % 2]); }
 // b of method.md eq. 39b, times h^2.
 float stiffness_of_$KIND(Constraint4x2 c, float w[4], float a[2]) {
   float b = 0.0;
@@ -17,11 +16,11 @@ void project_$KIND(uint number, uint owned) {
     x[j] = between(q, first);
     w[j] = inverse_mass_of(q);
   }
-  for (uint v = 0u; v < $VALUES; ++v) rest[v] = word_of_$KIND(number, 1u + v);
+  for (uint v = 0u; v < $VALUES; ++v) rest[v] = record_value(number, 1u + v);
   Constraint4x2 c = $KIND(x, rest, ids);
   float a[2], before[2];
   for (uint k = 0u; k < 2u; ++k) {
-    a[k] = word_of_$KIND(number, 1u + $VALUES + k) * params.inverse_h * params.inverse_h;
+    a[k] = record_value(number, 1u + $VALUES + k) * params.inverse_h * params.inverse_h;
     before[k] = last_multiplier(number + k);  // a record has several words, the first is theirs
     c.C[k] += a[k] * before[k];
   }

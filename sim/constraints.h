@@ -19,6 +19,9 @@ struct ConstraintList {
   std::vector<std::uint32_t> vertices;  ///< arity * count
   std::vector<double> rest;
   std::vector<double> compliance{};  ///< of a material, the kind's components each; else empty: the settings'
+  std::vector<double> stiffness{}, damping{};  ///< k and s, where bodies differ; else empty: the settings'
+  /// s, of constraint c, where it resists its rate; `all`: of those that have none of their own.
+  double damping_at(std::size_t c, double all) const { return damping.empty() ? all : damping[c]; }
   std::size_t count() const { return vertices.size() / std::size_t(std::max(arity, 1)); }
   std::span<const std::uint32_t> ends(std::size_t c) const {  ///< of constraint c
     return std::span(vertices).subspan(c * std::size_t(arity), std::size_t(arity));
@@ -31,6 +34,7 @@ struct ConstraintList {
       to.insert(to.end(), first, first + std::ptrdiff_t(each));
     };
     append(vertices, from.vertices), append(rest, from.rest), append(compliance, from.compliance);
+    append(stiffness, from.stiffness), append(damping, from.damping);
   }
 };
 

@@ -83,6 +83,56 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
   return system;
 }
 
+namespace {
+
+TetMesh body_mesh(const Model& model, const Body& body) {
+  const auto part = [](const auto& all, std::size_t first, std::size_t count) {
+    const auto begin = all.begin() + std::ptrdiff_t(first);
+    return std::vector(begin, begin + std::ptrdiff_t(count));
+  };
+  TetMesh mesh{part(model.rest.positions, body.first_vertex, body.vertices),
+               part(model.rest.tets, body.first_tet, body.tets),
+               part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece,
+               body.is_sheet() ? model.rest.thickness : 0};
+  const auto shift = [&](auto& elements) {
+    for (auto& element : elements)
+      for (std::uint32_t& v : element) v -= std::uint32_t(body.first_vertex);
+  };
+  shift(mesh.tets), shift(mesh.surface);
+  return mesh;
+}
+
+// Adds a body's constraints, with the numbers of its material, which others of their kind may not have.
+void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body& body, const Material& m) {
+  for (std::size_t k = 0; k < kind_count; ++k) {
+    ConstraintList& list = to.lists[k];
+    const ConstraintList& own = from.lists[k];
+    const ConstraintKind& kind = constraint_kinds[k];
+    const std::size_t count = own.count();
+    for (const std::uint32_t v : own.vertices) list.vertices.push_back(v + std::uint32_t(body.first_vertex));
+    list.rest.insert(list.rest.end(), own.rest.begin(), own.rest.end());
+    list.compliance.insert(list.compliance.end(), own.compliance.begin(), own.compliance.end());
+    list.compliance.resize(list.count() * std::size_t(kind.components), m.compliance[k]);
+    list.stiffness.resize(list.count(), m.stiffness[k]);
+    const bool dashpots = m.material == "neo-hookean" && !kind.rate;  // in place of damping of C
+    list.damping.resize(list.count(), dashpots ? 0 : m.constraint_damping);
+    to.present[k] = to.present[k] || count > 0;
+  }
+  for (std::size_t i = 0; i < body.vertices; ++i) to.at_vertex[body.first_vertex + i] = from.at_vertex[i];
+}
+
+}  // namespace
+
+ConstraintSystem build_constraints(const Model& model, const Material& all) {
+  if (!has_own_materials(model)) return build_constraints(model.rest, all);
+  ConstraintSystem system = build_constraints(TetMesh{model.rest.positions, {}, {}}, "");
+  for (const Body& body : model.bodies) {
+    const Material& own = body_material(body, all);
+    append_body(system, build_constraints(body_mesh(model, body), own), body, own);
+  }
+  return system;
+}
+
 const std::vector<Preset>& material_presets() {
   static const std::vector<Preset> rows = {
       {"rubber", "soft vulcanised rubber", "material=neo-hookean,young_modulus=1e6,poisson_ratio=0.48"},

@@ -124,8 +124,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
                         GL_STREAM_READ);
   for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
-    m.passes.push_back(
-        {Program::compute(fmt::format("metrics/{}.comp", name), {}, obstacle_defines(model))});
+    m.passes.push_back({Program::compute(fmt::format("metrics/{}.comp", name), {}, obstacle_defines(model))});
   m.vertices = double(model.positions.size());
   return m;
 }
@@ -153,7 +152,8 @@ void measure(Metrics& m, const Sim& sim) {
       kernel.set("edge_range", body.edges), kernel.set("hinge_range", body.hinges);
       kernel.set("tet_range", body.tets);
       kernel.set("mass", float(body.mass));
-      if (&pass == &m.passes[0]) kernel.set("material", energy_material(sim.settings));
+      if (&pass == &m.passes[0])
+        kernel.set("material", energy_material(body_material(sim.model->bodies[b], sim.settings)));
       kernel.set("touching", float(1e-5 * body.size));
       const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // these add the groups' sums
       pass.work_groups = one_group ? 1 : groups;

@@ -13,6 +13,7 @@
 #include "sim/error.h"
 #include "sim/hilbert.h"
 #include "sim/parallel.h"
+#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 
@@ -60,6 +61,38 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   const double size = bounds(mesh.positions).size();
   model.size = model.bodies.empty() ? size : std::max(model.size, size);
   model.bodies.push_back(body);
+}
+
+const Body& body_at(const Model& model, std::size_t vertex) {
+  return *std::prev(std::ranges::upper_bound(model.bodies, vertex, {}, &Body::first_vertex));
+}
+
+bool has_own_materials(const Model& model) {
+  return std::ranges::any_of(model.bodies, [](const Body& body) { return body.material.has_value(); });
+}
+
+bool any_material(const Model& model, const Material& all, bool (*holds)(const Material&)) {
+  if (!has_own_materials(model)) return holds(all);
+  return std::ranges::any_of(model.bodies, [&](const Body& body) { return holds(body_material(body, all)); });
+}
+
+double most_damping(const Model& model, const Material& all) {
+  double most = has_own_materials(model) ? 0 : all.constraint_damping;
+  for (const Body& body : model.bodies) most = std::max(most, body_material(body, all).constraint_damping);
+  return most;
+}
+
+void check_settings(const Model& model, const Settings& settings) {
+  if (!has_own_materials(model)) return check_settings(settings, "settings");
+  for (const Body& body : model.bodies) {
+    const std::string where = body.material ? "body " + body.name : "settings";
+    if (mode_of(settings).published)
+      throw Error(fmt::format("mode {} has one material for all bodies", settings.mode), where,
+                  "use mode node or constraint");
+    Settings own = settings;
+    static_cast<Material&>(own) = body_material(body, settings);
+    check_settings(own, where);
+  }
 }
 
 void renumber(Model& model) {

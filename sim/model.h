@@ -1,12 +1,14 @@
 // What a simulation starts from: one rest mesh of all bodies, masses, start positions and velocities.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sim/contact/obstacle.h"
 #include "sim/mesh/carry.h"
 #include "sim/mesh/tet_mesh.h"
+#include "sim/settings.h"
 
 namespace tetpbd {
 
@@ -21,11 +23,13 @@ struct State {
   std::vector<Held> held{};  ///< by vertex of a surface, of CPU modes where bodies touch
 };
 
-/// A contiguous part of the rest mesh.
+/// A contiguous part of the rest mesh, and what it is made of.
 struct Body {
   std::string name;
   std::size_t first_vertex = 0, vertices = 0, first_tet = 0, tets = 0, first_triangle = 0, triangles = 0;
-  bool one_piece = false;  ///< and so a rigid body, if it is hard
+  bool one_piece = false;              ///< and so a rigid body, if it is hard
+  std::optional<Material> material{};  ///< its own; none: that of the settings
+  std::optional<double> friction{};    ///< its own, where an obstacle has none; none: the world's
   bool is_sheet() const { return tets == 0; }
 };
 
@@ -43,6 +47,21 @@ struct Model {
   /// Where a body has a fine surface: of all bodies, what is drawn and exported in place of `rest.surface`.
   CarriedSurface carried;
 };
+
+/// The body that has a vertex.
+const Body& body_at(const Model& model, std::size_t vertex);
+/// What the body is made of; `all`: the settings, for those without a material of their own.
+inline const Material& body_material(const Body& body, const Material& all) {
+  return body.material ? *body.material : all;
+}
+/// Whether bodies have materials of their own. Constraints then carry the numbers of theirs.
+bool has_own_materials(const Model& model);
+/// Whether `holds` is true of what any body is made of.
+bool any_material(const Model& model, const Material& all, bool (*holds)(const Material&));
+/// s, the most constraint_damping of any body.
+double most_damping(const Model& model, const Material& all);
+/// As the other, of what each body is made of; `where` is the body where it has a material of its own.
+void check_settings(const Model& model, const Settings& settings);
 
 /// Adds a body; `positions` are its start positions (same count as `mesh`), `fixed` its fixed vertices;
 /// `mass_factors`, if not empty, multiply the masses of its vertices.

@@ -263,9 +263,9 @@ bool uses(const Material& material, const ConstraintKind& kind) {
   return std::find(names.begin(), names.end(), kind.name) != names.end();
 }
 
-bool rigid_in_contact(const Settings& settings) {
-  return settings.rigid_contact && settings.contact == "none" && hard(settings) &&
-         uses(settings, Stretch::row) && !mode_of(settings).published;
+bool rigid_in_contact(const Settings& settings, const Material& material) {
+  return settings.rigid_contact && settings.contact == "none" && hard(material) &&
+         uses(material, Stretch::row) && !mode_of(settings).published;
 }
 
 bool hard(const Material& material) {

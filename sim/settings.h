@@ -147,7 +147,8 @@ std::optional<std::string> kind_without_force(const Material& material);
 bool damped(const Material& material);
 /// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use hold a
 /// shape, all with k = 1.
-bool rigid_in_contact(const Settings& settings);
+bool rigid_in_contact(const Settings& settings, const Material& material);
+inline bool rigid_in_contact(const Settings& settings) { return rigid_in_contact(settings, settings); }
 /// All kinds in use have k = 1 and nothing has compliance: the exact answer is a rigid body, if they include
 /// stretch.
 bool hard(const Material& material);

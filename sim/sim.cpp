@@ -60,12 +60,12 @@ double quantum_of(const Sim& sim, const State& state) {
 }
 
 // As they are before anything is known of the bodies' motion.
-std::vector<RigidRecord> rigid_records(const Model& model) {
+std::vector<RigidRecord> rigid_records(const Model& model, const Settings& settings) {
   std::vector<RigidRecord> records;
   for (const Body& body : model.bodies) {
     RigidRecord& record = records.emplace_back();
     record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
-    record.one_piece = body.one_piece;
+    record.one_piece = body.one_piece && rigid_in_contact(settings, body_material(body, settings));
     const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
     record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
   }
@@ -94,7 +94,7 @@ SolverInput solver_input(const Sim& sim) {
           sim.plan,
           sim.tuning,
           is_software_renderer(),
-          compliant(s),
+          any_material(*sim.model, s, compliant),
           touches_rigidly(*sim.model, s)};
 }
 
@@ -130,8 +130,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   if (sim.solver.quantized_buffers > 1)
     sim.quantized[1] = buffer("quantized positions, other side", quantized_bytes);
   if (input.rigid) {
-    sim.rigid_bodies =
-        buffer("hard bodies", rigid_records(*sim.model).size() * sizeof(RigidRecord) + 8 * count);
+    sim.rigid_bodies = buffer("hard bodies", sim.model->bodies.size() * sizeof(RigidRecord) + 8 * count);
     sim.rigid_contact = {Program::compute("contact/rigid_contact.comp", {}, defines),
                          work_groups(count, group_size), 4 * count};
   }
@@ -149,9 +148,9 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 
 // The constraints of other settings, if the solver needs only be told their numbers.
 bool adopt_constraints(Sim& sim, const Settings& settings) {
-  if (same_constraints(settings, sim.settings)) return true;
+  if (same_constraints(*sim.model, settings, sim.settings)) return true;
   if (!sim.solver.takes_constraints) return false;
-  ConstraintSystem system = build_constraints(sim.model->rest, settings);
+  ConstraintSystem system = build_constraints(*sim.model, settings);
   const auto like = [](const ConstraintList& a, const ConstraintList& b) {
     return a.count() == b.count() && a.compliance.size() == b.compliance.size();
   };
@@ -164,9 +163,10 @@ bool adopt_constraints(Sim& sim, const Settings& settings) {
 void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Model>& model) {
   if (check_finite(sim, true)) restore_checkpoint(sim);  // it has nothing better to start from
   State state = read_state(sim);
-  Sim fresh = make_sim(
-      model, settings, sim.tuning,
-      same_constraints(settings, sim.settings) ? sim.system : build_constraints(sim.model->rest, settings));
+  Sim fresh = make_sim(model, settings, sim.tuning,
+                       same_constraints(*sim.model, settings, sim.settings)
+                           ? sim.system
+                           : build_constraints(*sim.model, settings));
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps;
   fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, time_of(sim)};
@@ -223,26 +223,30 @@ double half_substep_fall(const Settings& settings, const Plan& plan) {
 }
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
-  check_settings(settings, "settings");
-  ConstraintSystem system = build_constraints(model->rest, settings);
+  check_settings(*model, settings);
+  ConstraintSystem system = build_constraints(*model, settings);
   Sim sim = make_sim(std::move(model), settings, tuning, std::move(system));
   reset(sim);
   return sim;
 }
 
-bool same_constraints(const Settings& a, const Settings& b) {
+bool same_constraints(const Model& model, const Settings& a, const Settings& b) {
   const auto decides = [](const Settings& s) {
     const bool dashpots = s.material == "neo-hookean";
     return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio,
                       dashpots ? s.constraint_damping : 0);
   };
-  return decides(a) == decides(b);
+  // Where bodies differ, constraints carry the settings' numbers too.
+  const auto numbers = [](const Settings& s) {
+    return std::tuple(s.stiffness, s.compliance, s.constraint_damping);
+  };
+  return decides(a) == decides(b) && (!has_own_materials(model) || numbers(a) == numbers(b));
 }
 
 void write_step_block(Sim& sim, int substeps_before) {
   const Settings& s = sim.settings;
   const double h = sim.plan.h;
-  const bool soft = compliant(s);
+  const bool soft = any_material(*sim.model, s, compliant);
   Step block{};
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
   block.h = float(h);
@@ -257,12 +261,12 @@ void write_step_block(Sim& sim, int substeps_before) {
   block.velocity_scale = float(std::exp(-s.damping * h));
   block.max_correction = float(longest_correction(*sim.model, s));
   block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
-  block.mass_splitting = splits_masses(s);
+  block.mass_splitting = splits_masses(*sim.model, s);
   block.quantum = float(sim.quantum);
   block.inverse_quantum = float(1 / sim.quantum);
   block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
   block.vertex_count = unsigned(sim.model->positions.size());
-  block.damping = float(s.constraint_damping / h);
+  block.damping = float(most_damping(*sim.model, s) / h);
   block.turn_limit = float(TURN_LIMIT / sim.watch.finer);
   write_planes(*sim.model, s, block);
   for (std::size_t k = 0; k < kind_count; ++k) {
@@ -276,7 +280,7 @@ void write_step_block(Sim& sim, int substeps_before) {
 
 void forget_contacts(Sim& sim) {
   if (!sim.rigid_bodies) return;
-  const auto records = rigid_records(*sim.model);
+  const auto records = rigid_records(*sim.model, sim.settings);
   sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
 }
 
@@ -354,9 +358,10 @@ void adopt_settings(Sim& sim, const Settings& settings) {
 }  // namespace
 
 void apply_settings(Sim& sim, const Settings& settings) {
-  check_settings(settings, "settings");
+  check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, compliant(s), touches_rigidly(*sim.model, s), s.contact);
+    return std::tuple(s.mode, any_material(*sim.model, s, compliant), touches_rigidly(*sim.model, s),
+                      s.contact);
   };
   if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))
     adopt_settings(sim, settings);

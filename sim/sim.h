@@ -100,8 +100,8 @@ void forget_contacts(Sim& sim);
 /// m/s that velocities of mid-substep are behind of those at the substep's end, by gravity; 0 where they are
 /// of the end.
 double half_substep_fall(const Settings& settings, const Plan& plan);
-/// Whether both make the same constraints.
-bool same_constraints(const Settings& a, const Settings& b);
+/// Whether both make the same constraints of a model.
+bool same_constraints(const Model& model, const Settings& a, const Settings& b);
 State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);

@@ -2,6 +2,7 @@
 // rest, of which their planes in the step's block say all; then SOLIDS others, whose records are of the end of a
 // substep. A displacement relative to an obstacle is less by how far obstacle_velocity() comes in a substep.
 #include "contact/plane.glsl"
+#include "contact/friction.glsl"
 float depth_of(Pair x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
 Surface plane_surface(int k, Pair x) { return Surface(params.planes[k].xyz, depth_of(x, params.planes[k])); }
 
@@ -47,6 +48,9 @@ uint near_solids(Pair x, float moved) {
   for (int k = 0; k < SOLIDS; ++k) bits |= is_near_solid(k, x, moved, 1.0) ? 1u << k : 0u;
   return bits;
 }
+float solid_friction(int k, uint i) {
+  return BODY_FRICTION == 0 || solids[k].own_friction == 1 ? solids[k].friction : body_friction(i);
+}
 Surface solid_met(int k, Pair x, vec3 way) {
   vec3 to = into_solid(k, arm_from_solid(k, x));
   Surface s = find_contact(solid_at(k), to - into_solid(k, way), to);
@@ -55,11 +59,12 @@ Surface solid_met(int k, Pair x, vec3 way) {
 #endif
 
 int obstacle_count() { return params.plane_count + SOLIDS; }
-float obstacle_friction(int k) {
+// Of vertex i on an obstacle.
+float obstacle_friction(int k, uint i) {
 #if SOLIDS
-  if (k >= params.plane_count) return solids[k - params.plane_count].friction;
+  if (k >= params.plane_count) return solid_friction(k - params.plane_count, i);
 #endif
-  return params.friction;
+  return body_friction(i);
 }
 float obstacle_restitution(int k) {
 #if SOLIDS
@@ -134,12 +139,12 @@ bool will_touch(Pair x, Pair next, float substeps) {
 #endif
   return any;
 }
-// x, moved out of all obstacles in turn; `moved`: its displacement in this substep so far.
-Pair resolve_contacts(Pair x, vec3 moved) {
+// Vertex i at x, moved out of all obstacles in turn; `moved`: its displacement in this substep so far.
+Pair resolve_contacts(uint i, Pair x, vec3 moved) {
   for (int k = 0; k < params.plane_count; ++k) {
     Surface plane = plane_surface(k, x);
     if (plane.distance < 0.0) {
-      vec3 correction = plane_correction(plane.normal, plane.distance, moved, params.friction);
+      vec3 correction = plane_correction(plane.normal, plane.distance, moved, body_friction(i));
       x = pair_add(x, correction);
       moved += correction;
     }
@@ -151,7 +156,7 @@ Pair resolve_contacts(Pair x, vec3 moved) {
     vec3 way = moved - params.h * solid_velocity(k, x);
     Surface met = solid_met(k, x, way);
     if (met.distance < 0.0) {
-      vec3 correction = plane_correction(met.normal, met.distance, way, solids[k].friction);
+      vec3 correction = plane_correction(met.normal, met.distance, way, solid_friction(k, i));
       x = pair_add(x, correction);
       moved += correction;
       left = near_solids(x, length(moved)) & ~((2u << k) - 1u);

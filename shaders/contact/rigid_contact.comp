@@ -45,10 +45,10 @@ struct Meeting {
   vec3 velocity;
   float friction, restitution;
 };
-Meeting meeting_with(int k, Pair x, vec3 arm) {
+Meeting meeting_with(int k, uint vertex, Pair x, vec3 arm) {
   vec3 velocity = (velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale;
   Surface surface = surface_before(k, x, velocity);
-  return Meeting(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k), obstacle_restitution(k));
+  return Meeting(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex), obstacle_restitution(k));
 }
 // The normal velocity at a contact may not be under this.
 float least_at(Meeting m, vec3 arm) {
@@ -57,7 +57,7 @@ float least_at(Meeting m, vec3 arm) {
 void take_in(int k, uint place, vec3 origin, vec3 impulse) {
   Pair x = position_of(place / MAX_OBSTACLES);
   vec3 arm = arm_of(x, origin) - before.centre;
-  Meeting m = meeting_with(int(place % MAX_OBSTACLES), x, arm);
+  Meeting m = meeting_with(int(place % MAX_OBSTACLES), place / MAX_OBSTACLES, x, arm);
   contacts[k] = touch_at(before, m.normal, arm, least_at(m, arm), impulse, m.velocity, m.friction);
   places[k] = place;
 }
@@ -95,7 +95,7 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
       Pair x = position_of(vertex);
       vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
       for (int p = 0; p < obstacle_count(); ++p) {
-        Meeting m = meeting_with(p, x, arm);
+        Meeting m = meeting_with(p, vertex, x, arm);
         float over = least_at(m, arm) - dot(m.normal, speed - m.velocity);
         if (over > most || (over == most && vertex * MAX_OBSTACLES + uint(p) < place)) {
           most = over;

@@ -12,7 +12,11 @@ void add_$KIND(uint number, uint part, int i, int j, inout mat3 block, inout vec
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN] * (params.h * params.h);
 #endif
   float push = $RATE == 1 ? 0.0 : c.C, held = $RATE == 1 ? 0.0 : 1.0;
+#if $OWN
+  float tau = $RATE == 1 ? 1.0 : dampings_$KIND[number];
+#else
   float tau = $RATE == 1 ? 1.0 : params.damping * params.h;
+#endif
   if (tau > 0.0) {
     // Along the way since z.
     float h = at(OFFSET, ids[0]).w, rate = 0.0;

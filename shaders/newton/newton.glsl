@@ -34,10 +34,11 @@ layout(std430) restrict readonly buffer Mesh {
   uint first_member[AGGREGATES + 1u];
   uvec2 members[max(MEMBERS, 1u)];  // vertex; weight in WEIGHT_UNITs
   FreeBody free_bodies[max(FREE_BODIES, 1u)];
-  // Of constraints: vertices, values at rest, compliances of a material.
+  // Of constraints: vertices, values at rest, compliances of a material, damping of a body's own.
   #foreach uvec$ARITY vertices_$KIND[max(COUNT_$KIND, 1u)];
   #foreach float values_$KIND[max($VALUESu * COUNT_$KIND, 1u)];
   #foreach float compliances_$KIND[max($MATERIALu * $COMPONENTSu * COUNT_$KIND, 1u)];
+  #foreach float dampings_$KIND[max($OWNu * COUNT_$KIND, 1u)];
 };
 
 #define UNKNOWNS (6u * AGGREGATES)

@@ -21,7 +21,7 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
     r = -force - aim.w * (u - aim.xyz);
     mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z, diagonal.z + aim.w);
     float push = at(GAIN, i).w;
-    float friction = obstacle_friction(findLSB(touched));  // of the first of them
+    float friction = obstacle_friction(findLSB(touched), i);  // of the first of them
     if (push > 0.0 && touched != 0u && friction > 0.0) {
       vec3 slid = free_part(u - params.h * obstacle_velocity(findLSB(touched), x), touched, i);
       slides = resistance(friction, push, slid);

@@ -1,6 +1,12 @@
 // The correction of a contact: needs positions, velocities, pairs/formulas.glsl and pairs/sums.glsl.
 const float push_most = EDGE / 10.0;  // m, in a substep: so bodies that are deep in each other leave each other
 #define UNSEEN 4                      // contacts that may share a vertex of which none was seen coming: too few would shoot it away
+#include "contact/friction.glsl"
+#if BODY_FRICTION
+float friction_between(uvec4 vertices) { return mean_friction(body_friction(vertices[0]), body_friction(vertices[3])); }
+#else  // a mean of equals would let the compiler round what follows otherwise
+float friction_between(uvec4 vertices) { return params.friction; }
+#endif
 uniform uint side;                    // of the numbers of contacts that share a vertex, that of this substep
 ivec3 to_quanta(vec3 correction) {
   float most = params.body_size / SUM_PARTS;

@@ -129,6 +129,8 @@ Meeting meet_edges(vec3 p, vec3 left, vec3 right, vec3 q, vec3 r, vec3 other_lef
 // Whether a vertex, with its normal of any length, can have come in through the triangle: those that look the same way are the far side of a thin part, or
 // beside the rim of a face.
 bool opposes(Meeting m, vec3 normal) { return dot(m.face, normal) < real(0.3) * length(normal); }
+// Of two bodies with each other.
+real mean_friction(real a, real b) { return a == b ? a : sqrt(a * b); }
 // How a vertex is to move relative to the triangle that it is in, whose `way` in this substep it went relative to it: what stops it and what friction
 // takes back along the triangle changes its velocity as well; what is left of the depth, by `push` (m) at most, only its place, so that
 // it gives no energy.

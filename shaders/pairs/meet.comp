@@ -86,7 +86,7 @@ void main() {
     // In this substep, in the next or after it.
     if (ahead && weight != 0.0 && (touches || m.gap + 2.0 * dot(sum.xyz, m.normal) < 0.0)) atomicAdd(sharing[shared_at(vertex, 1u - side)], 1);
 #if LAGGED
-    if (touches) correct(vertex, weight, meeting_correction(m, sum.xyz, push_most, params.friction), sum);
+    if (touches) correct(vertex, weight, meeting_correction(m, sum.xyz, push_most, friction_between(vertices_met[here])), sum);
 #else
     if (touches && weight != 0.0) atomicAdd(sharing[shared_at(vertex, side)], 1);
     if (touches) atomicAdd(contact_sums[vertex].asks, 1);

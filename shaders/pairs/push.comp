@@ -45,7 +45,7 @@ void push(uint record) {
   if (m.gap < 0.0) {  // another program found it, and may round otherwise
     vec4 sum = vec4(0.0);
     for (uint j = 0u; j < 4u; ++j) sum += part_of(vertices[j], m.weights[j]);
-    Stop by = meeting_correction(m, sum.xyz, push_most, params.friction);
+    Stop by = meeting_correction(m, sum.xyz, push_most, friction_between(vertices));
     for (uint j = 0u; j < 4u; ++j) correct(vertices[j], m.weights[j], by, sum);
   }
   memoryBarrierBuffer();

@@ -26,7 +26,7 @@ Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
       vec3 moved = correction;
       if (predicts) moved += params.h * v.high;
       else moved += params.h * velocities[i].high + relative(x, Pair(predicted[i].high, predicted[i].low));
-      corrected = resolve_contacts(corrected, moved);
+      corrected = resolve_contacts(i, corrected, moved);
     }
     x = corrected;
   }

@@ -15,7 +15,7 @@ Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
   Pair x = predict_position(start, v);
   if (may_touch(x, length(params.h * v.high))) {
     Pair free = x;
-    x = resolve_contacts(x, params.h * v.high);
+    x = resolve_contacts(i, x, params.h * v.high);
     v = pair_add(v, relative(x, free) * params.inverse_h);
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);

@@ -66,6 +66,7 @@ MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double
     const double sine = glm::length(axis);
     if (sine > 0) moving.spin = axis / sine * (2 * std::atan2(sine, turn.w) / h);
   }
+  moving.own_friction = o.friction.has_value();
   moving.friction = o.friction.value_or(friction), moving.restitution = o.restitution.value_or(restitution);
   return moving;
 }

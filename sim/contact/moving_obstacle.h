@@ -8,8 +8,6 @@
 
 namespace tetpbd {
 
-struct Settings;
-
 /// An obstacle over a substep: as it stands at its end, and how its matter moves to there.
 struct MovingObstacle {
   using Surface = Formulas<double>::Surface;
@@ -18,7 +16,8 @@ struct MovingObstacle {
   Pose pose;
   glm::dvec3 velocity{0}, spin{0};  ///< m/s of the centre, rad/s
   double friction = 0, restitution = 0;
-  double reach = 0;  ///< m: all of its surface is nearer to its centre
+  bool own_friction = false;  ///< not the world's, which gives way to a body's
+  double reach = 0;           ///< m: all of its surface is nearer to its centre
   /// Half spaces at rest that have no friction or restitution of their own, MAX_PLANES of a step, are no more
   /// than n.x >= d: (n, d).
   bool is_plane = false;
@@ -55,6 +54,11 @@ struct MovingObstacle {
 /// `friction`, `restitution`: where the obstacle has none of its own.
 MovingObstacle moving_obstacle(const Obstacle& obstacle, double start, double h, double friction,
                                double restitution);
+
+/// Of a vertex on it: the obstacle's own, else the body's own, else the world's.
+inline double friction_on(const MovingObstacle& o, const Model& model, std::size_t vertex) {
+  return o.own_friction ? o.friction : body_at(model, vertex).friction.value_or(o.friction);
+}
 
 /// All of a substep of h that begins at `start`. Half spaces that are no more than planes come first, with
 /// the ground of the settings at their head.

@@ -34,7 +34,8 @@ ObstacleRecord record_block(const MovingObstacle& o, int first) {
   block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
   block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
   block.velocity = glm::vec3(o.velocity), block.spin = glm::vec3(o.spin);
-  block.friction = float(o.friction), block.restitution = float(o.restitution);
+  block.friction = float(o.friction), block.own_friction = o.own_friction,
+  block.restitution = float(o.restitution);
   return block;
 }
 
@@ -44,17 +45,26 @@ std::vector<std::shared_ptr<const DistanceField>> fields_of(const Model& model) 
   return fields;
 }
 
-void make_fields(Obstacles& obstacles, const std::vector<float>& values) {
+std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<float>& values,
+                                       const char* remedy) {
   GLint most = 0;
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
   if (values.size() > std::size_t(most))
-    throw Error("the fields of obstacles are too large",
-                fmt::format("{} values, the driver allows {}", values.size(), most),
-                "give their meshes fewer voxels", 1);
-  obstacles.fields = Buffer("fields of obstacles", values);
-  obstacles.fields_texture = Texture("fields of obstacles", GL_TEXTURE_BUFFER);
-  glTexBuffer(GL_TEXTURE_BUFFER, GL_R32F, obstacles.fields.id());
+    throw Error(fmt::format("too many values for the {}", label),
+                fmt::format("{} of them, the driver allows {}", values.size(), most), remedy, 1);
+  std::pair<Buffer, Texture> made{Buffer(label, values), Texture(label, GL_TEXTURE_BUFFER)};
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_R32F, made.first.id());
   glBindTexture(GL_TEXTURE_BUFFER, 0);
+  return made;
+}
+void bind_texels(int unit, const Texture& texture) {
+  glActiveTexture(GL_TEXTURE0 + GLenum(unit));
+  glBindTexture(GL_TEXTURE_BUFFER, texture.id());
+  glActiveTexture(GL_TEXTURE0);
+}
+
+bool bodies_have_friction(const Model& model) {
+  return std::ranges::any_of(model.bodies, [](const Body& body) { return body.friction.has_value(); });
 }
 
 }  // namespace
@@ -67,7 +77,7 @@ std::vector<std::string> obstacle_defines(const Model& model) {
   for (const auto& [number, function] : kinds) rows += fmt::format(" ROW({}, {})", number, function);
   const bool fields = std::ranges::any_of(solids, [](const Obstacle* o) { return bool(o->field); });
   return {fmt::format("SOLIDS {}", solids.size()), fmt::format("FIELDS {:d}", fields),
-          "OBSTACLE_KINDS(ROW)" + rows};
+          fmt::format("BODY_FRICTION {:d}", bodies_have_friction(model)), "OBSTACLE_KINDS(ROW)" + rows};
 }
 
 bool share_kernels(const Model& model, const Model& other) {
@@ -78,6 +88,13 @@ bool share_kernels(const Model& model, const Model& other) {
 Obstacles make_obstacles(const Model& model) {
   check_obstacles(model);
   Obstacles obstacles;
+  if (bodies_have_friction(model)) {
+    std::vector<float> values;
+    for (const Body& body : model.bodies)
+      values.resize(values.size() + body.vertices, float(body.friction.value_or(-1)));
+    std::tie(obstacles.friction, obstacles.friction_texture) =
+        make_texels("friction of vertices", values, "give all bodies the same friction");
+  }
   const std::size_t count = solid_obstacles(model).size();
   if (count == 0) return obstacles;
   GLint alignment = 256;
@@ -88,7 +105,9 @@ Obstacles make_obstacles(const Model& model) {
   std::vector<float> values;
   for (const auto& field : fields_of(model))
     if (field) values.insert(values.end(), field->values.begin(), field->values.end());
-  if (!values.empty()) make_fields(obstacles, values);
+  if (!values.empty())
+    std::tie(obstacles.fields, obstacles.fields_texture) =
+        make_texels("fields of obstacles", values, "give their meshes fewer voxels");
   return obstacles;
 }
 
@@ -126,15 +145,13 @@ void write_obstacles(Sim& sim) {
 }
 
 void bind_obstacles(const Obstacles& obstacles, int list) {
+  if (obstacles.friction) bind_texels(UNIT_FRICTION, obstacles.friction_texture);
   if (!obstacles.records) return;
   const std::size_t last = obstacles.records.bytes() / obstacles.stride - 1;
   glBindBufferRange(GL_UNIFORM_BUFFER, BIND_OBSTACLES, obstacles.records.id(),
                     GLintptr(std::min(std::size_t(list), last) * obstacles.stride),
                     GLsizeiptr(obstacles.bytes));
-  if (!obstacles.fields) return;
-  glActiveTexture(GL_TEXTURE0 + UNIT_FIELDS);
-  glBindTexture(GL_TEXTURE_BUFFER, obstacles.fields_texture.id());
-  glActiveTexture(GL_TEXTURE0);
+  if (obstacles.fields) bind_texels(UNIT_FIELDS, obstacles.fields_texture);
 }
 
 }  // namespace tetpbd

@@ -11,7 +11,6 @@
 
 namespace tetpbd {
 
-struct Settings;
 struct Sim;
 
 struct Obstacles {
@@ -19,6 +18,8 @@ struct Obstacles {
                    ///< one of the end of each substep; a single list where nothing moves
   Buffer fields;   ///< one after the other
   Texture fields_texture;
+  Buffer friction;  ///< by vertex, where bodies have their own; negative: the world's
+  Texture friction_texture;
   std::size_t bytes = 0, stride = 0;  ///< of a list; from one to the next
   int present = 0;                    ///< which list is of now
 };

@@ -47,13 +47,13 @@ Objective objective_of(const Implicit& run, const Start& start) {
     o.predicted.push_back(w > 0 ? start.z[i] + free / drag : run.now.positions[i]);
   }
   o.unit = mass * o.inertia * run.input.model.size * run.input.model.size;
-  if (settings.constraint_damping > 0) {
+  if (any_material(run.input.model, settings, damped)) {
     const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
     o.before = constraint_values(o, run.now.positions);
     const std::vector<double> earlier = constraint_values(o, run.before.positions);
     for (std::size_t k = 0; k < earlier.size(); ++k) o.before[k] = (4 * o.before[k] - earlier[k]) / 3;
     o.per_step = 1.5 / run.h;
-    o.damping = dashpots ? 0 : settings.constraint_damping * o.per_step;
+    o.damping = dashpots ? 0 : settings.constraint_damping;
   }
   return o;
 }
@@ -83,7 +83,7 @@ double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obsta
 }
 
 // What the last solution's forces and the way since z make of friction.
-std::vector<Objective::Drag> drags(const Objective& o, const Start& start,
+std::vector<Objective::Drag> drags(const Model& model, const Objective& o, const Start& start,
                                    const std::vector<MovingObstacle>& obstacles,
                                    const std::vector<Touching>& touching) {
   std::vector<Objective::Drag> list;
@@ -92,8 +92,8 @@ std::vector<Objective::Drag> drags(const Objective& o, const Start& start,
       const MovingObstacle& obstacle = obstacles[t.plane];
       const double h = start.h[t.vertex];
       const glm::dvec3 at = start.z[t.vertex], from = at + h * obstacle.velocity_at(at);
-      list.push_back({t.vertex, glm::dvec3(o.plane(t.vertex, t.plane)), from, obstacle.friction * t.force,
-                      least_slip * h});
+      list.push_back({t.vertex, glm::dvec3(o.plane(t.vertex, t.plane)), from,
+                      friction_on(obstacle, model, t.vertex) * t.force, least_slip * h});
     }
   return list;
 }
@@ -103,9 +103,11 @@ std::vector<Objective::Drag> drags(const Objective& o, const Start& start,
 Minimum solve(const Implicit& run, const Start& start) {
   Objective o = objective_of(run, start);
   const auto obstacles = obstacles_at(run.input.model, run.input.settings, run.time[0], run.h);
-  const bool rubs = std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; });
+  const bool rubs =
+      std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
+      std::ranges::any_of(run.input.model.bodies, [](const Body& b) { return b.friction.has_value(); });
   find_planes(run, obstacles, o.predicted, o);
-  o.drags = drags(o, start, obstacles, run.touching);
+  o.drags = drags(run.input.model, o, start, obstacles, run.touching);
   const int most_rounds = run.most > 0 ? 0 : 50;
   Minimum minimum = minimise(o, o.predicted, run.most);
   for (int round = 0; o.plane_count > 0 && round < most_rounds; ++round) {
@@ -115,7 +117,7 @@ Minimum solve(const Implicit& run, const Start& start) {
     std::vector<double> change(run.now.positions.size(), 0);
     double all = 0, most = 0;
     for (const Objective::Drag& d : o.drags) all += d.force;
-    const std::vector<Objective::Drag> next = drags(o, start, obstacles, minimum.touching);
+    const std::vector<Objective::Drag> next = drags(run.input.model, o, start, obstacles, minimum.touching);
     for (const Objective::Drag& d : o.drags) change[d.vertex] -= d.force;
     for (const Objective::Drag& d : next) change[d.vertex] += d.force;
     for (const double c : change) most = std::max(most, std::abs(c));

@@ -27,7 +27,7 @@ void for_each_spring(const Leapfrog& run, F&& visit) {
 // Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha,
 // of rates -(grad C . v) grad C / alpha.
 Points accelerations(Leapfrog& run) {
-  const double tau = run.input.settings.constraint_damping;
+  const double all = run.input.settings.constraint_damping;
   const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
   for_each_spring(run, [&](auto kind, const ConstraintList& list, auto&& alpha, std::size_t offset) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
@@ -40,7 +40,7 @@ Points accelerations(Leapfrog& run) {
       for (int k = 0; k < kind.row.components; ++k) {
         const auto [C, gradient] = component(value, k);
         double size = kind.row.rate ? 0 : C;
-        const double resists = kind.row.rate ? 1 : dashpots ? 0 : tau;
+        const double resists = kind.row.rate ? 1 : list.damping_at(c, dashpots ? 0 : all);
         for (std::size_t j = 0; j < arity; ++j) size += resists * glm::dot(gradient[j], run.v[vertices[j]]);
         for (std::size_t j = 0; j < arity; ++j)
           run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
@@ -114,7 +114,7 @@ void advance(Leapfrog& run, long steps) {
       for (const MovingObstacle& obstacle : obstacles) {
         const glm::dvec3 way = x - before - run.h * obstacle.velocity_at(x);
         const auto met = obstacle.surface_met(x, way);
-        touch(met.normal, -met.distance, obstacle.friction, way, run.h, x, run.v[i]);
+        touch(met.normal, -met.distance, friction_on(obstacle, run.input.model, i), way, run.h, x, run.v[i]);
       }
     });
     run.pairs.resolve(settings, run.x, run.v, run.held, run.input.inverse_masses, run.h);
@@ -134,10 +134,7 @@ State state_of(Leapfrog& run) {
 
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
                    int iterations) {
-  Settings settings = input.settings;
-  settings.constraint_damping = 0;
-  const ReferenceInput still{input.model, input.system, settings, input.inverse_masses};
-  Leapfrog run = prepared(still, compliances, positions);
+  Leapfrog run = prepared(input, compliances, positions);  // at rest, so that nothing is damped
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-1, 1);
   Points p(positions.size());
@@ -162,7 +159,7 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
     }
     largest = std::sqrt(sum / double(p.size()));
   }
-  const double omega = std::sqrt(1.02 * largest), damped = input.settings.constraint_damping * omega;
+  const double omega = std::sqrt(1.02 * largest), damped = most_damping(input.model, input.settings) * omega;
   return (std::sqrt(damped * damped + 4) - damped) / omega;
 }
 

@@ -47,16 +47,19 @@ void require_answer(const ReferenceInput& input) {
   const auto refuse = [&](const std::string& what) {
     throw Error("the scene has no right motion", what, hint);
   };
-  if (!compliant(settings) && !uses(settings, Stretch::row))
-    refuse("without stretch constraints bodies have no shape to keep");
-  if (settings.material != "none") return;
-  for (std::size_t k = 0; k < kind_count; ++k) {
-    if (!uses(settings, constraint_kinds[k])) continue;
-    if (settings.stiffness[k] != 1)
-      refuse(fmt::format("k_{} is {}", constraint_kinds[k].name, settings.stiffness[k]));
-    if (compliant(settings) && settings.compliance[k] == 0)
-      refuse(fmt::format("compliance_{} is 0 and another is not", constraint_kinds[k].name));
-  }
+  const bool soft = any_material(input.model, settings, compliant);
+  const auto check = [&](const Material& own) {
+    if (!soft && !uses(own, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");
+    for (std::size_t k = 0; own.material == "none" && k < kind_count; ++k) {
+      if (!uses(own, constraint_kinds[k])) continue;
+      if (own.stiffness[k] != 1)
+        refuse(fmt::format("k_{} is {}", constraint_kinds[k].name, own.stiffness[k]));
+      if (soft && own.compliance[k] == 0)
+        refuse(fmt::format("compliance_{} is 0 and another is not", constraint_kinds[k].name));
+    }
+  };
+  if (!has_own_materials(input.model)) return check(settings);
+  for (const Body& body : input.model.bodies) check(body_material(body, settings));
 }
 
 Pair rigid_pair(const ReferenceInput& input) {
@@ -187,10 +190,17 @@ std::uint64_t scene_key(const ReferenceInput& input) {
     if (obstacle.field) add(obstacle.field->values);
   }
   const Settings& s = input.settings;
-  if (s.material == "none")
-    add(s.constraints), add(s.stiffness), add(s.compliance);
-  else
-    add(s.material), add(std::array{s.young_modulus, s.poisson_ratio});
+  const auto add_material = [&](const Material& m) {
+    if (m.material == "none")
+      add(m.constraints), add(m.stiffness), add(m.compliance);
+    else
+      add(m.material), add(std::array{m.young_modulus, m.poisson_ratio});
+  };
+  add_material(s);
+  for (const Body& body : model.bodies) {
+    if (body.material) add_material(*body.material), add(std::array{body.material->constraint_damping});
+    if (body.friction) add(std::array{*body.friction});
+  }
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
   add(numbers);
@@ -207,7 +217,7 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   require_answer(input);
   Motion motion;
   motion.method = method;
-  const bool soft = compliant(input.settings);
+  const bool soft = any_material(input.model, input.settings, compliant);
   const double stable = !soft || method == "implicit"
                             ? 0
                             : stable_step(input, compliances_of(input), input.model.rest.positions);

@@ -28,12 +28,13 @@ void for_each_constraint(const Objective& o, const Points& positions, F&& visit)
   for_each_elastic<true>(o.system, o.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
     constexpr ConstraintKind row = decltype(kind)::row;
     constexpr std::size_t arity = std::size_t(row.arity);
-    const double held = row.rate ? 0 : 1, damped = row.rate ? o.per_step : o.damping;
+    const double held = row.rate ? 0 : 1;
     std::array<glm::dvec3, arity> x;
     std::array<Spring, std::size_t(row.components)> springs;
     for (std::size_t c = 0; c < list.count(); ++c) {
       const std::uint32_t* vertices = list.vertices.data() + c * arity;
       for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
+      const double damped = o.per_step * (row.rate ? 1 : list.damping_at(c, o.damping));
       for (std::size_t k = 0; k < springs.size(); ++k, ++number) {
         springs[k] = {(held + damped) / alpha(c)[k], 0};
         if (damped > 0) springs[k].offset = damped / (held + damped) * o.before[number];

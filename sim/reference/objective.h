@@ -31,9 +31,9 @@ struct Objective {
   glm::dvec3 gravity{0};         ///< m/s^2; 0 for a step, whose y has it already
   double unit = 1;               ///< J, what tolerances are relative to (`Minimum::residual`)
   /// Damping over a step: E += ((C - before)^2 per_step) / (2 alpha) of kinds of which only the change
-  /// counts, and `damping` in place of per_step of the others. Empty: none.
+  /// counts, and `damping` times that of the others, but of bodies with their own. Empty: none.
   std::vector<double> before{};      ///< by component (constraint_values)
-  double damping = 0, per_step = 0;  ///< constraint_damping over the step's length; 1/s
+  double damping = 0, per_step = 0;  ///< s; 1/s
   /// Each vertex with mass is kept in `plane_count` half spaces (n, d), n . x >= d; by vertex.
   std::vector<glm::dvec4> planes{};
   std::size_t plane_count = 0;

@@ -68,7 +68,7 @@ std::vector<Contact> find_contacts(const RigidBody& b, const std::vector<MovingO
     const glm::dvec3 t = glm::normalize(glm::cross(n, side));
     Contact c;
     c.number = number, c.arm = arm, c.surface = o.velocity_at(b.centre + arm);
-    c.friction = o.friction, c.restitution = o.restitution;
+    c.friction = o.own_friction ? o.friction : b.friction.value_or(o.friction), c.restitution = o.restitution;
     c.axes = glm::dmat3(n, t, glm::cross(n, t));
     const glm::dmat3 cross(glm::cross(c.arm, c.axes[0]), glm::cross(c.arm, c.axes[1]),
                            glm::cross(c.arm, c.axes[2]));
@@ -116,7 +116,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
   for (const Body& body : model.bodies) {
     RigidBody b;
     b.first = body.first_vertex;
-    b.held = is_held(model, body);
+    b.held = is_held(model, body), b.friction = body.friction;
     glm::dvec3 rest_centre(0), momentum(0);
     const auto each = [&](auto&& visit) {
       for (std::size_t i = b.first; i < b.first + body.vertices; ++i) visit(i, model.masses[i]);

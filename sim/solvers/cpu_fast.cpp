@@ -44,6 +44,11 @@ struct Batch {
   float rest[std::size_t(Kind::row.values)][lanes];
   float multipliers[std::size_t(Kind::row.components)][lanes];  // in this substep
   std::uint32_t count;                                          // lanes in use; the others repeat the first
+  double stiffness = -1, damping = 0;                           // of a body's own material, s; else -1
+  Rule<float> rule(Rule<float> all) const {
+    if (stiffness >= 0) all.set(stiffness, damping, Kind::row);
+    return all;
+  }
 };
 template <class Kind>
 using Batches = std::vector<Batch<Kind>>;
@@ -164,7 +169,8 @@ template <class Kind, bool damped>
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
   std::uint32_t guards[lanes];
   float multipliers[components][lanes], softness_now[components][lanes];
-  const auto [k, limit, all, gamma, share, unit] = rule;
+  const float k = rule.k, limit = rule.limit, all = rule.a, gamma = rule.gamma, share = rule.share;
+  const double unit = rule.softness;
   for (std::size_t part = 0; part < components; ++part)
     for (std::size_t lane = 0; lane < lanes; ++lane)
       softness_now[part][lane] = softness ? float(softness->values[part][lane] * unit) : all;
@@ -224,11 +230,12 @@ template <class Kind, bool damped>
 // Batches [begin, end) of a kind; `first`: in a substep's first iteration.
 template <class Kind, bool damped>
 [[gnu::always_inline]] inline void project_batches(Work& work, std::size_t begin, std::size_t end,
-                                                   const Rule<float>& rule, bool first, GuardCounts& guards) {
+                                                   const Rule<float>& all, bool first, GuardCounts& guards) {
   Batch<Kind>* batches = std::get<Batches<Kind>>(work.batches).data();
   const auto& own = std::get<Softnesses<Kind>>(work.softnesses);
   for (std::size_t b = begin; b < end; ++b) {
     const Softness<Kind>* softness = own.empty() ? nullptr : &own[b];
+    const Rule<float> rule = batches[b].rule(all);
     Columns<Kind> columns;
     [[maybe_unused]] Columns<Kind> starts;
     gather(batches[b], work.x, columns);
@@ -246,7 +253,7 @@ WIDEST void project_kind(Work& work, int kind, std::size_t begin, std::size_t en
                          bool first, GuardCounts& guards) {
   for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
     if (number != kind) return;
-    if (rule.gamma > 0)
+    if (!work.starts.empty())
       project_batches<decltype(is), true>(work, begin, end, rule, first, guards);
     else
       project_batches<decltype(is), false>(work, begin, end, rule, first, guards);
@@ -290,9 +297,11 @@ class FastPbd {
       const Coloured colours = coloured(input.system.lists[std::size_t(kind)], input.model.positions.size());
       for (std::size_t colour = 0; colour + 1 < colours.first.size(); ++colour) {
         const std::size_t before = batches.size(), end = colours.first[colour + 1];
-        for (std::size_t begin = colours.first[colour]; begin < end; begin += lanes)
+        for (std::size_t begin = colours.first[colour], next; begin < end; begin = next) {
+          next = end_of_batch(colours.list, begin, end);
           fill(batches.emplace_back(), std::get<Softnesses<decltype(is)>>(work_.softnesses), colours.list,
-               begin, std::min(begin + lanes, end));
+               begin, next);
+        }
         turns_.push_back({kind, before, batches.size()});
       }
       all += batches.size();
@@ -313,7 +322,8 @@ class FastPbd {
     auto& v = state.velocities;
     auto& x = work_.x;
     x.resize(state.positions.size());
-    work_.starts.resize(damped(settings) ? x.size() : 0);
+    const bool damped = any_material(*model_, settings, tetpbd::damped);
+    work_.starts.resize(damped ? x.size() : 0);
     predicted_.resize(x.size());
     const auto move_to = [&](std::size_t i, const glm::dvec3& p) {
       x[i].row = Row{p.x, p.y, p.z, inverse_masses[i]};
@@ -329,7 +339,7 @@ class FastPbd {
       };
       GuardCounts counts{};
       for (int s = 0; s < plan.substeps; ++s) {
-        if (damped(settings)) std::copy(&x[begin], &x[end], &work_.starts[begin]);
+        if (damped) std::copy(&x[begin], &x[end], &work_.starts[begin]);
         if (contact.wanted()) {
           barrier.wait(thread);
           if (thread == 0) contact.prepare(substep, s, inverse_masses, work_, v);
@@ -342,7 +352,7 @@ class FastPbd {
         for (int iteration = 0; iteration < plan.iterations; ++iteration) {
           solve(settings, plan.h, thread, threads, iteration == 0, barrier, counts);
           for_each_free_vertex([&](std::size_t i) {
-            move_to(i, substep.out_of_obstacles(s, x[i].position(), predicted_[i], v[i]));
+            move_to(i, substep.out_of_obstacles(s, i, x[i].position(), predicted_[i], v[i]));
           });
         }
         for_each_free_vertex([&](std::size_t i) {
@@ -377,6 +387,16 @@ class FastPbd {
   // moved about 2.
   static constexpr std::size_t batches_of_a_useful_thread = 2;
 
+  // Those of a batch have k and damping in common.
+  static std::size_t end_of_batch(const ConstraintList& list, std::size_t begin, std::size_t end) {
+    std::size_t next = std::min(begin + lanes, end);
+    const auto like_first = [&](std::size_t c) {
+      return list.stiffness[c] == list.stiffness[begin] && list.damping[c] == list.damping[begin];
+    };
+    while (!list.stiffness.empty() && !like_first(next - 1)) --next;
+    return next;
+  }
+
   template <class Kind>
   static void fill(Batch<Kind>& batch, Softnesses<Kind>& softnesses, const ConstraintList& list,
                    std::size_t begin, std::size_t end) {
@@ -384,6 +404,7 @@ class FastPbd {
                           components = std::size_t(Kind::row.components);
     batch.count = std::uint32_t(end - begin);
     if (!list.compliance.empty()) softnesses.emplace_back();
+    if (!list.stiffness.empty()) batch.stiffness = list.stiffness[begin], batch.damping = list.damping[begin];
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const std::size_t c = begin + (lane < batch.count ? lane : 0);
       for (std::size_t j = 0; j < arity; ++j) batch.vertices[j][lane] = list.vertices[c * arity + j];

@@ -20,13 +20,18 @@ template <class real>
 struct Rule {
   real k, limit, a, gamma, share;
   double softness;  ///< of a material's compliance: 1/s^2, of rates 1/s
-  Rule(const Settings& settings, double h, std::size_t kind, double longest, double omega = 1)
-      : k(real(settings.stiffness[kind])), limit(real(longest)) {
-    const bool rate = constraint_kinds[kind].rate;
-    softness = rate ? 1 / h : 1 / (h * h);
+  double h, omega;
+  Rule(const Settings& settings, double substep, std::size_t kind, double longest, double relaxation = 1)
+      : limit(real(longest)), h(substep), omega(relaxation) {
+    softness = constraint_kinds[kind].rate ? 1 / h : 1 / (h * h);
     a = real(settings.compliance[kind] / (h * h));
-    gamma = real(settings.constraint_damping / h);
-    share = (rate ? 1 : 1 + gamma) / real(omega);
+    set(settings.stiffness[kind], settings.constraint_damping, constraint_kinds[kind]);
+  }
+  /// Of a body with a material of its own; damping in s.
+  void set(double stiffness, double damping, const ConstraintKind& kind) {
+    k = real(stiffness), gamma = real(damping / h);
+    const bool undamped = kind.rate || kind.components > 1;  // dashpots are in place of damping of these
+    share = (undamped ? 1 : 1 + gamma) / real(omega);
   }
 };
 
@@ -87,7 +92,7 @@ template <class Kind, class real, class Vertices>
 /// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
 /// finer: their rounding is what moves the centre of a free body then.
 inline double longest_correction(const Model& model, const Settings& settings) {
-  return splits_masses(settings) ? model.size / 64 : model.size;
+  return splits_masses(model, settings) ? model.size / 64 : model.size;
 }
 
 /// `jacobi`: all corrections from the same positions, averaged with omega / n_i, or with
@@ -109,7 +114,7 @@ class CpuPbd {
         for (std::size_t v = 0; v < items[c].rest.size(); ++v)
           items[c].rest[v] = real(list.rest[c * items[c].rest.size() + v]);
       }
-      compliances_[std::size_t(k)] = list.compliance;
+      own_[std::size_t(k)] = {list.compliance, list.stiffness, list.damping};
     });
   }
 
@@ -120,7 +125,7 @@ class CpuPbd {
   /// triggered.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    Sweep sweep, double time = 0) {
-    const bool jacobi = sweep == Sweep::jacobi, soft = compliant(settings);
+    const bool jacobi = sweep == Sweep::jacobi, soft = any_material(*model_, settings, compliant);
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(*model_, settings) : model_->size;
     const Plan plan = plan_for(settings);
@@ -130,12 +135,12 @@ class CpuPbd {
     auto& v = state.velocities;
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
-    if (jacobi && splits_masses(settings))
+    if (jacobi && splits_masses(*model_, settings))
       for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
     GuardCounts guards{};
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
     for (int s = 0; s < plan.substeps; ++s) {
-      if (damped(settings)) start = x;
+      if (any_material(*model_, settings, damped)) start = x;
       contact.prepare(substep, s, inverse_masses, vertices, v);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
@@ -143,12 +148,14 @@ class CpuPbd {
       for (int iteration = 0; iteration < plan.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
         for_each_kind([&](auto kind, int k) {
-          const Rule<real> rule(settings, plan.h, std::size_t(k), longest,
-                                jacobi && soft ? settings.omega : 1);
-          const std::vector<double>& own = compliances_[std::size_t(k)];
-          const double* compliance = own.empty() ? nullptr : own.data();
+          Rule<real> rule(settings, plan.h, std::size_t(k), longest, jacobi && soft ? settings.omega : 1);
+          const Own& own = own_[std::size_t(k)];
+          const double* compliance = own.compliance.empty() ? nullptr : own.compliance.data();
+          std::size_t number = 0;
           for (auto& item : std::get<Items<decltype(kind)>>(items_)) {
             if (iteration == 0) item.multipliers = {};
+            if (!own.stiffness.empty())
+              rule.set(own.stiffness[number], own.damping[number], kind.row), ++number;
             project<decltype(kind)>(item.vertices.data(), item.rest.data(), compliance, rule,
                                     item.multipliers.data(), vertices, guards);
             if (compliance) compliance += decltype(kind)::row.components;
@@ -157,7 +164,7 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
-          x[i] = substep.out_of_obstacles(s, x[i], predicted[i], v[i]);
+          x[i] = substep.out_of_obstacles(s, i, x[i], predicted[i], v[i]);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)
@@ -190,7 +197,11 @@ class CpuPbd {
   PairContact pairs_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;
-  std::array<std::vector<double>, kind_count> compliances_;  // of a material, else empty
+  // Of materials; else empty.
+  struct Own {
+    std::vector<double> compliance, stiffness, damping;
+  };
+  std::array<Own, kind_count> own_;
 };
 
 }  // namespace tetpbd

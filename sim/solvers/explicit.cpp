@@ -25,7 +25,7 @@ double stiffening_for(double stiffer, double stability) {
 }
 
 double explicit_substeps(const Model& model, const Settings& s) {
-  const ConstraintSystem system = build_constraints(model.rest, s);
+  const ConstraintSystem system = build_constraints(model, s);
   const ReferenceInput input{model, system, s, model.inverse_masses};
   const double longest = stable_step(input, s.compliance, model.rest.positions, 12);
   return std::max(1.0, std::ceil(s.dt / (s.stability * longest)));

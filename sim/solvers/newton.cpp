@@ -175,10 +175,11 @@ void retune(Sim& sim, Newton& n, const Settings* before) {
   const auto forces = [](const Settings& s) {
     return std::tuple(s.compliance, s.constraint_damping, plan_for(s).h);
   };
-  const bool others = !same_constraints(*before, sim.settings);
+  const bool others = !same_constraints(*sim.model, *before, sim.settings);
   for (std::size_t k = 0; others && k < kind_count; ++k) {
     write(mesh, n.layout.constraints[k].values, to_floats(sim.system.lists[k].rest));
     write(mesh, n.layout.constraints[k].compliances, to_floats(sim.system.lists[k].compliance));
+    write(mesh, n.layout.constraints[k].dampings, to_floats(sim.system.lists[k].damping));
   }
   if (others || forces(*before) != forces(sim.settings)) begin_refresh(sim, n);
 }

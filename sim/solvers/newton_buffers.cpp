@@ -1,11 +1,11 @@
 #include "sim/solvers/newton_buffers.h"
 
-#include "sim/contact/obstacles.h"
-
 #include <fmt/format.h>
 
 #include <bit>
 #include <cmath>
+
+#include "sim/contact/obstacles.h"
 
 namespace tetpbd {
 
@@ -102,6 +102,9 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
   add_by_kind("compliances", [&](const std::string& name, List list, auto& of_kind) {
     of_kind.compliances = to.mesh.add<float>(name, list.compliance.size());
   });
+  add_by_kind("dampings", [&](const std::string& name, List list, auto& of_kind) {
+    of_kind.dampings = to.mesh.add<float>(name, list.damping.size());
+  });
 
   to.centres = to.coarse.add<glm::vec4>("centres", sizes.aggregates);
   to.coarse_inverse = to.coarse.add<glm::vec4>("coarse_inverse", sizes.unknowns() * sizes.coarse_row());
@@ -166,6 +169,7 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
     put(contents, layout.constraints[k].vertices, system.lists[k].vertices);
     put(contents, layout.constraints[k].values, to_floats(system.lists[k].rest));
     put(contents, layout.constraints[k].compliances, to_floats(system.lists[k].compliance));
+    put(contents, layout.constraints[k].dampings, to_floats(system.lists[k].damping));
   }
   return contents;
 }

@@ -47,7 +47,7 @@ struct NewtonBuffers {
   Range<newton::FreeBody> free_bodies;
   struct Constraints {
     Range<std::uint32_t> vertices;
-    Range<float> values, compliances;
+    Range<float> values, compliances, dampings;
   };
   std::array<Constraints, kind_count> constraints;
   Range<glm::vec4> centres, coarse_inverse;

@@ -64,7 +64,8 @@ glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList&
     return Formulas<double>{}.neo_hookean_part(x.data(), rest, &list.compliance[2 * c], i, j).block;
   } else {
     const double a = list.compliance.empty() ? settings.compliance[index_of<Kind>] : list.compliance[c];
-    const double held = (Kind::row.rate ? 0 : 1) + (Kind::row.rate ? 1 : settings.constraint_damping) / h;
+    const double held =
+        (Kind::row.rate ? 0 : 1) + (Kind::row.rate ? 1 : list.damping_at(c, settings.constraint_damping)) / h;
     const auto value = Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest));
     return held / a * glm::outerProduct(value.gradient[i], value.gradient[j]);
   }

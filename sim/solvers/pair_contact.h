@@ -43,7 +43,11 @@ class PairContact {
       }
       if (!(weight > 0)) continue;
       const double push_most = mesh_.edge / 10;  // correct.glsl
-      const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, settings.friction);
+      const auto friction = [&](std::uint32_t vertex) {
+        return body_at(*model_, vertex).friction.value_or(settings.friction);
+      };
+      const double both = Formulas<double>{}.mean_friction(friction(vertices[0]), friction(vertices[3]));
+      const auto by = Formulas<double>{}.meeting_correction(m, way, push_most, both);
       for (std::size_t j = 0; j < 4; ++j) {
         const double factor = m.weights[j] * inverse_masses[vertices[j]] / weight;
         x[vertices[j]] += factor * (by.stopped + by.pushed), stopped[vertices[j]] += factor * by.stopped;

@@ -77,7 +77,7 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
   result.vertices.resize(chunks * result.largest);
   const auto write_record = [&](const ConstraintList& list, const Record& record) {
     std::vector<std::uint32_t> words = {record[0]};
-    for (const auto* values : {&list.rest, &list.compliance}) {
+    for (const auto* values : {&list.rest, &list.compliance, &list.stiffness, &list.damping}) {
       const std::size_t each = values->size() / list.count();
       for (std::size_t v = 0; v < each; ++v)
         words.push_back(std::bit_cast<std::uint32_t>(float((*values)[record[1] * each + v])));

@@ -21,7 +21,7 @@ struct Patches {
   /// `largest` per chunk: the vertex, and the number of constraints on it as float bits.
   std::vector<std::array<std::uint32_t, 2>> vertices;
   /// Constraints, as many pairs of words each as record_pairs() says: its vertices in the chunk, a byte each;
-  /// rest values and a material's compliances as float bits.
+  /// rest values, a material's compliances, and where bodies differ k and damping, as float bits.
   std::vector<std::array<std::uint32_t, 2>> records;
   std::size_t largest = 0, most_owned = 0;  ///< vertices, owned ones, of any chunk
   bool chunked = false;                     ///< any patch has several chunks
@@ -29,7 +29,9 @@ struct Patches {
 
 /// Pairs of words of a record of the list.
 inline std::size_t record_pairs(const ConstraintList& list) {
-  return (1 + (list.rest.size() + list.compliance.size()) / std::max<std::size_t>(list.count(), 1) + 1) / 2;
+  const std::size_t values =
+      list.rest.size() + list.compliance.size() + list.stiffness.size() + list.damping.size();
+  return (1 + values / std::max<std::size_t>(list.count(), 1) + 1) / 2;
 }
 
 /// Each constraint in one patch of at most `most`; all its vertices are owned.

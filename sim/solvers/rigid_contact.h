@@ -11,15 +11,23 @@
 
 namespace tetpbd {
 
-/// Whether hard bodies are carried: rigid_in_contact(), and there is something to touch.
+/// Whether hard bodies are carried: rigid_in_contact(), and there is something to touch. Beside a soft one
+/// none is: a kernel would need more than 8 storage blocks for records and multipliers.
 inline bool touches_rigidly(const Model& model, const Settings& settings) {
-  return rigid_in_contact(settings) && has_obstacles(model, settings);
+  const auto is_rigid = [&](const Body& body) {
+    return rigid_in_contact(settings, body_material(body, settings));
+  };
+  return has_obstacles(model, settings) && !any_material(model, settings, compliant) &&
+         std::ranges::any_of(model.bodies, is_rigid);
 }
 
 class RigidContact {
  public:
   RigidContact(const Model& model, const Settings& settings)
-      : model_(model), wanted_(touches_rigidly(model, settings)), carried_(model.positions.size()) {}
+      : model_(model),
+        settings_(settings),
+        wanted_(touches_rigidly(model, settings)),
+        carried_(model.positions.size()) {}
 
   bool wanted() const { return wanted_; }  ///< else prepare() does nothing
   /// Whether vertex i belongs to a body that touches: then its velocity is the body's in the whole substep.
@@ -37,7 +45,7 @@ class RigidContact {
                std::vector<glm::dvec3>& v) {
     if (!wanted_) return;
     for (const Body& body : model_.bodies) {
-      if (!body.one_piece) continue;
+      if (!body.one_piece || !rigid_in_contact(settings_, body_material(body, settings_))) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto near = near_contacts(s, substep, inverse_masses, place, v, first, end);
       const bool moved = !near.empty() && move(s, substep, near, place, v, first, end);
@@ -101,7 +109,7 @@ class RigidContact {
       double most = loose;
       std::size_t place = 0;
       // Of vertex i at arm: a normal and the gap there, how the obstacle moves, brakes and rebounds.
-      const auto consider = [&](const glm::dvec3& arm, const glm::dvec3& n, double gap,
+      const auto consider = [&](std::size_t i, const glm::dvec3& arm, const glm::dvec3& n, double gap,
                                 const glm::dvec3& surface, const MovingObstacle& o) {
         const double least =
             Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
@@ -110,7 +118,7 @@ class RigidContact {
         const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
         if (!(over > most)) return;
         most = over, places[std::size_t(count)] = place,
-        worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, o.friction);
+        worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, friction_on(o, model_, i));
       };
       for (const std::size_t i : near) {
         const glm::dvec3 arm = at(i) - body.centre;
@@ -118,7 +126,7 @@ class RigidContact {
           const glm::dvec3 surface = o.velocity_at(at(i)),
                            way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
           const auto ahead = o.surface_ahead(at(i), s.h * surface + way, way);
-          consider(arm, ahead.normal, ahead.distance, surface, o);
+          consider(i, arm, ahead.normal, ahead.distance, surface, o);
         }
       }
       const auto taken = places.begin() + count;
@@ -132,6 +140,7 @@ class RigidContact {
   }
 
   const Model& model_;
+  const Settings& settings_;
   bool wanted_;
   std::vector<char> carried_;
 };

@@ -50,7 +50,8 @@ static const std::vector<SolverMode> rows = {
      .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions: for machines without a GPU",
      .create = MADE_BY(create_cpu_fast_solver),
      .pairs = true,
-     .cpu = true},
+     .cpu = true,
+     .all_cores = true},
     {.name = "explicit",
      .help = "leapfrog on the GPU, of what has a material or compliance, in as many substeps as stay stable: "
              "for what is soft",
@@ -138,6 +139,7 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
                        {"INDEX", std::to_string(words.size())},
                        {"PAIRS", std::to_string(record_pairs(system.lists[k]))},
                        {"MATERIAL", system.lists[k].compliance.empty() ? "0" : "1"},
+                       {"OWN", system.lists[k].stiffness.empty() ? "0" : "1"},
                        {"PROJECT", constraint_kinds[k].components == 1 ? "project" : "project_two"},
                        {"RATE", constraint_kinds[k].rate ? "1" : "0"},
                        {"VALUES", std::to_string(constraint_kinds[k].values)},

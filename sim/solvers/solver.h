@@ -88,6 +88,7 @@ struct SolverMode {
   bool pairs = false;      ///< and contact between bodies
   bool jacobi = false;     ///< corrections are averaged or masses split
   bool cpu = false;        ///< steps on the CPU: `Sim::host` is the state
+  bool all_cores = false;  ///< of it
   bool published = false;  ///< as in the paper: corrections are averaged, hard bodies rebound by them
   bool offered = true;     ///< in --mode and the window; else in bench and compare alone
   int iterations = 1, substeps = 20;  ///< where nothing is asked for; of leapfrog the least, 1
@@ -108,8 +109,9 @@ ShaderWords scheme_words(const SolverInput& input);
 /// Definitions for the shaders that move vertices (vertex.glsl).
 std::vector<std::string> vertex_defines(const SolverInput& input);
 /// Words for the shaders of the kinds present: KIND, ARITY, INDEX (among those present), KIND_ROW and
-/// KIND_COLUMN (of the stiffness), PAIRS (of a record), MATERIAL (1: it has compliances of its own), PROJECT
-/// (the file that projects it), RATE (1: only its change counts), VALUES (at rest).
+/// KIND_COLUMN (of the stiffness), PAIRS (of a record), MATERIAL (1: it has compliances of its own), OWN
+/// (1: and k and damping), PROJECT (the file that projects it), RATE (1: only its change counts), VALUES (at
+/// rest).
 std::vector<Substitutions> kind_words(const ConstraintSystem& system);
 /// The records of one list (layout.glsl: Record2, Record4).
 Buffer record_buffer(const ConstraintList& list, const std::string& kind);

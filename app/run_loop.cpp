@@ -28,6 +28,8 @@ void print_error(const std::string& line) {
   std::fflush(stderr);
 }
 
+void print_gl_error(const char* text) { print_error(fmt::format("GL error: {}\n", text)); }
+
 Progress::Progress(const std::string& of, long steps, bool force, double lines_every)
     : label(of), total(steps), bar(force || isatty(2)), every(lines_every) {
   if (!bar) last = start;

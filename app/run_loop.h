@@ -27,6 +27,8 @@ inline double seconds_since(std::chrono::steady_clock::time_point begin) {
 
 /// On standard error, even where nothing can be written there.
 void print_error(const std::string& line);
+/// For count_gl_errors().
+void print_gl_error(const char* text);
 
 /// A line on standard error that is written over, on a terminal or if forced; elsewhere a new one every so
 /// many seconds.

@@ -159,6 +159,7 @@ int run_selftest(int gpu) {
     const Capabilities& device = context.capabilities();
     fmt::print("{}, OpenGL {}{}\n", device.renderer, device.version,
                device.software ? ": a SOFTWARE renderer on the CPU" : "");
+    count_gl_errors(print_gl_error);
     const int before = gl_error_count();
     check_steps(checks);
     check_motions(checks);

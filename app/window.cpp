@@ -465,6 +465,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   Desktop desktop(options.size[0], options.size[1], "tetpbd");
   Session s;  // after the desktop: its GL objects go before the context does
   s.gl = load_gl();
+  count_gl_errors(print_gl_error);
   if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);
   s.samples = options.samples;
   s.first_samples = options.samples;

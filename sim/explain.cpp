@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/keep_bindings.h"
 #include "sim/snapshot.h"
 
 namespace tetpbd {
@@ -23,6 +24,7 @@ void count_step(Sim& sim) {
 }  // namespace
 
 Explanation explain(Sim& sim, int timed_steps) {
+  const KeepBindings kept;
   Pairs& p = sim.pairs;
   Explanation result;
   const auto add = [&](const Buffer& buffer) {

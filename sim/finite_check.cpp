@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sim/keep_bindings.h"
 #include "sim/snapshot.h"
 
 namespace tetpbd {
@@ -112,6 +113,7 @@ void check_step(Sim& sim) {
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait) {
   FiniteCheck& check = sim.check;
   if (check.found || on_cpu(sim)) return check.found;
+  const KeepBindings kept;
   check_context();
   take_answer(check, wait);
   ask(sim);
@@ -125,6 +127,7 @@ bool restore_checkpoint(Sim& sim) {
   const auto after = std::ranges::find_if(
       check.kept, [&](const Snapshot& kept) { return kept.step.steps >= check.found->step; });
   if (after == check.kept.begin()) return false;
+  const KeepBindings kept;
   // Both are made anew while it is gone back to.
   const Snapshot then = *std::prev(after);
   const Buffer from = std::exchange(check.checkpoint, {});

@@ -10,6 +10,7 @@
 
 #include "shaders/metrics/layout.glsl"
 #include "sim/contact/moving_obstacle.h"
+#include "sim/keep_bindings.h"
 #include "sim/material.h"
 
 namespace tetpbd {
@@ -82,6 +83,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
 }  // namespace
 
 Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
+  const KeepBindings kept;
   // Those that are measured; further kinds have no measure.
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
   const bool all_made = made.present.size() >= measured_kinds &&
@@ -130,6 +132,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
 }
 
 void measure(Metrics& m, const Sim& sim) {
+  const KeepBindings kept;
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
@@ -169,7 +172,9 @@ void measure(Metrics& m, const Sim& sim) {
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {
-  if (m.pending.empty() || !read(m, m.pending.front(), wait)) return std::nullopt;
+  if (m.pending.empty()) return std::nullopt;
+  const KeepBindings kept;
+  if (!read(m, m.pending.front(), wait)) return std::nullopt;
   const Measurement result = m.pending.front().result;
   m.pending.pop_front();
   return result;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sim/keep_bindings.h"
 #include "sim/overlap.h"
 #include "sim/sim.h"
 
@@ -281,6 +282,7 @@ void add_carried(Carried& all, Pairs& p) {
 }
 
 PairNumbers touched(Sim& sim) {
+  const KeepBindings kept;
   Pairs& p = sim.pairs;
   if (p)
     for (int turn = 0; turn < 2; ++turn) take_answer(sim), ask(p);

@@ -12,6 +12,7 @@
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
 #include "sim/hash.h"
+#include "sim/keep_bindings.h"
 #include "sim/material.h"
 #include "sim/parallel.h"
 #include "sim/solvers/cpu_pbd.h"
@@ -223,6 +224,7 @@ double half_substep_fall(const Settings& settings, const Plan& plan) {
 }
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
+  const KeepBindings kept;
   check_settings(*model, settings);
   ConstraintSystem system = build_constraints(*model, settings);
   Sim sim = make_sim(std::move(model), settings, tuning, std::move(system));
@@ -285,12 +287,14 @@ void forget_contacts(Sim& sim) {
 }
 
 void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
+  const KeepBindings kept;
   if (!share_kernels(*sim.model, *model)) return remake(sim, sim.settings, model);
   sim.model = std::move(model);
   write_step_block(sim);
 }
 
 void reset(Sim& sim) {
+  const KeepBindings kept;
   if (sim.guard_counts) sim.guard_counts.clear();
   sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
@@ -304,6 +308,7 @@ void forget_all(Sim& sim) {
 }
 
 void start_with(Sim& sim, State state, double fall) {
+  const KeepBindings kept;
   start_from(sim, state);
   add_upwards(sim, state, half_substep_fall(sim.settings, sim.plan) - fall);
   adopt(sim, state);
@@ -358,6 +363,7 @@ void adopt_settings(Sim& sim, const Settings& settings) {
 }  // namespace
 
 void apply_settings(Sim& sim, const Settings& settings) {
+  const KeepBindings kept;
   check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
     return std::tuple(s.mode, any_material(*sim.model, s, compliant), touches_rigidly(*sim.model, s),
@@ -369,13 +375,17 @@ void apply_settings(Sim& sim, const Settings& settings) {
     remake(sim, settings, sim.model);
 }
 
-void rebuild_shaders(Sim& sim) { remake(sim, sim.settings, sim.model); }
+void rebuild_shaders(Sim& sim) {
+  const KeepBindings kept;
+  remake(sim, sim.settings, sim.model);
+}
 
 void add_guards(Sim& sim, const GuardCounts& counts) {
   for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += counts[g];
 }
 
 GuardCounts guard_counts(Sim& sim) {
+  const KeepBindings kept;
   if (sim.guard_counts) {
     glMemoryBarrier(GL_ATOMIC_COUNTER_BARRIER_BIT);
     const auto now = sim.guard_counts.read_all<GLuint>();
@@ -394,10 +404,12 @@ State state_of(const std::vector<Position>& positions, const std::vector<Velocit
 
 State read_state(const Sim& sim) {
   if (on_cpu(sim)) return sim.host;
+  const KeepBindings kept;
   return state_of(sim.positions.read_all<Position>(), sim.velocities.read_all<Velocity>());
 }
 
 std::uint64_t state_hash(const Sim& sim) {
+  const KeepBindings kept;
   std::uint64_t hash = fnv_basis;
   const auto add = [&](const glm::vec3& value) { hash = hash_values(std::span(&value.x, 3), hash); };
   for (const Position& p : sim.positions.read_all<Position>()) add(p.high), add(p.low);
@@ -421,6 +433,7 @@ void write_inverse_mass(Sim& sim, std::uint32_t vertex, double value) {
 }  // namespace
 
 void pin(Sim& sim, std::uint32_t vertex) {
+  const KeepBindings kept;
   write_inverse_mass(sim, vertex, 0);
   const Velocity still{};
   sim.velocities.write(vertex * sizeof still, sizeof still, &still);
@@ -428,12 +441,14 @@ void pin(Sim& sim, std::uint32_t vertex) {
 }
 
 void unpin(Sim& sim, std::uint32_t vertex) {
+  const KeepBindings kept;
   write_inverse_mass(sim, vertex, sim.model->inverse_masses[vertex]);
 }
 
 bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }
 
 void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
+  const KeepBindings kept;
   const Position p = to_gpu(position, sim.inverse_masses[vertex], sim.system.at_vertex[vertex]);
   sim.positions.write(vertex * sizeof(Position), sizeof p, &p);
   sim.needs_predict = true;

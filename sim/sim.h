@@ -2,6 +2,14 @@
 // step.cpp takes steps, sim.cpp makes, sets and reads simulations, finite_check.cpp goes back to good states,
 // explain.cpp says what one costs. Whoever uses it calls these functions and reads its members; only they
 // write them.
+//
+// In a program that uses GL itself, a simulation belongs to the context that is current when it is made,
+// which has to be current in each call and when it is destroyed. After a call the program in use, textures
+// and the buffers of generic targets are bound as they were before it (keep_bindings.h); vertex arrays,
+// framebuffers, pixel storage and all else that drawing uses are never touched. Indexed buffers are not put
+// back, because there are too many to ask for: calls bind uniform buffers 0 and 1, storage buffers from 0 on
+// and atomic counter buffer 0. When a simulation is destroyed, GL unbinds its buffers there, and Mesa then
+// unbinds what the generic target has as well. GL errors that nobody asked for are dropped.
 #pragma once
 
 #include <memory>

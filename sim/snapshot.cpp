@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sim/keep_bindings.h"
 namespace tetpbd {
 
 namespace {
@@ -52,6 +53,7 @@ std::size_t snapshot_memory(const Sim& sim) {
 }
 
 Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_only) {
+  const KeepBindings kept;
   Snapshot taken{sim.settings, sim.plan, sim};
   taken.found = sim.check.found, taken.at = at;
   if (on_cpu(sim)) taken.host = sim.host;
@@ -69,6 +71,7 @@ Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_onl
 }
 
 void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
+  const KeepBindings kept;
   if (then.settings == sim.settings) return restore_all(sim, then, from);
   State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
   forget_all(sim);

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "sim/contact/moving_obstacle.h"
+#include "sim/keep_bindings.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -73,6 +74,7 @@ void move_rigid_bodies(Sim& sim) {
 }  // namespace
 
 void step(Sim& sim) {
+  const KeepBindings kept;  // a caller may use GL as well
   sim.solver.prepare(sim);  // late answers, number of substeps, preconditioner
   const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
   if (on_cpu(sim)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sim/keep_bindings.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -26,6 +27,7 @@ bool read_convergence(Sim& sim) {
 }
 
 const Watch& watched(Sim& sim) {
+  const KeepBindings kept;
   if (mode_of(sim.settings).implicit)  // the answer that is under way, then of what came since
     for (int turn = 0; turn < 2; ++turn) read_convergence(sim);
   return sim.watch;

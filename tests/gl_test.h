@@ -29,5 +29,8 @@ inline Measurement measure_now(Metrics& metrics, const Sim& sim) {
 struct GlTest {
   tetpbd::HeadlessContext context{-1, true};
   int errors = tetpbd::gl_error_count();
+  GlTest() {
+    tetpbd::count_gl_errors([](const char* text) { MESSAGE("GL error: ", std::string(text)); });
+  }
   ~GlTest() { CHECK(tetpbd::gl_error_count() == errors); }
 };

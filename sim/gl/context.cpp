@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <atomic>
-#include <cstdio>
 
 #include "sim/error.h"
 
@@ -18,11 +17,11 @@ namespace {
 std::atomic<int> error_count = 0;
 
 void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* text,
-                           const void*) {
+                           const void* report) {
   // What the shader compiler finds is thrown as an Error with file and line.
   if (type != GL_DEBUG_TYPE_ERROR || source == GL_DEBUG_SOURCE_SHADER_COMPILER) return;
   ++error_count;
-  std::fprintf(stderr, "GL error: %s\n", text);
+  if (report) reinterpret_cast<GlErrorReport>(report)(text);
 }
 
 std::string gl_string(GLenum name) {
@@ -105,12 +104,14 @@ Capabilities load_gl() {
   if (gl_integer(GL_MAJOR_VERSION) * 10 + gl_integer(GL_MINOR_VERSION) < 43)
     throw Error("OpenGL 4.3 is needed", "the driver offers " + gl_string(GL_VERSION),
                 "use a newer driver or another GPU (tetpbd info lists them)", 1);
-  if (gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT) {
-    glEnable(GL_DEBUG_OUTPUT);
-    glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
-    glDebugMessageCallback(on_message, nullptr);
-  }
   return capabilities();
+}
+
+void count_gl_errors(GlErrorReport report) {
+  if (!(gl_integer(GL_CONTEXT_FLAGS) & GL_CONTEXT_FLAG_DEBUG_BIT)) return;
+  glEnable(GL_DEBUG_OUTPUT);
+  glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  glDebugMessageCallback(on_message, reinterpret_cast<const void*>(report));
 }
 
 void check_context() {
@@ -153,6 +154,7 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
       if (context_ == EGL_NO_CONTEXT) continue;
       display_ = display;
       capabilities_ = load_gl();
+      count_gl_errors();
       return;
     }
   throw Error("no OpenGL 4.3 context", device < 0 ? "any device of EGL" : fmt::format("--gpu {}", device),

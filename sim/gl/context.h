@@ -22,7 +22,11 @@ inline bool is_software_renderer() { return capabilities().software; }
 
 /// Loads GL functions for the current context and checks for GL 4.3. Throws Error with the version found.
 Capabilities load_gl();
-/// Number of GL debug messages of type ERROR since the start (only a debug context counts them).
+using GlErrorReport = void (*)(const char* text);
+/// Puts a debug callback into the current context if it is a debug context: messages of type ERROR are
+/// counted from now on, and their text goes to `report`, if there is one.
+void count_gl_errors(GlErrorReport report = nullptr);
+/// Number of messages since the start, of all contexts that are counted.
 int gl_error_count();
 
 /// Number of work-groups of `size` invocations that cover `count`.
@@ -37,7 +41,8 @@ std::vector<std::string> list_devices();
 /// Makes a context current for the calling thread until destroyed. It draws to framebuffer objects only.
 class HeadlessContext {
  public:
-  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3, GPUs before software.
+  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3, GPUs before software. With
+  /// `debug`, GL errors are counted.
   explicit HeadlessContext(int device = -1, bool debug = false);
   ~HeadlessContext();
   HeadlessContext(const HeadlessContext&) = delete;

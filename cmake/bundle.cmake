@@ -1,6 +1,7 @@
 # `cmake --install` and CPack make a folder that runs from anywhere: bin/tetpbd, lib/ with the libraries it needs except
 # libc's and OpenGL's own (those belong to the machine and its driver; GLEW's X11 client libraries come along), bin/tetgen,
-# share/tetpbd with the models and the licences of all that is in it.
+# share/tetpbd with the models and the licences of all that is in it. Component `program`, which alone the archive holds.
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
 set_target_properties(tetpbd PROPERTIES INSTALL_RPATH "$ORIGIN/../lib")
 target_link_options(tetpbd PRIVATE -Wl,--disable-new-dtags)
 install(TARGETS tetpbd RUNTIME DESTINATION bin)
@@ -49,6 +50,7 @@ install(CODE [[
   endif()
 ]])
 set(CPACK_GENERATOR TGZ)
+set(CPACK_INSTALL_CMAKE_PROJECTS "${CMAKE_BINARY_DIR};tetpbd;program;/")
 set(CPACK_PACKAGE_FILE_NAME "tetpbd-${PROJECT_VERSION}-linux-${CMAKE_SYSTEM_PROCESSOR}")
 set(CPACK_PACKAGE_VENDOR "the tetpbd developers")
 include(CPack)

@@ -11,6 +11,7 @@
 
 #include "app/commands.h"
 #include "app/export.h"
+#include "app/files.h"
 #include "app/lanes.h"
 #include "app/record.h"
 #include "sim/did_you_mean.h"
@@ -296,6 +297,8 @@ void add_commands(CLI::App& app, Arguments& a) {
       "frames for other programs, vtk: ParaView; pc2: Blender's mesh cache with its OBJ; ply: surfaces; as "
       "often as --positions-every says (default: every 1/30 s)")
       ->check(one_of(export_formats));
+  add(run, "--dump-shaders", a.run.dump_shaders,
+      "folder for the text of each shader of the run as it is compiled, a file each");
   CLI::Option* replay = add(run, "--replay", a.run.replay,
                             "instead: what a record of tetpbd view --record says, lanes and all; with "
                             "--video, drawn at the speed it was played");
@@ -508,6 +511,10 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   return [a = std::move(arguments)] {
     if (a.start != start_view || !a.run.record.empty())
       catch_interrupts();  // else there is nothing to finish
+    if (!a.run.dump_shaders.empty()) {
+      make_output_folder(a.run.dump_shaders);
+      set_shader_dump(a.run.dump_shaders.string());
+    }
     return a.explain ? print_explanation(*a.opened, a.run.gpu, a.run.steps ? a.run.steps : 3) : a.start(a);
   };
 }

@@ -2,7 +2,9 @@
 #include <doctest/doctest.h>
 #include <png.h>
 
+#include <algorithm>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -199,6 +201,53 @@ TEST_CASE("help, version, info and explain answer") {
   const Outcome view = program("view", folder, "env -u DISPLAY -u WAYLAND_DISPLAY");
   CHECK(view.status == 2);
   CHECK(view.err.find("display") != std::string::npos);
+}
+
+TEST_CASE("dump-shaders writes each shader of a run as it is compiled") {
+  const Folder folder;
+  const auto dumped = [&](const std::string& arguments, const std::string& to) {
+    const Outcome outcome = program("run --scene beam " + arguments + " --dump-shaders " + to, folder);
+    CHECK(outcome.status == 0);
+    std::map<std::string, std::string> texts;
+    for (const auto& entry : fs::directory_iterator(folder.path / to))
+      texts[entry.path().filename().string()] = read(entry.path());
+    for (const auto& [name, text] : texts) {
+      CAPTURE(name);
+      CHECK(text.starts_with("#version 430 core\n"));
+      CHECK(text.find("void main()") != std::string::npos);
+      for (const char* left : {"\n#include", "#foreach", "$KIND"})
+        CHECK(text.find(left) == std::string::npos);
+    }
+    return std::pair(texts, outcome.out);
+  };
+  const auto [explained, table] = dumped("--mode constraint --explain", "explained");
+  CHECK(explained.contains("solve_constraint_stretch_bend_volume.comp"));
+  // No two of those that the table lists share a file.
+  std::istringstream lines(table.substr(table.find("work-groups")));
+  std::string line;
+  std::size_t kernels = 0;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && !line.starts_with("all, in a step")) ++kernels;
+  CAPTURE(table);
+  CHECK(kernels >= 3);
+  CHECK(explained.size() >= kernels);
+  const auto [drawn, said] = dumped("--mode node --steps 1 --png-every 1 --size 32x32", "a/b");
+  CHECK(drawn.contains("solve_node_stretch_bend_volume.comp"));
+  CHECK(drawn.at("solve_node_stretch_bend_volume.comp").find("Constraint4 volume(") != std::string::npos);
+  CHECK(std::ranges::any_of(drawn, [](const auto& file) { return file.first.ends_with(".vert"); }));
+  CHECK(std::ranges::any_of(drawn, [](const auto& file) { return file.first.ends_with(".frag"); }));
+
+  std::ofstream(folder.path / "file") << "of other content";
+  for (const char* to : {"file", "file/below", "/proc/nothing"}) {
+    const Outcome outcome =
+        program("run --scene beam --steps 1 --out none --dump-shaders " + std::string(to), folder);
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == 2);
+    CHECK(outcome.err.starts_with("tetpbd: "));
+    CHECK(outcome.err.find(to) != std::string::npos);
+    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+    CHECK(!fs::exists(folder.path / "none"));
+  }
 }
 
 TEST_CASE("a driver that is not there, or too old, gets one line and status 1") {

@@ -181,6 +181,10 @@ struct ShaderWords {
 /// Reads shaders from this folder; empty: those inside the program. TETPBD_SHADERS sets it at start.
 void set_shader_folder(const std::string& folder);
 const std::string& shader_folder();
+/// From now on each program writes the text that the compiler gets into this folder: a file for each stage,
+/// called by the program's label, with a number where another text has that name. Empty: no longer.
+void set_shader_dump(const std::string& folder);
+void dump_shader(const std::string& label, const std::string& stage, const std::string& text);
 /// Changes when a file of the folder changes; 0 without a folder.
 std::int64_t shader_folder_version();
 

@@ -67,6 +67,7 @@ Program::Program(std::string label, const std::vector<std::string>& stages, cons
     std::vector<std::string> files;
     const std::string text = head + shader_text(stage, words, files);
     text_ += text;
+    dump_shader(label_, stage, text);
     shaders.push_back(compile(stage, text, files));
     glAttachShader(id(), shaders.back().id());
   }

@@ -1,13 +1,16 @@
 #include <fmt/format.h>
 
+#include <cctype>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <ranges>
 #include <sstream>
 
 #include "sim/error.h"
+#include "sim/files.h"
 #include "sim/gl/gpu.h"
 
 namespace tetpbd {
@@ -17,6 +20,11 @@ namespace fs = std::filesystem;
 const std::vector<std::pair<std::string, std::string>>& embedded_shaders();
 
 namespace {
+
+struct Dump {
+  std::string folder;
+  std::map<std::string, std::string> texts;  // by file
+} dump;
 
 std::string chosen_folder = std::getenv("TETPBD_SHADERS") ? std::getenv("TETPBD_SHADERS") : "";
 
@@ -60,6 +68,22 @@ void set_shader_folder(const std::string& folder) {
 }
 
 const std::string& shader_folder() { return chosen_folder; }
+
+void set_shader_dump(const std::string& folder) { dump = {folder, {}}; }
+
+void dump_shader(const std::string& label, const std::string& stage, const std::string& text) {
+  if (dump.folder.empty()) return;
+  std::string name = label;
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-') c = '_';
+  const std::string ending = stage.substr(stage.rfind('.'));
+  for (int number = 1;; ++number) {
+    const std::string file = name + (number > 1 ? fmt::format("_{}", number) : "") + ending;
+    const auto [at, is_new] = dump.texts.emplace(file, text);
+    if (is_new) write_file(fs::path(dump.folder) / file, text);
+    if (at->second == text) return;
+  }
+}
 
 std::int64_t shader_folder_version() {
   if (shader_folder().empty()) return 0;

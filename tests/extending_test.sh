@@ -56,6 +56,11 @@ while IFS= read -r line; do
 done <"$page"
 end_section
 
+# Files that the page names are there, the new ones among them.
+grep -oE '`(app|render|shaders|sim|tests)/[A-Za-z0-9_/]+\.[a-z]+`' "$page" | tr -d '`' | sort -u | while IFS= read -r file; do
+  [[ -e copy/$file || -e $sources/$file ]] || fail "the page names $file"
+done
+
 # Without optimisation: the compiler is what takes long.
 launcher=$(command -v ccache || true)
 cmake -G Ninja -S copy -B build -DTETPBD_WERROR=ON -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 \

@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <exception>
 #include <numeric>
-#include <parallel/algorithm>
 #include <span>
 #include <vector>
 
@@ -43,10 +42,18 @@ void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
   parallel_for(count, least, std::forward<F>(f));
 }
 
-/// Sorts items none of which are equal.
+/// Sorts items none of which are equal. Not by __gnu_parallel::sort: that ends the program where a comparison
+/// throws or memory runs out.
 template <class T>
 void parallel_sort(std::span<T> items) {
-  __gnu_parallel::sort(items.begin(), items.end());
+  const std::size_t threads = std::size_t(std::max(omp_get_max_threads(), 1)), count = items.size();
+  std::size_t run = std::max<std::size_t>((count + threads - 1) / threads, 8192);
+  const auto at = [&](std::size_t i) { return items.begin() + std::ptrdiff_t(std::min(i, count)); };
+  parallel_for((count + run - 1) / run, 1, [&](std::size_t k) { std::sort(at(k * run), at((k + 1) * run)); });
+  for (; run < count; run *= 2)
+    parallel_for((count + 2 * run - 1) / (2 * run), 1, [&](std::size_t k) {
+      std::inplace_merge(at(2 * k * run), at((2 * k + 1) * run), at(2 * (k + 1) * run));
+    });
 }
 
 /// Values by key: those of k are values[first[k]] .. values[first[k + 1]], in the order of their items.

@@ -1,9 +1,11 @@
 // Mode cpu-fast: its colours, its arithmetic, and that the number of threads changes nothing.
 #include <doctest/doctest.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "sim/contact/obstacle_kinds.h"
 #include "sim/sim.h"
 #include "sim/solvers/colours.h"
 #include "sim/solvers/cpu_pbd.h"
@@ -43,7 +45,7 @@ State reference(const Sim& sim, GuardCounts& guards) {
   return state;
 }
 
-double distance(const State& a, const State& b) {
+double distance_between(const State& a, const State& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.positions.size(); ++i)
     largest = std::max(largest, glm::length(a.positions[i] - b.positions[i]));
@@ -114,8 +116,8 @@ TEST_CASE("a step of mode cpu-fast is Gauss-Seidel in double in the order of col
         GuardCounts guards;
         const State before = read_state(sim), expected = reference(sim, guards);
         step(sim);
-        CHECK(distance(read_state(sim), expected) < 1e-5);
-        CHECK(distance(read_state(sim), before) > 1e-3);
+        CHECK(distance_between(read_state(sim), expected) < 1e-5);
+        CHECK(distance_between(read_state(sim), before) > 1e-3);
       }
 }
 
@@ -151,4 +153,43 @@ TEST_CASE("hard states stay finite in mode cpu-fast, and its guards are counted 
     for (int s = 0; s < 50; ++s) step(sim);
     for (const glm::dvec3& p : read_state(sim).positions) CHECK(std::isfinite(p.x + p.y + p.z));
   }
+}
+
+namespace {
+
+// In place of an obstacle's distance; looks at nothing of its object, which is a Formulas.
+struct FailingDistance : Formulas<double> {
+  static inline int thread = 0;
+  Surface fail(Solid, vec3) {
+    if (omp_get_thread_num() == thread) throw std::runtime_error("no distance");
+    return {{0, 1, 0}, 1};
+  }
+};
+
+}  // namespace
+
+TEST_CASE("what fails in a thread of mode cpu-fast reaches the caller, and the others do not wait for it") {
+  GlTest gl;
+  auto model = std::make_shared<Model>(*skewed_block({6, 5, 4}, 0.2, "none"));
+  model->obstacles.emplace_back().kind = find_obstacle_kind("sphere");
+  // Rows are made once for all, so a row is spoilt and put right again.
+  auto& distance = const_cast<ObstacleKind*>(find_obstacle_kind("sphere"))->distance;
+  const auto right = distance;
+  for (const bool rigid : {false, true})
+    for (const unsigned threads : {1u, 3u})
+      for (FailingDistance::thread = 0; FailingDistance::thread < int(threads); ++FailingDistance::thread) {
+        if (rigid && FailingDistance::thread > 0) continue;  // the first alone looks at hard bodies
+        CAPTURE(rigid);
+        CAPTURE(threads);
+        Settings settings = fast(2, 3);
+        settings.rigid_contact = rigid;
+        Sim sim = create_sim(model, settings, {.threads = threads});
+        const State before = read_state(sim);
+        distance = static_cast<Formulas<double>::Distance>(&FailingDistance::fail);
+        CHECK_THROWS_WITH(step(sim), "no distance");
+        distance = right;
+        write_state(sim, before);
+        step(sim);
+        CHECK(distance_between(read_state(sim), before) > 0);
+      }
 }

@@ -73,6 +73,22 @@ TEST_CASE("parallel: sorting and grouping do not depend on threads") {
   }
 }
 
+TEST_CASE("parallel: what a comparison throws while sorting reaches the caller") {
+  struct Item {
+    int value;
+    bool operator<(const Item& other) const {
+      if (value == 150000) throw std::runtime_error("no order");
+      return value < other.value;
+    }
+  };
+  std::vector<Item> items;
+  for (int i = 0; i < 200001; ++i) items.push_back({i});
+  for (const unsigned count : counts) {
+    const Threads threads(count);
+    CHECK_THROWS_WITH(parallel_sort(std::span(items)), "no order");
+  }
+}
+
 TEST_CASE("parallel: models, constraints, patches and reports have the same bits for any number of threads") {
   omp_set_num_threads(1);
   const Model model = block_model();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <exception>
 #include <memory>
 #include <thread>
 
@@ -264,22 +265,45 @@ WIDEST void project_kind(Work& work, int kind, std::size_t begin, std::size_t en
 // those of the others for a while before it lets others run.
 class Barrier {
  public:
-  void set(int threads) { arrivals_ = std::vector<Arrivals>(std::size_t(threads)); }
+  explicit Barrier(std::size_t most) : threads(most), arrivals_(most) {}
+  std::size_t threads;  ///< at most as many as it was made for
+
+  /// No exception may leave a parallel region, so each thread's work ends here: one that fails lets the
+  /// others out of their waiting, and rethrow() throws what it threw.
+  template <class Work>
+  void run(Work&& work) noexcept {
+    try {
+      work();
+    } catch (const Abandoned&) {
+    } catch (...) {
+#pragma omp critical(barrier_failure)
+      if (!failure_) failure_ = std::current_exception();
+      failed_.store(true, std::memory_order_release);
+    }
+  }
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
   void wait(std::size_t thread) {
-    if (arrivals_.size() == 1) return;
+    if (threads == 1) return;
     const unsigned now = arrivals_[thread].count.load(std::memory_order_relaxed) + 1;
     arrivals_[thread].count.store(now, std::memory_order_release);
     int looks = 0;
-    for (const Arrivals& other : arrivals_)
-      while (int(other.count.load(std::memory_order_acquire) - now) < 0)
+    for (std::size_t other = 0; other < threads; ++other)
+      while (int(arrivals_[other].count.load(std::memory_order_acquire) - now) < 0) {
+        if (failed_.load(std::memory_order_acquire)) throw Abandoned();
         if (++looks > 4000) std::this_thread::yield();
+      }
   }
 
  private:
+  struct Abandoned {};
   struct alignas(64) Arrivals {
     std::atomic<unsigned> count = 0;
   };
   std::vector<Arrivals> arrivals_;  // by thread
+  std::atomic<bool> failed_ = false;
+  std::exception_ptr failure_;  // the first
 };
 
 // A colour of a kind: batches [begin, end).
@@ -330,7 +354,7 @@ class FastPbd {
     };
     for (std::size_t i = 0; i < x.size(); ++i) move_to(i, state.positions[i]);
     GuardCounts guards{};
-    Barrier barrier;
+    Barrier barrier(threads_);
     const auto substeps = [&](std::size_t thread, std::size_t threads) {
       const std::size_t begin = x.size() * thread / threads, end = x.size() * (thread + 1) / threads;
       const auto for_each_free_vertex = [&](auto&& act) {
@@ -339,7 +363,7 @@ class FastPbd {
       };
       GuardCounts counts{};
       for (int s = 0; s < plan.substeps; ++s) {
-        if (damped) std::copy(&x[begin], &x[end], &work_.starts[begin]);
+        if (damped) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
         if (contact.wanted()) {
           barrier.wait(thread);
           if (thread == 0) contact.prepare(substep, s, inverse_masses, work_, v);
@@ -369,15 +393,16 @@ class FastPbd {
         }
       }
 #pragma omp critical
-      for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += counts[g];
+      for (std::size_t g = 0; g < counts.size(); ++g) guards[g] += counts[g];
     };
 // Loops inside the region itself would be 4 % slower on one thread.
 #pragma omp parallel num_threads(int(threads_))
     {
 #pragma omp single
-      barrier.set(omp_get_num_threads());
-      substeps(std::size_t(omp_get_thread_num()), std::size_t(omp_get_num_threads()));
+      barrier.threads = std::size_t(omp_get_num_threads());
+      barrier.run([&] { substeps(std::size_t(omp_get_thread_num()), barrier.threads); });
     }
+    barrier.rethrow();
     for (std::size_t i = 0; i < x.size(); ++i) state.positions[i] = x[i].position();
     return guards;
   }

@@ -172,6 +172,18 @@ TEST_CASE("explicit: a body that becomes stiffer takes more substeps before it b
   CHECK(large.plan.substeps > 2 * small.plan.substeps);
 }
 
+TEST_CASE("explicit: the numbers that its longest step starts from are the same with every library") {
+  std::mt19937 random(1);
+  for (const double expected : {0.9943696164605311, 0.8651147227363309, -0.743751104455388})
+    CHECK(draw_unit(random) == expected);
+#ifdef __GLIBCXX__
+  std::mt19937 other(1);
+  other.discard(6);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int k = 0; k < 100000; ++k) REQUIRE(draw_unit(random) == unit(other));
+#endif
+}
+
 TEST_CASE("explicit: what has no force is refused in a line") {
   GlTest gl;
   const auto model = irregular_block(1, false);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
@@ -136,9 +135,8 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
                    int iterations) {
   Leapfrog run = prepared(input, compliances, positions);  // at rest, so that nothing is damped
   std::mt19937 random(1);
-  std::uniform_real_distribution<double> unit(-1, 1);
   Points p(positions.size());
-  for (glm::dvec3& q : p) q = {unit(random), unit(random), unit(random)};
+  for (glm::dvec3& q : p) q = {draw_unit(random), draw_unit(random), draw_unit(random)};
   const double reach = 1e-7 * input.model.size;
   double largest = 0;  // 1/s^2
   for (int iteration = 0; iteration < iterations; ++iteration) {

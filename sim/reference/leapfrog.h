@@ -5,6 +5,7 @@
 // with ever shorter steps.
 #pragma once
 
+#include <random>
 #include <vector>
 
 #include "sim/parallel.h"
@@ -34,6 +35,12 @@ void advance(Leapfrog& run, long steps);
 /// Positions and velocities of the same instant.
 State state_of(Leapfrog& run);
 
+/// From -1 to 1. The numbers of libstdc++'s std::uniform_real_distribution, which others replace by their
+/// own.
+inline double draw_unit(std::mt19937& random) {
+  const double low = double(random()), high = double(random());
+  return 2 * ((low + high * 0x1p32) / 0x1p64) - 1;
+}
 /// The longest step that is stable about these positions, s: of the largest eigenvalue of M^-1 K, by power
 /// iteration on differences of forces, and of constraint_damping. Bodies that deform far need less.
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,

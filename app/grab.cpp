@@ -11,7 +11,7 @@ namespace tetpbd {
 namespace {
 
 constexpr std::size_t most_neighbours = 32;
-constexpr std::size_t most_held = 128;  // each is a write into the GPU's buffers, before every step
+constexpr std::size_t most_held = 128;  // each is a copy into the GPU's buffers, before every step
 
 // A hold falls behind by so much of its radius: with more its own tets are sheared by more than a half.
 constexpr double slack_of_radius = 0.3;
@@ -98,24 +98,22 @@ Hold take_hold(const Sim& sim, std::uint32_t vertex, double radius) {
   return hold;
 }
 
-void pin_held(Sim& sim, const Hold& hold) {
-  for (const std::uint32_t v : hold.vertices) pin(sim, v);
-}
+void pin_held(Sim& sim, const Hold& hold) { pin(sim, hold.vertices); }
 
 void unpin_held(Sim& sim, const Hold& hold) {
-  for (const std::uint32_t v : hold.vertices)
-    if (!hold.was_pinned) unpin(sim, v);
+  if (!hold.was_pinned) unpin(sim, hold.vertices);
 }
 
 void move_held(Sim& sim, const Hold& hold, const glm::dvec3& to) {
-  move_pinned(sim, hold.caught(), to);
+  std::vector<glm::dvec3> places{to};
   const glm::dvec3 moved = to - hold.starts.front();
   const double distance = glm::length(moved), slack = std::min(hold.slack, distance);
   for (std::size_t i = 1; i < hold.vertices.size(); ++i) {
     glm::dvec3 place = hold.starts[i];
     if (distance > 0) place += moved * (1 - hold.behind[i] * slack / distance);
-    move_pinned(sim, hold.vertices[i], out_of_obstacles(*sim.model, sim.settings, time_of(sim), place));
+    places.push_back(out_of_obstacles(*sim.model, sim.settings, time_of(sim), place));
   }
+  move_pinned(sim, hold.vertices, places);
 }
 
 Grab begin_grab(const Sim& sim, const Hold& hold, const Pick& pick) {

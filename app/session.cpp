@@ -520,7 +520,7 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
   s.timeline.touched.insert(vertex);
   const bool pinned = is_pinned(s.loaded.sim(), vertex);
   note(s, {{pinned ? "unpin" : "pin", vertex}});
-  for (Lane& lane : s.loaded.lanes) (pinned ? unpin : pin)(lane.sim, vertex);
+  for (Lane& lane : s.loaded.lanes) pinned ? unpin(lane.sim, vertex) : pin(lane.sim, vertex);
   s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
 

@@ -47,9 +47,9 @@ void show(Session& s, std::size_t index) {
     for (const std::uint32_t vertex : t.touched)
       if (const bool pinned = is_pinned(lane.sim, vertex);
           pinned != bool(std::ranges::count(then.pinned, vertex)))
-        (pinned ? unpin : pin)(lane.sim, vertex);
+        pinned ? unpin(lane.sim, vertex) : pin(lane.sim, vertex);
     restore_snapshot(lane.sim, then.lanes[i], then.states);
-    for (const std::uint32_t vertex : then.held) unpin(lane.sim, vertex);
+    unpin(lane.sim, then.held);
     lane.apart = {};
     if (s.loaded.disturbed != then.disturbed)
       lane.distance = then.distances[i];  // held against something else

@@ -60,11 +60,13 @@ void keep_checkpoint(Sim& sim) {
 // Since the checkpoint others may have been pinned.
 void restore_pins(Sim& sim) {
   const auto positions = sim.positions.read_all<Position>();
+  VertexList pinned, unpinned;
   for (std::uint32_t i = 0; i < positions.size(); ++i)
     if (is_pinned(sim, i) && sim.model->inverse_masses[i] > 0)
-      pin(sim, i);
+      pinned.push_back(i);
     else if (positions[i].inverse_mass != float(sim.inverse_masses[i]))
-      unpin(sim, i);
+      unpinned.push_back(i);
+  pin(sim, pinned), unpin(sim, unpinned);
 }
 
 void take_answer(FiniteCheck& check, bool wait) {

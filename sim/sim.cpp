@@ -422,37 +422,52 @@ std::uint64_t state_hash(const Sim& sim) {
 
 namespace {
 
-void write_inverse_mass(Sim& sim, std::uint32_t vertex, double value) {
-  sim.inverse_masses[vertex] = value;
-  const float inverse_mass = float(value);
-  sim.positions.write(vertex * sizeof(Position) + offsetof(Position, inverse_mass), sizeof(float),
-                      &inverse_mass);
+// A member of each vertex's record in a buffer of `Record`s.
+template <class Record, class Value>
+void write_vertices(Sim& sim, const Buffer& to, std::size_t member, const VertexList& vertices,
+                    const std::vector<Value>& values) {
+  if (vertices.empty()) return;
+  std::vector<std::size_t> offsets;
+  for (const std::uint32_t v : vertices) offsets.push_back(v * sizeof(Record) + member);
+  to.write_each(offsets, sizeof(Value), values.data());
   sim.needs_predict = true;
+}
+
+void write_inverse_masses(Sim& sim, const VertexList& vertices) {
+  std::vector<float> values;
+  for (const std::uint32_t v : vertices) values.push_back(float(sim.inverse_masses[v]));
+  write_vertices<Position>(sim, sim.positions, offsetof(Position, inverse_mass), vertices, values);
 }
 
 }  // namespace
 
-void pin(Sim& sim, std::uint32_t vertex) {
+void pin(Sim& sim, const VertexList& vertices) {
   const KeepBindings kept;
-  write_inverse_mass(sim, vertex, 0);
-  const Velocity still{};
-  sim.velocities.write(vertex * sizeof still, sizeof still, &still);
-  if (on_cpu(sim)) sim.host.velocities[vertex] = glm::dvec3(0);
+  for (const std::uint32_t v : vertices) {
+    sim.inverse_masses[v] = 0;
+    if (on_cpu(sim)) sim.host.velocities[v] = glm::dvec3(0);
+  }
+  write_inverse_masses(sim, vertices);
+  write_vertices<Velocity>(sim, sim.velocities, 0, vertices, std::vector<Velocity>(vertices.size()));
 }
 
-void unpin(Sim& sim, std::uint32_t vertex) {
+void unpin(Sim& sim, const VertexList& vertices) {
   const KeepBindings kept;
-  write_inverse_mass(sim, vertex, sim.model->inverse_masses[vertex]);
+  for (const std::uint32_t v : vertices) sim.inverse_masses[v] = sim.model->inverse_masses[v];
+  write_inverse_masses(sim, vertices);
 }
 
 bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }
 
-void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
+void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions) {
   const KeepBindings kept;
-  const Position p = to_gpu(position, sim.inverse_masses[vertex], sim.system.at_vertex[vertex]);
-  sim.positions.write(vertex * sizeof(Position), sizeof p, &p);
-  sim.needs_predict = true;
-  if (on_cpu(sim)) sim.host.positions[vertex] = position;
+  std::vector<Position> records;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::uint32_t v = vertices[i];
+    records.push_back(to_gpu(positions[i], sim.inverse_masses[v], sim.system.at_vertex[v]));
+    if (on_cpu(sim)) sim.host.positions[v] = positions[i];
+  }
+  write_vertices<Position>(sim, sim.positions, 0, vertices, records);
 }
 
 }  // namespace tetpbd

@@ -137,12 +137,19 @@ const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
 /// where there is none.
 bool restore_checkpoint(Sim& sim);
 
-/// A pinned vertex stays where it is or is put (infinite mass). Does not wait.
-void pin(Sim& sim, std::uint32_t vertex);
-void unpin(Sim& sim, std::uint32_t vertex);
+/// Pinned vertices stay where they are or are put (infinite mass). Any number costs one or two writes to the
+/// GPU, none of which waits.
+using VertexList = std::vector<std::uint32_t>;
+void pin(Sim& sim, const VertexList& vertices);
+void unpin(Sim& sim, const VertexList& vertices);
+inline void pin(Sim& sim, std::uint32_t vertex) { pin(sim, VertexList{vertex}); }
+inline void unpin(Sim& sim, std::uint32_t vertex) { unpin(sim, VertexList{vertex}); }
 bool is_pinned(const Sim& sim, std::uint32_t vertex);
-/// Puts a pinned vertex somewhere, in metres.
-void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position);
+/// Puts each somewhere, in metres.
+void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions);
+inline void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
+  move_pinned(sim, VertexList{vertex}, {position});
+}
 
 struct Explanation {
   struct Item {

@@ -607,6 +607,25 @@ TEST_CASE("window: what the mouse holds follows it without a spike, in every lan
   CHECK(take_hold(sim, held[1], 0.45).vertices == std::vector{held[1]});
 }
 
+TEST_CASE("window: however much the mouse holds, moving it is one write to the GPU") {
+  GlTest gl;
+  Session s;
+  show_beam(s);
+  Sim& sim = s.loaded.lane().sim;
+  const Hold hold = take_hold(sim, 0, 0.45);
+  REQUIRE(hold.vertices.size() > 8);
+  static int made;
+  static const auto of_driver = __glewGenBuffers;
+  __glewGenBuffers = [](GLsizei count, GLuint* names) { made += count, of_driver(count, names); };
+  const auto writes = [&](const auto& action) { return made = 0, action(), made; };
+  CHECK(writes([&] { pin_held(sim, hold); }) <= 2);  // masses and velocities
+  const glm::dvec3 to = hold.starts.front() + glm::dvec3(0, 0.1, 0);
+  CHECK(writes([&] { move_held(sim, hold, to); }) == 1);
+  CHECK(glm::distance(read_state(sim).positions[0], to) < 1e-6);
+  CHECK(writes([&] { unpin_held(sim, hold); }) == 1);
+  __glewGenBuffers = of_driver;
+}
+
 TEST_CASE("window: where it is slow, it says what would be faster") {
   GlTest gl;
   Session s;

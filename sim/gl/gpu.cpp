@@ -43,19 +43,26 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
 // Kernels queued before may still read or write the buffer: the barrier here is why pins, uploads, resets and
 // read-backs need none of their own. What no kernel wrote, GL orders by itself.
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   if (whole_at_once_ && offset == 0 && bytes == this->bytes()) {
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glBindBuffer(GL_COPY_WRITE_BUFFER, id());
     glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(bytes), data, GL_STREAM_DRAW);
     return;
   }
-  // Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old
-  // bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
+  write_each({offset}, bytes, data);
+}
+
+// Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old
+// bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
+void Buffer::write_each(const std::vector<std::size_t>& offsets, std::size_t bytes, const void* data) const {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   const GLuint staging = new_buffer();
   glBindBuffer(GL_COPY_READ_BUFFER, staging);
-  glBufferData(GL_COPY_READ_BUFFER, GLsizeiptr(bytes), data, GL_STREAM_DRAW);
+  glBufferData(GL_COPY_READ_BUFFER, GLsizeiptr(offsets.size() * bytes), data, GL_STREAM_DRAW);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id());
-  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, GLintptr(offset), GLsizeiptr(bytes));
+  for (std::size_t i = 0; i < offsets.size(); ++i)
+    glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GLintptr(i * bytes), GLintptr(offsets[i]),
+                        GLsizeiptr(bytes));
   delete_buffer(staging);
 }
 

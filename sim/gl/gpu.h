@@ -118,6 +118,8 @@ class Buffer : public Owned<GLuint, delete_buffer> {
 
   const std::string& label() const { return label_; }
   void write(std::size_t offset, std::size_t bytes, const void* data) const;
+  /// Items of one size, one after the other in `data`, each to an offset of its own.
+  void write_each(const std::vector<std::size_t>& offsets, std::size_t bytes, const void* data) const;
   void read(std::size_t offset, std::size_t bytes, void* data) const {
     read_buffer(id(), offset, bytes, data);
   }

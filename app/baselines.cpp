@@ -55,9 +55,10 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
       model, settings, steps, right,
       [&] {
         const Plan plan = plan_for(settings);
-        const Substep substep(model, settings, plan, std::exchange(time, time + settings.dt));
+        Substep substep(model, settings, plan, std::exchange(time, time + settings.dt));
         for (int s = 0; s < plan.substeps; ++s) {
-          contact.prepare(substep, s, model.inverse_masses, Place{now.positions}, now.velocities);
+          substep.begin(s);
+          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities);
           for (RigidBody& body : bodies) {
             const bool touches = contact.carries(body.first);
             if (touches) {

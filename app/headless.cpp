@@ -288,7 +288,9 @@ int print_info(int gpu) {
              c.storage_bytes);
   fmt::print("work-groups:     {} invocations, {} bytes of shared memory\nMSAA:            {} samples\n",
              c.work_group_invocations, c.shared_bytes, c.samples);
-  fmt::print("extensions used: none beyond OpenGL 4.3 core\nmodels:          {}\n", models_folder().string());
+  fmt::print(
+      "extensions used: none beyond OpenGL 4.3 core, but to ask for free memory\nmodels:          {}\n",
+      models_folder().string());
   fmt::print("shaders:         {}\n", shader_folder().empty() ? "embedded" : shader_folder());
   fmt::print(
       "licences:        tetpbd MIT; TetGen, a program of its own, AGPL-3+; "

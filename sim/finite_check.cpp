@@ -22,14 +22,19 @@ void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool g
   Recorder& recorder = check.recorder;
   recorder.begin();
   recorder.give("Check", check.words);
+  // Only the part, for together they may be larger than a block; from where GL lets any block begin.
+  const auto give = [&](const char* block, const Buffer& buffer, std::size_t first, std::size_t bytes) {
+    const std::size_t before = first % 256;
+    recorder.give(block, buffer.id(), first - before, before + bytes);
+    return unsigned(before / 4);
+  };
   for (const auto& [from, first, to, at, bytes] : parts) {
     const unsigned words = unsigned(bytes / 4);
-    recorder.give("From", *from), recorder.give("To", *to);
+    const unsigned from_at = give("From", *from, first, bytes), to_at = give("To", *to, at, bytes);
     check.copy.work_groups = std::min<std::size_t>(work_groups(words, 256), 1024);
-    recorder.run(check.copy, {{"count", words},
-                              {"from_at", unsigned(first / 4)},
-                              {"to_at", unsigned(at / 4)},
-                              {"good_only", unsigned(good_only)}});
+    recorder.run(
+        check.copy,
+        {{"count", words}, {"from_at", from_at}, {"to_at", to_at}, {"good_only", unsigned(good_only)}});
   }
   recorder.barrier(GL_BUFFER_UPDATE_BARRIER_BIT);  // restoring reads what was written
 }

@@ -136,7 +136,7 @@ void measure(Metrics& m, const Sim& sim) {
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
-  bind_obstacles(sim.obstacles, sim.obstacles.present);
+  bind_obstacles(sim.obstacles);
   Recorder& recorder = m.recorder;
   recorder.begin();
   recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);

@@ -75,15 +75,13 @@ std::vector<RigidRecord> rigid_records(const Model& model, const Settings& setti
 
 // What the driver allows, where nothing lower is asked for.
 Tuning within_limits(Tuning tuning) {
-  GLint row = 0;
-  glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &row);
+  const unsigned row = unsigned(most_work_groups_in_row());
   if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // there, one after the other
   if (tuning.lanes > 8 || !std::has_single_bit(tuning.lanes))
     throw Error("no such tuning", fmt::format("lanes={}", tuning.lanes), "a power of two up to 8");
-  if (tuning.row == 0 || tuning.row > unsigned(row)) tuning.row = unsigned(row);
-  GLint64 bytes = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-  if (tuning.storage == 0 || tuning.storage > std::size_t(bytes)) tuning.storage = std::size_t(bytes);
+  if (tuning.row == 0 || tuning.row > row) tuning.row = row;
+  const std::size_t storage = std::size_t(capabilities().storage_bytes);
+  if (tuning.storage == 0 || tuning.storage > storage) tuning.storage = storage;
   return tuning;
 }
 
@@ -123,7 +121,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.step_block = Buffer("step", sizeof(Step));
   sim.positions = buffer("positions", count * sizeof(Position));
   sim.velocities = buffer("velocities", count * sizeof(Velocity));
-  sim.recorder.row = sim.tuning.row;
+  sim.recorder.row = sim.tuning.row, sim.recorder.storage = sim.tuning.storage;
   if (on_cpu(sim)) return sim;
   if (sim.solver.keeps_prediction) sim.predicted = buffer("predicted", count * sizeof(Velocity));
   const std::size_t quantized_bytes = count * 16 * (input.compliant ? 2 : 1);

@@ -47,7 +47,7 @@ void begin_on_gpu(Sim& sim, bool moving) {
   if (moving) write_obstacles(sim);
   give_buffers(sim);
   plan_body_contacts(sim);
-  bind_obstacles(sim.obstacles, 0);
+  bind_obstacles(sim.obstacles);
   if (sim.timed) sim.timer.begin();
   sim.recorder.barrier(
       GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
@@ -83,7 +83,7 @@ void step(Sim& sim) {
   } else {
     begin_on_gpu(sim, moving);
     for (int k = 0; k < sim.plan.substeps; ++k) {
-      if (moving) bind_obstacles(sim.obstacles, ++sim.obstacles.present);
+      if (moving) bind_next_obstacles(sim);
       move_rigid_bodies(sim);
       sim.solver.substep(sim, k);
       resolve_body_contacts(sim, sim.plan.substeps - 1 - k);

@@ -313,6 +313,77 @@ TEST_CASE("limits of a driver are named with what is needed and what there is") 
   CHECK(has(what_of([&] { create_sim(block(), quick("node"), {.storage = 100}); }),
             "a storage buffer is too large: "));
   CHECK(has(what_of([&] { make_target(100000, 10); }), "bad image size: 100000x10"));
+  const auto model = block();
+  Sim sim = create_sim(model, quick("node"));
+  Metrics metrics = create_metrics(*model);
+  metrics.recorder.storage = 100;
+  CHECK(has(what_of([&] { measure(metrics, sim); }), "a storage buffer is too large: 'positions' of "));
+  Renderer renderer = make_renderer(model->rest);
+  renderer.recorder.storage = 100;
+  const Target target = make_target(32, 32);
+  Frame frame;
+  frame.positions = sim.positions.id(), frame.target = target.framebuffer.id();
+  frame.viewport = {0, 0, 32, 32};
+  CHECK(has(what_of([&] { draw(renderer, frame); }), "a storage buffer is too large: 'surface "));
+}
+
+TEST_CASE("a copy of the state may be larger than a storage block, for kernels see parts of it alone") {
+  GlTest gl;
+  Sim sim = create_sim(block(), quick("node"));
+  REQUIRE(sim.check.checkpoint.bytes() > sim.positions.bytes());
+  for (const GLuint block : {0u, 1u, 2u}) {
+    GLint buffer = 0;
+    GLint64 bytes = 0;
+    glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, block, &buffer);
+    glGetInteger64i_v(GL_SHADER_STORAGE_BUFFER_SIZE, block, &bytes);
+    if (GLuint(buffer) != sim.check.checkpoint.id()) continue;
+    CHECK(bytes > 0);  // else all of it
+    CHECK(bytes <= GLint64(sim.positions.bytes()) + 256);
+  }
+}
+
+TEST_CASE("memory that a GPU does not have is refused before a run, with what is needed and what there is") {
+  GlTest gl;
+  const auto model = block();
+  const auto mode_named = [](const char* mode) {
+    Settings settings = quick(mode);
+    settings.contact = "self";
+    if (mode_of(settings).leapfrog || mode_of(settings).implicit)
+      settings.material = "neo-hookean", settings.substeps = settings.iterations = automatic;
+    return settings;
+  };
+  Sim running = create_sim(model, quick("node"));
+  step(running);
+  struct AsBefore {
+    ~AsBefore() { gl_live().most_bytes = 0; }
+  } as_before;
+  for (const SolverMode& mode : solver_modes()) {
+    CAPTURE(mode.name);
+    const GlLive before = gl_live();
+    std::int64_t needed = 0;
+    {
+      const Sim whole = create_sim(model, mode_named(mode.name));
+      needed = gl_live().buffer_bytes - before.buffer_bytes;
+    }
+    for (int part = 0; part < 20; ++part) {
+      gl_live().most_bytes = before.buffer_bytes + needed * part / 20 + 1;
+      const std::string what = what_of([&] { create_sim(model, mode_named(mode.name)); });
+      CAPTURE(what);
+      CHECK(has(what, "out of GPU memory: buffer '"));
+      CHECK(has(what, " bytes beside "));
+      CHECK(has(what, " are available: "));
+      CHECK(gl_live().buffer_bytes == before.buffer_bytes);
+      CHECK(gl_live().objects == before.objects);
+      if (std::string(mode.name) == "node") continue;
+      const auto hash = state_hash(running);
+      CHECK(has(what_of([&] { apply_settings(running, mode_named(mode.name)); }), "out of GPU memory: "));
+      CHECK(running.settings.mode == "node");
+      CHECK(state_hash(running) == hash);
+    }
+    gl_live().most_bytes = 0;
+    step(running);
+    CHECK(!check_finite(running, true));
+  }
 }
 
 TEST_CASE("a buffer that does not fit is named with its bytes, and the simulation beside it goes on") {
@@ -320,7 +391,7 @@ TEST_CASE("a buffer that does not fit is named with its bytes, and the simulatio
   Sim sim = create_sim(block(), quick("node"));
   step(sim);
   const std::string what = what_of([] { Buffer("adjacency", std::size_t(1) << 46); });
-  CHECK(has(what, "out of GPU memory: buffer 'adjacency' of 70368744177664 bytes: "));
+  CHECK(has(what, "out of GPU memory: buffer 'adjacency' of 70368744177664 bytes"));
   step(sim);
   CHECK(!check_finite(sim, true));
 }

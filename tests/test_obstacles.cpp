@@ -614,3 +614,28 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again, what i
   }
   std::filesystem::remove(file);
 }
+
+TEST_CASE_FIXTURE(GlTest, "obstacles: many substeps of what moves need no more memory, and meet the same") {
+  const auto run = [](const char* mode, int substeps, int steps) {
+    Setup setup;
+    add(setup, slab, {0, 0.12, 0});
+    Obstacle lift = box({1, 0.5, 1}, {0, -0.5, 0});
+    lift.velocity = {0, 0.5, 0};
+    setup.model->obstacles = {lift};
+    in_mode(setup, mode);
+    setup.settings.iterations = 1, setup.settings.gravity = 0;
+    setup.settings.substeps = substeps, setup.settings.dt = 0.1 / steps;
+    Sim sim = create_sim(setup.model, setup.settings);
+    for (int s = 0; s < steps; ++s) step(sim);
+    CHECK(sim.obstacles.records.bytes() <= 1 << 18);
+    return read_state(sim).positions;
+  };
+  for (const char* mode : {"node", "cpu", "cpu-fast"}) {
+    CAPTURE(mode);
+    const auto at_once = run(mode, 6000, 1), one_by_one = run(mode, 100, 60);
+    double worst = 0;
+    for (std::size_t i = 0; i < at_once.size(); ++i)
+      worst = std::max(worst, glm::distance(at_once[i], one_by_one[i]));
+    CHECK(worst < 1e-5);
+  }
+}

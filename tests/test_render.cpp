@@ -682,3 +682,18 @@ TEST_CASE("render: obstacles are seen, where they stand by then, and cast shadow
   CHECK(difference(stage.image(), without, 20).count < 300);  // the light's map is coarser
   CHECK(gl_error_count() == 0);
 }
+
+TEST_CASE("render: a driver that takes few work-groups in a row gives the same picture and the same pick") {
+  const auto look = [](std::size_t row) {
+    Stage stage;
+    stage.renderer.recorder.row = row;
+    stage.move(0.5, {0, 0.3, 0});
+    stage.frame.ground = 0.0f;
+    stage.frame.options.colour = Colour::volume;
+    stage.frame.options.shadow = true;
+    return stage.image().rgba;
+  };
+  const auto wide = look(65535);
+  CHECK(look(1) == wide);
+  CHECK(look(2) == wide);
+}

@@ -7,7 +7,7 @@
 layout(std430) writeonly buffer Values { vec4 cofactors[]; };
 
 void main() {
-  uint v = gl_GlobalInvocationID.x;
+  uint v = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (v >= count) return;
   vec3 x = position(v), r = rest[v].xyz;
   mat3 f = mat3(0.0);

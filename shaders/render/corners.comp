@@ -22,7 +22,7 @@ vec3 normal_at(uint v, vec3 face) {
 }
 
 void main() {
-  uint c = gl_GlobalInvocationID.x;
+  uint c = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (c >= count) return;
   uint first = c - c % 3u, v = triangles[c];
   vec3 p[3];

@@ -38,6 +38,6 @@ float gathered(uint v) {
 }
 
 void main() {
-  uint v = gl_GlobalInvocationID.x;
+  uint v = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (v < count) values[v] = gathered(v);
 }

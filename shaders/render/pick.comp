@@ -68,7 +68,7 @@ float hit(uint t) {
 #endif
 
 void main() {
-  uint i = gl_GlobalInvocationID.x;
+  uint i = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (stage == 2) {
     if (i != 0u || triangle == 0xffffffffu) return;
     vec3 x = origin + uintBitsToFloat(distance_bits) * direction;

@@ -81,8 +81,8 @@ void fit_light() {
 
 void main() {
   uint lane = gl_LocalInvocationIndex;
-  find_bounds(gl_GlobalInvocationID.x, lane);
+  find_bounds(gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x, lane);
   memoryBarrierBuffer();
   barrier();
-  if (lane == 0u && atomicAdd(done, 1u) == gl_NumWorkGroups.x - 1u) fit_light();
+  if (lane == 0u && atomicAdd(done, 1u) == gl_NumWorkGroups.x * gl_NumWorkGroups.y - 1u) fit_light();
 }

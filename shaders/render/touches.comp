@@ -10,7 +10,7 @@ layout(std430) readonly buffer Positions { Position positions[]; };
 layout(std430) writeonly buffer Arrows { TouchArrow arrows[]; };
 vec3 place(uint vertex) { return positions[vertex].high; }
 void main() {
-  uint record = gl_GlobalInvocationID.x;
+  uint record = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (record >= ITEMS) return;
   uint t = record < counts.records ? records[record].target : NONE, s = records[record].item;
   arrows[record] = TouchArrow(vec3(0.0), -1.0, vec3(0.0), 0.0);

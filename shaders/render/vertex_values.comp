@@ -13,7 +13,7 @@ uniform uint count;
 uniform float scale;
 
 void main() {
-  uint v = gl_GlobalInvocationID.x;
+  uint v = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (v >= count) return;
 #ifdef SPEED
   values[v] = length(velocities[v].high);

@@ -85,14 +85,6 @@ std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& set
   return list;
 }
 
-ObstacleLists obstacles_over(const Model& model, const Settings& settings, double start, double h,
-                             int substeps) {
-  ObstacleLists lists;
-  for (int s = 0; s < (std::ranges::any_of(model.obstacles, moves) ? substeps : 1); ++s)
-    lists.push_back(obstacles_at(model, settings, start + s * h, h));
-  return lists;
-}
-
 std::vector<const Obstacle*> solid_obstacles(const Model& model) { return order_obstacles(model).solids; }
 
 bool has_obstacles(const Model& model, const Settings& settings) {

@@ -64,10 +64,6 @@ inline double friction_on(const MovingObstacle& o, const Model& model, std::size
 /// the ground of the settings at their head.
 std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start,
                                          double h = 0);
-/// Of the substeps of h from `start` on, one list each; a single one where nothing moves.
-using ObstacleLists = std::vector<std::vector<MovingObstacle>>;
-ObstacleLists obstacles_over(const Model& model, const Settings& settings, double start, double h,
-                             int substeps);
 /// Those of the model that are more than planes, in the order of a step.
 std::vector<const Obstacle*> solid_obstacles(const Model& model);
 bool has_obstacles(const Model& model, const Settings& settings);

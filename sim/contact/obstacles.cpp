@@ -116,19 +116,19 @@ void write_planes(const Model& model, const Settings& settings, Step& block) {
     if (o.is_plane) block.planes[block.plane_count++] = glm::vec4(o.plane);
 }
 
-void write_obstacles(Sim& sim) {
+void write_obstacles(Sim& sim, int list) {
   Obstacles& obstacles = sim.obstacles;
   if (obstacles.bytes == 0) return;
-  const int substeps = on_cpu(sim) ? 0 : sim.plan.substeps;
-  const double h = sim.plan.h;
-  const auto lists = obstacles_over(*sim.model, sim.settings, time_of(sim) - h, h, substeps + 1);
+  const bool single = on_cpu(sim) || std::ranges::none_of(sim.model->obstacles, moves);
+  const int lists = single ? 1 : std::min(sim.plan.substeps + 1, Obstacles::most_lists);
+  const double h = sim.plan.h, start = time_of(sim) - h;
   const auto fields = fields_of(*sim.model);
-  std::vector<char> bytes(lists.size() * obstacles.stride);
-  for (std::size_t l = 0; l < lists.size(); ++l) {
-    char* reaches = &bytes[l * obstacles.stride];
+  std::vector<char> bytes(std::size_t(lists) * obstacles.stride);
+  for (int l = 0; l < lists; ++l) {
+    char* reaches = bytes.data() + std::size_t(l) * obstacles.stride;
     char* records = reaches + fields.size() * sizeof(glm::vec4);
     int first = 0, k = 0;
-    for (const MovingObstacle& o : lists[l]) {
+    for (const MovingObstacle& o : obstacles_at(*sim.model, sim.settings, start + (list + l) * h, h)) {
       if (o.is_plane) continue;
       const ObstacleRecord record = record_block(o, first);
       const glm::vec4 reach = reach_block(o, h);
@@ -141,15 +141,21 @@ void write_obstacles(Sim& sim) {
     obstacles.records.write(0, bytes.size(), bytes.data());
   else
     obstacles.records = Buffer("obstacles", bytes, GL_STREAM_DRAW);
-  obstacles.present = 0;
+  obstacles.first = obstacles.present = list;
 }
 
-void bind_obstacles(const Obstacles& obstacles, int list) {
+void bind_next_obstacles(Sim& sim) {
+  Obstacles& obstacles = sim.obstacles;
+  const int lists = int(obstacles.records.bytes() / obstacles.stride);
+  if (++obstacles.present == obstacles.first + lists) write_obstacles(sim, obstacles.present);
+  bind_obstacles(obstacles);
+}
+
+void bind_obstacles(const Obstacles& obstacles) {
   if (obstacles.friction) bind_texels(UNIT_FRICTION, obstacles.friction_texture);
   if (!obstacles.records) return;
-  const std::size_t last = obstacles.records.bytes() / obstacles.stride - 1;
   glBindBufferRange(GL_UNIFORM_BUFFER, BIND_OBSTACLES, obstacles.records.id(),
-                    GLintptr(std::min(std::size_t(list), last) * obstacles.stride),
+                    GLintptr(std::size_t(obstacles.present - obstacles.first) * obstacles.stride),
                     GLsizeiptr(obstacles.bytes));
   if (obstacles.fields) bind_texels(UNIT_FIELDS, obstacles.fields_texture);
 }

@@ -14,6 +14,7 @@ namespace tetpbd {
 struct Sim;
 
 struct Obstacles {
+  static constexpr int most_lists = 256;  ///< written at once
   Buffer records;  ///< ObstacleRecord, and before them how far each is met: a list of the step's start, then
                    ///< one of the end of each substep; a single list where nothing moves
   Buffer fields;   ///< one after the other
@@ -21,7 +22,7 @@ struct Obstacles {
   Buffer friction;  ///< by vertex, where bodies have their own; negative: the world's
   Texture friction_texture;
   std::size_t bytes = 0, stride = 0;  ///< of a list; from one to the next
-  int present = 0;                    ///< which list is of now
+  int first = 0, present = 0;         ///< which lists `records` begins with, and is of now
 };
 
 /// Definitions for kernels that include contact/obstacles.glsl: what these are made for.
@@ -33,9 +34,11 @@ Obstacles make_obstacles(const Model& model);
 
 /// Those that are planes.
 void write_planes(const Model& model, const Settings& settings, Step& block);
-/// All others at and after the present.
-void write_obstacles(Sim& sim);
-/// A list of them for the next kernels; the last where there are fewer.
-void bind_obstacles(const Obstacles& obstacles, int list);
+/// All others: lists of the step from this one on, which becomes the present.
+void write_obstacles(Sim& sim, int first = 0);
+/// The present list, for the next kernels.
+void bind_obstacles(const Obstacles& obstacles);
+/// The same of the next substep.
+void bind_next_obstacles(Sim& sim);
 
 }  // namespace tetpbd

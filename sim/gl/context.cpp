@@ -94,6 +94,12 @@ Capabilities capabilities() {
   return caps;
 }
 
+std::size_t most_work_groups_in_row() {
+  GLint most = 0;
+  glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &most);
+  return std::size_t(most);
+}
+
 Capabilities load_gl() {
   glewExperimental = GL_TRUE;
   // GLEW built for GLX answers GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.

@@ -29,6 +29,8 @@ void count_gl_errors(GlErrorReport report = nullptr);
 /// Number of messages since the start, of all contexts that are counted.
 int gl_error_count();
 
+/// That a dispatch may have in its first dimension; 65535 guaranteed.
+std::size_t most_work_groups_in_row();
 /// Number of work-groups of `size` invocations that cover `count`.
 inline std::size_t work_groups(std::size_t count, unsigned size) { return (count + size - 1) / size; }
 

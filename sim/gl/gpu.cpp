@@ -3,16 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "sim/error.h"
 
 namespace tetpbd {
 
+static const char* const smaller = "use a smaller mesh, a smaller image or fewer samples";
+
 void check_memory(const std::string& what, std::size_t bytes, bool fits) {
   // Drivers call an absurd size by other names than GL_OUT_OF_MEMORY.
   if (glGetError() != GL_NO_ERROR || !fits)
-    throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes),
-                "use a smaller mesh, a smaller image or fewer samples", 1);
+    throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes), smaller, 1);
 }
 
 void clear_errors() {
@@ -20,23 +22,62 @@ void clear_errors() {
 }
 
 namespace {
+
 GLuint new_buffer() {
   GLuint id = 0;
   glGenBuffers(1, &id);
   return id;
 }
+
+// Bytes for a further buffer beside `held` ones, where the driver says how many there are.
+std::optional<std::int64_t> available_bytes(std::int64_t held) {
+  if (const std::int64_t most = gl_live().most_bytes) return most - held;
+  GLint kib[4] = {};
+  if (GLEW_ATI_meminfo) {
+    glGetIntegerv(GL_VBO_FREE_MEMORY_ATI, kib);
+    return (std::int64_t(kib[0]) + kib[2]) << 10;  // the GPU's own, and what it has of the computer's
+  }
+  if (!GLEW_NVX_gpu_memory_info) return std::nullopt;
+  glGetIntegerv(GL_GPU_MEMORY_INFO_CURRENT_AVAILABLE_VIDMEM_NVX, &kib[0]);
+  glGetIntegerv(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX, &kib[1]);
+  // That driver takes a buffer's memory at its first use: what is free now may be promised already.
+  return std::min(std::int64_t(kib[0]) << 10, (std::int64_t(kib[1]) << 10) - held);
+}
+
+// Small ones are taken on trust: some drivers stop their threads to answer.
+constexpr std::size_t large = 1 << 20;
+
+void check_available(const std::string& label, std::size_t bytes) {
+  if (bytes < large && gl_live().most_bytes == 0) return;
+  const std::int64_t held = gl_live().buffer_bytes - std::int64_t(bytes);
+  const auto available = available_bytes(held);
+  if (available && std::int64_t(bytes) > *available)
+    throw Error("out of GPU memory",
+                fmt::format("buffer '{}' of {} bytes beside {} of others, {} are available", label, bytes,
+                            held, std::max<std::int64_t>(*available, 0)),
+                smaller, 1);
+}
+
+// New memory for the buffer that is bound there.
+void allocate(GLenum target, const std::string& label, std::size_t bytes, const void* data, GLenum usage,
+              bool check) {
+  if (check) clear_errors();
+  glBufferData(target, GLsizeiptr(bytes), data, usage);
+  if (!check) return;
+  GLint64 made = 0;  // some drivers say nothing of what does not fit
+  glGetBufferParameteri64v(target, GL_BUFFER_SIZE, &made);
+  check_memory(fmt::format("buffer '{}'", label), bytes, std::size_t(made) >= bytes);
+}
+
 }  // namespace
 
 Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
     : Owned(new_buffer(), std::int64_t(bytes)),
       label_(std::move(label)),
       whole_at_once_(usage == GL_STREAM_DRAW) {
-  clear_errors();
+  check_available(label_, bytes);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id());
-  glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(std::max<std::size_t>(bytes, 4)), data, usage);
-  GLint64 made = 0;  // some drivers say nothing of what does not fit
-  glGetBufferParameteri64v(GL_COPY_WRITE_BUFFER, GL_BUFFER_SIZE, &made);
-  check_memory(fmt::format("buffer '{}'", label_), bytes, std::size_t(made) >= bytes);
+  allocate(GL_COPY_WRITE_BUFFER, label_, std::max<std::size_t>(bytes, 4), data, usage, true);
   label_object(GL_BUFFER, id(), label_);
 }
 
@@ -46,7 +87,7 @@ void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) cons
   if (whole_at_once_ && offset == 0 && bytes == this->bytes()) {
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glBindBuffer(GL_COPY_WRITE_BUFFER, id());
-    glBufferData(GL_COPY_WRITE_BUFFER, GLsizeiptr(bytes), data, GL_STREAM_DRAW);
+    allocate(GL_COPY_WRITE_BUFFER, label_, bytes, data, GL_STREAM_DRAW, bytes >= large);
     return;
   }
   write_each({offset}, bytes, data);
@@ -56,14 +97,14 @@ void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) cons
 // bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
 void Buffer::write_each(const std::vector<std::size_t>& offsets, std::size_t bytes, const void* data) const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  const GLuint staging = new_buffer();
-  glBindBuffer(GL_COPY_READ_BUFFER, staging);
-  glBufferData(GL_COPY_READ_BUFFER, GLsizeiptr(offsets.size() * bytes), data, GL_STREAM_DRAW);
+  const Owned<GLuint, delete_buffer> staging(new_buffer());
+  const std::size_t all = offsets.size() * bytes;
+  glBindBuffer(GL_COPY_READ_BUFFER, staging.id());
+  allocate(GL_COPY_READ_BUFFER, label_ + ", new contents", all, data, GL_STREAM_DRAW, all >= large);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id());
   for (std::size_t i = 0; i < offsets.size(); ++i)
     glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GLintptr(i * bytes), GLintptr(offsets[i]),
                         GLsizeiptr(bytes));
-  delete_buffer(staging);
 }
 
 void read_buffer(GLuint from, std::size_t offset, std::size_t bytes, void* data) {

@@ -1,6 +1,7 @@
 // The little OpenGL 4.3 core that this program needs: a context (context.h), buffers, programs with includes,
-// fences and timers, all labelled and counted. No direct state access, no buffer storage, no vendor
-// extension. Nothing here knows of meshes or solvers.
+// fences and timers, all labelled and counted. No direct state access, no buffer storage; of
+// vendors' extensions only how much memory is free, where one says it. Nothing here knows of meshes or
+// solvers.
 #pragma once
 
 #include <GL/glew.h>
@@ -23,6 +24,7 @@ namespace tetpbd {
 struct GlLive {
   long objects = 0;
   std::int64_t buffer_bytes = 0;
+  std::int64_t most_bytes = 0;  ///< as if the GPU had so many for buffers, in tests; 0: it has what it has
 };
 inline GlLive& gl_live() {
   static GlLive live;

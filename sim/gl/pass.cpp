@@ -8,6 +8,13 @@
 
 namespace tetpbd {
 
+void check_block(const std::string& label, std::size_t bytes, std::size_t most) {
+  if (bytes > most)
+    throw Error("a storage buffer is too large",
+                fmt::format("'{}' of {} bytes, the driver allows {}", label, bytes, most),
+                "use a smaller mesh", 1);
+}
+
 std::size_t Recorder::place(const std::string& block) {
   const std::size_t at = std::size_t(std::ranges::find(names_, block) - names_.begin());
   if (at == names_.size()) names_.push_back(block), ranges_.emplace_back();
@@ -16,6 +23,12 @@ std::size_t Recorder::place(const std::string& block) {
 
 void Recorder::give(const std::string& block, GLuint buffer, std::size_t first, std::size_t bytes) {
   ranges_[place(block)] = {buffer, first, bytes};
+}
+
+void Recorder::give(const std::string& block, const Buffer& buffer) {
+  if (storage == 0) storage = std::size_t(capabilities().storage_bytes);
+  check_block(buffer.label(), buffer.bytes(), storage);
+  give(block, buffer.id());
 }
 
 const Program& Recorder::use(const Program& program) {
@@ -60,6 +73,7 @@ void Recorder::run(Pass& pass, std::initializer_list<DispatchParameter> paramete
   DispatchCount* counted_as = counting || timing ? &count(pass, what, bytes) : nullptr;
   if (timing) counted_as->timer.begin();
   if (pass.work_groups) {
+    if (row == 0) row = most_work_groups_in_row();
     const std::size_t in_row = std::min(pass.work_groups, row);  // types.glsl: group_index
     glDispatchCompute(GLuint(in_row), GLuint((pass.work_groups + in_row - 1) / in_row), 1);
   } else if (pass.grid.x) {

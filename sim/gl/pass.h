@@ -39,11 +39,15 @@ struct DispatchCount {
   Timer timer{};
 };
 
+/// Throws Error where a buffer is larger than a block may be.
+void check_block(const std::string& label, std::size_t bytes, std::size_t most);
+
 class Recorder {
  public:
   /// Kernels find the buffer, or so many bytes of it from `first` on, under this name until another is given.
   void give(const std::string& block, GLuint buffer, std::size_t first = 0, std::size_t bytes = 0);
-  void give(const std::string& block, const Buffer& buffer) { give(block, buffer.id()); }
+  /// Throws Error where all of a buffer is more than a block may have.
+  void give(const std::string& block, const Buffer& buffer);
   /// For other readers of what was written, or for what others wrote.
   void barrier(GLbitfield bits) { glMemoryBarrier(bits); }
   /// To be called where others may have bound buffers or programs since.
@@ -57,8 +61,9 @@ class Recorder {
   void run(Pass& pass, std::initializer_list<DispatchParameter> parameters = {}, const char* what = "",
            std::size_t bytes = 0);
 
-  std::size_t row = ~std::size_t(0);  ///< most work-groups in a dispatch's first dimension
-  GLuint counts = 0;                  ///< buffer of numbers of work-groups that kernels decide
+  std::size_t row = 0;      ///< most work-groups in a dispatch's first dimension; 0: what the driver allows
+  std::size_t storage = 0;  ///< most bytes of a block; 0: likewise
+  GLuint counts = 0;        ///< buffer of numbers of work-groups that kernels decide
   bool counting = false, timing = false;
   std::vector<DispatchCount> counted;  ///< while `counting`, in the order in which names came first
 

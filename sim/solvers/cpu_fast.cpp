@@ -341,7 +341,7 @@ class FastPbd {
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
                    double time) {
     const Plan plan = plan_for(settings);
-    const Substep substep(*model_, settings, plan, time);
+    Substep substep(*model_, settings, plan, time);
     RigidContact contact(*model_, settings);
     auto& v = state.velocities;
     auto& x = work_.x;
@@ -364,9 +364,9 @@ class FastPbd {
       GuardCounts counts{};
       for (int s = 0; s < plan.substeps; ++s) {
         if (damped) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
-        if (contact.wanted()) {
+        if (contact.wanted() || (substep.moving && s > 0)) {
           barrier.wait(thread);
-          if (thread == 0) contact.prepare(substep, s, inverse_masses, work_, v);
+          if (thread == 0) substep.begin(s), contact.prepare(substep, inverse_masses, work_, v);
           barrier.wait(thread);
         }
         for_each_free_vertex([&](std::size_t i) {
@@ -376,7 +376,7 @@ class FastPbd {
         for (int iteration = 0; iteration < plan.iterations; ++iteration) {
           solve(settings, plan.h, thread, threads, iteration == 0, barrier, counts);
           for_each_free_vertex([&](std::size_t i) {
-            move_to(i, substep.out_of_obstacles(s, i, x[i].position(), predicted_[i], v[i]));
+            move_to(i, substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i]));
           });
         }
         for_each_free_vertex([&](std::size_t i) {

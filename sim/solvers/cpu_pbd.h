@@ -129,7 +129,7 @@ class CpuPbd {
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(*model_, settings) : model_->size;
     const Plan plan = plan_for(settings);
-    const Substep substep(*model_, settings, plan, time);
+    Substep substep(*model_, settings, plan, time);
     RigidContact contact(*model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
@@ -141,7 +141,8 @@ class CpuPbd {
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
-      contact.prepare(substep, s, inverse_masses, vertices, v);
+      substep.begin(s);
+      contact.prepare(substep, inverse_masses, vertices, v);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
       predicted = x;
@@ -164,7 +165,7 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
-          x[i] = substep.out_of_obstacles(s, i, x[i], predicted[i], v[i]);
+          x[i] = substep.out_of_obstacles(i, x[i], predicted[i], v[i]);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)

@@ -38,17 +38,17 @@ class RigidContact {
     return carried_[i] ? x + s.h * v : s.predict(x, v);
   }
 
-  /// At the start of a substep, by number: finds bodies that would touch an obstacle, and sets their
+  /// At the start of a substep: finds bodies that would touch an obstacle, and sets their
   /// velocities v. `place.at(i)`: of vertex i, m.
   template <class Place>
-  void prepare(const Substep& s, int substep, const std::vector<double>& inverse_masses, const Place& place,
+  void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
                std::vector<glm::dvec3>& v) {
     if (!wanted_) return;
     for (const Body& body : model_.bodies) {
       if (!body.one_piece || !rigid_in_contact(settings_, body_material(body, settings_))) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
-      const auto near = near_contacts(s, substep, inverse_masses, place, v, first, end);
-      const bool moved = !near.empty() && move(s, substep, near, place, v, first, end);
+      const auto near = near_contacts(s, inverse_masses, place, v, first, end);
+      const bool moved = !near.empty() && move(s, near, place, v, first, end);
       std::fill(carried_.begin() + std::ptrdiff_t(first), carried_.begin() + std::ptrdiff_t(end), moved);
     }
   }
@@ -58,10 +58,9 @@ class RigidContact {
 
   // The vertices that would touch an obstacle next; none if one is fixed.
   template <class Place>
-  std::vector<std::size_t> near_contacts(const Substep& s, int substep,
-                                         const std::vector<double>& inverse_masses, const Place& place,
-                                         const std::vector<glm::dvec3>& v, std::size_t first,
-                                         std::size_t end) const {
+  std::vector<std::size_t> near_contacts(const Substep& s, const std::vector<double>& inverse_masses,
+                                         const Place& place, const std::vector<glm::dvec3>& v,
+                                         std::size_t first, std::size_t end) const {
     std::vector<std::size_t> found;
     for (std::size_t i = first; i < end; ++i) {
       if (!(inverse_masses[i] > 0)) return {};
@@ -70,14 +69,14 @@ class RigidContact {
       const auto stops = [&](const MovingObstacle& o) {
         return o.surface_met(next, next - here - s.h * o.velocity_at(here)).distance < 0;
       };
-      if (std::ranges::any_of(s.obstacles_in(substep), stops)) found.push_back(i);
+      if (std::ranges::any_of(s.obstacles, stops)) found.push_back(i);
     }
     return found;
   }
 
   // False for a body without inertia about some axis.
   template <class Place>
-  bool move(const Substep& s, int substep, const std::vector<std::size_t>& near, const Place& place,
+  bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place,
             std::vector<glm::dvec3>& v, std::size_t first, std::size_t end) const {
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
     double mass = 0;
@@ -122,7 +121,7 @@ class RigidContact {
       };
       for (const std::size_t i : near) {
         const glm::dvec3 arm = at(i) - body.centre;
-        for (const MovingObstacle& o : s.obstacles_in(substep)) {
+        for (const MovingObstacle& o : s.obstacles) {
           const glm::dvec3 surface = o.velocity_at(at(i)),
                            way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
           const auto ahead = o.surface_ahead(at(i), s.h * surface + way, way);

@@ -177,10 +177,7 @@ Buffer record_buffer(const ConstraintList& list, const std::string& kind) {
 }
 
 void check_storage(const Tuning& tuning, const std::string& label, std::size_t bytes) {
-  if (tuning.storage > 0 && bytes > tuning.storage)
-    throw Error("a storage buffer is too large",
-                fmt::format("'{}' of {} bytes, the driver allows {}", label, bytes, tuning.storage),
-                "use a smaller mesh", 1);
+  if (tuning.storage > 0) check_block(label, bytes, tuning.storage);
 }
 
 void add_buffer(Solver& solver, const Tuning& tuning, const char* block, Buffer buffer) {

@@ -18,36 +18,46 @@ inline bool splits_masses(const Model& model, const Settings& settings) {
 
 /// What moves a vertex in a substep besides its constraints.
 struct Substep {
-  const Model& model;
   double h, velocity_scale;
   glm::dvec3 gravity;
-  ObstacleLists obstacles;  ///< of each substep of the step, or of all
+  std::vector<MovingObstacle> obstacles;  ///< of the substep that began last
+  bool moving;                            ///< they differ from one substep to the next
 
-  Substep(const Model& own, const Settings& settings, const Plan& plan, double time)
-      : model(own),
-        h(plan.h),
+  /// Of the step's first substep; all live longer than this.
+  Substep(const Model& model, const Settings& settings, const Plan& plan, double time)
+      : h(plan.h),
         velocity_scale(std::exp(-settings.damping * h)),
         gravity(0, -settings.gravity, 0),
-        obstacles(obstacles_over(model, settings, time, h, plan.substeps)) {}
-  const std::vector<MovingObstacle>& obstacles_in(int substep) const {
-    return obstacles[std::min(std::size_t(substep), obstacles.size() - 1)];
+        obstacles(obstacles_at(model, settings, time, h)),
+        moving(std::ranges::any_of(model.obstacles, moves)),
+        model_(model),
+        settings_(settings),
+        time_(time) {}
+  /// Goes on to a substep by number.
+  void begin(int substep) {
+    if (moving && substep > 0) obstacles = obstacles_at(model_, settings_, time_ + substep * h, h);
   }
   /// Where prediction moves x (eqs. 1-2); changes v.
   glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
     v = (v + h * gravity) * velocity_scale;
     return x + h * v;
   }
-  /// Vertex i at x, out of all obstacles (eqs. 11-12), in a substep by number.
-  glm::dvec3 out_of_obstacles(int substep, std::size_t i, glm::dvec3 x, const glm::dvec3& predicted,
+  /// Vertex i at x, out of all obstacles (eqs. 11-12).
+  glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted,
                               const glm::dvec3& v) const {
-    for (const MovingObstacle& o : obstacles_in(substep)) {
+    for (const MovingObstacle& o : obstacles) {
       const glm::dvec3 way = h * (v - o.velocity_at(x)) + (x - predicted);
       const auto met = o.surface_met(x, way);
       if (met.distance < 0)
-        x += Formulas<double>{}.plane_correction(met.normal, met.distance, way, friction_on(o, model, i));
+        x += Formulas<double>{}.plane_correction(met.normal, met.distance, way, friction_on(o, model_, i));
     }
     return x;
   }
+
+ private:
+  const Model& model_;
+  const Settings& settings_;
+  double time_;
 };
 
 }  // namespace tetpbd

@@ -55,10 +55,11 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
       model, settings, steps, right,
       [&] {
         const Plan plan = plan_for(settings);
+        GuardCounts left_out{};
         Substep substep(model, settings, plan, std::exchange(time, time + settings.dt));
         for (int s = 0; s < plan.substeps; ++s) {
           substep.begin(s);
-          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities);
+          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities, left_out);
           for (RigidBody& body : bodies) {
             const bool touches = contact.carries(body.first);
             if (touches) {

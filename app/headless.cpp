@@ -153,6 +153,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"final_potential", last.potential}};
   const GuardCounts guards = guard_counts(sim);
   for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
+  for (const auto& [name, count] : dropped(sim)) j["dropped"][name] = count;
   j["finite"] = errors.finite;
   j["non_finite"] = non_finite_json(errors.non_finite);
   j["state_hash"] = hash;
@@ -235,6 +236,8 @@ int run_headless(Scene scene, const RunOptions& options) {
              sim.steps, context.capabilities().renderer,
              options.measure_every > 1 ? "of measured steps " : "", run.errors.max_volume_loss_percent,
              good ? worst_tet(sim) + ", " : "", median(run.wall_ms), (options.out / "stats.json").string());
+  for (const auto& [name, count] : dropped(sim))
+    fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
                 "what was finished is written", 1);

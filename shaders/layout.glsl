@@ -122,6 +122,12 @@ struct RigidRecord {
 #define GUARD_LIMIT 32u       // a correction was longer than the body: shortened
 #define GUARD_NOT_FINITE 64u  // a correction was not a number: dropped
 #define GUARDS 7
+// What is left out where a fixed size or a number of turns does not suffice: counters of the block Check, always
+// counted, for that costs nothing where it does.
+#define DROP_CONTACTS 0  // a hard body in a substep had more contacts than MOST_TOUCHES
+#define DROP_SWEEPS 1    // its impulses had not settled
+#define DROP_RANGE 2     // a vertex of it was beyond what sums hold
+#define DROPS 3
 
 // What a dispatch does (a dispatch parameter); bits.
 #define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v

@@ -10,7 +10,7 @@ namespace pair_layout {
 using glm::uint;
 #include "shaders/pairs/layout.glsl"
 static_assert(sizeof(SurfaceLeaf) == 28 && sizeof(SurfaceBody) == 8 && sizeof(SurfaceSlice) == 12);
-static_assert(sizeof(ContactTotals) == 8 && sizeof(CandidateCounts) == 64 && sizeof(BodyBox) == 52);
+static_assert(sizeof(ContactTotals) == 12 && sizeof(CandidateCounts) == 64 && sizeof(BodyBox) == 56);
 static_assert(sizeof(LeafBox) == 28 && sizeof(NearLeaves) == 256 && sizeof(ContactRecord) == 44);
 static_assert(sizeof(ContactSums) == 28);
 }  // namespace pair_layout

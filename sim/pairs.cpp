@@ -105,7 +105,7 @@ void take_answer(Sim& sim) {
   const auto answer = take<std::byte>(p.asked, p.answer, "contacts", true);
   if (!answer) return;
   const ContactTotals totals = get(*answer, p.ranges.totals)[0];
-  p.touches += totals.touching;
+  p.touches += totals.touching, p.crowded += totals.crowded;
   p.depth = double(std::bit_cast<float>(totals.deepest));
   p.deepest = std::max(p.deepest, p.depth);
   std::vector<Extent> bodies;
@@ -116,6 +116,9 @@ void take_answer(Sim& sim) {
     bodies.push_back({{place(box.low), place(box.high)},
                       {place(box.slowest), place(box.fastest)},
                       spreads * double(std::bit_cast<float>(box.spread))});
+    // A few vertices may be faster than that, which matters where they cross the margin before the next look.
+    const double faster = double(std::bit_cast<float>(box.top)) - speed_of(bodies.back());
+    p.outrun += faster * double(Pairs::every) * sim.settings.dt > p.margin;
   }
   decide(sim, bodies);
 }

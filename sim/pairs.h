@@ -55,6 +55,8 @@ inline double pair_margin(const PairMesh& mesh) { return 0.5 * mesh.edge; }
 struct PairNumbers {
   long detections = 0;              ///< since the start
   std::uint64_t touches = 0;        ///< contacts, summed over substeps, since the start
+  std::uint64_t crowded = 0;        ///< lists of candidates that were full, with some that push nothing
+  std::uint64_t outrun = 0;         ///< looks at boxes that found a vertex too fast for the margin
   double deepest = 0;               ///< m, the largest depth that a vertex came to in a substep
   double depth = 0;                 ///< m, the same between the last two looks at boxes
   bool near = true;                 ///< bodies may touch before the answer after the next

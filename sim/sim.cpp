@@ -135,7 +135,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   }
   if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(input);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
-  sim.check.words = Buffer("check", 16);
+  sim.check.words = Buffer("check", std::vector<GLuint>(4 + DROPS), GL_DYNAMIC_COPY);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
   sim.check.copy = {Program::compute("checkpoint.comp")};
   if (sim.solver.watches) {
@@ -167,7 +167,7 @@ void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Mode
                            ? sim.system
                            : build_constraints(*sim.model, settings));
   fresh.inverse_masses = sim.inverse_masses;
-  fresh.steps = sim.steps;
+  fresh.steps = sim.steps, fresh.guards = guard_counts(sim);
   fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, time_of(sim)};
   fresh.timed = sim.timed;
   start_with(fresh, std::move(state), half_substep_fall(sim.settings, sim.plan));
@@ -291,9 +291,14 @@ void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
   write_step_block(sim);
 }
 
+static void clear_drops(Sim& sim) {
+  sim.check.words.write(4 * sizeof(GLuint), DROPS * sizeof(GLuint), std::array<GLuint, DROPS>{}.data());
+}
+
 void reset(Sim& sim) {
   const KeepBindings kept;
   if (sim.guard_counts) sim.guard_counts.clear();
+  if (sim.check.words) clear_drops(sim);
   sim.guards = {};
   sim.inverse_masses = sim.model->inverse_masses;
   forget_all(sim);
@@ -379,7 +384,7 @@ void rebuild_shaders(Sim& sim) {
 }
 
 void add_guards(Sim& sim, const GuardCounts& counts) {
-  for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += counts[g];
+  for (std::size_t g = 0; g < counts.size(); ++g) sim.guards[g] += counts[g];
 }
 
 GuardCounts guard_counts(Sim& sim) {
@@ -390,7 +395,23 @@ GuardCounts guard_counts(Sim& sim) {
     for (std::size_t g = 0; g < GUARDS; ++g) sim.guards[g] += now[g];
     sim.guard_counts.clear();
   }
+  if (sim.check.words) {
+    std::array<GLuint, DROPS> now{};
+    sim.check.words.read(4 * sizeof(GLuint), sizeof now, now.data());
+    for (std::size_t d = 0; d < DROPS; ++d) sim.guards[GUARDS + d] += now[d];
+    if (now != std::array<GLuint, DROPS>{}) clear_drops(sim);
+  }
   return sim.guards;
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> dropped(Sim& sim) {
+  const GuardCounts counts = guard_counts(sim);
+  const PairNumbers pairs = touched(sim);
+  std::vector<std::pair<std::string, std::uint64_t>> all;
+  for (std::size_t d = 0; d < DROPS; ++d) all.emplace_back(drop_names[d], counts[GUARDS + d]);
+  all.emplace_back("contact_candidates", pairs.crowded), all.emplace_back("contact_speed", pairs.outrun);
+  std::erase_if(all, [](const auto& item) { return item.second == 0; });
+  return all;
 }
 
 State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities) {

@@ -125,6 +125,9 @@ std::uint64_t state_hash(const Sim& sim);
 /// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count.
 /// Waits.
 GuardCounts guard_counts(Sim& sim);
+/// What was left out since then because a fixed size or number of turns did not suffice, by name, where it
+/// was; also in GPU modes. Waits.
+std::vector<std::pair<std::string, std::uint64_t>> dropped(Sim& sim);
 
 /// Starts anew from the state of now, of which nothing is known but that it was `given`, if it was.
 void start_check(Sim& sim, const State* given);

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <glm/gtc/matrix_transform.hpp>
+#include <map>
 #include <numbers>
 
 #include "sim/error.h"
@@ -346,4 +347,44 @@ TEST_CASE("contact: restitution is of hard bodies") {
   refused([](Settings& s) { s.material = "neo-hookean"; });
   refused([](Settings& s) { s.rigid_contact = false; });
   refused([](Settings& s) { s.constraints = "volume"; });
+}
+
+TEST_CASE_FIXTURE(GlTest,
+                  "contact: what is left out of a hard body's contacts is counted, and nothing else is") {
+  const auto model = std::make_shared<Model>();
+  add(*model, irregular_block(), {0, 0.35, 0});
+  // A cage of walls that close in on it from all sides, each dragging another way.
+  const auto cage = std::make_shared<Model>(*model);
+  for (int k = 0; k < 24; ++k) {
+    const double y = 1 - (2 * k + 1) / 24.0, turn = 2.4 * k, r = std::sqrt(1 - y * y);
+    const glm::dvec3 n(r * std::cos(turn), y, r * std::sin(turn));
+    Obstacle wall = samples::half_space(n, glm::dot(n, glm::dvec3(0, 0.35, 0)) - 0.6);
+    wall.velocity = 2.0 * n + glm::cross(n, glm::dvec3(std::sin(3.0 * k), 1, std::cos(5.0 * k)));
+    wall.friction = 0.7;
+    cage->obstacles.push_back(wall);
+  }
+  const auto fast = std::make_shared<Model>();
+  add(*fast, irregular_block(), {0, 0.35, 0}, glm::dmat3(1), {1500, -1, 0});
+  for (const std::string& mode : all_modes) {
+    CAPTURE(mode);
+    const auto run = [&](const std::shared_ptr<const Model>& one, int steps) {
+      Sim sim = create_sim(one, in_mode(mode));
+      for (int s = 0; s < steps; ++s) step(sim);
+      const auto first = dropped(sim);
+      CHECK(dropped(sim) == first);
+      Settings other = sim.settings;
+      other.mode = mode == "node" ? "constraint" : "node";
+      apply_settings(sim, other);
+      CHECK(dropped(sim) == first);
+      reset(sim);
+      CHECK(dropped(sim).empty());
+      return std::map(first.begin(), first.end());
+    };
+    CHECK(run(model, 200).empty());
+    auto caged = run(cage, 60);
+    const bool cpu = find_solver_mode(mode)->cpu;  // where contacts are found anew in each substep, and fewer
+    CHECK((caged["rigid_contacts"] > 0) == !cpu);
+    CHECK(caged["rigid_sweeps"] > 0);
+    CHECK((run(fast, 3)["rigid_range"] > 0) == !cpu);
+  }
 }

@@ -639,3 +639,22 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: many substeps of what moves need no more m
     CHECK(worst < 1e-5);
   }
 }
+
+TEST_CASE("obstacles: no way is so long that a plate of two cells is stepped over") {
+  Obstacle plate;
+  plate.kind = find_obstacle_kind("mesh");
+  auto field = std::make_shared<DistanceField>();
+  field->spacing = 0.01, field->size = {41, 9, 41}, field->origin = {-0.2, -0.04, -0.2};
+  for (int k = 0; k < 41; ++k)
+    for (int j = 0; j < 9; ++j)
+      for (int i = 0; i < 41; ++i) field->values.push_back(float(std::abs(j - 4) * 0.01 - 0.01));
+  plate.field = field;
+  const MovingObstacle shape = still(plate);
+  int missed = 0;
+  for (int k = 0; k < 200; ++k)
+    for (const double length : {1.5, 5.0, 500.0}) {
+      const glm::dvec3 from(-1 - 0.003 * k, 1 + 0.002 * k, 0.001 * k);
+      missed += !(shape.surface_met(from * (1 - length), -from * length).distance < 0);
+    }
+  CHECK(missed == 0);
+}

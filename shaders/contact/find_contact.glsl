@@ -2,15 +2,17 @@
 // would be stopped. Where it meets nothing, that of the nearest point of the surface (method.md, "Obstacles with a
 // shape"). GLSL and C++ (sim/formulas.h); surface_of(): the distance of the solid's kind.
 // Convex solids lie behind the plane at their nearest point, so the search goes from plane to plane (Newton's
-// method); others are searched in steps of the distance, half a cell at least.
+// method): each plane makes distance times approach at least four times smaller, so it takes a dozen turns. Others are
+// searched in steps of the distance, half a cell at least, however long the way is: few lead up to their field, and
+// there are turns enough to cross it.
 Surface find_contact(Solid s, vec3 from, vec3 to) {
   vec3 way = to - from;
-  real l = length(way), least = max(real(0.5) * s.spacing, l / real(64));
+  real l = length(way), least = s.spacing > real(0) ? real(0.5) * s.spacing : l / real(64);
   real close = real(1e-3) * l + real(4) * rounding * length(from), t = real(0);
   bool convex = s.convex != 0, hit = false, on = true;
   Surface here = Surface(vec3(real(0)), real(0)), end = here, plane = here;
   // The start, the end, then the way between: one call of the distance, whose code is long.
-  for (int turn = 0; turn < 66 && on; ++turn) {
+  for (int turn = 0; turn < 66 + 2 * (s.cells.x + s.cells.y + s.cells.z) && on; ++turn) {
     Surface found = surface_of(s, turn == 1 ? to : from + t * way);
     if (turn == 1) end = found;
     else here = found;

@@ -5,6 +5,7 @@ struct Rigid {
   vec3 velocity;
   vec3 spin;  // rad/s
   mat3 inverse_inertia;
+  bool unsettled;  // impulses still changed when it was left
 };
 struct Touch {
   vec3 normal;
@@ -87,6 +88,7 @@ Rigid settled(TOUCHES Rigid b, int count, real enough, real still) {
     }
     if (count == 1) change = real(0);
   }
+  b.unsettled = change > enough;
   real reach = real(0);
   for (int k = 0; k < count; ++k) reach = max(reach, length(contacts[k].arm));
   if (length(b.velocity) + reach * length(b.spin) < still) b.velocity = b.spin = vec3(real(0));

@@ -54,6 +54,9 @@ void add_rigid_sum(uint b, int which, int rest, float value) {
   add_quanta(b, rest, round((quanta - whole) * RIGID_PARTS));
 }
 void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].fixed_vertices, 1u); }
+void note_range(vec3 value) {
+  if (any(greaterThan(abs(value), vec3(1.0)))) atomicAdd(dropped[DROP_RANGE], 1u);
+}
 // Vertex i is at x with velocity v and will be at `next`.
 void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
   uint b = state.body, s = side_now();
@@ -62,14 +65,17 @@ void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inve
   if (inside) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
   if (!state.summed) return;
   float weight = 1.0 / (inverse_mass * state.mass);
-  vec3 arm = clamp(arm_of(x, state.origin) / (2.0 * params.body_size), vec3(-1.0), vec3(1.0));
+  vec3 place = arm_of(x, state.origin) / (2.0 * params.body_size), arm = clamp(place, vec3(-1.0), vec3(1.0));
+  note_range(place);
   for (int a = 0; a < 3; ++a) {
     add_rigid_sum(b, a, weight * arm[a]);
     add_rigid_sum(b, 9 + a, weight * arm[a] * arm[a]);
     add_rigid_sum(b, 12 + a, weight * arm[a] * arm[(a + 1) % 3]);
   }
   if (state.carried) return;  // then its momenta are known
-  vec3 speed = clamp((v.high + v.low) / RIGID_SPEED, vec3(-1.0), vec3(1.0)), turn = 0.5 * cross(arm, speed);
+  vec3 rate = (v.high + v.low) / RIGID_SPEED, speed = clamp(rate, vec3(-1.0), vec3(1.0));
+  vec3 turn = 0.5 * cross(arm, speed);
+  note_range(rate);
   for (int a = 0; a < 3; ++a) {
     add_rigid_sum(b, 3 + a, 15 + a, weight * speed[a]);
     add_rigid_sum(b, 6 + a, 18 + a, weight * turn[a]);

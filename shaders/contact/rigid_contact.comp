@@ -23,6 +23,7 @@ Rigid rigid_motion(uint b, uint s) {
   vec3 c = vec3(sums[0], sums[1], sums[2]);
   mat3 moments = mat3(sums[9], sums[12], sums[14], sums[12], sums[10], sums[13], sums[14], sums[13], sums[11]) - outerProduct(c, c);
   Rigid motion;
+  motion.unsettled = false;
   motion.centre = reach * c;
   motion.inverse_inertia = inverse_inertia_of(moments * (reach * reach));
   vec3 angular;
@@ -82,7 +83,8 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     body = settled(now, touching, enough, still);
   }
   // Contacts are taken in as the motion found so far breaks them, the worst first.
-  for (int round = 0; round < MOST_TOUCHES; ++round) {
+  bool full = false;
+  for (int round = 0;; ++round) {
     if (lane == 0u) {
       worst = 0u;
       worst_place = ~0u;
@@ -114,7 +116,8 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
       if (contacts[k].impulse == vec3(0.0)) at = k;
       known = known || places[k] == worst_place;
     }
-    if (known || at == MOST_TOUCHES) break;
+    full = !known && (at == MOST_TOUCHES || round == MOST_TOUCHES);
+    if (known || full) break;
     touching = max(touching, at + 1);
     barrier();
     if (lane == 0u) {
@@ -129,6 +132,8 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     rigid_bodies[b].sides[o].impulses[lane] = vec4(contacts[lane].impulse, 0.0);
   }
   if (writes && lane == 0u) {
+    if (full) atomicAdd(dropped[DROP_CONTACTS], 1u);
+    if (body.unsettled) atomicAdd(dropped[DROP_SWEEPS], 1u);
     rigid_bodies[b].sides[o].touching = uint(touching);
     rigid_bodies[b].sides[o].velocity = body.velocity;
     rigid_bodies[b].sides[o].angular = length(body.spin) > 0.0 ? inverse(body.inverse_inertia) * body.spin : vec3(0.0);

@@ -4,10 +4,11 @@
 #include "pairs/pairs.glsl"
 layout(std430) restrict readonly buffer Positions { Position positions[]; };
 layout(std430) restrict readonly buffer Velocities { Velocity velocities[]; };
-shared vec3 lows[GROUP_SIZE], highs[GROUP_SIZE];
+shared vec3 lows[GROUP_SIZE];
+shared vec4 highs[GROUP_SIZE];   // w: of squares of speeds
 shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares, or reaches
 // Leaves the box of all invocations, and the sum of their speeds or the largest, at 0.
-void reduce(uint lane, vec3 low, vec3 high, vec4 speed, bool sum) {
+void reduce(uint lane, vec3 low, vec4 high, vec4 speed, bool sum) {
   lows[lane] = low, highs[lane] = high, speeds[lane] = speed;
   barrier();
   for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
@@ -39,7 +40,7 @@ void leaf_box(uint leaf, uint lane) {
     target(TRIANGLES + e, uvec3(edge_vertex(e, 0u), edge_vertex(e, 1u), edge_vertex(e, 1u)), low, high);
     gather(SURFACE_VERTICES + e, reach);
   }
-  reduce(lane, low, high, vec4(reach), false);
+  reduce(lane, low, vec4(high, 0.0), vec4(reach), false);
   if (lane < 3u) {
     leaf_boxes[leaf].low[lane] = lows[0][lane];
     leaf_boxes[leaf].high[lane] = highs[0][lane];
@@ -55,8 +56,8 @@ void main() {
     return;
   }
   uint body = slices[slice].body, first = slices[slice].first, end = slices[slice].end;
-  vec3 low = vec3(1e30), high = vec3(-1e30);
-  vec4 speed = vec4(0.0);
+  vec3 low = vec3(1e30);
+  vec4 high = vec4(vec3(-1e30), 0.0), speed = vec4(0.0);
   const uint at_once = 4u;  // what is read does not wait for each other
   for (uint s = first + lane; s < end; s += at_once * GROUP_SIZE) {
     vec3 x[at_once], v[at_once];
@@ -65,7 +66,7 @@ void main() {
       x[j] = positions[i].high, v[j] = velocities[i].high;
     }
     for (uint j = 0u; j < at_once; ++j) {
-      low = min(low, x[j]), high = max(high, x[j]);
+      low = min(low, x[j]), high = max(high, vec4(x[j], dot(v[j], v[j])));
       if (s + j * GROUP_SIZE < end) speed += vec4(v[j], dot(v[j], v[j]));
     }
   }
@@ -78,5 +79,6 @@ void main() {
     atomicMax(boxes[body].fastest[lane], sortable(mean[lane]));
   } else if (lane == 3u) {
     atomicMax(boxes[body].spread, floatBitsToUint(sqrt(max(mean.w - dot(mean.xyz, mean.xyz), 0.0))));
+    atomicMax(boxes[body].top, floatBitsToUint(sqrt(highs[0].w)));
   }
 }

@@ -25,6 +25,7 @@ struct SurfaceSlice {
 struct ContactTotals {
   uint touching;
   uint deepest;  // m, a float's bits
+  uint crowded;  // lists of candidates that were full, with some that push nothing
 };
 // Three numbers for an indirect dispatch.
 struct WorkGroups {
@@ -44,7 +45,7 @@ struct CandidateCounts {
 // The box around the surface of a body and that around the mean velocities of its slices, as numbers that sort like
 // the floats; and how far from these the others are (m/s), a float's bits.
 struct BodyBox {
-  uint low[3], high[3], slowest[3], fastest[3], spread;
+  uint low[3], high[3], slowest[3], fastest[3], spread, top;  // top: of any vertex (m/s), a float's bits
 };
 struct LeafBox {
   float low[3], high[3], reach;  // reach: how far its items look

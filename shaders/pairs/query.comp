@@ -86,7 +86,7 @@ void look_at(uint s, uint t, bool same_body, Pair own, uint held, vec3 normal) {
 #define MOST_PIECES (GROUP_SIZE * CANDIDATES / 2u)
 shared uint lists[max(PER_GROUP * WAITING, GROUP_SIZE * CANDIDATES)];  // targets that wait to be looked at, of each item; what each invocation found
 shared uint scratch[2u * MOST_PIECES];  // first and end of near leaves' targets, in pieces of GROUP_SIZE; how far what is in lists is (floats' bits)
-shared uint piece_count, waiting_count[PER_GROUP], items[PER_GROUP], found_count, first_record;
+shared uint piece_count, waiting_count[PER_GROUP], items[PER_GROUP], found_count, crowded_count, first_record;
 shared vec4 balls[PER_GROUP];  // around what each item looks at: centre, radius, below 0 where there is none
 #if QUERY_EDGES
 uint first_target(uint leaf) { return TRIANGLES + leaves[leaf].edges[0]; }
@@ -159,7 +159,7 @@ void main() {
   for (uint k = 0u; k < CANDIDATES; ++k) found[k] = NONE, distances[k] = radius;
   vec4 ball = there ? vec4(0.5 * (own.high + end), 0.5 * distance(own.high, end) + 1.01 * radius) : vec4(vec3(0.0), -1e30);
   if (lane == 0u) waiting_count[part] = 0u, items[part] = s, balls[part] = ball;
-  if (gl_LocalInvocationIndex == 0u) piece_count = found_count = 0u;
+  if (gl_LocalInvocationIndex == 0u) piece_count = found_count = crowded_count = 0u;
   barrier();
   vec3 lowest = vec3(1e30), highest = vec3(-1e30);
   for (uint p = 0u; p < PER_GROUP; ++p)
@@ -218,11 +218,16 @@ void main() {
 #if LANES > 1
   merge(lane);
 #endif
-  bool opposed = false;
-  for (uint k = 0u; k < CANDIDATES; ++k) opposed = opposed || (found[k] & BESIDE) == 0u;
+  bool opposed = false, beside = false;
+  for (uint k = 0u; k < CANDIDATES; ++k) {
+    opposed = opposed || (found[k] & BESIDE) == 0u;
+    beside = beside || (found[k] & BESIDE) != 0u;
+  }
+  if (lane == 0u && there && beside && found[CANDIDATES - 1u] != NONE) atomicAdd(crowded_count, 1u);
   bool keeps = lane == 0u && there && opposed;
   uint record = keeps ? atomicAdd(found_count, 1u) : 0u;
   barrier();
+  if (gl_LocalInvocationIndex == 0u && crowded_count > 0u) atomicAdd(totals.crowded, crowded_count);
   if (gl_LocalInvocationIndex == 0u && found_count > 0u) {
     first_record = atomicAdd(counts.records, found_count);
     uint last = first_record + found_count - 1u;

@@ -366,7 +366,7 @@ class FastPbd {
         if (damped) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
         if (contact.wanted() || (substep.moving && s > 0)) {
           barrier.wait(thread);
-          if (thread == 0) substep.begin(s), contact.prepare(substep, inverse_masses, work_, v);
+          if (thread == 0) substep.begin(s), contact.prepare(substep, inverse_masses, work_, v, counts);
           barrier.wait(thread);
         }
         for_each_free_vertex([&](std::size_t i) {

@@ -142,7 +142,7 @@ class CpuPbd {
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
       substep.begin(s);
-      contact.prepare(substep, inverse_masses, vertices, v);
+      contact.prepare(substep, inverse_masses, vertices, v, guards);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
       predicted = x;

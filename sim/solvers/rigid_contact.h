@@ -39,16 +39,16 @@ class RigidContact {
   }
 
   /// At the start of a substep: finds bodies that would touch an obstacle, and sets their
-  /// velocities v. `place.at(i)`: of vertex i, m.
+  /// velocities v. `place.at(i)`: of vertex i, m. Counts what was left out.
   template <class Place>
   void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
-               std::vector<glm::dvec3>& v) {
+               std::vector<glm::dvec3>& v, GuardCounts& counts) {
     if (!wanted_) return;
     for (const Body& body : model_.bodies) {
       if (!body.one_piece || !rigid_in_contact(settings_, body_material(body, settings_))) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto near = near_contacts(s, inverse_masses, place, v, first, end);
-      const bool moved = !near.empty() && move(s, near, place, v, first, end);
+      const bool moved = !near.empty() && move(s, near, place, v, first, end, counts);
       std::fill(carried_.begin() + std::ptrdiff_t(first), carried_.begin() + std::ptrdiff_t(end), moved);
     }
   }
@@ -77,7 +77,7 @@ class RigidContact {
   // False for a body without inertia about some axis.
   template <class Place>
   bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place,
-            std::vector<glm::dvec3>& v, std::size_t first, std::size_t end) const {
+            std::vector<glm::dvec3>& v, std::size_t first, std::size_t end, GuardCounts& counts) const {
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
     double mass = 0;
     Rules::Rigid body{};
@@ -102,8 +102,8 @@ class RigidContact {
     const Rules::Rigid falling = body;
     // Contacts are taken in as the motion found so far breaks them, the worst first.
     Rules::Touch touches[MOST_TOUCHES], worst;
-    std::array<std::size_t, MOST_TOUCHES> places{};  // a number per vertex and obstacle
-    for (int count = 0; count < MOST_TOUCHES; ++count) {
+    std::array<std::size_t, MOST_TOUCHES + 1> places{};  // a number per vertex and obstacle
+    for (int count = 0;; ++count) {
       const double loose = 1e-3 * fall + enough;
       double most = loose;
       std::size_t place = 0;
@@ -131,9 +131,14 @@ class RigidContact {
       const auto taken = places.begin() + count;
       if (most == loose || std::find(places.begin(), taken, *taken) != taken)
         break;  // where one is known contacts contradict each other, as where a body is jammed
+      if (count == MOST_TOUCHES) {
+        ++counts[GUARDS + DROP_CONTACTS];
+        break;
+      }
       touches[count] = worst;
       body = Rules{}.settled(touches, body, count + 1, enough, 1e-4 * fall);
     }
+    counts[GUARDS + DROP_SWEEPS] += body.unsettled;
     for (std::size_t i = first; i < end; ++i) v[i] = Rules{}.velocity_at(body, at(i) - body.centre);
     return true;
   }

@@ -19,9 +19,12 @@ struct Carried;
 
 /// How often each guard of layout.glsl triggered, in its order. A projection counts once where each
 /// constraint is evaluated once (constraint and cpu modes), and once a vertex of it in node mode.
-using GuardCounts = std::array<std::uint64_t, GUARDS>;
+/// Behind them, what was left out (DROP_...).
+using GuardCounts = std::array<std::uint64_t, GUARDS + DROPS>;
 inline constexpr std::array<const char*, GUARDS> guard_names = {
     "direction", "hinge", "angle", "volume_floor", "collapsed", "limit", "not_finite"};
+inline constexpr std::array<const char*, DROPS> drop_names = {"rigid_contacts", "rigid_sweeps",
+                                                              "rigid_range"};
 
 /// What a mode does with a simulation; its file makes it, with whatever else it keeps inside these functions.
 struct Solver {

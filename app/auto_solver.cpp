@@ -9,10 +9,10 @@
 #include "app/reference_command.h"
 #include "app/run_loop.h"
 #include "app/sweep.h"
+#include "sim/contact/pairs.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/pairs.h"
 
 namespace tetpbd {
 
@@ -115,7 +115,8 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   std::optional<Motion> right = right_motion(*model, settings);
   if (right) choice.judged = "motion";
   for (const Settings& candidate : candidates(settings)) {
-    const bool first = choice.trials.empty(), as_it_is = candidate == settings || mode_of(candidate).leapfrog;
+    const bool first = choice.trials.empty(),
+               as_it_is = candidate == settings || solver_mode(candidate).leapfrog;
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
     Sim sim = create_sim(model, candidate);
     if (first) warm_up(sim);
@@ -179,11 +180,12 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   }
   double spin = 0;
   for (const BodyDescription& body : scene.bodies) spin = std::max(spin, glm::length(body.spin));
-  // Four times as many where newton would take four times its own (sim/watch.h).
+  // Four times as many where newton would take four times its own (sim/adaptive_substeps.h).
   const double wanted = explicit_substeps(model, s),
-               most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? finer_times : 1);
+               most = (is_software_renderer() ? 20 : 40) *
+                      (0.5 * s.dt * spin > TURN_LIMIT ? refined_substeps : 1);
   // Of bodies that touch newton is the less right, and takes four times its substeps as well.
-  if (wanted <= most * (bodies_touch(model, s) ? finer_times : 1)) {
+  if (wanted <= most * (bodies_touch(model, s) ? refined_substeps : 1)) {
     set_mode(s, "explicit", scene.name);
     return fmt::format("explicit, about {:g} substep{}", wanted, wanted == 1 ? "" : "s");
   }

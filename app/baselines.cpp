@@ -2,11 +2,11 @@
 
 #include <utility>
 
+#include "sim/contact/rigid_contact.h"
 #include "sim/interrupt.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/rigid.h"
-#include "sim/solvers/rigid_contact.h"
 
 namespace tetpbd {
 
@@ -46,7 +46,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
   const Model nothing;  // to touch: contact is found here
   Settings flight = settings, carried = settings;
   flight.ground = carried.ground = false, carried.gravity = 0;
-  State now = state_of(model, bodies);
+  State now = make_state(model, bodies);
   struct Place {
     const Points& points;
     const glm::dvec3& at(std::uint32_t i) const { return points[i]; }
@@ -72,7 +72,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
             }
             advance(body, nothing, touches ? carried : flight, substep.h);
           }
-          now = state_of(model, bodies);
+          now = make_state(model, bodies);
         }
       },
       [&] { return now; });
@@ -83,7 +83,7 @@ MeasuredRun direct_run(const Model& model, const Settings& settings, long steps,
   const Plan plan = plan_for(settings);
   const ConstraintSystem system = build_constraints(model, settings);
   const ReferenceInput input{model, system, settings, model.inverse_masses};
-  Implicit run = implicit(input, compliances_of(input), {model.positions, model.velocities}, plan.h);
+  Implicit run = implicit(input, reference_compliances(input), {model.positions, model.velocities}, plan.h);
   run.most = plan.iterations;
   return baseline_run(
       model, settings, steps, right, [&] { advance(run, plan.substeps); }, [&] { return run.now; });

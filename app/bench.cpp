@@ -88,7 +88,7 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
     const Camera camera = scene_camera(scene, *model, float(width) / float(height));
     for (const std::string& picture : options.pictures) {
       const auto kind = std::ranges::find(picture_kinds, picture, &PictureKind::name);
-      const Frame frame = frame_of(sim, camera, kind->view, target);
+      const Frame frame = make_frame(sim, camera, kind->view, target);
       row["size"] = fmt::format("{}x{}", width, height);
       row["picture"] = picture;
       rows.push_back(row);

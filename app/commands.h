@@ -33,7 +33,7 @@ struct RunOptions {
   long measure_every = 1;           ///< steps between measurements; the last step is measured in any case
   bool positions = false;           ///< of the end, as arrays
   long positions_every = 0;         ///< steps a frame of trajectory.npy and exports; 0: of exports, real time
-  std::vector<std::string> exports;  ///< of export_formats
+  std::vector<std::string> exports;    ///< of export_formats
   std::filesystem::path dump_shaders;  ///< folder for the text of all shaders; empty: none
   int gpu = -1;
   std::array<int, 2> size{1280, 720};  ///< pixels

@@ -7,7 +7,7 @@
 
 #include "app/commands.h"
 #include "app/probe.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 

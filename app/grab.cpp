@@ -27,7 +27,7 @@ constexpr double edges_at_most = 2.5;
 
 // Takes in the watched positions that have come back, and asks for the next.
 void watch(Grab& grab, const Sim& sim, bool wait = false) {
-  if (const auto copy = take<Position>(grab.copied, grab.copy, "reading a vertex", wait)) {
+  if (const auto copy = poll_readback<Position>(grab.copied, grab.copy, "reading a vertex", wait)) {
     grab.neighbours = glm::dvec3(0);
     for (const Position& p : *copy) {
       grab.seen = glm::dvec3(p.high) + glm::dvec3(p.low);
@@ -111,7 +111,7 @@ void move_held(Sim& sim, const Hold& hold, const glm::dvec3& to) {
   for (std::size_t i = 1; i < hold.vertices.size(); ++i) {
     glm::dvec3 place = hold.starts[i];
     if (distance > 0) place += moved * (1 - hold.behind[i] * slack / distance);
-    places.push_back(out_of_obstacles(*sim.model, sim.settings, time_of(sim), place));
+    places.push_back(out_of_obstacles(*sim.model, sim.settings, simulated_time(sim), place));
   }
   move_pinned(sim, hold.vertices, places);
 }
@@ -151,7 +151,7 @@ void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor) {
   const double reach = glm::dot(grab.hit - origin, forward) / glm::dot(along, forward);
   grab.target = origin + along * reach + grab.start - grab.hit;
   // A pinned vertex has infinite mass and no contact, so it is kept out of obstacles here.
-  grab.target = out_of_obstacles(*sim.model, sim.settings, time_of(sim), grab.target);
+  grab.target = out_of_obstacles(*sim.model, sim.settings, simulated_time(sim), grab.target);
 }
 
 void lead(Grab& grab) {

@@ -5,8 +5,8 @@
 #include <tuple>
 
 #include "app/commands.h"
-#include "sim/did_you_mean.h"
 #include "sim/error.h"
+#include "sim/model/did_you_mean.h"
 
 namespace tetpbd {
 

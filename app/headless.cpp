@@ -45,8 +45,8 @@ struct FrameWriter {
         video_every(run.video_every > 0 ? run.video_every : steps_per_frame(dt)),
         target(make_target(run.size[0], run.size[1], run.samples)),
         renderer(make_renderer(*sim.model)),
-        frame(frame_of(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
-                       run.view, target)) {
+        frame(make_frame(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
+                         run.view, target)) {
     const double rate = std::clamp(1 / (double(video_every) * dt), 1.0, 120.0);  // of real time
     if (run.view.colour == Colour::motion && !right)
       throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
@@ -127,10 +127,10 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"gpu_ms_per_step", times(run.gpu_ms)},
                  {"wall_ms_per_step", times(run.wall_ms)},
                  {"fps", double(sim.steps) / run.seconds}};
-  const Watch& watch = watched(sim);
-  if (mode_of(sim.settings).leapfrog)
+  const AdaptiveSubsteps& watch = adaptive_values(sim);
+  if (solver_mode(sim.settings).leapfrog)
     j["watch"] = {{"longest_substep_at_rest", sim.longest_substep}, {"most_substeps", watch.most_substeps}};
-  if (mode_of(sim.settings).implicit)
+  if (solver_mode(sim.settings).implicit)
     j["watch"] = {{"largest_residual", watch.largest_residual},
                   {"least_health", watch.least_health},
                   {"most_substeps", watch.most_substeps}};

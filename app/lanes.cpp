@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include "app/auto_solver.h"
-#include "sim/did_you_mean.h"
 #include "sim/error.h"
-#include "sim/material.h"
+#include "sim/model/did_you_mean.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -22,8 +22,8 @@ long compared_every(const Model& model) { return std::max(4l, long(model.positio
 
 // How far its iterations go, about.
 double effort(const Sim& sim) {
-  return mode_of(sim.settings).leapfrog ? 1e9 / sim.settings.stability
-                                        : double(sim.plan.iterations) * sim.plan.substeps;
+  return solver_mode(sim.settings).leapfrog ? 1e9 / sim.settings.stability
+                                            : double(sim.plan.iterations) * sim.plan.substeps;
 }
 
 GLuint patch_words(const Sim& sim) {
@@ -146,9 +146,9 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     else if (!apply_preset(settings, solver_presets(), word) &&
              !apply_preset(settings, material_presets(), word))
       throw Error(fmt::format("'{}' is no way to solve", word), where,
-                  did_you_mean(word, names_of(solver_presets())) +
+                  did_you_mean(word, preset_names(solver_presets())) +
                       fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
-                                  fmt::join(names_of(solver_presets()), ", ")));
+                                  fmt::join(preset_names(solver_presets()), ", ")));
   }
   check_settings(settings, where);
   if (budget_ms > 0 && model) settings = choose_solver(model, settings, budget_ms, 400).settings();

@@ -7,7 +7,7 @@
 
 #include "app/scene.h"
 #include "render/renderer.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
 
@@ -35,7 +35,7 @@ struct Lane {
   Buffer apart{};   ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                     ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
-  std::optional<float> far() const { return distance.at(time_of(sim)); }  ///< now
+  std::optional<float> far() const { return distance.at(simulated_time(sim)); }  ///< now
   /// Steps no more, since its state is not finite, while others go on.
   bool stopped() const { return sim.check.found.has_value(); }
 };

@@ -9,7 +9,7 @@
 #include "app/run_loop.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 

@@ -14,10 +14,10 @@
 #include "app/files.h"
 #include "app/lanes.h"
 #include "app/record.h"
-#include "sim/did_you_mean.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
+#include "sim/model/did_you_mean.h"
 #include "sim/solvers/solver.h"
 
 using namespace tetpbd;

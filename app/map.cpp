@@ -11,9 +11,9 @@
 #include "app/chart.h"
 #include "app/commands.h"
 #include "app/report.h"
-#include "sim/did_you_mean.h"
 #include "sim/error.h"
-#include "sim/material.h"
+#include "sim/model/did_you_mean.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -37,8 +37,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
   Scene own = scene;
   own.settings = settings;
   const long steps = duration_in_steps(own);
-  if (!last || last->scene != scene_key(*model, settings))
-    last = answer_for(*model, settings, steps);
+  if (!last || last->scene != scene_key(*model, settings)) last = answer_for(*model, settings, steps);
   MeasuredRun run;
   try {
     run = run_model(model, settings, steps, last ? &*last : nullptr, true, film.of(steps));

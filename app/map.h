@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/model.h"
+#include "sim/model/model.h"
 #include "sim/reference/motion.h"
 
 namespace tetpbd {

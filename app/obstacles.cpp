@@ -9,8 +9,8 @@
 #include "app/files.h"
 #include "app/scene.h"
 #include "sim/contact/obstacle_kinds.h"
-#include "sim/did_you_mean.h"
 #include "sim/error.h"
+#include "sim/model/did_you_mean.h"
 
 namespace tetpbd {
 

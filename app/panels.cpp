@@ -14,7 +14,7 @@
 #include "app/ui.h"
 #include "app/widgets.h"
 #include "sim/error.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -73,7 +73,7 @@ bool words_widget(Session& s, const Parameter& row, std::string& value, const st
 // What has no effect, as the stiffness of a kind that is switched off, is not shown.
 bool has_effect(const Session& s, const Settings& settings, const Parameter& row) {
   const std::string_view name = row.name;
-  const SolverMode& mode = mode_of(settings);
+  const SolverMode& mode = solver_mode(settings);
   const bool material = settings.material != "none";
   if (name == "mass_splitting") return mode.jacobi && !compliant(settings);  // which brings it with it
   if (name == "omega") return mode.jacobi;
@@ -191,7 +191,7 @@ struct Ways {
   std::map<std::string, Settings> to{};
 };
 Ways ways_of(const Settings& now, const std::vector<Preset>& presets, const std::string& help) {
-  Ways ways{.help = help, .words = names_of(presets)};
+  Ways ways{.help = help, .words = preset_names(presets)};
   for (const Preset& preset : presets) {
     apply_preset(ways.to[preset.name] = now, presets, preset.name);
     if (ways.to[preset.name] == now) ways.current = preset.name;
@@ -214,17 +214,18 @@ void draw_solver(Session& s) {
   ways.words.push_back("auto");
   if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
-  const Watch& watch = s.loaded.sim().watch;
-  if (mode_of(now).leapfrog)
+  const AdaptiveSubsteps& watch = s.loaded.sim().adaptive;
+  if (solver_mode(now).leapfrog)
     ImGui::TextWrapped("%d substeps%s", s.loaded.sim().plan.substeps,
                        watch.stiffening > 1
                            ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
                            : "");
-  if (mode_of(now).implicit)
+  if (solver_mode(now).implicit)
     ImGui::TextWrapped(
         "residual %.1e of the start's, health %.2f%s", watch.residual, watch.health,
-        watch.finer > 1 ? fmt::format("; {} times the substeps until no tet is inverted", watch.finer).c_str()
-                        : "");
+        watch.substep_factor > 1
+            ? fmt::format("; {} times the substeps until no tet is inverted", watch.substep_factor).c_str()
+            : "");
   if (!automatic) return;
   if (slider(s, "budget", s.budget_ms, 0.5, 0.01, 100, "%.3g ms per step",
              "time that a step may take: auto chooses again when you let go, which takes a second or "

@@ -155,7 +155,7 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
     const float y = corner.y + size.y * float(1 - (decade - axes.low) / (axes.high - axes.low));
     draw.AddLine(ImVec2(corner.x, y), ImVec2(end.x, y), faint);
   }
-  if (const double now = time_of(s.loaded.sim());
+  if (const double now = simulated_time(s.loaded.sim());
       row.of && !row.over_cost && now < axes.right) {  // back in time
     const float x = corner.x + size.x * float((now - axes.left) / (axes.right - axes.left));
     draw.AddLine(ImVec2(x, corner.y), ImVec2(x, end.y), ImGui::GetColorU32(ImGuiCol_Text, 0.4f));

@@ -5,7 +5,7 @@
 
 #include "render/frame.h"
 #include "render/layout.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -99,7 +99,8 @@ bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait) {
     if (probe.next.tet == mesh.tets.size()) return probe.reading.reset(), true;  // of a sheet
     copy_values(probe, lane);
   }
-  const auto values = take<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);
+  const auto values =
+      poll_readback<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);
   if (values) probe.reading = reading_of(probe.next, lane, *values);
   return values.has_value();
 }

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "sim/files.h"
-#include "sim/settings.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 
@@ -16,8 +16,8 @@ using nlohmann::ordered_json;
 
 struct Record {
   GrowingFile file;
-  long step = 0;       ///< of the lanes, as whoever reads the lines so far knows it
-  bool shown = false;  ///< another moment is shown than the lines say
+  long step = 0;        ///< of the lanes, as whoever reads the lines so far knows it
+  bool shown = false;   ///< another moment is shown than the lines say
   ordered_json view{};  ///< how bodies look, as the lines say
   explicit Record(const std::filesystem::path& name) : file(name) {}
 };

@@ -10,8 +10,8 @@
 #include "app/run_loop.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
-#include "sim/material.h"
 #include "sim/mesh/cache.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 

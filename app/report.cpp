@@ -152,7 +152,7 @@ Film::Film(const Scene& scene, const Model& model, const std::filesystem::path& 
 std::function<void(const Sim&, long)> Film::of(long steps) {
   return [this, steps](const Sim& sim, long step) {
     while (drawn < frames && (frames == 1 ? step == steps : step * long(frames - 1) >= long(drawn) * steps)) {
-      Frame frame = frame_of(sim, camera, {}, target);
+      Frame frame = make_frame(sim, camera, {}, target);
       draw(renderer, frame);
       const Image image = read_rgba(target);
       constexpr std::size_t line = std::size_t(width) * 4;

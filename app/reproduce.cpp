@@ -170,7 +170,7 @@ void snapshots(Report& report, const Published& paper, const Scene& scene,
   Sim sim = create_sim(model, scene.settings);
   Renderer renderer = make_renderer(*model);
   const Target target = make_target(360, 300, 4);
-  Frame frame = frame_of(sim, scene_camera(scene, *model, 1.2f), {}, target);
+  Frame frame = make_frame(sim, scene_camera(scene, *model, 1.2f), {}, target);
   report.html += fmt::format(
       "<h2>Figure {}: snapshots, {}</h2>\n<p>All constraints, 25 iterations.</p>\n"
       "<div class=\"snapshots\">\n",

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sim/contact/pairs.h"
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
-#include "sim/overlap.h"
-#include "sim/pairs.h"
+#include "sim/measure/overlap.h"
 
 namespace tetpbd {
 
@@ -92,7 +92,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     if (touching && (s % steps_per_frame(sim.settings.dt) == 0 || s == steps))
       run.errors.overlap =
           largest(run.errors.overlap.value_or(Overlap{}),
-                  overlap_of(*sim.model, read_state(sim).positions, sim.settings.contact == "self"));
+                  measure_overlap(*sim.model, read_state(sim).positions, sim.settings.contact == "self"));
     if (plan.stepped) plan.stepped(s);
     if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }
@@ -102,7 +102,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   }
   take(true);
   run.errors.non_finite = check_finite(sim, true);
-  run.substeps = std::max(sim.plan.substeps, sim.watch.most_substeps);
+  run.substeps = std::max(sim.plan.substeps, sim.adaptive.most_substeps);
   run.errors.finite = run.errors.finite && !run.errors.non_finite;
   return run;
 }

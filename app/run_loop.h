@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "sim/reference/motion.h"
 
 namespace tetpbd {

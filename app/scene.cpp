@@ -13,10 +13,10 @@
 #include "app/obstacles.h"
 #include "app/run_loop.h"
 #include "render/obstacles.h"
-#include "sim/did_you_mean.h"
 #include "sim/error.h"
-#include "sim/layout.h"
-#include "sim/material.h"
+#include "sim/gl/layout.h"
+#include "sim/model/did_you_mean.h"
+#include "sim/model/material.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -143,7 +143,7 @@ void read_material(const json& bodies, Settings& settings, const std::string& fi
   if (material.is_string()) {
     if (apply_preset(settings, material_presets(), material)) return;
     refuse(fmt::format("'bodies.0.material' is no material; there are {}",
-                       fmt::join(names_of(material_presets()), ", ")),
+                       fmt::join(preset_names(material_presets()), ", ")),
            file);
   }
   settings.material = "neo-hookean";
@@ -291,8 +291,8 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
                 "leave out one of the two");
   if (!name.empty() && !apply_preset(settings, solver_presets(), name))
     throw Error("no such solver", "--solver " + name,
-                did_you_mean(name, names_of(solver_presets())) +
-                    fmt::format("choose from auto, {}", fmt::join(names_of(solver_presets()), ", ")));
+                did_you_mean(name, preset_names(solver_presets())) +
+                    fmt::format("choose from auto, {}", fmt::join(preset_names(solver_presets()), ", ")));
   return false;
 }
 
@@ -437,7 +437,7 @@ namespace {
 // Nothing where it may change something.
 std::string why_unused(const Settings& s, const std::string& name) {
   const auto is = [&](auto... names) { return ((name == names) || ...); };
-  const SolverMode& mode = mode_of(s);
+  const SolverMode& mode = solver_mode(s);
   if (mode.leapfrog && is("iterations")) return "mode explicit has no iterations";
   if (!mode.leapfrog && is("stability")) return "it is of mode explicit";
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);

@@ -13,8 +13,8 @@
 
 #include "render/camera.h"
 #include "sim/mesh/wrap.h"
-#include "sim/model.h"
-#include "sim/settings.h"
+#include "sim/model/model.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 

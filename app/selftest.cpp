@@ -7,7 +7,7 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 

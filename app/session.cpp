@@ -102,7 +102,7 @@ void take_back(Session& s, const char* word, std::vector<Change>& from, std::vec
     put_settings(s, from.back().lanes);
     const auto numbers = [](const std::vector<Obstacle>& all) {
       std::vector<std::vector<double>> list;
-      for (const Obstacle& o : all) list.push_back(numbers_of(o));
+      for (const Obstacle& o : all) list.push_back(obstacle_values(o));
       return list;
     };
     if (numbers(now.obstacles) != numbers(from.back().obstacles)) put_obstacles(s, from.back().obstacles);
@@ -137,7 +137,8 @@ void step_lanes(Session& s) {
     if (s.grab) move_held(lane.sim, *s.hold, s.grab->position);
     const auto begin = Steady::now();
     step(lane.sim);
-    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, time_of(lane.sim));
+    if (on_cpu(lane.sim) && s.measuring)
+      lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
   }
   if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
@@ -557,9 +558,9 @@ std::optional<Advice> faster_way(const Session& s) {
   const auto& ms = s.loaded.lanes[s.loaded.chosen].step_ms.values;
   // Less than half of the time goes into steps.
   if (!ms.empty() && double(ms.back()) * clock.factor / own.dt < 500) return Advice{"a smaller window", ""};
-  const bool with_forces = mode_of(own).leapfrog || mode_of(own).implicit;
+  const bool with_forces = solver_mode(own).leapfrog || solver_mode(own).implicit;
   const SolverMode& fast = *std::ranges::find_if(solver_modes(), &SolverMode::all_cores);
-  if (!mode_of(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
+  if (!solver_mode(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
     return Advice{fmt::format("mode {}", fast.name), fmt::format("mode={}", fast.name)};
   if (const Plan& plan = s.loaded.sim().plan; hard(own) && plan.iterations * plan.substeps > 5)
     return Advice{"solver hard", "hard,mode=" + own.mode};
@@ -604,7 +605,7 @@ void advance(Session& s, double elapsed) {
 
 void measure_frame(Session& s, bool stepped) {
   for (Lane& lane : s.loaded.lanes) {
-    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, time_of(lane.sim));
+    while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, simulated_time(lane.sim));
     lane.sim.timed = s.measuring;
     if (!s.measuring) continue;
     if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);

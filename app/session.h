@@ -23,7 +23,7 @@
 #include "render/picking.h"
 #include "render/renderer.h"
 #include "render/target.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "sim/sim.h"
 
 namespace tetpbd {

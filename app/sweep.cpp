@@ -142,7 +142,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });
   std::vector<Settings> chosen;
   for (Settings& settings : all) {
-    if (mode_of(settings).leapfrog) {  // iterations and substeps are its own choice
+    if (solver_mode(settings).leapfrog) {  // iterations and substeps are its own choice
       settings.iterations = settings.substeps = automatic;
       if (std::ranges::find(chosen, settings) != chosen.end()) continue;
     }

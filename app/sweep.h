@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "sim/gl/gpu.h"
-#include "sim/settings.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 

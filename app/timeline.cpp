@@ -113,7 +113,7 @@ void keep_moment(Session& s) {
               moment->lanes.push_back(take_snapshot(lane.sim, states, at));
               at += snapshot_bytes(lane.sim);
               History& last = moment->distances.emplace_back();
-              if (const auto far = lane.far()) last.add(double(*far), time_of(lane.sim));
+              if (const auto far = lane.far()) last.add(double(*far), simulated_time(lane.sim));
             }
             moment->disturbed = s.loaded.disturbed;
             for (const std::uint32_t vertex : t.touched)

@@ -314,7 +314,7 @@ void draw_ui(Session& s, const Layout& layout) {
   if (s.obstacle >= 0) {
     const auto& obstacle = s.loaded.scene.obstacles[std::size_t(s.obstacle)];
     const ImVec2 at = seen_at(s, lane_place(s, s.loaded.chosen, layout.view),
-                              pose_at(obstacle, time_of(s.loaded.sim())).centre);
+                              pose_at(obstacle, simulated_time(s.loaded.sim())).centre);
     mark(s, "chosen obstacle", {at.x - 1, at.y - 1, 2, 2});
   }
   if (layout.panel.width > 0) {

@@ -29,7 +29,7 @@ void next_cut(Session& s) {
 }
 
 Frame shown_frame(const Session& s, std::size_t lane) {
-  Frame frame = frame_of(s.loaded.lanes[lane].sim, s.camera, s.view, {});
+  Frame frame = make_frame(s.loaded.lanes[lane].sim, s.camera, s.view, {});
   frame.viewport = {};
   frame.options.follow = false;
   return frame;
@@ -46,7 +46,7 @@ void draw_lanes(Session& s, const Target& target) {
   const std::size_t valued =
       farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
   for (std::size_t i = 0; i < lanes.size(); ++i) {
-    Frame frame = frame_of(lanes[i].sim, s.camera, s.view, target);
+    Frame frame = make_frame(lanes[i].sim, s.camera, s.view, target);
     frame.viewport = tile_in(s, i, target.width, target.height);
     // The hand's are larger than those of the scene.
     for (const std::uint32_t v : s.timeline.touched)

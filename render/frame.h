@@ -119,7 +119,7 @@ struct Frame {
 };
 
 /// A picture of a simulation with its ground, walls and pinned vertices (infinite mass), all of the target.
-Frame frame_of(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target);
+Frame make_frame(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target);
 /// What changes from step to step: the time, and what touches.
 void renew(Frame& frame, const Sim& sim);
 

@@ -3,7 +3,7 @@
 
 #include <glm/glm.hpp>
 
-#include "sim/layout.h"
+#include "sim/gl/layout.h"
 
 namespace tetpbd {
 using glm::mat4;

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "render/layout.h"
-#include "sim/layout.h"
+#include "sim/gl/layout.h"
 
 namespace tetpbd {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "render/target.h"
-#include "sim/model.h"
+#include "sim/model/model.h"
 
 namespace tetpbd {
 

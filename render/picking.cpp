@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "render/layout.h"
-#include "sim/layout.h"
+#include "sim/gl/layout.h"
 
 namespace tetpbd {
 
@@ -56,12 +56,12 @@ void request(Picker& picker, Renderer& renderer, const Frame& frame, const Ray& 
   if (!picker.inside) return request(picker, frame.positions, ray);
   if (!picker.tets_kernel) picker.tets_kernel = {Program::compute("render/pick.comp", {}, {"TETS"})};
   bind_view(renderer, frame);
-  picker.recorder.give("Rest", rest_of(renderer));
-  ask(picker, picker.tets_kernel, frame.positions, tets_of(renderer), renderer.mesh.tets.size(), ray);
+  picker.recorder.give("Rest", rest_buffer(renderer));
+  ask(picker, picker.tets_kernel, frame.positions, tet_buffer(renderer), renderer.mesh.tets.size(), ray);
 }
 
 std::optional<Pick> poll(Picker& picker, bool wait) {
-  const auto answer = take<std::uint32_t>(picker.answered, picker.result, "picking", wait);
+  const auto answer = poll_readback<std::uint32_t>(picker.answered, picker.result, "picking", wait);
   if (!answer) return std::nullopt;
   const std::uint32_t element = answer->at(1), vertex = answer->at(2);
   if (element == none) return Pick{.ray = picker.ray};

@@ -13,7 +13,7 @@
 #include "render/legend.h"
 #include "render/obstacles.h"
 #include "sim/gl/pass.h"
-#include "sim/model.h"
+#include "sim/model/model.h"
 
 namespace tetpbd {
 
@@ -52,8 +52,8 @@ struct Renderer {
   Buffer graph;            ///< edges' vertices
   Buffer arrow_vertices, touches;
   std::vector<std::string> touches_sizes;  ///< ... these Pairs::sizes
-  Buffer rest;             ///< vec4: rest position and body
-  CarriedSurface carried;  ///< of all bodies, or empty
+  Buffer rest;                             ///< vec4: rest position and body
+  CarriedSurface carried;                  ///< of all bodies, or empty
   Buffer carried_vertices, carried_triangles;
   VertexArray carried_array;
   std::array<Texture, 5> carried_texels;
@@ -84,8 +84,8 @@ Pass& kernel(Renderer& renderer, const std::string& name);
 /// Dispatches a kernel over so many items, in work-groups of 128.
 void run_over(Renderer& renderer, Pass& pass, std::size_t count);
 /// The tetrahedra's vertices, rest positions with bodies: made when first asked for.
-const Buffer& tets_of(Renderer& renderer);
-const Buffer& rest_of(Renderer& renderer);
+const Buffer& tet_buffer(Renderer& renderer);
+const Buffer& rest_buffer(Renderer& renderer);
 /// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
 /// What colours show of each vertex, now; empty where they show nothing. Waits for the GPU.

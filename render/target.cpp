@@ -101,7 +101,7 @@ void ReadBack::push(const Target& target) {
 std::optional<Image> ReadBack::poll(bool wait) {
   if (pending_.empty()) return std::nullopt;
   auto& [width, height, pixels, fence] = pending_.front();
-  auto rows = take<std::uint8_t>(fence, pixels, "reading a frame back", wait);
+  auto rows = poll_readback<std::uint8_t>(fence, pixels, "reading a frame back", wait);
   if (!rows) return std::nullopt;
   Image image{width, height, std::move(*rows)};
   const auto row = [&](int y) { return image.rgba.begin() + std::ptrdiff_t(bytes_of(image.width, y)); };

@@ -1,4 +1,4 @@
-// Buffer layouts and binding numbers, read by GLSL and by C++ (sim/layout.h). Units are SI.
+// Buffer layouts and binding numbers, read by GLSL and by C++ (sim/gl/layout.h). Units are SI.
 //
 // A position is an unevaluated sum high + low of two floats a component (about 48 bits): what one float would drop of
 // a small h*v is kept (method.md, "What float drops").
@@ -87,8 +87,8 @@ struct ObstacleRecord {
 
 // A hard body that touches obstacles (contact/rigid.glsl). Momenta and impulses per mass of the body.
 struct RigidSide {
-  int sums[RIGID_SUMS];   // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and products; then what is
-                          // finer than a quantum of velocity and arm x velocity
+  int sums[RIGID_SUMS];  // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and
+                         // products; then what is finer than a quantum of velocity and arm x velocity
   uint near;              // how many vertices would touch an obstacle next
   uint fixed_vertices;
   uint carried;           // 1: all velocities are the body's in this substep
@@ -112,8 +112,8 @@ struct RigidRecord {
   RigidSide sides[2];
 };
 
-// Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in the order
-// of their counters.
+// Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in
+// the order of their counters.
 #define GUARD_DIRECTION 1u    // stretch: coincident vertices part along a pseudo-random direction
 #define GUARD_HINGE 2u        // bend: a wing on its edge has no angle: skipped
 #define GUARD_ANGLE 4u        // bend: the error was clamped to 1 rad

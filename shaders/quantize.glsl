@@ -1,9 +1,9 @@
-// What neighbours see of a vertex, its quantized position: whole quanta modulo 2^32 in each component, with the inverse mass (times n_i for
-// mass splitting) as float bits. Differences wrap as well, so they are exact wherever the body is, as long as the vertices of a
-// constraint are within 2^31 quanta of each other (method.md, "What neighbours see").
-// With compliance as many follow: where the vertices were at the substep's start.
-// Halves of 16 bits: a float holds neither 2^32 nor a small negative number plus 2^32.
-ivec4 quantize(Pair x, float weight) {
+// What neighbours see of a vertex, its quantized position: whole quanta modulo 2^32 in each component, with the inverse
+// mass (times n_i for mass splitting) as float bits. Differences wrap as well, so they are exact wherever the body is,
+// as long as the vertices of a constraint are within 2^31 quanta of each other (method.md, "What neighbours see"). With
+// compliance as many follow: where the vertices were at the substep's start. Halves of 16 bits: a float holds neither
+// 2^32 nor a small negative number plus 2^32.
+ivec4 quantize(DoubleSingle x, float weight) {
   vec3 quanta = x.high * params.inverse_quantum;
   vec3 upper = floor(quanta / 65536.0);
   vec3 lower = (quanta - upper * 65536.0) + x.low * params.inverse_quantum;

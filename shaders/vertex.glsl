@@ -3,23 +3,25 @@
 #include "vertex_state.glsl"
 #include "contact/obstacles.glsl"
 
-Pair predict_velocity(Pair v) {
-  v = pair_add(v, params.gravity * params.h);
-  return Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
+DoubleSingle predict_velocity(DoubleSingle v) {
+  v = add_double(v, params.gravity * params.h);
+  return DoubleSingle(v.high * params.velocity_scale, v.low * params.velocity_scale);
 }
-Pair predict_position(Pair x, Pair v) {
+DoubleSingle predict_position(DoubleSingle x, DoubleSingle v) {
   precise vec3 move = params.h * v.high;
-  return pair_add(pair_add(x, move), params.h * v.low);
+  return add_double(add_double(x, move), params.h * v.low);
 }
-// The inverse mass that constraints see. With mass splitting (Tonge et al. 2012) each of n_i constraints has 1/n_i of the mass: the
-// average over them then keeps momentum (method.md eq. 13m).
-float weight_of(Position own) { return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass; }
+// The inverse mass that constraints see. With mass splitting (Tonge et al. 2012) each of n_i constraints has 1/n_i of
+// the mass: the average over them then keeps momentum (method.md eq. 13m).
+float weight_of(Position own) {
+  return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass;
+}
 
 #if RIGID_CONTACT
 #include "contact/rigid.glsl"
 #endif
 #if CONTACTS
-#include "pairs/sums.glsl"
+#include "contact/bodies/sums.glsl"
 // What contact with other bodies found after the last substep: where it stops the vertex, its velocity changes as well.
 void apply_contacts(uint i, inout Position own, inout Velocity speed) {
   uint side = (phases & PHASE_SHARED_SIDE) != 0u ? 1u : 0u, now = shared_at(i, side), then = shared_at(i, 1u - side);
@@ -34,13 +36,14 @@ void apply_contacts(uint i, inout Position own, inout Velocity speed) {
   if ((phases & PHASE_SHARED_LAST) != 0u) sharing[now] = 0;
   for (uint c = 0u; c < 3u; ++c) contact_sums[i].stopped[c] = contact_sums[i].pushed[c] = 0;
   if (!(own.inverse_mass > 0.0)) return;
-  Pair x = pair_add(Pair(own.high, own.low), stopped + pushed), v = pair_add(Pair(speed.high, speed.low), stopped * params.inverse_h);
+  DoubleSingle x = add_double(DoubleSingle(own.high, own.low), stopped + pushed),
+       v = add_double(DoubleSingle(speed.high, speed.low), stopped * params.inverse_h);
   own.high = x.high, own.low = x.low, speed.high = v.high, speed.low = v.low;
 }
 #endif
 
 // Moves vertex i, which is not fixed; returns where its neighbours see it.
-Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction);
+DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction);
 
 // Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases
 // predict or finish.
@@ -48,7 +51,7 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
 #if CONTACTS
   if ((phases & PHASE_TOUCHED) != 0u) apply_contacts(i, own, speed);
 #endif
-  Pair x = Pair(own.high, own.low);
+  DoubleSingle x = DoubleSingle(own.high, own.low);
   if (own.inverse_mass > 0.0) {
     x = move_vertex(i, own, speed, correction);
   } else if ((phases & PHASE_FINISH) != 0u) {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "sim/gl/gpu.h"
-#include "sim/model.h"
-#include "sim/settings.h"
+#include "sim/model/model.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 
@@ -44,7 +44,7 @@ struct TimeOrigin {
 /// The numbers of a Sim itself that a step hands on.
 struct StepValues {
   long steps = 0;             ///< taken since the start
-  TimeOrigin origin;          ///< ask time_of()
+  TimeOrigin origin;          ///< ask simulated_time()
   double quantum = 1;         ///< m, of quantized positions
   bool needs_predict = true;  ///< the quantized positions are not those of the next step
   unsigned read_index = 0;    ///< which of `quantized` is read next

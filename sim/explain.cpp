@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/keep_bindings.h"
+#include "sim/gl/keep_bindings.h"
 #include "sim/snapshot.h"
 
 namespace tetpbd {
@@ -51,7 +51,7 @@ Explanation explain(Sim& sim, int timed_steps) {
                                &p.lists,
                                &p.sums,
                                &p.empty,
-                               &p.answer})
+                               &p.readback})
     add(*buffer);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;

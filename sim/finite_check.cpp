@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "sim/keep_bindings.h"
+#include "sim/gl/keep_bindings.h"
 #include "sim/snapshot.h"
 
 namespace tetpbd {
@@ -75,8 +75,8 @@ void restore_pins(Sim& sim) {
 }
 
 void take_answer(FiniteCheck& check, bool wait) {
-  const auto answer =
-      take<std::uint32_t>(check.asked, check.read_back, "checking for numbers that are not finite", wait);
+  const auto answer = poll_readback<std::uint32_t>(check.requested, check.read_back,
+                                                   "checking for numbers that are not finite", wait);
   if (!answer) return;
   const std::uint32_t step = (*answer)[0], vertex = (*answer)[1];
   if (step != ~0u) check.found = {long(step), vertex};
@@ -86,9 +86,9 @@ void take_answer(FiniteCheck& check, bool wait) {
 // Asks the GPU about the steps so far, unless a question is under way.
 void ask(Sim& sim) {
   FiniteCheck& check = sim.check;
-  if (check.found || check.asked || check.known >= sim.steps) return;
+  if (check.found || check.requested || check.known >= sim.steps) return;
   check.words.copy_to(check.read_back, 0, 0, check.read_back.bytes());
-  check.asked = Fence::here();
+  check.requested = Fence::here();
   check.asked_step = sim.steps;
 }
 
@@ -96,7 +96,7 @@ void ask(Sim& sim) {
 
 void start_check(Sim& sim, const State* given) {
   FiniteCheck& check = sim.check;
-  check.asked = {};
+  check.requested = {};
   check.first = check.known = sim.steps;
   check.found = given ? non_finite(*given, sim.steps) : std::nullopt;
   check.kept.clear();

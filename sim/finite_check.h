@@ -20,7 +20,7 @@ Error error_of(const NonFinite& found, const std::string& where = "");
 struct FiniteCheck {
   static constexpr long ask_every = 32, checkpoint_every = 64;  ///< steps
   Buffer words, read_back;  ///< the kernels' block, and its copy for an answer under way
-  Fence asked;
+  Fence requested;
   Pass copy;  ///< checkpoint.comp
   Recorder recorder;
   Buffer checkpoint;          ///< of the last snapshot before a state that is not finite

@@ -4,61 +4,20 @@
 
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <numeric>
-#include <span>
 #include <tuple>
 
 #include "sim/contact/moving_obstacle.h"
+#include "sim/contact/rigid_contact.h"
 #include "sim/error.h"
-#include "sim/hash.h"
-#include "sim/keep_bindings.h"
-#include "sim/material.h"
-#include "sim/parallel.h"
-#include "sim/solvers/cpu_pbd.h"
-#include "sim/solvers/substep.h"
+#include "sim/gl/keep_bindings.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
-
-// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
-// so that their low parts are lost (a test guards against it).
-[[gnu::noinline]] void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
-  for (int a = 0; a < 3; ++a) {
-    const volatile float rounded = float(value[a]);
-    high[a] = rounded;
-    low[a] = float(value[a] - double(rounded));
-  }
-}
 
 namespace {
 
 constexpr unsigned group_size = 256;  // of rigid_contact
-
-Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constraints) {
-  Position p{};
-  split_pair(x, p.high, p.low);
-  p.inverse_mass = float(inverse_mass);
-  p.constraints = float(constraints);
-  return p;
-}
-
-// The quantum: a power of two, so that multiplying by it is exact, and small, with room for vertices
-// of a constraint 16 sizes apart (of the largest body, or of what the state stretches most). Everything that
-// is computed from quantized positions is blurred by it.
-double quantum_of(const Sim& sim, const State& state) {
-  double reach = sim.model->size;
-  for (const ConstraintList& list : sim.system.lists) {
-    const std::size_t arity = std::size_t(list.arity);
-#pragma omp parallel for reduction(max : reach)
-    for (std::size_t c = 0; c < list.vertices.size(); c += arity)
-      for (std::size_t j = 1; j < arity; ++j) {
-        const double apart =
-            glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]);
-        if (apart > reach && std::isfinite(apart)) reach = apart;
-      }
-  }
-  return std::exp2(std::ceil(std::log2(reach)) - 27);
-}
 
 // As they are before anything is known of the bodies' motion.
 std::vector<RigidRecord> rigid_records(const Model& model, const Settings& settings) {
@@ -112,7 +71,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   const SolverInput input = solver_input(sim);
   const auto defines = vertex_defines(input);
   sim.obstacles = make_obstacles(*sim.model);
-  sim.solver = mode_of(settings).create(input);
+  sim.solver = solver_mode(settings).create(input);
   sim.solver.retune(sim, nullptr);
   const auto buffer = [&](const char* label, std::size_t bytes) {
     check_storage(sim.tuning, label, bytes);
@@ -139,8 +98,8 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
   sim.check.copy = {Program::compute("checkpoint.comp")};
   if (sim.solver.watches) {
-    sim.watch.answer = Buffer("watch read-back", 8, nullptr, GL_STREAM_READ);
-    sim.watch.nothing = Buffer("nothing", 8, std::array{0.0f, 1.0f}.data());
+    sim.adaptive.readback = Buffer("watch read-back", 8, nullptr, GL_STREAM_READ);
+    sim.adaptive.nothing = Buffer("nothing", 8, std::array{0.0f, 1.0f}.data());
   }
   return sim;
 }
@@ -168,7 +127,7 @@ void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Mode
                            : build_constraints(*sim.model, settings));
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps, fresh.guards = guard_counts(sim);
-  fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, time_of(sim)};
+  fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, simulated_time(sim)};
   fresh.timed = sim.timed;
   start_with(fresh, std::move(state), half_substep_fall(sim.settings, sim.plan));
   sim = std::move(fresh);
@@ -180,17 +139,9 @@ void add_upwards(const Sim& sim, State& state, double speed) {
     if (sim.inverse_masses[i] > 0) state.velocities[i].y += speed;
 }
 
-void write_velocities(const Sim& sim, const State& state) {
-  std::vector<Velocity> velocities(state.velocities.size());
-  parallel_for(velocities.size(), [&](std::size_t i) {
-    split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
-  });
-  sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
-}
-
 // What is decided from a state before its first step.
 void start_from(Sim& sim, const State& state) {
-  forget_answers(sim);
+  forget_readbacks(sim);
   start_pairs(sim, state);
   sim.solver.start(sim, state);
 }
@@ -198,7 +149,7 @@ void start_from(Sim& sim, const State& state) {
 void adopt(Sim& sim, const State& state) {
   if (on_cpu(sim)) sim.host = state;
   upload(sim, state);
-  sim.quantum = quantum_of(sim, state);
+  sim.quantum = choose_quantum(sim, state);
   write_step_block(sim);
   start_check(sim, &state);
 }
@@ -218,7 +169,7 @@ void retime_velocities(Sim& sim, double fall) {
 // Semi-implicit Euler started half a substep back is leapfrog: velocities are those of mid-substep, and a
 // constant acceleration is integrated exactly (method.md eq. 3).
 double half_substep_fall(const Settings& settings, const Plan& plan) {
-  return mode_of(settings).implicit ? 0 : 0.5 * plan.h * settings.gravity;
+  return solver_mode(settings).implicit ? 0 : 0.5 * plan.h * settings.gravity;
 }
 
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, const Tuning& tuning) {
@@ -241,41 +192,6 @@ bool same_constraints(const Model& model, const Settings& a, const Settings& b) 
     return std::tuple(s.stiffness, s.compliance, s.constraint_damping);
   };
   return decides(a) == decides(b) && (!has_own_materials(model) || numbers(a) == numbers(b));
-}
-
-void write_step_block(Sim& sim, int substeps_before) {
-  const Settings& s = sim.settings;
-  const double h = sim.plan.h;
-  const bool soft = any_material(*sim.model, s, compliant);
-  Step block{};
-  block.gravity = {0.0f, float(-s.gravity), 0.0f};
-  block.h = float(h);
-  block.inverse_h = float(1 / h);
-  block.omega = soft ? 1.0f : float(s.omega);
-  block.share = mode_of(s).leapfrog ? 0.0f : float(1 / s.omega);
-  block.friction = float(s.friction);
-  block.drag = float(s.damping);
-  block.kick = substeps_before ? float(0.5 * (1 + double(sim.plan.substeps) / substeps_before)) : 1;
-  block.restitution = float(s.restitution);
-  block.body_size = float(sim.model->size);
-  block.velocity_scale = float(std::exp(-s.damping * h));
-  block.max_correction = float(longest_correction(*sim.model, s));
-  block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
-  block.mass_splitting = splits_masses(*sim.model, s);
-  block.quantum = float(sim.quantum);
-  block.inverse_quantum = float(1 / sim.quantum);
-  block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
-  block.vertex_count = unsigned(sim.model->positions.size());
-  block.damping = float(most_damping(*sim.model, s) / h);
-  block.turn_limit = float(TURN_LIMIT / sim.watch.finer);
-  write_planes(*sim.model, s, block);
-  for (std::size_t k = 0; k < kind_count; ++k) {
-    block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.stiffness[k]);
-    block.compliance[k / 4][glm::length_t(k % 4)] = float(s.compliance[k] / (h * h));
-  }
-  sim.step_block.write(0, sizeof block, &block);
-  write_obstacles(sim);
-  sim.needs_predict = true;  // the quantized positions hold a prediction with the old h and gravity
 }
 
 void forget_contacts(Sim& sim) {
@@ -328,19 +244,9 @@ Carried carried(Sim& sim) {
   if (sim.quantized[0]) all.add(sim.quantized[sim.read_index]);
   if (sim.rigid_bodies) all.add(sim.rigid_bodies);
   sim.solver.carried(sim, all);
-  add_carried(all, sim.watch, sim.check.words);
+  add_carried(all, sim.adaptive, sim.check.words);
   add_carried(all, sim.pairs);
   return all;
-}
-
-void upload(Sim& sim, const State& state) {
-  std::vector<Position> positions(state.positions.size());
-  parallel_for(positions.size(), [&](std::size_t i) {
-    positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
-  });
-  sim.positions.write(0, positions.size() * sizeof(Position), positions.data());
-  write_velocities(sim, state);
-  sim.needs_predict = true;
 }
 
 namespace {
@@ -348,7 +254,7 @@ namespace {
 // The kernels stay. Throws where the solver cannot take the settings.
 void adopt_settings(Sim& sim, const Settings& settings) {
   const TimeOrigin origin = sim.origin;
-  if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, time_of(sim)};
+  if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, simulated_time(sim)};
   const Settings before = std::exchange(sim.settings, settings);
   const double fall = half_substep_fall(before, sim.plan);
   const Plan plan = std::exchange(sim.plan, plan_for(settings));
@@ -358,7 +264,7 @@ void adopt_settings(Sim& sim, const Settings& settings) {
     sim.settings = before, sim.plan = plan, sim.origin = origin;
     throw;
   }
-  forget_answers(sim);
+  forget_readbacks(sim);
   write_step_block(sim);
   retime_velocities(sim, fall);
 }
@@ -412,81 +318,6 @@ std::vector<std::pair<std::string, std::uint64_t>> dropped(Sim& sim) {
   all.emplace_back("contact_candidates", pairs.crowded), all.emplace_back("contact_speed", pairs.outrun);
   std::erase_if(all, [](const auto& item) { return item.second == 0; });
   return all;
-}
-
-State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities) {
-  State state;
-  for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
-  for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
-  return state;
-}
-
-State read_state(const Sim& sim) {
-  if (on_cpu(sim)) return sim.host;
-  const KeepBindings kept;
-  return state_of(sim.positions.read_all<Position>(), sim.velocities.read_all<Velocity>());
-}
-
-std::uint64_t state_hash(const Sim& sim) {
-  const KeepBindings kept;
-  std::uint64_t hash = fnv_basis;
-  const auto add = [&](const glm::vec3& value) { hash = hash_values(std::span(&value.x, 3), hash); };
-  for (const Position& p : sim.positions.read_all<Position>()) add(p.high), add(p.low);
-  for (const Velocity& v : sim.velocities.read_all<Velocity>()) add(v.high), add(v.low);
-  return hash;
-}
-
-// ---------------------------------------------------------------------------------------------------------
-// pinning
-
-namespace {
-
-// A member of each vertex's record in a buffer of `Record`s.
-template <class Record, class Value>
-void write_vertices(Sim& sim, const Buffer& to, std::size_t member, const VertexList& vertices,
-                    const std::vector<Value>& values) {
-  if (vertices.empty()) return;
-  std::vector<std::size_t> offsets;
-  for (const std::uint32_t v : vertices) offsets.push_back(v * sizeof(Record) + member);
-  to.write_each(offsets, sizeof(Value), values.data());
-  sim.needs_predict = true;
-}
-
-void write_inverse_masses(Sim& sim, const VertexList& vertices) {
-  std::vector<float> values;
-  for (const std::uint32_t v : vertices) values.push_back(float(sim.inverse_masses[v]));
-  write_vertices<Position>(sim, sim.positions, offsetof(Position, inverse_mass), vertices, values);
-}
-
-}  // namespace
-
-void pin(Sim& sim, const VertexList& vertices) {
-  const KeepBindings kept;
-  for (const std::uint32_t v : vertices) {
-    sim.inverse_masses[v] = 0;
-    if (on_cpu(sim)) sim.host.velocities[v] = glm::dvec3(0);
-  }
-  write_inverse_masses(sim, vertices);
-  write_vertices<Velocity>(sim, sim.velocities, 0, vertices, std::vector<Velocity>(vertices.size()));
-}
-
-void unpin(Sim& sim, const VertexList& vertices) {
-  const KeepBindings kept;
-  for (const std::uint32_t v : vertices) sim.inverse_masses[v] = sim.model->inverse_masses[v];
-  write_inverse_masses(sim, vertices);
-}
-
-bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }
-
-void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions) {
-  const KeepBindings kept;
-  std::vector<Position> records;
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const std::uint32_t v = vertices[i];
-    records.push_back(to_gpu(positions[i], sim.inverse_masses[v], sim.system.at_vertex[v]));
-    if (on_cpu(sim)) sim.host.positions[v] = positions[i];
-  }
-  write_vertices<Position>(sim, sim.positions, 0, vertices, records);
 }
 
 }  // namespace tetpbd

@@ -1,7 +1,7 @@
 // A simulation: a model, settings, GPU buffers and the passes of a step. Any number can live side by side.
-// step.cpp takes steps, sim.cpp makes, sets and reads simulations, finite_check.cpp goes back to good states,
-// explain.cpp says what one costs. Whoever uses it calls these functions and reads its members; only they
-// write them.
+// step.cpp takes steps, sim.cpp makes and sets simulations, state.cpp reads and writes them, finite_check.cpp
+// goes back to good states, explain.cpp says what one costs. Whoever uses it calls these functions and reads
+// its members; only they write them.
 //
 // In a program that uses GL itself, a simulation belongs to the context that is current when it is made,
 // which has to be current in each call and when it is destroyed. After a call the program in use, textures
@@ -17,15 +17,15 @@
 #include <string>
 #include <vector>
 
+#include "sim/adaptive_substeps.h"
 #include "sim/carried.h"
 #include "sim/contact/obstacles.h"
+#include "sim/contact/pairs.h"
 #include "sim/finite_check.h"
 #include "sim/gl/gpu.h"
-#include "sim/layout.h"
-#include "sim/model.h"
-#include "sim/pairs.h"
+#include "sim/gl/layout.h"
+#include "sim/model/model.h"
 #include "sim/solvers/solver.h"
-#include "sim/watch.h"
 
 namespace tetpbd {
 
@@ -57,9 +57,9 @@ struct Sim : StepValues {
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
   Recorder recorder;
-  GuardCounts guards{};  ///< since the last reset; ask guard_counts()
-  FiniteCheck check;     ///< ask check_finite()
-  Watch watch;           ///< ask watched()
+  GuardCounts guards{};       ///< since the last reset; ask guard_counts()
+  FiniteCheck check;          ///< ask check_finite()
+  AdaptiveSubsteps adaptive;  ///< ask adaptive_values()
 };
 
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
@@ -80,10 +80,10 @@ void step(Sim& sim);
 void reset(Sim& sim);
 
 /// Whether the mode steps on the CPU: then `host` is the state.
-inline bool on_cpu(const Sim& sim) { return mode_of(sim.settings).cpu; }
+inline bool on_cpu(const Sim& sim) { return solver_mode(sim.settings).cpu; }
 
 /// s, since the start.
-inline double time_of(const Sim& sim) {
+inline double simulated_time(const Sim& sim) {
   return sim.origin.time + double(sim.steps - sim.origin.step) * sim.settings.dt;
 }
 /// Goes on with a model that differs in its obstacles alone; the state stays. Throws Error where there are
@@ -95,6 +95,8 @@ Carried carried(Sim& sim);
 void forget_all(Sim& sim);
 /// Goes on from a state whose velocities were `fall` behind (half_substep_fall()).
 void start_with(Sim& sim, State state, double fall);
+/// m, of positions that neighbours see.
+double choose_quantum(const Sim& sim, const State& state);
 /// Settings and plan, for the kernels of the next steps.
 void write_step_block(Sim& sim, int substeps_before = 0);
 /// For solvers. A kernel of a substep; kernels find the quantized positions that are read now, after others
@@ -110,13 +112,14 @@ void forget_contacts(Sim& sim);
 double half_substep_fall(const Settings& settings, const Plan& plan);
 /// Whether both make the same constraints of a model.
 bool same_constraints(const Model& model, const Settings& a, const Settings& b);
-State state_of(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
+State make_state(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
 /// A state that is not finite is taken, and found by check_finite() at once.
 void write_state(Sim& sim, const State& state);
 /// A value as the sum of two floats.
 void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low);
+void write_velocities(const Sim& sim, const State& state);
 /// The GPU's buffers of a state that CPU code stepped.
 void upload(Sim& sim, const State& state);
 /// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.

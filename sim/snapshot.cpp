@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "sim/keep_bindings.h"
+#include "sim/gl/keep_bindings.h"
 namespace tetpbd {
 
 namespace {
@@ -12,7 +12,7 @@ State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
   std::vector<Velocity> velocities(vertices);
   from.read(at, vertices * sizeof(Position), positions.data());
   from.read(at + vertices * sizeof(Position), vertices * sizeof(Velocity), velocities.data());
-  return state_of(positions, velocities);
+  return make_state(positions, velocities);
 }
 
 // Everything, so that the next steps are those that followed then.

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "sim/contact/moving_obstacle.h"
-#include "sim/keep_bindings.h"
+#include "sim/gl/keep_bindings.h"
 #include "sim/sim.h"
 
 namespace tetpbd {

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 
 /// The modes that take bodies without compliance.
 inline std::vector<tetpbd::SolverMode> pbd_modes() {

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "sim/error.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "tests/reference_steps.h"
 
 namespace reference_scenes {

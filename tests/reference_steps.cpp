@@ -85,7 +85,7 @@ State rigid_step(const ReferenceInput& input, State state) {
 
 namespace {
 
-Objective objective_of(const ReferenceInput& input, const Compliances& compliances) {
+Objective make_objective(const ReferenceInput& input, const Compliances& compliances) {
   require_compliances(input.system, compliances);
   Objective o{.system = input.system, .compliances = compliances, .masses = {}, .predicted = {}};
   for (double w : input.inverse_masses) o.masses.push_back(w > 0 ? 1 / w : 0);
@@ -103,7 +103,7 @@ Error no_convergence(const Minimum& result, const char* hint) {
 }  // namespace
 
 Objective step_objective(const ReferenceInput& input, State state, const Compliances& compliances, double h) {
-  Objective o = objective_of(input, compliances);
+  Objective o = make_objective(input, compliances);
   predict(input, state, h);
   o.predicted = std::move(state.positions);
   o.inertia = 1 / (h * h);
@@ -113,7 +113,7 @@ Objective step_objective(const ReferenceInput& input, State state, const Complia
 
 Objective static_objective(const ReferenceInput& input, const Points& positions,
                            const Compliances& compliances) {
-  Objective o = objective_of(input, compliances);
+  Objective o = make_objective(input, compliances);
   o.predicted = positions;
   o.gravity.y = -input.settings.gravity;
   o.unit = total_mass(o) * input.settings.gravity * input.model.size;

@@ -9,7 +9,7 @@
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/gl/context.h"
-#include "sim/layout.h"
+#include "sim/gl/layout.h"
 
 namespace tetpbd {
 

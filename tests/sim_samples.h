@@ -49,7 +49,7 @@ inline State reference_after(const Sim& sim, int steps, Sweep sweep) {
   CpuPbd<double> pbd(*sim.model, sim.system);
   State state = read_state(sim);
   for (int s = 0; s < steps; ++s)
-    pbd.step(state, sim.settings, sim.inverse_masses, sweep, time_of(sim) + s * sim.settings.dt);
+    pbd.step(state, sim.settings, sim.inverse_masses, sweep, simulated_time(sim) + s * sim.settings.dt);
   return state;
 }
 

@@ -10,7 +10,7 @@
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "tests/gl_test.h"
 #include "tests/sim_samples.h"
 

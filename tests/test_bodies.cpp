@@ -1,8 +1,8 @@
 // Bodies with materials and friction of their own: each moves as if it were alone with settings that have
 // them.
 
-#include "sim/material.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
+#include "sim/model/material.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -142,18 +142,19 @@ TEST_CASE("bodies: the reference has each one's material and friction") {
   const ReferenceInput input{*model, system, settings, model->inverse_masses};
   const State start{model->positions, model->velocities};
   const double h = 1e-4;
-  Leapfrog explicit_run = leapfrog(input, compliances_of(input), start, h);
+  Leapfrog explicit_run = leapfrog(input, reference_compliances(input), start, h);
   advance(explicit_run, 1000);
-  const State state = state_of(explicit_run);
+  const State state = make_state(explicit_run);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     CAPTURE(std::string(bodies[b].name));
     const auto own_model = alone(bodies[b], b);
     const Settings own_settings = of_body(settings, bodies[b]);
     const ConstraintSystem own_system = build_constraints(*own_model, own_settings);
     const ReferenceInput own{*own_model, own_system, own_settings, own_model->inverse_masses};
-    Leapfrog run = leapfrog(own, compliances_of(own), {own_model->positions, own_model->velocities}, h);
+    Leapfrog run =
+        leapfrog(own, reference_compliances(own), {own_model->positions, own_model->velocities}, h);
     advance(run, 1000);
-    CHECK(difference(*model, b, state, state_of(run)) < 1e-9);
+    CHECK(difference(*model, b, state, make_state(run)) < 1e-9);
   }
 }
 

@@ -170,7 +170,7 @@ TEST_CASE_FIXTURE(GlTest,
     turning.push_back(right.angular);
   }
   REQUIRE(impact > 0);
-  const Totals reference = totals(*model, state_of(*model, {right}));
+  const Totals reference = totals(*model, make_state(*model, {right}));
   for (const std::string& mode : all_modes) {
     CAPTURE(mode);
     Sim sim = create_sim(model, in_mode(mode));

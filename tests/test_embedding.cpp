@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "sim/snapshot.h"
 #include "tests/gl_test.h"
 #include "tests/sim_samples.h"
@@ -100,7 +100,7 @@ TEST_CASE_FIXTURE(GlTest, "a call leaves what its caller has bound as it was") {
     REQUIRE(before.at("GL_DISPATCH_INDIRECT_BUFFER_BINDING") == GLint(caller.buffer.id()));
     Settings settings;
     set_mode(settings, mode, "test");
-    const SolverMode& row = mode_of(settings);
+    const SolverMode& row = solver_mode(settings);
     if (row.pairs) settings.contact = "bodies";
     if (row.leapfrog || row.implicit) settings.material = "neo-hookean";
     Sim sim = create_sim(model, settings, tuning);
@@ -109,7 +109,7 @@ TEST_CASE_FIXTURE(GlTest, "a call leaves what its caller has bound as it was") {
     unchanged(mode, "step");
     read_state(sim), state_hash(sim), guard_counts(sim), check_finite(sim, true);
     unchanged(mode, "reading");
-    watched(sim), touched(sim), explain(sim);
+    adaptive_values(sim), touched(sim), explain(sim);
     unchanged(mode, "what is known of steps");
     settings.dt *= 0.5;
     apply_settings(sim, settings);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "sim/error.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -41,7 +41,8 @@ TEST_CASE("explicit: a run is that of leapfrog in double, damped or not, in flig
         Sim sim = create_sim(model, soft(material, tau));
         const double h = sim.settings.dt / sim.plan.substeps;
         const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
-        Leapfrog right = leapfrog(input, compliances_of(input), {model->positions, model->velocities}, h);
+        Leapfrog right =
+            leapfrog(input, reference_compliances(input), {model->positions, model->velocities}, h);
         for (int s = 0; s < 20; ++s) step(sim), advance(right, sim.plan.substeps);
         const State state = read_state(sim);
         CHECK(largest_distance(state.positions, right.x) < 2e-5);
@@ -144,7 +145,7 @@ TEST_CASE("explicit: a body that becomes stiffer takes more substeps before it b
     CAPTURE(run);
     Sim sim = create_sim(model, settings);
     const int at_rest = sim.plan.substeps;
-    if (run == 0) sim.watch.answer = {};  // not watched
+    if (run == 0) sim.adaptive.readback = {};  // not watched
     double most = 0;
     Metrics metrics = create_metrics(*model, sim.system);
     for (int s = 0; s < 400; ++s) {
@@ -156,7 +157,7 @@ TEST_CASE("explicit: a body that becomes stiffer takes more substeps before it b
     if (run == 0) CHECK(most > 1.5 * start);
     if (run == 0) continue;
     CHECK(most < start);
-    CHECK(sim.watch.most_substeps > 1.5 * at_rest);
+    CHECK(sim.adaptive.most_substeps > 1.5 * at_rest);
     CHECK(sim.plan.substeps == at_rest);
     if (run == 1) bits = state_hash(sim);
     CHECK(state_hash(sim) == bits);
@@ -166,7 +167,7 @@ TEST_CASE("explicit: a body that becomes stiffer takes more substeps before it b
   Sim still = create_sim(irregular_block(5, false, {0, 0, 0}, {0, 0, 0}), settings);
   const int first = still.plan.substeps;
   for (int s = 0; s < 20; ++s) step(still);
-  CHECK(still.watch.most_substeps == first);
+  CHECK(still.adaptive.most_substeps == first);
   // Also from a start that is deformed already.
   Sim large = create_sim(deformed_block(glm::dvec3(3)), settings), small = create_sim(model, settings);
   CHECK(large.plan.substeps > 2 * small.plan.substeps);

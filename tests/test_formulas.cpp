@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "sim/constraints.h"
+#include "sim/model/constraints.h"
 
 using namespace tetpbd;
 

@@ -348,7 +348,7 @@ TEST_CASE("memory that a GPU does not have is refused before a run, with what is
   const auto mode_named = [](const char* mode) {
     Settings settings = quick(mode);
     settings.contact = "self";
-    if (mode_of(settings).leapfrog || mode_of(settings).implicit)
+    if (solver_mode(settings).leapfrog || solver_mode(settings).implicit)
       settings.material = "neo-hookean", settings.substeps = settings.iterations = automatic;
     return settings;
   };
@@ -453,9 +453,10 @@ TEST_CASE("shader faults name file and line, or the uniform") {
     CHECK(!has(what, "\n"));
     return what;
   };
-  CHECK(with("average.comp", "void main", "void main") == "");
-  CHECK(has(with("average.comp", "uint i = group", "uint i = nothing + group"), "shaders/average.comp:"));
-  CHECK(has(with("average.comp", "\"pair.glsl\"", "\"pears.glsl\""),
+  CHECK(with("solvers/average.comp", "void main", "void main") == "");
+  CHECK(has(with("solvers/average.comp", "uint i = group", "uint i = nothing + group"),
+            "shaders/solvers/average.comp:"));
+  CHECK(has(with("solvers/average.comp", "\"double_single.glsl\"", "\"pears.glsl\""),
             "no such shader: " + folder.string() + "/pears.glsl"));
   CHECK(has(with("render/plane.frag", "uniform float opacity", "const float opacity = 1.0"),
             "no such uniform: 'opacity' in plane"));

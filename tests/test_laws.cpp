@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "app/run_loop.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "tests/gl_test.h"
 #include "tests/sim_samples.h"
 

@@ -8,10 +8,10 @@
 #include <map>
 #include <string>
 
+#include "sim/contact/pair_layout.h"
 #include "sim/error.h"
-#include "sim/layout.h"
-#include "sim/material.h"
-#include "sim/pair_layout.h"
+#include "sim/gl/layout.h"
+#include "sim/model/material.h"
 #include "sim/solvers/newton_buffers.h"
 #include "tests/gl_test.h"
 #include "tests/sim_samples.h"
@@ -66,8 +66,8 @@ void check_block(const Program& program, const char* block, const BufferLayout& 
 
 TEST_CASE("struct offsets and strides are GL's") {
   GlTest gl;
-  const Program predict =
-      Program::compute("predict.comp", {{{"SCHEME", "corrections"}}, {}}, {"COMPLIANT 1", "SOLIDS 0"});
+  const Program predict = Program::compute("solvers/predict.comp", {{{"SCHEME", "corrections"}}, {}},
+                                           {"COMPLIANT 1", "SOLIDS 0"});
   const auto variable = [&](const std::string& name) {
     return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET);
   };
@@ -82,7 +82,7 @@ TEST_CASE("struct offsets and strides are GL's") {
         sizeof(Velocity));
 
   const auto paper = [](Substitutions words) {
-    return Program::compute("solve_paper.comp", {words, {}}, {"GROUP_SIZE 1024", "COUNT 7"});
+    return Program::compute("solvers/paper.comp", {words, {}}, {"GROUP_SIZE 1024", "COUNT 7"});
   };
   const Program volume = paper({{"KIND", "volume"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "2"}});
   CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
@@ -133,7 +133,7 @@ TEST_CASE("members of mode newton's blocks lie where GL reads them, and no array
       const NewtonBuffers layout = lay_out_newton_buffers(sizes, system);
       for (const char* name : {"begin", "predict", "start", "linearise", "residual", "update", "coarse",
                                "prolong", "product", "finish", "momentum"}) {
-        const Program program = Program::compute(std::string("newton/") + name + ".comp",
+        const Program program = Program::compute(std::string("solvers/newton/") + name + ".comp",
                                                  {{}, kind_words(system)}, newton_defines(sizes, input));
         check_block(program, "Mesh", layout.mesh);
         check_block(program, "Coarse", layout.coarse);
@@ -163,8 +163,9 @@ TEST_CASE("members of the blocks of contact lie where GL reads them, and no arra
                    {"COMPLIANT 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1", "IMPLICIT 0",
                     "SHEETS 1", "CONTACT_SELF 1", "LAGGED 1", "QUERY_EDGES 0", "ROW 9u", "EDGE 1.0",
                     "SELF_MARGIN 1.0", "VERTICES " + std::to_string(sizes.all_vertices)});
-    for (const char* name : {"pairs/boxes", "pairs/cull", "pairs/query", "pairs/meet", "pairs/push",
-                             "render/touches", "average"}) {
+    for (const char* name :
+         {"contact/bodies/boxes", "contact/bodies/cull", "contact/bodies/query", "contact/bodies/meet",
+          "contact/bodies/push", "render/touches", "solvers/average"}) {
       const Program program =
           Program::compute(std::string(name) + ".comp", {{{"SCHEME", "leapfrog"}}, {}}, defines, 10);
       check_block(program, "PairMesh", layout.mesh);
@@ -178,11 +179,11 @@ TEST_CASE("a shader that does not compile names its file and line") {
   GlTest gl;
   const std::string folder = "/tmp/tetpbd_shader_test_" + std::to_string(getpid());
   std::filesystem::create_directories(folder);
-  for (const char* name : {"types.glsl", "layout.glsl", "pair.glsl"}) {
+  for (const char* name : {"types.glsl", "layout.glsl", "double_single.glsl"}) {
     std::ofstream(folder + "/" + name) << "";
   }
-  std::ofstream(folder + "/predict.comp")
-      << "layout(local_size_x = 1) in;\n#include \"pair.glsl\"\nvoid main() { float a = nonsense; }\n";
+  std::ofstream(folder + "/predict.comp") << "layout(local_size_x = 1) in;\n#include "
+                                             "\"double_single.glsl\"\nvoid main() { float a = nonsense; }\n";
   set_shader_folder(folder);
   CHECK(shader_folder_version() != 0);
   std::string message;
@@ -201,7 +202,7 @@ TEST_CASE("a shader that does not compile names its file and line") {
 
 TEST_CASE("#include, #foreach and words expand") {
   std::vector<std::string> files;
-  const std::string text = shader_text("solve_node.comp",
+  const std::string text = shader_text("solvers/node.comp",
                                        {{},
                                         {{{"KIND", "stretch"},
                                           {"ARITY", "2"},
@@ -220,9 +221,9 @@ TEST_CASE("#include, #foreach and words expand") {
                                           {"PAIRS", "3"},
                                           {"MATERIAL", "1"}}}},
                                        files);
-  CHECK(text.find("project_stretch(records_stretch.x + 1 * (t - begin_stretch), chunk.owned)") !=
+  CHECK(text.find("project_stretch(records_stretch.x + 1 * (t - begin_stretch), owned)") !=
         std::string::npos);
-  CHECK(text.find("project_bend(records_bend.x + 3 * (t - begin_bend), chunk.owned)") != std::string::npos);
+  CHECK(text.find("project_bend(records_bend.x + 3 * (t - begin_bend), owned)") != std::string::npos);
   CHECK(text.find("project_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);
   CHECK(text.find("$KIND") == std::string::npos);

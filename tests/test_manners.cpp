@@ -1,7 +1,7 @@
 // What the command line says of words it does not know, and of flags that change nothing.
 #include <doctest/doctest.h>
 
-#include "sim/did_you_mean.h"
+#include "sim/model/did_you_mean.h"
 #include "tests/run_program.h"
 
 using namespace tetpbd;

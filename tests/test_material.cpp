@@ -2,7 +2,7 @@
 #include <Eigen/Dense>
 #include <nlohmann/json.hpp>
 
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -191,7 +191,7 @@ TEST_CASE("material: every mode keeps the rest state, and goes where the leapfro
       const long steps = long(std::ceil(0.1 / h));
       Leapfrog right = leapfrog(scene.input(), none, scene.start(), 0.1 / double(steps));
       advance(right, steps);
-      const State end = state_of(right);
+      const State end = make_state(right);
       const double moved = error_to(scene.model, scene.start(), end);
       for (const std::string mode : {"cpu-double", "cpu", "cpu-fast", "node", "constraint"}) {
         CAPTURE(material);
@@ -231,7 +231,7 @@ TEST_CASE("material: errors shrink with the substeps as those of a method of fir
     const double h = 0.1 * stable_step(scene.input(), none, scene.model.positions);
     Leapfrog right = leapfrog(scene.input(), none, scene.start(), 0.1 / std::round(0.1 / h));
     advance(right, std::lround(0.1 / right.h));
-    const State end = state_of(right);
+    const State end = make_state(right);
     for (const std::string mode : {"cpu-double", "cpu", "cpu-fast", "node", "constraint"}) {
       CAPTURE(mode);
       Settings settings = scene.settings;

@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;

@@ -4,7 +4,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
@@ -231,13 +231,13 @@ TEST_CASE("motion: two masses on a spring fall, stick, and leave the ground when
   const Compliances compliances{alpha, infinity, infinity};
   const auto lands_and_leaves = [&](auto run) {
     advance(run, std::lround((fall + 0.5 * lift) / run.h));
-    Points x = state_of(run).positions;
+    Points x = make_state(run).positions;
     CHECK(x[0].y == doctest::Approx(0).epsilon(1e-6).scale(1));
     CHECK(x[1].y == doctest::Approx(1 - sag + height(0.5 * lift)).epsilon(1e-4));
     advance(run, std::lround(0.48 * lift / run.h));
-    CHECK(state_of(run).positions[0].y < 1e-6);
+    CHECK(make_state(run).positions[0].y < 1e-6);
     advance(run, std::lround(0.06 * lift / run.h));
-    x = state_of(run).positions;
+    x = make_state(run).positions;
     CHECK(x[0].y > 1e-6);
     CHECK(x[0].x == 0);
   };
@@ -252,10 +252,10 @@ TEST_CASE("motion: soft bodies slide v^2 / (2 friction g) and stop") {
   const State start{scene.model.positions, {{1, 0, 0}, {1, 0, 0}}};
   const auto slides_and_stops = [](auto run, double creep) {
     advance(run, std::lround(0.3 / run.h));
-    const double stopped = state_of(run).positions[0].x;
+    const double stopped = make_state(run).positions[0].x;
     CHECK(stopped == doctest::Approx(1 / (2 * 0.5 * 9.81)).epsilon(0.005));
     advance(run, std::lround(0.1 / run.h));
-    CHECK(std::abs(state_of(run).positions[0].x - stopped) <= creep);
+    CHECK(std::abs(make_state(run).positions[0].x - stopped) <= creep);
   };
   const Compliances compliances{1e-4, infinity, infinity};
   slides_and_stops(leapfrog(scene.input(), compliances, start, 1e-4), 1e-9);
@@ -274,7 +274,7 @@ TEST_CASE(
   const auto after = [&](double h) {
     Leapfrog run = leapfrog(scene.input(), compliances, start, h);
     advance(run, std::lround(0.02 / h));
-    return state_of(run);
+    return make_state(run);
   };
   const double stable = stable_step(scene.input(), compliances, scene.model.rest.positions);
   const double h = 0.02 / std::ceil(0.02 / (0.3 * stable));
@@ -320,7 +320,7 @@ TEST_CASE("motion: implicit steps, which share no line with the leapfrog, go whe
     const long steps = std::lround(16 * end / stable);
     Leapfrog right = leapfrog(scene.input(), none, scene.start(), end / double(steps));
     advance(right, steps);
-    const State answer = state_of(right);
+    const State answer = make_state(right);
     std::vector<double> errors;
     for (const long n : {80l, 320l}) {
       Implicit run = implicit(scene.input(), none, scene.start(), end / double(n));
@@ -349,7 +349,7 @@ TEST_CASE("motion: implicit steps in flight are of second order, with drag and c
     states.push_back(run.now);
   }
   const auto apart = [&](const State& a, const State& b) { return error_to(scene.model, a, b); };
-  CHECK(apart(states[2], state_of(other)) < 1e-4);
+  CHECK(apart(states[2], make_state(other)) < 1e-4);
   CHECK(apart(states[2], states[0]) / apart(states[2], states[1]) == doctest::Approx(5).epsilon(0.2));
 }
 

@@ -12,7 +12,7 @@
 
 #include "sim/error.h"
 #include "sim/hash.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
@@ -290,7 +290,8 @@ TEST_CASE("newton: its motion nears that of leapfrog with the square of the step
       settings.substeps = substeps;
       Sim sim = create_sim(model, settings);
       const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
-      Leapfrog right = leapfrog(input, compliances_of(input), {model->positions, model->velocities}, 2e-4);
+      Leapfrog right =
+          leapfrog(input, reference_compliances(input), {model->positions, model->velocities}, 2e-4);
       for (int s = 0; s < 20; ++s) step(sim), advance(right, 25);
       off.push_back(distance(read_state(sim).positions, right.x));
     }
@@ -326,8 +327,8 @@ TEST_CASE("newton: a stiff block that spins fast keeps its spin in more substeps
   settings.ground = false;
   Sim sim = create_sim(model, settings);
   for (int s = 0; s < 60; ++s) step(sim);
-  CHECK(sim.watch.finer == 4);
-  CHECK(watched(sim).least_health == float(HEALTH_TURNING));
+  CHECK(sim.adaptive.substep_factor == 4);
+  CHECK(adaptive_values(sim).least_health == float(HEALTH_TURNING));
   const State now = read_state(sim);
   CHECK(kinetic_energy(*model, now) < 1.01 * kinetic_energy(*model, start));
   // Without, 0.15 of it is gone, and later energy comes from nowhere.
@@ -453,28 +454,28 @@ TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no t
     for (const int run : {0, 1, 2}) {
       CAPTURE(run);
       Sim sim = create_sim(deformed(how.c_str()), stiff);
-      if (run == 0) sim.watch.answer = {};  // not watched
+      if (run == 0) sim.adaptive.readback = {};  // not watched
       int steps_with_inverted = 0;
       for (int s = 0; s < 400; ++s) {
         step(sim);
         steps_with_inverted += inverted_tets(sim) > 0;
       }
       CHECK((steps_with_inverted > 0) == (run == 0 && how == "none"));
-      CHECK((sim.watch.finer == 1 || sim.watch.health == float(HEALTH_TURNING)));
+      CHECK((sim.adaptive.substep_factor == 1 || sim.adaptive.health == float(HEALTH_TURNING)));
       if (run == 0) continue;
-      CHECK(sim.watch.most_substeps == 4);
-      CHECK(watched(sim).least_health < 0.1);
+      CHECK(sim.adaptive.most_substeps == 4);
+      CHECK(adaptive_values(sim).least_health < 0.1);
       if (run == 1) bits = state_hash(sim);
       CHECK(state_hash(sim) == bits);
       reset(sim);
-      CHECK(sim.watch.most_substeps == 0);
+      CHECK(sim.adaptive.most_substeps == 0);
     }
   }
   Settings healthy = soft("neo-hookean");
   healthy.iterations = 8;
   Sim sim = create_sim(deformed("none"), healthy);
   for (int s = 0; s < 200; ++s) step(sim);
-  CHECK(sim.watch.most_substeps == 1);
+  CHECK(sim.adaptive.most_substeps == 1);
 }
 
 TEST_CASE("newton: a body that is pulled comes to where it rests in mode explicit, and lets go") {
@@ -496,7 +497,7 @@ TEST_CASE("newton: a body that is pulled comes to where it rests in mode explici
     unpin(sim, pulled);
     for (int s = 0; s < 40; ++s) step(sim);
     CHECK(glm::distance(read_state(sim).positions[pulled], from + way) > 0.01);
-    CHECK(sim.watch.finer == 1);
+    CHECK(sim.adaptive.substep_factor == 1);
   }
   CHECK(distance(ends[0], ends[1]) < 2e-4);
   CHECK(distance(ends[0], model->positions) > 0.02);

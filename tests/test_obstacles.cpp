@@ -11,8 +11,8 @@
 #include "app/scene.h"
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/material.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
+#include "sim/model/material.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"
@@ -129,7 +129,7 @@ double deepest(const Sim& sim) {
   double most = 0;
   const State state = read_state(sim);
   for (const Obstacle& o : sim.model->obstacles) {
-    const MovingObstacle shape = moving_obstacle(o, time_of(sim), 0, 0, 0);
+    const MovingObstacle shape = moving_obstacle(o, simulated_time(sim), 0, 0, 0);
     for (const glm::dvec3& x : state.positions) most = std::max(most, -shape.surface_at(x).distance);
   }
   return most / sim.model->size;
@@ -427,9 +427,9 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: time goes with the state: back, anew, and 
     Settings slower = sim.settings;
     slower.dt = 0.01;
     apply_settings(sim, slower);
-    CHECK(time_of(sim) == doctest::Approx(0.15));
+    CHECK(simulated_time(sim) == doctest::Approx(0.15));
     step(sim);
-    CHECK(time_of(sim) == doctest::Approx(0.16));
+    CHECK(simulated_time(sim) == doctest::Approx(0.16));
   }
   const Pose pose = pose_at(
       [] {
@@ -467,9 +467,9 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: references meet them too") {
   Leapfrog leaps = leapfrog(input, sim.settings.compliance, start, 5e-5);
   Implicit implicits = implicit(input, sim.settings.compliance, start, 1e-3);
   advance(leaps, 3000), advance(implicits, 150);
-  const double apart = samples::distance(state_of(leaps), state_of(implicits));
+  const double apart = samples::distance(make_state(leaps), make_state(implicits));
   CHECK(apart < 5e-3);
-  CHECK(-still(soft.model->obstacles[0]).surface_at(state_of(leaps).positions[2]).distance < 1e-4);
+  CHECK(-still(soft.model->obstacles[0]).surface_at(make_state(leaps).positions[2]).distance < 1e-4);
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: penetration is measured over planes and shapes") {

@@ -15,7 +15,7 @@
 #include "render/picking.h"
 #include "render/renderer.h"
 #include "render/target.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
 #include "tests/mesh_samples.h"

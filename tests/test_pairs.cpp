@@ -8,7 +8,7 @@
 #include "app/run_loop.h"
 #include "render/renderer.h"
 #include "sim/contact/obstacle_kinds.h"
-#include "sim/overlap.h"
+#include "sim/measure/overlap.h"
 #include "sim/reference/motion.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
@@ -48,7 +48,7 @@ Settings touching(const std::string& mode, double young_modulus = 2e5) {
   Settings s;
   s.mode = mode, s.contact = "bodies", s.material = "neo-hookean", s.young_modulus = young_modulus;
   s.poisson_ratio = 0.4, s.gravity = 0, s.ground = false, s.friction = 0;
-  s.substeps = mode_of(s).leapfrog ? automatic : 20;
+  s.substeps = solver_mode(s).leapfrog ? automatic : 20;
   return s;
 }
 
@@ -275,24 +275,24 @@ TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far ap
 
 TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") {
   const auto model = blocks({{}, {{0.45, 0.03, 0.02}}, {{5, 0, 0}}});
-  const Overlap apart =
-      overlap_of(*blocks({{}, {{0.51, 0.03, 0.02}}}), blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
+  const Overlap apart = measure_overlap(*blocks({{}, {{0.51, 0.03, 0.02}}}),
+                                        blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
   CHECK(apart.inside == 0);
   CHECK(apart.triangles == 0);
   CHECK(apart.largest == 0);
-  const Overlap overlap = overlap_of(*model, model->positions, false);
+  const Overlap overlap = measure_overlap(*model, model->positions, false);
   CHECK(overlap.inside == 32);  // 4 x 4 vertices of each face
   CHECK(overlap.largest == doctest::Approx(0.05 / (0.5 * std::sqrt(3.0))));
   CHECK(overlap.part_999 <= overlap.largest);
   auto blown_up = model->positions;  // where cells cannot be counted
   blown_up[0].x = 1e12, blown_up[1].y = NAN, blown_up[130].z = -1e30;
-  CHECK(overlap_of(*model, blown_up, true).inside > 20);
+  CHECK(measure_overlap(*model, blown_up, true).inside > 20);
   // Edges that cross where no vertex is inside.
   const double r = std::sqrt(0.5);
   Placed ridge{}, keel{{0.07, 0.7, 0.09}};
   ridge.turn = glm::dmat3(1, 0, 0, 0, r, r, 0, -r, r), keel.turn = glm::dmat3(r, r, 0, -r, r, 0, 0, 0, 1);
   const auto crossed = blocks({ridge, keel});
-  const Overlap cut = overlap_of(*crossed, crossed->positions, false);
+  const Overlap cut = measure_overlap(*crossed, crossed->positions, false);
   CHECK(cut.inside == 0);
   CHECK(cut.triangles == 4);  // two beside each edge
 }
@@ -313,7 +313,7 @@ TEST_CASE("pairs: a block slides on another as friction says") {
     const double before = speed_of(sim, 1, 0);
     for (int s = 0; s < 40; ++s) step(sim);
     CHECK(before - speed_of(sim, 1, 0) == doctest::Approx(friction * 9.81 * 0.2).epsilon(0.02));
-    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.005);
+    CHECK(measure_overlap(*model, read_state(sim).positions, false).largest < 0.005);
   }
 }
 
@@ -345,7 +345,7 @@ TEST_CASE("pairs: three blocks on each other come to rest") {
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < 600; ++s) step(sim);
     CHECK(motion_of(sim).energy < 0.02);  // J, of 375 kg: what each substep gives vertices and contact takes
-    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.002);
+    CHECK(measure_overlap(*model, read_state(sim).positions, false).largest < 0.002);
     const glm::dvec3 before = centre_of(*model, read_state(sim).positions);
     for (int s = 0; s < 200; ++s) step(sim);
     CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) < 3e-4);
@@ -375,14 +375,14 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < 200; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
-    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.01);
+    CHECK(measure_overlap(*model, read_state(sim).positions, false).largest < 0.01);
   }
 }
 
 TEST_CASE("pairs: a body that another is deep in does not meet its own far sides") {
   GlTest gl;
   const auto model = blocks({{{0, 0, 0}}, {{0.24, 0.02, 0.03}, {0, 0, 0}, {0.3, 0.2, 0.9}}});
-  REQUIRE(overlap_of(*model, model->positions, true).deepest > 0.15);
+  REQUIRE(measure_overlap(*model, model->positions, true).deepest > 0.15);
   std::vector<State> ends;
   for (const char* contact : {"bodies", "self"}) {
     Settings settings = touching("cpu-double");
@@ -436,13 +436,13 @@ TEST_CASE("pairs: a vertex leaves a body that is folded over itself") {
   for (glm::dvec3& p : start) p += glm::dvec3(0.065, 0.206, 0.03);
   add_body(both, "small", small, 1000, start, {}, {}, {});
   const auto model = std::make_shared<const Model>(both);
-  REQUIRE(overlap_of(*model, model->positions, false).deepest > 0.02);
+  REQUIRE(measure_overlap(*model, model->positions, false).deepest > 0.02);
   for (const std::string mode : {"explicit", "cpu-double"}) {
     CAPTURE(mode);
     Sim sim = create_sim(model, touching(mode));
     for (int s = 0; s < 8; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
-    CHECK(overlap_of(*model, read_state(sim).positions, false).deepest < 1e-3);
+    CHECK(measure_overlap(*model, read_state(sim).positions, false).deepest < 1e-3);
   }
 }
 
@@ -463,7 +463,7 @@ TEST_CASE("pairs: a vertex behind the crease of a sharp valley is pushed out thr
   finish_tets(valley, "valley"), finish_tets(spike, "spike");
   add_body(*model, "valley", valley, 1000, valley.positions, {}, {}, all);
   add_body(*model, "spike", spike, 1000, above, {}, {}, {});
-  REQUIRE(overlap_of(*model, model->positions, false).inside == 1);
+  REQUIRE(measure_overlap(*model, model->positions, false).inside == 1);
   for (const std::string mode : {"explicit", "newton", "cpu-double"}) {
     CAPTURE(mode);
     Settings settings = touching(mode, 1e6);
@@ -471,7 +471,7 @@ TEST_CASE("pairs: a vertex behind the crease of a sharp valley is pushed out thr
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < 10; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
-    CHECK(overlap_of(*model, read_state(sim).positions, false).largest < 0.001);
+    CHECK(measure_overlap(*model, read_state(sim).positions, false).largest < 0.001);
     CHECK(std::abs(speed_of(sim, 1, 1)) < 0.5);  // it is put out, not shot
   }
 }
@@ -518,7 +518,7 @@ TEST_CASE("pairs: eight balls or cubes fall into a bowl in ten ways: all end fin
     for (int s = 0; s < 120; ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
     CHECK(touched(sim).touches > 100);
-    CHECK(overlap_of(*shared, read_state(sim).positions, false).largest < 0.02);
+    CHECK(measure_overlap(*shared, read_state(sim).positions, false).largest < 0.02);
   }
 }
 
@@ -593,7 +593,7 @@ TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
   Camera camera;
   camera.distance = 3;
   const auto picture = [&](bool contacts) {
-    Frame frame = frame_of(sim, camera, {.contacts = contacts}, target);
+    Frame frame = make_frame(sim, camera, {.contacts = contacts}, target);
     frame.target = target.framebuffer.id();
     draw(renderer, frame);
     return read_rgba(target);
@@ -611,7 +611,7 @@ TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
   Settings settings = touching("explicit");
   settings.gravity = 9.81;
   Sim on_ball = create_sim(std::make_shared<const Model>(other), settings);
-  Frame frame = frame_of(on_ball, camera, {.contacts = true}, target);
+  Frame frame = make_frame(on_ball, camera, {.contacts = true}, target);
   for (int s = 0; s < 5; ++s) step(on_ball);
   renew(frame, on_ball);
   CHECK(frame.touching.size() >= 1);

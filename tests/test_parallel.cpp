@@ -4,8 +4,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "sim/hilbert.h"
-#include "sim/model.h"
+#include "sim/model/hilbert.h"
+#include "sim/model/model.h"
 #include "sim/parallel.h"
 #include "sim/solvers/patches.h"
 

@@ -186,10 +186,10 @@ TEST_CASE("help, version, info and explain answer") {
   const Outcome explained =
       program("run --scene beam --mode constraint --constraints stretch --explain", folder);
   CHECK(explained.status == 0);
-  CHECK(explained.out.find("solve_constraint stretch") != std::string::npos);
+  CHECK(explained.out.find("solvers/constraint stretch") != std::string::npos);
   CHECK(explained.out.find("volume") == std::string::npos);
   // A line of a kernel: work-groups, how often, bytes, microseconds, gigabytes per second.
-  std::istringstream line(explained.out.substr(explained.out.find("solve_constraint stretch")));
+  std::istringstream line(explained.out.substr(explained.out.find("solvers/constraint stretch")));
   std::string word;
   for (double number = 0; number == 0 && line >> word;) number = std::atof(word.c_str());
   double often = 0, bytes = 0, us = 0, rate = 0;
@@ -221,7 +221,7 @@ TEST_CASE("dump-shaders writes each shader of a run as it is compiled") {
     return std::pair(texts, outcome.out);
   };
   const auto [explained, table] = dumped("--mode constraint --explain", "explained");
-  CHECK(explained.contains("solve_constraint_stretch_bend_volume.comp"));
+  CHECK(explained.contains("solvers_constraint_stretch_bend_volume.comp"));
   // No two of those that the table lists share a file.
   std::istringstream lines(table.substr(table.find("work-groups")));
   std::string line;
@@ -232,8 +232,8 @@ TEST_CASE("dump-shaders writes each shader of a run as it is compiled") {
   CHECK(kernels >= 3);
   CHECK(explained.size() >= kernels);
   const auto [drawn, said] = dumped("--mode node --steps 1 --png-every 1 --size 32x32", "a/b");
-  CHECK(drawn.contains("solve_node_stretch_bend_volume.comp"));
-  CHECK(drawn.at("solve_node_stretch_bend_volume.comp").find("Constraint4 volume(") != std::string::npos);
+  CHECK(drawn.contains("solvers_node_stretch_bend_volume.comp"));
+  CHECK(drawn.at("solvers_node_stretch_bend_volume.comp").find("Constraint4 volume(") != std::string::npos);
   CHECK(std::ranges::any_of(drawn, [](const auto& file) { return file.first.ends_with(".vert"); }));
   CHECK(std::ranges::any_of(drawn, [](const auto& file) { return file.first.ends_with(".frag"); }));
 
@@ -267,7 +267,7 @@ TEST_CASE("a driver that is not there, or too old, gets one line and status 1") 
   if (info.find("Mesa") != std::string::npos)  // others take no orders about their version
     for (const char* version : {"4.2", "3.3"})
       fails(std::string("MESA_GL_VERSION_OVERRIDE=") + version, std::string("the driver offers ") + version);
-  fails("TETPBD_SHADERS=/nonexistent", "/nonexistent/solve_node.comp", 2);
+  fails("TETPBD_SHADERS=/nonexistent", "/nonexistent/solvers/node.comp", 2);
 }
 
 TEST_CASE("a run that stops being numbers leaves those of the last good step, and says where and why") {

@@ -9,7 +9,7 @@
 #include "app/scene.h"
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/metrics.h"
+#include "sim/measure/metrics.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;

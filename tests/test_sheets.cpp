@@ -8,9 +8,9 @@
 #include <random>
 
 #include "app/scene.h"
-#include "sim/material.h"
-#include "sim/metrics.h"
-#include "sim/overlap.h"
+#include "sim/measure/metrics.h"
+#include "sim/measure/overlap.h"
+#include "sim/model/material.h"
 #include "sim/reference/objective.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"
@@ -338,7 +338,7 @@ TEST_CASE("sheets: a ball and another sheet fall on one that is held, and stay o
     REQUIRE_FALSE(check_finite(sim, true));
     const State state = read_state(sim);
     CHECK(crossings(model->rest, state.positions) == 0);
-    CHECK(overlap_of(*model, state.positions, true).triangles == 0);
+    CHECK(measure_overlap(*model, state.positions, true).triangles == 0);
     const auto lowest = [&](std::size_t body) {
       double low = 1;
       for (std::size_t i = 0; i < model->bodies[body].vertices; ++i)
@@ -378,8 +378,8 @@ TEST_CASE("sheets: one that folds onto itself does not go through itself where t
       if (s % 10 == 9) most = std::max(most, crossings(sheet, read_state(sim).positions));
     }
     const auto end = read_state(sim).positions;
-    CHECK((overlap_of(*model, end, true).triangles == 0) == (crossings(sheet, end) == 0));
-    CHECK(overlap_of(*model, end, false).triangles == 0);
+    CHECK((measure_overlap(*model, end, true).triangles == 0) == (crossings(sheet, end) == 0));
+    CHECK(measure_overlap(*model, end, false).triangles == 0);
     REQUIRE_FALSE(check_finite(sim, true));
     if (contact == "none")
       through = most;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "sim/snapshot.h"
 #include "tests/gl_test.h"
 
@@ -79,7 +79,7 @@ TEST_CASE("snapshot: with other settings the state goes on with those") {
     step(sim);
     const Kept again = keep(sim);  // also of the other mode
     for (const Kept* of : {&kept, &again, &kept}) restore_snapshot(sim, of->snapshot, of->buffer);
-    CHECK(time_of(sim) == doctest::Approx(20 * settings.dt));
+    CHECK(simulated_time(sim) == doctest::Approx(20 * settings.dt));
     const State now = read_state(sim);
     const double h = 0.5 * other.dt / other.substeps * other.gravity;  // mid-substep
     const double upwards = h - 0.5 * plan_for(settings).h * settings.gravity;
@@ -104,7 +104,8 @@ TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of the
   std::vector<std::uint64_t> hashes;
   std::vector<int> finer;
   for (int s = 0; s < 60; ++s) {
-    kept.push_back(keep(sim)), hashes.push_back(state_hash(sim)), finer.push_back(sim.watch.finer);
+    kept.push_back(keep(sim)), hashes.push_back(state_hash(sim)),
+        finer.push_back(sim.adaptive.substep_factor);
     step(sim);
   }
   CHECK(finer.front() == 1);
@@ -113,7 +114,7 @@ TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of the
   for (const std::size_t back : {first, std::size_t(0), first + 3, first - 1}) {
     CAPTURE(back);
     restore_snapshot(sim, kept[back].snapshot, kept[back].buffer);
-    CHECK(sim.watch.finer == finer[back]);
+    CHECK(sim.adaptive.substep_factor == finer[back]);
     for (std::size_t s = back + 1; s < hashes.size(); ++s) step(sim);
     CHECK(state_hash(sim) == hashes.back());
   }

@@ -17,7 +17,7 @@
 #include "render/target.h"
 #include "sim/contact/obstacle_kinds.h"
 #include "sim/error.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "tests/gl_test.h"
 #include "tests/run_program.h"
 
@@ -70,7 +70,7 @@ TEST_CASE("window: the camera follows bodies that go away, smoothly, and keeps w
   const auto frames = [&](int count) {
     bool moving = false;
     for (int i = 0; i < count; ++i) {
-      draw(s.loaded.renderer, frame_of(s.loaded.sim(), s.camera, s.view, target));
+      draw(s.loaded.renderer, make_frame(s.loaded.sim(), s.camera, s.view, target));
       glFinish();
       moving = follow_bodies(s, 0.05);
     }

@@ -249,9 +249,9 @@ key s; await '^step 1$'; shot beam.png
 
 # -------------------------------------------------------------------------------------------------------- shaders
 sleep 1.1  # the folder's version is the time of its newest file
-forget; cp shaders/predict.comp good.comp; echo "this is no shader" >>shaders/predict.comp; await '^error shader does not compile.*predict.comp:[0-9]+'
+forget; cp shaders/solvers/predict.comp good.comp; echo "this is no shader" >>shaders/solvers/predict.comp; await '^error shader does not compile.*predict.comp:[0-9]+'
 key s; await '^step 2$'
-forget; sleep 1.1; cp good.comp shaders/predict.comp; await '^message shaders compiled again'
+forget; sleep 1.1; cp good.comp shaders/solvers/predict.comp; await '^message shaders compiled again'
 key s; await '^step 3$'
 
 # A state that is not finite: said, paused, and mended by a reset.

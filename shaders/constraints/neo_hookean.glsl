@@ -1,9 +1,9 @@
-// Stable neo-Hookean elasticity of a tet (Smith, de Goes and Kim 2018, eq. 14) as two constraints (method.md eqs. 29-31): with I the sum of
-// squared singular values of the deformation gradient and J its determinant,
+// Stable neo-Hookean elasticity of a tet (Smith, de Goes and Kim 2018, eq. 14) as two constraints (method.md eqs.
+// 29-31): with I the sum of squared singular values of the deformation gradient and J its determinant,
 //   C_0 = sqrt(I - log(I + 1)),  C_1 = J - alpha,  alpha = 1 + 3 mu / (4 lambda),
-// and compliances 1 / (mu V), 1 / (lambda V), the energy C^2 / (2 compliance) is Smith's. At rest neither is 0: their forces cancel.
-// `rest`: the inverse of the metric of the sides at rest (a a, a b, a d, b b, b d, d d), 1 over 6 volumes, alpha.
-// A tet in a point or on a line has no gradient: it stays so until another moves its vertices.
+// and compliances 1 / (mu V), 1 / (lambda V), the energy C^2 / (2 compliance) is Smith's. At rest neither is 0: their
+// forces cancel. `rest`: the inverse of the metric of the sides at rest (a a, a b, a d, b b, b d, d d), 1 over 6
+// volumes, alpha. A tet in a point or on a line has no gradient: it stays so until another moves its vertices.
 Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
   Constraint4x2 c;
   vec3 a = x[1] - x[0];
@@ -31,9 +31,9 @@ Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
 real neo_hookean_jacobian(vec3 x[4], const real rest[8]) {
   return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]) * rest[6];
 }
-// A block of the Hessian of the energy, with compliances a[0] and a[1], and a quarter of the difference of the gradients. The part that
-// can be negative, (J - alpha) Hess J, is taken up to where it meets the positive one: that of I over the largest singular value. At
-// rest it just does, as a body turns freely.
+// A block of the Hessian of the energy, with compliances a[0] and a[1], and a quarter of the difference of the
+// gradients. The part that can be negative, (J - alpha) Hess J, is taken up to where it meets the positive one: that of
+// I over the largest singular value. At rest it just does, as a body turns freely.
 EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i, int j) {
   vec3 s1 = x[1] - x[0], s2 = x[2] - x[0], s3 = x[3] - x[0];
   vec3 t1 = rest[0] * s1 + rest[1] * s2 + rest[2] * s3;
@@ -44,7 +44,8 @@ EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i,
   // The squared singular values are the eigenvalues of the matrix of all t . s: the largest, by its deviator.
   real third = I / real(3), d11 = dot(t1, s1) - third, d22 = dot(t2, s2) - third, d33 = dot(t3, s3) - third;
   real d12 = dot(t1, s2), d13 = dot(t1, s3), d21 = dot(t2, s1), d23 = dot(t2, s3), d31 = dot(t3, s1), d32 = dot(t3, s2);
-  real p = sqrt(max((d11 * d11 + d22 * d22 + d33 * d33) / real(6) + (d12 * d21 + d13 * d31 + d23 * d32) / real(3), real(0)));
+  real p =
+      sqrt(max((d11 * d11 + d22 * d22 + d33 * d33) / real(6) + (d12 * d21 + d13 * d31 + d23 * d32) / real(3), real(0)));
   real det = d11 * (d22 * d33 - d23 * d32) - d12 * (d21 * d33 - d23 * d31) + d13 * (d21 * d32 - d22 * d31);
   real angle = acos(clamp(p > real(0) ? (det / p) / (real(2) * p * p) : real(1), real(-1), real(1))) / real(3);
   real longest = sqrt(max(third + real(2) * p * cos(angle), real(1e-12)));
@@ -56,7 +57,8 @@ EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i,
                         : -(high == 1 ? rest[0] + m12 + m13 : high == 2 ? m12 + rest[3] + m23 : m13 + m23 + rest[5]);
   vec3 others = low > 0 ? (low == 2 ? -s1 : high == 2 ? -s3 : s2) : high == 1 ? s2 - s3 : high == 2 ? s3 - s1 : s1 - s2;
   vec3 t0 = -(t1 + t2 + t3), g0 = -(g1 + g2 + g3);
-  vec3 ti = chosen(i, t0, t1, t2, t3), tj = chosen(j, t0, t1, t2, t3), gi = chosen(i, g0, g1, g2, g3), gj = chosen(j, g0, g1, g2, g3);
+  vec3 ti = chosen(i, t0, t1, t2, t3), tj = chosen(j, t0, t1, t2, t3), gi = chosen(i, g0, g1, g2, g3),
+       gj = chosen(j, g0, g1, g2, g3);
   EdgePart part;
   part.block = mat3(share * metric / a[0]) + outerProduct(ti * (real(2) / (a[0] * (I + real(1)) * (I + real(1)))), tj) +
                outerProduct(gi / a[1], gj) + cross_matrix(others * ((i < j ? held : -held) * rest[6]));

@@ -1,8 +1,9 @@
-// What every constraint formula returns, and what a solver makes of it. GLSL and C++ (sim/formulas.h): `real` is float or double, vec3 follows it. No formula
-// returns early: at least one driver makes loops of that which cost more than all the rest (docs/decisions.md).
-// C and its gradient by each vertex; `floor` bounds sum |gradient|^2 from below where the gradient can vanish
-// with C still large (same unit as |gradient|^2; 0 where it cannot); `guards`: bits of layout.glsl's GUARD_*.
-// `ids`: what id_of(ids, j) finds the number of the constraint's vertex j by; asked for in guards only.
+// What every constraint formula returns, and what a solver makes of it. GLSL and C++ (sim/model/formulas.h): `real` is
+// float or double, vec3 follows it. No formula returns early: at least one driver makes loops of that which cost more
+// than all the rest (docs/decisions.md). C and its gradient by each vertex; `floor` bounds sum |gradient|^2 from below
+// where the gradient can vanish with C still large (same unit as |gradient|^2; 0 where it cannot); `guards`: bits of
+// layout.glsl's GUARD_*. `ids`: what id_of(ids, j) finds the number of the constraint's vertex j by; asked for in
+// guards only.
 struct Constraint2 {
   real C;
   vec3 gradient[2];
@@ -22,8 +23,8 @@ struct Constraint4x2 {
   uint guards;
 };
 
-// Blocks of Hessians (mode newton; method.md eq. 41), of vertices i and j != i: what the gradient of i gains per way of j. Chosen by
-// conditions: an array with an index that is not constant would lie in memory.
+// Blocks of Hessians (mode newton; method.md eq. 41), of vertices i and j != i: what the gradient of i gains per way of
+// j. Chosen by conditions: an array with an index that is not constant would lie in memory.
 vec3 chosen(int j, vec3 v0, vec3 v1, vec3 v2, vec3 v3) { return j == 0 ? v0 : j == 1 ? v1 : j == 2 ? v2 : v3; }
 vec3 gradient_of(Constraint2 c, int j) { return j == 0 ? c.gradient[0] : c.gradient[1]; }
 vec3 gradient_of(Constraint4 c, int j) { return chosen(j, c.gradient[0], c.gradient[1], c.gradient[2], c.gradient[3]); }
@@ -36,8 +37,8 @@ struct EdgePart {
   vec3 force;
 };
 
-// A direction for two vertices in one place: of unit length, the opposite one for (b, a), and unlike that of other pairs,
-// so that a body that has collapsed to a point does not unfold along a line only.
+// A direction for two vertices in one place: of unit length, the opposite one for (b, a), and unlike that of other
+// pairs, so that a body that has collapsed to a point does not unfold along a line only.
 vec3 any_direction(uint a, uint b) {
   uint h = min(a, b) * 0x9E3779B9u + max(a, b) * 0x85EBCA6Bu;
   h = (h ^ (h >> 16)) * 0x7FEB352Du;
@@ -51,11 +52,12 @@ vec3 any_direction(uint a, uint b) {
 
 // A constraint error that rounding alone can make is no error: without this, rounding noise of 1e-9 m divided by a
 // substep of 1e-6 s becomes a velocity (method.md, "What float drops").
-// `noise`: the size that C is known to rounding of. Positions themselves are known to rounding * quantization_size (0 where they are kept
-// in full).
+// `noise`: the size that C is known to rounding of. Positions themselves are known to rounding * quantization_size (0
+// where they are kept in full).
 real apply_dead_zone(real C, real noise) { return abs(C) <= real(4) * rounding * noise ? real(0) : C; }
 
-// Of a constraint with inverse masses w: sum w |grad C|^2, the largest w^2 |grad C|^2, and what bounds the sum from below.
+// Of a constraint with inverse masses w: sum w |grad C|^2, the largest w^2 |grad C|^2, and what bounds the sum from
+// below.
 struct Weighted {
   real sum;
   real longest;
@@ -75,10 +77,10 @@ Weighted weighted(Constraint4 c, real w[4]) {
   return Weighted(sum, longest, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));
 }
 
-// The multiplier (method.md eqs. 4, 25-26): lambda w_j grad_j C moves vertex j, by `max_correction` (one body size) at most. XPBD's
-// (Macklin, Mueller and Chentanez 2016), of which PBD's is the one with a = 0 and share = 1: `c.C` is the whole residual,
-// C + a lambda + gamma (C - C at the substep's start), with a = alpha / h^2 and gamma = tau / h; `share` is (1 + gamma) / omega: the
-// relaxation leaves a alone, so that one iteration of a short substep is right too.
+// The multiplier (method.md eqs. 4, 25-26): lambda w_j grad_j C moves vertex j, by `max_correction` (one body size) at
+// most. XPBD's (Macklin, Mueller and Chentanez 2016), of which PBD's is the one with a = 0 and share = 1: `c.C` is the
+// whole residual, C + a lambda + gamma (C - C at the substep's start), with a = alpha / h^2 and gamma = tau / h;
+// `share` is (1 + gamma) / omega: the relaxation leaves a alone, so that one iteration of a short substep is right too.
 struct Multiplier {
   real lambda;  // 0 where it is no number
   uint guards;  // that it took
@@ -100,7 +102,8 @@ Multiplier multiplier(Constraint4 c, real w[4], real k, real max_correction, rea
   return bounded(c.C, c.guards, s, share * max(s.sum, s.least) + a, k, max_correction);
 }
 
-// Of two constraints (method.md eq. 32): (share grad C W grad C^T + a) lambda = -C. As above, `c.C` is the whole residual.
+// Of two constraints (method.md eq. 32): (share grad C W grad C^T + a) lambda = -C. As above, `c.C` is the whole
+// residual.
 struct Multiplier2 {
   real lambda[2];
   uint guards;

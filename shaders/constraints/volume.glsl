@@ -1,7 +1,7 @@
 // Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so an inverted tet is pushed back
-// (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a regular tet's at rest)
-// keeps the correction under about ten times the tet's size there. A tet on a line has no gradient at all: its vertices part in
-// pseudo-random directions.
+// (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a
+// regular tet's at rest) keeps the correction under about ten times the tet's size there. A tet on a line has no
+// gradient at all: its vertices part in pseudo-random directions.
 Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   Constraint4 c;
   vec3 a = x[1] - x[0];
@@ -21,8 +21,8 @@ Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   real sum = real(0);
   for (int j = 0; j < 4; ++j) sum += dot(c.gradient[j], c.gradient[j]);
   if (sum <= real(1e-10) * c.floor) {
-    // Two pairs push each other apart, so momentum stays. Large, so that the step is small, a few hundredths of the tet: it is to
-    // break the symmetry, and the true gradient takes over.
+    // Two pairs push each other apart, so momentum stays. Large, so that the step is small, a few hundredths of the
+    // tet: it is to break the symmetry, and the true gradient takes over.
     c.gradient[0] = any_direction(id_of(ids, 0), id_of(ids, 1)) * (real(9) * area);
     c.gradient[1] = -c.gradient[0];
     c.gradient[2] = any_direction(id_of(ids, 2), id_of(ids, 3)) * (real(9) * area);

@@ -1,6 +1,6 @@
 // The plane that a point meets on its straight way `from`, `to`, and the distance of `to` from it: negative where it
 // would be stopped. Where it meets nothing, that of the nearest point of the surface (method.md, "Obstacles with a
-// shape"). GLSL and C++ (sim/formulas.h); surface_of(): the distance of the solid's kind.
+// shape"). GLSL and C++ (sim/model/formulas.h); surface_of(): the distance of the solid's kind.
 // Convex solids lie behind the plane at their nearest point, so the search goes from plane to plane (Newton's
 // method): each plane makes distance times approach at least four times smaller, so it takes a dozen turns. Others are
 // searched in steps of the distance, half a cell at least, however long the way is: few lead up to their field, and

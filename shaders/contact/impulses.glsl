@@ -1,5 +1,5 @@
-// A rigid body on obstacles: inelastic impacts and Coulomb friction by impulses, each contact in turn (method.md eqs. 34-37). GLSL and
-// C++ (sim/formulas.h). Impulses and momenta per mass of the body.
+// A rigid body on obstacles: inelastic impacts and Coulomb friction by impulses, each contact in turn (method.md eqs.
+// 34-37). GLSL and C++ (sim/model/formulas.h). Impulses and momenta per mass of the body.
 struct Rigid {
   vec3 centre;
   vec3 velocity;
@@ -27,8 +27,8 @@ mat3 inverse_inertia_of(mat3 moments) {
 }
 bool has_inertia(Rigid b) { return b.inverse_inertia[0][0] > real(0); }
 vec3 velocity_at(Rigid b, vec3 arm) { return b.velocity + cross(b.spin, arm); }
-// `approach`: normal velocity before; under what gravity alone makes of it in two substeps there is no rebound. `gap`: closed in h at most,
-// but for one that rounding may have opened.
+// `approach`: normal velocity before; under what gravity alone makes of it in two substeps there is no rebound. `gap`:
+// closed in h at most, but for one that rounding may have opened.
 const real closed_gap = real(1e-6);  // of the body's size
 real least_velocity(real approach, real gap, real h, real fall, real restitution) {
   return restitution > real(0) && approach < real(-2) * fall ? -restitution * approach : -max(gap, real(0)) / h;
@@ -47,8 +47,8 @@ Rigid pushed(Rigid b, vec3 arm, vec3 impulse) {
   b.spin += b.inverse_inertia * cross(arm, impulse);
   return b;
 }
-// The impulse at a contact while all others stay as they are: the one that stops it, if friction can; else the limit of friction against
-// the slip that is left. `velocity`: there, with the contact's impulse so far in it.
+// The impulse at a contact while all others stay as they are: the one that stops it, if friction can; else the limit of
+// friction against the slip that is left. `velocity`: there, with the contact's impulse so far in it.
 vec3 impulse_at(Touch t, vec3 velocity, real friction) {
   vec3 n = t.normal, was = t.impulse, impulse = was - t.stopping * (velocity - t.least * n);
   real push = dot(impulse, n), grip = length(impulse - push * n);
@@ -75,13 +75,15 @@ vec3 impulse_at(Touch t, vec3 velocity, real friction) {
 #define SLIP_OF(k, v) v, params.friction
 #endif
 SHARED_TOUCHES
-// Over the contacts in `contacts` until no impulse changes by more than `enough`; a body slower than `still` in the end stands still.
+// Over the contacts in `contacts` until no impulse changes by more than `enough`; a body slower than `still` in the end
+// stands still.
 Rigid settled(TOUCHES Rigid b, int count, real enough, real still) {
   real change = enough + enough;
   for (int sweep = 0; sweep < 200 && change > enough; ++sweep) {
     change = real(0);
     for (int k = 0; k < count; ++k) {
-      vec3 arm = contacts[k].arm, impulse = impulse_at(contacts[k], SLIP_OF(k, velocity_at(b, arm))), more = impulse - contacts[k].impulse;
+      vec3 arm = contacts[k].arm, impulse = impulse_at(contacts[k], SLIP_OF(k, velocity_at(b, arm))),
+           more = impulse - contacts[k].impulse;
       b = pushed(b, arm, more);
       change = max(change, length(more));
       contacts[k].impulse = impulse;

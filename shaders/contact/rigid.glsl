@@ -1,5 +1,6 @@
-// Hard bodies that touch (method.md, "Contact of a hard body"): what a vertex tells of itself at the end of a substep, for
-// rigid_contact.comp, and whether its body is carried as a rigid one in this substep. Two sides take turns: one is read, the other written.
+// Hard bodies that touch (method.md, "Contact of a hard body"): what a vertex tells of itself at the end of a substep,
+// for rigid_contact.comp, and whether its body is carried as a rigid one in this substep. Two sides take turns: one is
+// read, the other written.
 layout(std430) buffer RigidBodies {
   RigidRecord rigid_bodies[BODY_COUNT];
   uint near[];  // by side and body: vertices that would touch an obstacle next, in any order
@@ -17,7 +18,7 @@ uint body_of(uint i) {  // the last that starts at i or before
   return low;
 }
 // From the origin of its body.
-vec3 arm_of(Pair x, vec3 origin) { return (x.high - origin) + x.low; }
+vec3 arm_of(DoubleSingle x, vec3 origin) { return (x.high - origin) + x.low; }
 
 // A body's record as vertices ask for it.
 struct RigidState {
@@ -28,7 +29,8 @@ struct RigidState {
 };
 RigidState state_of(uint b) {
   uint s = side_now();
-  return RigidState(b, rigid_bodies[b].sides[s].carried != 0u, rigid_bodies[b].sides[s].summed != 0u, rigid_bodies[b].sides[s].origin, rigid_bodies[b].mass);
+  return RigidState(b, rigid_bodies[b].sides[s].carried != 0u, rigid_bodies[b].sides[s].summed != 0u,
+                    rigid_bodies[b].sides[s].origin, rigid_bodies[b].mass);
 }
 RigidState group_state;  // of the body that the work-group's first vertex belongs to
 RigidState state_at(uint i) {
@@ -45,7 +47,8 @@ void add_quanta(uint b, int which, float quanta) {
   if (b == group_state.body) atomicAdd(rigid_sums[which], int(quanta));
   else atomicAdd(rigid_bodies[b].sides[side_now()].sums[which], int(quanta));
 }
-float quanta_of(float value) { return clamp(value, -1.0, 1.0) * 1073741824.0; }  // of 2^-30: weights add up to 1, so no sum overflows
+// Of 2^-30: weights add up to 1, so no sum overflows.
+float quanta_of(float value) { return clamp(value, -1.0, 1.0) * 1073741824.0; }
 void add_rigid_sum(uint b, int which, float value) { add_quanta(b, which, round(quanta_of(value))); }
 // Of momenta, which are small beside RIGID_SPEED: `rest` counts parts of a quantum.
 void add_rigid_sum(uint b, int which, int rest, float value) {
@@ -58,7 +61,7 @@ void note_range(vec3 value) {
   if (any(greaterThan(abs(value), vec3(1.0)))) atomicAdd(dropped[DROP_RANGE], 1u);
 }
 // Vertex i is at x with velocity v and will be at `next`.
-void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inverse_mass) {
+void note_motion(RigidState state, uint i, DoubleSingle x, DoubleSingle v, DoubleSingle next, float inverse_mass) {
   uint b = state.body, s = side_now();
   bool inside = will_touch(x, next, 1.0);
   if (inside || will_touch(x, next, 4.0)) rigid_bodies[b].sides[s].soon = 1u;
@@ -85,5 +88,6 @@ void note_motion(RigidState state, uint i, Pair x, Pair v, Pair next, float inve
 void end_sums() {
   barrier();
   uint k = gl_LocalInvocationIndex;
-  if (k < RIGID_SUMS && rigid_sums[k] != 0) atomicAdd(rigid_bodies[group_state.body].sides[side_now()].sums[k], rigid_sums[k]);
+  if (k < RIGID_SUMS && rigid_sums[k] != 0)
+    atomicAdd(rigid_bodies[group_state.body].sides[side_now()].sums[k], rigid_sums[k]);
 }

@@ -1,7 +1,8 @@
-// Contact of hard bodies (method.md, "Contact of a hard body"), before each substep: a body of which a vertex would get into an obstacle
-// gets the velocities of a rigid body in inelastic frictional contact. Every work-group finds them for itself.
+// Contact of hard bodies (method.md, "Contact of a hard body"), before each substep: a body of which a vertex would get
+// into an obstacle gets the velocities of a rigid body in inelastic frictional contact. Every work-group finds them for
+// itself.
 #include "types.glsl"
-#include "pair.glsl"
+#include "double_single.glsl"
 #include "quantized.glsl"
 layout(local_size_x = 256) in;
 #include "solvers/corrections.glsl"
@@ -12,7 +13,7 @@ shared Rigid before, body;  // the centre from the body's origin; momenta per ma
 shared uint worst, worst_place;
 shared uint places[MOST_TOUCHES];  // of the touches: vertex * MAX_OBSTACLES + obstacle
 
-Pair position_of(uint i) { return Pair(positions[i].high, positions[i].low); }
+DoubleSingle position_of(uint i) { return DoubleSingle(positions[i].high, positions[i].low); }
 
 // The rigid motion of body b, from its sums on side s.
 Rigid rigid_motion(uint b, uint s) {
@@ -21,7 +22,8 @@ Rigid rigid_motion(uint b, uint s) {
   for (int k = 0; k < 6; ++k) sums[3 + k] += sums[15 + k] / RIGID_PARTS;
   float reach = 2.0 * params.body_size;
   vec3 c = vec3(sums[0], sums[1], sums[2]);
-  mat3 moments = mat3(sums[9], sums[12], sums[14], sums[12], sums[10], sums[13], sums[14], sums[13], sums[11]) - outerProduct(c, c);
+  mat3 moments = mat3(sums[9], sums[12], sums[14], sums[12], sums[10], sums[13], sums[14], sums[13], sums[11]) -
+                 outerProduct(c, c);
   Rigid motion;
   motion.unsettled = false;
   motion.centre = reach * c;
@@ -46,17 +48,19 @@ struct Meeting {
   vec3 velocity;
   float friction, restitution;
 };
-Meeting meeting_with(int k, uint vertex, Pair x, vec3 arm) {
+Meeting meeting_with(int k, uint vertex, DoubleSingle x, vec3 arm) {
   vec3 velocity = (velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale;
   Surface surface = surface_before(k, x, velocity);
-  return Meeting(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex), obstacle_restitution(k));
+  return Meeting(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex),
+                 obstacle_restitution(k));
 }
 // The normal velocity at a contact may not be under this.
 float least_at(Meeting m, vec3 arm) {
-  return least_velocity(dot(m.normal, velocity_at(before, arm) - m.velocity), m.gap - closed_gap * params.body_size, params.h, params.h * length(params.gravity), m.restitution);
+  return least_velocity(dot(m.normal, velocity_at(before, arm) - m.velocity), m.gap - closed_gap * params.body_size,
+                        params.h, params.h * length(params.gravity), m.restitution);
 }
 void take_in(int k, uint place, vec3 origin, vec3 impulse) {
-  Pair x = position_of(place / MAX_OBSTACLES);
+  DoubleSingle x = position_of(place / MAX_OBSTACLES);
   vec3 arm = arm_of(x, origin) - before.centre;
   Meeting m = meeting_with(int(place % MAX_OBSTACLES), place / MAX_OBSTACLES, x, arm);
   contacts[k] = touch_at(before, m.normal, arm, least_at(m, arm), impulse, m.velocity, m.friction);
@@ -72,7 +76,8 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
   if (lane == 0u) before = rigid_motion(b, s);
   barrier();
   if (!has_inertia(before)) return false;
-  if (lane < uint(touching)) take_in(int(lane), rigid_bodies[b].sides[s].touches[lane], origin, rigid_bodies[b].sides[s].impulses[lane].xyz);
+  if (lane < uint(touching))
+    take_in(int(lane), rigid_bodies[b].sides[s].touches[lane], origin, rigid_bodies[b].sides[s].impulses[lane].xyz);
   Rigid now = before;
   now.velocity = (now.velocity + params.h * params.gravity) * params.velocity_scale;
   now.spin *= params.velocity_scale;
@@ -94,7 +99,7 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     uint place = ~0u;
     for (uint k = lane; k < count; k += gl_WorkGroupSize.x) {
       uint vertex = near[s * params.vertex_count + rigid_bodies[b].first + k];
-      Pair x = position_of(vertex);
+      DoubleSingle x = position_of(vertex);
       vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
       for (int p = 0; p < obstacle_count(); ++p) {
         Meeting m = meeting_with(p, vertex, x, arm);
@@ -142,14 +147,16 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
 }
 
 void main() {
-  uint lane = gl_LocalInvocationIndex, base = group_index() * gl_WorkGroupSize.x, i = base + lane, s = side_now(), o = 1u - s;
+  uint lane = gl_LocalInvocationIndex, base = group_index() * gl_WorkGroupSize.x, i = base + lane, s = side_now(),
+       o = 1u - s;
   if (base >= params.vertex_count) return;
   uint last = body_of(min(base + gl_WorkGroupSize.x, params.vertex_count) - 1u);
   for (uint b = body_of(base); b <= last; ++b) {
     uint first = rigid_bodies[b].first, count = rigid_bodies[b].sides[s].near;
     bool writes = first >= base && first < base + gl_WorkGroupSize.x;
     vec3 origin = rigid_bodies[b].sides[s].origin;
-    bool moves = count > 0u && rigid_bodies[b].sides[s].summed != 0u && rigid_bodies[b].one_piece != 0u && rigid_bodies[b].sides[s].fixed_vertices == 0u;
+    bool moves = count > 0u && rigid_bodies[b].sides[s].summed != 0u && rigid_bodies[b].one_piece != 0u &&
+                 rigid_bodies[b].sides[s].fixed_vertices == 0u;
     if (moves) moves = find_motion(b, s, count, writes);
     if (writes) {
       if (lane < RIGID_SUMS) rigid_bodies[b].sides[o].sums[lane] = 0;
@@ -163,10 +170,10 @@ void main() {
       }
     }
     if (moves && i >= first && i < first + rigid_bodies[b].vertices) {
-      Pair x = position_of(i);
+      DoubleSingle x = position_of(i);
       vec3 v = velocity_at(body, arm_of(x, origin) - body.centre);
       velocities[i] = Velocity(v, 0.0, vec3(0.0), 0.0);
-      quantized_out[i] = quantize(predict_position(x, Pair(v, vec3(0.0))), weight_of(positions[i]));
+      quantized_out[i] = quantize(predict_position(x, DoubleSingle(v, vec3(0.0))), weight_of(positions[i]));
     }
     barrier();
   }

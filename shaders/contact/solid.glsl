@@ -1,6 +1,6 @@
 // What a kind of obstacle is described by, in its own coordinates, and what distances of several kinds need. Each
 // file of obstacles/ is a kind: the signed distance NAME_surface(), negative inside, or a bound that is nowhere
-// longer outside (method.md, "Obstacles with a shape"). GLSL and C++ (sim/formulas.h); texel(i): value i of the
+// longer outside (method.md, "Obstacles with a shape"). GLSL and C++ (sim/model/formulas.h); texel(i): value i of the
 // fields.
 struct Solid {  // as in ObstacleRecord (layout.glsl)
   int kind;

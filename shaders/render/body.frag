@@ -12,8 +12,8 @@ in Point {
 
 layout(location = 0) out vec4 result;
 
-// How much of this pixel the triangle's edges cover, lines one pixel wide of which each side draws its half. Of triangles a few pixels wide
-// they would be all one sees: there they give way.
+// How much of this pixel the triangle's edges cover, lines one pixel wide of which each side draws its half. Of
+// triangles a few pixels wide they would be all one sees: there they give way.
 float edge_cover(vec3 barycentric) {
   vec3 dx = dFdx(barycentric), dy = dFdy(barycentric), pixel = sqrt(dx * dx + dy * dy);
   vec3 cover = clamp(1.0 - barycentric / max(pixel, vec3(1e-9)), 0.0, 1.0);

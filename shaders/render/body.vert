@@ -13,7 +13,8 @@ out Corner {
 
 void main() {
   corner.position = high + low;
-  // A value that is no number has no colour: such a corner goes the way of one without a place, and takes its faces along.
+  // A value that is no number has no colour: such a corner goes the way of one without a place, and takes its faces
+  // along.
   if (!finite(vec3(value * 1e-30))) corner.position = vec3(uintBitsToFloat(0x7f800000u));
   corner.value = value;
   corner.rest = rest;

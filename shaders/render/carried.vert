@@ -1,5 +1,5 @@
-// A vertex of a fine surface that rides on tetrahedra, straight from the simulation's buffer, to the image or the shadow map.
-// Vertex shaders need not have storage buffers in GL 4.3, hence textures.
+// A vertex of a fine surface that rides on tetrahedra, straight from the simulation's buffer, to the image or the
+// shadow map. Vertex shaders need not have storage buffers in GL 4.3, hence textures.
 #include "render/view.glsl"
 #include "render/point.glsl"
 layout(location = ATTRIBUTE_CARRIED) in uvec4 carried;  // as carried.cpp packs it

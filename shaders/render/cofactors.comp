@@ -1,5 +1,6 @@
-// Of each vertex the cofactors of the mean deformation gradient F of its tetrahedra, by volume at rest: what turns the normals of a
-// surface that rides on them. Means of vertices, mixed within a tetrahedron, leave no kinks where tetrahedra meet.
+// Of each vertex the cofactors of the mean deformation gradient F of its tetrahedra, by volume at rest: what turns the
+// normals of a surface that rides on them. Means of vertices, mixed within a tetrahedron, leave no kinks where
+// tetrahedra meet.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"

@@ -38,7 +38,8 @@ vec3 number_colour(float number) {
   return clamp(oklab_to_linear(vec3(lightness, 0.11f * cos(hue), 0.11f * sin(hue))), vec3(0.0f), vec3(1.0f));
 }
 
-// What `value` looks like on a scale from `low` to `high`; kinds 1 (volume) and 2 (stretch) are signed, 6 (patch) counts.
+// What `value` looks like on a scale from `low` to `high`; kinds 1 (volume) and 2 (stretch) are signed, 6 (patch)
+// counts.
 vec3 scale_colour(int kind, float value, float low, float high) {
   if (kind == 6) return number_colour(value);
   float t = (value - low) / (high - low);

@@ -1,6 +1,6 @@
-// The corners of the surface's triangles as they are drawn, a thread each: place, value, and as normal the sum, weighted by angles, of
-// those of the triangles around the vertex that lie within the angle of an edge of its own. So edges stay sharp without a geometry
-// shader; GPUs made for computing have few units for those.
+// The corners of the surface's triangles as they are drawn, a thread each: place, value, and as normal the sum,
+// weighted by angles, of those of the triangles around the vertex that lie within the angle of an edge of its own. So
+// edges stay sharp without a geometry shader; GPUs made for computing have few units for those.
 #include "render/view.glsl"
 #include "render/gathered.glsl"
 layout(std430) readonly buffer Triangles { uint triangles[]; };

@@ -1,5 +1,5 @@
-// Values of vertices, each gathered from its items in fixed order, so the same every time. TETS: the mean over its tetrahedra
-// of what values.glsl has of `kind`. Otherwise the mean over its edges of L/L0 - 1.
+// Values of vertices, each gathered from its items in fixed order, so the same every time. TETS: the mean over its
+// tetrahedra of what values.glsl has of `kind`. Otherwise the mean over its edges of L/L0 - 1.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"

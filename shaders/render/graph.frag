@@ -11,6 +11,7 @@ layout(location = 0) out vec4 result;
 
 void main() {
   int kind = int(view.colour.x);
-  vec3 colour = kind == COLOUR_PLAIN ? 0.4 * point.albedo : scale_colour(kind, point.value, view.colour.y, view.colour.z);
+  vec3 colour =
+      kind == COLOUR_PLAIN ? 0.4 * point.albedo : scale_colour(kind, point.value, view.colour.y, view.colour.z);
   result = vec4(colour, 0.45 * view.material.w);  // what lies behind shows
 }

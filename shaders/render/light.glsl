@@ -1,4 +1,5 @@
-// Material, lights and shadows. All colours linear; irradiances over pi, so that a white face under all of them is about 1.
+// Material, lights and shadows. All colours linear; irradiances over pi, so that a white face under all of them is
+// about 1.
 layout(binding = UNIT_SHADOW) uniform sampler2DShadow shadow_map;
 layout(binding = UNIT_SHADOW_DEPTH) uniform sampler2D shadow_depth;
 layout(binding = UNIT_PLANES) uniform sampler2D plane_light;
@@ -27,8 +28,8 @@ vec2 arriving(vec3 position, float plane) {
   return textureLod(plane_light, vec2((at.x * 0.5 + 0.5 + plane) / view.scene.x, at.y * 0.5 + 0.5), 0.0).rg;
 }
 
-// Part of the key light that arrives on a body, from four looks that the sampler filters. The point compared is moved off the surface
-// by more than they are apart, which is what keeps a surface from shadowing itself.
+// Part of the key light that arrives on a body, from four looks that the sampler filters. The point compared is moved
+// off the surface by more than they are apart, which is what keeps a surface from shadowing itself.
 float body_shadow(vec3 position, vec3 normal, float facing) {
   if (view.right.w == 0.0) return 1.0;
   vec3 s = light_space(position + normal * light.centre.w * (1.0 + 1.5 * (1.0 - facing))) * 0.5 + 0.5;
@@ -44,7 +45,8 @@ vec2 below(vec3 position) {
   if (view.scene.y == 0.0 || view.right.w == 0.0) return vec2(1.0);
   vec4 ground = view.planes[0];
   float height = max(dot(ground.xyz, position) - ground.w, 0.0);
-  return mix(arriving(position - height * ground.xyz, 0.0), vec2(1.0), height / (height + 0.35 * light.extent.y + 1e-6));
+  return mix(arriving(position - height * ground.xyz, 0.0), vec2(1.0),
+             height / (height + 0.35 * light.extent.y + 1e-6));
 }
 
 // From the sky as a part of all, and else from the ground.
@@ -52,8 +54,9 @@ vec3 surroundings(float sky, vec2 on_ground) {
   return mix(bounced * (key_direction.y * key_colour * on_ground.x + sky_colour * on_ground.y), sky_colour, sky);
 }
 
-// Of the bodies, a dull plastic: GGX in the form of B. Karis and others for small machines, under the key light, sky and ground, and a little
-// light beside the camera. Where colours mean something they keep their hue: not `shiny`, under light that has none.
+// Of the bodies, a dull plastic: GGX in the form of B. Karis and others for small machines, under the key light, sky
+// and ground, and a little light beside the camera. Where colours mean something they keep their hue: not `shiny`,
+// under light that has none.
 vec3 shade(vec3 albedo, vec3 position, vec3 normal, bool shiny) {
   vec3 to_eye = normalize(view.eye.xyz - position);
   float facing = dot(normal, key_direction), key = max(facing, 0.0);

@@ -1,5 +1,6 @@
-// The first triangle, or of TETS the first tetrahedron as it is shown, along a ray. Stage 0: the least distance, as float bits (positive floats sort like their bits).
-// Stage 1: the least triangle at exactly that distance. Stage 2, one thread: its corner nearest to the hit.
+// The first triangle, or of TETS the first tetrahedron as it is shown, along a ray. Stage 0: the least distance, as
+// float bits (positive floats sort like their bits). Stage 1: the least triangle at exactly that distance. Stage 2, one
+// thread: its corner nearest to the hit.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/view.glsl"
@@ -22,8 +23,8 @@ vec3 position(uint v) { return positions[v].high + positions[v].low; }
 #define CORNERS 4u
 layout(std430) readonly buffer Rest { vec4 rest[]; };
 
-// Where the ray comes into what the cut leaves of the tetrahedron, or a negative number. All that bounds it is a + b t >= 0: its
-// coordinates, and the cut's plane, which is one of the rest shape and so one of these.
+// Where the ray comes into what the cut leaves of the tetrahedron, or a negative number. All that bounds it is a + b t
+// >= 0: its coordinates, and the cut's plane, which is one of the rest shape and so one of these.
 float hit(uint t) {
   vec3 p[4];
   float kept[4];
@@ -52,8 +53,8 @@ float hit(uint t) {
 }
 #else
 #define CORNERS 3u
-// Distance to the triangle (Moeller, Trumbore 1997), or a negative number. Edges are a hair wider than they are, so that no ray
-// slips between two triangles.
+// Distance to the triangle (Moeller, Trumbore 1997), or a negative number. Edges are a hair wider than they are, so
+// that no ray slips between two triangles.
 float hit(uint t) {
   vec3 a = position(triangles[3u * t]), b = position(triangles[3u * t + 1u]), c = position(triangles[3u * t + 2u]);
   if (!finite(a) || !finite(b) || !finite(c)) return -1.0;

@@ -26,7 +26,8 @@ void main() {
   float line = grid * max(0.10 * lines(across * 10.0, pixel * 10.0, 1.0), 0.26 * lines(across, pixel, 1.5));
   vec3 albedo = wall ? vec3(0.46, 0.55, 0.63) : vec3(0.70, 0.70, 0.695);
   vec2 light = dot(n.xyz, view.eye.xyz) < n.w ? vec2(1.0) : arriving(position, float(plane));
-  vec3 received = key_colour * max(dot(n.xyz, key_direction), 0.0) * light.x + surroundings(0.5 + 0.5 * n.y, vec2(1.0)) * light.y;
+  vec3 received =
+      key_colour * max(dot(n.xyz, key_direction), 0.0) * light.x + surroundings(0.5 + 0.5 * n.y, vec2(1.0)) * light.y;
   vec3 colour = albedo * (1.0 - line) * received;
   result = opacity == 1.0 ? vec4(mix(background_colour(gl_FragCoord.y), colour, fade), 1.0)
                           : vec4(colour, fade * mix(opacity, 1.0, wall ? 2.0 * line : 0.0));

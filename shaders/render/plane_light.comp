@@ -1,5 +1,5 @@
-// What of the key light and of the sky arrives on the ground and on walls: of each a map of what the bodies may darken, seen along the light
-// and beside each other, so that a pixel of the picture needs one look.
+// What of the key light and of the sky arrives on the ground and on walls: of each a map of what the bodies may darken,
+// seen along the light and beside each other, so that a pixel of the picture needs one look.
 #include "render/view.glsl"
 #include "render/light.glsl"
 layout(local_size_x = 16, local_size_y = 16) in;
@@ -26,14 +26,15 @@ vec2 disk_point(int i, int n) {
   return radius * vec2(cos(angle), sin(angle));
 }
 
-// Sharp at the contact, softer with the distance from what casts the shadow (R. Fernando, Percentage-Closer Soft Shadows, 2005). The plane
-// casts none itself, so there is no bias.
+// Sharp at the contact, softer with the distance from what casts the shadow (R. Fernando, Percentage-Closer Soft
+// Shadows, 2005). The plane casts none itself, so there is no bias.
 float key_light(vec3 position) {
   const float light_size = 0.16;  // widening of the penumbra in metres for each metre
   const float widest = 0.024;     // of the shadow map
   vec3 s = light_space(position) * 0.5 + 0.5;
   float metre = 0.5 / light.extent.y, depth = min(s.z, 1.0);
-  float narrowest = plane_reach / float(map_size), search = clamp(light_size * s.z * light.extent.x * metre, narrowest, widest);
+  float narrowest = plane_reach / float(map_size),
+        search = clamp(light_size * s.z * light.extent.x * metre, narrowest, widest);
   if (any(lessThan(s.xy, vec2(-search))) || any(greaterThan(s.xy, vec2(1.0 + search)))) return 1.0;
   float blockers = 0.0, sum = 0.0, lit = 0.0;
   for (int i = 0; i < 16; ++i) {
@@ -44,12 +45,14 @@ float key_light(vec3 position) {
   }
   if (blockers == 0.0) return 1.0;
   if (blockers == 16.0) return 0.0;  // for no penumbra is wider than the search
-  float gap = max(s.z - sum / blockers, 0.0) * light.extent.x, radius = clamp(light_size * gap * metre, narrowest, search);
+  float gap = max(s.z - sum / blockers, 0.0) * light.extent.x,
+        radius = clamp(light_size * gap * metre, narrowest, search);
   for (int i = 0; i < 40; ++i) lit += textureLod(shadow_map, vec3(s.xy + radius * disk_point(i, 40), depth), 0.0);
   return lit / 40.0;
 }
 
-// The part of the hemisphere that is hidden by disks, each for a share of the bodies' triangles; a ray that meets a body meets two.
+// The part of the hemisphere that is hidden by disks, each for a share of the bodies' triangles; a ray that meets a
+// body meets two.
 float hidden(vec3 at, vec3 normal, uint begin, uint step_size) {
   const uint most = 256u;
   uint disks = min(triangles, most);

@@ -1,7 +1,7 @@
-// The shadow map's projection around the bodies' bounds: least and greatest x, y, z of all finite positions, as integers of the
-// same order, since minimum and maximum of integers are atomic and do not depend on the order of threads; then, by the
-// work-group that ends last, the projection, which also takes in obstacles. Its size goes in steps and its centre by whole texels, so that shadow edges
-// do not crawl while a body moves.
+// The shadow map's projection around the bodies' bounds: least and greatest x, y, z of all finite positions, as
+// integers of the same order, since minimum and maximum of integers are atomic and do not depend on the order of
+// threads; then, by the work-group that ends last, the projection, which also takes in obstacles. Its size goes in
+// steps and its centre by whole texels, so that shadow edges do not crawl while a body moves.
 #include "layout.glsl"
 #include "render/view.glsl"
 layout(local_size_x = 128) in;
@@ -50,8 +50,10 @@ void fit_light() {
   memoryBarrierBuffer();
   vec3 low = limit.xyz, high = limit.xyz;
   if (bounds[0] <= bounds[3]) {
-    low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w, limit.xyz + limit.w);
-    high = clamp(vec3(decoded(bounds[3]), decoded(bounds[4]), decoded(bounds[5])), limit.xyz - limit.w, limit.xyz + limit.w);
+    low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w,
+                limit.xyz + limit.w);
+    high = clamp(vec3(decoded(bounds[3]), decoded(bounds[4]), decoded(bounds[5])), limit.xyz - limit.w,
+                 limit.xyz + limit.w);
   }
   for (int a = 0; a < 3; ++a) bounds[a] = ~0u, bounds[3 + a] = 0u;  // for the next picture
   done = 0u;

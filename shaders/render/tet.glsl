@@ -8,7 +8,8 @@ vec3 tone() {
   return view.palette[int(corner[0].rest.w) % PALETTE_SIZE].rgb * shade;
 }
 
-// Its corners, shrunk towards its centre and moved from that of the bodies, and their values; false if one is not finite.
+// Its corners, shrunk towards its centre and moved from that of the bodies, and their values; false if one is not
+// finite.
 bool place_tet(out vec3 p[4], out float value[4]) {
   vec3 r[4];
   for (int i = 0; i < 4; ++i) {

@@ -1,12 +1,12 @@
-// An arrow for each vertex or sharp edge that is in another body: where it is, along which normal it leaves, and how deep it is, below 0 where there
-// is none. One invocation per record of contact (pairs/pairs.glsl).
+// An arrow for each vertex or sharp edge that is in another body: where it is, along which normal it leaves, and how
+// deep it is, below 0 where there is none. One invocation per record of contact (pairs/pairs.glsl).
 #include "layout.glsl"
 #include "render/layout.glsl"
 #define real float
-#include "pairs/formulas.glsl"
+#include "contact/bodies/formulas.glsl"
 layout(local_size_x = 128) in;
 layout(std430) readonly buffer Positions { Position positions[]; };
-#include "pairs/surfaces.glsl"
+#include "contact/bodies/surfaces.glsl"
 layout(std430) writeonly buffer Arrows { TouchArrow arrows[]; };
 vec3 place(uint vertex) { return positions[vertex].high; }
 void main() {

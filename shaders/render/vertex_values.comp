@@ -1,4 +1,5 @@
-// A value of each vertex alone. SPEED: of its velocity, m/s. Otherwise its distance from where `answers` has it, as a part of 1 / `scale`.
+// A value of each vertex alone. SPEED: of its velocity, m/s. Otherwise its distance from where `answers` has it, as a
+// part of 1 / `scale`.
 #include "layout.glsl"
 #include "render/layout.glsl"
 layout(local_size_x = 128) in;

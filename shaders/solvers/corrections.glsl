@@ -1,16 +1,16 @@
 // A vertex in a substep of corrections: prediction before the first iteration, contacts in each, velocity after the
 // last (method.md eqs. 1-2, 5, 11-13).
 #include "vertex.glsl"
-layout(std430) buffer Predicted { Velocity predicted[]; };  // a Pair, padded
+layout(std430) buffer Predicted { Velocity predicted[]; };  // a DoubleSingle, padded
 
 // Where it will be after the next prediction: what the first iteration starts from.
-Pair seen_by_neighbours(Pair x, Pair v) { return predict_position(x, predict_velocity(v)); }
+DoubleSingle seen_by_neighbours(DoubleSingle x, DoubleSingle v) { return predict_position(x, predict_velocity(v)); }
 // At the start of the substep, for damping.
-Pair place_before(Pair x, Pair v) { return x; }
+DoubleSingle place_before(DoubleSingle x, DoubleSingle v) { return x; }
 
-Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
+DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
   bool predicts = (phases & PHASE_PREDICT) != 0u, finishes = (phases & PHASE_FINISH) != 0u;
-  Pair x = Pair(own.high, own.low), v = Pair(speed.high, speed.low), start = x;
+  DoubleSingle x = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low), start = x;
   bool carried = false;
 #if RIGID_CONTACT
   RigidState body = state_at(i);
@@ -21,19 +21,19 @@ Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
     start = x = predict_position(x, v);
   }
   if ((phases & PHASE_SOLVE) != 0u) {
-    Pair corrected = pair_add(x, correction);
+    DoubleSingle corrected = add_double(x, correction);
     if (may_touch(corrected)) {
       vec3 moved = correction;
       if (predicts) moved += params.h * v.high;
-      else moved += params.h * velocities[i].high + relative(x, Pair(predicted[i].high, predicted[i].low));
+      else moved += params.h * velocities[i].high + relative(x, DoubleSingle(predicted[i].high, predicted[i].low));
       corrected = resolve_contacts(i, corrected, moved);
     }
     x = corrected;
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   if (finishes) {
-    if (!predicts) start = Pair(predicted[i].high, predicted[i].low);
-    if (!carried) v = pair_add(v, relative(x, start) * params.inverse_h);
+    if (!predicts) start = DoubleSingle(predicted[i].high, predicted[i].low);
+    if (!carried) v = add_double(v, relative(x, start) * params.inverse_h);
     note_unless_finite(i, x.high + x.low, v.high + v.low);
   } else if (predicts) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
@@ -44,7 +44,7 @@ Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
 #endif
   // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
   if (finishes) {
-    Pair here = x;
+    DoubleSingle here = x;
     x = seen_by_neighbours(x, v);
 #if RIGID_CONTACT
     note_motion(body, i, here, v, x, own.inverse_mass);

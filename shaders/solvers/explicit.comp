@@ -1,8 +1,8 @@
 // Mode explicit: a vertex gathers the forces of all constraints on it and moves, in one dispatch (method.md eq. 39). A
-// work-group owns a patch of neighbouring vertices; a constraint on the border of patches is evaluated in each. Vertices
-// are read from one buffer and written to another.
+// work-group owns a patch of neighbouring vertices; a constraint on the border of patches is evaluated in each.
+// Vertices are read from one buffer and written to another.
 #include "types.glsl"
-#include "pair.glsl"
+#include "double_single.glsl"
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 #include "solvers/leapfrog.glsl"
@@ -12,7 +12,7 @@ void keep_multiplier(uint record, float lambda) {}
 // The largest h^2 b of the work-group's constraints (method.md eq. 39b).
 shared uint stiffest_here;
 #define NOTE_STIFFNESS(value) if ((phases & PHASE_WATCH) != 0u) atomicMax(stiffest_here, floatBitsToUint(value))
-#include "patch.glsl"
+#include "solvers/patch.glsl"
 
 void main() {
   uint lane = gl_LocalInvocationIndex;

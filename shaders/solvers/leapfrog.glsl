@@ -1,22 +1,22 @@
 // A vertex in a substep of mode explicit (method.md eq. 39).
 #include "vertex.glsl"
 
-Pair seen_by_neighbours(Pair x, Pair v) { return x; }
+DoubleSingle seen_by_neighbours(DoubleSingle x, DoubleSingle v) { return x; }
 // A substep before, for damping.
-Pair place_before(Pair x, Pair v) { return predict_position(x, Pair(-v.high, -v.low)); }
+DoubleSingle place_before(DoubleSingle x, DoubleSingle v) { return predict_position(x, DoubleSingle(-v.high, -v.low)); }
 
 // The force where the vertex is, then the displacement.
-Pair move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
-  Pair start = Pair(own.high, own.low), v = Pair(speed.high, speed.low);
+DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
+  DoubleSingle start = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low);
   // From the middle of the last substep to the middle of this.
   float time = (phases & PHASE_CHANGED) != 0u ? params.h * params.kick : params.h;
-  v = pair_add(pair_add(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
-  v = Pair(v.high * params.velocity_scale, v.low * params.velocity_scale);
-  Pair x = predict_position(start, v);
+  v = add_double(add_double(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
+  v = DoubleSingle(v.high * params.velocity_scale, v.low * params.velocity_scale);
+  DoubleSingle x = predict_position(start, v);
   if (may_touch(x, length(params.h * v.high))) {
-    Pair free = x;
+    DoubleSingle free = x;
     x = resolve_contacts(i, x, params.h * v.high);
-    v = pair_add(v, relative(x, free) * params.inverse_h);
+    v = add_double(v, relative(x, free) * params.inverse_h);
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);

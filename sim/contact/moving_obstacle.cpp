@@ -7,7 +7,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "sim/error.h"
-#include "sim/settings.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sim/contact/obstacle_kinds.h"
-#include "sim/model.h"
+#include "sim/model/model.h"
 
 namespace tetpbd {
 

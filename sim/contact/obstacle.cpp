@@ -20,7 +20,7 @@ glm::dmat3 rotation_of(const glm::dvec3& degrees) {
   return glm::dmat3(glm::eulerAngleZYX(angle.z, angle.y, angle.x));
 }
 
-std::vector<double> numbers_of(const Obstacle& o) {
+std::vector<double> obstacle_values(const Obstacle& o) {
   std::vector<double> all = {double(o.kind->number()), o.radius, o.half_length, o.friction.value_or(-1),
                              o.restitution.value_or(-1)};
   const auto add = [&](const glm::dvec3& v) { all.insert(all.end(), {v.x, v.y, v.z}); };

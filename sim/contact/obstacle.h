@@ -49,7 +49,7 @@ void set_heights(Obstacle& obstacle, const std::vector<std::vector<double>>& row
 bool moves(const Obstacle& obstacle);
 
 /// All that its motion and contact with it depend on, beside the values of its field.
-std::vector<double> numbers_of(const Obstacle& obstacle);
+std::vector<double> obstacle_values(const Obstacle& obstacle);
 
 struct Pose {
   glm::dvec3 centre{0};

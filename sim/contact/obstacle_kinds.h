@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sim/contact/obstacle.h"
-#include "sim/formulas.h"
+#include "sim/model/formulas.h"
 
 namespace tetpbd {
 

@@ -39,7 +39,7 @@ ObstacleRecord record_block(const MovingObstacle& o, int first) {
   return block;
 }
 
-std::vector<std::shared_ptr<const DistanceField>> fields_of(const Model& model) {
+std::vector<std::shared_ptr<const DistanceField>> obstacle_fields(const Model& model) {
   std::vector<std::shared_ptr<const DistanceField>> fields;
   for (const Obstacle* o : solid_obstacles(model)) fields.push_back(o->field);
   return fields;
@@ -81,7 +81,8 @@ std::vector<std::string> obstacle_defines(const Model& model) {
 }
 
 bool share_kernels(const Model& model, const Model& other) {
-  return obstacle_defines(model) == obstacle_defines(other) && fields_of(model) == fields_of(other) &&
+  return obstacle_defines(model) == obstacle_defines(other) &&
+         obstacle_fields(model) == obstacle_fields(other) &&
          model.obstacles.empty() == other.obstacles.empty();
 }
 
@@ -103,7 +104,7 @@ Obstacles make_obstacles(const Model& model) {
   obstacles.bytes = count * (sizeof(glm::vec4) + sizeof(ObstacleRecord));
   obstacles.stride = (obstacles.bytes + unit - 1) / unit * unit;
   std::vector<float> values;
-  for (const auto& field : fields_of(model))
+  for (const auto& field : obstacle_fields(model))
     if (field) values.insert(values.end(), field->values.begin(), field->values.end());
   if (!values.empty())
     std::tie(obstacles.fields, obstacles.fields_texture) =
@@ -121,8 +122,8 @@ void write_obstacles(Sim& sim, int list) {
   if (obstacles.bytes == 0) return;
   const bool single = on_cpu(sim) || std::ranges::none_of(sim.model->obstacles, moves);
   const int lists = single ? 1 : std::min(sim.plan.substeps + 1, Obstacles::most_lists);
-  const double h = sim.plan.h, start = time_of(sim) - h;
-  const auto fields = fields_of(*sim.model);
+  const double h = sim.plan.h, start = simulated_time(sim) - h;
+  const auto fields = obstacle_fields(*sim.model);
   std::vector<char> bytes(std::size_t(lists) * obstacles.stride);
   for (int l = 0; l < lists; ++l) {
     char* reaches = bytes.data() + std::size_t(l) * obstacles.stride;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "sim/gl/gpu.h"
-#include "sim/layout.h"
-#include "sim/model.h"
+#include "sim/gl/layout.h"
+#include "sim/model/model.h"
 
 namespace tetpbd {
 

@@ -153,7 +153,8 @@ struct Fence : Owned<GLsync, delete_fence> {
 bool reached(GLsync fence, bool wait, const char* what);
 /// What a buffer held when the GPU came to `fence`, once; nothing before (with `wait`: waits) or without one.
 template <class T>
-std::optional<std::vector<T>> take(Fence& fence, const Buffer& buffer, const char* what, bool wait = false) {
+std::optional<std::vector<T>> poll_readback(Fence& fence, const Buffer& buffer, const char* what,
+                                            bool wait = false) {
   if (!fence || !reached(fence.id(), wait, what)) return std::nullopt;
   fence = Fence();
   return buffer.read_all<T>();

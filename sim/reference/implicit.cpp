@@ -34,7 +34,7 @@ Start start_of(const Implicit& run) {
   return start;
 }
 
-Objective objective_of(const Implicit& run, const Start& start) {
+Objective make_objective(const Implicit& run, const Start& start) {
   const Settings& settings = run.input.settings;
   Objective o{.system = run.input.system, .compliances = run.compliances};
   o.inertia = 1 / (run.h * run.h);
@@ -101,7 +101,7 @@ std::vector<Objective::Drag> drags(const Model& model, const Objective& o, const
 // Forces depend on friction and friction on them: solved in turn until none changes by more than a part of
 // all of them.
 Minimum solve(const Implicit& run, const Start& start) {
-  Objective o = objective_of(run, start);
+  Objective o = make_objective(run, start);
   const auto obstacles = obstacles_at(run.input.model, run.input.settings, run.time[0], run.h);
   const bool rubs =
       std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||

@@ -27,6 +27,6 @@ struct Implicit {
 Implicit implicit(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);
 /// `steps` steps of h. Throws Error where one is not solved.
 void advance(Implicit& run, long steps);
-inline const State& state_of(const Implicit& run) { return run.now; }
+inline const State& make_state(const Implicit& run) { return run.now; }
 
 }  // namespace tetpbd

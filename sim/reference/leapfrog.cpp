@@ -124,7 +124,7 @@ void advance(Leapfrog& run, long steps) {
                   "take shorter ones", 1);
 }
 
-State state_of(Leapfrog& run) {
+State make_state(Leapfrog& run) {
   State state{run.x, run.v};
   const Points a = accelerations(run);
   for (std::size_t i = 0; i < a.size(); ++i) state.velocities[i] += run.h / 2 * a[i];

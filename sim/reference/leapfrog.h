@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
+#include "sim/contact/pair_contact.h"
 #include "sim/parallel.h"
 #include "sim/reference/objective.h"
 #include "sim/reference/reference.h"
-#include "sim/solvers/pair_contact.h"
 
 namespace tetpbd {
 
@@ -33,7 +33,7 @@ Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, c
 /// `steps` steps of h. Throws Error when the state is not finite.
 void advance(Leapfrog& run, long steps);
 /// Positions and velocities of the same instant.
-State state_of(Leapfrog& run);
+State make_state(Leapfrog& run);
 
 /// From -1 to 1. The numbers of libstdc++'s std::uniform_real_distribution, which others replace by their
 /// own.

@@ -7,12 +7,12 @@
 #include <cmath>
 #include <fstream>
 
+#include "sim/contact/pairs.h"
 #include "sim/error.h"
 #include "sim/files.h"
 #include "sim/hash.h"
 #include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
-#include "sim/pairs.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"
@@ -78,8 +78,8 @@ Pair rigid_pair(const ReferenceInput& input) {
         for (long s = 0; s < run.steps; ++s)
           advance(body, input.model, input.settings, input.settings.dt / double(run.steps));
   };
-  pair.coarse = [runs, input] { return state_of(input.model, (*runs)[0].bodies); };
-  pair.fine = [runs, input] { return state_of(input.model, (*runs)[1].bodies); };
+  pair.coarse = [runs, input] { return make_state(input.model, (*runs)[0].bodies); };
+  pair.fine = [runs, input] { return make_state(input.model, (*runs)[1].bodies); };
   return pair;
 }
 
@@ -93,8 +93,8 @@ Pair pair_of(double dt, long steps, const Make& make, const Arrays& arrays) {
   Pair pair;
   pair.step = (*runs)[1].h;
   pair.advance = [runs, steps] { advance((*runs)[0], steps), advance((*runs)[1], 2 * steps); };
-  pair.coarse = [runs] { return state_of((*runs)[0]); };
-  pair.fine = [runs] { return state_of((*runs)[1]); };
+  pair.coarse = [runs] { return make_state((*runs)[0]); };
+  pair.fine = [runs] { return make_state((*runs)[1]); };
   pair.save = [runs, arrays](std::string& bytes) {
     for (Run& run : *runs) arrays(run, [&](auto& values) { put_array(bytes, values); });
   };
@@ -110,7 +110,7 @@ Pair leapfrog_pair(const ReferenceInput& input, double stable) {
   const State start{input.model.positions, input.model.velocities};
   return pair_of(
       input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
-      [&](double h) { return leapfrog(input, compliances_of(input), start, h); },
+      [&](double h) { return leapfrog(input, reference_compliances(input), start, h); },
       [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.held), each(run.time); });
 }
 
@@ -118,7 +118,7 @@ Pair implicit_pair(const ReferenceInput& input) {
   const State start{input.model.positions, input.model.velocities};
   return pair_of(
       input.settings.dt, implicit_steps,
-      [&](double h) { return implicit(input, compliances_of(input), start, h); },
+      [&](double h) { return implicit(input, reference_compliances(input), start, h); },
       [](Implicit& run, auto&& each) {
         for (State* state : {&run.now, &run.before}) each(state->positions), each(state->velocities);
         each(run.anew), each(run.touching), each(run.time);
@@ -169,7 +169,7 @@ Motion::Row measured(const Model& model, const Settings& settings, const State& 
   return row;
 }
 
-Compliances compliances_of(const ReferenceInput& input) {
+Compliances reference_compliances(const ReferenceInput& input) {
   Compliances compliances;
   for (std::size_t k = 0; k < kind_count; ++k)
     compliances[k] = input.system.present[k] && input.system.lists[k].compliance.empty()
@@ -186,7 +186,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   add(model.masses), add(input.inverse_masses);
   if (model.rest.thickness > 0) add(model.rest.surface);
   for (const Obstacle& obstacle : model.obstacles) {
-    add(numbers_of(obstacle));
+    add(obstacle_values(obstacle));
     if (obstacle.field) add(obstacle.field->values);
   }
   const Settings& s = input.settings;
@@ -220,7 +220,7 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   const bool soft = any_material(input.model, input.settings, compliant);
   const double stable = !soft || method == "implicit"
                             ? 0
-                            : stable_step(input, compliances_of(input), input.model.rest.positions);
+                            : stable_step(input, reference_compliances(input), input.model.rest.positions);
   const bool touching = bodies_touch(input.model, input.settings);
   if (method.empty())
     motion.method = !soft                                                   ? "rigid body"

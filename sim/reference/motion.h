@@ -34,7 +34,7 @@ struct Motion {
 /// Of a state at `time` (s), but for the error.
 Motion::Row measured(const Model& model, const Settings& settings, const State& state, double time);
 /// Those of the settings; of kinds that are absent, or a material's, infinity.
-Compliances compliances_of(const ReferenceInput& input);
+Compliances reference_compliances(const ReferenceInput& input);
 /// Of all that decides the motion: mesh, masses, start, kinds and compliances, world, `dt`. Not of how it is
 /// solved.
 std::uint64_t scene_key(const ReferenceInput& input);

@@ -10,7 +10,7 @@ namespace tetpbd {
 
 namespace {
 
-glm::dvec3 way_of(const Objective::Drag& drag, const Points& positions) {
+glm::dvec3 drag_displacement(const Objective::Drag& drag, const Points& positions) {
   const glm::dvec3 moved = positions[drag.vertex] - drag.from;
   return moved - drag.normal * glm::dot(drag.normal, moved);
 }
@@ -66,7 +66,7 @@ Energy evaluate_energy(const Objective& o, const Points& positions) {
     }
   });
   for (const Objective::Drag& drag : o.drags) {
-    const double way = glm::length(way_of(drag, positions));
+    const double way = glm::length(drag_displacement(drag, positions));
     add(drag.force * (way < drag.reach ? way * way / (2 * drag.reach) : way - drag.reach / 2));
   }
   return e;
@@ -103,7 +103,7 @@ Points gradient(const Objective& o, const Points& positions) {
                         }
                       });
   for (const Objective::Drag& drag : o.drags) {
-    const glm::dvec3 way = way_of(drag, positions);
+    const glm::dvec3 way = drag_displacement(drag, positions);
     g[drag.vertex] += drag.force / std::max(glm::length(way), drag.reach) * way;
   }
   return g;
@@ -148,9 +148,9 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
       const double start = coordinate;
       coordinate = start + step;
       const double high = coordinate;
-      hessian.col(column) = weighted(Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest)));
+      hessian.col(column) = weighted(Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest)));
       coordinate = start - step;
-      hessian.col(column) -= weighted(Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest)));
+      hessian.col(column) -= weighted(Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest)));
       hessian.col(column) /= high - coordinate;
       coordinate = start;
     }
@@ -188,7 +188,7 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
                           }
                       });
   for (const Objective::Drag& drag : o.drags) {
-    const glm::dvec3 way = way_of(drag, positions);
+    const glm::dvec3 way = drag_displacement(drag, positions);
     const double length = glm::length(way);
     glm::dmat3 local = drag.force / std::max(length, drag.reach) *
                        (glm::dmat3(1) - glm::outerProduct(drag.normal, drag.normal));

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/constraints.h"
+#include "sim/model/constraints.h"
 
 namespace tetpbd {
 
@@ -60,7 +60,7 @@ Points gradient(const Objective& objective, const Points& positions);
 /// gets the same C.
 template <class Kind, class Positions>
 auto unclamped(Positions& x, const double* rest) {
-  auto c = Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest));
+  auto c = Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest));
   if constexpr (Kind::row.components == 1 && Kind::row.values == 1) {
     const double unit = c.C;
     if (unit == 1 || unit == -1) {

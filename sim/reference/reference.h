@@ -6,10 +6,10 @@
 
 #include <vector>
 
-#include "sim/constraints.h"
-#include "sim/model.h"
+#include "sim/model/constraints.h"
+#include "sim/model/model.h"
+#include "sim/model/settings.h"
 #include "sim/reference/objective.h"
-#include "sim/settings.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {

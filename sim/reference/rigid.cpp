@@ -204,7 +204,7 @@ void advance(RigidBody& b, const Model& model, const Settings& settings, double 
   move(b, h / 2);
 }
 
-State state_of(const Model& model, const std::vector<RigidBody>& bodies) {
+State make_state(const Model& model, const std::vector<RigidBody>& bodies) {
   State state{model.positions, model.velocities};
   for (const RigidBody& b : bodies) {
     const glm::dvec3 spin = angular_velocity(b);

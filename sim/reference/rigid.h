@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "sim/model.h"
-#include "sim/settings.h"
+#include "sim/model/model.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 
@@ -38,6 +38,6 @@ std::vector<RigidBody> rigid_bodies(const Model& model);
 /// in contact.
 void advance(RigidBody& body, const Model& model, const Settings& settings, double h);
 /// The model's vertices, moved with the bodies.
-State state_of(const Model& model, const std::vector<RigidBody>& bodies);
+State make_state(const Model& model, const std::vector<RigidBody>& bodies);
 
 }  // namespace tetpbd

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sim/model.h"
+#include "sim/model/model.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {

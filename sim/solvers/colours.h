@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "sim/constraints.h"
+#include "sim/model/constraints.h"
 
 namespace tetpbd {
 

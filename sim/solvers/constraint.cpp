@@ -12,7 +12,7 @@ Solver create_constraint_solver(const SolverInput& input) {
   const Cut cut = tuned({input.system.count() <= 150000 ? 128u : 256u, 128}, input.tuning);
   const Patches patches = constraint_patches(input.system, cut.patch);
   if (patches.count > 0) {
-    jacobi.passes.push_back(make_patch_pass(solver, input, patches, "solve_constraint.comp", cut.group));
+    jacobi.passes.push_back(make_patch_pass(solver, input, patches, "solvers/constraint.comp", cut.group));
     jacobi.passes.back().bytes += patches.vertices.size() * 2 * 12;  // an atomic reads and writes
   }
   jacobi.passes.push_back(make_average_pass(solver, input, 256, false));

@@ -187,7 +187,7 @@ template <class Kind, bool damped>
     float rest[values], a[components];
     for (std::size_t v = 0; v < values; ++v) rest[v] = batch.rest[v][lane];
     for (std::size_t part = 0; part < components; ++part) a[part] = softness_now[part][lane];
-    auto c = Kind::template evaluate<float, LaneMath>(x, rest_of<Kind>(rest), no_ids);
+    auto c = Kind::template evaluate<float, LaneMath>(x, rest_values<Kind>(rest), no_ids);
     [[maybe_unused]] glm::vec3 start[arity];
     if constexpr (damped) {
 #pragma GCC unroll 4
@@ -195,8 +195,8 @@ template <class Kind, bool damped>
         start[j] =
             j == 0 ? glm::vec3(0) : glm::vec3(starts[j][0][lane], starts[j][1][lane], starts[j][2][lane]);
       if constexpr (components == 1) {
-        const auto then = Kind::template evaluate<float, LaneMath>(start, rest_of<Kind>(rest), no_ids);
-        c.C = Kind::row.rate ? change_of(c, then, x, start) : c.C + gamma * (c.C - then.C);
+        const auto then = Kind::template evaluate<float, LaneMath>(start, rest_values<Kind>(rest), no_ids);
+        c.C = Kind::row.rate ? constraint_change(c, then, x, start) : c.C + gamma * (c.C - then.C);
       }
     }
     glm::vec3 corrections[arity];
@@ -472,7 +472,7 @@ Solver create_cpu_fast_solver(const SolverInput& input) {
   Solver solver;
   solver.substep = [pbd = std::make_shared<FastPbd>(input)](Sim& sim, int) {
     pbd->change_model(*sim.model);
-    add_guards(sim, pbd->step(sim.host, sim.settings, sim.inverse_masses, time_of(sim)));
+    add_guards(sim, pbd->step(sim.host, sim.settings, sim.inverse_masses, simulated_time(sim)));
   };
   return solver;
 }

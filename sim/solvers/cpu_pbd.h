@@ -6,11 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include "sim/constraints.h"
-#include "sim/model.h"
-#include "sim/settings.h"
-#include "sim/solvers/pair_contact.h"
-#include "sim/solvers/rigid_contact.h"
+#include "sim/contact/pair_contact.h"
+#include "sim/contact/rigid_contact.h"
+#include "sim/model/constraints.h"
+#include "sim/model/model.h"
+#include "sim/model/settings.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -37,8 +37,8 @@ struct Rule {
 
 /// How much C changed from `then` to c, without cancellation; at positions x and start.
 template <class Constraint, class Vector>
-[[gnu::always_inline]] inline auto change_of(const Constraint& c, const Constraint& then, const Vector* x,
-                                             const Vector* start) {
+[[gnu::always_inline]] inline auto constraint_change(const Constraint& c, const Constraint& then,
+                                                     const Vector* x, const Vector* start) {
   decltype(c.C) sum = 0;
   for (std::size_t j = 0; j < std::size(c.gradient); ++j)
     sum += decltype(c.C)(0.5) * glm::dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);
@@ -57,7 +57,7 @@ template <class Kind, class real, class Vertices>
   glm::vec<3, real> local[arity];
   const auto evaluate = [&](auto&& position) {
     for (std::size_t j = 0; j < arity; ++j) local[j] = glm::vec<3, real>(position(ids[j]) - position(ids[0]));
-    return Kind::template evaluate<real>(local, rest_of<Kind>(rest), ids);
+    return Kind::template evaluate<real>(local, rest_values<Kind>(rest), ids);
   };
   auto c = evaluate([&](std::uint32_t v) { return vertices.at(v); });
   real w[arity], a[components];
@@ -68,7 +68,8 @@ template <class Kind, class real, class Vertices>
     if (rule.gamma > 0) {
       const auto here = std::to_array(local);
       const auto then = evaluate([&](std::uint32_t v) { return vertices.start(v); });
-      c.C = Kind::row.rate ? change_of(c, then, here.data(), local) : c.C + rule.gamma * (c.C - then.C);
+      c.C =
+          Kind::row.rate ? constraint_change(c, then, here.data(), local) : c.C + rule.gamma * (c.C - then.C);
     }
     c.C += a[0] * multipliers[0];
     const auto m = Formulas<real>{}.multiplier(c, w, rule.k, rule.limit, a[0], rule.share);

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "sim/error.h"
-#include "sim/material.h"
+#include "sim/model/material.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/sim.h"
 #include "sim/solvers/node.h"
@@ -60,32 +60,33 @@ Plan make_plan(const Settings& settings, double longest, double stiffening) {
 // Other accelerations come in by halves where the length of a substep changes (PHASE_CHANGED).
 void set_stiffening(Sim& sim, double stiffening) {
   const int before = sim.plan.substeps;
-  sim.watch.stiffening = stiffening;
+  sim.adaptive.stiffening = stiffening;
   sim.plan = make_plan(sim.settings, sim.longest_substep, stiffening);
   if (sim.plan.substeps == before) return;
-  sim.watch.changed = true;
+  sim.adaptive.changed = true;
   write_step_block(sim, before);
 }
 
 void watch_stiffness(Sim& sim) {
-  Watch& w = sim.watch;
-  const auto answer = read_watch(sim);
-  const double asked_h = std::exchange(w.asked_h, sim.plan.h);
+  AdaptiveSubsteps& w = sim.adaptive;
+  const auto answer = poll_notes(sim);
+  const double noted_h = std::exchange(w.noted_h, sim.plan.h);
   if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front()))
     return;  // 0: nothing was noted yet
-  const double stiffer = answer->front() / (asked_h * asked_h * w.at_rest);
+  const double stiffer = answer->front() / (noted_h * noted_h * w.at_rest);
   const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next answer, if it goes on so
   w.stiffer = stiffer;
   const double needed = stiffening_for(next, sim.settings.stability);
   // Up at once; down a quarter at a time, as bodies swing.
-  w.calm = needed < w.stiffening ? w.calm + 1 : 0;
+  w.calm_readbacks = needed < w.stiffening ? w.calm_readbacks + 1 : 0;
   if (needed > w.stiffening) set_stiffening(sim, needed);
-  if (w.calm == 16) w.calm = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
+  if (w.calm_readbacks == 16)
+    w.calm_readbacks = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
 }
 
 void start(Sim& sim, const State& state) {
-  Watch& w = sim.watch;
-  w = WatchNumbers{.at_rest = w.at_rest};
+  AdaptiveSubsteps& w = sim.adaptive;
+  w = AdaptiveValues{.at_rest = w.at_rest};
   if (w.at_rest > 0) {
     const double now = stiffest(sim, state.positions) / w.at_rest;
     w.stiffer = std::isfinite(now) ? now : 1;
@@ -100,8 +101,8 @@ void retune(Sim& sim, const Settings* before) {
   const double longest =
       same ? sim.longest_substep
            : stable_step(reference_input(sim), sim.settings.compliance, sim.model->rest.positions, 30);
-  sim.plan = make_plan(sim.settings, longest, sim.watch.stiffening);
-  if (!same) sim.watch.at_rest = stiffest(sim, sim.model->rest.positions);
+  sim.plan = make_plan(sim.settings, longest, sim.adaptive.stiffening);
+  if (!same) sim.adaptive.at_rest = stiffest(sim, sim.model->rest.positions);
   sim.longest_substep = longest;
 }
 
@@ -116,15 +117,15 @@ Solver create_explicit_solver(const SolverInput& input) {
   solver.start = start;
   solver.retune = retune;
   solver.prepare = [](Sim& sim) {
-    Watch& w = sim.watch;
-    if (!w.answer) return;
-    if (sim.steps % Watch::every == 0 && w.at_rest > 0) watch_stiffness(sim);
+    AdaptiveSubsteps& w = sim.adaptive;
+    if (!w.readback) return;
+    if (sim.steps % AdaptiveSubsteps::every == 0 && w.at_rest > 0) watch_stiffness(sim);
     w.most_substeps = std::max(w.most_substeps, sim.plan.substeps);
   };
   solver.substep = [pass](Sim& sim, int substep) {
     unsigned phases = PHASE_PREDICT | PHASE_SOLVE | PHASE_FINISH | sim.pairs.phases;
-    if (substep == 0 && sim.watch.answer)
-      phases |= PHASE_WATCH | (std::exchange(sim.watch.changed, false) ? PHASE_CHANGED : 0u);
+    if (substep == 0 && sim.adaptive.readback)
+      phases |= PHASE_WATCH | (std::exchange(sim.adaptive.changed, false) ? PHASE_CHANGED : 0u);
     const std::size_t velocities = 2 * sim.model->positions.size() * sizeof(Velocity);
     run_kernel(sim, *pass, phases, "", velocities);
     turn_quantized(sim);

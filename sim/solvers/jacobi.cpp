@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "sim/pairs.h"
+#include "sim/contact/pairs.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -61,9 +61,9 @@ void add_jacobi(Solver& solver, const SolverInput& input, JacobiPasses passes) {
 void add_prediction(Solver& solver, const SolverInput& input) {
   constexpr unsigned group = 256;
   const std::size_t count = input.model.positions.size();
-  const auto pass =
-      std::make_shared<Pass>(Program::compute("predict.comp", scheme_words(input), vertex_defines(input)),
-                             work_groups(count, group), count * (sizeof(Position) + sizeof(Velocity) + 16));
+  const auto pass = std::make_shared<Pass>(
+      Program::compute("solvers/predict.comp", scheme_words(input), vertex_defines(input)),
+      work_groups(count, group), count * (sizeof(Position) + sizeof(Velocity) + 16));
   solver.predict = [pass](Sim& sim) {
     sim.recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
     run_kernel(sim, *pass);
@@ -110,7 +110,7 @@ Pass make_average_pass(Solver& solver, const SolverInput& input, unsigned group,
   Buffer sums("correction sums", vertices * 16);
   sums.clear();
   add_buffer(solver, input.tuning, "Sums", std::move(sums));
-  return {Program::compute("average.comp", {}, defines), work_groups(vertices, group), bytes};
+  return {Program::compute("solvers/average.comp", {}, defines), work_groups(vertices, group), bytes};
 }
 
 }  // namespace tetpbd

@@ -36,7 +36,7 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   const std::vector<std::string> defines = newton_defines(sizes, input);
   const ShaderWords words{{}, kind_words(input.system)};
   const auto pass = [&](const char* name, std::size_t work_groups, std::size_t bytes) {
-    return Pass{Program::compute(fmt::format("newton/{}.comp", name), words, defines),
+    return Pass{Program::compute(fmt::format("solvers/newton/{}.comp", name), words, defines),
                 std::max<std::size_t>(work_groups, 1), bytes};
   };
   const auto groups = [&](std::size_t items) { return (items + sizes.group - 1) / sizes.group; };
@@ -98,12 +98,12 @@ void refresh(Sim& sim, Newton& n) {
 
 void make_plan(Sim& sim) {
   sim.plan = plan_for(sim.settings);
-  sim.plan.substeps *= sim.watch.finer;
+  sim.plan.substeps *= sim.adaptive.substep_factor;
   sim.plan.h = sim.settings.dt / sim.plan.substeps;
 }
 
-void set_finer(Sim& sim, Newton& n, int times) {
-  if (std::exchange(sim.watch.finer, times) == times) return;
+void set_substep_factor(Sim& sim, Newton& n, int times) {
+  if (std::exchange(sim.adaptive.substep_factor, times) == times) return;
   make_plan(sim);
   refresh(sim, n);
   write_step_block(sim);
@@ -115,16 +115,18 @@ void set_finer(Sim& sim, Newton& n, int times) {
 // 5 ms, 1 % so.
 void adapt_substeps(Sim& sim, Newton& n) {
   constexpr int enough = 8, most = 100;  // answers
-  Watch& w = sim.watch;
+  AdaptiveSubsteps& w = sim.adaptive;
   const bool near = sim.pairs && sim.pairs.near;
-  w.calm = w.health < LEAST_HEALTH || near ? 0 : w.calm + 1;
+  w.calm_readbacks = w.health < LEAST_HEALTH || near ? 0 : w.calm_readbacks + 1;
   if (near)
-    w.mending = 0;
-  else if (w.finer > 1 && w.health != float(HEALTH_TURNING))
-    ++w.mending;
-  if (w.finer == 1 && w.calm == 0 && w.mending < most) set_finer(sim, n, finer_times);
-  if (w.finer > 1 && w.calm == enough) w.mending = 0, set_finer(sim, n, 1);
-  if (w.finer > 1 && w.mending == most) set_finer(sim, n, 1);
+    w.refined_readbacks = 0;
+  else if (w.substep_factor > 1 && w.health != float(HEALTH_TURNING))
+    ++w.refined_readbacks;
+  if (w.substep_factor == 1 && w.calm_readbacks == 0 && w.refined_readbacks < most)
+    set_substep_factor(sim, n, refined_substeps);
+  if (w.substep_factor > 1 && w.calm_readbacks == enough)
+    w.refined_readbacks = 0, set_substep_factor(sim, n, 1);
+  if (w.substep_factor > 1 && w.refined_readbacks == most) set_substep_factor(sim, n, 1);
 }
 
 // rad/s, of the body that spins the fastest.
@@ -152,18 +154,18 @@ double fastest_spin(const Model& model, const State& state) {
 
 void start(Sim& sim, Newton& n, const State& state) {
   while (n.refresh.inverse.valid()) end_refresh(sim, n);
-  Watch& w = sim.watch;
-  w = WatchNumbers{.finer = w.finer};
+  AdaptiveSubsteps& w = sim.adaptive;
+  w = AdaptiveValues{.substep_factor = w.substep_factor};
   const double turn = fastest_spin(*sim.model, state) * plan_for(sim.settings).h;
   const bool near = sim.pairs && sim.pairs.near;
-  set_finer(sim, n, turn > TURN_LIMIT || near ? finer_times : 1);
+  set_substep_factor(sim, n, turn > TURN_LIMIT || near ? refined_substeps : 1);
 }
 
 void prepare(Sim& sim, Newton& n) {
   if (n.refresh.inverse.valid() && --n.refresh.steps == 0) end_refresh(sim, n);
-  Watch& w = sim.watch;
-  if (!w.answer) return;
-  if (sim.steps % Watch::every == 0 && read_convergence(sim) && !n.refresh.inverse.valid())
+  AdaptiveSubsteps& w = sim.adaptive;
+  if (!w.readback) return;
+  if (sim.steps % AdaptiveSubsteps::every == 0 && poll_convergence(sim) && !n.refresh.inverse.valid())
     adapt_substeps(sim, n);
   w.most_substeps = std::max(w.most_substeps, sim.plan.substeps);
 }

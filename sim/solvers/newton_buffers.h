@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "sim/buffer_layout.h"
+#include "sim/gl/buffer_layout.h"
 #include "sim/solvers/aggregates.h"
 #include "sim/solvers/newton_graph.h"
 

@@ -66,7 +66,7 @@ glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList&
     const double a = list.compliance.empty() ? settings.compliance[index_of<Kind>] : list.compliance[c];
     const double held =
         (Kind::row.rate ? 0 : 1) + (Kind::row.rate ? 1 : list.damping_at(c, settings.constraint_damping)) / h;
-    const auto value = Kind::template evaluate<double>(x.data(), rest_of<Kind>(rest));
+    const auto value = Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest));
     return held / a * glm::outerProduct(value.gradient[i], value.gradient[j]);
   }
 }

@@ -7,12 +7,12 @@
 
 namespace tetpbd {
 
-/// shaders/newton/layout.glsl as C++.
+/// shaders/solvers/newton/layout.glsl as C++.
 namespace newton {
 using glm::uint;
 using glm::vec3;
 using glm::vec4;
-#include "shaders/newton/layout.glsl"
+#include "shaders/solvers/newton/layout.glsl"
 static_assert(sizeof(EdgeBlock) == 48 && sizeof(FreeBody) == 8);
 static_assert(sizeof(Iteration) == 12 && sizeof(BodyMotion) == 64 && sizeof(MomentumSums) == 80);
 }  // namespace newton

@@ -8,7 +8,7 @@
 
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
-#include "sim/layout.h"
+#include "sim/gl/layout.h"
 
 namespace tetpbd {
 
@@ -51,7 +51,7 @@ Pass make_vertex_patch_pass(Solver& solver, const SolverInput& input, const char
 Solver create_node_solver(const SolverInput& input) {
   Solver solver;
   JacobiPasses jacobi;
-  jacobi.passes.push_back(make_vertex_patch_pass(solver, input, "solve_node.comp", true));
+  jacobi.passes.push_back(make_vertex_patch_pass(solver, input, "solvers/node.comp", true));
   add_jacobi(solver, input, std::move(jacobi));
   return solver;
 }

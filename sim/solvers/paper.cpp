@@ -6,7 +6,7 @@
 #include <numeric>
 #include <random>
 
-#include "sim/layout.h"
+#include "sim/gl/layout.h"
 #include "sim/solvers/jacobi.h"
 
 namespace tetpbd {
@@ -41,7 +41,7 @@ Solver create_paper_solver(const SolverInput& input) {
     const std::size_t bytes =
         count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
     jacobi.passes.push_back(
-        {.program = Program::compute("solve_paper.comp", {kinds[index++], {}},
+        {.program = Program::compute("solvers/paper.comp", {kinds[index++], {}},
                                      {fmt::format("GROUP_SIZE {}", group), fmt::format("COUNT {}", count)}),
          .work_groups = work_groups(count, group),
          .bytes = bytes,

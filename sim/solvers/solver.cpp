@@ -8,9 +8,9 @@
 #include <cstdlib>
 
 #include "sim/contact/obstacles.h"
+#include "sim/contact/pairs.h"
 #include "sim/error.h"
-#include "sim/layout.h"
-#include "sim/pairs.h"
+#include "sim/gl/layout.h"
 #include "sim/parallel.h"
 #include "sim/solvers/patches.h"
 
@@ -99,14 +99,14 @@ const SolverMode* find_solver_mode(const std::string& name) {
 }
 
 Plan plan_for(const Settings& s) {
-  const SolverMode& mode = mode_of(s);
+  const SolverMode& mode = solver_mode(s);
   Plan plan{s.substeps == automatic ? mode.substeps : s.substeps,
             s.iterations == automatic || mode.leapfrog ? mode.iterations : s.iterations};
   plan.h = s.dt / plan.substeps;
   return plan;
 }
 
-const SolverMode& mode_of(const Settings& settings) {
+const SolverMode& solver_mode(const Settings& settings) {
   static const SolverMode of_baseline{};
   const SolverMode* mode = find_solver_mode(settings.mode);
   return mode ? *mode : of_baseline;
@@ -152,7 +152,7 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
 }
 
 ShaderWords scheme_words(const SolverInput& input) {
-  return {{{"SCHEME", mode_of(input.settings).leapfrog ? "leapfrog" : "corrections"}}, {}};
+  return {{{"SCHEME", solver_mode(input.settings).leapfrog ? "leapfrog" : "corrections"}}, {}};
 }
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "sim/constraints.h"
+#include "sim/gl/layout.h"
 #include "sim/gl/pass.h"
-#include "sim/layout.h"
-#include "sim/model.h"
-#include "sim/settings.h"
+#include "sim/model/constraints.h"
+#include "sim/model/model.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 
@@ -50,7 +50,7 @@ struct Solver {
   bool takes_constraints = false;  ///< retune() takes other numbers of the same constraints
   /// What is made for a plan, at once for that of now.
   std::function<void(Sim&)> refresh = [](Sim&) {};
-  bool watches = false;  ///< kernels note what the number of substeps follows (watch.h)
+  bool watches = false;  ///< kernels note what the number of substeps follows (adaptive_substeps.h)
   /// What a step hands on beside what every mode has.
   std::function<void(Sim&, Carried&)> carried = [](Sim&, Carried&) {};
 };
@@ -105,7 +105,7 @@ const std::vector<SolverMode>& solver_modes();
 /// Of all modes; nullptr if there is none.
 const SolverMode* find_solver_mode(const std::string& name);
 /// Of a baseline that compare runs beside modes: a row that can do nothing.
-const SolverMode& mode_of(const Settings& settings);
+const SolverMode& solver_mode(const Settings& settings);
 
 /// SCHEME: the file of shaders/solvers/ that says how a vertex moves.
 ShaderWords scheme_words(const SolverInput& input);

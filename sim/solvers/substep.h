@@ -12,7 +12,7 @@ namespace tetpbd {
 /// Whether Jacobi shares masses out among a vertex's constraints; else it averages corrections. With
 /// compliance always: with averages, a constraint's multiplier would not be what its vertices were moved by.
 inline bool splits_masses(const Model& model, const Settings& settings) {
-  return (settings.mass_splitting && !mode_of(settings).published) ||
+  return (settings.mass_splitting && !solver_mode(settings).published) ||
          any_material(model, settings, compliant);
 }
 

@@ -1,0 +1,60 @@
+// What a picture is drawn of: a simulation as it stands.
+#include "render/frame.h"
+
+#include <iterator>
+#include <ranges>
+
+#include "sim/contact/moving_obstacle.h"
+#include "sim/model/material.h"
+
+namespace tetpbd {
+
+// Vertices within 10^-5 of the size of an obstacle that is no half space (the GPU finds those on planes), as
+// metrics count them. Waits for the GPU.
+static std::vector<std::uint32_t> find_touching(const Sim& sim) {
+  auto obstacles = obstacles_at(*sim.model, sim.settings, simulated_time(sim));
+  std::erase_if(obstacles, [](const MovingObstacle& o) { return o.kind->flat; });
+  if (obstacles.empty()) return {};
+  const double near = 1e-5 * sim.model->size;
+  std::vector<std::uint32_t> touching;
+  const State state = read_state(sim);
+  for (std::uint32_t v = 0; v < state.positions.size(); ++v) {
+    const glm::dvec3& x = state.positions[v];
+    if (std::ranges::any_of(obstacles, [&](const MovingObstacle& o) {
+          return glm::distance(x, o.pose.centre) < 1.01 * o.reach + near && o.surface_at(x).distance < near;
+        }))
+      touching.push_back(v);
+  }
+  return touching;
+}
+
+void renew(Frame& frame, const Sim& sim) {
+  frame.time = simulated_time(sim);
+  frame.pairs = sim.pairs && sim.pairs.near ? &sim.pairs : nullptr;
+  if (frame.options.contacts) frame.touching = find_touching(sim);
+}
+
+Frame make_frame(const Sim& sim, const Camera& camera, const ViewOptions& options, const Target& target) {
+  Frame frame;
+  frame.positions = sim.positions.id();
+  frame.velocities = sim.velocities.id();
+  frame.camera = camera;
+  frame.viewport = {0, 0, target.width, target.height};
+  frame.options = options;
+  if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
+  frame.material = energy_material(sim.settings);
+  frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
+  frame.model = sim.model;
+  renew(frame, sim);
+  const auto held = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };
+  for (const Body& body : sim.model->bodies) {
+    const auto vertices =
+        std::views::iota(std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices));
+    if (!std::ranges::all_of(vertices, held))  // a body that stands fast as a whole needs no dots
+      std::ranges::copy_if(vertices, std::back_inserter(frame.pinned), held);
+  }
+  frame.target = target.framebuffer.id();
+  return frame;
+}
+
+}  // namespace tetpbd

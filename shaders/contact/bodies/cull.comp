@@ -1,0 +1,62 @@
+// Which leaves are near one of another body; their items and these leaves are listed. Of what is near nothing, nothing
+// is held. A work-group per leaf.
+#include "contact/bodies/pairs.glsl"
+#define BODY_WORDS ((BODY_COUNT + 31u) / 32u)
+shared uint near_bodies[BODY_WORDS];  // a bit per body
+shared uint near, first_vertex, first_edge;
+// What holds a leaf's items is forgotten.
+void forget(uint lane, uint item, uint count) {
+  for (uint j = lane; j < count; j += GROUP_SIZE) held_by[item + j] = NONE;
+}
+uint fill_groups(uint count) { return (count + PER_GROUP - 1u) / PER_GROUP * PER_GROUP; }
+void main() {
+  uint lane = gl_LocalInvocationIndex, leaf = group_index();
+  if (leaf >= LEAVES) return;
+  uint body = leaves[leaf].body;
+  vec3 low = low_of_leaf(leaf), high = high_of_leaf(leaf);
+  float reach = leaf_boxes[leaf].reach, most = uintBitsToFloat(counts.most_reach);
+  if (lane == 0u) near = 0u;
+  for (uint w = lane; w < BODY_WORDS; w += GROUP_SIZE) near_bodies[w] = 0u;
+  barrier();
+  for (uint other = lane; other < BODY_COUNT; other += GROUP_SIZE)
+    if ((CONTACT_SELF != 0 || other != body) && in_body(other, low - most, high + most))
+      atomicOr(near_bodies[other / 32u], 1u << (other % 32u));
+  barrier();
+  for (uint w = 0u; w < BODY_WORDS; ++w)
+    for (uint left = near_bodies[w]; left != 0u; left &= left - 1u) {
+      uint other = 32u * w + uint(findLSB(left));
+      for (uint l = bodies[other].first_leaf + lane; l < bodies[other + 1u].first_leaf; l += GROUP_SIZE) {
+        float apart = max(reach, leaf_boxes[l].reach);
+        if (!in_leaf(l, low - apart, high + apart)) continue;
+        uint slot = atomicAdd(near, 1u);
+        if (slot < NEAR_LEAVES) near_leaves[leaf].leaves[slot] = l;
+      }
+    }
+  barrier();
+  uint vertex = leaves[leaf].vertices[0], vertices = leaves[leaf].vertices[1] - vertex;
+  uint edge = leaves[leaf].edges[0], edges = leaves[leaf].edges[1] - edge;
+  if (near == 0u) {
+    forget(lane, vertex, vertices);
+    forget(lane, SURFACE_VERTICES + edge, edges);
+    return;
+  }
+  uint vertices_filled = fill_groups(vertices), edges_filled = fill_groups(edges);
+  if (lane == 0u) {
+    near_leaves[leaf].count = near;
+    first_vertex = atomicAdd(counts.near_vertices, vertices_filled);
+    need_groups(QUERY_GROUPS, (first_vertex + vertices_filled) / PER_GROUP);
+    if (edges > 0u) {
+      first_edge = atomicAdd(counts.near_edges, edges_filled);
+      need_groups(EDGE_GROUPS, (first_edge + edges_filled) / PER_GROUP);
+    }
+  }
+  barrier();
+  for (uint j = lane; j < vertices_filled; j += GROUP_SIZE)
+    near_vertices[first_vertex + j] = j < vertices ? vertex + j : NONE;
+  for (uint j = lane; j < vertices_filled / PER_GROUP; j += GROUP_SIZE)
+    leaf_of_group[first_vertex / PER_GROUP + j] = leaf;
+  for (uint j = lane; j < edges_filled; j += GROUP_SIZE)
+    near_edges[first_edge + j] = j < edges ? SURFACE_VERTICES + edge + j : NONE;
+  for (uint j = lane; j < edges_filled / PER_GROUP; j += GROUP_SIZE)
+    leaf_of_edge_group[first_edge / PER_GROUP + j] = leaf;
+}

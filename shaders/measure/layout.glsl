@@ -1,0 +1,32 @@
+// Bindings and results of the measuring kernels, read by GLSL and C++.
+#define METRICS_GROUPS 64      // of a reduction at most; always as many for a mesh, so that sums keep their order
+#define METRICS_SIZE 256       // their size
+
+// Sums over one body, in this order in a row. The first group comes from constraints, the second from vertices, the
+// third from vertices once the centre and rotation are known.
+#define M_VOLUME_CHANGE 0      // sum V - V0, m^3
+#define M_TET_SQUARES 1        // sum ((V - V0)/V0)^2
+#define M_TET_MAX 2
+#define M_INVERTED 3           // tets with V <= 0
+#define M_STRETCH_SQUARES 4    // sum ((l - d)/d)^2
+#define M_STRETCH_MAX 5
+#define M_BEND_SQUARES 6       // sum of squared angle errors, rad^2
+#define M_ELASTIC 7            // J, of a material
+#define M_MOMENT 8             // 3: sum m (x - x0), x0 the body's first vertex
+#define M_MOMENTUM 11          // 3: sum m v
+#define M_SPEED 14             // sum m |v|
+#define M_KINETIC 15           // J
+#define M_HEIGHT 16            // sum m y
+#define M_COVARIANCE 17        // 9: sum m (x - x0) X^T, column by column
+#define M_CONTACTS 26          // pairs of a vertex and an obstacle that it touches
+#define M_NON_FINITE 27        // vertices with a position or velocity that is not finite
+#define M_PENETRATION 28       // m, of the vertex that is deepest in an obstacle
+#define M_DEPTHS 29            // DEPTHS: vertices inside by so much of the size, from 1 on, each half an octave less
+#define DEPTHS 32
+#define M_ANGULAR 61           // 3: sum m r x u about the centre of mass
+#define M_RIGID_SQUARES 64     // sum m |x - c - R X|^2
+#define M_CENTRE 65            // 3: c - x0
+#define M_ROTATION 68          // 4: quaternion w, x, y, z
+#define M_ORIGIN 72            // 3: x0
+#define M_ROW 75
+#define M_STRIDE 128           // floats from one body's row to the next: a multiple of any driver's binding alignment

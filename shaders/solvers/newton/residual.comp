@@ -1,0 +1,80 @@
+// The residual at Newton's start, the inverse diagonal blocks, and which obstacles hold a vertex. LANES invocations per
+// vertex.
+#include "solvers/newton/newton.glsl"
+shared vec3 parts[3][GROUP_SIZE];
+
+// Friction of the last substep's force against the way since it (lagged: Li et al. 2020): resistance per way, and
+// smoothly less below `slip`.
+const float slip_speed = 0.05;  // m/s
+float resistance(float friction, float normal_force, vec3 slid) {
+  float way = length(slid), slip = slip_speed * params.h;
+  return friction * normal_force * (way < slip ? (2.0 - way / slip) / slip : 1.0 / way);
+}
+void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
+  Position own = positions[i];
+  DoubleSingle x = DoubleSingle(own.high, own.low);
+  vec4 aim = at(AIM, i), before = at(WAY, i);
+  vec3 r = vec3(0.0);
+  uint holds = 0u, touched = floatBitsToUint(before.w) & ~KNOWN;
+  float slides = 0.0;
+  vec3 inverse_diagonal = vec3(0.0), inverse_across = vec3(0.0);
+  if (aim.w > 0.0) {
+    vec3 u = start_of(i, x);
+    r = -force - aim.w * (u - aim.xyz);
+    mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z,
+                  diagonal.z + aim.w);
+    float push = at(GAIN, i).w;
+    float friction = obstacle_friction(findLSB(touched), i);  // of the first of them
+    if (push > 0.0 && touched != 0u && friction > 0.0) {
+      vec3 slid = free_part(u - params.h * obstacle_velocity(findLSB(touched), x), touched, i);
+      slides = resistance(friction, push, slid);
+      r -= slides * slid;
+      for (int c = 0; c < 3; ++c) {
+        vec3 axis = vec3(0.0);
+        axis[c] = slides;
+        D[c] += free_part(axis, touched, i);
+      }
+    }
+    for (int k = 0; k < obstacle_count(); ++k) {
+      Surface plane = surface_ahead(k, x, aimed(i), u);
+      bool there = plane.distance <= 2.0 * params.quantum;
+      if (there && (dot(plane.normal, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
+    }
+    mat3 B = inverse(D);
+    inverse_diagonal = vec3(B[0][0], B[1][1], B[2][2]);
+    inverse_across = vec3(B[0][1], B[0][2], B[1][2]);
+  }
+  put(RESIDUAL, i, r, uintBitsToFloat(holds));
+  put(DIRECTION, i, vec3(0.0), 0.0);
+  put(IMAGE, i, vec3(0.0), 0.0);
+  put(STEP, i, vec3(0.0), 0.0);
+  put(INVERSE, i, inverse_diagonal, slides);
+  put(INVERSE2, i, inverse_across, uintBitsToFloat(touched));
+}
+
+void main() {
+  uint lane = gl_LocalInvocationIndex, row = lane / LANES, i = group_index() * (GROUP_SIZE / LANES) + row;
+  vec3 force = vec3(0.0), diagonal = vec3(0.0), across = vec3(0.0);
+  if (i < VERTICES) {
+    uint end = first_neighbour[i + 1u];
+    for (uint k = first_neighbour[i] + lane % LANES; k < end; k += LANES) {
+      uint edge = neighbours[k].x, e = edge >> 1;
+      vec4 c0 = blocks[e].columns[0], c1 = blocks[e].columns[1], c2 = blocks[e].columns[2];
+      vec3 f = vec3(c0.w, c1.w, c2.w);
+      force += (edge & 1u) == 0u ? f : -f;
+      diagonal -= vec3(c0.x, c1.y, c2.z);
+      across -= 0.5 * vec3(c0.y + c1.x, c0.z + c2.x, c1.z + c2.y);
+    }
+  }
+  parts[0][lane] = force;
+  parts[1][lane] = diagonal;
+  parts[2][lane] = across;
+  barrier();
+  if (lane % LANES != 0u || i >= VERTICES) return;
+  for (uint k = 1u; k < LANES; ++k) {
+    force += parts[0][lane + k];
+    diagonal += parts[1][lane + k];
+    across += parts[2][lane + k];
+  }
+  finish(i, force, diagonal, across);
+}

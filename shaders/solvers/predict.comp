@@ -1,0 +1,42 @@
+// Where every vertex will be after prediction (method.md eqs. 1-2), as its neighbours see it (mode explicit: where it
+// is): needed once after positions, velocities, pins or settings were changed from outside. Otherwise each substep's
+// last dispatch has done it. One thread per vertex.
+#include "types.glsl"
+#include "double_single.glsl"
+#include "quantized.glsl"
+layout(local_size_x = 256) in;
+#include "solvers/$SCHEME.glsl"
+
+void predict(uint i) {
+  Position own = positions[i];
+  DoubleSingle x = DoubleSingle(own.high, own.low);
+  DoubleSingle here = x, v = DoubleSingle(velocities[i].high, velocities[i].low);
+  if (own.inverse_mass > 0.0) x = seen_by_neighbours(x, v);
+#if COMPLIANT
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(here, v), 0.0);
+#endif
+#if RIGID_CONTACT
+  RigidState body = state_at(i);
+  body.summed = true;
+  body.origin = positions[rigid_bodies[body.body].first].high;
+  if (own.inverse_mass > 0.0) note_motion(body, i, here, v, x, own.inverse_mass);
+  else note_fixed(i);
+  if (i == rigid_bodies[body.body].first) {
+    rigid_bodies[body.body].sides[side_now()].origin = body.origin;
+    rigid_bodies[body.body].sides[side_now()].summed = 1u;
+  }
+#endif
+  quantized_out[i] = quantize(x, weight_of(own));
+}
+
+void main() {
+  uint i = group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+#if RIGID_CONTACT
+  begin_sums(i - gl_LocalInvocationIndex);
+  barrier();
+#endif
+  if (i < params.vertex_count) predict(i);
+#if RIGID_CONTACT
+  end_sums();
+#endif
+}

@@ -1,0 +1,68 @@
+// One constraint of a chunk: evaluates it and adds its corrections to the sums of its owned vertices (method.md eqs. 4,
+// 25-26).
+void project_$KIND(uint number, uint owned) {
+  uvec2 record = patch_words[RECORDS_AT + number];  // its vertices, a byte each; rest
+  vec3 x[$ARITY];
+  float w[$ARITY];
+  ivec4 first = local_positions[record.x & 255u];
+  for (int j = 0; j < $ARITY; ++j) {
+    ivec4 q = local_positions[local_id(record.x, j)];
+    x[j] = between(q, first);
+    w[j] = inverse_mass_of(q);
+  }
+#if $VALUES == 1
+  float rest = uintBitsToFloat(record.y);
+#else
+  float rest[$VALUES];
+  for (uint v = 0u; v < $VALUES; ++v) rest[v] = record_value(number, 1u + v);
+#endif
+  Constraint$ARITY c = $KIND(x, rest, record.x);
+#if $OWN
+  float k = record_value(number, 1u + $VALUES + $COMPONENTS),
+        gamma = record_value(number, 2u + $VALUES + $COMPONENTS) * params.inverse_h;
+#else
+  float k = params.stiffness[$KIND_ROW][$KIND_COLUMN], gamma = params.damping;
+#endif
+#if COMPLIANT
+#if $MATERIAL
+  float a = record_value(number, 1u + $VALUES) * ($RATE == 1 ? params.inverse_h : params.inverse_h * params.inverse_h);
+#else
+  float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
+#endif
+  float before = last_multiplier(number), share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
+  if (gamma > 0.0) {
+    vec3 start[$ARITY];
+    ivec4 first_start = start_positions[record.x & 255u];
+    for (int j = 0; j < $ARITY; ++j) start[j] = between(start_positions[local_id(record.x, j)], first_start);
+    Constraint$ARITY then = $KIND(start, rest, record.x);
+#if $RATE  // the change of C, without its cancellation
+    c.C = 0.0;
+    for (int j = 0; j < $ARITY; ++j) c.C += 0.5 * dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);
+#else
+    c.C += gamma * (c.C - then.C);
+#endif
+  }
+  c.C += a * before;
+#else
+  const float a = 0.0, share = 1.0;
+#endif
+  Multiplier m = multiplier(c, w, k, params.max_correction, a, share);
+#if COMPLIANT
+  keep_multiplier(number, before + m.lambda);
+#endif
+#if !$RATE
+  NOTE_STIFFNESS(weighted(c, w).sum / a);
+#endif
+#if COUNT_GUARDS
+  if (local_id(record.x, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
+#endif
+  for (int j = 0; j < $ARITY; ++j) {
+    uint local = local_id(record.x, j);
+    if (local < owned && m.lambda != 0.0) {
+      ivec3 quanta = ivec3(round(m.lambda * w[j] * c.gradient[j] * quanta_per_metre[local]));
+      atomicAdd(sums[3u * local], quanta.x);
+      atomicAdd(sums[3u * local + 1u], quanta.y);
+      atomicAdd(sums[3u * local + 2u], quanta.z);
+    }
+  }
+}

@@ -1,0 +1,63 @@
+#include "sim/gl/keep_bindings.h"
+
+#include "sim/error.h"
+#include "sim/gl/context.h"
+#include "sim/gl/layout.h"
+
+namespace tetpbd {
+
+namespace {
+
+constexpr GLenum fields_unit = GL_TEXTURE0 + UNIT_FIELDS;
+
+struct Target {
+  GLenum target, binding;
+};
+// glBindBufferBase() binds to the generic target as well.
+constexpr std::array<Target, 6> targets = {
+    {{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},
+     {GL_COPY_WRITE_BUFFER, GL_COPY_WRITE_BUFFER},
+     {GL_UNIFORM_BUFFER, GL_UNIFORM_BUFFER_BINDING},
+     {GL_SHADER_STORAGE_BUFFER, GL_SHADER_STORAGE_BUFFER_BINDING},
+     {GL_ATOMIC_COUNTER_BUFFER, GL_ATOMIC_COUNTER_BUFFER_BINDING},
+     {GL_DISPATCH_INDIRECT_BUFFER, GL_DISPATCH_INDIRECT_BUFFER_BINDING}}};
+
+}  // namespace
+
+KeepBindings::KeepBindings() {
+  if (!glDispatchCompute) load_gl();
+  glGetIntegerv(GL_ACTIVE_TEXTURE, &unit_);
+  if (unit_ == 0) {  // never so in a context that answers
+    check_context();
+    throw Error("no OpenGL context is current", "this thread", "make one current before the call", 1);
+  }
+  glGetIntegerv(GL_CURRENT_PROGRAM, &program_);
+  if (program_) {  // one that was deleted lives only as long as it is in use
+    GLint deleted = 0;
+    glGetProgramiv(GLuint(program_), GL_DELETE_STATUS, &deleted);
+    if (deleted) program_ = 0;
+  }
+  for (std::size_t k = 0; k < targets.size(); ++k) glGetIntegerv(targets[k].binding, &buffers_[k]);
+  glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[0]);
+  glActiveTexture(fields_unit);
+  glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[1]);
+  glActiveTexture(GLenum(unit_));
+}
+
+// An object that was deleted meanwhile can no longer be bound.
+KeepBindings::~KeepBindings() {
+  for (std::size_t k = 0; k < targets.size(); ++k) {
+    const GLuint buffer = GLuint(buffers_[k]);
+    glBindBuffer(targets[k].target, buffer && glIsBuffer(buffer) ? buffer : 0);
+  }
+  const auto bind_texture = [](GLenum unit, GLint name) {
+    glActiveTexture(unit);
+    glBindTexture(GL_TEXTURE_BUFFER, name && glIsTexture(GLuint(name)) ? GLuint(name) : 0);
+  };
+  bind_texture(fields_unit, textures_[1]);
+  bind_texture(GLenum(unit_), textures_[0]);
+  const GLuint program = GLuint(program_);
+  glUseProgram(program && glIsProgram(program) ? program : 0);
+}
+
+}  // namespace tetpbd

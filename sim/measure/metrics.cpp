@@ -1,0 +1,223 @@
+#include "sim/measure/metrics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <ranges>
+
+#include "shaders/measure/layout.glsl"
+#include "sim/contact/moving_obstacle.h"
+#include "sim/gl/keep_bindings.h"
+#include "sim/model/material.h"
+
+namespace tetpbd {
+
+namespace {
+
+// Of the kinds that are measured, in the order of the table.
+constexpr std::array record_blocks = {"Stretch", "Bend", "Volume"};
+constexpr std::size_t ring_size = 16, measured_kinds = std::tuple_size_v<decltype(Metrics::counts)>;
+
+// Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
+glm::uvec2 range_of(const ConstraintList& list, glm::uvec2 vertices) {
+  const auto numbers = std::views::iota(0u, unsigned(list.count()));
+  const auto first_vertex = [&](unsigned c) { return list.vertices[c * std::size_t(list.arity)]; };
+  return {std::ranges::lower_bound(numbers, vertices.x, {}, first_vertex) - numbers.begin(),
+          std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
+}
+
+// Whether the result is there.
+bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
+  if (!pending.fence.sync()) return true;
+  if (!reached(pending.fence.sync(), wait, "measuring")) return false;
+  pending.fence = {};
+  Measurement& result = pending.result;
+  const std::vector<float> rows = m.rows[pending.slot].read_all<float>();
+  std::array<double, M_ROW> sums{};
+  const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const float* row = rows.data() + b * M_STRIDE;
+    for (std::size_t at = 0; at < M_ROW; ++at) sums[at] += double(row[at]);
+    result.tet_volume_max = largest(result.tet_volume_max, double(row[M_TET_MAX]));
+    result.penetration_max = largest(result.penetration_max, double(row[M_PENETRATION]) / m.bodies[b].size);
+    result.stretch_max = largest(result.stretch_max, double(row[M_STRETCH_MAX]));
+    const auto of_body = [&](std::size_t at) { return glm::dvec3(row[at], row[at + 1], row[at + 2]); };
+    const glm::dvec3 centre = of_body(M_ORIGIN) + of_body(M_CENTRE);
+    result.centre += m.bodies[b].mass * centre;
+    result.angular_momentum += of_body(M_ANGULAR) + glm::cross(centre, of_body(M_MOMENTUM));
+  }
+  const auto rms = [](double squares, std::size_t count) {
+    return count ? std::sqrt(squares / double(count)) : 0.0;
+  };
+  const auto vector = [&](std::size_t at) { return glm::dvec3(sums[at], sums[at + 1], sums[at + 2]); };
+  double deeper = 0, most = m.vertices / 1000;
+  for (int octaves = 0; octaves < DEPTHS && deeper <= most; ++octaves) {
+    const double here = sums[std::size_t(M_DEPTHS + octaves)];
+    if (deeper + here > most) result.penetration_999 = std::exp2(-0.5 * (octaves + (most - deeper) / here));
+    deeper += here;
+  }
+  result.penetration_999 = std::min(result.penetration_999, result.penetration_max);
+  if (!pending.obstacles) result.penetration_max = result.penetration_999 = std::nan("");
+  result.volume = m.volume + sums[M_VOLUME_CHANGE];
+  result.volume_error_percent = m.volume > 0 ? 100 * (result.volume - m.volume) / m.volume : 0;
+  result.tet_volume_rms = rms(sums[M_TET_SQUARES], m.counts[2]);
+  result.inverted_tets = sums[M_INVERTED];
+  result.stretch_rms = rms(sums[M_STRETCH_SQUARES], m.counts[0]);
+  result.bend_rms_rad = rms(sums[M_BEND_SQUARES], m.counts[1]);
+  result.rigid_distance = std::sqrt(sums[M_RIGID_SQUARES] / m.mass) / (m.mass_sizes / m.mass);
+  result.momentum = vector(M_MOMENTUM);
+  result.speed = sums[M_SPEED];
+  result.centre /= m.mass;
+  result.angular_momentum -= glm::cross(result.centre, result.momentum);
+  result.kinetic = sums[M_KINETIC];
+  result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
+  result.elastic = sums[M_ELASTIC];
+  result.contacts = sums[M_CONTACTS];
+  result.non_finite = sums[M_NON_FINITE];
+  return true;
+}
+
+}  // namespace
+
+Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
+  const KeepBindings kept;
+  // Those that are measured; further kinds have no measure.
+  static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
+  const bool all_made = made.present.size() >= measured_kinds &&
+                        std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
+  const ConstraintSystem own =
+      all_made ? ConstraintSystem{} : build_constraints(model.rest, "stretch,bend,volume");
+  const std::vector<ConstraintList>& lists = (all_made ? made : own).lists;
+  Metrics m;
+  for (std::size_t k = 0; k < measured_kinds; ++k) {
+    m.records.push_back(record_buffer(lists[k], constraint_kinds[k].name));
+    m.counts[k] = lists[k].count();
+  }
+  std::vector<glm::vec4> rest(model.rest.positions.size());
+  const std::vector<double> volumes = tet_volumes(model.rest);
+  for (const Body& body : model.bodies) {
+    Metrics::BodyRanges ranges;
+    const std::size_t first = body.first_vertex, end = first + body.vertices;
+    ranges.vertices = {first, end};
+    ranges.edges = range_of(lists[0], ranges.vertices);
+    ranges.hinges = range_of(lists[1], ranges.vertices);
+    ranges.tets = {body.first_tet, body.first_tet + body.tets};
+    glm::dvec3 centre{0};
+    for (std::size_t i = first; i < end; ++i) {
+      ranges.mass += model.masses[i];
+      centre += model.masses[i] * model.rest.positions[i];
+    }
+    centre /= ranges.mass;
+    for (std::size_t i = first; i < end; ++i)
+      rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
+    for (std::size_t t = ranges.tets.x; t < ranges.tets.y; ++t) m.volume += volumes[t];
+    const auto shape = model.rest.positions.begin();
+    ranges.size = bounds({shape + std::ptrdiff_t(first), shape + std::ptrdiff_t(end)}).size();
+    m.mass += ranges.mass;
+    m.mass_sizes += ranges.mass * ranges.size;
+    m.bodies.push_back(ranges);
+  }
+  m.rest = Buffer("metrics rest", rest);
+  m.partials = Buffer("metrics partials", M_ROW * METRICS_GROUPS * sizeof(float));
+  for (std::size_t slot = 0; slot < ring_size; ++slot)
+    m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
+                        GL_STREAM_READ);
+  for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
+    m.passes.push_back({Program::compute(fmt::format("measure/{}.comp", name), {}, obstacle_defines(model))});
+  m.vertices = double(model.positions.size());
+  return m;
+}
+
+void measure(Metrics& m, const Sim& sim) {
+  const KeepBindings kept;
+  if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
+  const std::size_t slot = m.measured++ % ring_size;
+  sim.step_block.bind_uniform(BIND_STEP);
+  bind_obstacles(sim.obstacles);
+  Recorder& recorder = m.recorder;
+  recorder.begin();
+  recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
+  recorder.give("Rest", m.rest), recorder.give("Partials", m.partials);
+  for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const Metrics::BodyRanges& body = m.bodies[b];
+    recorder.give("Row", m.rows[slot].id(), b * M_STRIDE * sizeof(float), M_STRIDE * sizeof(float));
+    // About four tets per invocation before there are more groups; of a sheet, edges.
+    const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
+    const unsigned groups =
+        unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
+    for (Pass& pass : m.passes) {
+      const Program& kernel = recorder.use(pass.program);
+      kernel.set("vertex_range", body.vertices);
+      kernel.set("edge_range", body.edges), kernel.set("hinge_range", body.hinges);
+      kernel.set("tet_range", body.tets);
+      kernel.set("mass", float(body.mass));
+      if (&pass == &m.passes[0])
+        kernel.set("material", energy_material(body_material(sim.model->bodies[b], sim.settings)));
+      kernel.set("touching", float(1e-5 * body.size));
+      const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // these add the groups' sums
+      pass.work_groups = one_group ? 1 : groups;
+      recorder.run(pass, {{"groups", groups}});
+    }
+  }
+  m.pending.push_back({Fence::here(),
+                       slot,
+                       {.step = sim.steps, .time = simulated_time(sim)},
+                       sim.settings.ground ? sim.settings.ground_height : 0.0,
+                       sim.settings.gravity,
+                       has_obstacles(*sim.model, sim.settings)});
+}
+
+std::optional<Measurement> collect(Metrics& m, bool wait) {
+  if (m.pending.empty()) return std::nullopt;
+  const KeepBindings kept;
+  if (!read(m, m.pending.front(), wait)) return std::nullopt;
+  const Measurement result = m.pending.front().result;
+  m.pending.pop_front();
+  return result;
+}
+
+Measurement nothing_measured() {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  Measurement m;
+  for (double* value :
+       {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
+        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
+        &m.potential, &m.elastic, &m.contacts, &m.penetration_max, &m.penetration_999})
+    *value = nan;
+  m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
+  return m;
+}
+
+void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) {
+  errors.finite = errors.finite && now.finite();
+  if (!errors.finite) return;  // numbers stay those of the last good state
+  if (!errors.first) errors.first = now, errors.start_energy = errors.max_energy = now.energy();
+  errors.last = now;
+  errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
+  errors.max_energy = std::max(errors.max_energy, now.energy());
+  errors.penetration_max = std::fmax(now.penetration_max, errors.penetration_max);
+  errors.penetration_999 = std::fmax(now.penetration_999, errors.penetration_999);
+  double mass = 0;
+  for (std::size_t i = 0; i < sim.inverse_masses.size(); ++i) {
+    mass += sim.model->masses[i];
+    if (!(sim.inverse_masses[i] > 0)) errors.free = false;
+  }
+  if (now.contacts > 0 || sim.settings.damping > 0) errors.free = false;
+  if (!errors.free) return;
+  const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
+  const glm::dvec3 expected = errors.first->momentum + mass * gravity * (now.time - errors.first->time);
+  if (now.speed > 0)
+    errors.linear_drift = std::fmax(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
+  // Relative to the angular momentum of a spinning body; of one that hardly spins, to size times sum m|v|.
+  const double spun = glm::length(errors.first->angular_momentum), moved = sim.model->size * now.speed;
+  const double scale = spun > 0.01 * moved ? spun : moved;
+  if (scale > 0)
+    errors.angular_drift = std::fmax(
+        errors.angular_drift, glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,154 @@
+#include "sim/measure/overlap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "sim/contact/cell_grid.h"
+#include "sim/contact/pairs.h"
+#include "sim/model/formulas.h"
+#include "sim/parallel.h"
+
+namespace tetpbd {
+
+namespace {
+
+bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x) {
+  const glm::dvec3& origin = x[tet[0]];
+  const glm::dmat3 edges(x[tet[1]] - origin, x[tet[2]] - origin, x[tet[3]] - origin);
+  const double volume = glm::determinant(edges);
+  if (!(volume > 0)) return false;
+  const glm::dvec3 at = glm::inverse(edges) * (p - origin);
+  return at.x > 0 && at.y > 0 && at.z > 0 && at.x + at.y + at.z < 1;
+}
+
+// Whether an edge of one triangle goes through the other.
+bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vector<glm::dvec3>& x) {
+  const auto corner = [&](std::uint32_t t, std::size_t c) { return x[mesh.triangles[t][c % 3]]; };
+  for (const auto& [t, o] : {std::pair(a, b), std::pair(b, a)}) {
+    const glm::dvec3 n = glm::cross(corner(o, 1) - corner(o, 0), corner(o, 2) - corner(o, 0));
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double from = glm::dot(n, corner(t, c) - corner(o, 0)),
+                   to = glm::dot(n, corner(t, c + 1) - corner(o, 0));
+      if (!(from * to < 0)) continue;
+      const glm::dvec3 p = corner(t, c) + (corner(t, c + 1) - corner(t, c)) * (from / (from - to));
+      bool within = true;
+      for (std::size_t k = 0; k < 3; ++k)
+        within = within && glm::dot(glm::cross(corner(o, k + 1) - corner(o, k), p - corner(o, k)), n) > 0;
+      if (within) return true;
+    }
+  }
+  return false;
+}
+
+bool apart(const Bounds& a, const Bounds& b) {
+  return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
+}
+
+// Pairs, of different bodies or also of one.
+template <class F>
+std::size_t cutting_triangles(const PairMesh& mesh, const std::vector<glm::dvec3>& x, double cell, bool self,
+                              F&& meets_another) {
+  std::vector<Bounds> boxes;
+  CellGrid grid(cell);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [i, j, k, body] = mesh.triangles[t];
+    boxes.push_back({glm::min(x[i], glm::min(x[j], x[k])), glm::max(x[i], glm::max(x[j], x[k]))});
+    if (meets_another(body, boxes[t])) grid.add(boxes[t], t);
+  }
+  std::vector<std::size_t> counts(boxes.size(), 0);
+  parallel_for(
+      counts.size(),
+      [&](std::size_t t) {
+        std::vector<std::uint32_t> near;
+        grid.for_each(boxes[t], [&](std::uint32_t o) {
+          if (o > t) near.push_back(o);
+        });
+        std::ranges::sort(near);
+        const auto same = std::ranges::unique(near);
+        near.erase(same.begin(), same.end());
+        const auto& own = mesh.triangles[t];
+        for (const std::uint32_t o : near) {
+          const auto& other = mesh.triangles[o];
+          if (apart(boxes[t], boxes[o]) || (other[3] == own[3] && !self)) continue;
+          const bool joined = std::any_of(own.begin(), own.begin() + 3, [&](std::uint32_t v) {
+            return v == other[0] || v == other[1] || v == other[2];
+          });
+          counts[t] += !joined && cuts(mesh, std::uint32_t(t), o, x);
+        }
+      },
+      64);
+  return std::reduce(counts.begin(), counts.end());
+}
+
+}  // namespace
+
+Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bool self) {
+  const PairMesh mesh = pair_mesh(model);
+  const double cell = 2 * mesh.edge, near = 2.4 * mesh.edge;
+  const auto& rest = model.rest.positions;
+  std::vector<Bounds> boxes;
+  std::vector<double> sizes;
+  for (const Body& body : model.bodies) {
+    const auto first = x.begin() + std::ptrdiff_t(body.first_vertex);
+    boxes.push_back(bounds({first, first + std::ptrdiff_t(body.vertices)}));
+    const auto at_rest = rest.begin() + std::ptrdiff_t(body.first_vertex);
+    sizes.push_back(bounds({at_rest, at_rest + std::ptrdiff_t(body.vertices)}).size());
+  }
+  const auto meets_another = [&](std::size_t body, const Bounds& box) {
+    for (std::size_t b = 0; b < boxes.size(); ++b)
+      if (b != body && !apart(box, boxes[b])) return true;
+    return self;
+  };
+  CellGrid grid(cell);
+  std::vector<std::uint32_t> body_of(model.rest.tets.size());
+  for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
+    for (std::size_t t = model.bodies[b].first_tet; t < model.bodies[b].first_tet + model.bodies[b].tets;
+         ++t) {
+      body_of[t] = b;
+      const auto& [i, j, k, l] = model.rest.tets[t];
+      const Bounds box = bounds({x[i], x[j], x[k], x[l]});
+      if (meets_another(b, box)) grid.add(box, std::uint32_t(t));
+    }
+  const auto depth = [&](const PairMesh::Item& item) {
+    double depth = 0;  // in the first tet that it is in
+    grid.for_each({x[item.vertex], x[item.vertex]}, [&](std::uint32_t t) {
+      const Tet& tet = model.rest.tets[t];
+      const bool own = body_of[t] == item.body;
+      if (own && (!self || std::ranges::any_of(tet, [&](std::uint32_t v) {
+            return glm::distance(rest[v], rest[item.vertex]) < near;
+          })))
+        return;
+      if (depth > 0 || !is_in(x[item.vertex], tet, x)) return;
+      double least = 1e30;
+      for (const auto& [i, j, k, body] : mesh.triangles)
+        if (body == body_of[t] && !(own && glm::distance(rest[i], rest[item.vertex]) < near)) {
+          const glm::dvec3 a = x[i] - x[item.vertex], b = x[j] - x[item.vertex], c = x[k] - x[item.vertex];
+          const glm::dvec3 w = Formulas<double>{}.nearest_weights(a, b, c);
+          least = std::min(least, glm::length(w.x * a + w.y * b + w.z * c));
+        }
+      depth = least;
+    });
+    return depth;
+  };
+  std::vector<double> depths(mesh.vertices.size());
+  parallel_for(
+      depths.size(), [&](std::size_t s) { depths[s] = depth(mesh.vertices[s]); }, 64);
+  Overlap result;
+  result.triangles = cutting_triangles(mesh, x, cell, self, meets_another);
+  if (!depths.empty()) result.deepest = std::ranges::max(depths);
+  for (std::size_t s = 0; s < depths.size(); ++s) depths[s] /= sizes[mesh.vertices[s].body];
+  result.inside = std::size_t(std::ranges::count_if(depths, [](double d) { return d > 0; }));
+  std::ranges::sort(depths);
+  if (depths.empty()) return result;
+  result.largest = depths.back();
+  result.part_999 = depths[std::size_t(0.999 * double(depths.size() - 1))];
+  return result;
+}
+
+Overlap largest(const Overlap& a, const Overlap& b) {
+  return {std::max(a.inside, b.inside), std::max(a.triangles, b.triangles), std::max(a.largest, b.largest),
+          std::max(a.deepest, b.deepest), std::max(a.part_999, b.part_999)};
+}
+
+}  // namespace tetpbd

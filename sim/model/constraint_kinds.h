@@ -1,0 +1,194 @@
+// The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and
+// a row here; its stiffness k_NAME and compliance compliance_NAME (unless it is
+// a material's), its kernels and its CPU loops follow. Order is the order of projection in Gauss-Seidel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "sim/mesh/tet_mesh.h"
+#include "sim/model/formulas.h"
+
+namespace tetpbd {
+
+/// For whoever evaluates a constraint without a mesh.
+inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
+
+/// The hinges of the surface: both wings, then their edge; each edge that two triangles share.
+std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh);
+
+struct ConstraintKind {
+  const char* name;
+  int arity;                    ///< vertices, 2 or 4
+  const char* noun;             ///< what has it, as help texts call them
+  const char* compliance_unit;  ///< 1 over that of C^2 / J
+  double most_compliance;       ///< the largest that settings take; 0: only a material has this kind
+  int values = 1;               ///< numbers that describe a constraint at rest
+  int components = 1;           ///< values of C, solved together, each with a compliance of its own
+  bool curved =
+      false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
+  bool tet = false;   ///< NAME_jacobian(): the volume over that at rest
+  bool rate = false;  ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
+  constexpr bool of_material() const { return most_compliance == 0; }
+};
+
+/// The kinds by number, in the order of their rows.
+template <int>
+struct KindAt;
+constexpr int first_kind = __COUNTER__ + 1;
+#define ADD_KIND(Kind)                      \
+  template <>                               \
+  struct KindAt<__COUNTER__ - first_kind> { \
+    using type = Kind;                      \
+  };
+
+// A row: what it is called, its formula, the vertices of each, and what these measure at rest.
+struct Stretch {
+  static constexpr ConstraintKind row{.name = "stretch",
+                                      .arity = 2,
+                                      .noun = "edges",
+                                      .compliance_unit = "m/N",
+                                      .most_compliance = 1,
+                                      .curved = true};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.stretch(x, rest, id);
+  }
+  static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
+  static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
+};
+ADD_KIND(Stretch)
+struct Bend {
+  static constexpr ConstraintKind row{"bend", 4, "hinges", "rad^2/J", 1e4};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.bend(x, rest, id);
+  }
+  static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
+  // The clamp of the formula to 1 rad is for errors, not for rest angles.
+  static double rest(glm::dvec3* x) { return Formulas<double>{}.hinge_angle(x); }
+};
+ADD_KIND(Bend)
+struct Volume {
+  static constexpr ConstraintKind row{.name = "volume",
+                                      .arity = 4,
+                                      .noun = "tets' volumes",
+                                      .compliance_unit = "m^3/Pa",
+                                      .most_compliance = 1,
+                                      .tet = true};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.volume(x, rest, id);
+  }
+  static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
+  static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
+};
+ADD_KIND(Volume)
+struct NeoHookean {
+  static constexpr ConstraintKind row{.name = "neo_hookean",
+                                      .arity = 4,
+                                      .noun = "tets",
+                                      .compliance_unit = "1/J",
+                                      .most_compliance = 0,
+                                      .values = 8,
+                                      .components = 2,
+                                      .curved = true,
+                                      .tet = true};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.neo_hookean(x, rest, id);
+  }
+  static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
+  static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then
+};
+ADD_KIND(NeoHookean)
+struct Dashpot {
+  static constexpr ConstraintKind row{.name = "dashpot",
+                                      .arity = 2,
+                                      .noun = "edges",
+                                      .compliance_unit = "m/(N s)",
+                                      .most_compliance = 0,
+                                      .rate = true};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.dashpot(x, rest, id);
+  }
+  static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
+  static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
+};
+ADD_KIND(Dashpot)
+struct Isobend {
+  static constexpr ConstraintKind row{.name = "isobend",
+                                      .arity = 4,
+                                      .noun = "curvatures across hinges",
+                                      .compliance_unit = "1/J",
+                                      .most_compliance = 1e8,
+                                      .values = 4};
+  template <class real, class Math = glsl::LibraryMath>
+  static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
+    return Formulas<real, Math>{}.isobend(x, rest, id);
+  }
+  static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
+  static std::array<double, 4> rest(glm::dvec3* x);
+};
+ADD_KIND(Isobend)
+// The next row goes here.
+
+template <int... I>
+std::tuple<typename KindAt<I>::type...> list_kinds(std::integer_sequence<int, I...>);
+using Kinds = decltype(list_kinds(std::make_integer_sequence<int, __COUNTER__ - first_kind>()));
+
+/// A constraint's rest values as its formula takes them: a number, or where there are several.
+template <class Kind, class real>
+auto rest_values(const real* values) {
+  if constexpr (Kind::row.values == 1)
+    return *values;
+  else
+    return values;
+}
+/// A component of what a formula returns: C, and its gradient by each vertex.
+template <class Constraint>
+auto component(const Constraint& c, int k) {
+  if constexpr (std::is_array_v<decltype(c.C)>)
+    return std::pair(c.C[k], &c.gradient[k][0]);
+  else
+    return std::pair(c.C, &c.gradient[0]);
+}
+
+constexpr std::size_t kind_count = std::tuple_size_v<Kinds>;
+
+/// Calls f(Kind{}, index) for every kind, in order.
+template <class F>
+constexpr void for_each_kind(F&& f) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) { (f(std::tuple_element_t<I, Kinds>{}, int(I)), ...); }
+  (std::make_index_sequence<kind_count>{});
+}
+
+template <template <class> class Of, class... Kind>
+std::tuple<Of<Kind>...> of_each(std::tuple<Kind...>);
+/// The tuple of Of<Kind> for every kind.
+template <template <class> class Of>
+using OfEachKind = decltype(of_each<Of>(Kinds()));
+
+/// Where a kind stands in the table, and in the settings' arrays by kind.
+template <class Kind>
+constexpr std::size_t index_of = [] {
+  std::size_t index = 0;
+  for_each_kind([&](auto kind, int k) {
+    if (std::is_same_v<decltype(kind), Kind>) index = std::size_t(k);
+  });
+  return index;
+}();
+
+/// The rows of the table.
+inline constexpr std::array<ConstraintKind, kind_count> constraint_kinds =
+    []<std::size_t... I>(std::index_sequence<I...>) {
+  return std::array<ConstraintKind, kind_count>{std::tuple_element_t<I, Kinds>::row...};
+}
+(std::make_index_sequence<kind_count>{});
+
+}  // namespace tetpbd

@@ -1,0 +1,105 @@
+#include "sim/model/constraints.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sim/model/settings.h"
+#include "sim/parallel.h"
+
+namespace tetpbd {
+
+namespace {
+
+template <class Kind>
+ConstraintList list_of(const TetMesh& mesh) {
+  constexpr std::size_t arity = std::size_t(Kind::row.arity);
+  const auto& all = Kind::vertices(mesh);
+  constexpr std::size_t values = std::size_t(Kind::row.values);
+  ConstraintList list{Kind::row.arity, std::vector<std::uint32_t>(all.size() * arity),
+                      std::vector<double>(all.size() * values)};
+  parallel_for(all.size(), [&](std::size_t c) {
+    std::copy_n(all[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
+    // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
+    std::array<glm::dvec3, arity> x;
+    for (std::size_t j = 0; j < arity; ++j) x[j] = mesh.positions[all[c][j]] - mesh.positions[all[c][0]];
+    const std::array<double, values> rest{Kind::rest(x.data())};
+    std::ranges::copy(rest, list.rest.begin() + std::ptrdiff_t(c * values));
+  });
+  return list;
+}
+
+}  // namespace
+
+std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh) {
+  // Each directed edge of the surface once; an edge and its opposite make a hinge.
+  struct Side {
+    std::uint32_t low, high, wing;
+    bool forward;
+  };
+  std::vector<Side> sides;
+  sides.reserve(mesh.surface.size() * 3);
+  for (const Triangle& t : mesh.surface)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::uint32_t a = t[c], b = t[(c + 1) % 3];
+      sides.push_back({std::min(a, b), std::max(a, b), t[(c + 2) % 3], a < b});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
+    return std::tie(l.low, l.high, l.forward, l.wing) < std::tie(r.low, r.high, r.forward, r.wing);
+  });
+  std::vector<std::array<std::uint32_t, 4>> result;
+  // A non-manifold edge of four sides (two bodies of tets that touch along it) makes no hinge.
+  for (std::size_t i = 0; i < sides.size();) {
+    std::size_t end = i;
+    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
+    // Wing 0 sees the edge x2 -> x3 run forwards, so a convex hinge has the same sign everywhere.
+    if (end - i == 2 && sides[i].forward != sides[i + 1].forward)
+      result.push_back({sides[i + 1].wing, sides[i].wing, sides[i].low, sides[i].high});
+    i = end;
+  }
+  return result;
+}
+
+std::array<double, 8> NeoHookean::rest(glm::dvec3* x) {
+  const glm::dmat3 sides(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+  const glm::dmat3 m = glm::inverse(glm::transpose(sides) * sides);
+  return {m[0][0], m[1][0], m[2][0], m[1][1], m[2][1], m[2][2], 1 / glm::determinant(sides), 1};
+}
+
+std::array<double, 4> Isobend::rest(glm::dvec3* x) {
+  const auto cotangent = [&](int at, int a, int b) {
+    const glm::dvec3 u = x[a] - x[at], v = x[b] - x[at];
+    return glm::dot(u, v) / glm::length(glm::cross(u, v));
+  };
+  const auto twice_area = [&](int wing) { return glm::length(glm::cross(x[2] - x[wing], x[3] - x[wing])); };
+  const double scale = std::sqrt(6 / (twice_area(0) + twice_area(1)));
+  std::array<double, 4> values{-scale * (cotangent(2, 1, 3) + cotangent(3, 1, 2)),
+                               scale * (cotangent(3, 0, 2) + cotangent(3, 1, 2)),
+                               scale * (cotangent(2, 0, 3) + cotangent(2, 1, 3)), 0};
+  // A wing without area has no weights: there the constraint does nothing.
+  if (!std::isfinite(values[0] + values[1] + values[2])) return {};
+  values[3] = evaluate<double>(x, values.data()).C;
+  return values;
+}
+
+std::size_t ConstraintSystem::count() const {
+  std::size_t sum = 0;
+  for (const ConstraintList& list : lists) sum += list.count();
+  return sum;
+}
+
+ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names) {
+  ConstraintSystem system;
+  system.at_vertex.assign(mesh.positions.size(), 0);
+  const auto wanted = split(names, ',');
+  for_each_kind([&]<class Kind>(Kind, int) {
+    const bool present = std::find(wanted.begin(), wanted.end(), Kind::row.name) != wanted.end();
+    ConstraintList list = present ? list_of<Kind>(mesh) : ConstraintList{Kind::row.arity, {}, {}, {}};
+    for (std::uint32_t v : list.vertices) ++system.at_vertex[v];
+    system.present.push_back(list.count() > 0);
+    system.lists.push_back(std::move(list));
+  });
+  return system;
+}
+
+}  // namespace tetpbd

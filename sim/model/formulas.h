@@ -1,0 +1,80 @@
+// The constraint formulas of shaders/ as C++: one text for GLSL, float and double.
+#pragma once
+
+#include <cmath>
+#include <glm/glm.hpp>
+#include <limits>
+
+#include "sim/gl/layout.h"
+
+namespace tetpbd::glsl {
+
+using namespace glm;
+
+/// The library functions that formulas call; another such struct can take their place (sim/lane_math.h).
+struct LibraryMath {
+  template <class real>
+  static real atan(real y, real x) {
+    return std::atan2(y, x);
+  }
+  template <class real>
+  static real pow(real x, real y) {
+    return std::pow(x, y);
+  }
+  template <class real>
+  static real log(real x) {
+    return std::log(x);
+  }
+};
+
+template <class Real, class Math = LibraryMath>
+struct Formulas {
+  using real = Real;
+  using vec3 = glm::vec<3, Real>;
+  using mat3 = glm::mat<3, 3, Real>;
+  static constexpr real rounding = std::numeric_limits<real>::epsilon();
+  static constexpr real quantization_size = 0;  // positions are kept in full here
+  static real atan(real y, real x) { return Math::atan(y, x); }
+  static real pow(real x, real y) { return Math::pow(x, y); }
+  static real log(real x) { return Math::log(x); }
+  const float* texels = nullptr;  // of an obstacle's field
+  struct Surface;
+  struct Solid;
+  using Distance = Surface (Formulas::*)(Solid, vec3);
+  Distance distance = nullptr;  // of the obstacle's kind
+  real texel(int i) const { return real(texels[i]); }
+  using Ids = const uint*;
+  static uint id_of(Ids ids, int j) { return ids[j]; }
+  // Here GCC 12 takes the initialised `distance` for one that is not.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+  Surface surface_of(Solid s, vec3 p) { return (this->*distance)(s, p); }
+#pragma GCC diagnostic pop
+  // in order of use
+  // clang-format off
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#include "shaders/constraints/types.glsl"
+#include "constraint_formulas.inc"  // CMake's: every other file there
+#include "shaders/contact/plane.glsl"
+#include "shaders/contact/bodies/formulas.glsl"
+#include "shaders/contact/solid.glsl"
+#include "obstacle_formulas.inc"  // CMake's: every file of shaders/contact/obstacles
+#include "shaders/contact/find_contact.glsl"
+#define SOLIDS 1
+#define SHARED_TOUCHES  // a work-group's in GLSL, the caller's here
+#define TOUCHES Touch *contacts,
+#include "shaders/contact/impulses.glsl"
+#undef TOUCHES
+#undef SHARED_TOUCHES
+#undef SLIP_OF
+#undef SOLIDS
+#pragma GCC diagnostic pop
+  // clang-format on
+};
+
+}  // namespace tetpbd::glsl
+
+namespace tetpbd {
+using glsl::Formulas;
+}

@@ -1,0 +1,146 @@
+#include "sim/model/material.h"
+
+#include <algorithm>
+#include <ranges>
+
+namespace tetpbd {
+
+Lame lame(double young_modulus, double poisson_ratio) {
+  return {young_modulus / (2 * (1 + poisson_ratio)),
+          young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))};
+}
+
+glm::vec4 energy_material(const Material& material) {
+  if (material.material == "none") return glm::vec4(0);
+  const Lame own = lame(material.young_modulus, material.poisson_ratio);
+  return glm::vec4(own.mu, own.lambda, material.material == "springs" ? 2 : 1, 0);
+}
+
+namespace {
+
+// Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest: mu = 4/3 mu_Lame,
+// lambda = lambda_Lame + 5/6 mu_Lame.
+void make_neo_hookean(ConstraintList& tets, const Lame& m) {
+  const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu;
+  for (std::size_t c = 0; c < tets.count(); ++c) {
+    double* rest = tets.rest.data() + 8 * c;
+    rest[7] = 1 + 0.75 * mu / lambda;
+    const double volume = 1 / (6 * rest[6]);
+    tets.compliance.insert(tets.compliance.end(), {1 / (mu * volume), 1 / (lambda * volume)});
+  }
+}
+
+// Springs along edges in all directions alike, of stiffness k over a length L, are isotropic with
+// mu = lambda = (sum k L^2) / (15 V) (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k
+// L^2. `volume(t)`: of tet t at rest.
+std::vector<double> spring_stiffness(const ConstraintList& edges, const ConstraintList& tets, double mu,
+                                     const auto& volume) {
+  std::vector<double> stiffness(edges.count());
+  const auto number_of = [&](std::uint32_t a, std::uint32_t b) {  // they are sorted by their vertices
+    const auto vertices = [&](std::size_t e) { return std::pair(edges.ends(e)[0], edges.ends(e)[1]); };
+    return *std::ranges::lower_bound(std::views::iota(std::size_t(0), edges.count()), std::minmax({a, b}), {},
+                                     vertices);
+  };
+  for (std::size_t t = 0; t < tets.count(); ++t) {
+    const auto v = tets.ends(t);
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const std::size_t e = number_of(v[i], v[j]);
+        stiffness[e] += 15.0 / 6 * mu * volume(t) / (edges.rest[e] * edges.rest[e]);
+      }
+  }
+  return stiffness;
+}
+
+// What such springs leave of lambda is the volumes'.
+void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
+  const auto volume = [&](std::size_t t) { return volumes.rest[t]; };
+  for (const double k : spring_stiffness(edges, volumes, m.mu, volume)) edges.compliance.push_back(1 / k);
+  for (const double V : volumes.rest) volumes.compliance.push_back(V / (m.lambda - m.mu));
+}
+
+// Dashpots along edges, tau times as damping as those springs are stiff.
+void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame& m, double tau) {
+  const auto volume = [&](std::size_t t) { return 1 / (6 * tets.rest[8 * t + 6]); };
+  for (const double k : spring_stiffness(edges, tets, m.mu, volume))
+    edges.compliance.push_back(1 / (k * tau));
+}
+
+}  // namespace
+
+ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material) {
+  if (mesh.thickness > 0 && material.material != "none")
+    throw Error("a sheet has no material", "material " + material.material,
+                "give constraints stretch and isobend their compliance, and material none");
+  ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
+  const Lame m = lame(material.young_modulus, material.poisson_ratio);
+  if (material.material == "springs")
+    make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
+  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  if (system.present[index_of<Dashpot>])
+    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m,
+                  material.constraint_damping);
+  return system;
+}
+
+namespace {
+
+TetMesh body_mesh(const Model& model, const Body& body) {
+  const auto part = [](const auto& all, std::size_t first, std::size_t count) {
+    const auto begin = all.begin() + std::ptrdiff_t(first);
+    return std::vector(begin, begin + std::ptrdiff_t(count));
+  };
+  TetMesh mesh{part(model.rest.positions, body.first_vertex, body.vertices),
+               part(model.rest.tets, body.first_tet, body.tets),
+               part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece,
+               body.is_sheet() ? model.rest.thickness : 0};
+  const auto shift = [&](auto& elements) {
+    for (auto& element : elements)
+      for (std::uint32_t& v : element) v -= std::uint32_t(body.first_vertex);
+  };
+  shift(mesh.tets), shift(mesh.surface);
+  return mesh;
+}
+
+// Adds a body's constraints, with the numbers of its material, which others of their kind may not have.
+void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body& body, const Material& m) {
+  for (std::size_t k = 0; k < kind_count; ++k) {
+    ConstraintList& list = to.lists[k];
+    const ConstraintList& own = from.lists[k];
+    const ConstraintKind& kind = constraint_kinds[k];
+    const std::size_t count = own.count();
+    for (const std::uint32_t v : own.vertices) list.vertices.push_back(v + std::uint32_t(body.first_vertex));
+    list.rest.insert(list.rest.end(), own.rest.begin(), own.rest.end());
+    list.compliance.insert(list.compliance.end(), own.compliance.begin(), own.compliance.end());
+    list.compliance.resize(list.count() * std::size_t(kind.components), m.compliance[k]);
+    list.stiffness.resize(list.count(), m.stiffness[k]);
+    const bool dashpots = m.material == "neo-hookean" && !kind.rate;  // in place of damping of C
+    list.damping.resize(list.count(), dashpots ? 0 : m.constraint_damping);
+    to.present[k] = to.present[k] || count > 0;
+  }
+  for (std::size_t i = 0; i < body.vertices; ++i) to.at_vertex[body.first_vertex + i] = from.at_vertex[i];
+}
+
+}  // namespace
+
+ConstraintSystem build_constraints(const Model& model, const Material& all) {
+  if (!has_own_materials(model)) return build_constraints(model.rest, all);
+  ConstraintSystem system = build_constraints(TetMesh{model.rest.positions, {}, {}}, "");
+  for (const Body& body : model.bodies) {
+    const Material& own = body_material(body, all);
+    append_body(system, build_constraints(body_mesh(model, body), own), body, own);
+  }
+  return system;
+}
+
+const std::vector<Preset>& material_presets() {
+  static const std::vector<Preset> rows = {
+      {"rubber", "soft vulcanised rubber", "material=neo-hookean,young_modulus=1e6,poisson_ratio=0.48"},
+      {"gelatine", "10 % in water", "material=neo-hookean,young_modulus=2e4,poisson_ratio=0.45"},
+      {"muscle", "at rest, across its fibres", "material=neo-hookean,young_modulus=6e4,poisson_ratio=0.45"},
+      {"foam", "soft polyurethane", "material=neo-hookean,young_modulus=1e5,poisson_ratio=0.2"},
+  };
+  return rows;
+}
+
+}  // namespace tetpbd

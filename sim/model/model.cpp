@@ -1,0 +1,211 @@
+#include "sim/model/model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+#include <span>
+
+#include "sim/error.h"
+#include "sim/model/constraint_kinds.h"
+#include "sim/model/hilbert.h"
+#include "sim/parallel.h"
+#include "sim/solvers/solver.h"
+
+namespace tetpbd {
+
+void add_body(Model& model, const std::string& name, const TetMesh& mesh, double density,
+              const std::vector<glm::dvec3>& positions, const glm::dvec3& velocity, const glm::dvec3& spin,
+              const std::vector<std::uint32_t>& fixed, const std::vector<double>& mass_factors) {
+  const std::uint32_t base = std::uint32_t(model.rest.positions.size());
+  Body body{name,
+            base,
+            mesh.positions.size(),
+            model.rest.tets.size(),
+            mesh.tets.size(),
+            model.rest.surface.size(),
+            mesh.surface.size(),
+            mesh.one_piece};
+  const auto append_shifted = [&](auto& to, const auto& from) {
+    const std::size_t start = to.size();
+    to.resize(start + from.size());
+    parallel_for(from.size(), [&](std::size_t i) {
+      for (std::size_t j = 0; j < from[i].size(); ++j) to[start + i][j] = from[i][j] + base;
+    });
+  };
+  model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
+  model.rest.thickness = std::max(model.rest.thickness, mesh.tets.empty() ? mesh.thickness : 0);
+  append_shifted(model.rest.tets, mesh.tets);
+  append_shifted(model.rest.surface, mesh.surface);
+  glm::dvec3 centre{0};
+  double total = 0;
+  auto masses = lumped_masses(mesh, density);
+  for (std::size_t i = 0; i < mass_factors.size(); ++i) masses[i] *= mass_factors[i];
+  for (std::size_t i = 0; i < masses.size(); ++i) centre += masses[i] * positions[i], total += masses[i];
+  centre /= total;
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    model.original.push_back(std::uint32_t(model.original.size()));
+    model.masses.push_back(masses[i]);
+    // A vertex of no tet has no mass; it belongs to nothing and stays where it is.
+    model.inverse_masses.push_back(masses[i] > 0 ? 1 / masses[i] : 0);
+    model.positions.push_back(positions[i]);
+    model.velocities.push_back(velocity + glm::cross(spin, positions[i] - centre));
+  }
+  for (std::uint32_t v : fixed) {
+    model.inverse_masses[base + v] = 0;
+    model.velocities[base + v] = glm::dvec3(0);
+  }
+  const double size = bounds(mesh.positions).size();
+  model.size = model.bodies.empty() ? size : std::max(model.size, size);
+  model.bodies.push_back(body);
+}
+
+const Body& body_at(const Model& model, std::size_t vertex) {
+  return *std::prev(std::ranges::upper_bound(model.bodies, vertex, {}, &Body::first_vertex));
+}
+
+bool has_own_materials(const Model& model) {
+  return std::ranges::any_of(model.bodies, [](const Body& body) { return body.material.has_value(); });
+}
+
+bool any_material(const Model& model, const Material& all, bool (*holds)(const Material&)) {
+  if (!has_own_materials(model)) return holds(all);
+  return std::ranges::any_of(model.bodies, [&](const Body& body) { return holds(body_material(body, all)); });
+}
+
+double most_damping(const Model& model, const Material& all) {
+  double most = has_own_materials(model) ? 0 : all.constraint_damping;
+  for (const Body& body : model.bodies) most = std::max(most, body_material(body, all).constraint_damping);
+  return most;
+}
+
+void check_settings(const Model& model, const Settings& settings) {
+  if (!has_own_materials(model)) return check_settings(settings, "settings");
+  for (const Body& body : model.bodies) {
+    const std::string where = body.material ? "body " + body.name : "settings";
+    if (solver_mode(settings).published)
+      throw Error(fmt::format("mode {} has one material for all bodies", settings.mode), where,
+                  "use mode node or constraint");
+    Settings own = settings;
+    static_cast<Material&>(own) = body_material(body, settings);
+    check_settings(own, where);
+  }
+}
+
+void renumber(Model& model) {
+  const std::size_t count = model.rest.positions.size();
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(count);  // along the curve, vertex
+  std::vector<std::uint32_t> old(count), now(count);  // vertex i was old[i]; vertex i is now now[i]
+  for (const Body& body : model.bodies) {
+    const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
+    const Bounds box = bounds({model.rest.positions.begin() + first, model.rest.positions.begin() + end});
+    parallel_for(body.vertices, [&](std::size_t v) {
+      const std::size_t i = body.first_vertex + v;
+      keys[i] = {hilbert_key(model.rest.positions[i], box), std::uint32_t(i)};
+    });
+    parallel_sort(std::span(keys).subspan(body.first_vertex, body.vertices));
+  }
+  for (std::uint32_t i = 0; i < count; ++i) old[i] = keys[i].second, now[old[i]] = i;
+  const auto reorder = [&](auto& rows) {
+    const auto from = rows;
+    parallel_for(count, [&](std::size_t i) { rows[i] = from[old[i]]; });
+  };
+  reorder(model.rest.positions);
+  reorder(model.inverse_masses);
+  reorder(model.masses);
+  reorder(model.positions);
+  reorder(model.velocities);
+  reorder(model.original);
+  const auto rename = [&](auto& elements) {
+    parallel_for(elements.size(), [&](std::size_t i) {
+      for (std::uint32_t& v : elements[i]) v = now[v];
+    });
+  };
+  rename(model.rest.tets);
+  rename(model.rest.surface);
+}
+
+namespace {
+
+double parse_factor(const std::string& how) {
+  const std::string text = how.substr(how.find(':') + 1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value > 0) || value > 1e6)
+    throw Error("bad factor", "--deform " + how, "give a number above 0, at most 1e6, as in stretch:2");
+  return value;
+}
+
+// The one nearest the middle.
+Tet middle_tet(const std::vector<glm::dvec3>& x, const TetMesh& rest, const glm::dvec3& centre) {
+  if (rest.tets.empty()) throw Error("a sheet has no tets", "--deform", "take a deformation of all of it");
+  return std::ranges::min(rest.tets, {}, [&](const Tet& t) {
+    return glm::length((x[t[0]] + x[t[1]] + x[t[2]] + x[t[3]]) * 0.25 - centre);
+  });
+}
+
+}  // namespace
+
+void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& how, unsigned seed) {
+  if (how.empty() || how == "none") return;
+  const Bounds box = bounds(x);
+  const glm::dvec3 centre = box.centre();
+  std::mt19937 generator(seed);
+  // Not std::uniform_real_distribution: its numbers differ from one standard library to the next.
+  const auto unit = [&] { return double(generator()) / 4294967296.0; };
+  if (how == "flatten") {
+    for (auto& p : x) p.y = centre.y;
+  } else if (how == "line") {
+    for (auto& p : x) p = {p.x, centre.y, centre.z};
+  } else if (how == "point") {
+    for (auto& p : x) p = centre;
+  } else if (how == "random") {
+    for (auto& p : x)
+      for (int a = 0; a < 3; ++a) p[a] = box.low[a] + unit() * (box.high[a] - box.low[a]);
+  } else if (how == "mirror") {
+    for (auto& p : x) p.x = 2 * centre.x - p.x;
+  } else if (how.starts_with("stretch:") || how.starts_with("squash:")) {
+    const double factor = parse_factor(how);
+    for (auto& p : x) p.y = centre.y + (p.y - centre.y) * factor;
+  } else if (how == "invert-one") {
+    // Its first vertex goes through the opposite face.
+    const Tet t = middle_tet(x, rest, centre);
+    const glm::dvec3 n = glm::normalize(glm::cross(x[t[2]] - x[t[1]], x[t[3]] - x[t[1]]));
+    x[t[0]] -= 2 * glm::dot(x[t[0]] - x[t[1]], n) * n;
+  } else if (how == "coincident") {
+    const Tet t = middle_tet(x, rest, centre);
+    x[t[0]] = x[t[1]];
+  } else if (how.starts_with("twist:")) {
+    const double turn = glm::radians(parse_factor(how));
+    for (auto& p : x) {
+      const double angle = turn * (p.y - box.low.y) / std::max(box.high.y - box.low.y, 1e-300);
+      const double s = std::sin(angle), c = std::cos(angle), dx = p.x - centre.x, dz = p.z - centre.z;
+      p.x = centre.x + c * dx + s * dz, p.z = centre.z - s * dx + c * dz;
+    }
+  } else if (how.starts_with("jitter:")) {
+    const double most = parse_factor(how);
+    glm::dvec3 move, axis;
+    for (int a = 0; a < 3; ++a) move[a] = (2 * unit() - 1) * most * box.size(), axis[a] = 2 * unit() - 1;
+    const double angle = (2 * unit() - 1) * most * glm::radians(360.0);
+    const glm::dmat3 turn(glm::rotate(glm::dmat4(1), angle, axis));
+    for (auto& p : x) p = centre + move + turn * (p - centre);
+  } else if (how == "fold") {
+    // The first surface hinge: one wing is laid onto the other triangle.
+    const auto all = hinges(rest);
+    if (all.empty()) return;
+    const auto& v = all[0];
+    const glm::dvec3 e = glm::normalize(x[v[3]] - x[v[2]]);
+    const auto across = [&](const glm::dvec3& p) { return (p - x[v[2]]) - e * glm::dot(p - x[v[2]], e); };
+    const glm::dvec3 a = across(x[v[0]]), b = across(x[v[1]]);
+    x[v[1]] += glm::normalize(a) * glm::length(b) - b;
+  } else {
+    throw Error("no such deformation", "--deform " + how,
+                "choose from none, flatten, line, point, random, mirror, stretch:F, squash:F, twist:DEGREES, "
+                "jitter:F, invert-one, coincident, fold");
+  }
+}
+
+}  // namespace tetpbd

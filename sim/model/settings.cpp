@@ -1,0 +1,327 @@
+#include "sim/model/settings.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "sim/error.h"
+#include "sim/model/did_you_mean.h"
+#include "sim/solvers/solver.h"
+
+namespace tetpbd {
+
+const std::vector<Parameter>& parameters() {
+  using S = Settings;
+  static const std::vector<Parameter> rows = [] {
+    std::vector<Parameter> all = {
+        {"mode", "solver", &S::mode,
+         "how constraints are solved, and where: hard bodies on the GPU by node, soft ones by explicit or "
+         "newton, without a GPU by cpu-fast",
+         0, 0, "", false, Effect::rebuild},
+        {"constraints", "solver", &S::constraints,
+         "kinds of constraint that hold a body together, separated by commas: lengths of edges, angles of "
+         "the surface (bend; isobend: quadratic, for thin sheets), volumes of tets",
+         0, 0, "", false, Effect::rebuild},
+    };
+    for (std::size_t k = 0; k < kind_count; ++k)
+      if (!constraint_kinds[k].of_material())
+        all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
+                       fmt::format("part of a correction that is applied to {} in an iteration: 1 is hard; "
+                                   "less is softer, but depends on iterations and mesh",
+                                   constraint_kinds[k].noun)});
+    for (std::size_t k = 0; k < kind_count; ++k)
+      if (!constraint_kinds[k].of_material())
+        all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
+                       KindMember{&S::compliance, k},
+                       fmt::format("softness of {}, of a spring 1 over its stiffness; 0: as hard as "
+                                   "iterations make it. Above 0 it brings mass_splitting with it",
+                                   constraint_kinds[k].noun),
+                       0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
+    const std::vector<Parameter> others = {
+        {"material", "solver", &S::material,
+         "what bodies are made of, in place of constraints, k and compliance: none; springs along edges and "
+         "volumes; neo-hookean tets, right for large strains",
+         0, 0, "", false, Effect::rebuild},
+        {"young_modulus", "solver", &S::young_modulus,
+         "stiffness of the material, Young's modulus: jelly 2e4, rubber 1e6, wood 1e10", 1, 1e12, "Pa", true,
+         Effect::rebuild},
+        {"poisson_ratio", "solver", &S::poisson_ratio,
+         "how much the material thins when it is pulled, Poisson's ratio: near 0.5 it keeps its volume; "
+         "springs: from 0.25",
+         0, 0.499, "", false, Effect::rebuild},
+        {"constraint_damping", "solver", &S::constraint_damping,
+         "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0,
+         10, "s", true},
+        {"omega", "solver", &S::omega,
+         "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
+         "above 2 it may not; with compliance at most 2",
+         0, 4},
+        {"mass_splitting", "solver", &S::mass_splitting,
+         "a vertex shares its mass out among its constraints, which keeps momentum; off: corrections are "
+         "averaged, as in the paper (modes node, constraint); with compliance always on"},
+        {"iterations", "solver", &S::iterations,
+         "passes over all constraints in each substep; more substeps of one iteration are mostly better. "
+         "Mode newton: of conjugate gradients, 2 to 32 as the material is stiff. auto: 1, in newton 4",
+         0, 100000, "", true, Effect::live, true},
+        {"substeps", "solver", &S::substeps,
+         "parts into which a step is cut: more are more accurate and stiffer, and cost as much more. 5 for "
+         "hard bodies, 20 to be sure. auto: 20, in newton 1, in explicit as many as stay stable, which also "
+         "takes more where more are asked for",
+         1, 100000, "", true, Effect::live, true},
+        {"stability", "solver", &S::stability,
+         "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower it if "
+         "a body that is much deformed fails",
+         0.01, 1},
+        {"dt", "solver", &S::dt, "time that one step simulates; shorter steps are more accurate", 1e-6, 1,
+         "s", true},
+        {"damping", "solver", &S::damping,
+         "slows all motion, also free fall: velocity decays by exp(-damping t)", 0, 1000, "1/s"},
+        {"gravity", "world", &S::gravity, "pull downwards: 9.81 on Earth, 0 in space", -1000, 1000, "m/s^2"},
+        {"ground", "world", &S::ground, "whether there is a ground to fall onto"},
+        {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
+        {"contact", "world", &S::contact,
+         "whether bodies touch each other (bodies), and also themselves (self); else they pass through each "
+         "other",
+         0, 1, "", false, Effect::rebuild},
+        {"friction", "world", &S::friction,
+         "Coulomb friction of ground, walls and bodies: 0 is ice, 0.5 wood, 1 rubber", 0, 10},
+        {"restitution", "world", &S::restitution,
+         "bounce of hard bodies (rigid_contact): speed after an impact over before; 0: none, 1: all of it"},
+        {"rigid_contact", "solver", &S::rigid_contact,
+         "hard bodies (all k 1, stretch among them, no compliance) that touch something move as rigid ones; "
+         "off, as in the paper: they rebound by what the corrections add",
+         0, 1, "", false, Effect::rebuild},
+        {"seed", "solver", &S::seed, "number that chooses among random starts and masses", 0, 2147483647, "",
+         false, Effect::restart},
+    };
+    all.insert(all.end(), others.begin(), others.end());
+    return all;
+  }();
+  return rows;
+}
+
+const Parameter* find_parameter(const std::string& name) {
+  std::string key = name;
+  std::replace(key.begin(), key.end(), '-', '_');
+  for (const Parameter& row : parameters())
+    if (key == row.name) return &row;
+  return nullptr;
+}
+
+std::string flag_name(const Parameter& parameter) {
+  std::string name = "--" + parameter.name;
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, separator);)
+    if (!part.empty()) parts.push_back(part);
+  return parts;
+}
+
+std::vector<std::string> choices(const Parameter& parameter) {
+  std::vector<std::string> names;
+  if (parameter.name == "mode")
+    for (const SolverMode& mode : solver_modes()) names.push_back(mode.name);
+  if (parameter.name == "constraints")
+    for (const ConstraintKind& kind : constraint_kinds)
+      if (!kind.of_material()) names.push_back(kind.name);
+  if (parameter.name == "material") names = {"none", "springs", "neo-hookean"};
+  if (parameter.name == "contact") names = {"none", "bodies", "self"};
+  return names;
+}
+
+namespace {
+
+[[noreturn]] void refuse(const Parameter& row, const std::string& value, const std::string& where,
+                         const std::string& mend) {
+  throw Error(fmt::format("'{}' cannot be {}", row.name, value.empty() ? "empty" : value), where, mend);
+}
+
+std::string range_text(const Parameter& row) {
+  const char* kind = std::holds_alternative<int Settings::*>(row.member) ? "whole number" : "number";
+  return fmt::format("give a {} from {:g} to {:g}{}{}", kind, row.low, row.high, *row.unit ? " " : "",
+                     row.unit);
+}
+
+bool in_range(const Parameter& row, double value) {
+  return std::isfinite(value) && value >= row.low && value <= row.high;
+}
+
+void check_words(const Parameter& row, const std::string& text, const std::string& where) {
+  const auto allowed = choices(row);
+  const bool list = row.name == "constraints";
+  const auto words = list ? split(text, ',') : std::vector<std::string>{text};
+  for (const std::string& word : words)
+    if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
+      refuse(row, "'" + text + "'", where,
+             did_you_mean(word, allowed) + fmt::format("choose from {}", fmt::join(allowed, ", ")));
+  for (std::size_t i = 0; i < words.size(); ++i)
+    if (std::count(words.begin(), words.end(), words[i]) > 1)
+      refuse(row, "'" + text + "'", where, "name each once");
+}
+
+}  // namespace
+
+void set_parameter(Settings& settings, const Parameter& row, const std::string& text,
+                   const std::string& where) {
+  with_value(settings, row, [&]<class T>(T& target) {
+    if constexpr (std::is_same_v<T, bool>) {
+      if (text != "true" && text != "false" && text != "1" && text != "0")
+        refuse(row, text, where, "give true or false");
+      target = text == "true" || text == "1";
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      const bool list = row.name == "constraints";
+      if (text.empty()) refuse(row, text, where, list ? "write none for no constraints" : "name one");
+      const std::string value = text == "none" && list ? "" : text;
+      check_words(row, value, where);
+      if (row.name == "mode")
+        set_mode(settings, value, where);
+      else
+        target = value;
+    } else {
+      if (row.automatic && text == "auto") {
+        target = T(automatic);
+        return;
+      }
+      T value{};
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+      if (error != std::errc() || end != text.data() + text.size() || !in_range(row, double(value)))
+        refuse(row, text, where, range_text(row));
+      target = value;
+    }
+  });
+}
+
+std::string parameter_text(const Settings& settings, const Parameter& row) {
+  return with_value(settings, row, [&]<class T>(const T& value) -> std::string {
+    if constexpr (std::is_same_v<T, bool>)
+      return value ? "true" : "false";
+    else if constexpr (std::is_same_v<T, std::string>)
+      return value.empty() ? "none" : value;
+    else
+      return row.automatic && value == T(automatic) ? "auto" : fmt::format("{}", value);
+  });
+}
+
+void set_mode(Settings& settings, const std::string& word, const std::string& where) {
+  const Parameter& row = *find_parameter("mode");
+  if (!find_solver_mode(word))
+    refuse(row, "'" + word + "'", where,
+           did_you_mean(word, choices(row)) + fmt::format("choose from {}", fmt::join(choices(row), ", ")));
+  if (!solver_mode(settings).solves_like(*find_solver_mode(word)))
+    settings.iterations = settings.substeps = automatic;
+  settings.mode = word;
+}
+
+const std::vector<Preset>& solver_presets() {
+  static const std::vector<Preset> rows = {
+      {"paper", "25 iterations a step, averaged",
+       "mode=node,iterations=25,substeps=1,omega=1.5,mass_splitting=false,rigid_contact=false"},
+      {"hard", "5 substeps of 1 iteration, for bodies with k = 1",
+       "mode=node,iterations=1,substeps=5,omega=1.5,mass_splitting=true,rigid_contact=true"},
+      {"substeps", "20 substeps of 1 iteration",
+       "mode=node,iterations=1,substeps=20,omega=1.5,mass_splitting=true,rigid_contact=true"},
+      {"newton", "an implicit step of 4 iterations, for soft bodies", "mode=newton,iterations=4,substeps=1"},
+  };
+  return rows;
+}
+
+bool apply_preset(Settings& settings, const std::vector<Preset>& presets, const std::string& name) {
+  const auto preset = std::ranges::find(presets, name, &Preset::name);
+  if (preset == presets.end()) return false;
+  for (const std::string& value : split(preset->values, ',')) {
+    const std::size_t equals = value.find('=');
+    set_parameter(settings, *find_parameter(value.substr(0, equals)), value.substr(equals + 1), name);
+  }
+  return true;
+}
+
+std::vector<std::string> preset_names(const std::vector<Preset>& presets) {
+  std::vector<std::string> names;
+  for (const Preset& preset : presets) names.emplace_back(preset.name);
+  return names;
+}
+
+bool damped(const Material& material) { return material.constraint_damping > 0; }
+
+std::string kinds_in_use(const Material& material) {
+  if (material.material == "springs") return "stretch,volume";
+  if (material.material == "none") return material.constraints;
+  return damped(material) ? "neo_hookean,dashpot" : "neo_hookean";
+}
+
+bool uses(const Material& material, const ConstraintKind& kind) {
+  const auto names = split(kinds_in_use(material), ',');
+  return std::find(names.begin(), names.end(), kind.name) != names.end();
+}
+
+bool rigid_in_contact(const Settings& settings, const Material& material) {
+  return settings.rigid_contact && settings.contact == "none" && hard(material) &&
+         uses(material, Stretch::row) && !solver_mode(settings).published;
+}
+
+bool hard(const Material& material) {
+  bool all = !compliant(material);
+  for (std::size_t k = 0; k < kind_count; ++k)
+    all = all && (material.stiffness[k] == 1 || !uses(material, constraint_kinds[k]));
+  return all;
+}
+
+bool compliant(const Material& material) {
+  bool any = damped(material) || material.material != "none";
+  for (std::size_t k = 0; k < kind_count; ++k)
+    any = any || (material.compliance[k] > 0 && uses(material, constraint_kinds[k]));
+  return any;
+}
+
+std::optional<std::string> kind_without_force(const Material& material) {
+  for (std::size_t k = 0; k < kind_count; ++k)
+    if (material.material == "none" && uses(material, constraint_kinds[k]) &&
+        !(material.compliance[k] > 0 && material.stiffness[k] == 1))
+      return constraint_kinds[k].name;
+  return std::nullopt;
+}
+
+void check_settings(const Settings& settings, const std::string& where) {
+  for (const Parameter& row : parameters())
+    with_value(settings, row, [&]<class T>(const T& value) {
+      if constexpr (std::is_same_v<T, std::string>) {
+        if (row.name != "mode" || !find_solver_mode(value)) check_words(row, value, where);  // also "paper"
+      } else if (!in_range(row, double(value)) && !(row.automatic && value == T(automatic)))
+        refuse(row, parameter_text(settings, row), where, range_text(row));
+    });
+  const SolverMode& mode = *find_solver_mode(settings.mode);
+  if (compliant(settings) && !mode.compliance)
+    throw Error(fmt::format("mode {} has no compliance", mode.name), where,
+                "set compliance and constraint_damping to 0 or use another mode");
+  for (const ConstraintKind& kind : constraint_kinds)
+    if (kind.values > 1 && uses(settings, kind) && !mode.compliance)
+      throw Error(fmt::format("mode {} has no {}", mode.name, kind.name), where,
+                  "leave it out of constraints or use another mode");
+  if (mode.leapfrog || mode.implicit)
+    if (const auto kind = kind_without_force(settings))
+      throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,
+                  fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));
+  if (settings.contact != "none" && !mode.pairs)
+    throw Error(fmt::format("in mode {} bodies do not touch each other", mode.name), where,
+                "set contact to none or use another mode");
+  if (settings.material == "springs" && settings.poisson_ratio < 0.25)
+    throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
+                "give 0.25 or more, or material neo-hookean");
+  if (settings.restitution > 0 && !rigid_in_contact(settings))
+    throw Error("restitution is of hard bodies", where,
+                "set it to 0, or rigid_contact to true and all k to 1, without compliance or material");
+  if (compliant(settings) && settings.omega > 2)
+    throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
+                "give at most 2: beyond it corrections grow");
+}
+
+}  // namespace tetpbd

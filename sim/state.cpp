@@ -1,0 +1,123 @@
+// The state of a simulation: positions and velocities to and from the GPU, and vertices that are pinned.
+#include <span>
+
+#include "sim/gl/keep_bindings.h"
+#include "sim/hash.h"
+#include "sim/parallel.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
+// so that their low parts are lost (a test guards against it).
+[[gnu::noinline]] void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
+  for (int a = 0; a < 3; ++a) {
+    const volatile float rounded = float(value[a]);
+    high[a] = rounded;
+    low[a] = float(value[a] - double(rounded));
+  }
+}
+
+namespace {
+
+Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constraints) {
+  Position p{};
+  split_pair(x, p.high, p.low);
+  p.inverse_mass = float(inverse_mass);
+  p.constraints = float(constraints);
+  return p;
+}
+
+}  // namespace
+
+void write_velocities(const Sim& sim, const State& state) {
+  std::vector<Velocity> velocities(state.velocities.size());
+  parallel_for(velocities.size(), [&](std::size_t i) {
+    split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
+  });
+  sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
+}
+
+void upload(Sim& sim, const State& state) {
+  std::vector<Position> positions(state.positions.size());
+  parallel_for(positions.size(), [&](std::size_t i) {
+    positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
+  });
+  sim.positions.write(0, positions.size() * sizeof(Position), positions.data());
+  write_velocities(sim, state);
+  sim.needs_predict = true;
+}
+
+State make_state(const std::vector<Position>& positions, const std::vector<Velocity>& velocities) {
+  State state;
+  for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
+  for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
+  return state;
+}
+
+State read_state(const Sim& sim) {
+  if (on_cpu(sim)) return sim.host;
+  const KeepBindings kept;
+  return make_state(sim.positions.read_all<Position>(), sim.velocities.read_all<Velocity>());
+}
+
+std::uint64_t state_hash(const Sim& sim) {
+  const KeepBindings kept;
+  std::uint64_t hash = fnv_basis;
+  const auto add = [&](const glm::vec3& value) { hash = hash_values(std::span(&value.x, 3), hash); };
+  for (const Position& p : sim.positions.read_all<Position>()) add(p.high), add(p.low);
+  for (const Velocity& v : sim.velocities.read_all<Velocity>()) add(v.high), add(v.low);
+  return hash;
+}
+
+namespace {
+
+// A member of each vertex's record in a buffer of `Record`s.
+template <class Record, class Value>
+void write_vertices(Sim& sim, const Buffer& to, std::size_t member, const VertexList& vertices,
+                    const std::vector<Value>& values) {
+  if (vertices.empty()) return;
+  std::vector<std::size_t> offsets;
+  for (const std::uint32_t v : vertices) offsets.push_back(v * sizeof(Record) + member);
+  to.write_each(offsets, sizeof(Value), values.data());
+  sim.needs_predict = true;
+}
+
+void write_inverse_masses(Sim& sim, const VertexList& vertices) {
+  std::vector<float> values;
+  for (const std::uint32_t v : vertices) values.push_back(float(sim.inverse_masses[v]));
+  write_vertices<Position>(sim, sim.positions, offsetof(Position, inverse_mass), vertices, values);
+}
+
+}  // namespace
+
+void pin(Sim& sim, const VertexList& vertices) {
+  const KeepBindings kept;
+  for (const std::uint32_t v : vertices) {
+    sim.inverse_masses[v] = 0;
+    if (on_cpu(sim)) sim.host.velocities[v] = glm::dvec3(0);
+  }
+  write_inverse_masses(sim, vertices);
+  write_vertices<Velocity>(sim, sim.velocities, 0, vertices, std::vector<Velocity>(vertices.size()));
+}
+
+void unpin(Sim& sim, const VertexList& vertices) {
+  const KeepBindings kept;
+  for (const std::uint32_t v : vertices) sim.inverse_masses[v] = sim.model->inverse_masses[v];
+  write_inverse_masses(sim, vertices);
+}
+
+bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }
+
+void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions) {
+  const KeepBindings kept;
+  std::vector<Position> records;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::uint32_t v = vertices[i];
+    records.push_back(to_gpu(positions[i], sim.inverse_masses[v], sim.system.at_vertex[v]));
+    if (on_cpu(sim)) sim.host.positions[v] = positions[i];
+  }
+  write_vertices<Position>(sim, sim.positions, 0, vertices, records);
+}
+
+}  // namespace tetpbd

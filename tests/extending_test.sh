@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# docs/extending.md as it stands: its blocks are applied to a copy of the sources, counted, built and run.
+# docs/extending.md as it stands: its blocks are applied to a copy of the sources, counted, built and run. A row changes
+# the layout of what nearly all files include, so the short suite builds the library and the page's tests alone;
+# the long suite (TETPBD_LONG) builds the program as well and runs it.
 #   extending_test.sh SOURCES FOLDER [PAGE]
 # A comment on a line of its own says what the code block after it is:
 #   <!-- file: PATH -->             this new file
 #   <!-- row: PATH after: TEXT -->  goes behind the first line of PATH that holds TEXT
 # and these stand alone:
-#   <!-- run: COMMAND -->           run when all is built, in an empty folder; tetpbd and tetpbd_tests are found
+#   <!-- run: COMMAND -->           run when all is built, in an empty folder; tetpbd_tests is found, and in the long suite tetpbd
 #   <!-- touches: F R T -->         the section's new files, rows, and tests (files or rows in tests/); else 1 1 1
 set -euo pipefail
 sources=$(realpath "$1") page=${3:-$1/docs/extending.md}
@@ -13,8 +15,14 @@ page=$(realpath "$page")
 rm -rf "$2" && mkdir -p "$2" && cd "$2" && mkdir copy run
 fail() { echo "extending: $*" >&2; exit 1; }
 
-git -C "$sources" ls-files -z -- ':!models' | tar -C "$sources" --null -T - -cf - | tar -C copy -xf -
+cp -r "$sources"/{CMakeLists.txt,cmake,shaders,sim,render,app,tests} copy/
 rm copy/tests/test_*.cpp  # those of the page are what is built
+cat >copy/tests/CMakeLists.txt <<'CMAKE'
+find_package(doctest REQUIRED)
+file(GLOB TEST_SOURCES test_*.cpp)
+add_executable(tetpbd_tests main.cpp ${TEST_SOURCES})
+target_link_libraries(tetpbd_tests PRIVATE tetpbd_sim doctest::doctest)
+CMAKE
 
 section='' files=0 rows=0 tests=0 wanted='1 1 1' what='' inside=false
 end_section() {
@@ -61,14 +69,15 @@ grep -oE '`(app|render|shaders|sim|tests)/[A-Za-z0-9_/]+\.[a-z]+`' "$page" | tr 
   [[ -e copy/$file || -e $sources/$file ]] || fail "the page names $file"
 done
 
-# Without optimisation: the compiler is what takes long.
+# The compiler is what takes long, so nothing is optimised, and OpenVDB's headers, which no example needs, are left out.
 launcher=$(command -v ccache || true)
-cmake -G Ninja -S copy -B build -DTETPBD_WERROR=ON -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 \
+cmake -G Ninja -S copy -B build -DTETPBD_WERROR=ON -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 -DTETPBD_OPENVDB_INCLUDE= \
   ${launcher:+-DCMAKE_CXX_COMPILER_LAUNCHER="$launcher"} >configure.log || { cat configure.log; fail "configuring"; }
-cmake --build build --target tetpbd tetpbd_tests >build.log 2>&1 || { cat build.log; fail "building"; }
+cmake --build build --target tetpbd_tests ${TETPBD_LONG:+tetpbd} >build.log 2>&1 || { cat build.log; fail "building"; }
 export TETPBD_MODELS=$sources/models PATH=$PWD/build:$PWD/build/tests:$PATH
 cd run
 while IFS= read -r command; do
+  [[ -z ${TETPBD_LONG:-} && $command == 'tetpbd '* ]] && continue
   echo "\$ $command"
   bash -euo pipefail -c "$command" </dev/null || fail "$command"
 done <../commands.txt

@@ -1,8 +1,16 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds the ci preset (warnings are errors) and runs all tests: unit, GL on a software
-# renderer, headless end to end, and the window under Xvfb. Arguments go to ctest (for example: ./test.sh -R mesh).
-# They run side by side, those of the window alone.
+# Installs what is missing, builds the ci preset (warnings are errors) and runs the tests: unit, GL on a software renderer,
+# headless end to end, and the window under Xvfb.
+#   ./test.sh [ARGUMENTS of ctest]         the short suite, for example ./test.sh -R mesh
+#   ./test.sh --long [SEED] [ARGUMENTS]    the same tests at their full length, with other random numbers for another SEED
+# What passed of the long suite is not run again at the same commit and seed. When all has passed, docs/data/long-suite.json says so.
 source "$(dirname "${BASH_SOURCE[0]}")/cmake/setup.sh"
 install_packages
 build_preset ci
-exec ctest --preset ci -j"$(nproc)" "$@"
+if [[ ${1:-} == --long ]]; then
+  shift
+  source tests/long_suite.sh
+  run_long_suite "$@"
+else
+  exec ctest --preset ci -j"$(nproc)" "$@"
+fi

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "tests/fuzz/readers.h"
+#include "tests/long_run.h"
 
 namespace fs = std::filesystem;
 
@@ -114,11 +115,11 @@ TEST_CASE("fuzz: every reader takes its corpus, or refuses it in one line") {
 
 TEST_CASE("fuzz: and mutations of it") {
   const Environment restored;
-  const int factor = std::max(1, std::atoi(Environment::value("FUZZ_FACTOR").c_str()));
+  const int factor = std::max(is_long_run() ? 20 : 1, std::atoi(Environment::value("FUZZ_FACTOR").c_str()));
   for (const fuzz::Reader& reader : fuzz::readers()) {
     CAPTURE(reader.name);
     const auto corpus = corpus_of(reader);
-    Mutator mutator{std::mt19937(20261121)};
+    Mutator mutator{std::mt19937(seed_of_run(20261121))};
     const int few = reader.forks ? 30 : std::string_view(reader.name) == "words" ? 100 : 1000;
     const int runs = few * factor;
     for (int run = 0; run < runs; ++run) {

@@ -6,12 +6,35 @@
 #include <sstream>
 
 #include "app/commands.h"
+#include "tests/long_run.h"
 #include "tests/run_program.h"
 
 using nlohmann::json;
 using namespace tetpbd;
 using run_program::Folder, run_program::Outcome, run_program::read, run_program::program;
 namespace fs = std::filesystem;
+
+namespace {
+
+/// The environment of a program whose scenes have this bunny and a beam of few cells. The long suite has
+/// those that are shipped.
+std::string smaller_scenes(const Folder& folder, const char* mesh) {
+  if (is_long_run()) return "";
+  const fs::path models = folder.path / "models";
+  fs::create_directories(models);
+  fs::copy(TEST_MODELS "/scenes", models / "scenes");
+  fs::copy(TEST_MODELS "/bunny_coarse.obj", models);
+  const auto change = [&](const char* name, const json& what) {
+    json scene = json::parse(read(models / "scenes" / name));
+    scene["bodies"][0].merge_patch(what);
+    std::ofstream(models / "scenes" / name) << scene;
+  };
+  change("bunny-drop.json", json::parse(mesh));
+  change("soft-beam.json", {{"block", {{"cells", {8, 2, 2}}}}});
+  return "TETPBD_MODELS=" + models.string();
+}
+
+}  // namespace
 
 TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does not pass") {
   const Folder folder;
@@ -188,7 +211,8 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
 
 TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contained report") {
   const Folder folder;
-  const Outcome run = program("reproduce --quick --out r", folder);
+  const std::string models = smaller_scenes(folder, R"({"mesh": "bunny_coarse.obj", "tetgen": "pY"})");
+  const Outcome run = program("reproduce --quick --out r", folder, models);
   CHECK(run.err.find("tetpbd:") == std::string::npos);  // progress alone
   REQUIRE(run.status == 0);
   const std::string html = read(folder.path / "r/report.html");
@@ -277,7 +301,10 @@ TEST_CASE(
   REQUIRE(text.find(rest) != std::string::npos);
   text.insert(text.find(rest) + rest.size(), " * real(1.001)");
   std::ofstream(file) << text;
-  const Outcome wrong = program("--shaders shaders info --selftest", folder);
+  const std::string models = smaller_scenes(
+      folder,
+      R"({"mesh": null, "tetgen": null, "height": null, "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}})");
+  const Outcome wrong = program("--shaders shaders info --selftest", folder, models);
   CAPTURE(wrong.out);
   CHECK(wrong.status == 1);
   CHECK(wrong.err.find("a step of node against cpu-double") != std::string::npos);

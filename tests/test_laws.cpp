@@ -4,6 +4,7 @@
 #include "app/run_loop.h"
 #include "sim/measure/metrics.h"
 #include "tests/gl_test.h"
+#include "tests/long_run.h"
 #include "tests/sim_samples.h"
 
 using namespace samples;
@@ -31,8 +32,11 @@ TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
 
 TEST_CASE("what rests stays at rest") {
   GlTest gl;
-  for (const SolverMode& mode : pbd_modes())
+  int number = 0;
+  for (const SolverMode& mode : pbd_modes()) {
+    ++number;  // the short suite takes the modes by turns in one substep and in five
     for (int substeps : {1, 5}) {
+      if (!is_long_run() && (number % 2 == 0) == (substeps == 1)) continue;
       CAPTURE(mode.name);
       CAPTURE(substeps);
       Settings floating = quick(mode.name, 5, substeps);
@@ -58,6 +62,7 @@ TEST_CASE("what rests stays at rest") {
         CHECK(distance(settled, State{mesh.positions, {}}) < (rigid ? 1e-5 : 0.02));
       }
     }
+  }
 }
 
 TEST_CASE("a run moved and turned about the vertical is the same run, moved and turned") {

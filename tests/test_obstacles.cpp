@@ -19,6 +19,7 @@
 #include "sim/sim.h"
 #include "sim/snapshot.h"
 #include "tests/gl_test.h"
+#include "tests/long_run.h"
 #include "tests/sim_samples.h"
 
 using namespace tetpbd;
@@ -537,8 +538,8 @@ TEST_CASE_FIXTURE(GlTest,
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite") {
-  std::mt19937 random(3);
-  for (int round = 0; round < 8; ++round) {
+  std::mt19937 random(seed_of_run(3));
+  for (int round = 0; round < (is_long_run() ? 40 : 4); ++round) {
     CAPTURE(round);
     Setup setup;
     add(setup, ball_mesh(0.3), within(random, 0.5), glm::dmat3(1), within(random, 30));

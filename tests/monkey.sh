@@ -9,8 +9,6 @@ if [[ ${1:-} != --inside ]]; then
   exec xvfb-run -a -s "-screen 0 800x600x24" "$0" --inside "$@"
 fi
 program=$(realpath "$2") folder=$3 seed=$4 count=$5 replay=
-# The long suite does twenty times as much, by a seed of its own.
-[[ -n ${TETPBD_LONG:-} && $seed != --replay ]] && seed=$((seed + ${TETPBD_SEED:-0})) count=$((20 * count))
 [[ $seed == --replay ]] && replay=$(realpath "$5") seed=0 count=0
 rm -rf "$folder" && mkdir -p "$folder/models/scenes" && cd "$folder" || exit 1
 # Scenes, meshes, caches and screenshots are the folder's own: nothing the monkey opens or saves is elsewhere.

@@ -65,8 +65,7 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
   for (int round = 0; round < 2; ++round) {
     reset(sim);
     const double seconds = is_software_renderer() ? 0 : 0.03;
-    const MeasuredRun run =
-        run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
+    const MeasuredRun run = run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
     if (interrupted()) throw Interrupted();
     const double substeps = plan_for(settings).substeps * budget_ms / step_ms(run);
     settings.substeps = int(std::clamp(substeps, 1.0, double(most_substeps)));
@@ -109,14 +108,13 @@ bool has_forces(const Settings& settings) { return compliant(settings) && !kind_
 
 double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 
-SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
-                           double budget_ms, long steps) {
+SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
+                           long steps) {
   SolverChoice choice{budget_ms, steps, ""};
   std::optional<Motion> right = right_motion(*model, settings);
   if (right) choice.judged = "motion";
   for (const Settings& candidate : candidates(settings)) {
-    const bool first = choice.trials.empty(),
-               as_it_is = candidate == settings || solver_mode(candidate).leapfrog;
+    const bool first = choice.trials.empty(), as_it_is = candidate == settings || solver_mode(candidate).leapfrog;
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
     Sim sim = create_sim(model, candidate);
     if (first) warm_up(sim);
@@ -152,8 +150,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
                                        : run.errors.max_volume_loss_percent;
       // In contact a step takes longer than those it was fitted to.
       if (trial.fits || as_it_is || trial.settings.substeps == 1 || attempt == 3) break;
-      trial.settings.substeps =
-          std::max(1, int(trial.settings.substeps * std::min(0.95, budget_ms / trial.ms)));
+      trial.settings.substeps = std::max(1, int(trial.settings.substeps * std::min(0.95, budget_ms / trial.ms)));
     }
     // Errors that agree to a hundredth are the same: then the plainer one.
     const SolverTrial& best = choice.trials[choice.best];
@@ -163,8 +160,8 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   if (!choice.trials[choice.best].fits) {
     const auto& quickest = *std::ranges::min_element(choice.trials, {}, &SolverTrial::ms);
     throw Error("nothing fits the budget",
-                fmt::format("{:.3g} ms a step; the quickest, {}, takes {:.3g} ms", budget_ms,
-                            quickest.settings.mode, quickest.ms),
+                fmt::format("{:.3g} ms a step; the quickest, {}, takes {:.3g} ms", budget_ms, quickest.settings.mode,
+                            quickest.ms),
                 "raise --budget-ms, or take fewer tets", 1);
   }
   return choice;
@@ -182,8 +179,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   for (const BodyDescription& body : scene.bodies) spin = std::max(spin, glm::length(body.spin));
   // Four times as many where newton would take four times its own (sim/adaptive_substeps.h).
   const double wanted = explicit_substeps(model, s),
-               most = (is_software_renderer() ? 20 : 40) *
-                      (0.5 * s.dt * spin > TURN_LIMIT ? refined_substeps : 1);
+               most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? refined_substeps : 1);
   // Of bodies that touch newton is the less right, and takes four times its substeps as well.
   if (wanted <= most * (bodies_touch(model, s) ? refined_substeps : 1)) {
     set_mode(s, "explicit", scene.name);
@@ -192,8 +188,8 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   set_mode(s, "newton", scene.name);
   // What truncated iterations leave turns a body that spins: so many keep that to a few percent.
   s.substeps = 2, s.iterations = wanted <= 40 ? 4 : wanted <= 128 ? 8 : wanted <= 400 ? 16 : 32;
-  return fmt::format("newton, 2 substeps of {} iterations: explicit would take {:g}, over {:g}", s.iterations,
-                     wanted, most);
+  return fmt::format("newton, 2 substeps of {} iterations: explicit would take {:g}, over {:g}", s.iterations, wanted,
+                     most);
 }
 
 std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model) {
@@ -216,15 +212,15 @@ std::string describe(const SolverChoice& choice) {
   const SolverTrial& best = choice.trials[choice.best];
   const Settings& s = best.settings;
   const Plan& plan = best.plan;
-  return fmt::format(
-      "{}, {} iteration{} x {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps",
-      s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps, plan.substeps == 1 ? "" : "s",
-      s.omega, s.mass_splitting && !compliant(s) ? ", masses split" : "", best.ms, choice.budget_ms,
-      fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the right motion"
-                               : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
-                                                                : "loss {:.3g} %"),
-                  best.error),
-      choice.steps);
+  return fmt::format("{}, {} iteration{} x {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps",
+                     s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps,
+                     plan.substeps == 1 ? "" : "s", s.omega, s.mass_splitting && !compliant(s) ? ", masses split" : "",
+                     best.ms, choice.budget_ms,
+                     fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the right motion"
+                                              : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
+                                                                               : "loss {:.3g} %"),
+                                 best.error),
+                     choice.steps);
 }
 
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {

@@ -42,8 +42,8 @@ double default_budget_ms(const Settings& settings);
 /// the cache or that of rigid bodies; else with compliance or k = 1 against a run in much finer steps; else
 /// by the largest volume loss. Everything else stays as in `settings`. Some seconds; needs a GL context.
 /// Throws Error where nothing fits the budget.
-SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings,
-                           double budget_ms, long steps);
+SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
+                           long steps);
 /// The mode of bodies that have forces, where nobody says one: `explicit` up to 40 substeps, 20 on a software
 /// renderer, else `newton` in two substeps of 4 iterations, 8 from 40 such substeps on, 16 from 128, 32 from
 /// 400. By what was measured (docs/results.md), without a race. Of hard ones `cpu-fast` on a software

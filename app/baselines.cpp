@@ -93,8 +93,8 @@ MeasuredRun direct_run(const Model& model, const Settings& settings, long steps,
 
 const std::vector<Baseline>& baselines() {
   static const std::vector<Baseline> rows = {
-      {"rigid-body", "with k = 1 and stretch",
-       [](const Settings& s) { return hard(s) && uses(s, Stretch::row); }, rigid_run},
+      {"rigid-body", "with k = 1 and stretch", [](const Settings& s) { return hard(s) && uses(s, Stretch::row); },
+       rigid_run},
       {"direct", "with compliance or a material", [](const Settings& s) { return compliant(s); }, direct_run},
   };
   return rows;

@@ -30,8 +30,7 @@ ordered_json spread(std::vector<double> values) {
 }
 
 /// Frames as fast as they come: a step, and a picture of it if there is one. One wait, at the end.
-void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options,
-                 const std::function<void()>& picture) {
+void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options, const std::function<void()>& picture) {
   std::vector<double> fps, gpu, wall;
   double drawing = 0, pictures = 0;
   RunPlan plan{.most_seconds = options.most_seconds, .wait = false};
@@ -68,9 +67,8 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
   const Explanation cost = explain(sim);
   Metrics metrics = create_metrics(*model, sim.system);
   const auto right = right_motion(*model, settings);
-  const MeasuredRun run =
-      run_loop(sim, &metrics, options.frames,
-               {.most_seconds = 12 * options.most_seconds, .right = right ? &*right : nullptr});
+  const MeasuredRun run = run_loop(sim, &metrics, options.frames,
+                                   {.most_seconds = 12 * options.most_seconds, .right = right ? &*right : nullptr});
   ordered_json row = row_of(scene, *model, sim.settings, run);
   row.update({{"size", ""},
               {"picture", ""},
@@ -129,8 +127,7 @@ Sweep bench_sweep(const BenchOptions& options) {
     const Scene scene = load_scene(name, options.overrides);
     const auto all = combinations(scene.settings, options.axes);
     const auto model = build_model(scene);
-    for (const Settings& settings : all)
-      sweep.work.push_back([=] { return rows_of(scene, model, settings, options); });
+    for (const Settings& settings : all) sweep.work.push_back([=] { return rows_of(scene, model, settings, options); });
   }
   return sweep;
 }
@@ -149,8 +146,7 @@ int run_bench(const BenchOptions& options) {
   fmt::print(
       "{} frames after {} to warm up, {} times, medians; one step of the scene's dt a frame, nothing waits "
       "between frames\nat least {:.2f} us a dispatch with its barrier, {:.0f} GB/s copied\n",
-      options.frames, options.warm_up, options.repeats, number(limits, "dispatch_us"),
-      number(limits, "copy_gb_s"));
+      options.frames, options.warm_up, options.repeats, number(limits, "dispatch_us"), number(limits, "copy_gb_s"));
   print_table(sweep, sweep.facts);
   return write_sweep(sweep, options.out, run_sweep(sweep, {}, options.out));
 }

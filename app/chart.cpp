@@ -24,11 +24,10 @@ constexpr double width = 860, height = 520, left = 86, right = width - 210, top 
 std::string text(double x, double y, const std::string& what, const char* anchor = "start", double size = 12,
                  const std::string& more = "") {
   std::string escaped;
-  for (char c : what)
-    escaped += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
+  for (char c : what) escaped += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
   return fmt::format(
-      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#222222\" {}>{}</text>\n",
-      x, y, size, anchor, more, escaped);
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#222222\" {}>{}</text>\n", x, y, size,
+      anchor, more, escaped);
 }
 
 std::string head(const std::string& title, const std::string& subtitle, const std::string& x_label,
@@ -91,8 +90,8 @@ std::vector<double> ticks(const Axis& axis) {
 }
 
 // Markers differ as well as colours, for print without colour.
-constexpr std::array markers = {"m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", "m-3.7 -3.7h7.4v7.4h-7.4z",
-                                "m0 -5l4.6 8h-9.2z", "m0 -5l5 5l-5 5l-5 -5z"};
+constexpr std::array markers = {"m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", "m-3.7 -3.7h7.4v7.4h-7.4z", "m0 -5l4.6 8h-9.2z",
+                                "m0 -5l5 5l-5 5l-5 -5z"};
 
 constexpr double least_percent = 1e-4, decades = 6;
 
@@ -124,40 +123,34 @@ std::string to_svg(const Chart& chart) {
     return std::abs(v) >= 10000 ? fmt::format("{:g}k", v / 1000) : fmt::format("{:g}", v);
   };
   for (double v : ticks(x))
-    svg += path(fmt::format("M{:.1f} {}V{}", x.at(v), top, bottom)) +
-           text(x.at(v), bottom + 18, tick(v), "middle");
+    svg += path(fmt::format("M{:.1f} {}V{}", x.at(v), top, bottom)) + text(x.at(v), bottom + 18, tick(v), "middle");
   for (double v : ticks(y))
-    svg += path(fmt::format("M{} {:.1f}H{}", left, y.at(v), right)) +
-           text(left - 8, y.at(v) + 4, tick(v), "end");
+    svg += path(fmt::format("M{} {:.1f}H{}", left, y.at(v), right)) + text(left - 8, y.at(v) + 4, tick(v), "end");
   double legend = top + 10;
   bool empty = true;
   for (std::size_t k = 0; k < chart.series.size(); ++k, legend += 20) {
     const Series& s = chart.series[k];
     const bool line = s.style != Series::markers;
     const std::string marker = line ? "" : markers[k % markers.size()];
-    const std::string style =
-        line ? fmt::format("stroke=\"{}\" stroke-width=\"1.8\" fill=\"none\"{}", s.colour,
-                           s.style == Series::dashes ? " stroke-dasharray=\"6 4\"" : "")
-             : fmt::format("fill=\"{}\"", s.colour);
+    const std::string style = line ? fmt::format("stroke=\"{}\" stroke-width=\"1.8\" fill=\"none\"{}", s.colour,
+                                                 s.style == Series::dashes ? " stroke-dasharray=\"6 4\"" : "")
+                                   : fmt::format("fill=\"{}\"", s.colour);
     std::string points;
     for (const glm::dvec2& p : s.points)
       if (x.shows(p.x) && y.shows(p.y))
-        points += fmt::format("{}{:.1f} {:.1f}{}", line && !points.empty() ? "L" : "M", x.at(p.x), y.at(p.y),
-                              marker);
+        points += fmt::format("{}{:.1f} {:.1f}{}", line && !points.empty() ? "L" : "M", x.at(p.x), y.at(p.y), marker);
     empty = empty && points.empty();
     svg += path(points, style) + text(right + 44, legend + 4, s.name);
     svg += path(fmt::format("M{} {}{}", right + (line ? 14 : 26), legend, line ? "h24" : marker), style);
   }
-  if (empty)
-    svg += text((left + right) / 2, middle, "no value to draw: all are 0 or none is finite", "middle", 15);
+  if (empty) svg += text((left + right) / 2, middle, "no value to draw: all are 0 or none is finite", "middle", 15);
   for (const Chart::Note& note : chart.notes)  // below and to the left, where a front leaves room
     if (x.shows(note.at.x) && y.shows(note.at.y))
       svg += text(x.at(note.at.x) - 7, y.at(note.at.y) + 14, note.text, "end", 10.5);
   for (const Chart::Spot& spot : chart.spots)
     if (x.shows(spot.at.x) && y.shows(spot.at.y))
-      svg +=
-          fmt::format("<circle data-row=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"8\" fill=\"transparent\"/>\n",
-                      spot.row, x.at(spot.at.x), y.at(spot.at.y));
+      svg += fmt::format("<circle data-row=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"8\" fill=\"transparent\"/>\n",
+                         spot.row, x.at(spot.at.x), y.at(spot.at.y));
   return svg + "</svg>\n";
 }
 
@@ -168,8 +161,8 @@ void write_svg(const std::filesystem::path& name, const std::string& picture) {
   const PartFile png(whole + ".png");
   const auto end = run_subprocess({"rsvg-convert", "-z", "1.5", "-o", png.part.string(), svg}, {60});
   if (end.kind == SubprocessEnd::done) return png.finish();
-  print_error(fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n",
-                          printable(png.file.string())));
+  print_error(
+      fmt::format("tetpbd: no {}: rsvg-convert did not make it: install librsvg2-bin\n", printable(png.file.string())));
 }
 
 // Dark blue, green, yellow, red.
@@ -182,9 +175,7 @@ glm::dvec3 heat(double part) {
   return glm::mix(stops[first], stops[first + 1], at - double(first));
 }
 
-double heat_part(double percent) {
-  return std::log10(std::max(percent, least_percent) / least_percent) / decades;
-}
+double heat_part(double percent) { return std::log10(std::max(percent, least_percent) / least_percent) / decades; }
 
 std::string map_svg(const nlohmann::ordered_json& document) {
   const auto& rows = document["rows"];
@@ -199,22 +190,21 @@ std::string map_svg(const nlohmann::ordered_json& document) {
     motion = motion || std::isfinite(number(row, "motion_rms"));
   }
   const double wide = (right - left) / double(xs.size()), high = (bottom - top) / double(ys.size());
-  std::string svg = head(fmt::format("{}: {} against {}", document["scene"].get<std::string>(),
-                                     document["y"].get<std::string>(), document["x"].get<std::string>()),
-                         fmt::format("mode {}, {} tets, {:g} s: {}", document["mode"].get<std::string>(),
-                                     document["tets"].get<long>(), document["seconds"].get<double>(),
-                                     motion ? "distance from the right motion over the run, % of the size"
-                                            : "largest net volume loss, %"),
-                         document["x"], document["y"]);
+  std::string svg = head(
+      fmt::format("{}: {} against {}", document["scene"].get<std::string>(), document["y"].get<std::string>(),
+                  document["x"].get<std::string>()),
+      fmt::format("mode {}, {} tets, {:g} s: {}", document["mode"].get<std::string>(), document["tets"].get<long>(),
+                  document["seconds"].get<double>(),
+                  motion ? "distance from the right motion over the run, % of the size" : "largest net volume loss, %"),
+      document["x"], document["y"]);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& row = rows[i];
-    const double x = left + double(note(xs, row["x"])) * wide,
-                 y = bottom - double(note(ys, row["y"]) + 1) * high;
+    const double x = left + double(note(xs, row["x"])) * wide, y = bottom - double(note(ys, row["y"]) + 1) * high;
     const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
     const bool failed = !row["finite"].get<bool>();
     const double part = heat_part(percent);
     const std::string said = row.contains("refused") ? "refused"
-                             : failed ? fmt::format("fails at {}", text_of(row["failed_at_step"]))
+                             : failed                ? fmt::format("fails at {}", text_of(row["failed_at_step"]))
                              : std::isfinite(percent)
                                  ? fmt::format(fmt::runtime(percent < 9.95 ? "{:.2g}" : "{:.0f}"), percent)
                                  : "";
@@ -232,8 +222,8 @@ std::string map_svg(const nlohmann::ordered_json& document) {
     svg += text(left - 8, bottom - (double(i) + 0.5) * high + 4, ys[i], "end");
   for (int decade = 0; decade <= int(decades); ++decade) {
     const double y = bottom - 20 - 22 * decade;
-    svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"18\" height=\"22\" fill=\"{}\"/>\n", right + 26,
-                       y - 15, heat_code(decade / decades));
+    svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"18\" height=\"22\" fill=\"{}\"/>\n", right + 26, y - 15,
+                       heat_code(decade / decades));
     svg += text(right + 52, y, fmt::format("{:g} %", least_percent * std::pow(10.0, decade)));
   }
   return svg + "</svg>\n";

@@ -25,14 +25,14 @@ std::function<int()> parse_command_line(std::vector<std::string> words);
 struct RunOptions {
   long steps = 0;  ///< 0: the scene's duration
   std::filesystem::path out = "out";
-  long png_every = 0;               ///< steps; 0: no frames
-  std::filesystem::path video;      ///< empty: none
-  long video_every = 0;             ///< steps a video frame; 0: real time at 30 frames a second
-  long csv_every = 1;               ///< steps; 0: no stats.csv
-  std::filesystem::path reference;  ///< the right motion; empty: the cache's, if any
-  long measure_every = 1;           ///< steps between measurements; the last step is measured in any case
-  bool positions = false;           ///< of the end, as arrays
-  long positions_every = 0;         ///< steps a frame of trajectory.npy and exports; 0: of exports, real time
+  long png_every = 0;                  ///< steps; 0: no frames
+  std::filesystem::path video;         ///< empty: none
+  long video_every = 0;                ///< steps a video frame; 0: real time at 30 frames a second
+  long csv_every = 1;                  ///< steps; 0: no stats.csv
+  std::filesystem::path reference;     ///< the right motion; empty: the cache's, if any
+  long measure_every = 1;              ///< steps between measurements; the last step is measured in any case
+  bool positions = false;              ///< of the end, as arrays
+  long positions_every = 0;            ///< steps a frame of trajectory.npy and exports; 0: of exports, real time
   std::vector<std::string> exports;    ///< of export_formats
   std::filesystem::path dump_shaders;  ///< folder for the text of all shaders; empty: none
   int gpu = -1;
@@ -42,12 +42,11 @@ struct RunOptions {
   double range = 0;                   ///< end of the colour scale, in its unit; 0: as it is
   double turntable = 0;               ///< s a turn of the camera about the bodies; 0: none
   std::filesystem::path camera_path;  ///< empty: none
-  std::vector<std::string>
-      lanes;                     ///< of the window: what each puts in place of the scene's settings (lanes.h)
-  long history_mb = 256;         ///< of the window: for states to go back to; 0: none
-  std::filesystem::path record;  ///< of the window: what is done there (record.h); empty: nowhere
-  std::filesystem::path replay;  ///< what `run` does in place of a scene's steps
-  bool progress = false;         ///< show it even if standard error is no terminal
+  std::vector<std::string> lanes;     ///< of the window: what each puts in place of the scene's settings (lanes.h)
+  long history_mb = 256;              ///< of the window: for states to go back to; 0: none
+  std::filesystem::path record;       ///< of the window: what is done there (record.h); empty: nowhere
+  std::filesystem::path replay;       ///< what `run` does in place of a scene's steps
+  bool progress = false;              ///< show it even if standard error is no terminal
 };
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
 int run_headless(Scene scene, const RunOptions& options);
@@ -60,13 +59,12 @@ int run_selftest(int gpu);
 
 /// `tetpbd view`: until the window is closed. `name` as it was given, a name or a file; `overrides` stay in
 /// force when the same scene is reset. Of the options: size, samples, view.
-int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides,
-               const RunOptions& options);
+int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides, const RunOptions& options);
 
 /// `tetpbd mesh`: checks a mesh, fills surfaces with TetGen's `switches`, reports, writes it where `out`
 /// says.
-int run_mesh_command(const std::filesystem::path& file, const std::string& switches,
-                     const std::filesystem::path& out, bool json);
+int run_mesh_command(const std::filesystem::path& file, const std::string& switches, const std::filesystem::path& out,
+                     bool json);
 
 /// `tetpbd mesh --repair OUT`: mends a surface as far as that takes no choice (repair() of tet_mesh.h).
 int run_repair(const std::filesystem::path& file, const std::filesystem::path& out);
@@ -82,8 +80,8 @@ struct BenchOptions {
                .mass_splitting = {0}};
   long frames = 400, warm_up = 50;
   int repeats = 3;
-  double most_seconds = 5;  ///< a repetition stops there, with fewer frames (slow CPU modes)
-  std::vector<std::array<int, 2>> sizes{{1280, 720}};     ///< of rendered frames, pixels; none: no rendering
+  double most_seconds = 5;                             ///< a repetition stops there, with fewer frames (slow CPU modes)
+  std::vector<std::array<int, 2>> sizes{{1280, 720}};  ///< of rendered frames, pixels; none: no rendering
   std::vector<std::string> pictures = {"plain", "full"};  ///< of picture_kinds, rendered at each size
   int samples = 0;
   int gpu = -1;
@@ -113,8 +111,7 @@ ordered_json launch_and_bandwidth_limits(bool software);
 struct CompareOptions {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  Axes axes = {
-      .modes = {}, .iterations = {1, 5, 10, 25}, .substeps = {1}};  ///< no modes: what suits the scene
+  Axes axes = {.modes = {}, .iterations = {1, 5, 10, 25}, .substeps = {1}};  ///< no modes: what suits the scene
   long steps = 400;
   int gpu = -1;
   std::filesystem::path out = "compare";
@@ -141,8 +138,7 @@ int run_map(const MapOptions& options);
 /// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
 /// scene has iterations. Steps 0: the scene's duration.
 int run_hard_cases(const CompareOptions& options);
-inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu",
-                                                      "cpu-double"};
+inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu", "cpu-double"};
 /// The first step of those at the end that all keep the volume within 1 %, no tet inverted and, of `hard`
 /// bodies, their shape within 1 % of the size, if they are 5 % of the run's `steps` at least: what is good
 /// for less long may be passing through.

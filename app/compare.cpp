@@ -53,8 +53,7 @@ constexpr Judge judges[] = {
 // Infinite where nothing is known.
 double error_by(const Judge& judge, const ordered_json& row) {
   const double value = judge.scale * number(row, judge.column);
-  return row["finite"] == true && std::isfinite(value) ? std::max(0.0, value)
-                                                       : std::numeric_limits<double>::infinity();
+  return row["finite"] == true && std::isfinite(value) ? std::max(0.0, value) : std::numeric_limits<double>::infinity();
 }
 // The one asked for; else the motion where it is known.
 const Judge& judge_of(const std::string& name, const ordered_json& rows) {
@@ -100,8 +99,7 @@ ordered_json course_of(const MeasuredRun& run) {
           {"energy", run.measurements.empty() ? std::nan("") : run.measurements.back().energy()}};
 }
 
-ordered_json compared(const Scene& scene, const Model& model, const Settings& settings,
-                      const MeasuredRun& run) {
+ordered_json compared(const Scene& scene, const Model& model, const Settings& settings, const MeasuredRun& run) {
   ordered_json row = row_of(scene, model, settings, run);
   row.update(course_of(run));
   row["mass_splitting"] = settings.mass_splitting ? 1 : 0;
@@ -127,20 +125,18 @@ void mark_front(ordered_json& rows, const Judge& judge) {
   }
 }
 
-std::string label_of(const ordered_json& row) {
-  return text_of(row["iterations"]) + " x " + text_of(row["substeps"]);
-}
+std::string label_of(const ordered_json& row) { return text_of(row["iterations"]) + " x " + text_of(row["substeps"]); }
 
 Chart chart_of(const ordered_json& document, const Judge& judge) {
   const auto& rows = document["rows"];
-  Chart chart{"Speed against error: " + text_of(rows[0]["scene"]),
-              fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps",
-                          text_of(rows[0]["tets"]), text_of(document["steps"]), text_of(document["dt"]),
-                          text_of(document["device"]["gl_renderer"])),
-              "time of a step, ms (GPU time; cpu modes: wall time)",
-              judge.label,
-              true,
-              true};
+  Chart chart{
+      "Speed against error: " + text_of(rows[0]["scene"]),
+      fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps", text_of(rows[0]["tets"]),
+                  text_of(document["steps"]), text_of(document["dt"]), text_of(document["device"]["gl_renderer"])),
+      "time of a step, ms (GPU time; cpu modes: wall time)",
+      judge.label,
+      true,
+      true};
   Series front{"Pareto front", "#999999", Series::dashes};
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& row = rows[i];
@@ -165,17 +161,15 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
 Chart course_chart(const ordered_json& document) {
   constexpr std::size_t most = 8;
   const bool all = document["rows"].size() <= most;
-  Chart chart{
-      "Error of the motion: " + text_of(document["rows"][0]["scene"]),
-      all ? "mode, iterations x substeps" : "what is on the front; labels: mode, iterations x substeps",
-      "time, s",
-      "distance from the right motion, % of the size",
-      false,
-      true};
+  Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
+              all ? "mode, iterations x substeps" : "what is on the front; labels: mode, iterations x substeps",
+              "time, s",
+              "distance from the right motion, % of the size",
+              false,
+              true};
   for (const auto& row : document["rows"]) {
     if ((!all && row["pareto"] != true) || chart.series.size() == most) continue;
-    Series series{text_of(row["mode"]) + ", " + label_of(row), palette_colour(chart.series.size()),
-                  Series::line};
+    Series series{text_of(row["mode"]) + ", " + label_of(row), palette_colour(chart.series.size()), Series::line};
     for (const auto& point : row["motion_over_time"])
       if (point[0] > 0) series.points.emplace_back(point[0].get<double>(), 100 * point[1].get<double>());
     if (!series.points.empty()) chart.series.push_back(series);
@@ -190,15 +184,14 @@ void print_best(ordered_json rows, const char* what, std::optional<double> limit
                 const Quantity& limited, const Quantity& judged) {
   if (!limit) return;
   fmt::print(fmt::runtime(what), *limit);
-  std::erase_if(rows.get_ref<ordered_json::array_t&>(), [&](const auto& row) {
-    return !std::isfinite(error_by(judge, row)) || !(limited(row) <= *limit);
-  });
+  std::erase_if(rows.get_ref<ordered_json::array_t&>(),
+                [&](const auto& row) { return !std::isfinite(error_by(judge, row)) || !(limited(row) <= *limit); });
   if (rows.empty()) return fmt::print(": nothing measured is\n");
   const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
   const auto& best = *std::ranges::min_element(rows, {}, order);
   fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, {} {:.3g} %)\n", text_of(best["mode"]),
-             text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best),
-             judge.name, error_by(judge, best));
+             text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best), judge.name,
+             error_by(judge, best));
 }
 
 }  // namespace
@@ -223,8 +216,7 @@ int run_compare(const CompareOptions& options) {
     for (const Baseline& baseline : baselines()) {
       if (std::erase(axes.modes, baseline.name) == 0) continue;
       if (!baseline.suits(scene.settings))
-        throw Error("no baseline for this scene", baseline.name,
-                    fmt::format("it is for scenes {}", baseline.scenes));
+        throw Error("no baseline for this scene", baseline.name, fmt::format("it is for scenes {}", baseline.scenes));
       Axes own = options.axes;
       own.modes = {}, own.omegas = {};
       for (Settings settings : combinations(scene.settings, own)) {
@@ -241,8 +233,7 @@ int run_compare(const CompareOptions& options) {
     for (const Settings& settings : combinations(scene.settings, axes))
       sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
         Film film(scene, *model, out, number, sweep.work.size());
-        const MeasuredRun run =
-            run_model(model, settings, steps, *right ? &**right : nullptr, true, film.of(steps));
+        const MeasuredRun run = run_model(model, settings, steps, *right ? &**right : nullptr, true, film.of(steps));
         ordered_json row = compared(scene, *model, settings, run);
         row["film"] = film.write();
         row["reference_distance"] = remaining_after_one_step(model, settings);

@@ -105,9 +105,8 @@ void move_by(Obstacle& o, const glm::dvec3& way) {
 void turn_by(Obstacle& o, const glm::dmat3& turn) {
   const glm::dmat3 now = turn * rotation_of(o.rotation);
   const glm::dvec3 before = o.rotation;
-  o.rotation =
-      glm::degrees(glm::dvec3(std::atan2(now[1].z, now[2].z), std::asin(std::clamp(-now[0].z, -1.0, 1.0)),
-                              std::atan2(now[0].y, now[0].x)));
+  o.rotation = glm::degrees(glm::dvec3(std::atan2(now[1].z, now[2].z), std::asin(std::clamp(-now[0].z, -1.0, 1.0)),
+                                       std::atan2(now[0].y, now[0].x)));
   for (Obstacle::Key& key : o.keyframes) key.rotation += o.rotation - before;
   o.spin = turn * o.spin;
   o.normal = turn * o.normal;
@@ -125,8 +124,7 @@ std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
       if (gap < 1e-4 * size) break;
       t += std::max(gap * all[i].trust, 1e-4 * size);
     }
-    if (gap < 1e-4 * size && t > 0 && t < far && (!first || t < first->distance))
-      first = ObstacleHit{int(i), t};
+    if (gap < 1e-4 * size && t > 0 && t < far && (!first || t < first->distance)) first = ObstacleHit{int(i), t};
   }
   return first;
 }

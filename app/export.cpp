@@ -22,8 +22,7 @@ std::vector<glm::vec3> rows_of(const Model& model, const std::vector<glm::dvec3>
 // Of each vertex; bodies own ranges of them, in either order.
 std::vector<std::uint32_t> body_numbers(const Model& model) {
   std::vector<std::uint32_t> numbers;
-  for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
-    numbers.insert(numbers.end(), model.bodies[b].vertices, b);
+  for (std::uint32_t b = 0; b < model.bodies.size(); ++b) numbers.insert(numbers.end(), model.bodies[b].vertices, b);
   return numbers;
 }
 
@@ -49,8 +48,8 @@ SurfaceMesh seen_surface(const Model& model, const std::vector<glm::dvec3>& posi
 // Samples follow: the vertices of the OBJ, in its order.
 std::string pc2_header(std::size_t vertices, long frames) {
   const auto bytes = [](auto value) { return bytes_of(std::vector{value}); };
-  return std::string("POINTCACHE2\0", 12) + bytes(std::int32_t(1)) + bytes(std::int32_t(vertices)) +
-         bytes(0.0f) + bytes(1.0f) + bytes(std::int32_t(frames));
+  return std::string("POINTCACHE2\0", 12) + bytes(std::int32_t(1)) + bytes(std::int32_t(vertices)) + bytes(0.0f) +
+         bytes(1.0f) + bytes(std::int32_t(frames));
 }
 
 // VTK's XML: arrays follow the text as they are, each behind its length.
@@ -87,8 +86,7 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
     }
   std::vector<std::uint32_t> corners;
   for (const Tet& tet : original_tets(model)) corners.insert(corners.end(), tet.begin(), tet.end());
-  for (const Triangle& t : in_original_numbers(model, sheets))
-    corners.insert(corners.end(), t.begin(), t.end());
+  for (const Triangle& t : in_original_numbers(model, sheets)) corners.insert(corners.end(), t.begin(), t.end());
   std::vector<std::uint8_t> types(tets, 10);  // VTK's numbers
   types.resize(ends.size(), 5);
   std::string text = fmt::format(
@@ -121,8 +119,7 @@ void write_arrays(const Sim& sim, const std::filesystem::path& folder) {
   write_npy(folder / "bodies.npy", body_numbers(model));
   if (model.carried.triangles.empty()) return;
   const SurfaceMesh surface = seen_surface(model, state.positions);
-  write_npy(folder / "surface.npy",
-            std::vector<glm::vec3>(surface.positions.begin(), surface.positions.end()));
+  write_npy(folder / "surface.npy", std::vector<glm::vec3>(surface.positions.begin(), surface.positions.end()));
   write_npy(folder / "surface_faces.npy", surface.triangles);
 }
 
@@ -144,8 +141,8 @@ void add_frame(Export& files, const Sim& sim) {
   if (files.trajectory) files.trajectory->add(bytes_of(positions));
   if (files.vtk) {
     write_file(files.folder / "vtk" / (name + ".vtu"), vtu_text(sim, state, positions));
-    files.times += fmt::format("<DataSet timestep=\"{:.9g}\" file=\"vtk/{}.vtu\"/>\n",
-                               double(sim.steps) * sim.settings.dt, name);
+    files.times +=
+        fmt::format("<DataSet timestep=\"{:.9g}\" file=\"vtk/{}.vtu\"/>\n", double(sim.steps) * sim.settings.dt, name);
   }
   if (files.cache || files.ply) {
     const SurfaceMesh surface = seen_surface(*sim.model, state.positions);
@@ -170,8 +167,8 @@ void close(Export& files, const Sim& sim) {
   }
   if (files.vtk)
     write_file(files.folder / "frames.pvd",
-               "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n" +
-                   files.times + "</Collection>\n</VTKFile>\n");
+               "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n" + files.times +
+                   "</Collection>\n</VTKFile>\n");
 }
 
 }  // namespace tetpbd

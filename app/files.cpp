@@ -70,15 +70,14 @@ std::optional<Image> read_png(const fs::path& file) {
 
 std::string npy_header(bool floats, const std::vector<std::size_t>& shape) {
   return fmt::format("{}{:<117}\n", std::string_view("\x93NUMPY\x01\0\x76\0", 10),
-                     fmt::format("{{'descr': '<{}4', 'fortran_order': False, 'shape': ({},), }}",
-                                 floats ? 'f' : 'u', fmt::join(shape, ", ")));
+                     fmt::format("{{'descr': '<{}4', 'fortran_order': False, 'shape': ({},), }}", floats ? 'f' : 'u',
+                                 fmt::join(shape, ", ")));
 }
 
 void write_npy(const fs::path& file, const std::vector<glm::vec3>& rows) {
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (!std::isfinite(rows[i].x) || !std::isfinite(rows[i].y) || !std::isfinite(rows[i].z))
-      throw Error("positions are not finite", fmt::format("{}, vertex {}", file.string(), i),
-                  "nothing is written", 1);
+      throw Error("positions are not finite", fmt::format("{}, vertex {}", file.string(), i), "nothing is written", 1);
   write_file(file, npy_header(true, {rows.size(), 3}) + bytes_of(rows));
 }
 

@@ -38,8 +38,7 @@ void watch(Grab& grab, const Sim& sim, bool wait = false) {
   }
   if (grab.copied) return;
   for (std::size_t i = 0; i < grab.watched.size(); ++i)
-    sim.positions.copy_to(grab.copy, i * sizeof(Position), grab.watched[i] * sizeof(Position),
-                          sizeof(Position));
+    sim.positions.copy_to(grab.copy, i * sizeof(Position), grab.watched[i] * sizeof(Position), sizeof(Position));
   grab.copied = Fence::here();
 }
 

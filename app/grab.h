@@ -16,7 +16,7 @@ struct Hold {
   std::vector<glm::dvec3> starts;       ///< m, when caught
   std::vector<double> behind;           ///< part of the slack: 0 of the caught one, 1 at the rim
   double slack = 0;                     ///< m
-  bool was_pinned = false;  ///< the caught one, by the user: it stays so when let go, and is alone
+  bool was_pinned = false;              ///< the caught one, by the user: it stays so when let go, and is alone
   std::uint32_t caught() const { return vertices.front(); }
   bool has(std::uint32_t vertex) const;
 };

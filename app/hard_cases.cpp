@@ -21,8 +21,7 @@ const char* case_table =
     "inverted_tets:inverted 10, rigid_distance 16";
 
 /// The case's scene with `mesh` for its body; a scene whose body is no bunny is itself the only mesh.
-std::optional<Scene> scene_of(const std::string& name, const std::string& mesh,
-                              const SceneOverrides& overrides) {
+std::optional<Scene> scene_of(const std::string& name, const std::string& mesh, const SceneOverrides& overrides) {
   Scene scene = load_scene("hard/" + name, overrides);
   BodyDescription& body = scene.bodies.at(0);
   const std::string own = body.block ? "block" : body.tet ? "tet" : "bunny";
@@ -61,8 +60,7 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
   Sim sim = create_sim(model, settings, {.count_guards = true});
   Metrics metrics = create_metrics(*model, sim.system);
   const MeasuredRun run = run_loop(sim, &metrics, steps);
-  const auto recovered =
-      run.errors.finite ? recovered_at(run.measurements, steps, hard(settings)) : std::nullopt;
+  const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps, hard(settings)) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
   row.update({{"steps", run.steps},
               {"recovered_at_step", recovered ? ordered_json(*recovered) : nullptr},

@@ -45,8 +45,8 @@ struct FrameWriter {
         video_every(run.video_every > 0 ? run.video_every : steps_per_frame(dt)),
         target(make_target(run.size[0], run.size[1], run.samples)),
         renderer(make_renderer(*sim.model)),
-        frame(make_frame(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])),
-                         run.view, target)) {
+        frame(make_frame(sim, scene_camera(scene, *sim.model, float(run.size[0]) / float(run.size[1])), run.view,
+                         target)) {
     const double rate = std::clamp(1 / (double(video_every) * dt), 1.0, 120.0);  // of real time
     if (run.view.colour == Colour::motion && !right)
       throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
@@ -71,8 +71,7 @@ struct FrameWriter {
     frame.options.follow = false;
     const auto centre = poll_centre(renderer, true);
     if (centre && options.view.follow) follow(camera, *centre, float(double(s - drawn) * dt));
-    if (centre && !options.view.follow)
-      keep_in_view(camera, *centre, float(target.width) / float(target.height));
+    if (centre && !options.view.follow) keep_in_view(camera, *centre, float(target.width) / float(target.height));
     drawn = s;
   }
 
@@ -193,8 +192,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   Metrics metrics = create_metrics(*model, sim.system);
   const auto right = right_motion(*model, sim.settings, options.reference);
   std::optional<FrameWriter> frames;
-  if (options.png_every > 0 || !options.video.empty())
-    frames.emplace(scene, sim, options, right ? &*right : nullptr);
+  if (options.png_every > 0 || !options.video.empty()) frames.emplace(scene, sim, options, right ? &*right : nullptr);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());
 
@@ -226,21 +224,19 @@ int run_headless(Scene scene, const RunOptions& options) {
   auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
   statistics["error"]["measured_every"] = options.measure_every;
   if (files)
-    statistics["frames"] = {{"count", files->count},
-                            {"every", files->every},
-                            {"seconds", double(files->every) * scene.settings.dt}};
+    statistics["frames"] = {
+        {"count", files->count}, {"every", files->every}, {"seconds", double(files->every) * scene.settings.dt}};
   write_file(options.out / "stats.json", json_text(statistics, 2) + "\n");
   if (csv) csv->close();
   if ((options.positions || options.positions_every > 0) && good) write_arrays(sim, options.out);
-  fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name,
-             sim.steps, context.capabilities().renderer,
-             options.measure_every > 1 ? "of measured steps " : "", run.errors.max_volume_loss_percent,
-             good ? worst_tet(sim) + ", " : "", median(run.wall_ms), (options.out / "stats.json").string());
+  fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name, sim.steps,
+             context.capabilities().renderer, options.measure_every > 1 ? "of measured steps " : "",
+             run.errors.max_volume_loss_percent, good ? worst_tet(sim) + ", " : "", median(run.wall_ms),
+             (options.out / "stats.json").string());
   for (const auto& [name, count] : dropped(sim))
     fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
   if (interrupted())
-    throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps),
-                "what was finished is written", 1);
+    throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);
   return 0;
 }
@@ -266,14 +262,14 @@ int print_explanation(Scene scene, int gpu, long steps) {
   for (const auto& buffer : e.buffers) fmt::print("{:<52}{:>14}\n", buffer.name, buffer.bytes);
   fmt::print("{:<52}{:>14}  ({:.1f} a tet)\n\n", "all", e.bytes,
              double(e.bytes) / double(std::max<std::size_t>(1, model->rest.tets.size())));
-  fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10}{:>8}\n", "kernel", "work-groups", "per step", "bytes each",
-             "µs each", "GB/s");
+  fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10}{:>8}\n", "kernel", "work-groups", "per step", "bytes each", "µs each",
+             "GB/s");
   for (const auto& d : e.dispatches)
     fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10}{:>8}\n", d.name, d.work_groups, d.per_step, d.bytes,
                d.ms ? fmt::format("{:.1f}", 1e3 * *d.ms) : "",
                d.ms ? fmt::format("{:.3g}", 1e-6 * double(d.bytes) / *d.ms) : "");
-  fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10.1f}\n", "all, in a step", "", e.dispatches_per_step,
-             e.bytes_per_step, 1e3 * e.ms_per_step);
+  fmt::print("{:<52}{:>12}{:>10}{:>14}{:>10.1f}\n", "all, in a step", "", e.dispatches_per_step, e.bytes_per_step,
+             1e3 * e.ms_per_step);
   if (e.dispatches.empty()) fmt::print("mode {} steps on the CPU and uploads positions\n", sim.settings.mode);
   return 0;
 }
@@ -284,16 +280,13 @@ int print_info(int gpu) {
   for (std::size_t i = 0; i < devices.size(); ++i) fmt::print("--gpu {}: {}\n", i, devices[i]);
   HeadlessContext context(gpu);
   const Capabilities& c = context.capabilities();
-  fmt::print("OpenGL vendor:   {}\nOpenGL renderer: {}{}\nOpenGL version:  {}\nGLSL version:    {}\n",
-             c.vendor, c.renderer, c.software ? " (software: a CPU, not a GPU)" : "", c.version,
-             c.shading_language);
-  fmt::print("storage blocks:  {} a compute stage, {} bytes each at most\n", c.storage_blocks,
-             c.storage_bytes);
+  fmt::print("OpenGL vendor:   {}\nOpenGL renderer: {}{}\nOpenGL version:  {}\nGLSL version:    {}\n", c.vendor,
+             c.renderer, c.software ? " (software: a CPU, not a GPU)" : "", c.version, c.shading_language);
+  fmt::print("storage blocks:  {} a compute stage, {} bytes each at most\n", c.storage_blocks, c.storage_bytes);
   fmt::print("work-groups:     {} invocations, {} bytes of shared memory\nMSAA:            {} samples\n",
              c.work_group_invocations, c.shared_bytes, c.samples);
-  fmt::print(
-      "extensions used: none beyond OpenGL 4.3 core, but to ask for free memory\nmodels:          {}\n",
-      models_folder().string());
+  fmt::print("extensions used: none beyond OpenGL 4.3 core, but to ask for free memory\nmodels:          {}\n",
+             models_folder().string());
   fmt::print("shaders:         {}\n", shader_folder().empty() ? "embedded" : shader_folder());
   fmt::print(
       "licences:        tetpbd MIT; TetGen, a program of its own, AGPL-3+; "

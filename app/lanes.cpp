@@ -49,8 +49,7 @@ std::string describe(const Lane& lane, bool material) {
 
 std::optional<float> History::at(double time) const {
   const auto after = std::ranges::upper_bound(times, time);
-  return after == times.begin() ? std::nullopt
-                                : std::optional(values[std::size_t(after - times.begin()) - 1]);
+  return after == times.begin() ? std::nullopt : std::optional(values[std::size_t(after - times.begin()) - 1]);
 }
 
 void History::add(double value, double time) {
@@ -59,8 +58,7 @@ void History::add(double value, double time) {
     values.resize(kept), times.resize(kept);
     added = kept ? long(kept - 1) * every + 1 : 0;
   }
-  if (!values.empty() && (added - 1) % every != 0)
-    values.pop_back(), times.pop_back();  // stood for the newest alone
+  if (!values.empty() && (added - 1) % every != 0) values.pop_back(), times.pop_back();  // stood for the newest alone
   values.push_back(float(value)), times.push_back(time);
   ++added;
   if (values.size() <= most) return;
@@ -114,8 +112,7 @@ const std::vector<Comparison>& comparisons() {
        {"material=neo-hookean,mode=explicit", "material=none,hard"}},
       {"forces, implicit, XPBD",
        "of soft bodies: leapfrog at half of what is stable, one implicit step, 20 substeps, 5",
-       {"mode=explicit", "newton", "mode=node,iterations=1,substeps=20",
-        "mode=node,iterations=1,substeps=5"}},
+       {"mode=explicit", "newton", "mode=node,iterations=1,substeps=20", "mode=node,iterations=1,substeps=5"}},
   };
   return rows;
 }
@@ -139,12 +136,10 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     const std::size_t equals = word.find('=');
     const Parameter* row = find_parameter(word.substr(0, equals));
     if (row && shared_by_lanes(*row))
-      throw Error(fmt::format("{} is that of all lanes", row->name), where,
-                  "give it as a flag or in the scene");
+      throw Error(fmt::format("{} is that of all lanes", row->name), where, "give it as a flag or in the scene");
     if (equals != std::string::npos && row)
       set_parameter(settings, *row, word.substr(equals + 1), where);
-    else if (!apply_preset(settings, solver_presets(), word) &&
-             !apply_preset(settings, material_presets(), word))
+    else if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
       throw Error(fmt::format("'{}' is no way to solve", word), where,
                   did_you_mean(word, preset_names(solver_presets())) +
                       fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",

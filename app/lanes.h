@@ -31,9 +31,9 @@ struct Lane {
   std::optional<Metrics> metrics{};             ///< made when first shown
   History step_ms{}, volume_error{}, energy{};  ///< J, with the elastic one of a material
   History distance{};                           ///< from what is right, % of the size
-  History depth{};  ///< of the vertex deepest in an obstacle or another body, % of the size
-  Buffer apart{};   ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
-                    ///< known
+  History depth{};                              ///< of the vertex deepest in an obstacle or another body, % of the size
+  Buffer apart{};    ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
+                     ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)
   std::optional<float> far() const { return distance.at(simulated_time(sim)); }  ///< now
   /// Steps no more, since its state is not finite, while others go on.

@@ -32,8 +32,7 @@ bool has_answer(LiveMap& map) {
   if (!map.search) {
     map.right_of = key;
     map.search = std::make_unique<LiveMap::Search>();
-    const auto find = [model = map.model, settings = cell.settings, steps = map.steps,
-                       stop = map.search->stop] {
+    const auto find = [model = map.model, settings = cell.settings, steps = map.steps, stop = map.search->stop] {
       return answer_for(*model, settings, steps, [&](long) {
         if (*stop) throw Interrupted();
       });
@@ -86,8 +85,7 @@ void judge(LiveMap& map) {
     if (map.volume > 0) map.loss = std::max(map.loss, 100 * (map.volume - now) / map.volume);
   }
   cell.percent = map.right ? 100 * map.error.rms : map.loss;
-  if (sim.steps >= map.steps)
-    end_cell(map, std::isfinite(cell.percent) ? MapCell::finished : MapCell::failed);
+  if (sim.steps >= map.steps) end_cell(map, std::isfinite(cell.percent) ? MapCell::finished : MapCell::failed);
 }
 
 // A batch of steps, or what comes before and after one; false while it has to wait.
@@ -114,10 +112,9 @@ bool go_on(LiveMap& map, const std::function<bool()>& in_time) {
 
 }  // namespace
 
-LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x,
-                  const std::string& y, double seconds) {
-  LiveMap map{
-      .x = map_axis(x, "across"), .y = map_axis(y, "up"), .model = std::move(model), .seconds = seconds};
+LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x, const std::string& y,
+                  double seconds) {
+  LiveMap map{.x = map_axis(x, "across"), .y = map_axis(y, "up"), .model = std::move(model), .seconds = seconds};
   if (map.model->rest.tets.size() > LiveMap::most_tets)
     throw Error(fmt::format("a map here is of at most {} tets", LiveMap::most_tets), "stability map",
                 "take a smaller scene, or tetpbd map");
@@ -128,8 +125,7 @@ LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, cons
       cell.settings = base;
       set_parameter(cell.settings, *map.x.row, across, "across");
       set_parameter(cell.settings, *map.y.row, up, "up");
-      check_settings(cell.settings,
-                     fmt::format("{} {}, {} {}", map.x.row->name, across, map.y.row->name, up));
+      check_settings(cell.settings, fmt::format("{} {}, {} {}", map.x.row->name, across, map.y.row->name, up));
     }
   map.volume = mesh_volume(map.model->rest);
   map.order.resize(map.cells.size());
@@ -139,16 +135,13 @@ LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, cons
     return axis.values.size() > 1 &&
            scene_key(*map.model, map.cells[0].settings) != scene_key(*map.model, map.cells[other].settings);
   };
-  if (costs(map.x, std::min<std::size_t>(1, columns - 1)) &&
-      !costs(map.y, std::min(columns, map.cells.size() - 1)))
+  if (costs(map.x, std::min<std::size_t>(1, columns - 1)) && !costs(map.y, std::min(columns, map.cells.size() - 1)))
     std::ranges::sort(map.order, {}, [&](std::size_t i) { return std::pair(i % columns, i / columns); });
   return map;
 }
 
 void fill_map(LiveMap& map, double budget) {
-  const auto in_time = [budget, begin = std::chrono::steady_clock::now()] {
-    return seconds_since(begin) < budget;
-  };
+  const auto in_time = [budget, begin = std::chrono::steady_clock::now()] { return seconds_since(begin) < budget; };
   try {
     while (!map.is_done() && in_time() && go_on(map, in_time)) {
     }

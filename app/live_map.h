@@ -14,8 +14,7 @@ namespace tetpbd {
 struct MapCell {
   enum State { waiting, running, finished, failed, refused } state = waiting;
   Settings settings;
-  double percent =
-      0;  ///< from the right motion over the run, of the size; without one the largest net volume loss
+  double percent = 0;  ///< from the right motion over the run, of the size; without one the largest net volume loss
   long failed_at = 0;  ///< step
   std::string why{};   ///< refused
 };
@@ -49,8 +48,8 @@ struct LiveMap {
 };
 
 /// Throws Error for axes that are none, and for bodies that are too large.
-LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x,
-                  const std::string& y, double seconds);
+LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x, const std::string& y,
+                  double seconds);
 /// Goes on for about so long (s), but for what a change of settings compiles.
 void fill_map(LiveMap& map, double budget);
 

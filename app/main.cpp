@@ -52,8 +52,7 @@ struct Arguments {
 // kinds of options
 
 /// "1280x720", "2/8": two whole numbers in a range.
-std::array<int, 2> two_numbers(const std::string& flag, const std::string& text, char between, int low,
-                               int high) {
+std::array<int, 2> two_numbers(const std::string& flag, const std::string& text, char between, int low, int high) {
   std::istringstream in(text);
   int first = 0, second = 0;
   char found = 0;
@@ -71,8 +70,8 @@ CLI::Validator one_of(const Words& words) {
       [=](std::string& text) {
         const auto found = std::ranges::find(words, text);
         if (found == words.end())
-          return fmt::format("{}must be one of {}, not '{}'",
-                             did_you_mean(text, {words.begin(), words.end()}), fmt::join(words, ", "), text);
+          return fmt::format("{}must be one of {}, not '{}'", did_you_mean(text, {words.begin(), words.end()}),
+                             fmt::join(words, ", "), text);
         text = std::to_string(found - words.begin());
         return std::string();
       },
@@ -95,8 +94,8 @@ void add(CLI::App& command, const char* flag, T& target, N low, N high, const st
   const auto in_range = [=](const std::string& text) {
     N value{};
     if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
-    return fmt::format("must be a {} from {} to {}, not '{}'",
-                       std::is_integral_v<N> ? "whole number" : "number", low, high, text);
+    return fmt::format("must be a {} from {} to {}, not '{}'", std::is_integral_v<N> ? "whole number" : "number", low,
+                       high, text);
   };
   option->check(in_range, fmt::format("[{} .. {}]", low, high));
   bool shown = false;
@@ -149,9 +148,9 @@ void add_parameters(CLI::App& command, SceneOverrides& overrides) {
   for (const Parameter& row : parameters()) {
     if (command.get_option_no_throw(flag_name(row))) continue;
     const auto words = choices(row);
-    std::string allowed =
-        words.empty() ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
-                      : fmt::format(": {}", fmt::join(words, ", "));
+    std::string allowed = words.empty()
+                              ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
+                              : fmt::format(": {}", fmt::join(words, ", "));
     if (row.name == "mode") {
       allowed = ":";
       for (const SolverMode& mode : solver_modes()) allowed += fmt::format("\n{}: {}", mode.name, mode.help);
@@ -194,8 +193,7 @@ void open_scene(Arguments& a) {
 
 // Options that mean the same in every command that opens a scene. Where nobody says the mode, the device may.
 void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
-  add(command, "--scene,--scenes", a.scene,
-      fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")));
+  add(command, "--scene,--scenes", a.scene, fmt::format("a scene file, or one of {}", fmt::join(scene_names(), ", ")));
   add_overrides(command, a.overrides);
   command.add_option("--deform", a.overrides.deform,
                      "start shape: none, flatten, line, point, random, mirror, stretch:F, squash:F, "
@@ -210,19 +208,16 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
   add(command, "--budget-ms", a.overrides.budget_ms, 1e-6, 1e6,
       "GPU ms per step, for --solver auto (default: a tenth of dt)");
   add_gpu(command, a.run.gpu);
-  command.add_flag(
-      "--explain", a.explain,
-      "print what the scene allocates and dispatches after --steps steps (default: 3), and stop");
+  command.add_flag("--explain", a.explain,
+                   "print what the scene allocates and dispatches after --steps steps (default: 3), and stop");
   add_sizes(command, "--size", a.sizes, "of images and window, WxH from 16x16 to 16384x16384")->expected(1);
   add_samples(command, a.run.samples);
   CLI::App& view = *command.add_option_group("View");
   ViewOptions& look = a.run.view;
-  view.add_option("--look", look.look, fmt::format("{}", fmt::join(look_names, ", ")))
-      ->transform(one_of(look_names));
+  view.add_option("--look", look.look, fmt::format("{}", fmt::join(look_names, ", ")))->transform(one_of(look_names));
   view.add_option("--colour", look.colour, fmt::format("{}", fmt::join(colour_names, ", ")))
       ->transform(one_of(colour_names));
-  add(view, "--range", a.run.range, 1e-12, 1e12,
-      "end of the colour scale, in its unit (default: as the values ask)");
+  add(view, "--range", a.run.range, 1e-12, 1e12, "end of the colour scale, in its unit (default: as the values ask)");
   add(view, "--cut", look.cut, 0.0, 1.0, "shows what is below this part of the body alone");
   add(view, "--cut-axis", look.cut_axis, 0, 2, "0: x, 1: y, 2: z");
   view.add_flag("!--flat", look.smooth_normals, "flat normals");
@@ -269,17 +264,15 @@ void add_commands(CLI::App& app, Arguments& a) {
       "memory for states to go back to, on the GPU and of CPU modes; 0: none");
   add(view, "--record", a.run.record, "write what is done into this file, for tetpbd run --replay");
 
-  CLI::App& run =
-      command("run", "headless: steps a scene, writes frames, video, statistics", [](const Arguments& a) {
-        return a.run.replay.empty() ? run_headless(*a.opened, a.run) : run_replay(a.run);
-      });
+  CLI::App& run = command("run", "headless: steps a scene, writes frames, video, statistics", [](const Arguments& a) {
+    return a.run.replay.empty() ? run_headless(*a.opened, a.run) : run_replay(a.run);
+  });
   add_scene(run, a, true);
   add(run, "--steps", a.run.steps, 1L, most_steps, "steps to take (default: the scene's duration)");
   add(run, "--out", a.run.out, "folder for stats.json, stats.csv, frames");
   add(run, "--png-every", a.run.png_every, 1L, most_steps, "write frame_NNNNN.png every K steps");
   add(run, "--video", a.run.video, "write a video (.mp4 .mkv .webm .gif) through ffmpeg, in real time");
-  add(run, "--video-every", a.run.video_every, 1L, most_steps,
-      "steps per video frame (default: those of 1/30 s)");
+  add(run, "--video-every", a.run.video_every, 1L, most_steps, "steps per video frame (default: those of 1/30 s)");
   add(run, "--turntable", a.run.turntable, 1e-3, 1e9, "the camera turns about the bodies once in so many s");
   add(run, "--camera-path", a.run.camera_path,
       "a JSON list of cameras as in a scene, each with its \"time\" in s, which it goes through")
@@ -287,8 +280,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(run, "--csv-every", a.run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
   add(run, "--reference", a.run.reference,
       "the right motion, made by tetpbd reference (default: the cache's of this scene)");
-  add(run, "--measure-every", a.run.measure_every, 1L, most_steps,
-      "measure errors every K steps and at the end");
+  add(run, "--measure-every", a.run.measure_every, 1L, most_steps, "measure errors every K steps and at the end");
   run.add_flag("--positions", a.run.positions,
                "write positions, velocities, rest (positions), tets, faces and bodies (of vertices) as .npy");
   add(run, "--positions-every", a.run.positions_every, 1L, most_steps,
@@ -302,11 +294,10 @@ void add_commands(CLI::App& app, Arguments& a) {
   CLI::Option* replay = add(run, "--replay", a.run.replay,
                             "instead: what a record of tetpbd view --record says, lanes and all; with "
                             "--video, drawn at the speed it was played");
-  for (const char* dropped :
-       {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
-        "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
-        "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
-        "--turntable", "--camera-path", "--positions-every", "--export",    "--height"})
+  for (const char* dropped : {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
+                              "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
+                              "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
+                              "--turntable", "--camera-path", "--positions-every", "--export",    "--height"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   add_progress(run, a.run.progress);
@@ -319,13 +310,11 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(reference, "--method", a.reference.method,
       "leapfrog or implicit, for soft bodies (default: leapfrog, unless its steps are too short)")
       ->check(one_of(std::array{"leapfrog", "implicit"}));
-  add(reference, "--out", a.reference.out,
-      "file to write (default: in the cache, where runs of the scene find it)");
+  add(reference, "--out", a.reference.out, "file to write (default: in the cache, where runs of the scene find it)");
   add_progress(reference, a.reference.progress);
 
-  CLI::App& soak =
-      command("soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down",
-              [](const Arguments& a) { return run_soak(*a.opened, a.soak); });
+  CLI::App& soak = command("soak", "a long run of a body at rest: fails if it drifts, leaks memory or slows down",
+                           [](const Arguments& a) { return run_soak(*a.opened, a.soak); });
   add_scene(soak, a);
   add(soak, "--settle", a.soak.settle, 0L, most_steps, "steps before the watch begins");
   add(soak, "--steps", a.soak.steps, 10L, most_steps, "steps watched");
@@ -388,10 +377,8 @@ void add_commands(CLI::App& app, Arguments& a) {
       "by what: motion (the distance from the right one, found first if need be), volume (largest net loss), "
       "strain, overlap (how deep bodies are in each other; default: motion where it is known)")
       ->check(one_of(std::array{"motion", "volume", "strain", "overlap"}));
-  add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9,
-      "print the best setting within so many ms per step");
-  add(compare, "--error", a.compare.error_percent, 1e-9, 1e9,
-      "print the cheapest setting with at most this error, %");
+  add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9, "print the best setting within so many ms per step");
+  add(compare, "--error", a.compare.error_percent, 1e-9, 1e9, "print the cheapest setting with at most this error, %");
   compare.add_option_function<std::string>(
       "--shard",
       [&](const std::string& text) {
@@ -409,30 +396,25 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_gpu(compare, a.compare.gpu);
   add(compare, "--out", a.compare.out, "folder for compare.html, .csv, .json, .svg, .png");
 
-  CLI::App& reproduce =
-      command("reproduce", "the paper's table and figures, measured here, with plots and one report",
-              [](const Arguments& a) { return run_reproduce(a.reproduce); });
+  CLI::App& reproduce = command("reproduce", "the paper's table and figures, measured here, with plots and one report",
+                                [](const Arguments& a) { return run_reproduce(a.reproduce); });
   add(reproduce, "--out", a.reproduce.out, "folder for report.html, figures, tables");
-  reproduce.add_flag("--quick", a.reproduce.quick,
-                     "bunny alone, few frames: checks the trends without a GPU");
+  reproduce.add_flag("--quick", a.reproduce.quick, "bunny alone, few frames: checks the trends without a GPU");
   add_gpu(reproduce, a.reproduce.gpu);
 
-  CLI::App& mesh = command(
-      "mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", [](const Arguments& a) {
+  CLI::App& mesh =
+      command("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", [](const Arguments& a) {
         return a.mesh_repaired.empty() ? run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json)
                                        : run_repair(a.mesh_file, a.mesh_repaired);
       });
   add(mesh, "file", a.mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")->required();
   add_tetgen(mesh, a.switches);
-  add(mesh, "--out", a.mesh_out,
-      "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
-  add(mesh, "--repair", a.mesh_repaired,
-      "mend the surface as far as that is safe, and write it: .ply .obj .off .stl");
+  add(mesh, "--out", a.mesh_out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  add(mesh, "--repair", a.mesh_repaired, "mend the surface as far as that is safe, and write it: .ply .obj .off .stl");
   mesh.add_flag("--json", a.json, "print the report as JSON");
 
-  CLI::App& info =
-      command("info", "GL version, devices, limits, extensions used, build, licences",
-              [](const Arguments& a) { return (a.selftest ? run_selftest : print_info)(a.run.gpu); });
+  CLI::App& info = command("info", "GL version, devices, limits, extensions used, build, licences",
+                           [](const Arguments& a) { return (a.selftest ? run_selftest : print_info)(a.run.gpu); });
   add_gpu(info, a.run.gpu);
   info.add_flag("--selftest", a.selftest,
                 "check that this device computes what it should, and measure how fast; a minute at most");
@@ -449,15 +431,13 @@ void add_commands(CLI::App& app, Arguments& a) {
   const auto take = [&](auto& self, const CLI::App& from) -> void {
     for (const CLI::Option* option : from.get_options())
       for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
-    for (const CLI::App* group :
-         from.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); }))
+    for (const CLI::App* group : from.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); }))
       self(self, *group);
   };
   const auto commands = app.get_subcommands([](const CLI::App* one) { return !one->get_name().empty(); });
   for (const CLI::App* one : commands) {
     if (parsed.empty()) known.push_back(one->get_name());
-    if (one->get_option_no_throw(word))
-      mend += fmt::format("it is an option of tetpbd {}; ", one->get_name());
+    if (one->get_option_no_throw(word)) mend += fmt::format("it is an option of tetpbd {}; ", one->get_name());
   }
   for (const CLI::App* one : parsed) take(take, *one);
   take(take, app);
@@ -473,9 +453,8 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   app.require_subcommand(0, 1);
   app.fallthrough();
   std::string shaders;
-  app.add_option(
-      "--shaders", shaders,
-      "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
+  app.add_option("--shaders", shaders,
+                 "folder to read shaders from instead of the embedded ones; edits take effect at once in the window");
   Arguments arguments;
   add_commands(app, arguments);
 
@@ -509,8 +488,7 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
     open_scene(arguments);
   }
   return [a = std::move(arguments)] {
-    if (a.start != start_view || !a.run.record.empty())
-      catch_interrupts();  // else there is nothing to finish
+    if (a.start != start_view || !a.run.record.empty()) catch_interrupts();  // else there is nothing to finish
     if (!a.run.dump_shaders.empty()) {
       make_output_folder(a.run.dump_shaders);
       set_shader_dump(a.run.dump_shaders.string());

@@ -26,8 +26,7 @@ double to_number(const std::string& text, const std::string& where) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size())
-    throw Error(fmt::format("'{}' is no number", text), where,
-                "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+    throw Error(fmt::format("'{}' is no number", text), where, "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   return value;
 }
 
@@ -75,8 +74,7 @@ MapAxis map_axis(const std::string& text, const std::string& flag) {
   MapAxis axis{row, split(text.substr(equals + 1), ',')};
   const auto range = split(text.substr(equals + 1), ':');
   if (range.size() == 3) {
-    const double from = to_number(range[0], where), to = to_number(range[1], where),
-                 count = to_number(range[2], where);
+    const double from = to_number(range[0], where), to = to_number(range[1], where), count = to_number(range[2], where);
     const bool factors = row->logarithmic && from > 0 && to > 0;
     if (!(count >= 2 && count <= 100)) throw Error("bad number of values", where, "give 2 to 100");
     axis.values.clear();
@@ -90,8 +88,7 @@ MapAxis map_axis(const std::string& text, const std::string& flag) {
   }
   Settings probe;
   for (const std::string& value : axis.values) set_parameter(probe, *row, value, where);
-  if (axis.values.empty())
-    throw Error("no values", where, "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+  if (axis.values.empty()) throw Error("no values", where, "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   return axis;
 }
 
@@ -107,16 +104,15 @@ std::optional<Motion> answer_for(const Model& model, const Settings& settings, l
 int run_map(const MapOptions& options) {
   const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");
   if (x.row == y.row) throw Error("both axes are the same setting", x.row->name, "give another to --y");
-  Sweep sweep{
-      "map",
-      "cell",
-      split(std::string("x,y,") + results, ','),
-      2,
-      fmt::format("x:{} {}, y:{} {}, ", x.row->name, std::max<std::size_t>(12, x.row->name.size() + 3),
-                  y.row->name, std::max<std::size_t>(12, y.row->name.size() + 3)) +
-          "finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
-          "max_volume_loss_percent:loss-% 10, tet_volume_max:worst-tet 12, ms_per_step:ms 10",
-      {}};
+  Sweep sweep{"map",
+              "cell",
+              split(std::string("x,y,") + results, ','),
+              2,
+              fmt::format("x:{} {}, y:{} {}, ", x.row->name, std::max<std::size_t>(12, x.row->name.size() + 3),
+                          y.row->name, std::max<std::size_t>(12, y.row->name.size() + 3)) +
+                  "finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
+                  "max_volume_loss_percent:loss-% 10, tet_volume_max:worst-tet 12, ms_per_step:ms 10",
+              {}};
   ordered_json document = run_or_merge(sweep, {}, options.out, options.gpu, [&] {
     Scene scene = load_scene(options.scene, options.overrides);
     const auto model = build_model(scene);

@@ -32,8 +32,7 @@ void draw_grid(Session& s, const LiveMap& map) {
   const std::size_t columns = map.x.values.size(), rows = map.y.values.size();
   const float line = ImGui::GetTextLineHeight(), whole = ImGui::GetContentRegionAvail().x;
   float labels = 0;
-  for (const std::string& value : map.y.values)
-    labels = std::max(labels, ImGui::CalcTextSize(value.c_str()).x + 6);
+  for (const std::string& value : map.y.values) labels = std::max(labels, ImGui::CalcTextSize(value.c_str()).x + 6);
   const float wide = (whole - labels) / float(columns), high = std::clamp(wide, 1.3f * line, 2.2f * line);
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const ImVec2 corner = ImGui::GetCursorScreenPos();
@@ -61,20 +60,16 @@ void draw_grid(Session& s, const LiveMap& map) {
       mark(s, id);
       const bool bad = cell.state == MapCell::failed || cell.state == MapCell::refused;
       const double part = heat_part(cell.percent);
-      const glm::vec3 c(bad                               ? glm::dvec3(0.2)
-                        : cell.state == MapCell::finished ? heat(part)
-                                                          : glm::dvec3(0.8));
+      const glm::vec3 c(bad ? glm::dvec3(0.2) : cell.state == MapCell::finished ? heat(part) : glm::dvec3(0.8));
       draw.AddRectFilled(low, end, ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1)));
       const bool dark = bad || (cell.state == MapCell::finished && (part < 0.45 || part > 0.93));
-      const std::string said =
-          cell.state == MapCell::running ? "..."
-          : cell.state == MapCell::finished
-              ? fmt::format(fmt::runtime(cell.percent < 9.5 ? "{:.1g}" : "{:.0f}"), cell.percent)
-          : cell.state == MapCell::failed  ? fmt::format("@{}", cell.failed_at)
-          : cell.state == MapCell::refused ? "no"
-                                           : "";
-      write(said, (low.x + end.x) / 2, (low.y + end.y) / 2, dark ? IM_COL32_WHITE : IM_COL32(30, 30, 30, 255),
-            wide);
+      const std::string said = cell.state == MapCell::running ? "..."
+                               : cell.state == MapCell::finished
+                                   ? fmt::format(fmt::runtime(cell.percent < 9.5 ? "{:.1g}" : "{:.0f}"), cell.percent)
+                               : cell.state == MapCell::failed  ? fmt::format("@{}", cell.failed_at)
+                               : cell.state == MapCell::refused ? "no"
+                                                                : "";
+      write(said, (low.x + end.x) / 2, (low.y + end.y) / 2, dark ? IM_COL32_WHITE : IM_COL32(30, 30, 30, 255), wide);
       if (parameter_text(own, *map.x.row) == parameter_text(cell.settings, *map.x.row) &&
           parameter_text(own, *map.y.row) == parameter_text(cell.settings, *map.y.row))
         draw.AddRect(low, end, ink, 0, 0, 2 * s.ui.scale);  // the lane's own
@@ -85,12 +80,11 @@ void draw_grid(Session& s, const LiveMap& map) {
   }
   const float below = corner.y + float(rows) * high;
   for (std::size_t column = 0; column < columns; ++column)
-    write(map.x.values[column], corner.x + labels + (float(column) + 0.5f) * wide, below + line / 2, ink,
-          wide);
+    write(map.x.values[column], corner.x + labels + (float(column) + 0.5f) * wide, below + line / 2, ink, wide);
   ImGui::SetCursorScreenPos(ImVec2(corner.x, below + line));
   ImGui::Dummy(ImVec2(whole, 1));
-  ImGui::TextWrapped("%s over %s: %s, %%; @: the step at which it fails",
-                     label_of(map.y.row->name.c_str()).c_str(), label_of(map.x.row->name.c_str()).c_str(),
+  ImGui::TextWrapped("%s over %s: %s, %%; @: the step at which it fails", label_of(map.y.row->name.c_str()).c_str(),
+                     label_of(map.x.row->name.c_str()).c_str(),
                      map.motion ? "distance from the right motion" : "largest loss of volume");
 }
 
@@ -104,8 +98,7 @@ void draw_map(Session& s) {
     ImGui::TextUnformatted(label);
     ImGui::SameLine(ImGui::GetFontSize() * 4);
     ImGui::SetNextItemWidth(-1);
-    words.typed |=
-        ImGui::InputText(fmt::format("##{}", label).c_str(), text, ImGuiInputTextFlags_AutoSelectAll);
+    words.typed |= ImGui::InputText(fmt::format("##{}", label).c_str(), text, ImGuiInputTextFlags_AutoSelectAll);
     mark(s, std::string("map ") + label);
     if (ImGui::IsItemHovered() && !ImGui::IsItemActive())
       ImGui::SetTooltip("PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT, as tetpbd map takes them");

@@ -8,8 +8,8 @@
 
 namespace tetpbd {
 
-int run_mesh_command(const std::filesystem::path& file, const std::string& switches,
-                     const std::filesystem::path& out, bool json) {
+int run_mesh_command(const std::filesystem::path& file, const std::string& switches, const std::filesystem::path& out,
+                     bool json) {
   if (!out.empty()) require_mesh_format(out);
   ordered_json document{{"file", file.string()}};
   const auto put = [&](const char* title, const ordered_json& table) {
@@ -50,8 +50,7 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
 }
 
 int run_repair(const std::filesystem::path& file, const std::filesystem::path& out) {
-  if (!is_surface_file(out))
-    throw Error("not a surface format", out.string(), "use .ply, .obj, .stl or .off");
+  if (!is_surface_file(out)) throw Error("not a surface format", out.string(), "use .ply, .obj, .stl or .off");
   SurfaceMesh surface = load_as_is(file);
   const std::string done = repair(surface);
   write_surface(out, surface);

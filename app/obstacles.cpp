@@ -26,8 +26,8 @@ void make_heights(Obstacle& o) {
     throw Error("no picture of heights", o.image.string(), "give a PNG of 2 to 1024 pixels a side");
   std::vector<std::vector<double>> rows(std::size_t(image->height));
   for (std::size_t p = 0; p < image->rgba.size(); p += 4)
-    rows[p / 4 / std::size_t(image->width)].push_back(
-        (image->rgba[p] + image->rgba[p + 1] + image->rgba[p + 2]) / 765.0);
+    rows[p / 4 / std::size_t(image->width)].push_back((image->rgba[p] + image->rgba[p + 1] + image->rgba[p + 2]) /
+                                                      765.0);
   set_heights(o, rows);
 }
 
@@ -59,8 +59,7 @@ json obstacle_schema() {
   })");
 }
 
-Obstacle read_obstacle(const json& value, const std::string& where, const std::string& file,
-                       const fs::path& folder) {
+Obstacle read_obstacle(const json& value, const std::string& where, const std::string& file, const fs::path& folder) {
   const auto refuse = [&](const std::string& key, const std::string& what,
                           const std::string& mend = "see docs/guide.md") {
     throw Error(fmt::format("'{}.{}' {}", where, key, what), file, mend);
@@ -76,11 +75,9 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
   }
   for (const std::string& key : o.kind->needs)
     if (!value.contains(key)) refuse(key, fmt::format("is missing: a {} needs it", shape));
-  static const std::vector<std::string> all = {"shape",    "friction", "restitution",
-                                               "velocity", "spin",     "keyframes"};
+  static const std::vector<std::string> all = {"shape", "friction", "restitution", "velocity", "spin", "keyframes"};
   for (const auto& [key, held] : value.items())
-    if (!o.kind->has(key) && !std::ranges::count(all, key))
-      refuse(key, fmt::format("is nothing that a {} has", shape));
+    if (!o.kind->has(key) && !std::ranges::count(all, key)) refuse(key, fmt::format("is nothing that a {} has", shape));
   const auto get = [&](const char* key, auto& to) {
     if (value.contains(key)) value[key].get_to(to);
   };
@@ -108,8 +105,7 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
   for (const json& frame : frames) {
     const double time = frame.value("time", 0.0);
     if (!(time > key.time))
-      refuse(fmt::format("keyframes.{}.time", o.keyframes.size()),
-             "must be later than the one before, and 0");
+      refuse(fmt::format("keyframes.{}.time", o.keyframes.size()), "must be later than the one before, and 0");
     key.time = time;
     if (frame.contains("centre")) frame["centre"].get_to(key.centre);
     if (frame.contains("rotation")) frame["rotation"].get_to(key.rotation);

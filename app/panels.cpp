@@ -34,8 +34,8 @@ bool number_widget(const Parameter& row, const std::string& id, T& value) {
     changed = ImGui::SliderScalar(id.c_str(), type, &value, &low, &high, format.c_str(), flags);
   } else {  // a linear slider over a wide range cannot be aimed: such a value is dragged, by a part of itself
     const float speed = real ? 0.01f * std::max(1.0f, std::abs(float(value))) : 1.0f;
-    changed = ImGui::DragScalar(id.c_str(), type, &value, speed, &low, &high, format.c_str(),
-                                ImGuiSliderFlags_AlwaysClamp);
+    changed =
+        ImGui::DragScalar(id.c_str(), type, &value, speed, &low, &high, format.c_str(), ImGuiSliderFlags_AlwaysClamp);
   }
   if (changed && real) value = T(std::stod(fmt::format("{:.4g}", double(value))));
   if (!(value >= low && value <= high)) value = before;  // "nan" was typed
@@ -47,8 +47,7 @@ std::string help_text(const Parameter& row) {
   if (row.name == "mode")
     for (const SolverMode& mode : solver_modes()) text += fmt::format("\n{}: {}", mode.name, mode.help);
   if (choices(row).empty() && !std::holds_alternative<bool Settings::*>(row.member))
-    text += fmt::format("\n{:g} to {:g}{}{}; Ctrl+click to type", row.low, row.high, *row.unit ? " " : "",
-                        row.unit);
+    text += fmt::format("\n{:g} to {:g}{}{}; Ctrl+click to type", row.low, row.high, *row.unit ? " " : "", row.unit);
   if (row.effect == Effect::restart) text += "\ntakes effect at the next reset";
   return text + fmt::format("\non the command line: {}", flag_name(row));
 }
@@ -97,8 +96,8 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
 void count_widget(Session& s, const Parameter& row, const std::string& id, int& value) {
   const Plan& plan = s.loaded.sim().plan;
   const int decided = row.name == "iterations" ? plan.iterations : plan.substeps;
-  const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x +
-                    ImGui::CalcTextSize("auto").x + ImGui::GetStyle().ItemSpacing.x;
+  const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize("auto").x +
+                    ImGui::GetStyle().ItemSpacing.x;
   int shown = value == automatic ? decided : value;
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - box);
   if (number_widget(row, id, shown)) value = shown;
@@ -177,8 +176,7 @@ void draw_settings(Session& s, const Group& group) {
   Settings wanted = now;
   bool changed = false;
   for (const Parameter* row : shown) changed |= parameter_widget(s, *row, wanted);
-  const bool unusual =
-      std::ranges::any_of(rest, [&](const auto* row) { return differs(now, s.loaded.own, *row); });
+  const bool unusual = std::ranges::any_of(rest, [&](const auto* row) { return differs(now, s.loaded.own, *row); });
   if (!rest.empty() && more(s, group.name, unusual))
     for (const Parameter* row : rest) changed |= parameter_widget(s, *row, wanted);
   if (changed) change_settings(s, wanted);
@@ -216,10 +214,9 @@ void draw_solver(Session& s) {
     ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
   const AdaptiveSubsteps& watch = s.loaded.sim().adaptive;
   if (solver_mode(now).leapfrog)
-    ImGui::TextWrapped("%d substeps%s", s.loaded.sim().plan.substeps,
-                       watch.stiffening > 1
-                           ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str()
-                           : "");
+    ImGui::TextWrapped(
+        "%d substeps%s", s.loaded.sim().plan.substeps,
+        watch.stiffening > 1 ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str() : "");
   if (solver_mode(now).implicit)
     ImGui::TextWrapped(
         "residual %.1e of the start's, health %.2f%s", watch.residual, watch.health,
@@ -262,12 +259,11 @@ void draw_lane_rows(Session& s) {
   Ways ways{.help = help, .words = {}};
   for (const Comparison& row : comparisons())
     ways.words.push_back(row.name), ways.help += fmt::format("\n{}: {}", row.name, row.help);
-  if (const auto name =
-          combo(s, "side by side", lanes.size() > 1 ? "as below" : "one way", ways.words, ways.help))
+  if (const auto name = combo(s, "side by side", lanes.size() > 1 ? "as below" : "one way", ways.words, ways.help))
     compare_lanes(s, std::ranges::find(comparisons(), *name, &Comparison::name)->lanes);
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
-  if (button(s, "Add a lane", "add lane",
-             "the same bodies once more, with the settings of this lane to change\nK", width))
+  if (button(s, "Add a lane", "add lane", "the same bodies once more, with the settings of this lane to change\nK",
+             width))
     add_lane(s);
   ImGui::SameLine();
   if (lanes.size() < 2) return ImGui::NewLine();
@@ -310,30 +306,28 @@ void draw_colour_range(Session& s) {
   check_box(s, "hold range", s.view.hold_range, "keeps the scale as it is; else it follows the values of now",
             s.first_view.hold_range);
   ImGui::SameLine(label_width());
-  check_box(s, "mark worst", s.view.worst,
-            "rings around the vertices with the largest values, inside bodies too\nW", s.first_view.worst);
+  check_box(s, "mark worst", s.view.worst, "rings around the vertices with the largest values, inside bodies too\nW",
+            s.first_view.worst);
   if (!s.view.worst) return;
   for (const auto& [vertex, value] : s.worst)
-    ImGui::TextDisabled(
-        "%s", fmt::format(fmt::runtime(scale.is_signed ? "vertex {}: {:+.3g} {}" : "vertex {}: {:.3g} {}"),
-                          s.loaded.sim().model->original[vertex], double(value) * scale.factor, scale.unit)
-                  .c_str());
+    ImGui::TextDisabled("%s",
+                        fmt::format(fmt::runtime(scale.is_signed ? "vertex {}: {:+.3g} {}" : "vertex {}: {:.3g} {}"),
+                                    s.loaded.sim().model->original[vertex], double(value) * scale.factor, scale.unit)
+                            .c_str());
 }
 
 void draw_view(Session& s) {
   ViewOptions& view = s.view;
   const ViewOptions& first = s.first_view;
-  enum_combo(
-      s, "look", look_names, view.look, first.look,
-      "surface; with its edges; the tetrahedra, to see inside; the constraints between vertices\n1 2 3 4");
+  enum_combo(s, "look", look_names, view.look, first.look,
+             "surface; with its edges; the tetrahedra, to see inside; the constraints between vertices\n1 2 3 4");
   Words colours;
   for (std::size_t i = 0; i < colour_names.size(); ++i)
     if (has_colour(s, Colour(i)) || view.colour == Colour(i)) colours.push_back(colour_names[i]);
-  if (const auto name =
-          combo(s, "colour", colour_names[std::size_t(view.colour)], colours,
-                "what the surface shows: nothing, or by how much volume, lengths of edges, speed, "
-                "elastic energy or the motion are off; patch: what is solved together\nC",
-                colour_names[std::size_t(first.colour)]))
+  if (const auto name = combo(s, "colour", colour_names[std::size_t(view.colour)], colours,
+                              "what the surface shows: nothing, or by how much volume, lengths of edges, speed, "
+                              "elastic energy or the motion are off; patch: what is solved together\nC",
+                              colour_names[std::size_t(first.colour)]))
     choose_colour(s, Colour(std::ranges::find(colour_names, *name) - colour_names.begin()));
   draw_colour_range(s);
   if (view.look == Look::tets) {
@@ -342,9 +336,8 @@ void draw_view(Session& s) {
     slider(s, "explode", view.explode, first.explode, 0, 3, "%.2f of the way",
            "tetrahedra away from the bodies' centre");
   }
-  slider(
-      s, "cut", view.cut, first.cut, 0, 1, "%.2f of the body",
-      "what is below this part of the bodies at rest is shown; 1: all\nX; Alt+drag, Alt+wheel on the view");
+  slider(s, "cut", view.cut, first.cut, 0, 1, "%.2f of the body",
+         "what is below this part of the bodies at rest is shown; 1: all\nX; Alt+drag, Alt+wheel on the view");
   if (view.is_cut()) {
     const int before = view.cut_axis;
     enum_combo(s, "cut along", cut_names, view.cut_axis, first.cut_axis,
@@ -360,8 +353,7 @@ void draw_view(Session& s) {
        view.contacts, first.contacts},
       {"arrows", "velocities of some of the vertices", view.arrows, first.arrows},
       {"shadow", "of the bodies, on the ground and on each other", view.shadow, first.shadow},
-      {"smooth normals", "round shading; without, each triangle is flat\nN", view.smooth_normals,
-       first.smooth_normals},
+      {"smooth normals", "round shading; without, each triangle is flat\nN", view.smooth_normals, first.smooth_normals},
       {"grid", "lines on the ground and on walls\nG", view.grid, first.grid},
       {"sky and ground", "also walls; without: one colour", view.backdrop, first.backdrop},
       {"legend", "the colour scale, with every colour but plain", view.legend, first.legend},
@@ -387,9 +379,8 @@ void draw_view(Session& s) {
   Preferences& kept = s.ui.kept;
   enum_combo(s, "theme", std::array{"light", "dark"}, kept.dark, false, "colours of the panels; it is kept");
   const Words sizes{"75 %", "100 %", "125 %", "150 %", "200 %", "300 %"};
-  if (const auto size =
-          combo(s, "text size", fmt::format("{:.0f} %", 100 * kept.text), sizes,
-                "of all text and widgets, on top of the display's own scale; it is kept", "100 %"))
+  if (const auto size = combo(s, "text size", fmt::format("{:.0f} %", 100 * kept.text), sizes,
+                              "of all text and widgets, on top of the display's own scale; it is kept", "100 %"))
     kept.text = std::atof(size->c_str()) / 100;
 }
 
@@ -397,9 +388,7 @@ void draw_view(Session& s) {
 
 void draw_timeline(Session& s) {
   Timeline& t = s.timeline;
-  const auto name = [](int halvings) {
-    return halvings ? fmt::format("1/{}x", 1 << halvings) : std::string("1x");
-  };
+  const auto name = [](int halvings) { return halvings ? fmt::format("1/{}x", 1 << halvings) : std::string("1x"); };
   ImGui::SetNextItemWidth(ImGui::GetFontSize() * 4);
   if (ImGui::BeginCombo("##speed", name(s.clock.halvings).c_str())) {
     for (int halvings = 0; halvings <= most_halvings; ++halvings) {
@@ -418,8 +407,7 @@ void draw_timeline(Session& s) {
   ImGui::SetNextItemWidth(-1);
   const double dt = s.loaded.sim().settings.dt;
   const long first = t.moments.empty() ? 0 : t.moments.front()->step;
-  long now = steps_of(s.loaded.lanes),
-       last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
+  long now = steps_of(s.loaded.lanes), last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
   std::string text = t.moments.empty() ? "nothing is kept" : fmt::format("{:.3f} s", double(now) * dt);
   if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
     text += fmt::format(" of {:.3f} .. {:.3f} s", double(first) * dt, double(last) * dt);

@@ -30,8 +30,7 @@ std::vector<Curve> curves_of(const Session& s, const PlotRow& row) {
     if (row.over_cost && costs.empty()) continue;
     // Of late: settings change.
     const double cost =
-        row.over_cost ? median({costs.end() - std::min<std::ptrdiff_t>(240, std::ssize(costs)), costs.end()})
-                      : 0;
+        row.over_cost ? median({costs.end() - std::min<std::ptrdiff_t>(240, std::ssize(costs)), costs.end()}) : 0;
     for (std::size_t k = 0; k < history.values.size(); ++k)
       curve.points.emplace_back(row.over_cost ? cost : history.times[k], double(history.values[k]));
     curves.push_back(std::move(curve));
@@ -85,8 +84,7 @@ void look_closer(Session& s, std::size_t slot, double from, double to, const ImV
   }
   if (ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(0)) view.zoomed = false;
   if (was != view.zoomed || (view.zoomed && view.low != before))
-    s.log("plot {} {}", slot + 1,
-          view.zoomed ? fmt::format("{:.4g} .. {:.4g}", view.low, view.high) : "whole");
+    s.log("plot {} {}", slot + 1, view.zoomed ? fmt::format("{:.4g} .. {:.4g}", view.low, view.high) : "whole");
 }
 
 // No more points than pixels have room for: of each column the first, the extremes and the last.
@@ -170,32 +168,25 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
     const ImU32 colour = s.loaded.lanes.size() > 1 ? ImGui::GetColorU32(ImVec4(c.x, c.y, c.z, 1))
                                                    : ImGui::GetColorU32(ImGuiCol_Text, 0.85f);
     const auto line = thinned(axes, curve.points);
-    draw.AddPolyline(line.data(), int(line.size()), colour, 0,
-                     (s.loaded.lanes.size() > 1 ? 1.6f : 1.2f) * s.ui.scale);
+    draw.AddPolyline(line.data(), int(line.size()), colour, 0, (s.loaded.lanes.size() > 1 ? 1.6f : 1.2f) * s.ui.scale);
     glm::dvec2 marked = curve.points.back();
     if (hovered && !row.over_cost)
-      marked = *std::ranges::min_element(curve.points, {},
-                                         [&](const glm::dvec2& p) { return std::abs(p.x - there); });
-    draw.AddCircleFilled(axes.at(marked), (hovered || s.loaded.lanes.size() > 1 ? 3.5f : 2.0f) * s.ui.scale,
-                         colour);
+      marked = *std::ranges::min_element(curve.points, {}, [&](const glm::dvec2& p) { return std::abs(p.x - there); });
+    draw.AddCircleFilled(axes.at(marked), (hovered || s.loaded.lanes.size() > 1 ? 3.5f : 2.0f) * s.ui.scale, colour);
     values += fmt::format("{}{}", values.empty() ? "" : "\n", value_text(s, row, curve, marked));
   }
   const auto label = [&](bool at_right, bool at_top, const std::string& text) {
     const ImVec2 box = ImGui::CalcTextSize(text.c_str());
     const ImVec2 low(at_right ? end.x - box.x - 3 : corner.x + 3, at_top ? corner.y : end.y - box.y);
-    draw.AddRectFilled(low, ImVec2(low.x + box.x, low.y + box.y),
-                       ImGui::GetColorU32(ImGuiCol_FrameBg, 0.75f));
+    draw.AddRectFilled(low, ImVec2(low.x + box.x, low.y + box.y), ImGui::GetColorU32(ImGuiCol_FrameBg, 0.75f));
     draw.AddText(low, ink, text.c_str());
   };
-  const auto number = [](double v, bool powers) {
-    return fmt::format("{:.3g}", powers ? std::pow(10.0, v) : v);
-  };
+  const auto number = [](double v, bool powers) { return fmt::format("{:.3g}", powers ? std::pow(10.0, v) : v); };
   label(false, true, number(axes.high, axes.powers_y) + " " + row.unit);
   if (curves.size() == 1) label(true, true, value_text(s, row, curves[0], curves[0].points.back()));
   label(false, false, number(axes.low, axes.powers_y) + " " + row.unit);
   label(true, false,
-        number(axes.left, axes.powers_x) + " .. " + number(axes.right, axes.powers_x) +
-            (row.over_cost ? " ms" : " s"));
+        number(axes.left, axes.powers_x) + " .. " + number(axes.right, axes.powers_x) + (row.over_cost ? " ms" : " s"));
   draw.PopClipRect();
   if (hovered) ImGui::SetTooltip("%s", values.c_str());
 }
@@ -222,9 +213,8 @@ void draw_slot(Session& s, std::size_t slot, float x, float width) {
     }
     ImGui::EndCombo();
   }
-  describe_item(
-      s, name,
-      "what is plotted, of all lanes; the wheel on a plot zooms, a drag scrolls, a double click shows all");
+  describe_item(s, name,
+                "what is plotted, of all lanes; the wheel on a plot zooms, a drag scrolls, a double click shows all");
   const PlotRow& row = plot_rows()[chosen];
   ImGui::SameLine();
   if (button(s, "CSV", fmt::format("csv {}", slot + 1).c_str(), "copies all values as CSV")) {
@@ -256,8 +246,8 @@ const std::vector<PlotRow>& plot_rows() {
 }
 
 std::string plot_csv(const Session& s, const PlotRow& row) {
-  std::string text = fmt::format("lane,{},{} [{}]\n", row.over_cost ? "time per step [ms]" : "time [s]",
-                                 title_of(s, row), row.unit);
+  std::string text =
+      fmt::format("lane,{},{} [{}]\n", row.over_cost ? "time per step [ms]" : "time [s]", title_of(s, row), row.unit);
   for (const Curve& curve : curves_of(s, row)) {
     // A lane's words have commas.
     const std::string name = row.of ? lane_name(s, curve) : "window";
@@ -289,8 +279,7 @@ void draw_plots(Session& s, const Rect& place) {
   const float pad = ImGui::GetStyle().WindowPadding.x, room = place.width / (17 * ImGui::GetFontSize());
   const auto count = std::clamp(std::size_t(room), std::size_t(1), std::size_t(3));
   const float width = (place.width - float(count + 1) * pad) / float(count);
-  for (std::size_t slot = 0; slot < count; ++slot)
-    draw_slot(s, slot, pad + float(slot) * (pad + width), width);
+  for (std::size_t slot = 0; slot < count; ++slot) draw_slot(s, slot, pad + float(slot) * (pad + width), width);
   ImGui::End();
 }
 

@@ -12,8 +12,7 @@ namespace tetpbd {
 namespace {
 
 namespace measures {
-using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, glm::vec4, glm::abs, glm::max,
-    std::log;
+using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, glm::vec4, glm::abs, glm::max, std::log;
 // clang-format off: in this order
 #include "shaders/energy.glsl"
 #include "shaders/render/values.glsl"
@@ -21,8 +20,7 @@ using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, g
 }  // namespace measures
 
 // Floats of the copy: the tet's positions, the vertex's velocity, its distance.
-constexpr std::size_t of_velocity = 4 * sizeof(Position) / 4,
-                      of_distance = of_velocity + sizeof(Velocity) / 4;
+constexpr std::size_t of_velocity = 4 * sizeof(Position) / 4, of_distance = of_velocity + sizeof(Velocity) / 4;
 
 std::uint32_t tet_behind(const TetMesh& mesh, const Triangle& face) {
   const auto has = [&](const Tet& tet) {
@@ -55,8 +53,7 @@ Reading reading_of(Reading reading, const Lane& lane, const std::vector<float>& 
     if (tet[i] == reading.vertex) reading.position = now[i];
   }
   reading.speed = glm::length(pair(of_velocity));
-  const glm::vec4 material =
-      energy_material(body_material(body_at(model, reading.vertex), lane.sim.settings));
+  const glm::vec4 material = energy_material(body_material(body_at(model, reading.vertex), lane.sim.settings));
   const TetValues measured = tet_values(model, reading.tet, now, material);
   reading.volume = double(measured.volume), reading.strain = double(measured.strain);
   if (material.z > 0) reading.energy = double(measured.energy);
@@ -79,8 +76,8 @@ TetValues tet_values(const Model& model, std::size_t tet, const std::array<glm::
           measures::tet_value(COLOUR_ENERGY, now, rest, material)};
 }
 
-void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer,
-         const Frame& frame, const Ray& ray) {
+void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer, const Frame& frame,
+         const Ray& ray) {
   const Sim& sim = lanes[lane].sim;
   if (!probe.picker.kernel) probe.picker = make_picker(sim.model->rest);
   probe.copied = {};
@@ -99,8 +96,7 @@ bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait) {
     if (probe.next.tet == mesh.tets.size()) return probe.reading.reset(), true;  // of a sheet
     copy_values(probe, lane);
   }
-  const auto values =
-      poll_readback<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);
+  const auto values = poll_readback<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);
   if (values) probe.reading = reading_of(probe.next, lane, *values);
   return values.has_value();
 }

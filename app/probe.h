@@ -18,11 +18,10 @@ TetValues tet_values(const Model& model, std::size_t tet, const std::array<glm::
 
 struct Reading {
   std::uint32_t vertex = 0, tet = 0;
-  glm::dvec3 position{0};         ///< m
-  double speed = 0;               ///< m/s
-  double volume = 0, strain = 0;  ///< V/V0 - 1 and the mean L/L0 - 1 of the tet
-  std::optional<double> energy{},
-      distance{};  ///< J/m^3, where there is a material; from what is right, over the size
+  glm::dvec3 position{0};                      ///< m
+  double speed = 0;                            ///< m/s
+  double volume = 0, strain = 0;               ///< V/V0 - 1 and the mean L/L0 - 1 of the tet
+  std::optional<double> energy{}, distance{};  ///< J/m^3, where there is a material; from what is right, over the size
 };
 
 /// One question at a time: first which, then what.
@@ -37,8 +36,8 @@ struct Probe {
 };
 
 /// Replaces a question that has not been answered.
-void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer,
-         const Frame& frame, const Ray& ray);
+void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer, const Frame& frame,
+         const Ray& ray);
 /// Takes in what has arrived; whether there is a new reading, or none now. With `wait`: waits for it.
 bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait = false);
 

@@ -19,8 +19,7 @@ namespace tetpbd {
 ordered_json settings_text(const Settings& settings, const Settings* before) {
   ordered_json result = ordered_json::object();
   for (const Parameter& row : parameters())
-    if (const std::string text = parameter_text(settings, row);
-        !before || text != parameter_text(*before, row))
+    if (const std::string text = parameter_text(settings, row); !before || text != parameter_text(*before, row))
       result[row.name] = text;
   return result;
 }
@@ -81,8 +80,7 @@ void set_view(Session& s, const ordered_json& given, const std::string& where) {
   view.update(given);
   const auto number_of = [&](const auto& names, const char* key) {
     const auto found = std::ranges::find(names, view.at(key).template get<std::string>());
-    if (found == names.end())
-      throw Error(fmt::format("there is no {} {}", key, view[key].dump()), where, "see --help");
+    if (found == names.end()) throw Error(fmt::format("there is no {} {}", key, view[key].dump()), where, "see --help");
     return int(found - names.begin());
   };
   ViewOptions& v = s.view;
@@ -103,9 +101,8 @@ void set_view(Session& s, const ordered_json& given, const std::string& where) {
 ordered_json hashes(Session& s) {
   ordered_json result = ordered_json::array();
   for (Lane& lane : s.loaded.lanes)
-    result.push_back(check_finite(lane.sim, true)
-                         ? ordered_json()
-                         : ordered_json(fmt::format("{:016x}", state_hash(lane.sim))));
+    result.push_back(check_finite(lane.sim, true) ? ordered_json()
+                                                  : ordered_json(fmt::format("{:016x}", state_hash(lane.sim))));
   return result;
 }
 
@@ -140,8 +137,7 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
   };
   const auto lane_of = [&] {
     const std::size_t lane = a.value("lane", 0u);
-    if (lane >= lanes.size())
-      throw Error(fmt::format("there is no lane {}", lane + 1), where, "the first is 0");
+    if (lane >= lanes.size()) throw Error(fmt::format("there is no lane {}", lane + 1), where, "the first is 0");
     return lane;
   };
   if (a.contains("load")) {
@@ -283,8 +279,7 @@ int run_replay(const RunOptions& options) {
         step_lanes(s);
         owed += s.loaded.sim().settings.dt / s.clock.speed();
         if (steps_of(s.loaded.lanes) == before)
-          throw Error(fmt::format("no lane comes to step {}", until), where, "no state is finite any more",
-                      1);
+          throw Error(fmt::format("no lane comes to step {}", until), where, "no state is finite any more", 1);
         ++steps;
       }
       if (interrupted()) throw Error("interrupted", where, "there is no video", 1);
@@ -303,8 +298,7 @@ int run_replay(const RunOptions& options) {
   ordered_json result = {{"record", options.replay.string()}, {"steps", steps}};
   for (std::size_t i = 0; i < s.loaded.lanes.size(); ++i) {
     const Lane& lane = s.loaded.lanes[i];
-    result["lanes"].push_back(
-        {{"mode", lane.sim.settings.mode}, {"step", lane.sim.steps}, {"state_hash", found[i]}});
+    result["lanes"].push_back({{"mode", lane.sim.settings.mode}, {"step", lane.sim.steps}, {"state_hash", found[i]}});
     fmt::print("{}: step {}, state {}\n", describe(lane), lane.sim.steps, json_text(found[i], -1));
   }
   result["as_recorded"] = recorded.is_null() ? ordered_json() : ordered_json(recorded == found);

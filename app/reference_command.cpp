@@ -47,18 +47,17 @@ std::filesystem::path cached_motion(std::uint64_t scene) { return cache_file("mo
 
 // A line of JSON, then the kept positions as float64, frames x N x 3, in the first order of vertices.
 void write_motion(const std::filesystem::path& file, const Model& model, const Motion& motion) {
-  ordered_json head = {
-      {"format", format_name},
-      {"scene", hex(motion.scene)},
-      {"method", motion.method},
-      {"dt", motion.dt},
-      {"step", motion.step},
-      {"vertices", model.masses.size()},
-      {"kept", motion.kept},
-      {"columns", {"time", "x", "y", "z", "vx", "vy", "vz", "kinetic", "potential", "error"}}};
+  ordered_json head = {{"format", format_name},
+                       {"scene", hex(motion.scene)},
+                       {"method", motion.method},
+                       {"dt", motion.dt},
+                       {"step", motion.step},
+                       {"vertices", model.masses.size()},
+                       {"kept", motion.kept},
+                       {"columns", {"time", "x", "y", "z", "vx", "vy", "vz", "kinetic", "potential", "error"}}};
   for (const Motion::Row& r : motion.rows)
-    head["rows"].push_back({r.time, r.centre.x, r.centre.y, r.centre.z, r.velocity.x, r.velocity.y,
-                            r.velocity.z, r.kinetic, r.potential, r.error});
+    head["rows"].push_back({r.time, r.centre.x, r.centre.y, r.centre.z, r.velocity.x, r.velocity.y, r.velocity.z,
+                            r.kinetic, r.potential, r.error});
   std::string text = head.dump() + "\n";
   for (const auto& positions : motion.positions) {
     const auto rows = in_original_order(model, positions);
@@ -118,8 +117,7 @@ std::filesystem::path find_and_keep(const Scene& scene, const Model& model, cons
 
 }  // namespace
 
-std::optional<Motion> right_motion(const Model& model, const Settings& settings,
-                                   const std::filesystem::path& file) {
+std::optional<Motion> right_motion(const Model& model, const Settings& settings, const std::filesystem::path& file) {
   const std::uint64_t scene = scene_key(model, settings);
   const std::filesystem::path from = file.empty() ? cached_motion(scene) : file;
   std::error_code ignored;

@@ -92,8 +92,7 @@ std::string base64(const std::string& bytes) {
     unsigned value = 0;
     for (std::size_t k = 0; k < 3; ++k)
       value = value << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      result += i + k > bytes.size() ? '=' : letters[value >> (18 - 6 * k) & 63];
+    for (std::size_t k = 0; k < 4; ++k) result += i + k > bytes.size() ? '=' : letters[value >> (18 - 6 * k) & 63];
   }
   return result;
 }
@@ -109,11 +108,7 @@ std::string page(const std::string& title, const std::string& body) {
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text)
-    result += c == '<'   ? "&lt;"
-              : c == '>' ? "&gt;"
-              : c == '&' ? "&amp;"
-              : c == '"' ? "&quot;"
-                         : std::string(1, c);
+    result += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
   return result;
 }
 
@@ -124,8 +119,7 @@ std::string data_uri(const std::filesystem::path& png) {
 }
 
 std::string html_table(const std::vector<std::string>& titles, const std::vector<PageRow>& rows, bool shown) {
-  std::string html =
-      fmt::format("<table><thead><tr><th>{}</th></tr></thead><tbody>\n", fmt::join(titles, "</th><th>"));
+  std::string html = fmt::format("<table><thead><tr><th>{}</th></tr></thead><tbody>\n", fmt::join(titles, "</th><th>"));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     html += fmt::format("<tr{}{}{}>", rows[i].marked ? " class=\"marked\"" : "",
                         shown ? fmt::format(" data-row=\"{}\"", i) : "",
@@ -144,8 +138,7 @@ Film::Film(const Scene& scene, const Model& model, const std::filesystem::path& 
       renderer(make_renderer(model)),
       target(make_target(width, height, 4)),
       camera(scene_camera(scene, model, float(width) / float(height))),
-      strip{width * int(frames), height,
-            std::vector<std::uint8_t>(std::size_t(width) * height * 4 * frames)} {
+      strip{width * int(frames), height, std::vector<std::uint8_t>(std::size_t(width) * height * 4 * frames)} {
   make_output_folder(out / "films");
 }
 
@@ -183,23 +176,21 @@ void write_report(const Sweep& sweep, const std::filesystem::path& out, const or
   for (const auto& row : document["rows"]) {
     PageRow& made = rows.emplace_back();
     for (const TableColumn& column : columns) made.cells.push_back(text_of(cell(row, column.key)));
-    if (row.contains("film") && row["film"].is_string())
-      made.film = data_uri(out / row["film"].get<std::string>());
+    if (row.contains("film") && row["film"].is_string()) made.film = data_uri(out / row["film"].get<std::string>());
     made.marked = row.contains("pareto") && row["pareto"] == true;
   }
   const ordered_json& device = document["device"];
   const std::string note =
       device["software"] == true ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "";
   const std::filesystem::path file = out / (sweep.name + ".html");
-  write_file(
-      file, page("tetpbd " + sweep.name,
-                 fmt::format(
-                     "<p><code>tetpbd {}</code> on {}, OpenGL {}.{}</p>\n<div class=\"figures\"><div>{}</div>"
-                     "<aside id=\"card\">Rest the cursor on a point or a row: its settings, its numbers, "
-                     "and how it ends.</aside></div>\n",
-                     sweep.name, escaped(text_of(device["gl_renderer"])),
-                     escaped(text_of(device["gl_version"])), note, figures) +
-                     html_table(titles, rows, true)));
+  write_file(file,
+             page("tetpbd " + sweep.name,
+                  fmt::format("<p><code>tetpbd {}</code> on {}, OpenGL {}.{}</p>\n<div class=\"figures\"><div>{}</div>"
+                              "<aside id=\"card\">Rest the cursor on a point or a row: its settings, its numbers, "
+                              "and how it ends.</aside></div>\n",
+                              sweep.name, escaped(text_of(device["gl_renderer"])),
+                              escaped(text_of(device["gl_version"])), note, figures) +
+                      html_table(titles, rows, true)));
   fmt::print("{}\n", file.string());
 }
 

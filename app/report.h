@@ -23,8 +23,7 @@ struct PageRow {
 };
 /// Sorted by a click on a column's title. Where rows are `shown`, those under the cursor are shown beside the
 /// figures, as are those that a picture's data-row or the address's #row=N names.
-std::string html_table(const std::vector<std::string>& titles, const std::vector<PageRow>& rows,
-                       bool shown = false);
+std::string html_table(const std::vector<std::string>& titles, const std::vector<PageRow>& rows, bool shown = false);
 
 /// Small pictures of a run, side by side in one file, the end last: so many that a page of `rows` stays
 /// small.
@@ -36,8 +35,7 @@ struct Film {
   Target target;
   Camera camera;
   Image strip;
-  Film(const Scene& scene, const Model& model, const std::filesystem::path& out, std::size_t number,
-       std::size_t rows);
+  Film(const Scene& scene, const Model& model, const std::filesystem::path& out, std::size_t number, std::size_t rows);
   /// For run_model().
   std::function<void(const Sim&, long)> of(long steps);
   /// "films/0003.png", below `out`; null where nothing was drawn.

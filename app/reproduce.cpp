@@ -108,8 +108,8 @@ void table_4(Report& report, std::span<const Published> papers) {
     const auto file = load_scene(paper.name + "-drop").bodies[0].mesh;
     for (const char* switches : {"pY", "pYq1.85o/140"}) {
       const MeshReport mesh = tetpbd::report(load_mesh(file, switches));
-      rows.push_back({name, switches, mesh.vertices, mesh.surface_triangles, mesh.edges, mesh.bends,
-                      mesh.tets, mesh.euler_characteristic});
+      rows.push_back({name, switches, mesh.vertices, mesh.surface_triangles, mesh.edges, mesh.bends, mesh.tets,
+                      mesh.euler_characteristic});
     }
   }
   report.html += "<h2>Table 4: the meshes</h2>\n";
@@ -117,8 +117,7 @@ void table_4(Report& report, std::span<const Published> papers) {
 }
 
 /// Figures 8 and 10.
-void volume_error(Report& report, const Published& paper, Scene scene,
-                  const std::shared_ptr<const Model>& model) {
+void volume_error(Report& report, const Published& paper, Scene scene, const std::shared_ptr<const Model>& model) {
   report.html += fmt::format("<h2>Figure {}: volume error over time, {}</h2>\n", paper.figure, paper.name);
   ordered_json rows;
   Losses losses;
@@ -138,8 +137,7 @@ void volume_error(Report& report, const Published& paper, Scene scene,
       const double lost = losses[all][k] = run.errors.max_volume_loss_percent;
       rows.push_back({all ? "all" : "stretch+bend", iteration_counts[k], printed, lost, lost / printed});
       Series series{fmt::format("{} iterations", iteration_counts[k]), palette_colour(k), Series::line};
-      for (const Measurement& m : run.measurements)
-        series.points.emplace_back(m.time, -m.volume_error_percent);
+      for (const Measurement& m : run.measurements) series.points.emplace_back(m.time, -m.volume_error_percent);
       chart.series.push_back(series);
       series.name = fmt::format("published {:.1f} %", printed);
       series.style = Series::dashes;
@@ -148,8 +146,7 @@ void volume_error(Report& report, const Published& paper, Scene scene,
     }
     report.figure(fmt::format("volume_error_{}_{}", paper.name, all ? "all" : "stretch_bend"), chart);
   }
-  report.table("volume_error_" + paper.name, "constraints,iterations,published %,ours %,ours / published",
-               rows);
+  report.table("volume_error_" + paper.name, "constraints,iterations,published %,ours %,ours / published", rows);
   std::string broken;
   const auto& [without, with] = losses;
   for (std::size_t k = 0; k < with.size(); ++k) {
@@ -161,12 +158,10 @@ void volume_error(Report& report, const Published& paper, Scene scene,
   fmt::print("{}: the paper's trends {}\n", paper.name, verdict);
   report.broken += broken;
   report.html += fmt::format(
-      "<p><b>The trends (more iterations lose less; the volume constraint lowers the loss) {}.</b></p>\n",
-      verdict);
+      "<p><b>The trends (more iterations lose less; the volume constraint lowers the loss) {}.</b></p>\n", verdict);
 }
 
-void snapshots(Report& report, const Published& paper, const Scene& scene,
-               const std::shared_ptr<const Model>& model) {
+void snapshots(Report& report, const Published& paper, const Scene& scene, const std::shared_ptr<const Model>& model) {
   Sim sim = create_sim(model, scene.settings);
   Renderer renderer = make_renderer(*model);
   const Target target = make_target(360, 300, 4);
@@ -186,8 +181,7 @@ void snapshots(Report& report, const Published& paper, const Scene& scene,
   report.html += "</div>\n";
 }
 
-void speed(Report& report, const BenchOptions& options, int figure, const std::string& name,
-           const std::string& what) {
+void speed(Report& report, const BenchOptions& options, int figure, const std::string& name, const std::string& what) {
   const std::vector<std::string>& modes = options.axes.modes;
   const ordered_json rows = run_sweep(bench_sweep(options))["rows"];
   if (interrupted()) throw Interrupted();
@@ -210,9 +204,8 @@ void speed(Report& report, const BenchOptions& options, int figure, const std::s
   report.html += fmt::format("<h2>Figure {}: frames a second, {}</h2>\n", figure, what);
   report.figure(name + "_rendered", charts[1]);
   report.figure(name + "_alone", charts[0]);
-  report.table(
-      name, "scene,mode,size,fps,fps / fps of " + modes[0] + ",GPU ms a step,wall ms a frame,volume loss %",
-      table);
+  report.table(name, "scene,mode,size,fps,fps / fps of " + modes[0] + ",GPU ms a step,wall ms a frame,volume loss %",
+               table);
 }
 
 void speeds(Report& report) {
@@ -240,14 +233,13 @@ int run_reproduce(const ReproduceOptions& options) {
   const Capabilities& device = context.capabilities();
   const auto papers = std::span(published).first(options.quick ? 1 : published.size());
   Report report{options.out, options.quick};
-  report.html = fmt::format(
-      head, device.renderer, device.version, fmt::gmtime(std::time(nullptr)), options.quick ? " --quick" : "",
-      device.software ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "");
+  report.html = fmt::format(head, device.renderer, device.version, fmt::gmtime(std::time(nullptr)),
+                            options.quick ? " --quick" : "",
+                            device.software ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "");
   table_4(report, papers);
   report.html += fmt::format(unstated, damping, volume_stiffness);
   if (options.quick)
-    report.html +=
-        "<p><b>Quick: a short fall from 0.05 m with k = 1, undamped; only the trends count.</b></p>\n";
+    report.html += "<p><b>Quick: a short fall from 0.05 m with k = 1, undamped; only the trends count.</b></p>\n";
   for (const Published& paper : papers) {
     if (!paper.figure) continue;
     SceneOverrides overrides{.solver = "paper", .parameters = {{"mode", "constraint"}}};

@@ -69,8 +69,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.push_back(*ms);
   };
   const auto hold = [&](long s) {
-    hold_against(run, plan.right, *sim.model, s, double(s) * sim.settings.dt,
-                 [&] { return read_state(sim); });
+    hold_against(run, plan.right, *sim.model, s, double(s) * sim.settings.dt, [&] { return read_state(sim); });
   };
   const bool touching = metrics && bodies_touch(*sim.model, sim.settings);
   if (metrics) measure(*metrics, sim);

@@ -62,9 +62,9 @@ struct MeasuredRun {
   std::vector<std::array<double, 2>> motion_over_time;  ///< s, distance over the size
   std::vector<Measurement> measurements;                ///< the start first
   std::vector<double> gpu_ms, wall_ms;                  ///< a step; GPU time is that of its passes alone
-  double seconds = 0;  ///< of all steps, without what came between those waited for
-  long steps = 0;      ///< taken, and finite
-  int substeps = 0;    ///< of a step
+  double seconds = 0;                                   ///< of all steps, without what came between those waited for
+  long steps = 0;                                       ///< taken, and finite
+  int substeps = 0;                                     ///< of a step
 };
 
 /// Of a state that the run has reached: its distance from the right motion there, where `right` has that

@@ -39,9 +39,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, ce
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Sheet, size, cells)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(WrapOptions, voxels, thickness)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, scale, height,
-                                                rotation, position, density, velocity, spin, fixed, heavy,
-                                                deform, thickness)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, scale, height, rotation,
+                                                position, density, velocity, spin, fixed, heavy, deform, thickness)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
 
 namespace {
@@ -104,13 +103,11 @@ void check(const json& value, const json& allowed, const std::string& path, cons
     require(x >= low && x <= high && (!whole || x == std::floor(x)),
             fmt::format("a {} from {:g} to {:g}", whole ? "whole number" : "number", low, high));
   } else if (allowed.contains("three")) {
-    check(value, {{"least", 3}, {"most", 3}, {"of", "three numbers"}, {"each", allowed["three"]}}, path,
-          file);
+    check(value, {{"least", 3}, {"most", 3}, {"of", "three numbers"}, {"each", allowed["three"]}}, path, file);
   } else if (allowed.contains("each")) {
     require(value.is_array() && value.size() >= allowed["least"] && value.size() <= allowed["most"],
             "a list of " + allowed["of"].get<std::string>());
-    for (std::size_t i = 0; i < value.size(); ++i)
-      check(value[i], allowed["each"], inner(std::to_string(i)), file);
+    for (std::size_t i = 0; i < value.size(); ++i) check(value[i], allowed["each"], inner(std::to_string(i)), file);
   } else if (allowed.is_object() && !(allowed.value("or", json()) == "text" && value.is_string()) &&
              !(value == false && allowed.value("or", json()) == false)) {
     require(value.is_object(), "an object in braces");
@@ -119,8 +116,8 @@ void check(const json& value, const json& allowed, const std::string& path, cons
         std::vector<std::string> known;
         for (const auto& item : allowed.items())
           if (item.key() != "or") known.push_back(item.key());
-        throw Error(fmt::format("'{}' is not known here; known are {}", inner(key), fmt::join(known, ", ")),
-                    file, did_you_mean(key, known) + "see docs/guide.md");
+        throw Error(fmt::format("'{}' is not known here; known are {}", inner(key), fmt::join(known, ", ")), file,
+                    did_you_mean(key, known) + "see docs/guide.md");
       }
       check(held, allowed[key], inner(key), file);
     }
@@ -162,11 +159,8 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (value.contains("wrap") && body.wrap) body.wrap = value["wrap"].get<WrapOptions>();
   const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet) + bool(body.sheet);
   if (kinds > 1 || (kinds == 0 && body.surface.empty()))
-    refuse(
-        fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where),
-        file);
-  if (kinds == 0 && !body.wrap)
-    refuse(fmt::format("'{}' has a surface alone, so it needs its \"wrap\"", where), file);
+    refuse(fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where), file);
+  if (kinds == 0 && !body.wrap) refuse(fmt::format("'{}' has a surface alone, so it needs its \"wrap\"", where), file);
   if (body.thickness > 0 && (body.block || body.tet || (!body.mesh.empty() && !is_surface_file(body.mesh))))
     refuse(fmt::format("'{}.thickness' is of a sheet, or of a surface mesh that is to be one", where), file);
   if (!body.surface.empty() && (body.sheet || body.thickness > 0))
@@ -194,14 +188,12 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
   scene.description = document.value("description", "");
   scene.duration = document.value("duration", scene.duration);
   for (const json& body : document["bodies"])
-    scene.bodies.push_back(
-        read_body(body, fmt::format("bodies.{}", scene.bodies.size()), file, path.parent_path()));
-  for (const char* section : {"world", "solver"})
-    read_settings(document.value(section, json()), scene.settings, file);
+    scene.bodies.push_back(read_body(body, fmt::format("bodies.{}", scene.bodies.size()), file, path.parent_path()));
+  for (const char* section : {"world", "solver"}) read_settings(document.value(section, json()), scene.settings, file);
   read_material(document["bodies"], scene.settings, file);
   for (const json& obstacle : document.value("/world/obstacles"_json_pointer, json()))
-    scene.obstacles.push_back(read_obstacle(
-        obstacle, fmt::format("world.obstacles.{}", scene.obstacles.size()), file, path.parent_path()));
+    scene.obstacles.push_back(
+        read_obstacle(obstacle, fmt::format("world.obstacles.{}", scene.obstacles.size()), file, path.parent_path()));
   if (document.contains("camera")) scene.camera = document["camera"].get<Camera>();
   return scene;
 }
@@ -209,16 +201,14 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
 // Printing and copying JSON is recursive.
 bool check_depth(std::size_t depth) {
   if (depth > most_depth)
-    throw Error("lists or objects are nested too deeply", "scene",
-                fmt::format("no key needs {} levels", most_depth));
+    throw Error("lists or objects are nested too deeply", "scene", fmt::format("no key needs {} levels", most_depth));
   return true;
 }
 
 /// Throws json::exception, and Error where it is nested too deeply.
 template <class Text>
 json parsed(Text&& text) {
-  return json::parse(text,
-                     [](int depth, json::parse_event_t, json&) { return check_depth(std::size_t(depth)); });
+  return json::parse(text, [](int depth, json::parse_event_t, json&) { return check_depth(std::size_t(depth)); });
 }
 
 // What nlohmann says, without its "[json.exception.parse_error.101] ".
@@ -250,8 +240,7 @@ void set_path(json& document, const std::string& assignment) {
   check_depth(parts.size());
   json* at = &document;
   try {
-    for (const std::string& part : parts)
-      at = at->is_array() ? &at->at(json::json_pointer("/" + part)) : &(*at)[part];
+    for (const std::string& part : parts) at = at->is_array() ? &at->at(json::json_pointer("/" + part)) : &(*at)[part];
   } catch (const json::exception& problem) {
     throw Error("no such place in the scene", "--set " + assignment, said(problem));
   }
@@ -282,8 +271,8 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
     for (const auto& [parameter, text] : overrides.parameters)
       for (const char* chosen : {"mode", "iterations", "substeps", "omega"})
         if (parameter == chosen)
-          throw Error(fmt::format("--solver auto chooses {} itself", chosen),
-                      flag_name(*find_parameter(parameter)), "leave out one of the two");
+          throw Error(fmt::format("--solver auto chooses {} itself", chosen), flag_name(*find_parameter(parameter)),
+                      "leave out one of the two");
     return true;
   }
   if (overrides.budget_ms)
@@ -349,8 +338,7 @@ std::vector<CameraKey> read_camera_path(const fs::path& file) {
   for (json whole = Camera(); const json& key : keys) {
     whole.update(key);
     if (!key.contains("time") || (!path.empty() && !(key["time"] > path.back().time)))
-      refuse(fmt::format("'path.{}.time' must be there, and later than the one before", path.size()),
-             file.string());
+      refuse(fmt::format("'path.{}.time' must be there, and later than the one before", path.size()), file.string());
     path.push_back({key["time"], whole.get<Camera>()});
   }
   return path;
@@ -374,10 +362,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     const bool hard = name_or_file.starts_with("hard/");
     std::vector<std::string> names = scene_names(hard ? "scenes/hard" : "scenes");
     for (std::string& name : names) name.insert(0, hard ? "hard/" : "");
-    throw Error("no such scene", name_or_file,
-                did_you_mean(name_or_file, names) + fmt::format("give a .json file or one of {} in {}",
-                                                                fmt::join(names, ", "),
-                                                                (models_folder() / "scenes").string()));
+    throw Error(
+        "no such scene", name_or_file,
+        did_you_mean(name_or_file, names) + fmt::format("give a .json file or one of {} in {}", fmt::join(names, ", "),
+                                                        (models_folder() / "scenes").string()));
   }
   json document = read_json(file, "scene");
   if (document.is_object() && document.contains("state_hash"))
@@ -405,8 +393,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   const bool by_trying = apply_solver(scene.settings, overrides);
   for (const auto& [name, text] : overrides.parameters) {
     const Parameter& row = *find_parameter(name);
-    if (row.name == std::string("material") && apply_preset(scene.settings, material_presets(), text))
-      continue;
+    if (row.name == std::string("material") && apply_preset(scene.settings, material_presets(), text)) continue;
     set_parameter(scene.settings, row, text, flag_name(row));
   }
   if (by_trying) scene.budget_ms = overrides.budget_ms.value_or(default_budget_ms(scene.settings));
@@ -443,8 +430,7 @@ std::string why_unused(const Settings& s, const std::string& name) {
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
   if (s.material == "none" && is("young_modulus", "poisson_ratio")) return "there is no material";
-  if (s.material != "none" &&
-      (is("constraints") || name.starts_with("k_") || name.starts_with("compliance_")))
+  if (s.material != "none" && (is("constraints") || name.starts_with("k_") || name.starts_with("compliance_")))
     return "the material stands in its place";
   for (const ConstraintKind& kind : constraint_kinds)
     if (is(std::string("k_") + kind.name, std::string("compliance_") + kind.name) && !uses(s, kind))
@@ -456,8 +442,7 @@ std::string why_unused(const Settings& s, const std::string& name) {
 
 }  // namespace
 
-void note_unused(const Settings& settings, const std::vector<std::string>& modes,
-                 const SceneOverrides& overrides) {
+void note_unused(const Settings& settings, const std::vector<std::string>& modes, const SceneOverrides& overrides) {
   for (const auto& [name, text] : overrides.parameters) {
     const std::string key = find_parameter(name)->name;
     std::string why = why_unused(settings, key);
@@ -528,8 +513,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     auto [mesh, carried] = body_of(body, scene.name);
     carries = carries || !carried.triangles.empty();
     if (!mesh.tets.empty())  // a sheet is drawn as itself
-      add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried,
-                  model->rest.tets.size());
+      add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried, model->rest.tets.size());
     for (auto& p : mesh.positions) p *= body.scale;
     if (model->rest.tets.size() + mesh.tets.size() > most_tets)
       throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
@@ -538,8 +522,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     // Fixed and heavy vertices are chosen in the mesh's own frame, before it is turned.
     const Bounds own = bounds(mesh.positions);
     const auto is_in = [&](std::size_t vertex, const BodyDescription::Box& box) {
-      const glm::dvec3 part =
-          (mesh.positions[vertex] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
+      const glm::dvec3 part = (mesh.positions[vertex] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
       return glm::all(glm::greaterThanEqual(part, box.low - 1e-9)) &&
              glm::all(glm::lessThanEqual(part, box.high + 1e-9));
     };
@@ -563,8 +546,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     for (auto& p : mesh.positions) p += body.position - bottom;
     if (mesh.tets.empty()) mesh.thickness = body.thickness > 0 ? body.thickness : 1e-3 * placed.size();
     std::vector<glm::dvec3> start = mesh.positions;
-    deform(start, mesh, body.deform,
-           unsigned(scene.settings.seed) + 0x9e3779b9u * unsigned(model->bodies.size()));
+    deform(start, mesh, body.deform, unsigned(scene.settings.seed) + 0x9e3779b9u * unsigned(model->bodies.size()));
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   if (!carries) model->carried = {};

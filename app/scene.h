@@ -38,18 +38,18 @@ struct BodyDescription {
   std::optional<Block> block;                    ///< a generated block, or
   std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m, or
   std::optional<Sheet> sheet;                    ///< a flat sheet
-  double thickness = 0;  ///< m, of a sheet, 0: a thousandth of its size; of a surface mesh, makes it a sheet
+  double thickness = 0;           ///< m, of a sheet, 0: a thousandth of its size; of a surface mesh, makes it a sheet
   std::filesystem::path surface;  ///< a fine one that rides on it, or, alone, on its wrap
   std::string tetgen = "pYq1.85o/140";
   std::optional<WrapOptions> wrap = WrapOptions{};  ///< of a surface that TetGen refuses; none: an error
   glm::dvec3 scale{1};                              ///< along the mesh's own axes, before all else
   double height = 0;                                ///< m, scales the mesh; 0 keeps its size
   glm::dvec3 rotation{0};                           ///< degrees about x, then y, then z
-  glm::dvec3 position{0};  ///< m, where the middle of the bottom of its bounding box goes
-  double density = 1000;   ///< kg/m^3
-  glm::dvec3 velocity{0};  ///< m/s
-  glm::dvec3 spin{0};      ///< rad/s about the centre of mass
-  std::vector<Box> fixed;  ///< vertices in any of these boxes are fixed
+  glm::dvec3 position{0};                           ///< m, where the middle of the bottom of its bounding box goes
+  double density = 1000;                            ///< kg/m^3
+  glm::dvec3 velocity{0};                           ///< m/s
+  glm::dvec3 spin{0};                               ///< rad/s about the centre of mass
+  std::vector<Box> fixed;                           ///< vertices in any of these boxes are fixed
   std::vector<Box> heavy;
   std::string deform = "none";
 };
@@ -75,8 +75,7 @@ struct SceneOverrides {
   std::optional<double> height{};                                 ///< of the first body; 0: its file's
   std::vector<std::pair<std::string, std::string>> parameters{};  ///< name, text
   std::vector<std::string> set{};                                 ///< PATH=VALUE
-  bool by_device =
-      false;  ///< hard bodies that nobody says a mode for, or what Jacobi has, may take another than node
+  bool by_device = false;  ///< hard bodies that nobody says a mode for, or what Jacobi has, may take another than node
 };
 
 /// A name in models/scenes, or a file. Throws Error naming file, key and allowed range.
@@ -86,8 +85,7 @@ std::vector<CameraKey> read_camera_path(const std::filesystem::path& file);
 std::vector<std::string> scene_names(const std::string& folder = "scenes");
 /// Says on standard error which flags of these change nothing, and why, in any of these modes; none named:
 /// that of the settings.
-void note_unused(const Settings& settings, const std::vector<std::string>& modes,
-                 const SceneOverrides& overrides);
+void note_unused(const Settings& settings, const std::vector<std::string>& modes, const SceneOverrides& overrides);
 
 /// One at least.
 inline long duration_in_steps(const Scene& scene) {

@@ -41,12 +41,10 @@ const SceneCard& card_of(Session& s, const fs::path& file) {
 bool card(Session& s, const std::string& name, const fs::path& file) {
   const SceneCard& card = card_of(s, file);
   const ImGuiStyle& style = ImGui::GetStyle();
-  const float line = ImGui::GetTextLineHeight(), high = 4.5f * line,
-              wide = high * picture_width / picture_height;
+  const float line = ImGui::GetTextLineHeight(), high = 4.5f * line, wide = high * picture_width / picture_height;
   const ImVec2 at = ImGui::GetCursorScreenPos(), end(at.x + wide, at.y + high);
   const float room = ImGui::GetContentRegionAvail().x;
-  const bool chosen =
-      ImGui::Selectable(("##" + file.string()).c_str(), name == s.loaded.name, 0, ImVec2(0, high));
+  const bool chosen = ImGui::Selectable(("##" + file.string()).c_str(), name == s.loaded.name, 0, ImVec2(0, high));
   mark(s, "scene=" + name);
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   if (card.picture)
@@ -85,11 +83,11 @@ void draw_scenes(Session& s) {
 }
 
 // Three numbers, or one.
-bool drag_field(Session& s, const char* label, double* value, int count, double speed, double low,
-                const char* format, const char* help) {
+bool drag_field(Session& s, const char* label, double* value, int count, double speed, double low, const char* format,
+                const char* help) {
   const double most = 1e6;
-  const bool changed = ImGui::DragScalarN(begin_row(s, label).c_str(), ImGuiDataType_Double, value, count,
-                                          float(speed), &low, &most, format, ImGuiSliderFlags_AlwaysClamp);
+  const bool changed = ImGui::DragScalarN(begin_row(s, label).c_str(), ImGuiDataType_Double, value, count, float(speed),
+                                          &low, &most, format, ImGuiSliderFlags_AlwaysClamp);
   end_row(s, label, help);
   return changed && std::all_of(value, value + count, [](double x) { return std::isfinite(x); });
 }
@@ -122,18 +120,15 @@ bool obstacle_fields(Session& s, Obstacle& o) {
   }
   if (kind.has("radius")) changed |= drag_field(s, "radius", &o.radius, 1, step, least, "%.3f m", "m");
   if (kind.has("half_length"))
-    changed |=
-        drag_field(s, "half length", &o.half_length, 1, step, least, "%.3f m", "m, along its own y axis");
+    changed |= drag_field(s, "half length", &o.half_length, 1, step, least, "%.3f m", "m, along its own y axis");
   if (kind.has("half"))
     others |= drag_field(s, "half", &o.half.x, 3, step, least, "%.3f", "m, half lengths along its own axes");
-  if (kind.has("mesh") && o.height > 0)
-    others |= drag_field(s, "height", &o.height, 1, step, least, "%.3f m", "m");
+  if (kind.has("mesh") && o.height > 0) others |= drag_field(s, "height", &o.height, 1, step, least, "%.3f m", "m");
   changed |= own_or_worlds(s, "its friction", o.friction, world.friction, 2);
   changed |= own_or_worlds(s, "its restitution", o.restitution, world.restitution, 1);
   if (o.keyframes.empty()) {
     changed |= drag_field(s, "velocity", &o.velocity.x, 3, step, -1e5, "%.2f", "m/s; all start anew");
-    changed |=
-        drag_field(s, "spin", &o.spin.x, 3, 0.02, -1e5, "%.2f", "rad/s about its centre; all start anew");
+    changed |= drag_field(s, "spin", &o.spin.x, 3, 0.02, -1e5, "%.2f", "rad/s about its centre; all start anew");
   } else {
     ImGui::TextDisabled("moves through %zu keyframes", o.keyframes.size());
   }
@@ -147,8 +142,7 @@ void draw_scene(Session& s) {
   draw_scenes(s);
   begin_row(s, "open file");
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
-  bool load_it =
-      ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
+  bool load_it = ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
   end_row(s, "mesh",
           "a scene (.json), or a mesh in place of this scene's first body: .ply .obj .stl .off surfaces, "
           ".node/.ele .msh tetrahedra. A file can also be dropped onto the window");
@@ -157,8 +151,7 @@ void draw_scene(Session& s) {
   if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
   if (button(s, "Save scene", "save scene",
-             "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S",
-             width))
+             "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S", width))
     save_scene(s);
   ImGui::SameLine();
   ImGui::BeginDisabled(s.changes.past.empty());

@@ -37,8 +37,7 @@ Scene falling_block(bool soft) {
   return scene;
 }
 
-State state_after(const std::shared_ptr<const Model>& model, Settings settings, const char* mode,
-                  long steps) {
+State state_after(const std::shared_ptr<const Model>& model, Settings settings, const char* mode, long steps) {
   set_mode(settings, mode, "selftest");
   Sim sim = create_sim(model, settings);
   run_loop(sim, nullptr, steps);
@@ -90,8 +89,7 @@ void check_motions(Checks& checks) {
       if (mode.implicit) settings.substeps = 2, settings.iterations = 8;
       const MeasuredRun run = run_model(model, settings, steps, &right, false);
       const double most = !soft ? 0.01 : mode.leapfrog ? 1e-4 : 0.02;
-      checks.add(fmt::format("{}, {}: distance from the right motion over the size", soft ? "soft" : "hard",
-                             mode.name),
+      checks.add(fmt::format("{}, {}: distance from the right motion over the size", soft ? "soft" : "hard", mode.name),
                  run.errors.finite ? run.motion->final : std::nan(""), most);
     }
   }
@@ -114,8 +112,7 @@ void check_bits(Checks& checks) {
         run_loop(sim, nullptr, 10);
         hash = state_hash(sim);
       }
-      checks.add(fmt::format("{}: runs of 10 that have other bits than the first", mode),
-                 hashes[0] != hashes[1], 0);
+      checks.add(fmt::format("{}: runs of 10 that have other bits than the first", mode), hashes[0] != hashes[1], 0);
     }
   }
 }
@@ -123,8 +120,8 @@ void check_bits(Checks& checks) {
 /// Steps a second beside the error: of a hard body, and of a soft one by both ways to step it.
 std::vector<std::string> speeds(Checks& checks) {
   std::vector<std::string> said;
-  const auto run = [&](const std::string& what, const std::shared_ptr<const Model>& model,
-                       const Settings& settings, const Motion& right, double most) {
+  const auto run = [&](const std::string& what, const std::shared_ptr<const Model>& model, const Settings& settings,
+                       const Motion& right, double most) {
     const MeasuredRun measured = run_model(model, settings, right.kept.back(), &right);
     const double error = measured.errors.finite ? measured.motion->final : std::nan("");
     checks.add(what + ": distance from the right motion", error, most);
@@ -134,11 +131,9 @@ std::vector<std::string> speeds(Checks& checks) {
   const bool slow = is_software_renderer();
   const Scene hard = load_scene("bunny-drop");
   const auto bunny = build_model(hard);
-  run("bunny-drop node 20x1", bunny, hard.settings, *rigid_motion(*bunny, hard.settings, slow ? 100 : 160),
-      1e-3);
+  run("bunny-drop node 20x1", bunny, hard.settings, *rigid_motion(*bunny, hard.settings, slow ? 100 : 160), 1e-3);
   Scene soft = load_scene(
-      "soft-beam",
-      {.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e6"}, {"mode", "explicit"}}});
+      "soft-beam", {.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e6"}, {"mode", "explicit"}}});
   const auto beam = build_model(soft);
   Settings fine = soft.settings;
   fine.stability = 0.1;
@@ -173,11 +168,10 @@ int run_selftest(int gpu) {
       "\nto share, ms a step and the error:\ntetpbd {} | {} | {} | {} | dispatch {:.2f} us | copy {:.0f} "
       "GB/s | {} of {} checks\n",
       TETPBD_VERSION, context.capabilities().renderer, context.capabilities().version, fmt::join(said, " | "),
-      number(limits, "dispatch_us"), number(limits, "copy_gb_s"),
-      std::size_t(checks.all) - checks.failed.size(), checks.all);
+      number(limits, "dispatch_us"), number(limits, "copy_gb_s"), std::size_t(checks.all) - checks.failed.size(),
+      checks.all);
   if (!checks.failed.empty())
-    throw Error("this device does not compute what it should",
-                fmt::format("{}", fmt::join(checks.failed, "; ")),
+    throw Error("this device does not compute what it should", fmt::format("{}", fmt::join(checks.failed, "; ")),
                 "try a newer driver, and report the lines above", 1);
   return 0;
 }

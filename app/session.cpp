@@ -137,8 +137,7 @@ void step_lanes(Session& s) {
     if (s.grab) move_held(lane.sim, *s.hold, s.grab->position);
     const auto begin = Steady::now();
     step(lane.sim);
-    if (on_cpu(lane.sim) && s.measuring)
-      lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
+    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
   }
   if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
@@ -279,8 +278,7 @@ void change_settings(Session& s, const Settings& wanted) {
     return long(plan.iterations) * plan.substeps;
   };
   if (passes(wanted) > std::max(most, passes(old)))
-    return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more",
-                              most));
+    return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
   attempt(s, [&] {
     // Of all lanes, before any is changed.
     const Change before = settings_and_obstacles(s);
@@ -347,12 +345,10 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                   Loaded loaded = load(name, overrides, scene);
                   if (keep_settings) loaded.own = s.loaded.own;
                   take_over(s, std::move(loaded), keep_camera);
-                  if (keep_settings && s.record)
-                    put_obstacles(s, s.loaded.scene.obstacles), s.loaded.disturbed = false;
+                  if (keep_settings && s.record) put_obstacles(s, s.loaded.scene.obstacles), s.loaded.disturbed = false;
                   const fs::path file = overrides.mesh.empty() ? fs::path(name) : overrides.mesh;
                   if (std::error_code error; fs::is_regular_file(file, error)) remember(s.ui.kept, file);
-                  for (const Settings& own : others)
-                    s.loaded.lanes.push_back({create_sim(s.loaded.sim().model, own)});
+                  for (const Settings& own : others) s.loaded.lanes.push_back({create_sim(s.loaded.sim().model, own)});
                   if (!others.empty()) start_lanes(s);
                   // What was there before is gone.
                   s.log("live {} {}", gl_live().objects, gl_live().buffer_bytes);
@@ -405,10 +401,9 @@ void choose_colour(Session& s, Colour colour) {
   s.fit_range = colour == Colour::energy || colour == Colour::motion;
   s.fitted = -1;
   if (!has_colour(s, colour))
-    say(s, colour == Colour::energy ? "this needs a material"
-           : colour == Colour::residual
-               ? "constraints with compliance give way as they should: energy shows how far"
-               : "patches of vertices are those of mode node");
+    say(s, colour == Colour::energy     ? "this needs a material"
+           : colour == Colour::residual ? "constraints with compliance give way as they should: energy shows how far"
+                                        : "patches of vertices are those of mode node");
   if (colour != Colour::motion) return;
   attempt(s, [&] { find_right(s); });
   if (s.loaded.disturbed)
@@ -424,9 +419,7 @@ void find_worst(Session& s) {
   attempt(s, [&] { values = poll_values(s.loaded.renderer); });
   if (!values) return;
   const auto& places = s.loaded.renderer.mesh.positions;
-  const auto size = [&](std::uint32_t v) {
-    return std::isfinite((*values)[v]) ? std::abs((*values)[v]) : -1.0f;
-  };
+  const auto size = [&](std::uint32_t v) { return std::isfinite((*values)[v]) ? std::abs((*values)[v]) : -1.0f; };
   constexpr std::size_t most = 5, looked_at = 4096;
   std::vector<std::uint32_t> order(values->size());
   for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = v;
@@ -445,9 +438,7 @@ void find_worst(Session& s) {
   if (fitted.high > s.view.range().high || fitted.high < 0.3 * s.view.range().high) s.view.range() = fitted;
 }
 
-const Motion* right_now(const Session& s) {
-  return s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr;
-}
+const Motion* right_now(const Session& s) { return s.loaded.right && !s.loaded.disturbed ? &*s.loaded.right : nullptr; }
 
 void hold_vertices(Session& s) {
   Loaded& l = s.loaded;
@@ -473,8 +464,7 @@ void add_lane(Session& s, const std::string& words) {
     if (lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
     const Sim& own = s.loaded.sim();
     let_go(s);
-    lanes.push_back(
-        {create_sim(own.model, lane_settings(own.settings, words, "--lane " + words, own.model))});
+    lanes.push_back({create_sim(own.model, lane_settings(own.settings, words, "--lane " + words, own.model))});
     s.loaded.chosen = lanes.size() - 1;
     start_lanes(s);
   });
@@ -545,8 +535,7 @@ void let_go(Session& s) {
   if (!s.hold) return;
   note(s, {{"release", s.hold->caught()}});
   for (Lane& lane : s.loaded.lanes) unpin_held(lane.sim, *s.hold);
-  if (s.grab)
-    s.log("release {} moved {:.4f}", s.hold->caught(), glm::length(s.grab->position - s.grab->start));
+  if (s.grab) s.log("release {} moved {:.4f}", s.hold->caught(), glm::length(s.grab->position - s.grab->start));
   s.grab.reset(), s.hold.reset();
 }
 
@@ -642,8 +631,7 @@ void follow_shaders(Session& s) {
     s.loaded.picker = make_picker(s.loaded.sim().model->rest);
     s.loaded.probe = {};
   });
-  for (Lane& lane : s.loaded.lanes)
-    lane.sim.shader_version = version;  // also after an error: said once an edit
+  for (Lane& lane : s.loaded.lanes) lane.sim.shader_version = version;  // also after an error: said once an edit
   if (!done) return;
   std::erase_if(s.messages, [](const Message& m) { return m.error && m.text.starts_with("shader "); });
   say(s, "shaders compiled again");

@@ -174,8 +174,8 @@ struct Session {
   double fitted = -1;                                  ///< when they were last
   std::vector<std::pair<std::uint32_t, float>> worst;  ///< vertices and their values, the largest first
   bool overlaid = false;                               ///< lanes are drawn in one place
-  bool ghost = true;  ///< beside the others stands the one they are held against
-  double now = 0;     ///< s since the start
+  bool ghost = true;                                   ///< beside the others stands the one they are held against
+  double now = 0;                                      ///< s since the start
 };
 
 void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);

@@ -81,8 +81,7 @@ int run_soak(Scene scene, const SoakOptions& options) {
   std::string failed;
   const auto check = [&](const char* name, double value, double limit, bool passed) {
     checks.push_back({{"name", name}, {"value", value}, {"limit", limit}, {"passed", passed}});
-    if (!passed)
-      failed += fmt::format("{}{} {:.3g} (limit {:.3g})", failed.empty() ? "" : ", ", name, value, limit);
+    if (!passed) failed += fmt::format("{}{} {:.3g} (limit {:.3g})", failed.empty() ? "" : ", ", name, value, limit);
   };
   check("drift", drift, most_drift, drift <= most_drift);
   check("resident_growth_bytes", growth, most_growth, growth <= most_growth);
@@ -93,30 +92,28 @@ int run_soak(Scene scene, const SoakOptions& options) {
   const double ratio = last_speed / first_speed;
   check("speed_ratio", ratio, least_speed_ratio, ratio >= least_speed_ratio);
 
-  const ordered_json document = {
-      {"scene", scene.name},
-      {"mode", sim.settings.mode},
-      {"device", device_json(context.capabilities())},
-      {"settle", options.settle},
-      {"steps", at(1)["step"]},
-      {"size", model->size},
-      {"gl_buffer_bytes", {{"start", live.buffer_bytes}, {"end", live_after.buffer_bytes}}},
-      {"gl_objects", {{"start", live.objects}, {"end", live_after.objects}}},
-      {"steps_per_second", {{"first_tenth", first_speed}, {"last_tenth", last_speed}}},
-      {"finite", run.errors.finite},
-      {"state_hash", fmt::format("{:016x}", state_hash(sim))},
-      {"checks", checks},
-      {"passed", failed.empty()}};
+  const ordered_json document = {{"scene", scene.name},
+                                 {"mode", sim.settings.mode},
+                                 {"device", device_json(context.capabilities())},
+                                 {"settle", options.settle},
+                                 {"steps", at(1)["step"]},
+                                 {"size", model->size},
+                                 {"gl_buffer_bytes", {{"start", live.buffer_bytes}, {"end", live_after.buffer_bytes}}},
+                                 {"gl_objects", {{"start", live.objects}, {"end", live_after.objects}}},
+                                 {"steps_per_second", {{"first_tenth", first_speed}, {"last_tenth", last_speed}}},
+                                 {"finite", run.errors.finite},
+                                 {"state_hash", fmt::format("{:016x}", state_hash(sim))},
+                                 {"checks", checks},
+                                 {"passed", failed.empty()}};
   write_file(options.out / "soak.csv", csv_text(keys(samples[0]), samples));
   write_file(options.out / "soak.json", json_text(document, 2) + "\n");
   fmt::print(
       "{}: {} steps at rest on {}: drift {:.2g} of the size, resident {:+.1f} MiB, {:.0f} then {:.0f} steps "
       "a second; {}\n",
-      scene.name, run.steps, context.capabilities().renderer, drift, growth / (1 << 20), first_speed,
-      last_speed, (options.out / "soak.json").string());
+      scene.name, run.steps, context.capabilities().renderer, drift, growth / (1 << 20), first_speed, last_speed,
+      (options.out / "soak.json").string());
   if (!failed.empty())
-    throw Error("the soak test failed", failed,
-                "see soak.csv; a body that still moves needs a longer --settle", 1);
+    throw Error("the soak test failed", failed, "see soak.csv; a body that still moves needs a longer --settle", 1);
   return 0;
 }
 

@@ -13,9 +13,7 @@ namespace {
 /// All that is measured, now and so far.
 ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
   const Measurement m = now.finite() ? now : nothing_measured();
-  const auto count = [](double number) {
-    return std::isfinite(number) ? ordered_json(long(number)) : nullptr;
-  };
+  const auto count = [](double number) { return std::isfinite(number) ? ordered_json(long(number)) : nullptr; };
   const auto overlap = [&](auto member) -> ordered_json {
     return so_far.overlap ? ordered_json((*so_far.overlap).*member) : nullptr;
   };
@@ -50,17 +48,16 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
 
 }  // namespace
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MeshReport, vertices, surface_vertices, surface_triangles, edges, bends,
-                                   tets, faces, euler_characteristic, genus, components, volume,
-                                   smallest_tet_volume, mean_tet_volume, min_dihedral_deg, max_dihedral_deg,
-                                   mean_min_dihedral_deg, slivers, inverted)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MeshReport, vertices, surface_vertices, surface_triangles, edges, bends, tets, faces,
+                                   euler_characteristic, genus, components, volume, smallest_tet_volume,
+                                   mean_tet_volume, min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg, slivers,
+                                   inverted)
 ordered_json mesh_json(const MeshReport& counts) { return nlohmann::json(counts); }
 
 ordered_json error_json(const RunErrors& errors) {
   const ordered_json all = quantities(errors.last.value_or(nothing_measured()), errors);
-  ordered_json result = {
-      {"max_volume_loss_percent", errors.last ? errors.max_volume_loss_percent : std::nan("")},
-      {"final_volume_error_percent", all["volume_error_percent"]}};
+  ordered_json result = {{"max_volume_loss_percent", errors.last ? errors.max_volume_loss_percent : std::nan("")},
+                         {"final_volume_error_percent", all["volume_error_percent"]}};
   for (const char* key : {"tet_volume_rms", "tet_volume_max", "inverted_tets", "stretch_rms", "stretch_max",
                           "bend_rms_rad", "rigid_distance"})
     result[key] = all[key];
@@ -100,8 +97,7 @@ void put_finite(ordered_json& row, const MeasuredRun& run) {
   print_error(fmt::format("tetpbd: {}\n", error_of(*found, where).what()));
 }
 
-ordered_json row_of(const Scene& scene, const Model& model, const Settings& settings,
-                    const MeasuredRun& run) {
+ordered_json row_of(const Scene& scene, const Model& model, const Settings& settings, const MeasuredRun& run) {
   std::string kinds = settings.constraints;
   std::ranges::replace(kinds, ',', '+');
   ordered_json row = {{"scene", scene.name},

@@ -65,8 +65,7 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
       ordered_json name;
       for (std::size_t c = 0; c < sweep.identity; ++c) name.push_back(row[sweep.columns[c]]);
       if (!names.insert(name).second)
-        throw Error("a setting is in two of these", folder.string() + ": " + name.dump(),
-                    "name each folder once");
+        throw Error("a setting is in two of these", folder.string() + ": " + name.dump(), "name each folder once");
     }
     if (all.is_null()) {
       all = part;
@@ -76,8 +75,7 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
     for (const auto& [key, value] : part.items())
       if (key != "rows" && key != "shard" && !(whole && key == "combinations") && value != all[key])
         throw Error("these shards differ", folder.string(), "merge runs of one command on one device");
-    for (const char* key : {"rows", "shard"})
-      all[key].insert(all[key].end(), part[key].begin(), part[key].end());
+    for (const char* key : {"rows", "shard"}) all[key].insert(all[key].end(), part[key].begin(), part[key].end());
     if (whole) all["combinations"] = all["combinations"].get<long>() + part["combinations"].get<long>();
   }
   if (all["rows"].size() < all["combinations"])
@@ -152,8 +150,7 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
 }
 
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards, const std::filesystem::path& out) {
-  const ordered_json document =
-      shards.merge.empty() ? measured(sweep, shards, out) : merged(sweep, shards.merge, out);
+  const ordered_json document = shards.merge.empty() ? measured(sweep, shards, out) : merged(sweep, shards.merge, out);
   if (!document["rows"].empty()) return document;
   if (interrupted()) throw Error("interrupted", "before the first row", "nothing was written", 1);
   throw Error("nothing to run", fmt::format("--shard {}/{}", shards.shard, shards.shards),
@@ -213,8 +210,8 @@ int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const o
   write_rows(sweep, folder, document);
   fmt::print("{}\n", (folder / (sweep.name + ".csv")).string());
   if (interrupted())
-    throw Error("interrupted", fmt::format("after {} rows", document["rows"].size()),
-                "what was finished is written", 1);
+    throw Error("interrupted", fmt::format("after {} rows", document["rows"].size()), "what was finished is written",
+                1);
   const auto finite = [](const ordered_json& row) { return row["finite"] == true; };
   return std::ranges::all_of(document["rows"], finite) ? 0 : 1;
 }

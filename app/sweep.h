@@ -31,8 +31,8 @@ struct Sweep {
   std::string name, title;           ///< of its files; on the progress bar
   std::vector<std::string> columns;  ///< of NAME.csv, of which the first so many ...
   std::size_t identity;              ///< ... tell rows apart
-  std::string table;   ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
-  ordered_json facts;  ///< what all shards have in common: "device", numbers
+  std::string table;                 ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
+  ordered_json facts;                ///< what all shards have in common: "device", numbers
   std::vector<std::function<std::vector<ordered_json>()>> work{};  ///< makes a combination's rows
   bool print_each = false;                                         ///< when they are there
 };

@@ -45,14 +45,12 @@ void show(Session& s, std::size_t index) {
   for (std::size_t i = 0; i < s.loaded.lanes.size(); ++i) {
     Lane& lane = s.loaded.lanes[i];
     for (const std::uint32_t vertex : t.touched)
-      if (const bool pinned = is_pinned(lane.sim, vertex);
-          pinned != bool(std::ranges::count(then.pinned, vertex)))
+      if (const bool pinned = is_pinned(lane.sim, vertex); pinned != bool(std::ranges::count(then.pinned, vertex)))
         pinned ? unpin(lane.sim, vertex) : pin(lane.sim, vertex);
     restore_snapshot(lane.sim, then.lanes[i], then.states);
     unpin(lane.sim, then.held);
     lane.apart = {};
-    if (s.loaded.disturbed != then.disturbed)
-      lane.distance = then.distances[i];  // held against something else
+    if (s.loaded.disturbed != then.disturbed) lane.distance = then.distances[i];  // held against something else
   }
   s.loaded.disturbed = then.disturbed;
   s.loaded.held = -1;
@@ -97,33 +95,32 @@ void keep_moment(Session& s) {
   for (Lane& lane : lanes) on_gpu += snapshot_bytes(lane.sim), bytes += snapshot_memory(lane.sim);
   bytes += on_gpu;
   if (bytes > t.budget / 4)
-    say(s, fmt::format("no history: a state of {:.0f} MB is too large for it (--history-mb)",
-                       double(bytes) / 1e6));
-  t.off = bytes > t.budget / 4 || !attempt(s, [&] {
-            Buffer states;
-            while (!t.moments.empty() &&
-                   (t.bytes + bytes > t.budget || (t.moments.size() >= most_moments && !t.wanted))) {
-              Buffer freed = drop(t, least_missed(t, now));
-              if (freed.bytes() == on_gpu) states = std::move(freed);
-            }
-            if (on_gpu && !states) states = Buffer("moment", on_gpu);
-            auto moment = std::make_unique<Moment>(now);
-            std::size_t at = 0;
-            for (Lane& lane : lanes) {
-              moment->lanes.push_back(take_snapshot(lane.sim, states, at));
-              at += snapshot_bytes(lane.sim);
-              History& last = moment->distances.emplace_back();
-              if (const auto far = lane.far()) last.add(double(*far), simulated_time(lane.sim));
-            }
-            moment->disturbed = s.loaded.disturbed;
-            for (const std::uint32_t vertex : t.touched)
-              if (is_pinned(lanes.front().sim, vertex)) moment->pinned.push_back(vertex);
-            if (s.hold && !s.hold->was_pinned) moment->held = s.hold->vertices;
-            moment->bytes = bytes;
-            moment->states = std::move(states);
-            t.moments.push_back(std::move(moment));
-            t.bytes += bytes;
-          });
+    say(s, fmt::format("no history: a state of {:.0f} MB is too large for it (--history-mb)", double(bytes) / 1e6));
+  t.off =
+      bytes > t.budget / 4 || !attempt(s, [&] {
+        Buffer states;
+        while (!t.moments.empty() && (t.bytes + bytes > t.budget || (t.moments.size() >= most_moments && !t.wanted))) {
+          Buffer freed = drop(t, least_missed(t, now));
+          if (freed.bytes() == on_gpu) states = std::move(freed);
+        }
+        if (on_gpu && !states) states = Buffer("moment", on_gpu);
+        auto moment = std::make_unique<Moment>(now);
+        std::size_t at = 0;
+        for (Lane& lane : lanes) {
+          moment->lanes.push_back(take_snapshot(lane.sim, states, at));
+          at += snapshot_bytes(lane.sim);
+          History& last = moment->distances.emplace_back();
+          if (const auto far = lane.far()) last.add(double(*far), simulated_time(lane.sim));
+        }
+        moment->disturbed = s.loaded.disturbed;
+        for (const std::uint32_t vertex : t.touched)
+          if (is_pinned(lanes.front().sim, vertex)) moment->pinned.push_back(vertex);
+        if (s.hold && !s.hold->was_pinned) moment->held = s.hold->vertices;
+        moment->bytes = bytes;
+        moment->states = std::move(states);
+        t.moments.push_back(std::move(moment));
+        t.bytes += bytes;
+      });
   if (t.off) t.moments.clear(), t.bytes = 0;
 }
 

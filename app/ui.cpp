@@ -40,9 +40,9 @@ void escape(Session& s) {
     s.messages.clear();
 }
 
-constexpr ImGuiWindowFlags plain_window =
-    ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
-    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
+constexpr ImGuiWindowFlags plain_window = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                                          ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                                          ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
 
 // What is cut off first in a narrow window stands last, but for the way to the help.
 void draw_status(Session& s, const Rect& place) {
@@ -52,11 +52,10 @@ void draw_status(Session& s, const Rect& place) {
                             : s.playing        ? fmt::format("{:.2g}x real time", s.clock.factor)
                                                : "paused";
   const char* dot = "\xC2\xB7";
-  const bool slow =
-      s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95 * s.clock.speed();
+  const bool slow = s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95 * s.clock.speed();
   const float help = ImGui::CalcTextSize("H: help").x + 3 * ImGui::GetStyle().WindowPadding.x;
-  ImGui::PushClipRect(ImVec2(place.x, place.y),
-                      ImVec2(place.x + place.width - 1.5f * help, place.y + place.height), true);
+  ImGui::PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width - 1.5f * help, place.y + place.height),
+                      true);
   ImGui::TextColored(slow ? alarm(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text), "%s", speed.c_str());
   if (const auto faster = faster_way(s)) {
     ImGui::SameLine();
@@ -100,8 +99,7 @@ void draw_messages(Session& s, const Rect& view) {
     ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(width, view.height));
     ImGui::PushStyleColor(ImGuiCol_Text, message.error ? alarm(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text));
     // By place, not by text: Dear ImGui keeps every window it has ever been told of.
-    ImGui::Begin(fmt::format("message {}", i).c_str(), nullptr,
-                 plain_window | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::Begin(fmt::format("message {}", i).c_str(), nullptr, plain_window | ImGuiWindowFlags_AlwaysAutoResize);
     ImGui::PushTextWrapPos(width - ImGui::GetStyle().WindowPadding.x);
     ImGui::TextUnformatted(message.text.c_str());
     ImGui::PopTextWrapPos();
@@ -198,16 +196,16 @@ void draw_edge(Session& s, const Rect& panel) {
   mark(s, "edge");
   if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
   if (ImGui::IsItemActive())
-    s.ui.kept.panel = std::clamp(double((panel.x + panel.width - ImGui::GetIO().MousePos.x) / s.ui.scale),
-                                 least_panel, most_panel);
+    s.ui.kept.panel =
+        std::clamp(double((panel.x + panel.width - ImGui::GetIO().MousePos.x) / s.ui.scale), least_panel, most_panel);
   ImGui::End();
   ImGui::PopStyleVar(3);
 }
 
 // In window coordinates.
 ImVec2 seen_at(const Session& s, const Rect& place, const glm::dvec3& point) {
-  const glm::vec4 seen = projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) *
-                         glm::vec4(glm::vec3(point), 1);
+  const glm::vec4 seen =
+      projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) * glm::vec4(glm::vec3(point), 1);
   return {place.x + place.width * (0.5f + 0.5f * seen.x / seen.w),
           place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)};
 }

@@ -27,12 +27,8 @@ void mark(Session& s, const std::string& name) {
   mark(s, name, {low.x, low.y, high.x - low.x, high.y - low.y});
 }
 
-ImVec4 alarm(const Session& s) {
-  return s.ui.kept.dark ? ImVec4(1, 0.6f, 0.45f, 1) : ImVec4(0.68f, 0.2f, 0.05f, 1);
-}
-ImVec4 accent(const Session& s) {
-  return s.ui.kept.dark ? ImVec4(0.5f, 0.75f, 1, 1) : ImVec4(0.05f, 0.3f, 0.75f, 1);
-}
+ImVec4 alarm(const Session& s) { return s.ui.kept.dark ? ImVec4(1, 0.6f, 0.45f, 1) : ImVec4(0.68f, 0.2f, 0.05f, 1); }
+ImVec4 accent(const Session& s) { return s.ui.kept.dark ? ImVec4(0.5f, 0.75f, 1, 1) : ImVec4(0.05f, 0.3f, 0.75f, 1); }
 
 namespace {
 
@@ -72,9 +68,8 @@ std::string begin_row(Session& s, const std::string& label, bool unusual) {
   ImGui::AlignTextToFramePadding();
   if (unusual) {
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    ImGui::GetWindowDrawList()->AddCircleFilled(
-        ImVec2(at.x - 4 * s.ui.scale, at.y + ImGui::GetFrameHeight() / 2), 2.5f * s.ui.scale,
-        ImGui::GetColorU32(accent(s)));
+    ImGui::GetWindowDrawList()->AddCircleFilled(ImVec2(at.x - 4 * s.ui.scale, at.y + ImGui::GetFrameHeight() / 2),
+                                                2.5f * s.ui.scale, ImGui::GetColorU32(accent(s)));
   }
   ImGui::PushStyleColor(ImGuiCol_Text, unusual ? accent(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text));
   ImGui::TextUnformatted(label.c_str());
@@ -110,8 +105,7 @@ bool button(Session& s, const char* label, const char* name, const char* help, f
   return pressed;
 }
 
-bool check_box(Session& s, const char* label, bool& value, const std::string& help,
-               std::optional<bool> usual) {
+bool check_box(Session& s, const char* label, bool& value, const std::string& help, std::optional<bool> usual) {
   const bool unusual = usual && *usual != value, before = value;
   ImGui::PushStyleColor(ImGuiCol_Text, unusual ? accent(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text));
   ImGui::Checkbox(label, &value);
@@ -121,12 +115,12 @@ bool check_box(Session& s, const char* label, bool& value, const std::string& he
   return value != before;
 }
 
-bool slider(Session& s, const char* label, double& value, double usual, double low, double high,
-            const char* format, const char* help, bool logarithmic) {
+bool slider(Session& s, const char* label, double& value, double usual, double low, double high, const char* format,
+            const char* help, bool logarithmic) {
   const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   const double before = value;
-  ImGui::SliderScalar(begin_row(s, label, value != usual).c_str(), ImGuiDataType_Double, &value, &low, &high,
-                      format, flags);
+  ImGui::SliderScalar(begin_row(s, label, value != usual).c_str(), ImGuiDataType_Double, &value, &low, &high, format,
+                      flags);
   char shown[64];
   std::snprintf(shown, sizeof shown, format, usual);
   if (end_row(s, label, help, before != usual ? shown : "")) value = usual;
@@ -134,12 +128,11 @@ bool slider(Session& s, const char* label, double& value, double usual, double l
   return value != before;
 }
 
-std::optional<std::string> combo(Session& s, const std::string& label, const std::string& now,
-                                 const Words& words, const std::string& help, const std::string& usual) {
+std::optional<std::string> combo(Session& s, const std::string& label, const std::string& now, const Words& words,
+                                 const std::string& help, const std::string& usual) {
   std::optional<std::string> chosen;
   const std::string back = now == usual ? "" : usual;
-  if (ImGui::BeginCombo(begin_row(s, label, !back.empty()).c_str(), now.c_str(),
-                        ImGuiComboFlags_HeightLarge)) {
+  if (ImGui::BeginCombo(begin_row(s, label, !back.empty()).c_str(), now.c_str(), ImGuiComboFlags_HeightLarge)) {
     for (const std::string& word : words) {
       if (ImGui::Selectable(word.c_str(), word == now)) chosen = word;
       mark(s, label + "=" + word);

@@ -25,12 +25,10 @@ ImVec4 alarm(const Session&session), accent(const Session&session);
 
 /// After a widget: marks it, and says what it means while the cursor is over it. `back`: what a right click
 /// goes back to; none where it is as usual. Whether it is to go back.
-bool describe_item(Session& session, const std::string& name, const std::string& help,
-                   const std::string& back = {});
+bool describe_item(Session& session, const std::string& name, const std::string& help, const std::string& back = {});
 /// A line: its label, then the widget of the id that this gives, then what it means.
 std::string begin_row(Session& session, const std::string& label, bool unusual = false);
-bool end_row(Session& session, const std::string& name, const std::string& help,
-             const std::string& back = {});
+bool end_row(Session& session, const std::string& name, const std::string& help, const std::string& back = {});
 
 /// Part of the panel that can be folded, and stays so; `open`: at first.
 bool section(Session& session, const char* name, bool open = true);
@@ -44,14 +42,13 @@ bool check_box(Session& session, const char* label, bool& value, const std::stri
 bool slider(Session& session, const char* label, double& value, double usual, double low, double high,
             const char* format, const char* help, bool logarithmic = false);
 /// The word chosen, once.
-std::optional<std::string> combo(Session& session, const std::string& label, const std::string& now,
-                                 const Words& words, const std::string& help, const std::string& usual = {});
+std::optional<std::string> combo(Session& session, const std::string& label, const std::string& now, const Words& words,
+                                 const std::string& help, const std::string& usual = {});
 /// For an enumeration whose names are in its order.
 template <class Enum, class Names>
-void enum_combo(Session& s, const char* label, const Names& names, Enum& value, Enum usual,
-                const std::string& help) {
-  const auto chosen = combo(s, label, names[std::size_t(value)], Words(std::begin(names), std::end(names)),
-                            help, names[std::size_t(usual)]);
+void enum_combo(Session& s, const char* label, const Names& names, Enum& value, Enum usual, const std::string& help) {
+  const auto chosen = combo(s, label, names[std::size_t(value)], Words(std::begin(names), std::end(names)), help,
+                            names[std::size_t(usual)]);
   if (!chosen) return;
   value = Enum(std::ranges::find(names, *chosen) - std::begin(names));
   s.log("{} {}", label, *chosen);

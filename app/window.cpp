@@ -55,9 +55,7 @@ struct Input {
   std::vector<std::function<void()>> events{};       ///< since the last frame, in order
 
   /// Something is under way that a frame must follow.
-  bool busy() const {
-    return drag != Drag::none || pinning || !events.empty() || session.loaded.probe.asked();
-  }
+  bool busy() const { return drag != Drag::none || pinning || !events.empty() || session.loaded.probe.asked(); }
 };
 
 using Drag = Input::Drag;
@@ -68,8 +66,7 @@ constexpr double same_place = 6;       // window coordinates between the clicks 
 Ray ray_at_cursor(const Input& in, std::size_t lane) {
   // Only ratios count, so window coordinates do as well as pixels.
   const Rect tile = lane_place(in.session, lane, in.view);
-  return pixel_ray(in.session.camera, float(in.x) - tile.x, float(in.y) - tile.y, int(tile.width),
-                   int(tile.height));
+  return pixel_ray(in.session.camera, float(in.x) - tile.x, float(in.y) - tile.y, int(tile.width), int(tile.height));
 }
 
 Ray ray_at_cursor(const Input& in) { return ray_at_cursor(in, in.session.loaded.chosen); }
@@ -93,8 +90,7 @@ double cut_moved(const Session& s, float dx, float dy, const Rect& place) {
     return glm::vec2(clip.x, -clip.y) / clip.w * 0.5f * glm::vec2(place.width, place.height);
   };
   const float extent = glm::dot(glm::abs(n), r.rest_high - r.rest_low);
-  const glm::vec2 way =
-      pixels(s.camera.target + 0.5f * extent * n) - pixels(s.camera.target - 0.5f * extent * n);
+  const glm::vec2 way = pixels(s.camera.target + 0.5f * extent * n) - pixels(s.camera.target - 0.5f * extent * n);
   // Where the normal points at the eye, up is into the picture.
   if (glm::length(way) < 0.1f * place.height) return double(dy / place.height);
   return double(glm::dot(glm::vec2(dx, dy), way) / glm::dot(way, way));
@@ -169,8 +165,8 @@ void release(Input& in, int button) {
   const Camera& c = s.camera;
   if (in.drag == Drag::cut) s.log("cut {:.4f}", s.view.cut);
   if (in.drag == Drag::orbit || in.drag == Drag::pan)
-    note_camera(s), s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation,
-                          c.distance, c.target.x, c.target.y, c.target.z);
+    note_camera(s), s.log("camera {:.2f} {:.2f} {:.4f} at {:.3f} {:.3f} {:.3f}", c.azimuth, c.elevation, c.distance,
+                          c.target.x, c.target.y, c.target.z);
   // A press that the picker has not answered yet is a click: it may still pin a vertex, but catches none.
   if (in.drag == Drag::grab) let_go(s);
   if (in.drag == Drag::obstacle) {
@@ -198,8 +194,7 @@ void key(Input& in, int code, int modifiers) {
   modifiers &= GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER | GLFW_MOD_SHIFT;
   if (modifiers == GLFW_MOD_SHIFT) modifiers = 0;
   for (const Shortcut& row : shortcuts())
-    if ((code == row.key || code == row.alternative) && modifiers == row.modifiers)
-      return row.act(in.session);
+    if ((code == row.key || code == row.alternative) && modifiers == row.modifiers) return row.act(in.session);
 }
 
 // Chosen by a click where no body is behind it, led by a drag once it is chosen, so that turning the view
@@ -213,8 +208,7 @@ bool take_obstacle(Input& in, const Pick& pick) {
   if (hit) choose_obstacle(s, hit->number);
   if (led) {
     s.moving_obstacle = true;
-    in.depth =
-        hit->distance * double(glm::dot(ray.direction, glm::normalize(s.camera.target - eye(s.camera))));
+    in.depth = hit->distance * double(glm::dot(ray.direction, glm::normalize(s.camera.target - eye(s.camera))));
   }
   if (in.drag == Drag::asking) in.drag = led ? Drag::obstacle : Drag::orbit;
   return true;
@@ -244,8 +238,8 @@ void hover(Input& in) {
   }
   const bool had = probe.reading.has_value();
   if (take_reading(probe, s.loaded.lanes) && probe.reading && !had)
-    s.log("probe {} {} {:.4f} {:.4f} {:.4f}", probe.reading->vertex, probe.reading->tet,
-          probe.reading->position.x, probe.reading->position.y, probe.reading->position.z);
+    s.log("probe {} {} {:.4f} {:.4f} {:.4f}", probe.reading->vertex, probe.reading->tet, probe.reading->position.x,
+          probe.reading->position.y, probe.reading->position.z);
   const std::size_t lane = lane_at_cursor(in);
   const Ray ray = ray_at_cursor(in, lane);
   const Seen now{ray.origin, ray.direction, s.loaded.sim().steps, s.loaded.held, lane};
@@ -261,8 +255,7 @@ void listen(GLFWwindow* window, Input& input) {
   glfwSetWindowUserPointer(window, &input);
   glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
     // Held down, only the keys that step go on.
-    const bool again =
-        action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT || code == GLFW_KEY_LEFT);
+    const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT || code == GLFW_KEY_LEFT);
     if (action == GLFW_PRESS || again)
       of(w)->events.push_back([in = of(w), code, modifiers] { key(*in, code, modifiers); });
   });
@@ -274,17 +267,15 @@ void listen(GLFWwindow* window, Input& input) {
       action == GLFW_PRESS ? press(*in, button, modifiers) : release(*in, button);
     });
   });
-  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
-    of(w)->events.push_back([=, in = of(w)] { move(*in, x, y); });
-  });
+  glfwSetCursorPosCallback(
+      window, [](GLFWwindow* w, double x, double y) { of(w)->events.push_back([=, in = of(w)] { move(*in, x, y); }); });
   glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** files) {
     if (count > 0)
       of(w)->events.push_back([in = of(w), file = std::string(files[0])] { open_file(in->session, file); });
   });
   glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turned) {
     bool of_cut = false;  // as it is now, not in the next frame
-    for (const int held :
-         {GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL})
+    for (const int held : {GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL})
       of_cut = of_cut || glfwGetKey(w, held) == GLFW_PRESS;
     of(w)->events.push_back([=, in = of(w)] { wheel(*in, turned, of_cut); });
   });
@@ -318,8 +309,7 @@ struct Desktop {
   bool visible = false;       ///< not minimised
 
   Desktop(int wanted_width, int wanted_height, const std::string& title) {
-    if (!glfwInit())
-      throw Error("no display", last_glfw_error(), "start it in a desktop session, or use tetpbd run");
+    if (!glfwInit()) throw Error("no display", last_glfw_error(), "start it in a desktop session, or use tetpbd run");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -354,8 +344,8 @@ void measure_window(Desktop& d, Session& s) {
   int pixels_x = 0, pixels_y = 0;
   glfwGetWindowSize(d.window, &d.width, &d.height);
   glfwGetFramebufferSize(d.window, &pixels_x, &pixels_y);
-  d.visible = pixels_x > 0 && pixels_y > 0 && d.width > 0 && d.height > 0 &&
-              !glfwGetWindowAttrib(d.window, GLFW_ICONIFIED);
+  d.visible =
+      pixels_x > 0 && pixels_y > 0 && d.width > 0 && d.height > 0 && !glfwGetWindowAttrib(d.window, GLFW_ICONIFIED);
   if (!d.visible) return;
   const std::tuple before(s.ui.scale, d.density, d.dark);
   d.density = float(pixels_x) / float(d.width);

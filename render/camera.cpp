@@ -28,9 +28,7 @@ void pan(Camera& camera, float dx, float dy, int shorter_side) {
   camera.target += metres * (-dx * right + dy * up);
 }
 
-void zoom(Camera& camera, float factor) {
-  camera.distance = std::clamp(camera.distance * factor, 1e-3f, 1e5f);
-}
+void zoom(Camera& camera, float factor) { camera.distance = std::clamp(camera.distance * factor, 1e-3f, 1e5f); }
 
 void follow(Camera& camera, const glm::vec3& goal, float seconds) {
   camera.target += (goal - camera.target) * (1.0f - std::exp(-seconds / 0.3f));
@@ -70,11 +68,9 @@ void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, floa
   const float tan_y = half_height(camera, aspect), tan_x = tan_y * aspect;
   float distance = 1e-3f;
   for (int corner = 0; corner < 8; ++corner) {
-    const glm::vec3 point{corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y,
-                          corner & 4 ? high.z : low.z};
+    const glm::vec3 point{corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y, corner & 4 ? high.z : low.z};
     const glm::vec3 p = rotation * (point - camera.target);  // z towards the eye
-    distance =
-        std::max({distance, p.z + margin * std::abs(p.x) / tan_x, p.z + margin * std::abs(p.y) / tan_y});
+    distance = std::max({distance, p.z + margin * std::abs(p.x) / tan_x, p.z + margin * std::abs(p.y) / tan_y});
   }
   camera.distance = distance;
 }
@@ -96,10 +92,8 @@ glm::mat4 projection_matrix(const Camera& camera, float aspect) {
 }
 
 Ray pixel_ray(const Camera& camera, float x, float y, int width, int height) {
-  const float aspect = float(width) / float(height), tan_y = half_height(camera, aspect),
-              tan_x = tan_y * aspect;
-  const glm::vec3 seen{(2.0f * x / float(width) - 1.0f) * tan_x, (1.0f - 2.0f * y / float(height)) * tan_y,
-                       -1.0f};
+  const float aspect = float(width) / float(height), tan_y = half_height(camera, aspect), tan_x = tan_y * aspect;
+  const glm::vec3 seen{(2.0f * x / float(width) - 1.0f) * tan_x, (1.0f - 2.0f * y / float(height)) * tan_y, -1.0f};
   return {eye(camera), glm::normalize(glm::transpose(glm::mat3(view_matrix(camera))) * seen)};
 }
 

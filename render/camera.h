@@ -39,8 +39,7 @@ void keep_in_view(Camera& camera, const glm::vec3& point, float aspect);
 /// the last it stands still.
 Camera camera_at(const std::vector<CameraKey>& path, double time);
 /// Looks at the middle of a box and goes back until all of it is in view, with `margin` around it (1: none).
-void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect,
-               float margin = 1.15f);
+void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, float aspect, float margin = 1.15f);
 
 glm::vec3 eye(const Camera& camera);
 glm::mat4 view_matrix(const Camera& camera);

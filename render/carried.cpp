@@ -18,9 +18,7 @@ std::uint32_t packed_normal(glm::dvec3 n) {
   n /= std::max(std::abs(n.x) + std::abs(n.y) + std::abs(n.z), 1e-300);
   glm::dvec2 at(n);
   if (n.z < 0) at = {std::copysign(1 - std::abs(n.y), n.x), std::copysign(1 - std::abs(n.x), n.y)};
-  const auto part = [](double x) {
-    return std::uint32_t(std::clamp(std::lround((x + 1) * 2047), 0l, 4095l));
-  };
+  const auto part = [](double x) { return std::uint32_t(std::clamp(std::lround((x + 1) * 2047), 0l, 4095l)); };
   return part(at.x) | part(at.y) << 12;
 }
 
@@ -49,8 +47,7 @@ bool shows_carried(const Renderer& renderer, const ViewOptions& options) {
     return false;
   GLint most = 0;  // texels: GL promises 65536
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
-  return 3 * renderer.mesh.positions.size() <= std::size_t(most) &&
-         renderer.mesh.tets.size() <= std::size_t(most);
+  return 3 * renderer.mesh.positions.size() <= std::size_t(most) && renderer.mesh.tets.size() <= std::size_t(most);
 }
 
 // A vertex on an edge has a normal for each side, and so becomes several.
@@ -80,8 +77,7 @@ void make_carried(Renderer& renderer) {
       const Corner& corner = corners[around.values[i]];
       glm::dvec3 sum(0);
       for (std::uint32_t j = around.first[v]; j < around.first[v + 1]; ++j)
-        if (const Corner& other = corners[around.values[j]];
-            glm::dot(other.normal, corner.normal) >= edge_cosine)
+        if (const Corner& other = corners[around.values[j]]; glm::dot(other.normal, corner.normal) >= edge_cosine)
           sum += other.normal * other.angle;
       const glm::uvec4 vertex = packed(surface.vertices[v], sum);
       const auto found = std::find(vertices.begin() + std::ptrdiff_t(own), vertices.end(), vertex);
@@ -113,8 +109,8 @@ void draw_carried(Renderer& renderer, const Frame& frame, const Program& program
   glActiveTexture(GL_TEXTURE0);
   glEnable(GL_CLIP_DISTANCE0);
   glBindVertexArray(renderer.carried_array.id());
-  glDrawElements(GL_TRIANGLES, GLsizei(renderer.carried_triangles.bytes() / sizeof(std::uint32_t)),
-                 GL_UNSIGNED_INT, nullptr);
+  glDrawElements(GL_TRIANGLES, GLsizei(renderer.carried_triangles.bytes() / sizeof(std::uint32_t)), GL_UNSIGNED_INT,
+                 nullptr);
   glDisable(GL_CLIP_DISTANCE0);
 }
 

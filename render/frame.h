@@ -58,8 +58,7 @@ struct ViewOptions {
   double shrink = 0.15;  ///< tets: each towards its centre, 0..1
   double explode = 0;    ///< tets: away from the bodies' centre, as a part of their distance from it
   double cut = 1;        ///< what is below this part of the rest shape's extent ...
-  int cut_axis =
-      0;  ///< ... along x, y, z (0, 1, 2) or `cut_normal` (3) is shown, and where it ends a flat face
+  int cut_axis = 0;      ///< ... along x, y, z (0, 1, 2) or `cut_normal` (3) is shown, and where it ends a flat face
   glm::vec3 cut_normal{0, 0, 1};
   glm::vec3 body_colour{0.74f, 0.50f, 0.41f};                 ///< sRGB; further bodies turn its hue
   std::array<ColourRange, colour_names.size()> ranges = [] {  ///< of each Colour
@@ -98,24 +97,23 @@ struct Viewport {
 struct Frame {
   GLuint positions = 0;   ///< buffer of Position; nothing but its current state is read
   GLuint velocities = 0;  ///< buffer of Velocity; needed for Colour::velocity and arrows alone
-  GLuint values =
-      0;  ///< buffer of floats by vertex; needed for Colour::motion (measure_distances) and patch alone
+  GLuint values = 0;      ///< buffer of floats by vertex; needed for Colour::motion (measure_distances) and patch alone
   const Pairs* pairs = nullptr;  ///< bodies that touch each other; needed for contacts alone
-  glm::vec4 material{0};  ///< as tet_energy of values.glsl has it; needed for energy and residual alone
+  glm::vec4 material{0};         ///< as tet_energy of values.glsl has it; needed for energy and residual alone
   Camera camera;
   Viewport viewport;
   ViewOptions options;
-  std::optional<float> ground;         ///< height, metres
-  std::shared_ptr<const Model> model;  ///< whose obstacles are drawn, as they stand at `time`; none: none
-  double time = 0;                     ///< s
-  int chosen_obstacle = -1;            ///< of the model; shown in another colour
+  std::optional<float> ground;                 ///< height, metres
+  std::shared_ptr<const Model> model;          ///< whose obstacles are drawn, as they stand at `time`; none: none
+  double time = 0;                             ///< s
+  int chosen_obstacle = -1;                    ///< of the model; shown in another colour
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
   std::vector<std::uint32_t> touching;         ///< obstacles, also through the body
   std::vector<std::uint32_t> worst;            ///< as rings, also through the body
   std::string caption;                         ///< upper left
   bool over = false;                           ///< the bodies alone, into what is drawn already
   float opacity = 1;                           ///< of the bodies
-  GLuint target = 0;  ///< framebuffer with an sRGB colour format (Target has it) and depth
+  GLuint target = 0;                           ///< framebuffer with an sRGB colour format (Target has it) and depth
 };
 
 /// A picture of a simulation with its ground, walls and pinned vertices (infinite mass), all of the target.

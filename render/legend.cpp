@@ -46,8 +46,7 @@ void draw_scale(ImDrawList& draw, const ViewOptions& options, ImVec2 corner, flo
   float width = std::max(ImGui::CalcTextSize(title).x, ImGui::CalcTextSize(unit).x);
   for (int i = 0; i < ticks; ++i) {
     const double shown = value(float(i) / (ticks - 1)) * factor;
-    labels[i] =
-        std::abs(shown) < 1e-9 ? "0" : fmt::format(fmt::runtime(is_signed ? "{:+.3g}" : "{:.3g}"), shown);
+    labels[i] = std::abs(shown) < 1e-9 ? "0" : fmt::format(fmt::runtime(is_signed ? "{:+.3g}" : "{:.3g}"), shown);
     width = std::max(width, line + pad + ImGui::CalcTextSize(labels[i].c_str()).x);
   }
   const ImVec2 low(std::round(corner.x - width - 2 * pad),
@@ -100,8 +99,7 @@ void CloseLegend::operator()(ImGuiContext* context) const {
   ImGui::DestroyContext(context);
 }
 
-void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options,
-                 const std::string& caption) {
+void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options, const std::string& caption) {
   const Current current(legend.get());
   if (!legend) {
     legend.reset(ImGui::CreateContext());

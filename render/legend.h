@@ -25,7 +25,6 @@ struct CloseLegend {
 /// A context of Dear ImGui beside the window's. Contexts are current for the whole program: one thread draws.
 using Legend = std::unique_ptr<ImGuiContext, CloseLegend>;
 /// A colour scale at the lower right where the options ask for one, a caption at the upper left.
-void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options,
-                 const std::string& caption);
+void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& options, const std::string& caption);
 
 }  // namespace tetpbd

@@ -13,9 +13,7 @@ namespace {
 constexpr glm::vec3 contact_colour(0.95f, 0.35f, 0.0f);
 
 // Pixels of marks of this size at 720 lines.
-float scaled(const Frame& frame, float size) {
-  return size * std::max(1.0f, float(frame.viewport.height) / 720.0f);
-}
+float scaled(const Frame& frame, float size) { return size * std::max(1.0f, float(frame.viewport.height) / 720.0f); }
 
 // Seen through the bodies, which hide where they stand. Vertices within 10^-5 of the size of the ground or a
 // wall, as metrics count them.

@@ -53,9 +53,7 @@ Bounds with_obstacles(const Bounds& box, const Model& model, double time, double
   return all;
 }
 
-bool has_surfaces(const Frame& frame) {
-  return frame.model && !std::ranges::all_of(frame.model->obstacles, is_flat);
-}
+bool has_surfaces(const Frame& frame) { return frame.model && !std::ranges::all_of(frame.model->obstacles, is_flat); }
 
 std::vector<glm::vec4> find_planes(const Frame& frame) {
   std::vector<glm::vec4> planes;

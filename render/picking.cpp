@@ -22,8 +22,7 @@ Picker make_picker(const TetMesh& mesh) {
 
 namespace {
 
-void ask(Picker& picker, Pass& pass, GLuint positions, const Buffer& elements, std::size_t count,
-         const Ray& ray) {
+void ask(Picker& picker, Pass& pass, GLuint positions, const Buffer& elements, std::size_t count, const Ray& ray) {
   picker.ray = ray;
   const std::array<std::uint32_t, 3> start{none, none, none};
   picker.result.write(0, sizeof start, start.data());

@@ -70,8 +70,7 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   View view{};
   const glm::mat4 seen = view_matrix(frame.camera);
-  view.camera =
-      projection_matrix(frame.camera, float(frame.viewport.width) / float(frame.viewport.height)) * seen;
+  view.camera = projection_matrix(frame.camera, float(frame.viewport.width) / float(frame.viewport.height)) * seen;
   // 55 degrees: the shipped meshes have folds of 50 that ought to look round, and would show as saw teeth.
   view.eye = glm::vec4(eye(frame.camera), options.smooth_normals ? 0.574f : 2.0f);
   view.right = glm::vec4(seen[0][0], seen[1][0], seen[2][0], options.shadow ? 1.0f : 0.0f);
@@ -136,8 +135,8 @@ void draw_surroundings(Renderer& renderer, const Frame& frame) {
 // However drawing ends, by a shader that does not compile, too.
 struct Afterwards {
   ~Afterwards() {
-    for (GLenum what : {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL,
-                        GL_DEPTH_CLAMP})
+    for (GLenum what :
+         {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL, GL_DEPTH_CLAMP})
       glDisable(what);
     for (int unit : {UNIT_SHADOW, UNIT_SHADOW_DEPTH, UNIT_PLANES}) glBindSampler(GLuint(unit), 0);
     glBindVertexArray(0);
@@ -180,8 +179,7 @@ void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool sha
   if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, tet_buffer(renderer));
 }
 
-void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset,
-               GLenum type) {
+void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset, GLenum type) {
   if (!buffer) {
     glDisableVertexAttribArray(index);
     glVertexAttrib4f(index, 0, 0, 0, 0);
@@ -189,8 +187,7 @@ void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std
   }
   glBindBuffer(GL_ARRAY_BUFFER, buffer);
   glEnableVertexAttribArray(index);
-  glVertexAttribPointer(index, count, type, type != GL_FLOAT, GLsizei(stride),
-                        reinterpret_cast<const void*>(offset));
+  glVertexAttribPointer(index, count, type, type != GL_FLOAT, GLsizei(stride), reinterpret_cast<const void*>(offset));
 }
 
 Pass& kernel(Renderer& renderer, const std::string& name) {
@@ -273,8 +270,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   glDisable(GL_CULL_FACE);
   const int planes = options.backdrop && !frame.over ? int(find_planes(frame).size()) : 0;
   const bool lit_planes = options.shadow && planes > 0, tets = options.look == Look::tets;
-  if (tets || options.look == Look::graph || options.is_cut() || renderer.bodies.size() > 1)
-    rest_buffer(renderer);
+  if (tets || options.look == Look::graph || options.is_cut() || renderer.bodies.size() > 1) rest_buffer(renderer);
   bind_view(renderer, frame);
   const GLuint values = find_values(renderer, frame);
   const bool carried = shows_carried(renderer, options);
@@ -293,8 +289,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   glEnable(GL_FRAMEBUFFER_SRGB);
   glDepthMask(GL_TRUE);
   glClearColor(0.7f, 0.73f, 0.76f, 1.0f);
-  if (!frame.over)
-    glClear(options.backdrop ? GL_DEPTH_BUFFER_BIT : GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  if (!frame.over) glClear(options.backdrop ? GL_DEPTH_BUFFER_BIT : GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
   if (options.shadow) bind_shadows(renderer.shadow);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);

@@ -42,7 +42,7 @@ struct Shadow {
 struct Renderer {
   TetMesh mesh;
   std::vector<std::size_t> bodies;  ///< the first vertex of each
-  std::vector<glm::ivec2> sheets;  ///< corners of triangles, the first and how many, of each that has no tets
+  std::vector<glm::ivec2> sheets;   ///< corners of triangles, the first and how many, of each that has no tets
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
   std::map<std::string, Pass> passes;
   Recorder recorder;

@@ -16,8 +16,8 @@ constexpr float obstacle_reach = 3;
 void make_map(Shadow& shadow) {
   Texture depth("shadow depth");
   clear_errors();
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow.size, shadow.size, 0, GL_DEPTH_COMPONENT,
-               GL_FLOAT, nullptr);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, shadow.size, shadow.size, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
+               nullptr);
   shadow.depth_size = shadow.size;
   check_memory("the shadow map", std::size_t(shadow.size) * std::size_t(shadow.size) * 4);
   shadow.depth = std::move(depth);
@@ -29,12 +29,9 @@ void make_map(Shadow& shadow) {
   const std::array<float, 4> lit{1.0f, 1.0f, 1.0f, 1.0f};
   shadow.compared = Sampler("shadow compared");
   shadow.plain = Sampler("shadow plain");
-  for (const auto& [sampler, filter] :
-       {std::pair{shadow.compared.id(), GL_LINEAR}, {shadow.plain.id(), GL_NEAREST}}) {
-    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
-      glSamplerParameteri(sampler, wrap, GL_CLAMP_TO_BORDER);
-    for (GLenum size : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
-      glSamplerParameteri(sampler, size, filter);
+  for (const auto& [sampler, filter] : {std::pair{shadow.compared.id(), GL_LINEAR}, {shadow.plain.id(), GL_NEAREST}}) {
+    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) glSamplerParameteri(sampler, wrap, GL_CLAMP_TO_BORDER);
+    for (GLenum size : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) glSamplerParameteri(sampler, size, filter);
     glSamplerParameterfv(sampler, GL_TEXTURE_BORDER_COLOR, lit.data());
   }
   glSamplerParameteri(shadow.compared.id(), GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
@@ -59,8 +56,7 @@ void fit_light(Renderer& renderer, const Frame& frame) {
   const Program& program = pass.program;
   program.set("map_size", float(shadow.size));
   const Bounds nothing{glm::dvec3(1e30), glm::dvec3(-1e30)};
-  const Bounds obstacles =
-      frame.model ? with_obstacles(nothing, *frame.model, frame.time, INFINITY) : nothing;
+  const Bounds obstacles = frame.model ? with_obstacles(nothing, *frame.model, frame.time, INFINITY) : nothing;
   program.set("obstacles_low", glm::vec3(obstacles.low));
   program.set("obstacles_high", glm::vec3(obstacles.high));
   program.set("reach", obstacle_reach * rest_size);
@@ -117,8 +113,7 @@ void light_planes(Renderer& renderer, const Frame& frame, int count) {
     check_memory("the light on planes", std::size_t(size) * std::size_t(size * count) * 2);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
-    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
-      glTexParameteri(GL_TEXTURE_2D, wrap, GL_CLAMP_TO_EDGE);
+    for (GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) glTexParameteri(GL_TEXTURE_2D, wrap, GL_CLAMP_TO_EDGE);
     shadow.planes_size = size, shadow.planes_count = count;
   }
   bind_shadows(shadow);
@@ -134,8 +129,7 @@ void light_planes(Renderer& renderer, const Frame& frame, int count) {
 
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait) {
   Shadow& shadow = renderer.shadow;
-  const auto centre =
-      poll_readback<glm::vec4>(shadow.centre_copied, shadow.centre, "reading the bodies' middle", wait);
+  const auto centre = poll_readback<glm::vec4>(shadow.centre_copied, shadow.centre, "reading the bodies' middle", wait);
   return centre ? std::optional(glm::vec3(centre->front())) : std::nullopt;
 }
 

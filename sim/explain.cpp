@@ -64,8 +64,7 @@ Explanation explain(Sim& sim, int timed_steps) {
     for (; const auto ms = counted.timer.poll(true); ++times) sum += *ms;
     const std::optional<double> ms = times > 0 ? std::optional(sum / times) : std::nullopt;
     const double per_step = double(counted.dispatches) / steps;
-    result.dispatches.push_back(
-        {counted.name, counted.work_groups, std::lround(per_step), counted.bytes, ms});
+    result.dispatches.push_back({counted.name, counted.work_groups, std::lround(per_step), counted.bytes, ms});
     result.ms_per_step += ms.value_or(0) * per_step;
     result.dispatches_per_step += std::lround(per_step);
     result.bytes_per_step += std::size_t(double(counted.bytes) * per_step);

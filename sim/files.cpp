@@ -28,9 +28,7 @@ void PartFile::finish() const {
   if (failed) throw Error("cannot be written", file.string(), failed.message(), 1);
 }
 
-GrowingFile::GrowingFile(const fs::path& file) : part_(file), stream_(part_.part, std::ios::binary) {
-  add("");
-}
+GrowingFile::GrowingFile(const fs::path& file) : part_(file), stream_(part_.part, std::ios::binary) { add(""); }
 
 void GrowingFile::add(const std::string& text) {
   if (!(stream_ << text)) throw Error("cannot be written", part_.file.string(), std::strerror(errno), 1);

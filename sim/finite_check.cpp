@@ -12,10 +12,9 @@
 namespace tetpbd {
 
 Error error_of(const NonFinite& found, const std::string& where) {
-  return Error(
-      "the state is not finite",
-      fmt::format("{}{}at step {}, vertex {}", where, where.empty() ? "" : ", ", found.step, found.vertex),
-      "use a smaller dt, more substeps or a lower stiffness", 1);
+  return Error("the state is not finite",
+               fmt::format("{}{}at step {}, vertex {}", where, where.empty() ? "" : ", ", found.step, found.vertex),
+               "use a smaller dt, more substeps or a lower stiffness", 1);
 }
 
 void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only) {
@@ -32,9 +31,8 @@ void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool g
     const unsigned words = unsigned(bytes / 4);
     const unsigned from_at = give("From", *from, first, bytes), to_at = give("To", *to, at, bytes);
     check.copy.work_groups = std::min<std::size_t>(work_groups(words, 256), 1024);
-    recorder.run(
-        check.copy,
-        {{"count", words}, {"from_at", from_at}, {"to_at", to_at}, {"good_only", unsigned(good_only)}});
+    recorder.run(check.copy,
+                 {{"count", words}, {"from_at", from_at}, {"to_at", to_at}, {"good_only", unsigned(good_only)}});
   }
   recorder.barrier(GL_BUFFER_UPDATE_BARRIER_BIT);  // restoring reads what was written
 }
@@ -75,8 +73,8 @@ void restore_pins(Sim& sim) {
 }
 
 void take_answer(FiniteCheck& check, bool wait) {
-  const auto answer = poll_readback<std::uint32_t>(check.requested, check.read_back,
-                                                   "checking for numbers that are not finite", wait);
+  const auto answer =
+      poll_readback<std::uint32_t>(check.requested, check.read_back, "checking for numbers that are not finite", wait);
   if (!answer) return;
   const std::uint32_t step = (*answer)[0], vertex = (*answer)[1];
   if (step != ~0u) check.found = {long(step), vertex};
@@ -131,8 +129,8 @@ const std::optional<NonFinite>& check_finite(Sim& sim, bool wait) {
 bool restore_checkpoint(Sim& sim) {
   FiniteCheck& check = sim.check;
   if (!check.found || check.found->step == check.first) return false;
-  const auto after = std::ranges::find_if(
-      check.kept, [&](const Snapshot& kept) { return kept.step.steps >= check.found->step; });
+  const auto after =
+      std::ranges::find_if(check.kept, [&](const Snapshot& kept) { return kept.step.steps >= check.found->step; });
   if (after == check.kept.begin()) return false;
   const KeepBindings kept;
   // Both are made anew while it is gone back to.

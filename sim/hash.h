@@ -17,9 +17,8 @@ inline std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t hash = fnv
 /// Of the bits of a list of values without padding.
 template <class List>
 std::uint64_t hash_values(const List& values, std::uint64_t hash = fnv_basis) {
-  return hash_bytes(
-      {reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof *std::data(values)},
-      hash);
+  return hash_bytes({reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof *std::data(values)},
+                    hash);
 }
 
 }  // namespace tetpbd

@@ -64,8 +64,7 @@ struct Grouped {
 template <class Each>
 Grouped group_by_key(std::size_t items, std::size_t keys, Each&& each) {
   Grouped result{std::vector<std::uint32_t>(keys + 1, 0), {}};
-  for (std::size_t i = 0; i < items; ++i)
-    each(i, [&](std::uint32_t key, std::uint32_t) { ++result.first[key + 1]; });
+  for (std::size_t i = 0; i < items; ++i) each(i, [&](std::uint32_t key, std::uint32_t) { ++result.first[key + 1]; });
   std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
   result.values.resize(result.first.back());
   std::vector<std::uint32_t> next = result.first;

@@ -85,12 +85,11 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   if (sim.solver.keeps_prediction) sim.predicted = buffer("predicted", count * sizeof(Velocity));
   const std::size_t quantized_bytes = count * 16 * (input.compliant ? 2 : 1);
   if (sim.solver.quantized_buffers > 0) sim.quantized[0] = buffer("quantized positions", quantized_bytes);
-  if (sim.solver.quantized_buffers > 1)
-    sim.quantized[1] = buffer("quantized positions, other side", quantized_bytes);
+  if (sim.solver.quantized_buffers > 1) sim.quantized[1] = buffer("quantized positions, other side", quantized_bytes);
   if (input.rigid) {
     sim.rigid_bodies = buffer("hard bodies", sim.model->bodies.size() * sizeof(RigidRecord) + 8 * count);
-    sim.rigid_contact = {Program::compute("contact/rigid_contact.comp", {}, defines),
-                         work_groups(count, group_size), 4 * count};
+    sim.rigid_contact = {Program::compute("contact/rigid_contact.comp", {}, defines), work_groups(count, group_size),
+                         4 * count};
   }
   if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(input);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
@@ -121,10 +120,9 @@ bool adopt_constraints(Sim& sim, const Settings& settings) {
 void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Model>& model) {
   if (check_finite(sim, true)) restore_checkpoint(sim);  // it has nothing better to start from
   State state = read_state(sim);
-  Sim fresh = make_sim(model, settings, sim.tuning,
-                       same_constraints(*sim.model, settings, sim.settings)
-                           ? sim.system
-                           : build_constraints(*sim.model, settings));
+  Sim fresh = make_sim(
+      model, settings, sim.tuning,
+      same_constraints(*sim.model, settings, sim.settings) ? sim.system : build_constraints(*sim.model, settings));
   fresh.inverse_masses = sim.inverse_masses;
   fresh.steps = sim.steps, fresh.guards = guard_counts(sim);
   fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, simulated_time(sim)};
@@ -188,9 +186,7 @@ bool same_constraints(const Model& model, const Settings& a, const Settings& b) 
                       dashpots ? s.constraint_damping : 0);
   };
   // Where bodies differ, constraints carry the settings' numbers too.
-  const auto numbers = [](const Settings& s) {
-    return std::tuple(s.stiffness, s.compliance, s.constraint_damping);
-  };
+  const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
   return decides(a) == decides(b) && (!has_own_materials(model) || numbers(a) == numbers(b));
 }
 
@@ -233,9 +229,7 @@ void start_with(Sim& sim, State state, double fall) {
   adopt(sim, state);
 }
 
-void write_state(Sim& sim, const State& state) {
-  start_with(sim, state, half_substep_fall(sim.settings, sim.plan));
-}
+void write_state(Sim& sim, const State& state) { start_with(sim, state, half_substep_fall(sim.settings, sim.plan)); }
 
 Carried carried(Sim& sim) {
   Carried all;
@@ -275,8 +269,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const KeepBindings kept;
   check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, any_material(*sim.model, s, compliant), touches_rigidly(*sim.model, s),
-                      s.contact);
+    return std::tuple(s.mode, any_material(*sim.model, s, compliant), touches_rigidly(*sim.model, s), s.contact);
   };
   if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))
     adopt_settings(sim, settings);

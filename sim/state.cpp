@@ -32,9 +32,8 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
 
 void write_velocities(const Sim& sim, const State& state) {
   std::vector<Velocity> velocities(state.velocities.size());
-  parallel_for(velocities.size(), [&](std::size_t i) {
-    split_pair(state.velocities[i], velocities[i].high, velocities[i].low);
-  });
+  parallel_for(velocities.size(),
+               [&](std::size_t i) { split_pair(state.velocities[i], velocities[i].high, velocities[i].low); });
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 

@@ -49,8 +49,7 @@ void begin_on_gpu(Sim& sim, bool moving) {
   plan_body_contacts(sim);
   bind_obstacles(sim.obstacles);
   if (sim.timed) sim.timer.begin();
-  sim.recorder.barrier(
-      GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
+  sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
   if (!sim.needs_predict) return;
   forget_contacts(sim);
   sim.solver.predict(sim);

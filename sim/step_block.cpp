@@ -17,8 +17,7 @@ double choose_quantum(const Sim& sim, const State& state) {
 #pragma omp parallel for reduction(max : reach)
     for (std::size_t c = 0; c < list.vertices.size(); c += arity)
       for (std::size_t j = 1; j < arity; ++j) {
-        const double apart =
-            glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]);
+        const double apart = glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]);
         if (apart > reach && std::isfinite(apart)) reach = apart;
       }
   }

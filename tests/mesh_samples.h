@@ -52,17 +52,14 @@ std::string error_of(const Action& action) {
   return "";
 }
 
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// An irregular block about (0, 0, 0), moved: corrections differ from vertex to vertex.
 inline tetpbd::TetMesh irregular_block(glm::ivec3 cells, const glm::dvec3& moved) {
   tetpbd::TetMesh mesh = tetpbd::make_block(glm::dvec3(1.0, 0.7, 0.5), cells);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     auto& p = mesh.positions[i];
-    p +=
-        0.02 * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+    p += 0.02 * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
     p += moved + glm::dvec3(0.15 * p.y * p.y, 0, 0);
   }
   tetpbd::finish_tets(mesh, "block");
@@ -86,8 +83,7 @@ inline tetpbd::SurfaceMesh cube(const glm::dvec3& at = glm::dvec3(0), double sid
 inline tetpbd::SurfaceMesh joined(tetpbd::SurfaceMesh a, const tetpbd::SurfaceMesh& b) {
   const auto base = static_cast<std::uint32_t>(a.positions.size());
   a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
-  for (const tetpbd::Triangle& t : b.triangles)
-    a.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+  for (const tetpbd::Triangle& t : b.triangles) a.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
   return a;
 }
 

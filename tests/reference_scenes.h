@@ -53,8 +53,7 @@ inline Scene block_scene(glm::ivec3 cells = {3, 2, 2}, double irregular = 0.02) 
 }
 
 // Another, 6 x 5 x 4 vertices, in flight or above the ground; one edge of it held, if `held`.
-inline std::shared_ptr<const Model> irregular_block(double height, bool held,
-                                                    const glm::dvec3& velocity = {1, 0, 0},
+inline std::shared_ptr<const Model> irregular_block(double height, bool held, const glm::dvec3& velocity = {1, 0, 0},
                                                     const glm::dvec3& spin = {2, -1, 3}) {
   TetMesh mesh = make_block({1, 0.7, 0.5}, {5, 4, 3});
   generator.seed(3);
@@ -68,8 +67,7 @@ inline std::shared_ptr<const Model> irregular_block(double height, bool held,
 
 // Springs along a line from the origin, built by hand: `positions` at rest, a spring from each vertex to the
 // next.
-inline Scene chain_scene(const std::vector<glm::dvec3>& positions,
-                         const std::vector<double>& inverse_masses) {
+inline Scene chain_scene(const std::vector<glm::dvec3>& positions, const std::vector<double>& inverse_masses) {
   Scene scene;
   scene.settings.ground = false;
   Model& model = scene.model;
@@ -101,8 +99,8 @@ inline const Compliances none = [] {
 inline double off(double value, double right) { return std::abs(value / right - 1); }
 
 // A clamped block of `material`, with what a run of it needs.
-inline Scene beam_of(const std::string& material, const glm::ivec3& cells, double young_modulus,
-                     double poisson_ratio, const glm::dvec3& size = {1, 0.25, 0.25}) {
+inline Scene beam_of(const std::string& material, const glm::ivec3& cells, double young_modulus, double poisson_ratio,
+                     const glm::dvec3& size = {1, 0.25, 0.25}) {
   Scene scene;
   scene.settings.material = material;
   scene.settings.young_modulus = young_modulus, scene.settings.poisson_ratio = poisson_ratio;
@@ -137,8 +135,7 @@ inline Errors errors_of(const Scene& scene, const std::vector<glm::dvec3>& x) {
   const auto& edges = scene.system.lists[0];
   Errors e;
   for (std::size_t c = 0; c < edges.count(); ++c)
-    e.strain +=
-        std::pow(glm::length(x[edges.vertices[2 * c]] - x[edges.vertices[2 * c + 1]]) / edges.rest[c] - 1, 2);
+    e.strain += std::pow(glm::length(x[edges.vertices[2 * c]] - x[edges.vertices[2 * c + 1]]) / edges.rest[c] - 1, 2);
   const auto& tets = scene.system.lists[2];
   TetMesh now{x, {}, {}};
   for (std::size_t c = 0; c < tets.count(); ++c) {

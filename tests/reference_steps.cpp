@@ -30,16 +30,14 @@ void predict(const ReferenceInput& input, State& state, double h) {
   const double velocity_scale = std::exp(-input.settings.damping * h);
   for (std::size_t i = 0; i < state.positions.size(); ++i)
     if (input.inverse_masses[i] > 0) {
-      state.velocities[i] =
-          (state.velocities[i] + h * glm::dvec3(0, -input.settings.gravity, 0)) * velocity_scale;
+      state.velocities[i] = (state.velocities[i] + h * glm::dvec3(0, -input.settings.gravity, 0)) * velocity_scale;
       state.positions[i] += h * state.velocities[i];
     }
 }
 
 // `state` as predicted; it moves on to `positions`.
 void finish(State& state, const Points& positions, double h) {
-  for (std::size_t i = 0; i < positions.size(); ++i)
-    state.velocities[i] += (positions[i] - state.positions[i]) / h;
+  for (std::size_t i = 0; i < positions.size(); ++i) state.velocities[i] += (positions[i] - state.positions[i]) / h;
   state.positions = positions;
 }
 
@@ -59,8 +57,7 @@ void align(const ReferenceInput& input, const Body& body, const Points& to, Poin
     covariance += glm::outerProduct(to[i] - centre, rest[i] - rest_centre) / input.inverse_masses[i];
   const BestRotation best = best_rotation(covariance);
   if (!best.unique)
-    throw Error("no best rotation",
-                "predicted positions of " + body.name + " are on a line, a point or mirrored",
+    throw Error("no best rotation", "predicted positions of " + body.name + " are on a line, a point or mirrored",
                 "start nearer to the rest shape", 1);
   for (std::size_t i = first; i < end; ++i) placed[i] = centre + best.R * (rest[i] - rest_centre);
 }
@@ -96,8 +93,7 @@ double total_mass(const Objective& o) { return std::accumulate(o.masses.begin(),
 
 Error no_convergence(const Minimum& result, const char* hint) {
   return {"the reference did not converge",
-          fmt::format("{} after {}, residual {:.1e}", result.reason, result.iterations, result.residual),
-          hint, 1};
+          fmt::format("{} after {}, residual {:.1e}", result.reason, result.iterations, result.residual), hint, 1};
 }
 
 }  // namespace
@@ -111,8 +107,7 @@ Objective step_objective(const ReferenceInput& input, State state, const Complia
   return o;
 }
 
-Objective static_objective(const ReferenceInput& input, const Points& positions,
-                           const Compliances& compliances) {
+Objective static_objective(const ReferenceInput& input, const Points& positions, const Compliances& compliances) {
   Objective o = make_objective(input, compliances);
   o.predicted = positions;
   o.gravity.y = -input.settings.gravity;
@@ -141,13 +136,11 @@ ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, cons
   return step;
 }
 
-ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions,
-                                 const Compliances& compliances) {
+ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions, const Compliances& compliances) {
   const bool held =
       std::any_of(input.inverse_masses.begin(), input.inverse_masses.end(), [](double w) { return w == 0; });
   if (!held || !(input.settings.gravity > 0))
-    throw Error("nothing hangs", held ? "gravity is 0" : "no vertex is fixed",
-                "fix vertices and set gravity");
+    throw Error("nothing hangs", held ? "gravity is 0" : "no vertex is fixed", "fix vertices and set gravity");
   const Objective full = static_objective(input, positions, compliances);
   for (int loads = 1;; loads *= 2) {
     Minimum result;
@@ -164,9 +157,7 @@ ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& posi
       refuse_contact(input, result.positions);
       for (std::size_t i = 0; i < positions.size(); ++i)
         if (input.inverse_masses[i] == 0) result.positions[i] = positions[i];
-      return {{std::move(result.positions), Points(positions.size(), glm::dvec3(0))},
-              iterations,
-              result.residual};
+      return {{std::move(result.positions), Points(positions.size(), glm::dvec3(0))}, iterations, result.residual};
     }
     if (loads == 64) throw no_convergence(result, "hold more vertices, or start nearer to equilibrium");
   }

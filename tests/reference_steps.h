@@ -19,8 +19,7 @@ State rigid_step(const ReferenceInput& input, State state);
 /// mass.
 Objective step_objective(const ReferenceInput& input, State state, const Compliances& compliances, double h);
 /// Rest under gravity: no inertia, unit M g size. `positions`: where fixed vertices are held.
-Objective static_objective(const ReferenceInput& input, const Points& positions,
-                           const Compliances& compliances);
+Objective static_objective(const ReferenceInput& input, const Points& positions, const Compliances& compliances);
 
 struct ReferenceStep {
   State state;
@@ -41,7 +40,6 @@ ReferenceStep implicit_euler_step(const ReferenceInput& input, State state, cons
 /// given positions, in up to 64 steps of load where one does not converge. Throws Error without fixed
 /// vertices or gravity, for compliances not above 0, and where no isolated stable equilibrium is found (a
 /// body free to turn has none).
-ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions,
-                                 const Compliances& compliances);
+ReferenceStep static_equilibrium(const ReferenceInput& input, const Points& positions, const Compliances& compliances);
 
 }  // namespace tetpbd

@@ -26,13 +26,10 @@ inline glm::vec3 project(const Camera& camera, const glm::vec3& point, int width
 // A block of cells, each cut into the six tets around its diagonal, and its boundary.
 inline TetMesh cut_block(const glm::dvec3& size, int n, const glm::dvec3& centre = glm::dvec3(0.0)) {
   TetMesh mesh;
-  const auto index = [&](const glm::ivec3& c) {
-    return std::uint32_t((c.z * (n + 1) + c.y) * (n + 1) + c.x);
-  };
+  const auto index = [&](const glm::ivec3& c) { return std::uint32_t((c.z * (n + 1) + c.y) * (n + 1) + c.x); };
   for (int z = 0; z <= n; ++z)
     for (int y = 0; y <= n; ++y)
-      for (int x = 0; x <= n; ++x)
-        mesh.positions.push_back(centre + size * (glm::dvec3(x, y, z) / double(n) - 0.5));
+      for (int x = 0; x <= n; ++x) mesh.positions.push_back(centre + size * (glm::dvec3(x, y, z) / double(n) - 0.5));
   const int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
   for (int cell = 0; cell < n * n * n; ++cell)
     for (int k = 0; k < 6; ++k) {
@@ -44,8 +41,7 @@ inline TetMesh cut_block(const glm::dvec3& size, int n, const glm::dvec3& centre
     }
   std::map<Triangle, Triangle> faces;
   for (const auto& [a, b, c, d] : mesh.tets)
-    for (const Triangle& face :
-         {Triangle{a, c, b}, Triangle{a, b, d}, Triangle{a, d, c}, Triangle{b, c, d}}) {
+    for (const Triangle& face : {Triangle{a, c, b}, Triangle{a, b, d}, Triangle{a, d, c}, Triangle{b, c, d}}) {
       Triangle key = face;
       std::sort(key.begin(), key.end());
       if (!faces.emplace(key, face).second) faces.erase(key);

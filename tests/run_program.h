@@ -29,8 +29,7 @@ struct Outcome {
   std::string out, err;
 };
 
-inline Outcome program(const std::string& arguments, const Folder& folder,
-                       const std::string& environment = "") {
+inline Outcome program(const std::string& arguments, const Folder& folder, const std::string& environment = "") {
   const std::string out = (folder.path / "stdout").string(), err = (folder.path / "stderr").string();
   const int status = std::system(("cd " + folder.path.string() + " && " + environment + " " TEST_PROGRAM " " +
                                   arguments + " >" + out + " 2>" + err)

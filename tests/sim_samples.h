@@ -13,14 +13,13 @@ namespace samples {
 using namespace tetpbd;
 
 // Irregular and asymmetric; 5*4*3 = 60 or 9*7*5 = 315 vertices, no multiple of any work-group.
-inline std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, double height = 0.2,
-                                                double scale = 1, const std::string& deformation = "none",
+inline std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, double height = 0.2, double scale = 1,
+                                                const std::string& deformation = "none",
                                                 glm::dvec3 spin = glm::dvec3(0)) {
   TetMesh mesh = make_block(glm::dvec3(1.0, 0.7, 0.5) * scale, cells);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     auto& p = mesh.positions[i];
-    p += 0.02 * scale *
-         glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+    p += 0.02 * scale * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
     p.y += (0.35 + 0.02 + height) * scale;
     p.x += 0.15 * p.y * p.y / scale;
   }

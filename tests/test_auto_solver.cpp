@@ -43,8 +43,7 @@ TEST_CASE("a solver by name puts its settings in place of the scene's, flags go 
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "paper", .budget_ms = 1.0}));
   CHECK_THROWS(load_scene("bunny-drop", {.solver = "auto", .parameters = {{"substeps", "7"}}}));
   CHECK(load_scene("bunny-drop", {.budget_ms = 2.0}).budget_ms == 2.0);
-  CHECK(*load_scene("bunny-drop", {.solver = "auto", .parameters = {{"dt", "0.01"}}}).budget_ms ==
-        doctest::Approx(1));
+  CHECK(*load_scene("bunny-drop", {.solver = "auto", .parameters = {{"dt", "0.01"}}}).budget_ms == doctest::Approx(1));
   CHECK_FALSE(load_scene("bunny-drop").budget_ms);
 }
 
@@ -55,12 +54,10 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
     const auto said = choose_by_rule(scene, *build_model(scene));
     CHECK_FALSE(scene.mode_open);
     const Plan plan = plan_for(scene.settings);
-    return fmt::format("{} {}x{} {}", scene.settings.mode, plan.substeps, plan.iterations,
-                       said.value_or("-"));
+    return fmt::format("{} {}x{} {}", scene.settings.mode, plan.substeps, plan.iterations, said.value_or("-"));
   };
   CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e4"}}).starts_with("explicit"));
-  CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e11"}})
-            .starts_with("newton 2x32 newton, 2 sub"));
+  CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e11"}}).starts_with("newton 2x32 newton, 2 sub"));
   CHECK(chosen({{"material", "springs"}, {"mode", "node"}, {"substeps", "9"}}) == "node 9x1 -");
   CHECK(chosen({{"material", "springs"}, {"substeps", "9"}}) == "node 9x1 -");
   CHECK(chosen({}).ends_with(" -"));  // nothing has a force
@@ -68,8 +65,7 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
   CHECK_FALSE(load_scene("soft-beam", {.solver = "newton"}).mode_open);
   CHECK_FALSE(load_scene("bunny-drop").mode_open);
   // What the rule expects is what the mode takes.
-  Scene scene =
-      falling({.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e8"}, {"mode", "explicit"}}});
+  Scene scene = falling({.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e8"}, {"mode", "explicit"}}});
   const auto model = build_model(scene);
   const Sim sim = create_sim(model, scene.settings);
   CHECK(explicit_substeps(*model, scene.settings) == doctest::Approx(sim.plan.substeps).epsilon(0.08));
@@ -117,8 +113,7 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     paper.stiffness[index_of<Volume>] = 0.5;
     CHECK(choose_solver(model, paper, 4, 5).judged == "volume");
     CHECK(choose_solver(model, own, 100, 2).settings().substeps > 4);
-    CHECK_THROWS_WITH_AS(choose_solver(model, own, 1e-6, 2), doctest::Contains("nothing fits the budget"),
-                         Error);
+    CHECK_THROWS_WITH_AS(choose_solver(model, own, 1e-6, 2), doctest::Contains("nothing fits the budget"), Error);
   }
 }
 
@@ -132,10 +127,8 @@ TEST_CASE("auto: a lane with a budget takes what fits it") {
 }
 
 TEST_CASE("each mode has its own substeps and iterations, where nobody asks for others") {
-  const auto plan = [](std::vector<std::pair<std::string, std::string>> parameters,
-                       std::vector<std::string> set = {}) {
-    const Plan p =
-        plan_for(load_scene("beam", {.parameters = std::move(parameters), .set = std::move(set)}).settings);
+  const auto plan = [](std::vector<std::pair<std::string, std::string>> parameters, std::vector<std::string> set = {}) {
+    const Plan p = plan_for(load_scene("beam", {.parameters = std::move(parameters), .set = std::move(set)}).settings);
     return fmt::format("{}x{}", p.substeps, p.iterations);
   };
   CHECK(plan({}) == "20x1");  // the scene's own

@@ -151,8 +151,7 @@ TEST_CASE("bodies: the reference has each one's material and friction") {
     const Settings own_settings = of_body(settings, bodies[b]);
     const ConstraintSystem own_system = build_constraints(*own_model, own_settings);
     const ReferenceInput own{*own_model, own_system, own_settings, own_model->inverse_masses};
-    Leapfrog run =
-        leapfrog(own, reference_compliances(own), {own_model->positions, own_model->velocities}, h);
+    Leapfrog run = leapfrog(own, reference_compliances(own), {own_model->positions, own_model->velocities}, h);
     advance(run, 1000);
     CHECK(difference(*model, b, state, make_state(run)) < 1e-9);
   }

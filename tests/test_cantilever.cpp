@@ -81,8 +81,7 @@ double linear_sag(const Scene& scene) {
     const Eigen::Matrix<double, 12, 12> K = std::abs(P.determinant()) / 6 * B.transpose() * D * B;
     for (int r = 0; r < 12; ++r)
       for (int c = 0; c < 12; ++c)
-        entries.emplace_back(3 * int(t[std::size_t(r / 3)]) + r % 3, 3 * int(t[std::size_t(c / 3)]) + c % 3,
-                             K(r, c));
+        entries.emplace_back(3 * int(t[std::size_t(r / 3)]) + r % 3, 3 * int(t[std::size_t(c / 3)]) + c % 3, K(r, c));
   }
   Eigen::SparseMatrix<double> K(rows, rows);
   K.setFromTriplets(entries.begin(), entries.end());
@@ -119,8 +118,7 @@ Refined refined(const Cantilever& exact) {
 
 }  // namespace
 
-TEST_CASE(
-    "material: a neo-hookean cantilever sags as linear finite elements and, refined, as Timoshenko says") {
+TEST_CASE("material: a neo-hookean cantilever sags as linear finite elements and, refined, as Timoshenko says") {
   const auto [stiffness, squares] = refined({5e7, 0.3});
   CHECK(stiffness[2] > 1);  // linear tets are too stiff
   CHECK(stiffness[1] > stiffness[2]);
@@ -143,10 +141,9 @@ TEST_CASE("material: sag tables") {
       return sag("springs") / sag("neo-hookean");
     };
     MESSAGE(nu, ": sags ", 1 / stiffness[0], " ", 1 / stiffness[1], " ", 1 / stiffness[2], " extrapolated ",
-            1 / extrapolated(stiffness), "; frequencies ", std::sqrt(squares[0]), " ", std::sqrt(squares[1]),
-            " ", std::sqrt(squares[2]), " extrapolated ", std::sqrt(extrapolated(squares)),
-            "; springs over tets, beam ", springs_over_tets({16, 4, 4}, {1, exact.b, exact.b}), ", cube ",
-            springs_over_tets({6, 6, 6}, {1, 1, 1}));
+            1 / extrapolated(stiffness), "; frequencies ", std::sqrt(squares[0]), " ", std::sqrt(squares[1]), " ",
+            std::sqrt(squares[2]), " extrapolated ", std::sqrt(extrapolated(squares)), "; springs over tets, beam ",
+            springs_over_tets({16, 4, 4}, {1, exact.b, exact.b}), ", cube ", springs_over_tets({6, 6, 6}, {1, 1, 1}));
   }
 }
 

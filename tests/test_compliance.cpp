@@ -51,8 +51,7 @@ std::shared_ptr<const Model> block_model(glm::ivec3 cells, double height, const 
   TetMesh mesh = make_block(glm::dvec3(1.0, 0.7, 0.5), cells);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     auto& p = mesh.positions[i];
-    p +=
-        0.02 * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
+    p += 0.02 * glm::dvec3(std::sin(12.9 * double(i)), std::sin(78.2 * double(i)), std::sin(37.7 * double(i)));
     p.y += 0.37 + height;
     p.x += 0.15 * p.y * p.y;
   }
@@ -68,8 +67,7 @@ Settings soft(const std::string& mode, int iterations, int substeps, double tau 
   Settings s;
   s.iterations = 25, s.substeps = 1;
   s.mode = mode, s.iterations = iterations, s.substeps = substeps;
-  s.compliance[index_of<Stretch>] = 1e-6, s.compliance[index_of<Bend>] = 1e-4,
-  s.compliance[index_of<Volume>] = 1e-10;
+  s.compliance[index_of<Stretch>] = 1e-6, s.compliance[index_of<Bend>] = 1e-4, s.compliance[index_of<Volume>] = 1e-10;
   s.constraint_damping = tau;
   return s;
 }
@@ -106,8 +104,8 @@ struct Beam {
     system = build_constraints(model.rest, settings.constraints);
     const Compliances alpha = {settings.compliance[index_of<Stretch>], settings.compliance[index_of<Bend>],
                                settings.compliance[index_of<Volume>]};
-    equilibrium = static_equilibrium({model, system, settings, model.inverse_masses}, model.positions, alpha)
-                      .state.positions;
+    equilibrium =
+        static_equilibrium({model, system, settings, model.inverse_masses}, model.positions, alpha).state.positions;
     sag = -tip(equilibrium);
   }
   // Height of the free end's middle.
@@ -167,8 +165,7 @@ TEST_CASE("a spring takes the step of implicit Euler, damped or not, in one iter
         const double mass = 0.7, alpha = 2e-4, stretched = 0.05, speed = 3;
         Spring spring(mass);
         Settings& s = spring.settings;
-        s.compliance[index_of<Stretch>] = alpha, s.constraint_damping = tau, s.iterations = iterations,
-        s.omega = 1;
+        s.compliance[index_of<Stretch>] = alpha, s.constraint_damping = tau, s.iterations = iterations, s.omega = 1;
         spring.state.positions[1].x += stretched, spring.state.velocities[1].x = speed;
         const double h = s.dt, inertia = mass / (h * h), k = 1 / alpha, c = tau / alpha / h;
         const double expected = (inertia * (stretched + h * speed) + c * stretched) / (inertia + k + c);
@@ -235,8 +232,7 @@ TEST_CASE("one GPU step with compliance is the double CPU step") {
           CAPTURE(tau);
           CAPTURE(iterations);
           CAPTURE(cells.x);
-          Sim sim =
-              create_sim(block_model(cells, -0.01, "stretch:1.1", {1, 3}), soft(mode, iterations, 3, tau));
+          Sim sim = create_sim(block_model(cells, -0.01, "stretch:1.1", {1, 3}), soft(mode, iterations, 3, tau));
           for (int s = 0; s < 3; ++s) step(sim);  // what the last step left must not matter
           const State expected = jacobi_after(sim), before = read_state(sim);
           step(sim);
@@ -299,8 +295,7 @@ TEST_CASE("compliance and damping keep momentum") {
     const auto momentum = [&] {
       glm::dvec3 sum(0);
       const State state = read_state(sim);
-      for (std::size_t i = 0; i < state.velocities.size(); ++i)
-        sum += sim.model->masses[i] * state.velocities[i];
+      for (std::size_t i = 0; i < state.velocities.size(); ++i) sum += sim.model->masses[i] * state.velocities[i];
       return sum;
     };
     const glm::dvec3 before = momentum();
@@ -330,13 +325,12 @@ TEST_CASE("a beam's sag and frequency are those of its compliance, whatever the 
   const ReferenceInput input{beam.model, beam.system, beam.settings, beam.model.inverse_masses};
   set(1e-3, 1, 1);
   const Swing reference = swing(beam, [&](State& state) {
-    const Compliances alpha = {beam.settings.compliance[index_of<Stretch>],
-                               beam.settings.compliance[index_of<Bend>],
+    const Compliances alpha = {beam.settings.compliance[index_of<Stretch>], beam.settings.compliance[index_of<Bend>],
                                beam.settings.compliance[index_of<Volume>]};
     state = implicit_euler_step(input, state, alpha).state;
   });
-  MESSAGE("sag " << 100 * beam.sag / 0.6 << " % of the length, implicit Euler's half period "
-                 << reference.half_period << " s");
+  MESSAGE("sag " << 100 * beam.sag / 0.6 << " % of the length, implicit Euler's half period " << reference.half_period
+                 << " s");
   const auto hold = [&](const std::string& mode, const Swing& found) {
     MESSAGE(mode << ", dt " << beam.settings.dt << " s, " << beam.settings.substeps << " substeps, "
                  << beam.settings.iterations << " iterations: sag " << found.sag << ", half a period "
@@ -349,8 +343,7 @@ TEST_CASE("a beam's sag and frequency are those of its compliance, whatever the 
     const auto measured = [&](double dt, int substeps, int iterations) {
       set(dt, substeps, iterations);
       CpuPbd<double> pbd(beam.model, beam.system);
-      return swing(beam,
-                   [&](State& state) { pbd.step(state, beam.settings, beam.model.inverse_masses, sweep); });
+      return swing(beam, [&](State& state) { pbd.step(state, beam.settings, beam.model.inverse_masses, sweep); });
     };
     const int base = sweep == Sweep::jacobi ? 25 : 5;
     hold(name, measured(5e-3, 10, base));
@@ -363,8 +356,7 @@ TEST_CASE("a beam's sag and frequency are those of its compliance, whatever the 
     beam.settings.mode = mode;
     Sim sim = create_sim(std::make_shared<Model>(beam.model), beam.settings);
     hold(mode, swing(beam, [&](State& state) {
-           if (state.positions == beam.equilibrium || state.positions == beam.model.positions)
-             write_state(sim, state);
+           if (state.positions == beam.equilibrium || state.positions == beam.model.positions) write_state(sim, state);
            step(sim);
            state = read_state(sim);
          }));

@@ -25,8 +25,7 @@ TetMesh ball_mesh(double radius) {
   mesh.positions = {{0, 0, 0}, {0, radius, 0}, {0, -radius, 0}};
   for (int k = 0; k < 10; ++k) {
     const double a = k * std::numbers::pi / 5, y = radius / std::sqrt(5.0) * (k % 2 ? -1 : 1);
-    mesh.positions.push_back(
-        {2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
+    mesh.positions.push_back({2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
   }
   for (std::uint32_t k = 0; k < 10; ++k) {
     const std::uint32_t a = 3 + k, b = 3 + (k + 1) % 10, c = 3 + (k + 2) % 10;
@@ -46,17 +45,15 @@ TetMesh irregular_block() {
   return mesh;
 }
 
-void add(Model& model, const TetMesh& mesh, const glm::dvec3& centre,
-         const glm::dmat3& rotation = glm::dmat3(1), const glm::dvec3& velocity = glm::dvec3(0),
-         const glm::dvec3& spin = glm::dvec3(0), const std::vector<std::uint32_t>& fixed = {}) {
+void add(Model& model, const TetMesh& mesh, const glm::dvec3& centre, const glm::dmat3& rotation = glm::dmat3(1),
+         const glm::dvec3& velocity = glm::dvec3(0), const glm::dvec3& spin = glm::dvec3(0),
+         const std::vector<std::uint32_t>& fixed = {}) {
   std::vector<glm::dvec3> start;
   for (const glm::dvec3& p : mesh.positions) start.push_back(centre + rotation * p);
   add_body(model, "body", mesh, 1000, start, velocity, spin, fixed);
 }
 
-glm::dmat3 tilted() {
-  return glm::dmat3(glm::rotate(glm::dmat4(1), 0.7, glm::normalize(glm::dvec3(1, 0.5, 2))));
-}
+glm::dmat3 tilted() { return glm::dmat3(glm::rotate(glm::dmat4(1), 0.7, glm::normalize(glm::dvec3(1, 0.5, 2)))); }
 
 Settings in_mode(const std::string& mode, int substeps = 20) {
   Settings settings;
@@ -131,18 +128,15 @@ TEST_CASE_FIXTURE(GlTest, "contact: a hard ball bounces to the square of its res
       }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "contact: a hard block on a slope slides as Coulomb has it, or sticks, in every mode") {
+TEST_CASE_FIXTURE(GlTest, "contact: a hard block on a slope slides as Coulomb has it, or sticks, in every mode") {
   for (const double degrees : {25.0, 28.0})
     for (const std::string& mode : all_modes) {
       CAPTURE(degrees);
       CAPTURE(mode);
       const double angle = degrees * std::numbers::pi / 180;
-      const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0),
-          down(-std::cos(angle), -std::sin(angle), 0);
+      const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0), down(-std::cos(angle), -std::sin(angle), 0);
       const auto model = std::make_shared<Model>();
-      add(*model, make_block({0.4, 0.2, 0.4}, {4, 2, 4}), 0.1 * normal,
-          glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
+      add(*model, make_block({0.4, 0.2, 0.4}, {4, 2, 4}), 0.1 * normal, glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
       model->obstacles = {samples::half_space(normal)};
       Settings settings = in_mode(mode);
       settings.ground = false;
@@ -212,8 +206,7 @@ TEST_CASE_FIXTURE(GlTest, "contact: hard bodies come to rest and stay, to the la
   }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "contact: a dented hard body that lies finds its shape without a jump, in every mode") {
+TEST_CASE_FIXTURE(GlTest, "contact: a dented hard body that lies finds its shape without a jump, in every mode") {
   const auto model = std::make_shared<Model>();
   const TetMesh mesh = make_block({1, 0.6, 0.3}, {3, 2, 2});
   add(*model, mesh, {0, 0.2999, 0});
@@ -268,8 +261,7 @@ TEST_CASE_FIXTURE(GlTest, "contact: bodies do not know of each other's contacts"
       const State alone = after(one, in_mode(mode), 60);
       double apart = 0;
       for (std::size_t i = 0; i < alone.positions.size(); ++i)
-        apart = std::max(
-            apart, glm::length(alone.positions[i] - together.positions[all->bodies[b].first_vertex + i]));
+        apart = std::max(apart, glm::length(alone.positions[i] - together.positions[all->bodies[b].first_vertex + i]));
       CHECK(apart < 1e-5);
     }
   }
@@ -309,11 +301,9 @@ TEST_CASE_FIXTURE(GlTest, "contact: what leaves the ground fast is carried on it
   }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "contact: bodies with hinges, or held somewhere, move as their constraints have them") {
+TEST_CASE_FIXTURE(GlTest, "contact: bodies with hinges, or held somewhere, move as their constraints have them") {
   TetMesh hinge;  // two tets with an edge in common
-  hinge.positions = {{0, 0, 0},       {1, 0, 0},         {0.3, 0.8, 0},
-                     {0.3, 0.2, 0.8}, {0.3, -0.6, -0.8}, {0.4, 0.3, -0.9}};
+  hinge.positions = {{0, 0, 0}, {1, 0, 0}, {0.3, 0.8, 0}, {0.3, 0.2, 0.8}, {0.3, -0.6, -0.8}, {0.4, 0.3, -0.9}};
   hinge.tets = {{0, 1, 2, 3}, {0, 1, 4, 5}};
   finish_tets(hinge, "hinge");
   CHECK(!hinge.one_piece);
@@ -351,8 +341,7 @@ TEST_CASE("contact: restitution is of hard bodies") {
   refused([](Settings& s) { s.constraints = "volume"; });
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "contact: what is left out of a hard body's contacts is counted, and nothing else is") {
+TEST_CASE_FIXTURE(GlTest, "contact: what is left out of a hard body's contacts is counted, and nothing else is") {
   const auto model = std::make_shared<Model>();
   add(*model, irregular_block(), {0, 0.35, 0});
   // A cage of walls that close in on it from all sides, each dragging another way.

@@ -61,9 +61,7 @@ TEST_CASE("a colour shares no vertex, and every constraint is in one") {
     const Coloured colours = coloured(list, mesh.positions.size());
     const std::size_t arity = std::size_t(list.arity);
     for (std::size_t colour = 0; colour + 1 < colours.first.size(); ++colour) {
-      const auto at = [&](std::size_t c) {
-        return colours.list.vertices.begin() + std::ptrdiff_t(c * arity);
-      };
+      const auto at = [&](std::size_t c) { return colours.list.vertices.begin() + std::ptrdiff_t(c * arity); };
       std::vector<std::uint32_t> used(at(colours.first[colour]), at(colours.first[colour + 1]));
       std::sort(used.begin(), used.end());
       CHECK(!used.empty());
@@ -88,12 +86,11 @@ TEST_CASE("functions for lanes are those of the library to 1e-6") {
   for (int i = -2000; i <= 2000; ++i) {
     const float x = float(std::cos(i * 0.00157079)), y = float(std::sin(i * 0.00157079));
     for (float size : {1e-12f, 1.0f, 1e12f})
-      angle = std::max(angle, std::abs(double(LaneMath::atan(size * y, size * x)) -
-                                       std::atan2(double(size * y), double(size * x))));
+      angle = std::max(
+          angle, std::abs(double(LaneMath::atan(size * y, size * x)) - std::atan2(double(size * y), double(size * x))));
     const float volume = std::pow(10.0f, float(i) * 0.015f);
-    power = std::max(
-        power,
-        std::abs(double(LaneMath::pow(volume, 2.0f / 3.0f)) / std::pow(double(volume), 2.0 / 3.0) - 1));
+    power =
+        std::max(power, std::abs(double(LaneMath::pow(volume, 2.0f / 3.0f)) / std::pow(double(volume), 2.0 / 3.0) - 1));
   }
   CHECK(angle < 1e-6);
   CHECK(power < 1e-6);

@@ -54,10 +54,9 @@ struct Caller {
     }
     glActiveTexture(GL_TEXTURE3);
     program.use();
-    for (const GLenum target :
-         {GL_ARRAY_BUFFER, GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GL_UNIFORM_BUFFER,
-          GL_SHADER_STORAGE_BUFFER, GL_ATOMIC_COUNTER_BUFFER, GL_DISPATCH_INDIRECT_BUFFER,
-          GL_DRAW_INDIRECT_BUFFER, GL_PIXEL_PACK_BUFFER, GL_PIXEL_UNPACK_BUFFER})
+    for (const GLenum target : {GL_ARRAY_BUFFER, GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GL_UNIFORM_BUFFER,
+                                GL_SHADER_STORAGE_BUFFER, GL_ATOMIC_COUNTER_BUFFER, GL_DISPATCH_INDIRECT_BUFFER,
+                                GL_DRAW_INDIRECT_BUFFER, GL_PIXEL_PACK_BUFFER, GL_PIXEL_UNPACK_BUFFER})
       glBindBuffer(target, buffer.id());
     glPixelStorei(GL_PACK_ALIGNMENT, 2), glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     glPixelStorei(GL_UNPACK_ROW_LENGTH, 7);
@@ -87,8 +86,7 @@ TEST_CASE_FIXTURE(GlTest, "a call leaves what its caller has bound as it was") {
   std::map<std::string, GLint> before;
   const auto unchanged = [&](const std::string& mode, const std::string& call) {
     CAPTURE(mode);
-    for (const auto& [name, value] : caller_state())
-      CHECK_MESSAGE(value == before.at(name), call << ": " << name);
+    for (const auto& [name, value] : caller_state()) CHECK_MESSAGE(value == before.at(name), call << ": " << name);
   };
   const auto model = scene();
   Tuning tuning;

@@ -41,18 +41,16 @@ TEST_CASE("explicit: a run is that of leapfrog in double, damped or not, in flig
         Sim sim = create_sim(model, soft(material, tau));
         const double h = sim.settings.dt / sim.plan.substeps;
         const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
-        Leapfrog right =
-            leapfrog(input, reference_compliances(input), {model->positions, model->velocities}, h);
+        Leapfrog right = leapfrog(input, reference_compliances(input), {model->positions, model->velocities}, h);
         for (int s = 0; s < 20; ++s) step(sim), advance(right, sim.plan.substeps);
         const State state = read_state(sim);
         CHECK(largest_distance(state.positions, right.x) < 2e-5);
         CHECK(largest_distance(state.velocities, right.v) < 2e-2);
         double deformed = 0;  // or nothing was tested
         for (std::size_t i = 0; i < 20; ++i)
-          deformed =
-              std::max(deformed, std::abs(glm::distance(right.x[i], right.x[i + 7]) /
-                                              glm::distance(model->positions[i], model->positions[i + 7]) -
-                                          1));
+          deformed = std::max(deformed, std::abs(glm::distance(right.x[i], right.x[i + 7]) /
+                                                     glm::distance(model->positions[i], model->positions[i + 7]) -
+                                                 1));
         if (kind > 0) CHECK(deformed > 1e-3);
       }
 }
@@ -68,8 +66,8 @@ TEST_CASE("explicit: substeps follow stiffness, dt and the part of the stable on
     CHECK(sim.plan.iterations == 1);
     return sim.plan.substeps;
   };
-  const double longest = stable_step({*sim.model, sim.system, settings, sim.inverse_masses},
-                                     settings.compliance, sim.model->rest.positions);
+  const double longest = stable_step({*sim.model, sim.system, settings, sim.inverse_masses}, settings.compliance,
+                                     sim.model->rest.positions);
   const double all = settings.dt / (settings.stability * longest);
   REQUIRE(all > 3);
   CHECK(std::abs(substeps([](Settings&) {}) - all) < 1.05);
@@ -101,8 +99,8 @@ std::shared_ptr<const Model> deformed_block(const glm::dvec3& by) {
 TEST_CASE("explicit: kernels note the stiffest constraint, it moves with the largest eigenvalue") {
   GlTest gl;
   for (const char* material : {"none", "springs", "neo-hookean"})
-    for (const glm::dvec3 by : {glm::dvec3(1), glm::dvec3(2, 1, 1), glm::dvec3(0.3, 1.2, 1.2),
-                                glm::dvec3(-1, 1, 1), glm::dvec3(1, 3, 3), glm::dvec3(2.5)}) {
+    for (const glm::dvec3 by : {glm::dvec3(1), glm::dvec3(2, 1, 1), glm::dvec3(0.3, 1.2, 1.2), glm::dvec3(-1, 1, 1),
+                                glm::dvec3(1, 3, 3), glm::dvec3(2.5)}) {
       CAPTURE(material);
       CAPTURE(by.x);
       CAPTURE(by.y);
@@ -112,8 +110,8 @@ TEST_CASE("explicit: kernels note the stiffest constraint, it moves with the lar
       const auto& alpha = sim.settings.compliance;
       const double stiffest = stiffest_constraint(input, alpha, model->positions);
       const double ratio = stiffest / stiffest_constraint(input, alpha, model->rest.positions);
-      const double eigenvalues = std::pow(
-          stable_step(input, alpha, model->rest.positions) / stable_step(input, alpha, model->positions), 2);
+      const double eigenvalues =
+          std::pow(stable_step(input, alpha, model->rest.positions) / stable_step(input, alpha, model->positions), 2);
       CHECK(stiffest > 0.98 / std::pow(stable_step(input, alpha, model->positions) / 2, 2));
       CHECK(ratio > 0.4 * eigenvalues);
       CHECK(ratio < 2.5 * eigenvalues);
@@ -190,8 +188,7 @@ TEST_CASE("explicit: what has no force is refused in a line") {
   const auto model = irregular_block(1, false);
   Settings hard;
   hard.mode = "explicit";
-  CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"),
-                       Error);
+  CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"), Error);
   Settings weak = soft("none", 0);
   weak.stiffness[index_of<Bend>] = 0.5;
   CHECK_THROWS_WITH_AS(create_sim(model, weak), doctest::Contains("bend has none"), Error);

@@ -103,9 +103,7 @@ std::function<void()> instead_of(const Folder& folder, const std::string& name, 
   const fs::path file = folder.path / "bin" / name;
   std::ofstream(file) << "#!/bin/sh\n" << script;
   ::chmod(file.c_str(), 0755);
-  return [path = (folder.path / "bin").string()] {
-    ::setenv("PATH", (path + ":" + std::getenv("PATH")).c_str(), 1);
-  };
+  return [path = (folder.path / "bin").string()] { ::setenv("PATH", (path + ":" + std::getenv("PATH")).c_str(), 1); };
 }
 
 std::string cube_off() {
@@ -130,14 +128,14 @@ TEST_CASE("faults: a full disk") {
   check_failed(video, "c.gif");
   CHECK(!fs::exists(folder.path / "c.gif"));
   Program compare(folder,
-                  {"compare", "--scene", "beam", "--modes", "node", "--iterations", "1", "--substeps", "1",
-                   "--steps", "2", "--out", "d"},
+                  {"compare", "--scene", "beam", "--modes", "node", "--iterations", "1", "--substeps", "1", "--steps",
+                   "2", "--out", "d"},
                   files_of_at_most(600));
   check_failed(compare, "d/films/");
   CHECK(fs::is_empty(folder.path / "d/films"));
   Program bench(folder,
-                {"bench", "--scenes", "beam", "--modes", "cpu", "--iterations", "1", "--frames", "1",
-                 "--warm-up", "0", "--repeats", "1", "--no-render", "--out", "e"},
+                {"bench", "--scenes", "beam", "--modes", "cpu", "--iterations", "1", "--frames", "1", "--warm-up", "0",
+                 "--repeats", "1", "--no-render", "--out", "e"},
                 files_of_at_most(200));
   check_failed(bench, "bench.");
   CHECK(fs::is_empty(folder.path / "e"));
@@ -188,8 +186,8 @@ TEST_CASE("faults: folders and files in the way") {
 
 TEST_CASE("faults: shards that are damaged are not merged") {
   const Folder folder;
-  Program whole(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", "1", "--substeps",
-                         "1", "--steps", "2", "--out", "part"});
+  Program whole(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", "1", "--substeps", "1",
+                         "--steps", "2", "--out", "part"});
   REQUIRE(whole.wait() == 0);
   const fs::path file = folder.path / "part/compare.json";
   const nlohmann::json good = nlohmann::json::parse(content(file));
@@ -221,8 +219,7 @@ TEST_CASE("faults: shards that are damaged are not merged") {
 
 TEST_CASE("faults: ffmpeg that is missing, fails at once, or dies on the way") {
   const Folder folder;
-  const auto film =
-      with(short_run, {"--out", "a", "--video", "'-q \"$(touch run)\nx.mp4", "--video-every", "1"});
+  const auto film = with(short_run, {"--out", "a", "--video", "'-q \"$(touch run)\nx.mp4", "--video-every", "1"});
   Program missing(folder, film, [] { ::setenv("PATH", "/nowhere", 1); });
   check_failed(missing, "install ffmpeg");
   Program fails(folder, film, instead_of(folder, "ffmpeg", "echo no such codec >&2; exit 1\n"));
@@ -240,8 +237,7 @@ TEST_CASE("faults: ffmpeg that is missing, fails at once, or dies on the way") {
 TEST_CASE("faults: interrupted, what was finished is whole") {
   const Folder folder;
   // A first signal after the first result is there.
-  const auto interrupt = [&](const std::vector<std::string>& words, int number,
-                             const std::function<bool()>& begun) {
+  const auto interrupt = [&](const std::vector<std::string>& words, int number, const std::function<bool()>& begun) {
     CAPTURE(words[0]);
     Program program(folder, words);
     CHECK(soon(begun));
@@ -254,8 +250,8 @@ TEST_CASE("faults: interrupted, what was finished is whole") {
       return std::size_t(std::count(out.begin(), out.end(), '\n')) >= lines;
     };
   };
-  interrupt({"run", "--scene", "beam", "--steps", "100000000", "--out", "run", "--size", "64x48", "--samples",
-             "0", "--png-every", "5", "--video", "run.mp4"},
+  interrupt({"run", "--scene", "beam", "--steps", "100000000", "--out", "run", "--size", "64x48", "--samples", "0",
+             "--png-every", "5", "--video", "run.mp4"},
             SIGTERM, [&] { return fs::exists(folder.path / "run/frame_00010.png"); });
   CHECK(nlohmann::json::parse(content(folder.path / "run/stats.json"))["timing"]["steps"].get<long>() >= 10);
   CHECK(content(folder.path / "run.mp4").substr(4, 4) == "ftyp");
@@ -285,27 +281,25 @@ TEST_CASE("faults: interrupted, what was finished is whole") {
             SIGINT, printed(7));
   CHECK(nlohmann::json::parse(content(folder.path / "bench/bench.json"))["rows"].size() >= 2);
   {
-    Program program(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", many,
-                             "--substeps", "1", "--steps", "5", "--out", "compare"});
+    Program program(folder, {"compare", "--scene", "beam", "--modes", "cpu", "--iterations", many, "--substeps", "1",
+                             "--steps", "5", "--out", "compare"});
     std::this_thread::sleep_for(std::chrono::seconds(2));
     ::kill(program.pid, SIGINT);
     check_failed(program, "interrupted");
     for (const auto& entry : fs::directory_iterator(folder.path / "compare"))
-      if (entry.path().extension() == ".json")
-        CHECK(nlohmann::json::parse(content(entry.path()))["rows"].size() >= 1);
+      if (entry.path().extension() == ".json") CHECK(nlohmann::json::parse(content(entry.path()))["rows"].size() >= 1);
   }
   // A step of hours: the second signal does not wait for it.
-  Program stubborn(folder, {"run", "--scene", "beam", "--mode", "cpu", "--iterations", "100000", "--substeps",
-                            "100000", "--out", "stubborn"});
+  Program stubborn(folder, {"run", "--scene", "beam", "--mode", "cpu", "--iterations", "100000", "--substeps", "100000",
+                            "--out", "stubborn"});
   CHECK(soon([&] { return fs::exists(folder.path / "stubborn"); }));
   std::this_thread::sleep_for(std::chrono::seconds(1));
   ::kill(stubborn.pid, SIGINT);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   ::kill(stubborn.pid, SIGINT);
   CHECK(stubborn.wait() == 128 + SIGINT);
-  fs::remove(folder.path / "stubborn/scene.json");  // that is whole from the start
-  for (const auto& entry :
-       fs::directory_iterator(folder.path / "stubborn"))  // temporary ones, as the guide says
+  fs::remove(folder.path / "stubborn/scene.json");                            // that is whole from the start
+  for (const auto& entry : fs::directory_iterator(folder.path / "stubborn"))  // temporary ones, as the guide says
     CHECK(contains(entry.path().filename().string(), ".part"));
 }
 
@@ -373,8 +367,7 @@ TEST_CASE("faults: cache folders that cannot be used cost time alone") {
   const std::string made = content(folder.path / "cube.msh");
   fs::path kept;
   for (const auto& entry : fs::directory_iterator(folder.cache())) kept = entry.path();
-  const auto again = [&](const std::string& how, const std::function<void()>& damage,
-                         const std::string& cache = "") {
+  const auto again = [&](const std::string& how, const std::function<void()>& damage, const std::string& cache = "") {
     CAPTURE(how);
     damage();
     fs::remove(folder.path / "cube.msh");

@@ -25,8 +25,7 @@ void check_gradients(double scale) {
     if (exact.C == -1 || exact.C == 1) continue;  // the clamp of bending: constant there
     glm::dvec3 sum(0);
     double largest = 0;
-    for (int j = 0; j < n; ++j)
-      sum += exact.gradient[j], largest = std::max(largest, glm::length(exact.gradient[j]));
+    for (int j = 0; j < n; ++j) sum += exact.gradient[j], largest = std::max(largest, glm::length(exact.gradient[j]));
     CHECK(glm::length(sum) <= 1e-12 * largest);  // translation changes nothing
     for (int j = 0; j < n; ++j)
       for (int a = 0; a < 3; ++a) {
@@ -44,8 +43,7 @@ void check_gradients(double scale) {
     std::array<glm::vec3, std::size_t(n)> y;
     for (int j = 0; j < n; ++j) y[std::size_t(j)] = glm::vec3(x[std::size_t(j)]);
     const auto rough = Kind::template evaluate<float>(y.data(), float(rest));
-    for (int j = 0; j < n; ++j)
-      CHECK(glm::length(glm::dvec3(rough.gradient[j]) - exact.gradient[j]) <= 2e-3 * largest);
+    for (int j = 0; j < n; ++j) CHECK(glm::length(glm::dvec3(rough.gradient[j]) - exact.gradient[j]) <= 2e-3 * largest);
     ++checked;
   }
   CHECK(checked > 50);
@@ -60,8 +58,7 @@ TEST_CASE_TEMPLATE("gradients match finite differences", Kind, Stretch, Bend, Vo
   }
 }
 
-TEST_CASE(
-    "every constraint kind has a formula that is zero at rest and the value expected of a hand-made change") {
+TEST_CASE("every constraint kind has a formula that is zero at rest and the value expected of a hand-made change") {
   std::array<glm::dvec3, 2> edge = {glm::dvec3(0), glm::dvec3(3, 4, 0)};
   CHECK(Stretch::evaluate<double>(edge.data(), 4.0).C == doctest::Approx(1.0));
   // Two triangles on the edge z: one wing along x, the other at 90 degrees.
@@ -72,8 +69,7 @@ TEST_CASE(
   CHECK(std::abs(Formulas<double>{}.hinge_angle(hinge.data())) == doctest::Approx(std::acos(-1.0) / 2));
   const double quarter = Formulas<double>{}.hinge_angle(hinge.data());
   hinge[1].y = -1;
-  CHECK(Formulas<double>{}.hinge_angle(hinge.data()) ==
-        doctest::Approx(-quarter));  // the sign that arccos loses
+  CHECK(Formulas<double>{}.hinge_angle(hinge.data()) == doctest::Approx(-quarter));  // the sign that arccos loses
   CHECK(Bend::evaluate<double>(hinge.data(), -quarter + 0.25).C == doctest::Approx(-0.25));
   CHECK(Bend::evaluate<double>(hinge.data(), -quarter + 2.0).C == doctest::Approx(-1.0));  // clamped to 1 rad
   // Angles wrap: 175 and -175 degrees are 10 degrees apart.
@@ -85,16 +81,14 @@ TEST_CASE(
     CHECK(std::abs(turned) == doctest::Approx(a));
     CHECK(std::abs(Bend::evaluate<double>(hinge.data(), -turned).C) == doctest::Approx(10.0 / 180 * pi));
   }
-  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0),
-                                   glm::dvec3(0, 0, 1)};
+  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
   CHECK(Volume::evaluate<double>(tet.data(), 0.0).C == doctest::Approx(1.0 / 6));
   tet[3].z = -1;
   CHECK(Volume::evaluate<double>(tet.data(), 1.0 / 6).C == doctest::Approx(-1.0 / 3));  // inverted: signed
 }
 
 TEST_CASE("one projection of one constraint meets it") {
-  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1.1, 0, 0), glm::dvec3(0, 1, 0.1),
-                                   glm::dvec3(0, 0.2, 1)};
+  std::array<glm::dvec3, 4> tet = {glm::dvec3(0), glm::dvec3(1.1, 0, 0), glm::dvec3(0, 1, 0.1), glm::dvec3(0, 0.2, 1)};
   double w[4] = {1, 2, 0.5, 1};
   const double rest = 0.15;
   for (int k = 0; k < 4; ++k) {
@@ -146,8 +140,7 @@ TEST_CASE("guards: what triggers them, and where vertices without a direction go
   CHECK(stretch.gradient[0] == -stretch.gradient[1]);
   // The same pair named the other way round parts the same way; another pair does not.
   CHECK(Stretch::evaluate<double>(edge.data(), 0.5, swapped).gradient[0] == -stretch.gradient[0]);
-  CHECK(glm::length(Stretch::evaluate<double>(edge.data(), 0.5, id + 1).gradient[0] - stretch.gradient[0]) >
-        0.01);
+  CHECK(glm::length(Stretch::evaluate<double>(edge.data(), 0.5, id + 1).gradient[0] - stretch.gradient[0]) > 0.01);
 
   std::array<glm::dvec3, 4> line;
   for (int j = 0; j < 4; ++j) line[std::size_t(j)] = glm::dvec3(j, 0, 0);

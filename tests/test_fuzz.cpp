@@ -19,8 +19,7 @@ namespace {
 
 std::vector<std::string> corpus_of(const fuzz::Reader& reader) {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(fs::path(TEST_CORPUS) / reader.corpus))
-    files.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(fs::path(TEST_CORPUS) / reader.corpus)) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::vector<std::string> contents;
   for (const fs::path& file : files) {
@@ -48,12 +47,10 @@ struct Mutator {
   }
   // Four bytes, as in binary counts and indices.
   void change_word(std::string& bytes) {
-    static constexpr unsigned words[] = {0,          1,          0x7fffffff, 0x80000000,
-                                         0xffffffff, 0x7f800000, 0x7fc00000, 0x00ffffff};
+    static constexpr unsigned words[] = {0, 1, 0x7fffffff, 0x80000000, 0xffffffff, 0x7f800000, 0x7fc00000, 0x00ffffff};
     const unsigned word = words[below(std::size(words))];
     const std::size_t at = below(bytes.size());
-    for (std::size_t k = 0; k < 4 && at + k < bytes.size(); ++k)
-      bytes[at + k] = static_cast<char>(word >> (8 * k));
+    for (std::size_t k = 0; k < 4 && at + k < bytes.size(); ++k) bytes[at + k] = static_cast<char>(word >> (8 * k));
   }
   std::string part_of(const std::string& bytes) {
     const std::size_t first = below(bytes.size());

@@ -23,8 +23,7 @@ namespace {
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::dvec3(0),
-                                   double height = 0.2) {
+std::shared_ptr<const Model> block(double size = 1, glm::dvec3 velocity = glm::dvec3(0), double height = 0.2) {
   TetMesh mesh = make_block(glm::dvec3(size, 0.6 * size, 0.5 * size), {5, 3, 2});
   for (auto& p : mesh.positions) p.y += (0.3 + height) * size;
   auto model = std::make_shared<Model>();
@@ -92,8 +91,7 @@ TEST_CASE("a given state that is not finite is found at once, with its lowest ve
       }
 }
 
-TEST_CASE(
-    "what stops being a number on the GPU is found in its step, and the checkpoint comes back bit for bit") {
+TEST_CASE("what stops being a number on the GPU is found in its step, and the checkpoint comes back bit for bit") {
   GlTest gl;
   for (const char* mode : {"node", "constraint"})
     for (const bool velocity : {false, true})
@@ -299,8 +297,7 @@ TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode chan
     double worst = 0;
     for (std::size_t i = 0; i < state.positions.size(); ++i)
       if (i != 3)
-        worst = std::max(
-            worst, glm::length(state.positions[i] - sim.model->positions[i] + glm::dvec3(0, fallen, 0)));
+        worst = std::max(worst, glm::length(state.positions[i] - sim.model->positions[i] + glm::dvec3(0, fallen, 0)));
     CHECK(worst < 1e-5 * fallen);
     CHECK(glm::length(state.positions[3] - held) < 1e-6);
     CHECK(glm::length(state.velocities[3]) == 0);
@@ -310,8 +307,7 @@ TEST_CASE("free fall goes on exactly when dt, substeps, gravity or the mode chan
 TEST_CASE("limits of a driver are named with what is needed and what there is") {
   GlTest gl;
   CHECK(capabilities().storage_blocks >= 8);
-  CHECK(has(what_of([&] { create_sim(block(), quick("node"), {.storage = 100}); }),
-            "a storage buffer is too large: "));
+  CHECK(has(what_of([&] { create_sim(block(), quick("node"), {.storage = 100}); }), "a storage buffer is too large: "));
   CHECK(has(what_of([&] { make_target(100000, 10); }), "bad image size: 100000x10"));
   const auto model = block();
   Sim sim = create_sim(model, quick("node"));
@@ -454,8 +450,8 @@ TEST_CASE("shader faults name file and line, or the uniform") {
     return what;
   };
   CHECK(with("solvers/average.comp", "void main", "void main") == "");
-  CHECK(has(with("solvers/average.comp", "uint i = group", "uint i = nothing + group"),
-            "shaders/solvers/average.comp:"));
+  CHECK(
+      has(with("solvers/average.comp", "uint i = group", "uint i = nothing + group"), "shaders/solvers/average.comp:"));
   CHECK(has(with("solvers/average.comp", "\"double_single.glsl\"", "\"pears.glsl\""),
             "no such shader: " + folder.string() + "/pears.glsl"));
   CHECK(has(with("render/plane.frag", "uniform float opacity", "const float opacity = 1.0"),
@@ -464,8 +460,7 @@ TEST_CASE("shader faults name file and line, or the uniform") {
   CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
   const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");
   CAPTURE(unlinked);
-  if (is_software_renderer())
-    CHECK(has(unlinked, "shader program does not link: surface: "));  // others may link it
+  if (is_software_renderer()) CHECK(has(unlinked, "shader program does not link: surface: "));  // others may link it
   // A kernel that goes wrong in a certain step: blamed, and the last good state stands.
   {
     std::ifstream stream(folder / "solvers/corrections.glsl");

@@ -14,8 +14,7 @@ using namespace samples;
 TEST_CASE("a guard that does not trigger changes no bit") {
   GlTest gl;
   // The same kernels with every guard taken out of their text.
-  const auto folder =
-      std::filesystem::temp_directory_path() / ("tetpbd_no_guards_" + std::to_string(getpid()));
+  const auto folder = std::filesystem::temp_directory_path() / ("tetpbd_no_guards_" + std::to_string(getpid()));
   std::filesystem::copy(TEST_MODELS "/../shaders", folder, std::filesystem::copy_options::recursive);
   const auto replace = [&](const char* file, const std::string& from, const std::string& to) {
     std::ifstream in(folder / file);
@@ -61,9 +60,8 @@ TEST_CASE("guards that trigger are counted, the same in every run") {
   GlTest gl;
   for (const char* mode : {"node", "constraint", "cpu"})
     for (const auto& [deformation, guard] :
-         {std::pair("point", GUARD_DIRECTION), std::pair("point", GUARD_COLLAPSED),
-          std::pair("line", GUARD_COLLAPSED), std::pair("line", GUARD_HINGE),
-          std::pair("mirror", GUARD_ANGLE)}) {
+         {std::pair("point", GUARD_DIRECTION), std::pair("point", GUARD_COLLAPSED), std::pair("line", GUARD_COLLAPSED),
+          std::pair("line", GUARD_HINGE), std::pair("mirror", GUARD_ANGLE)}) {
       CAPTURE(mode);
       CAPTURE(deformation);
       GuardCounts before{};

@@ -67,8 +67,7 @@ TEST_CASE("soak: a block at rest neither drifts nor grows, one that falls does n
   CHECK(json::parse(read(folder.path / "f/soak.json"))["passed"] == false);
 }
 
-TEST_CASE(
-    "bench writes a row a setting, with and without rendering, and calls a software renderer by its name") {
+TEST_CASE("bench writes a row a setting, with and without rendering, and calls a software renderer by its name") {
   const Folder folder;
   const Outcome run = program(
       "bench --scenes beam --modes cpu,node,paper --constraint-sets stretch,stretch+bend+volume --iterations "
@@ -83,10 +82,10 @@ TEST_CASE(
   CHECK(bench["floors"]["copy_gb_s"].get<double>() > 0);
   if (bench["device"]["software"] == true) CHECK(run.out.find("SOFTWARE") != std::string::npos);
   const std::string csv = read(folder.path / "b/bench.csv");
-  CHECK(csv.starts_with(
-      "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
-      "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_"
-      "percent,motion_final,motion_rms,motion_peak,motion_relative\n"));
+  CHECK(
+      csv.starts_with("scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
+                      "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_"
+                      "percent,motion_final,motion_rms,motion_peak,motion_relative\n"));
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 37);
   for (const json& row : bench["rows"]) {
     const int iterations = row["iterations"], kinds = row["constraints"] == "stretch" ? 1 : 3;
@@ -109,8 +108,7 @@ TEST_CASE("compare judges by the motion, beside a rigid body and a direct solver
           "compare --scene beam --set bodies.0.fixed=[] --set bodies.0.block.cells=[4,2,2] "
           "--set bodies.0.position=[0,0.1,0] --set bodies.0.rotation=[10,20,30] --steps 60 --iterations 1 ";
   // k = 1: what is not known is not judged by, and found when asked for.
-  const Outcome unknown =
-      program(falls + "--modes node --substeps 2 --out a --rigid-contact 0", folder, cache);
+  const Outcome unknown = program(falls + "--modes node --substeps 2 --out a --rigid-contact 0", folder, cache);
   REQUIRE(unknown.status == 0);
   CHECK(unknown.out.find("judged by volume") != std::string::npos);
   CHECK(unknown.out.find("--judge motion finds it") != std::string::npos);
@@ -128,8 +126,8 @@ TEST_CASE("compare judges by the motion, beside a rigid body and a direct solver
     CHECK(row["motion_over_time"].back()[1] == row["motion_final"]);
     CHECK(row["tet_volume_rms_peak"].is_null() == (row["mode"] == "rigid-body"));
     for (const json& other : rows)  // nothing on the front is beaten
-      if (row["pareto"] == true && other["wall_ms_per_step"] < row["wall_ms_per_step"] &&
-          row["mode"] != "node" && other["mode"] != "node")
+      if (row["pareto"] == true && other["wall_ms_per_step"] < row["wall_ms_per_step"] && row["mode"] != "node" &&
+          other["mode"] != "node")
         CHECK(other["motion_final"] >= row["motion_final"]);
   }
   CHECK(read(folder.path / "b/motion.svg").starts_with("<svg"));
@@ -155,8 +153,7 @@ TEST_CASE("compare judges by the motion, beside a rigid body and a direct solver
 
 TEST_CASE("compare finds the front, and shards merge to the same rows") {
   const Folder folder;
-  const std::string command =
-      "compare --scene beam --modes node,cpu --iterations 1,4 --substeps 1,2 --steps 12 ";
+  const std::string command = "compare --scene beam --modes node,cpu --iterations 1,4 --substeps 1,2 --steps 12 ";
   const Outcome whole = program(command + "--out whole --budget-ms 1e9 --error 1000", folder);
   REQUIRE(whole.status == 0);
   CHECK(whole.out.find("best within") != std::string::npos);
@@ -184,8 +181,7 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
     };
     for (const json& other : a["rows"])
       if (row["pareto"] == true)
-        CHECK(
-            !(cost(other) < cost(row) && other["max_volume_loss_percent"] < row["max_volume_loss_percent"]));
+        CHECK(!(cost(other) < cost(row) && other["max_volume_loss_percent"] < row["max_volume_loss_percent"]));
   }
   CHECK(on_front >= 1);
   CHECK(read(folder.path / "whole/compare.svg").starts_with("<svg"));
@@ -221,8 +217,8 @@ TEST_CASE("reproduce --quick shows the paper's trends and leaves one self-contai
     CHECK(html.find(part) != std::string::npos);
   CHECK(html.find("src=\"http") == std::string::npos);
   CHECK(html.ends_with("</html>\n"));
-  for (const char* file : {"tables/table4.csv", "tables/volume_error_bunny.csv",
-                           "figures/volume_error_bunny_all.svg", "figures/fps_all_alone.svg"})
+  for (const char* file : {"tables/table4.csv", "tables/volume_error_bunny.csv", "figures/volume_error_bunny_all.svg",
+                           "figures/fps_all_alone.svg"})
     CHECK(fs::exists(folder.path / "r" / file));
   CHECK(read(folder.path / "r/tables/table4.csv").find("31800,10582,42072,15419,36690,31709") ==
         std::string::npos);  // quick: bunny alone
@@ -236,9 +232,9 @@ TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the 
   CAPTURE(whole.err);
   REQUIRE(whole.status == 0);
   const std::string csv = read(folder.path / "whole/stability.csv");
-  CHECK(csv.starts_with(
-      "case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,"
-      "rigid_distance,reference_recovered_at_step,"));
+  CHECK(
+      csv.starts_with("case,mesh,mode,steps,finite,recovered_at_step,final_volume_error_percent,inverted_tets,"
+                      "rigid_distance,reference_recovered_at_step,"));
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 5);
   const json rows = json::parse(read(folder.path / "whole/stability.json"))["rows"];
   for (const auto& row : rows) {
@@ -250,17 +246,14 @@ TEST_CASE("compare --hard-cases: a row for each case, mesh and mode, beside the 
     CHECK(row["guard_direction"].get<long>() > 0);
   }
   for (int i : {1, 2})
-    CHECK(
-        program(common + "--shard " + std::to_string(i) + "/2 --out s" + std::to_string(i), folder).status ==
-        0);
+    CHECK(program(common + "--shard " + std::to_string(i) + "/2 --out s" + std::to_string(i), folder).status == 0);
   CHECK(program("compare --hard-cases --merge s1 s2 --out merged", folder).status == 0);
   CHECK(json::parse(read(folder.path / "merged/stability.json"))["rows"] == rows);
-  CHECK(program("compare --hard-cases --merge s1 --out half", folder).err.find("2 rows of 4") !=
-        std::string::npos);
+  CHECK(program("compare --hard-cases --merge s1 --out half", folder).err.find("2 rows of 4") != std::string::npos);
   CHECK(program("compare --hard-cases --cases nosuch --out none", folder).err.find("no such scene") !=
         std::string::npos);
-  CHECK(program("compare --hard-cases --meshes cow --out none", folder)
-            .err.find("choose from bunny, block, tet") != std::string::npos);
+  CHECK(program("compare --hard-cases --meshes cow --out none", folder).err.find("choose from bunny, block, tet") !=
+        std::string::npos);
 }
 
 TEST_CASE("hard cases: recovered is what stays good for the last 5 % of the steps") {
@@ -286,8 +279,8 @@ TEST_CASE("hard cases: where no constraint acts there is nothing to recover by")
       program("compare --hard-cases --cases stiffness-0 --meshes tet --modes node --steps 2 --out h", folder);
   CHECK(run.status == 2);
   CHECK(run.err.find("nothing to run") != std::string::npos);
-  CHECK(program("compare --hard-cases --out h", folder, "TETPBD_MODELS=/none")
-            .err.find("no hard cases: /none") != std::string::npos);
+  CHECK(program("compare --hard-cases --out h", folder, "TETPBD_MODELS=/none").err.find("no hard cases: /none") !=
+        std::string::npos);
 }
 
 TEST_CASE(
@@ -302,8 +295,7 @@ TEST_CASE(
   text.insert(text.find(rest) + rest.size(), " * real(1.001)");
   std::ofstream(file) << text;
   const std::string models = smaller_scenes(
-      folder,
-      R"({"mesh": null, "tetgen": null, "height": null, "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}})");
+      folder, R"({"mesh": null, "tetgen": null, "height": null, "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}})");
   const Outcome wrong = program("--shaders shaders info --selftest", folder, models);
   CAPTURE(wrong.out);
   CHECK(wrong.status == 1);

@@ -24,8 +24,7 @@ TEST_CASE("free fall is half g t^2 to 1e-5, for any number of substeps") {
       const State state = read_state(sim);
       double worst = 0;
       for (std::size_t i = 0; i < state.positions.size(); ++i)
-        worst = std::max(
-            worst, glm::length(state.positions[i] - (sim.model->positions[i] - glm::dvec3(0, fall, 0))));
+        worst = std::max(worst, glm::length(state.positions[i] - (sim.model->positions[i] - glm::dvec3(0, fall, 0))));
       CHECK(worst < 1e-5 * fall);
     }
 }
@@ -130,9 +129,7 @@ TEST_CASE("a hard body hung by a corner swings as a rigid one, and gains no ener
     return Motion{glm::dmat3(glm::cross(w, m.R[0]), glm::cross(w, m.R[1]), glm::cross(w, m.R[2])),
                   glm::cross(m.R * moment, glm::dvec3(0, -9.81, 0))};
   };
-  const auto moved = [](const Motion& m, double h, const Motion& by) {
-    return Motion{m.R + h * by.R, m.L + h * by.L};
-  };
+  const auto moved = [](const Motion& m, double h, const Motion& by) { return Motion{m.R + h * by.R, m.L + h * by.L}; };
   Motion right{glm::dmat3(1), glm::dvec3(0)};
   const double h = 1e-4;
   for (int s = 0; s < 10000; ++s) {
@@ -150,8 +147,8 @@ TEST_CASE("a hard body hung by a corner swings as a rigid one, and gains no ener
       const State state = read_state(sim);
       double sum = 0;
       for (std::size_t i = 0; i < state.positions.size(); ++i)
-        sum += model->masses[i] * (glm::dot(state.velocities[i], state.velocities[i]) / 2 +
-                                   9.81 * (state.positions[i].y - hook.y));
+        sum += model->masses[i] *
+               (glm::dot(state.velocities[i], state.velocities[i]) / 2 + 9.81 * (state.positions[i].y - hook.y));
       return sum;
     };
     const double start = energy();

@@ -66,33 +66,25 @@ void check_block(const Program& program, const char* block, const BufferLayout& 
 
 TEST_CASE("struct offsets and strides are GL's") {
   GlTest gl;
-  const Program predict = Program::compute("solvers/predict.comp", {{{"SCHEME", "corrections"}}, {}},
-                                           {"COMPLIANT 1", "SOLIDS 0"});
-  const auto variable = [&](const std::string& name) {
-    return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET);
-  };
+  const Program predict =
+      Program::compute("solvers/predict.comp", {{{"SCHEME", "corrections"}}, {}}, {"COMPLIANT 1", "SOLIDS 0"});
+  const auto variable = [&](const std::string& name) { return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET); };
   CHECK(variable("positions[0].high") == offsetof(Position, high));
   CHECK(variable("positions[0].inverse_mass") == offsetof(Position, inverse_mass));
   CHECK(variable("positions[0].low") == offsetof(Position, low));
   CHECK(variable("velocities[0].high") == offsetof(Velocity, high));
   CHECK(variable("velocities[0].low") == offsetof(Velocity, low));
-  CHECK(property(predict, GL_BUFFER_VARIABLE, "positions[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
-        sizeof(Position));
-  CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) ==
-        sizeof(Velocity));
+  CHECK(property(predict, GL_BUFFER_VARIABLE, "positions[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(Position));
+  CHECK(property(predict, GL_BUFFER_VARIABLE, "velocities[0].high", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(Velocity));
 
   const auto paper = [](Substitutions words) {
     return Program::compute("solvers/paper.comp", {words, {}}, {"GROUP_SIZE 1024", "COUNT 7"});
   };
   const Program volume = paper({{"KIND", "volume"}, {"ARITY", "4"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "2"}});
-  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) ==
-        offsetof(layout::Record4, rest));
-  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
-        sizeof(layout::Record4));
-  const Program stretch =
-      paper({{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}});
-  CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) ==
-        sizeof(layout::Record2));
+  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_OFFSET) == offsetof(layout::Record4, rest));
+  CHECK(property(volume, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(layout::Record4));
+  const Program stretch = paper({{"KIND", "stretch"}, {"ARITY", "2"}, {"KIND_ROW", "0"}, {"KIND_COLUMN", "0"}});
+  CHECK(property(stretch, GL_BUFFER_VARIABLE, "records[0].rest", GL_TOP_LEVEL_ARRAY_STRIDE) == sizeof(layout::Record2));
 
   const auto uniform = [&](const char* name) {
     return property(predict, GL_UNIFORM, std::string("StepBlock.") + name, GL_OFFSET);
@@ -126,13 +118,12 @@ TEST_CASE("members of mode newton's blocks lie where GL reads them, and no array
     const SolverInput input{*model, system, settings, plan_for(settings), {}};
     NewtonSizes all = measure_newton(input, build_newton_levels(*model, system));
     NewtonSizes odd = all, none = all;  // what is behind a list of odd length may have to be aligned
-    odd.aggregates = 3, odd.members = 7, odd.uses = 5, odd.free_bodies = 1, odd.parts = 3,
-    odd.product_groups = 1;
+    odd.aggregates = 3, odd.members = 7, odd.uses = 5, odd.free_bodies = 1, odd.parts = 3, odd.product_groups = 1;
     none.aggregates = none.members = none.uses = none.free_bodies = none.edges = 0;
     for (const NewtonSizes& sizes : {all, odd, none}) {
       const NewtonBuffers layout = lay_out_newton_buffers(sizes, system);
-      for (const char* name : {"begin", "predict", "start", "linearise", "residual", "update", "coarse",
-                               "prolong", "product", "finish", "momentum"}) {
+      for (const char* name : {"begin", "predict", "start", "linearise", "residual", "update", "coarse", "prolong",
+                               "product", "finish", "momentum"}) {
         const Program program = Program::compute(std::string("solvers/newton/") + name + ".comp",
                                                  {{}, kind_words(system)}, newton_defines(sizes, input));
         check_block(program, "Mesh", layout.mesh);
@@ -159,13 +150,11 @@ TEST_CASE("members of the blocks of contact lie where GL reads them, and no arra
   for (const PairSizes& sizes : {sheet, solid}) {
     const PairRanges layout = lay_out_pairs(sizes);
     std::vector<std::string> defines = pair_defines(sizes);
-    defines.insert(defines.end(),
-                   {"COMPLIANT 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1", "IMPLICIT 0",
-                    "SHEETS 1", "CONTACT_SELF 1", "LAGGED 1", "QUERY_EDGES 0", "ROW 9u", "EDGE 1.0",
-                    "SELF_MARGIN 1.0", "VERTICES " + std::to_string(sizes.all_vertices)});
-    for (const char* name :
-         {"contact/bodies/boxes", "contact/bodies/cull", "contact/bodies/query", "contact/bodies/meet",
-          "contact/bodies/push", "render/touches", "solvers/average"}) {
+    defines.insert(defines.end(), {"COMPLIANT 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1", "IMPLICIT 0",
+                                   "SHEETS 1", "CONTACT_SELF 1", "LAGGED 1", "QUERY_EDGES 0", "ROW 9u", "EDGE 1.0",
+                                   "SELF_MARGIN 1.0", "VERTICES " + std::to_string(sizes.all_vertices)});
+    for (const char* name : {"contact/bodies/boxes", "contact/bodies/cull", "contact/bodies/query",
+                             "contact/bodies/meet", "contact/bodies/push", "render/touches", "solvers/average"}) {
       const Program program =
           Program::compute(std::string(name) + ".comp", {{{"SCHEME", "leapfrog"}}, {}}, defines, 10);
       check_block(program, "PairMesh", layout.mesh);
@@ -221,8 +210,7 @@ TEST_CASE("#include, #foreach and words expand") {
                                           {"PAIRS", "3"},
                                           {"MATERIAL", "1"}}}},
                                        files);
-  CHECK(text.find("project_stretch(records_stretch.x + 1 * (t - begin_stretch), owned)") !=
-        std::string::npos);
+  CHECK(text.find("project_stretch(records_stretch.x + 1 * (t - begin_stretch), owned)") != std::string::npos);
   CHECK(text.find("project_bend(records_bend.x + 3 * (t - begin_bend), owned)") != std::string::npos);
   CHECK(text.find("project_volume") == std::string::npos);
   CHECK(text.find("#include") == std::string::npos);

@@ -63,8 +63,7 @@ TEST_CASE("manners: flags that change nothing say so, others do not, both spelli
         "tetpbd: --k-stretch changes nothing: the material stands in its place\n"
         "tetpbd: --iterations changes nothing: mode explicit has no iterations\n");
   CHECK(said("--mode node --young-modulus 1e5").find("there is no material") != std::string::npos);
-  CHECK(said("--mode node --constraints stretch --k-bend 0.5").find("bend is not among") !=
-        std::string::npos);
+  CHECK(said("--mode node --constraints stretch --k-bend 0.5").find("bend is not among") != std::string::npos);
   // On a CPU that pretends to be a GPU, a mode is taken that suits it, unless one is named.
   const Outcome chosen = program("run " + beam, folder), named = program("run --mode node " + beam, folder);
   const bool software = program("info", folder).out.find("software: a CPU") != std::string::npos;

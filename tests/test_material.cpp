@@ -18,8 +18,7 @@ namespace {
 glm::dmat3 random_matrix(double amplitude) { return {noise(amplitude), noise(amplitude), noise(amplitude)}; }
 
 std::array<glm::dvec3, 4> random_tet(double scale) {
-  std::array<glm::dvec3, 4> x = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0),
-                                 glm::dvec3(0, 0, 1)};
+  std::array<glm::dvec3, 4> x = {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
   for (auto& p : x) p = scale * (p + noise(0.3));
   return x;
 }
@@ -58,9 +57,8 @@ TEST_CASE("material: gradients of neo-hookean tets are those of finite differenc
       if (trial % 4 == 0) x[3] = -x[3];  // also inverted
       const auto c = NeoHookean::evaluate(x.data(), rest.data());
       for (int k = 0; k < 2; ++k)
-        CHECK(gradient_error(x, scale, c.gradient[k], [&](auto y) {
-                return NeoHookean::evaluate(y.data(), rest.data()).C[k];
-              }) < 1e-6);
+        CHECK(gradient_error(x, scale, c.gradient[k],
+                             [&](auto y) { return NeoHookean::evaluate(y.data(), rest.data()).C[k]; }) < 1e-6);
       std::array<glm::vec3, 4> y;
       std::array<float, 8> values;
       for (std::size_t j = 0; j < 4; ++j) y[j] = glm::vec3(x[j] - x[0]);
@@ -102,8 +100,7 @@ TEST_CASE("material: neo-hookean is Smith's energy, with no stress at rest and l
       double squares = 0, trace = 0;
       for (int k = 0; k < 3; ++k) squares += glm::dot(strain[k], strain[k]), trace += strain[k][k];
       // Both ways, so that what is of third order is gone.
-      CHECK(off(density(one + u) + density(one - u) - 2 * least,
-                2 * m.mu * squares + m.lambda * trace * trace) < 1e-4);
+      CHECK(off(density(one + u) + density(one - u) - 2 * least, 2 * m.mu * squares + m.lambda * trace * trace) < 1e-4);
     }
   }
 }
@@ -157,8 +154,7 @@ TEST_CASE("material: springs have the right stiffness averaged over directions, 
     double along = 0, shear = 0, lattice = 0;
     const int directions = 500;
     for (int i = 0; i < directions; ++i) {
-      const double z = 1 - (2 * i + 1.0) / directions, angle = i * pi * (3 - std::sqrt(5.0)),
-                   r = std::sqrt(1 - z * z);
+      const double z = 1 - (2 * i + 1.0) / directions, angle = i * pi * (3 - std::sqrt(5.0)), r = std::sqrt(1 - z * z);
       const glm::dvec3 n(r * std::cos(angle), r * std::sin(angle), z);
       const glm::dmat3 dyad = glm::outerProduct(n, n);
       along += density(delta * dyad) / directions;
@@ -276,8 +272,7 @@ TEST_CASE("material: a soft block that lands comes to rest, shortened by its own
   for (std::size_t i = 0; i < held.size(); ++i)
     if (model->rest.positions[i].y < 1e-9) held[i] = 0;
   const ReferenceInput input{*model, scene.system, scene.settings, held};
-  CHECK(off(shortened(static_equilibrium(input, model->rest.positions, none).state.positions), exact) <
-        0.003);
+  CHECK(off(shortened(static_equilibrium(input, model->rest.positions, none).state.positions), exact) < 0.003);
   for (const std::string mode : {"cpu-double", "cpu-fast", "node"}) {
     CAPTURE(mode);
     Settings settings = scene.settings;
@@ -331,8 +326,7 @@ TEST_CASE("material: scenes and flags name it, and say what is wrong with it") {
   const Folder folder;
   const auto scene = [&](const std::string& material) {
     std::ofstream(folder.path / "m.json")
-        << R"({"bodies": [{"block": {"size": [1, 0.5, 0.5], "cells": [2, 1, 1]}, "material": )" << material
-        << "}]}";
+        << R"({"bodies": [{"block": {"size": [1, 0.5, 0.5], "cells": [2, 1, 1]}, "material": )" << material << "}]}";
   };
   const auto settings = [&](const std::string& more) {
     const Outcome run = program("run --scene m.json --steps 2 --mode cpu --out r " + more, folder);
@@ -360,6 +354,5 @@ TEST_CASE("material: scenes and flags name it, and say what is wrong with it") {
   refused(R"({"model": "springs", "poisson_ratio": 0.1})", "springs have no Poisson's ratio of 0.1");
   std::ofstream(folder.path / "m.json")
       << R"({"bodies": [{"block": {}, "material": "foam"}, {"block": {}, "position": [3, 0, 0]}]})";
-  CHECK(program("run --scene m.json --steps 1 --out r", folder).err.find("different materials") !=
-        std::string::npos);
+  CHECK(program("run --scene m.json --steps 1 --out r", folder).err.find("different materials") != std::string::npos);
 }

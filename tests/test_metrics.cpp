@@ -113,8 +113,7 @@ TEST_CASE("a stretched spring, a folded hinge and a squeezed tet give what a han
   GlTest gl;
   const auto model = model_of(one_tet(), 0);
   State state{model->positions, model->velocities};
-  state.positions[3] = {
-      0, 0, 0.5};  // half the height: half the volume; edge 0-3 halved, edges 1-3 and 2-3 shortened
+  state.positions[3] = {0, 0, 0.5};  // half the height: half the volume; edge 0-3 halved, edges 1-3 and 2-3 shortened
   const Measurement m = measure_state(model, state);
   CHECK(m.volume_error_percent == doctest::Approx(-50));
   CHECK(m.tet_volume_rms == doctest::Approx(0.5));
@@ -167,8 +166,7 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   const auto eigen = [](glm::dvec3 v) { return Eigen::Vector3d(v.x, v.y, v.z); };
   for (std::size_t i = 0; i < state.positions.size(); ++i) {
-    angular +=
-        model->masses[i] * glm::cross(state.positions[i] - centre, state.velocities[i] - momentum / mass);
+    angular += model->masses[i] * glm::cross(state.positions[i] - centre, state.velocities[i] - momentum / mass);
     covariance += model->masses[i] * eigen(state.positions[i] - centre) *
                   eigen(model->rest.positions[i] - rest_centre).transpose();
   }
@@ -178,9 +176,9 @@ TEST_CASE("momentum, energy, contacts and rigid distance agree with sums in doub
   const Eigen::Matrix3d rotation = svd.matrixU() * fix * svd.matrixV().transpose();
   double squares = 0;
   for (std::size_t i = 0; i < state.positions.size(); ++i)
-    squares += model->masses[i] *
-               (eigen(state.positions[i] - centre) - rotation * eigen(model->rest.positions[i] - rest_centre))
-                   .squaredNorm();
+    squares +=
+        model->masses[i] *
+        (eigen(state.positions[i] - centre) - rotation * eigen(model->rest.positions[i] - rest_centre)).squaredNorm();
 
   CHECK(glm::length(m.momentum - momentum) < 1e-5 * speed);
   CHECK(glm::length(m.angular_momentum - angular) < 1e-5 * speed);

@@ -36,8 +36,8 @@ RigidBody rigid_of(const Scene& scene) { return rigid_bodies(scene.model).at(0);
 
 double energy_of(const RigidBody& b, double gravity) {
   const glm::dvec3 local = glm::transpose(b.rotation) * b.angular;
-  return 0.5 * b.mass * glm::dot(b.velocity, b.velocity) +
-         0.5 * glm::dot(local, glm::inverse(b.inertia) * local) + b.mass * gravity * b.centre.y;
+  return 0.5 * b.mass * glm::dot(b.velocity, b.velocity) + 0.5 * glm::dot(local, glm::inverse(b.inertia) * local) +
+         b.mass * gravity * b.centre.y;
 }
 
 }  // namespace
@@ -57,16 +57,15 @@ TEST_CASE("motion: a rigid block tumbles by Euler's equations and falls by a par
   const int steps = 20000;
   for (int s = 0; s < steps; ++s) {
     advance(b, scene.model, scene.settings, h);
-    const glm::dvec3 k1 = rate(w), k2 = rate(w + h / 2 * k1), k3 = rate(w + h / 2 * k2),
-                     k4 = rate(w + h * k3);
+    const glm::dvec3 k1 = rate(w), k2 = rate(w + h / 2 * k1), k3 = rate(w + h / 2 * k2), k4 = rate(w + h * k3);
     w += h / 6 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
   }
   const glm::dvec3 local = inverse * (glm::transpose(b.rotation) * b.angular);
   CHECK(glm::length(local - w) < 1e-4 * glm::length(w));
   CHECK(local.y < 0);  // about its middle axis it has turned over
   const double t = steps * h;
-  CHECK(glm::length(b.centre - (glm::dvec3(0, 9, 0) + t * glm::dvec3(1, 2, 3) -
-                                glm::dvec3(0, 0.5 * 9.81 * t * t, 0))) < 1e-9);
+  CHECK(glm::length(b.centre - (glm::dvec3(0, 9, 0) + t * glm::dvec3(1, 2, 3) - glm::dvec3(0, 0.5 * 9.81 * t * t, 0))) <
+        1e-9);
   CHECK(glm::length(glm::transpose(b.rotation) * b.rotation[0] - glm::dvec3(1, 0, 0)) < 1e-12);
 }
 
@@ -74,8 +73,7 @@ TEST_CASE("motion: a rigid block on a slope slides by g (sin - friction cos) t^2
   for (const double degrees : {25.0, 28.0}) {
     CAPTURE(degrees);
     const double angle = degrees * pi / 180;
-    const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0),
-        down(-std::cos(angle), -std::sin(angle), 0);
+    const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0), down(-std::cos(angle), -std::sin(angle), 0);
     const glm::dmat3 rotation(-down, normal, glm::dvec3(0, 0, 1));
     Scene scene = block_at({1, 0.2, 0.6}, 0.1 * normal, glm::dvec3(0), glm::dvec3(0), rotation);
     scene.settings.ground = false;
@@ -94,8 +92,7 @@ TEST_CASE("motion: a rigid block on a slope slides by g (sin - friction cos) t^2
   }
 }
 
-TEST_CASE(
-    "motion: a rigid block bounces to the square of its restitution of the height, and without it rests") {
+TEST_CASE("motion: a rigid block bounces to the square of its restitution of the height, and without it rests") {
   for (const double restitution : {0.0, 0.5, 0.9}) {
     CAPTURE(restitution);
     Scene scene = block_at({1, 0.2, 0.6}, {0, 1.1, 0});  // lands flat, its lower side 1 m up
@@ -156,19 +153,15 @@ TEST_CASE("motion: a corner that hits turns the body by its arm times the impuls
   }
 }
 
-TEST_CASE(
-    "motion: a rigid block that three fixed vertices hold stays, on a line they leave it free to turn") {
+TEST_CASE("motion: a rigid block that three fixed vertices hold stays, on a line they leave it free to turn") {
   Scene scene = block_at({1, 1, 1}, {0, 2, 0});
-  scene.model.inverse_masses[0] = scene.model.inverse_masses[1] = scene.model.inverse_masses[2] =
-      0;  // an edge
-  CHECK_THROWS_WITH_AS(find_motion(scene.input(), 5), doctest::Contains("can turn about its fixed vertices"),
-                       Error);
+  scene.model.inverse_masses[0] = scene.model.inverse_masses[1] = scene.model.inverse_masses[2] = 0;  // an edge
+  CHECK_THROWS_WITH_AS(find_motion(scene.input(), 5), doctest::Contains("can turn about its fixed vertices"), Error);
   scene.model.inverse_masses[3] = 0;
   const Motion motion = find_motion(scene.input(), 5);
   CHECK(motion.method == "rigid body");
   REQUIRE(motion.kept.back() == 5);
-  for (const auto& positions : motion.positions)
-    CHECK(largest_distance(positions, scene.model.positions) < 1e-12);
+  for (const auto& positions : motion.positions) CHECK(largest_distance(positions, scene.model.positions) < 1e-12);
   CHECK(motion.rows.back().kinetic == 0);
   scene.model.velocities[5].x = 1;
   CHECK_THROWS_AS(find_motion(scene.input(), 5), Error);  // cannot set off
@@ -196,12 +189,10 @@ TEST_CASE("motion: the longest stable step is that of the fastest vibration, dam
   Scene scene = chain_scene({{0, 0, 0}, {1, 0, 0}}, {1 / 2.0, 1 / 3.0});
   const double alpha = 1e-4, omega = std::sqrt((1 / 2.0 + 1 / 3.0) / alpha);
   const Compliances compliances{alpha, infinity, infinity};
-  CHECK(stable_step(scene.input(), compliances, scene.model.positions) ==
-        doctest::Approx(2 / omega).epsilon(0.02));
+  CHECK(stable_step(scene.input(), compliances, scene.model.positions) == doctest::Approx(2 / omega).epsilon(0.02));
   const double tau = scene.settings.constraint_damping = 0.01;
   const double limit = (std::sqrt(tau * tau * omega * omega + 4) - tau * omega) / omega;
-  CHECK(stable_step(scene.input(), compliances, scene.model.positions) ==
-        doctest::Approx(limit).epsilon(0.02));
+  CHECK(stable_step(scene.input(), compliances, scene.model.positions) == doctest::Approx(limit).epsilon(0.02));
   // A little below it the spring swings, a little above it does not stay finite.
   scene.settings.gravity = 0;
   for (const double part : {0.95, 1.05}) {
@@ -224,9 +215,7 @@ TEST_CASE("motion: two masses on a spring fall, stick, and leave the ground when
   // Above equilibrium by s: s = sag cos(w t) + speed / w sin(w t) from the moment of impact; the stretch is s
   // - sag.
   double lift = 0;
-  const auto height = [&](double t) {
-    return sag * std::cos(omega * t) + speed / omega * std::sin(omega * t);
-  };
+  const auto height = [&](double t) { return sag * std::cos(omega * t) + speed / omega * std::sin(omega * t); };
   while (height(lift) < 2 * sag || lift < pi / omega / 2) lift += 1e-6;
   const Compliances compliances{alpha, infinity, infinity};
   const auto lands_and_leaves = [&](auto run) {
@@ -262,8 +251,7 @@ TEST_CASE("motion: soft bodies slide v^2 / (2 friction g) and stop") {
   slides_and_stops(implicit(scene.input(), compliances, start, 1e-4), 1e-7);  // below 1e-6 m/s
 }
 
-TEST_CASE(
-    "motion: leapfrog is of second order, keeps momentum and energy, and is where implicit Euler goes") {
+TEST_CASE("motion: leapfrog is of second order, keeps momentum and energy, and is where implicit Euler goes") {
   const Scene scene = [] {
     Scene s = block_scene({2, 1, 1});
     s.settings.gravity = 0;
@@ -281,8 +269,7 @@ TEST_CASE(
   const State one = after(h), half = after(h / 2), quarter = after(h / 4);
   const double e1 = error_to(scene.model, quarter, one), e2 = error_to(scene.model, quarter, half);
   CHECK(e1 / e2 == doctest::Approx(5).epsilon(0.2));  // (1 - 1/16) / (1/4 - 1/16)
-  CHECK(glm::length(centre_of(scene.model, quarter.velocities) - centre_of(scene.model, start.velocities)) <
-        1e-12);
+  CHECK(glm::length(centre_of(scene.model, quarter.velocities) - centre_of(scene.model, start.velocities)) < 1e-12);
   const Objective elastic = static_objective(scene.input(), start.positions, compliances);
   const auto total = [&](const State& s) {
     double kinetic = 0;
@@ -357,8 +344,7 @@ TEST_CASE("motion: what is found states its own error, and does not depend on ho
   Scene scene = block_scene({2, 1, 1});
   for (auto& p : scene.model.positions) p.y -= 1.1;
   const std::uint64_t key = scene_key(scene.input());
-  scene.settings.iterations = 3, scene.settings.substeps = 7, scene.settings.mode = "cpu",
-  scene.settings.omega = 1;
+  scene.settings.iterations = 3, scene.settings.substeps = 7, scene.settings.mode = "cpu", scene.settings.omega = 1;
   CHECK(scene_key(scene.input()) == key);
   scene.settings.compliance = {1e-4, 1e-1, 1e-7};
   CHECK(scene_key(scene.input()) != key);
@@ -397,8 +383,7 @@ TEST_CASE("motion: what is found states its own error, and does not depend on ho
 // ----------------------------------------------------------------------------------------------------------
 // the command
 
-TEST_CASE(
-    "reference: a motion is kept, found by runs, taken up where it was, and refused for another scene") {
+TEST_CASE("reference: a motion is kept, found by runs, taken up where it was, and refused for another scene") {
   const Folder folder;
   std::ofstream(folder.path / "soft.json")
       << R"({"bodies": [{"block": {"size": [0.4, 0.2, 0.2], "cells": [4, 2, 2]}, "position": [0, 0.02, 0]}],
@@ -424,8 +409,7 @@ TEST_CASE(
   const std::string stiff = "reference --scene soft.json --set solver.compliance_stretch=1e-8 --out ";
   for (const std::string name : {"a", "c"}) {
     const std::string method = name == "a" ? "" : " --method implicit";
-    const Outcome stopped =
-        program(stiff + name + " --steps 400" + method, folder, cache + " timeout -s INT 1");
+    const Outcome stopped = program(stiff + name + " --steps 400" + method, folder, cache + " timeout -s INT 1");
     CHECK(stopped.status == 124);
     CHECK(stopped.err.find("interrupted") != std::string::npos);
     CHECK_FALSE(fs::exists(folder.path / name));

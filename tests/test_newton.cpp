@@ -51,8 +51,7 @@ std::array<glm::dvec3, 4> forces(Tet4 tet) {
   const auto c = NeoHookean::evaluate<double>(tet.x.data(), tet.rest.data());
   std::array<glm::dvec3, 4> sum;
   for (int j = 0; j < 4; ++j)
-    sum[std::size_t(j)] =
-        c.C[0] / tet.compliance[0] * c.gradient[0][j] + c.C[1] / tet.compliance[1] * c.gradient[1][j];
+    sum[std::size_t(j)] = c.C[0] / tet.compliance[0] * c.gradient[0][j] + c.C[1] / tet.compliance[1] * c.gradient[1][j];
   return sum;
 }
 
@@ -261,21 +260,17 @@ TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inve
         glm::dvec3 axis(0);
         axis[mode % 3] = 1;
         const Aggregate& a = aggregates.all[share.aggregate];
-        const glm::dvec3 way =
-            mode < 3 ? axis : glm::cross(axis, (model->rest.positions[v] - a.centre) / a.reach);
+        const glm::dvec3 way = mode < 3 ? axis : glm::cross(axis, (model->rest.positions[v] - a.centre) / a.reach);
         for (int c = 0; c < 3; ++c)
-          Q(Eigen::Index(3 * v) + c, Eigen::Index(6 * share.aggregate) + mode) +=
-              way[c] * share.weight / 65535.0;
+          Q(Eigen::Index(3 * v) + c, Eigen::Index(6 * share.aggregate) + mode) += way[c] * share.weight / 65535.0;
       }
   const Eigen::MatrixXd coarse = Q.transpose() * A * Q;
   const std::vector<float> inverse = coarse_inverse(*model, aggregates, {neighbours, inertia, blocks});
   REQUIRE(inverse.size() == unknowns * width);
   Eigen::MatrixXd found{Eigen::Index(unknowns), Eigen::Index(unknowns)};
   for (std::size_t r = 0; r < unknowns; ++r)
-    for (std::size_t c = 0; c < unknowns; ++c)
-      found(Eigen::Index(r), Eigen::Index(c)) = inverse[r * width + c];
-  CHECK((found * coarse - Eigen::MatrixXd::Identity(Eigen::Index(unknowns), Eigen::Index(unknowns))).norm() <
-        1e-2);
+    for (std::size_t c = 0; c < unknowns; ++c) found(Eigen::Index(r), Eigen::Index(c)) = inverse[r * width + c];
+  CHECK((found * coarse - Eigen::MatrixXd::Identity(Eigen::Index(unknowns), Eigen::Index(unknowns))).norm() < 1e-2);
 }
 
 TEST_CASE("newton: its motion nears that of leapfrog with the square of the step, damped or not") {
@@ -290,8 +285,7 @@ TEST_CASE("newton: its motion nears that of leapfrog with the square of the step
       settings.substeps = substeps;
       Sim sim = create_sim(model, settings);
       const ReferenceInput input{*model, sim.system, sim.settings, sim.inverse_masses};
-      Leapfrog right =
-          leapfrog(input, reference_compliances(input), {model->positions, model->velocities}, 2e-4);
+      Leapfrog right = leapfrog(input, reference_compliances(input), {model->positions, model->velocities}, 2e-4);
       for (int s = 0; s < 20; ++s) step(sim), advance(right, 25);
       off.push_back(distance(read_state(sim).positions, right.x));
     }
@@ -376,8 +370,7 @@ TEST_CASE("newton: a block that slides stops where friction stops it") {
   for (int s = 0; s < 120; ++s) step(sim);
   const State state = read_state(sim);
   double way = 0;
-  for (std::size_t i = 0; i < state.positions.size(); ++i)
-    way += state.positions[i].x - model->positions[i].x;
+  for (std::size_t i = 0; i < state.positions.size(); ++i) way += state.positions[i].x - model->positions[i].x;
   way /= double(state.positions.size());
   CHECK(way == doctest::Approx(1.5 * 1.5 / (2 * 0.5 * 9.81)).epsilon(0.07));
 }
@@ -526,8 +519,7 @@ TEST_CASE("newton: with other steps or forces while running it is soon as if mad
     const GLuint vectors = sim.solver.buffers[0].id();
     change(*value, to);
     CHECK(sim.solver.buffers[0].id() == vectors);  // the solver is not made again
-    for (int s = 0; s < 7; ++s)
-      step(sim), step(late), std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    for (int s = 0; s < 7; ++s) step(sim), step(late), std::this_thread::sleep_for(std::chrono::milliseconds(5));
     CHECK(second_level(sim) == served);
     step(sim), step(late);
     CHECK(second_level(sim) != served);
@@ -602,6 +594,5 @@ TEST_CASE("newton: the same bits twice, other modes go on from where it is, what
   CHECK(fall == doctest::Approx(0.5 * 9.81 * time * time).epsilon(1e-3));
   Settings hard;
   hard.mode = "newton";
-  CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"),
-                       Error);
+  CHECK_THROWS_WITH_AS(create_sim(model, hard), doctest::Contains("needs forces, and stretch has none"), Error);
 }

@@ -34,8 +34,7 @@ Obstacle box(const glm::dvec3& half, const glm::dvec3& centre = glm::dvec3(0)) {
   o.kind = find_obstacle_kind("box"), o.half = half, o.centre = centre;
   return o;
 }
-Obstacle round_shape(const char* kind, double radius, double half_length,
-                     const glm::dvec3& centre = glm::dvec3(0)) {
+Obstacle round_shape(const char* kind, double radius, double half_length, const glm::dvec3& centre = glm::dvec3(0)) {
   Obstacle o;
   o.kind = find_obstacle_kind(kind), o.radius = radius, o.half_length = half_length, o.centre = centre;
   return o;
@@ -62,8 +61,7 @@ Obstacle grid_sphere(double radius, int cells) {
   for (int k = 0; k < field->size.z; ++k)
     for (int j = 0; j < field->size.y; ++j)
       for (int i = 0; i < field->size.x; ++i)
-        field->values.push_back(
-            float(glm::length(field->origin + field->spacing * glm::dvec3(i, j, k)) - radius));
+        field->values.push_back(float(glm::length(field->origin + field->spacing * glm::dvec3(i, j, k)) - radius));
   o.field = field;
   return o;
 }
@@ -87,8 +85,7 @@ TetMesh ball_mesh(double radius) {
   mesh.positions = {{0, 0, 0}, {0, radius, 0}, {0, -radius, 0}};
   for (int k = 0; k < 10; ++k) {
     const double a = k * std::numbers::pi / 5, y = radius / std::sqrt(5.0) * (k % 2 ? -1 : 1);
-    mesh.positions.push_back(
-        {2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
+    mesh.positions.push_back({2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
   }
   for (std::uint32_t k = 0; k < 10; ++k) {
     const std::uint32_t a = 3 + k, b = 3 + (k + 1) % 10, c = 3 + (k + 2) % 10;
@@ -162,8 +159,7 @@ TEST_CASE("obstacles: a distance's gradient is its normal, and its sign says ins
       }
       inside += s.distance < 0;
       // Not beside an edge of the surface, or between its sides, where there are two normals.
-      const bool smooth =
-          glm::length(shape.surface_at(x + 1e-5 * within(random, 1)).normal - s.normal) < 1e-3;
+      const bool smooth = glm::length(shape.surface_at(x + 1e-5 * within(random, 1)).normal - s.normal) < 1e-3;
       if (closed && smooth)
         wrong = std::max(wrong, glm::length(slope - s.normal)), ++tested;
       else if (smooth && std::abs(s.distance) < 0.02)
@@ -218,9 +214,8 @@ TEST_CASE("obstacles: a way meets a shape where it goes in, and nothing where it
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in every kind of mode") {
-  std::vector<std::vector<Obstacle>> grounds = {{half_space({0, 1, 0})},
-                                                {box({1, 0.5, 1}, {0, -0.5, 0})},
-                                                {round_shape("cylinder", 1, 0.5, {0, -0.5, 0})}};
+  std::vector<std::vector<Obstacle>> grounds = {
+      {half_space({0, 1, 0})}, {box({1, 0.5, 1}, {0, -0.5, 0})}, {round_shape("cylinder", 1, 0.5, {0, -0.5, 0})}};
   grounds[0][0].friction = 0.5;
   std::vector<Obstacle> rails, balls;
   for (const double x : {-0.1, 0.1}) {
@@ -251,15 +246,13 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in eve
     }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "obstacles: a block slides down a tilted box as Coulomb has it, or sticks, in every mode") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: a block slides down a tilted box as Coulomb has it, or sticks, in every mode") {
   for (const std::string mode : {"node", "constraint", "cpu", "cpu-double", "cpu-fast", "newton"})
     for (const double degrees : {25.0, 28.0}) {
       CAPTURE(mode);
       CAPTURE(degrees);
       const double angle = glm::radians(degrees);
-      const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0),
-          down(-std::cos(angle), -std::sin(angle), 0);
+      const glm::dvec3 normal(-std::sin(angle), std::cos(angle), 0), down(-std::cos(angle), -std::sin(angle), 0);
       Setup setup;
       add(setup, slab, 0.1 * normal, glm::dmat3(-down, normal, glm::dvec3(0, 0, 1)));
       Obstacle slope = box({2, 0.5, 1}, -0.5 * normal);
@@ -285,8 +278,7 @@ TEST_CASE_FIXTURE(GlTest,
     }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "obstacles: a hard ball bounces off a sphere to the square of the obstacle's restitution") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: a hard ball bounces off a sphere to the square of the obstacle's restitution") {
   for (const std::string& mode : all_modes)
     for (const double restitution : {0.5, 0.9}) {
       CAPTURE(mode);
@@ -360,8 +352,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: what moves pushes at its speed, and a belt
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as an edge at 50 m/s") {
-  for (const std::string mode :
-       {"node 20", "node 1", "explicit", "newton", "cpu", "cpu-fast", "constraint"}) {
+  for (const std::string mode : {"node 20", "node 1", "explicit", "newton", "cpu", "cpu-fast", "constraint"}) {
     CAPTURE(mode);
     Setup setup;
     add(setup, slab, {0, 0.5, 0}, glm::dmat3(1), {0, -50, 0});
@@ -382,8 +373,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: nothing goes through a plate as thick as a
   }
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "obstacles: the GPU steps as the same method in double, and to the same bits again") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: the GPU steps as the same method in double, and to the same bits again") {
   for (const Obstacle& o : every_shape()) {
     CAPTURE(o.kind->name);
     Setup setup;
@@ -485,8 +475,8 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: penetration is measured over planes and sh
   CHECK(now.contacts == 25);
 }
 
-TEST_CASE_FIXTURE(
-    GlTest, "obstacles: half spaces beyond the planes of a step stop bodies too, and too many are refused") {
+TEST_CASE_FIXTURE(GlTest,
+                  "obstacles: half spaces beyond the planes of a step stop bodies too, and too many are refused") {
   for (const char* mode : {"node", "cpu-double"}) {
     CAPTURE(mode);
     Setup setup;
@@ -501,12 +491,10 @@ TEST_CASE_FIXTURE(
   add(setup, slab, {0, 0.2, 0});
   setup.model->obstacles.resize(MAX_OBSTACLES, half_space({0, 1, 0}));
   CHECK_THROWS_WITH_AS(create_sim(setup.model, setup.settings),
-                       doctest::Contains("too many obstacles: 31 of them: at most 30 beside the ground"),
-                       Error);
+                       doctest::Contains("too many obstacles: 31 of them: at most 30 beside the ground"), Error);
 }
 
-TEST_CASE_FIXTURE(GlTest,
-                  "obstacles: others are taken over without new kernels where these would be the same") {
+TEST_CASE_FIXTURE(GlTest, "obstacles: others are taken over without new kernels where these would be the same") {
   for (const char* mode : {"node", "newton", "cpu-double", "cpu-fast"}) {
     CAPTURE(mode);
     Setup setup;
@@ -517,8 +505,7 @@ TEST_CASE_FIXTURE(GlTest,
     for (int s = 0; s < 10; ++s) step(sim);
     const GLuint buffer = sim.positions.id();  // that of another simulation, where it is made again
     auto other = std::make_shared<Model>(*setup.model);
-    other->obstacles = {half_space({0, 1, 0}, -0.1), half_space({1, 0, 0}, -5),
-                        box({1, 0.5, 1}, {0, -0.58, 0})};
+    other->obstacles = {half_space({0, 1, 0}, -0.1), half_space({1, 0, 0}, -5), box({1, 0.5, 1}, {0, -0.58, 0})};
     change_obstacles(sim, other);
     setup.model.reset();  // nothing reads it any more
     CHECK(sim.positions.id() == buffer);
@@ -556,13 +543,11 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: any shapes anywhere leave numbers finite")
 }
 
 TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again, what is wrong is refused") {
-  const auto file =
-      std::filesystem::temp_directory_path() / ("tetpbd_obstacles_" + std::to_string(getpid()) + ".json");
+  const auto file = std::filesystem::temp_directory_path() / ("tetpbd_obstacles_" + std::to_string(getpid()) + ".json");
   const auto load = [&](const std::string& obstacles) {
-    std::ofstream(file)
-        << R"({"bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}],
+    std::ofstream(file) << R"({"bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}],
       "world": {"obstacles": [)"
-        << obstacles << "]}}";
+                        << obstacles << "]}}";
     return load_scene(file.string());
   };
   const std::string all = R"({"point": [0, 0, 0], "normal": [0, 1, 0]},
@@ -606,10 +591,8 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: scenes say them and say them again, what i
            {R"({"shape": "height-field", "half": [1, 1, 1]})", "heights"},
            {R"({"shape": "height-field", "half": [1, 1, 1], "image": "no.png"})", "no.png"},
            {R"({"shape": "height-field", "half": [1, 1, 1], "heights": [[0, 1, 0], [0, 1]]})", "same length"},
-           {R"({"shape": "box", "half": [1, 1, 1], "spin": [0, 1, 0], "keyframes": [{"time": 1}]})",
-            "keyframes"},
-           {R"({"shape": "box", "half": [1, 1, 1], "keyframes": [{"time": 1}, {"time": 1}]})",
-            "keyframes.1.time"}}) {
+           {R"({"shape": "box", "half": [1, 1, 1], "spin": [0, 1, 0], "keyframes": [{"time": 1}]})", "keyframes"},
+           {R"({"shape": "box", "half": [1, 1, 1], "keyframes": [{"time": 1}, {"time": 1}]})", "keyframes.1.time"}}) {
     CAPTURE(text);
     CHECK(error_of(text).find(word) != std::string::npos);
   }
@@ -635,8 +618,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: many substeps of what moves need no more m
     CAPTURE(mode);
     const auto at_once = run(mode, 6000, 1), one_by_one = run(mode, 100, 60);
     double worst = 0;
-    for (std::size_t i = 0; i < at_once.size(); ++i)
-      worst = std::max(worst, glm::distance(at_once[i], one_by_one[i]));
+    for (std::size_t i = 0; i < at_once.size(); ++i) worst = std::max(worst, glm::distance(at_once[i], one_by_one[i]));
     CHECK(worst < 1e-5);
   }
 }

@@ -66,8 +66,7 @@ struct ShaderVariant {
         ++kernels;
         const std::string old = match[1];
         const bool number = old.find_first_not_of("0123456789") == std::string::npos && old != "1";
-        const std::string now =
-            number ? std::to_string(std::min(1024, std::stoi(old) * order.enlarged)) : old;
+        const std::string now = number ? std::to_string(std::min(1024, std::stoi(old) * order.enlarged)) : old;
         text = std::string(match.prefix()) + "layout(local_size_x = " + now +
                ") in;\n"
                "uint ordered_group() { uint g = gl_WorkGroupID.x, n = gl_NumWorkGroups.x; return " +
@@ -75,8 +74,8 @@ struct ShaderVariant {
                "; }\n"
                "uint ordered_invocation() { return ordered_group() * gl_WorkGroupSize.x + "
                "gl_LocalInvocationID.x; }\n" +
-               replaced(replaced(match.suffix(), "gl_GlobalInvocationID.x", "ordered_invocation()"),
-                        "gl_WorkGroupID.x", "ordered_group()");
+               replaced(replaced(match.suffix(), "gl_GlobalInvocationID.x", "ordered_invocation()"), "gl_WorkGroupID.x",
+                        "ordered_group()");
       } else {
         text = replaced(text, "gl_GlobalInvocationID.x", "ordered_invocation()");
       }
@@ -84,11 +83,10 @@ struct ShaderVariant {
       const std::string row = "return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;";
       if (entry.path() == folder / "types.glsl") {
         REQUIRE(text.find(row) != std::string::npos);
-        text = replaced(
-            text, row,
-            "uint g = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, n = gl_NumWorkGroups.x * "
-            "gl_NumWorkGroups.y; return " +
-                std::string(order.expression) + ";");
+        text = replaced(text, row,
+                        "uint g = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, n = gl_NumWorkGroups.x * "
+                        "gl_NumWorkGroups.y; return " +
+                            std::string(order.expression) + ";");
       }
       CHECK_MESSAGE(text.find("gl_GlobalInvocationID") == std::string::npos, entry.path());
       std::ofstream(entry.path(), std::ios::binary) << text;
@@ -123,8 +121,7 @@ Settings settings_of(const std::string& mode) {
   return settings;
 }
 
-std::uint64_t hash_after(const std::shared_ptr<const Model>& model, const Settings& settings,
-                         int steps = 10) {
+std::uint64_t hash_after(const std::shared_ptr<const Model>& model, const Settings& settings, int steps = 10) {
   Sim sim = create_sim(model, settings);
   for (int s = 0; s < steps; ++s) step(sim);
   return state_hash(sim);
@@ -182,12 +179,10 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
     Metrics metrics = create_metrics(*model);
     for (int s = 0; s < 10; ++s) step(sim);
     const Measurement m = measure_now(metrics, sim);
-    answers.numbers = {m.volume,        m.tet_volume_rms,     m.tet_volume_max,
-                       m.inverted_tets, m.stretch_rms,        m.stretch_max,
-                       m.bend_rms_rad,  m.rigid_distance,     m.momentum.x,
-                       m.momentum.y,    m.angular_momentum.z, m.speed,
-                       m.centre.x,      m.centre.y,           m.kinetic,
-                       m.potential,     m.contacts,           m.non_finite};
+    answers.numbers = {
+        m.volume,       m.tet_volume_rms, m.tet_volume_max, m.inverted_tets, m.stretch_rms,        m.stretch_max,
+        m.bend_rms_rad, m.rigid_distance, m.momentum.x,     m.momentum.y,    m.angular_momentum.z, m.speed,
+        m.centre.x,     m.centre.y,       m.kinetic,        m.potential,     m.contacts,           m.non_finite};
     Picker picker = make_picker(model->rest);
     Camera camera;
     camera.target = {1, 0.4f, 0};
@@ -196,8 +191,8 @@ TEST_CASE("any order and size of work-groups gives the same measurements, picks 
       request(picker, sim.positions.id(), pixel_ray(camera, x, 60, 160, 120));
       const auto pick = poll(picker, true);
       hits += pick->hit;
-      answers.numbers.insert(answers.numbers.end(), {double(pick->hit), double(pick->element),
-                                                     double(pick->vertex), double(pick->distance)});
+      answers.numbers.insert(answers.numbers.end(),
+                             {double(pick->hit), double(pick->element), double(pick->vertex), double(pick->distance)});
     }
     CHECK(hits > 0);
     Renderer renderer = make_renderer(*model);
@@ -298,15 +293,13 @@ TEST_CASE("every mode, scene and mesh size gives the same bits twice") {
   for (const std::string& name : scene_names())
     if (name != "bowl-32")  // 32 times bunny-drop's body
       models.emplace_back(name, build_model(load_scene(name)));
-  for (const glm::ivec3& cells : sizes)
-    models.emplace_back("block " + std::to_string(cells.x), falling(cells, 2));
+  for (const glm::ivec3& cells : sizes) models.emplace_back("block " + std::to_string(cells.x), falling(cells, 2));
   const auto modes = pbd_modes();
   for (std::size_t m = 0; m < models.size(); ++m)
     for (std::size_t k = 0; k < modes.size(); ++k) {
       // The short suite takes a scene and a block in each mode, the long one all pairs.
       const bool scene = m + std::size(sizes) < models.size();
-      if (!is_long_run() &&
-          (scene ? m != 3 * k : (models.size() - m) % std::size(sizes) != k % std::size(sizes)))
+      if (!is_long_run() && (scene ? m != 3 * k : (models.size() - m) % std::size(sizes) != k % std::size(sizes)))
         continue;
       const auto& [name, model] = models[m];
       const SolverMode& mode = modes[k];

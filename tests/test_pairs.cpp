@@ -116,8 +116,7 @@ TEST_CASE("pairs: two edges: weights, gap and normal") {
     const glm::dvec3 a(-1, 0, 0), q(aside, lift, -1), r(aside, lift, 2);
     const glm::dvec3 left(0, -1, -1), right(0, -1, 1), keel_left(aside + 1, lift + 1, 0),
         keel_right(aside - 1, lift + 1, 0);
-    return f.meet_edges(glm::dvec3(2, 0, 0), left - a, right - a, q - a, r - a, keel_right - a,
-                        keel_left - a);
+    return f.meet_edges(glm::dvec3(2, 0, 0), left - a, right - a, q - a, r - a, keel_right - a, keel_left - a);
   };
   REQUIRE(glm::dot(glm::cross(glm::dvec3(2, 0, 0), glm::dvec3(1, -1, 1)), {0, 1, 0}) < 0);
   CHECK(at(0.1).gap > 1);  // they do not cross
@@ -182,8 +181,7 @@ TEST_CASE("pairs: edges that cross stop each other, on the GPU as in double") {
   for (int s = 0; s < 20; ++s) step(kernels), step(truth);
   CHECK(touched(kernels).touches > 4);
   const State a = read_state(kernels), b = read_state(truth);
-  for (std::size_t i = 0; i < a.positions.size(); ++i)
-    CHECK(glm::length(a.velocities[i] - b.velocities[i]) < 2e-3);
+  for (std::size_t i = 0; i < a.positions.size(); ++i) CHECK(glm::length(a.velocities[i] - b.velocities[i]) < 2e-3);
 }
 
 TEST_CASE("pairs: two bodies that collide keep their momentum, part again and gain no energy") {
@@ -235,8 +233,7 @@ TEST_CASE("pairs: kernels do what the CPU does in double") {
 
 TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far apart") {
   GlTest gl;
-  const auto near =
-      blocks({{{0, 0, 0}, {1, 0, 0}}, {{0.52, 0.1, 0}, {-1, 0, 0}}, {{0.1, 0.55, 0.1}, {0, -1, 0}}});
+  const auto near = blocks({{{0, 0, 0}, {1, 0, 0}}, {{0.52, 0.1, 0}, {-1, 0, 0}}, {{0.1, 0.55, 0.1}, {0, -1, 0}}});
   std::uint64_t bits = 0;
   for (const unsigned lanes : {1u, 1u, 2u, 8u}) {  // they share the search of a vertex
     Tuning tuning;
@@ -276,8 +273,8 @@ TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far ap
 
 TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") {
   const auto model = blocks({{}, {{0.45, 0.03, 0.02}}, {{5, 0, 0}}});
-  const Overlap apart = measure_overlap(*blocks({{}, {{0.51, 0.03, 0.02}}}),
-                                        blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
+  const Overlap apart =
+      measure_overlap(*blocks({{}, {{0.51, 0.03, 0.02}}}), blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
   CHECK(apart.inside == 0);
   CHECK(apart.triangles == 0);
   CHECK(apart.largest == 0);
@@ -303,8 +300,8 @@ TEST_CASE("pairs: a block slides on another as friction says") {
   std::vector<std::uint32_t> all(125);
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
   const double friction = 0.3, speed = 1.5;
-  const auto model = blocks({{{0, -0.25, 0}, {}, {}, all, {3, 0.5, 1}},
-                             {{-0.8, 0.1, 0.02}, {speed, 0, 0}, {}, {}, {0.4, 0.2, 0.4}}});
+  const auto model =
+      blocks({{{0, -0.25, 0}, {}, {}, all, {3, 0.5, 1}}, {{-0.8, 0.1, 0.02}, {speed, 0, 0}, {}, {}, {0.4, 0.2, 0.4}}});
   for (const std::string mode : {"explicit", "node"}) {
     CAPTURE(mode);
     Settings settings = touching(mode, 1e6);
@@ -352,8 +349,7 @@ TEST_CASE("pairs: three blocks on each other come to rest") {
     CHECK(measure_overlap(*model, read_state(sim).positions, false).largest < 0.002);
     const glm::dvec3 before = centre_of(*model, read_state(sim).positions);
     for (int s = 0; s < 100; ++s) step(sim);
-    CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) <
-          (is_long_run() ? 1.5e-4 : 1e-3));
+    CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) < (is_long_run() ? 1.5e-4 : 1e-3));
   }
 }
 
@@ -370,8 +366,7 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
       Placed one;
       do {
         for (int c = 0; c < 3; ++c) one.at[c] = 0.4 * unit(random), one.spin[c] = 2 * unit(random);
-      } while (std::ranges::any_of(
-          all, [&](const Placed& other) { return glm::distance(other.at, one.at) < 0.35; }));
+      } while (std::ranges::any_of(all, [&](const Placed& other) { return glm::distance(other.at, one.at) < 0.35; }));
       one.cells = glm::ivec3(is_long_run() ? 4 : 2);
       all.push_back(one);
     }
@@ -463,15 +458,12 @@ TEST_CASE("pairs: a vertex leaves a body that is folded over itself") {
 TEST_CASE("pairs: a vertex behind the crease of a sharp valley is pushed out through it") {
   GlTest gl;
   auto model = std::make_shared<Model>();
-  TetMesh valley = make_block({0.6, 0.5, 0.5}, {12, 5, 6}),
-          spike = make_block(glm::dvec3(0.1), glm::ivec3(2));
+  TetMesh valley = make_block({0.6, 0.5, 0.5}, {12, 5, 6}), spike = make_block(glm::dvec3(0.1), glm::ivec3(2));
   for (glm::dvec3& p : valley.positions) p.y -= 0.8 * (p.y + 0.25) * (1 - std::abs(p.x) / 0.3);
   const glm::dvec3 up = glm::normalize(glm::dvec3(1)), side = glm::normalize(glm::dvec3(1, 0, -1));
-  for (glm::dvec3& p : spike.positions)
-    p = {glm::dot(p, side), 3 * glm::dot(p, up), glm::dot(p, glm::cross(side, up))};
+  for (glm::dvec3& p : spike.positions) p = {glm::dot(p, side), 3 * glm::dot(p, up), glm::dot(p, glm::cross(side, up))};
   auto above = spike.positions;
-  for (glm::dvec3& p : above)
-    p += glm::dvec3(0.0005, -0.154 + 0.15 * std::sqrt(3.0), 0.06);  // 4 mm behind the crease
+  for (glm::dvec3& p : above) p += glm::dvec3(0.0005, -0.154 + 0.15 * std::sqrt(3.0), 0.06);  // 4 mm behind the crease
   std::vector<std::uint32_t> all(valley.positions.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
   finish_tets(valley, "valley"), finish_tets(spike, "spike");

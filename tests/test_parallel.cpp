@@ -43,9 +43,7 @@ TEST_CASE("parallel: each item once, and the first failure is thrown") {
       });
       CHECK(std::count(visits.begin(), visits.end(), 1) == std::ptrdiff_t(items));
     }
-    const auto fail = [](std::size_t, std::size_t end) {
-      throw std::runtime_error(end == 100 ? "last" : "part");
-    };
+    const auto fail = [](std::size_t, std::size_t end) { throw std::runtime_error(end == 100 ? "last" : "part"); };
     CHECK_THROWS_WITH(parallel_parts(100, 1, fail), count == 1 ? "last" : "part");
   }
 }
@@ -67,8 +65,7 @@ TEST_CASE("parallel: sorting and grouping do not depend on threads") {
     CHECK(groups.values.size() == 200000);
     for (std::size_t key = 0; key < 7; ++key)
       for (std::uint32_t at = groups.first[key]; at < groups.first[key + 1]; ++at)
-        if (groups.values[at] % 7 != key ||
-            (at > groups.first[key] && groups.values[at] <= groups.values[at - 1]))
+        if (groups.values[at] % 7 != key || (at > groups.first[key] && groups.values[at] <= groups.values[at - 1]))
           FAIL("not grouped in order");
   }
 }

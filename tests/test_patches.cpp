@@ -91,8 +91,7 @@ TEST_CASE("patches: each constraint in one, on at most 256 vertices") {
   }
 }
 
-TEST_CASE(
-    "patches: of vertices, with every constraint on these, also where a vertex has too many neighbours") {
+TEST_CASE("patches: of vertices, with every constraint on these, also where a vertex has too many neighbours") {
   struct Case {
     TetMesh mesh;
     std::size_t own;

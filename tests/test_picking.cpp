@@ -107,9 +107,7 @@ TEST_CASE("picking: what a cut shows, and tetrahedra shrunk and apart") {
     return *poll(picker, true);
   };
   const auto holds = [&](std::uint32_t tet, const glm::vec3& p) {  // whether it is in it, as it is at rest
-    const auto x = [&](int i) {
-      return glm::vec3(stage.mesh.positions[stage.mesh.tets[tet][std::size_t(i)]]);
-    };
+    const auto x = [&](int i) { return glm::vec3(stage.mesh.positions[stage.mesh.tets[tet][std::size_t(i)]]); };
     const glm::vec3 c = glm::inverse(glm::mat3(x(1) - x(0), x(2) - x(0), x(3) - x(0))) * (p - x(0));
     return std::min({c.x, c.y, c.z, 1 - c.x - c.y - c.z}) > -1e-4f;
   };

@@ -62,8 +62,7 @@ TEST_CASE(
   const auto kernel = [&](int blocks) {
     std::string text = "layout(local_size_x = 1) in;\n", sum = "0u";
     for (int b = 0; b < blocks; ++b) {
-      text += "layout(std430) buffer Block" + std::to_string(b) + " { uint values" + std::to_string(b) +
-              "[]; };\n";
+      text += "layout(std430) buffer Block" + std::to_string(b) + " { uint values" + std::to_string(b) + "[]; };\n";
       if (b > 0) sum += " + values" + std::to_string(b) + "[0]";
     }
     std::ofstream(folder / "sum.comp") << text << "void main() { values0[0] = " << sum << "; }\n";

@@ -19,8 +19,7 @@ TEST_CASE("the rigid step has no strain, keeps linear momentum, and is the neare
     CHECK(e.strain < 1e-13);
     CHECK(e.volume < 1e-12);
     CHECK(e.angle < 1e-12);
-    const glm::dvec3 was = centre_of(scene.model, before.velocities),
-                     now = centre_of(scene.model, state.velocities);
+    const glm::dvec3 was = centre_of(scene.model, before.velocities), now = centre_of(scene.model, state.velocities);
     CHECK(glm::length(now - was - h * gravity) < 1e-12);
     CHECK(largest_distance(state.velocities, before.velocities) > 1e-3);  // it does act
     for (std::size_t i = 0; i < state.positions.size(); ++i)
@@ -47,8 +46,7 @@ TEST_CASE("the rigid step has no strain, keeps linear momentum, and is the neare
       const glm::dvec3 axis = glm::normalize(noise(1)), shift = noise(1e-4);
       double other = 0;
       for (std::size_t i = 0; i < y.size(); ++i) {
-        const glm::dvec3 r = state.positions[i] - centre, side = glm::cross(axis, r),
-                         along = axis * glm::dot(axis, r);
+        const glm::dvec3 r = state.positions[i] - centre, side = glm::cross(axis, r), along = axis * glm::dot(axis, r);
         const glm::dvec3 p = centre + shift + along + (r - along) * std::cos(1e-3) + side * std::sin(1e-3);
         other += scene.model.masses[i] * glm::dot(p - y[i], p - y[i]);
       }
@@ -133,8 +131,8 @@ TEST_CASE("the gradient is the energy's, also where hinges have turned further t
 }
 
 TEST_CASE("the implicit-Euler step does not depend on the starting guess and is a minimum") {
-  for (const Compliances& compliances : {Compliances{1e-6, 1e-4, 1e-8}, Compliances{1e-4, 1e-2, 1e-6},
-                                         Compliances{1e-3, infinity, infinity}}) {
+  for (const Compliances& compliances :
+       {Compliances{1e-6, 1e-4, 1e-8}, Compliances{1e-4, 1e-2, 1e-6}, Compliances{1e-3, infinity, infinity}}) {
     CAPTURE(compliances[0]);
     const Scene scene = block_scene();
     const ReferenceStep step = implicit_euler_step(scene.input(), scene.start(), compliances);
@@ -149,13 +147,11 @@ TEST_CASE("the implicit-Euler step does not depend on the starting guess and is 
       CHECK(largest_distance(other.state.positions, x) < 1e-9 * scene.model.size);
       CHECK(largest_distance(other.state.positions, guess) > 1e-4 * scene.model.size);
     }
-    CHECK(implicit_euler_step(scene.input(), scene.start(), compliances, &x).iterations ==
-          1);  // the guess is used
+    CHECK(implicit_euler_step(scene.input(), scene.start(), compliances, &x).iterations == 1);  // the guess is used
     // Forces balance: what is left of each is rounding of the forces that cancel.
     const double h = scene.settings.dt;
     const Objective o = step_objective(scene.input(), scene.start(), compliances, h);
-    const auto g = gradient(o, x), at_start = gradient(o, o.predicted),
-               at_rest = gradient(o, scene.model.positions);
+    const auto g = gradient(o, x), at_start = gradient(o, o.predicted), at_rest = gradient(o, scene.model.positions);
     CHECK(std::sqrt(dot(g, g)) < 1e-8 * std::sqrt(dot(at_rest, at_rest)));
     CHECK(std::sqrt(dot(g, g)) < 1e-8 * std::sqrt(dot(at_start, at_start)));
     for (double amplitude : {1e-6, 1e-4, 1e-2})
@@ -298,8 +294,7 @@ TEST_CASE("the error to a reference is the RMS distance by mass over the body's 
   b.positions[5].y += 2;
   double mass = 0;
   for (double m : scene.model.masses) mass += m;
-  CHECK(error_to(scene.model, a, b) ==
-        doctest::Approx(2 * std::sqrt(scene.model.masses[5] / mass) / scene.model.size));
+  CHECK(error_to(scene.model, a, b) == doctest::Approx(2 * std::sqrt(scene.model.masses[5] / mass) / scene.model.size));
   b.positions[5].y = std::nan("");
   CHECK(std::isnan(error_to(scene.model, a, b)));
 }

@@ -17,8 +17,7 @@ TEST_CASE("a hanging chain stretches by the sum of segment forces times complian
     std::vector<double> expected(positions.size(), positions[0].y);
     for (std::size_t i = 1; i < positions.size(); ++i) {
       double below = 0;
-      for (std::size_t j = i; j < positions.size(); ++j)
-        below += scene.model.masses[j] * scene.settings.gravity;
+      for (std::size_t j = i; j < positions.size(); ++j) below += scene.model.masses[j] * scene.settings.gravity;
       expected[i] = expected[i - 1] + positions[i].y - positions[i - 1].y - alpha * below;
     }
     const double sag = positions.back().y - expected.back();

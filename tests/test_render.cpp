@@ -241,8 +241,7 @@ TEST_CASE("render: velocity colours, and the legend's bar is the colour map") {
       const glm::vec3 have = pixel(with, x, y);
       for (int i = 0; i < 3; ++i) CHECK(std::abs(have[i] - encoded(want[i])) < 20);
     };
-    const float low = colour == Colour::velocity ? 0.0f : -0.2f,
-                high = colour == Colour::velocity ? 5.0f : 0.2f;
+    const float low = colour == Colour::velocity ? 0.0f : -0.2f, high = colour == Colour::velocity ? 5.0f : 0.2f;
     const int bottom = legend.high.y - 13, top = bottom - int(0.42 * height) + 1;
     expect(bottom, low, low, high);
     expect(top, high, low, high);
@@ -340,8 +339,7 @@ TEST_CASE("render: the graph's edges, dots where vertices touch, arrows of veloc
   const Image above = stage.image();
   stage.frame.options.contacts = true;
   CHECK(difference(stage.image(), above).count == 0);
-  const glm::vec3 dot =
-      pixel(touching, project(stage.frame.camera, {0.5f / 3, -0.5f, 0.5f / 3}, width, height));
+  const glm::vec3 dot = pixel(touching, project(stage.frame.camera, {0.5f / 3, -0.5f, 0.5f / 3}, width, height));
   CHECK(dot.x > 2 * dot.z);
 
   stage.frame.camera.elevation = 18;
@@ -378,8 +376,7 @@ TEST_CASE("render: colour maps are even") {
     const float t = float(i) / 20, next = t + 0.05f;
     CHECK(luminance(colour_maps::sequential_colour(t)) < luminance(colour_maps::sequential_colour(next)));
     for (float sign : {-1.0f, 1.0f})
-      CHECK(luminance(colour_maps::diverging_colour(sign * t)) >
-            luminance(colour_maps::diverging_colour(sign * next)));
+      CHECK(luminance(colour_maps::diverging_colour(sign * t)) > luminance(colour_maps::diverging_colour(sign * next)));
   }
 }
 
@@ -393,8 +390,8 @@ TEST_CASE("render: edges stay sharp, and only they") {
   };
   for (std::size_t c = 0; c < corners.size(); ++c) {  // of a block: a face's own
     const std::size_t t = c - c % 3;
-    const glm::vec3 face = glm::normalize(glm::cross(corners[t + 1].position - corners[t].position,
-                                                     corners[t + 2].position - corners[t].position));
+    const glm::vec3 face = glm::normalize(
+        glm::cross(corners[t + 1].position - corners[t].position, corners[t + 2].position - corners[t].position));
     CHECK(glm::distance(normal(corners[c]), face) < 1e-3f);
     CHECK(corners[c].position == glm::vec3(stage.mesh.positions[stage.mesh.surface[c / 3][c % 3]]));
   }
@@ -445,8 +442,7 @@ TEST_CASE("camera: keeps a point in view, goes through its keys") {
   CHECK(std::min(seen.x, 300 - seen.x) > 30);
   CHECK(std::min(seen.y, 200 - seen.y) > 20);
   CHECK(glm::distance(eye(camera), glm::vec3(40, -7, 12)) > 0.4f * camera.distance);
-  const std::vector<CameraKey> path{
-      {1, {}}, {2, {{1, 0, 0}, 4, 90, 20, 35}}, {4, {{3, 0, 0}, 4, 270, 20, 35}}};
+  const std::vector<CameraKey> path{{1, {}}, {2, {{1, 0, 0}, 4, 90, 20, 35}}, {4, {{3, 0, 0}, 4, 270, 20, 35}}};
   for (const CameraKey& key : path) {
     CHECK(camera_at(path, key.time).azimuth == doctest::Approx(key.camera.azimuth));
     CHECK(camera_at(path, key.time).target == key.camera.target);
@@ -464,10 +460,8 @@ TEST_CASE("render: several bodies have hues of their own, marked vertices dots")
   const TetMesh other = cut_block(glm::dvec3(0.6), 2, {0.5, 0, 0});
   const auto first = std::uint32_t(two.positions.size());
   two.positions.insert(two.positions.end(), other.positions.begin(), other.positions.end());
-  for (Triangle face : other.surface)
-    two.surface.push_back({face[0] + first, face[1] + first, face[2] + first});
-  for (Tet tet : other.tets)
-    two.tets.push_back({tet[0] + first, tet[1] + first, tet[2] + first, tet[3] + first});
+  for (Triangle face : other.surface) two.surface.push_back({face[0] + first, face[1] + first, face[2] + first});
+  for (Tet tet : other.tets) two.tets.push_back({tet[0] + first, tet[1] + first, tet[2] + first, tet[3] + first});
   Stage stage(two);
   stage.renderer = make_renderer(two, {0, first});
   stage.frame.camera.azimuth = 0;
@@ -513,8 +507,7 @@ TEST_CASE("render: a vertex that is not finite spills nothing") {
   const Difference body = difference(whole, empty);
   auto positions = stage.positions.read_all<Position>();
   for (Look look : {Look::surface, Look::wire, Look::tets})
-    for (float bad :
-         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e30f}) {
+    for (float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e30f}) {
       auto broken = positions;
       broken.back().high.y = bad;
       stage.positions.write(0, stage.positions.bytes(), broken.data());

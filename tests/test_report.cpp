@@ -24,8 +24,7 @@ void check_closed(const std::string& html) {
 }
 
 /// A browser's picture of the page as the address `hash` shows it: how many pixels are of each colour.
-std::vector<unsigned char> screenshot(const Folder& folder, const std::string& page,
-                                      const std::string& hash) {
+std::vector<unsigned char> screenshot(const Folder& folder, const std::string& page, const std::string& hash) {
   const fs::path shot = folder.path / "shot.png";
   fs::remove(shot);
   const std::string command =
@@ -74,8 +73,8 @@ TEST_CASE("report: compare and map leave a page with a row, a point and a film e
     REQUIRE(program(compare + "--shard " + shard + "/2 --out part" + shard, folder).status == 0);
   REQUIRE(program("compare --merge part1 part2 --out merged", folder).status == 0);
   CHECK(count(read(folder.path / "merged/compare.html"), "data-film=\"data:image/png;base64,iVBOR") == 4);
-  REQUIRE(program("map " + small + "--set duration=0.05 --x omega=0.5,1 --y iterations=1,2,5 --out m", folder)
-              .status == 0);
+  REQUIRE(program("map " + small + "--set duration=0.05 --x omega=0.5,1 --y iterations=1,2,5 --out m", folder).status ==
+          0);
   const std::string map = read(folder.path / "m/map.html");
   check_closed(map);
   CHECK(count(map, "<rect data-row=") == 6);

@@ -60,8 +60,7 @@ TEST_CASE("run writes what it says, twice the same") {
   CHECK(first.err == "");
   REQUIRE(first.status == 0);
   REQUIRE(second.status == 0);
-  const json a = json::parse(read(folder.path / "a/stats.json")),
-             b = json::parse(read(folder.path / "b/stats.json"));
+  const json a = json::parse(read(folder.path / "a/stats.json")), b = json::parse(read(folder.path / "b/stats.json"));
   CHECK(a["state_hash"] == b["state_hash"]);
   CHECK(a["scene"] == "bunny-drop");
   CHECK(a["settings"]["iterations"] == 3);
@@ -81,9 +80,8 @@ TEST_CASE("run writes what it says, twice the same") {
     CHECK(a["timing"][key]["p95"] >= a["timing"][key]["median"]);
   }
   CHECK(a["timing"]["fps"].get<double>() > 0);
-  for (const char* key :
-       {"max_volume_loss_percent", "final_volume_error_percent", "tet_volume_rms", "tet_volume_max",
-        "inverted_tets", "stretch_rms", "stretch_max", "bend_rms_rad", "rigid_distance"})
+  for (const char* key : {"max_volume_loss_percent", "final_volume_error_percent", "tet_volume_rms", "tet_volume_max",
+                          "inverted_tets", "stretch_rms", "stretch_max", "bend_rms_rad", "rigid_distance"})
     CHECK(a["error"][key].is_number());
   CHECK(a["error"]["max_volume_loss_percent"] > 0);
   CHECK(a["momentum"]["linear_drift"].get<double>() < 1e-4);
@@ -101,8 +99,7 @@ TEST_CASE("run writes what it says, twice the same") {
   }
   CHECK(rows == 31);
 
-  const Picture start = read_png(folder.path / "a/frame_00000.png"),
-                end = read_png(folder.path / "a/frame_00030.png");
+  const Picture start = read_png(folder.path / "a/frame_00000.png"), end = read_png(folder.path / "a/frame_00030.png");
   CHECK(start.width == 320);
   CHECK(start.height == 240);
   CHECK(body_of(start).count > 1000);
@@ -126,10 +123,9 @@ TEST_CASE("every look and colour draws a body") {
                            "--colour velocity --no-shadow --no-grid", "--flat --no-legend"}) {
     CAPTURE(view);
     const std::string out = "v" + std::to_string(number++);
-    const Outcome run =
-        program("run --scene beam --steps 8 --iterations 2 --size 320x240 --samples 0 --png-every 8 --out " +
-                    out + " " + view,
-                folder);
+    const Outcome run = program(
+        "run --scene beam --steps 8 --iterations 2 --size 320x240 --samples 0 --png-every 8 --out " + out + " " + view,
+        folder);
     CHECK(run.status == 0);
     CHECK(run.err == "");
     const Picture picture = read_png(folder.path / out / "frame_00008.png");
@@ -176,15 +172,13 @@ TEST_CASE("help, version, info and explain answer") {
   const Folder folder;
   CHECK(program("--version", folder).out.find('.') != std::string::npos);
   const std::string help = program("run --help", folder).out;
-  for (const char* flag :
-       {"--scene",   "--mesh",      "--tetgen", "--mode",       "--constraints", "--k-stretch",
-        "--k-bend",  "--k-volume",  "--omega",  "--iterations", "--substeps",    "--dt",
-        "--gravity", "--seed",      "--deform", "--gpu",        "--size",        "--set",
-        "--explain", "--png-every", "--video",  "--csv-every",  "--positions"})
+  for (const char* flag : {"--scene",   "--mesh",      "--tetgen", "--mode",       "--constraints", "--k-stretch",
+                           "--k-bend",  "--k-volume",  "--omega",  "--iterations", "--substeps",    "--dt",
+                           "--gravity", "--seed",      "--deform", "--gpu",        "--size",        "--set",
+                           "--explain", "--png-every", "--video",  "--csv-every",  "--positions"})
     CHECK(help.find(flag) != std::string::npos);
   CHECK(program("info", folder).out.find("OpenGL version") != std::string::npos);
-  const Outcome explained =
-      program("run --scene beam --mode constraint --constraints stretch --explain", folder);
+  const Outcome explained = program("run --scene beam --mode constraint --constraints stretch --explain", folder);
   CHECK(explained.status == 0);
   CHECK(explained.out.find("solvers/constraint stretch") != std::string::npos);
   CHECK(explained.out.find("volume") == std::string::npos);
@@ -215,8 +209,7 @@ TEST_CASE("dump-shaders writes each shader of a run as it is compiled") {
       CAPTURE(name);
       CHECK(text.starts_with("#version 430 core\n"));
       CHECK(text.find("void main()") != std::string::npos);
-      for (const char* left : {"\n#include", "#foreach", "$KIND"})
-        CHECK(text.find(left) == std::string::npos);
+      for (const char* left : {"\n#include", "#foreach", "$KIND"}) CHECK(text.find(left) == std::string::npos);
     }
     return std::pair(texts, outcome.out);
   };
@@ -239,8 +232,7 @@ TEST_CASE("dump-shaders writes each shader of a run as it is compiled") {
 
   std::ofstream(folder.path / "file") << "of other content";
   for (const char* to : {"file", "file/below", "/proc/nothing"}) {
-    const Outcome outcome =
-        program("run --scene beam --steps 1 --out none --dump-shaders " + std::string(to), folder);
+    const Outcome outcome = program("run --scene beam --steps 1 --out none --dump-shaders " + std::string(to), folder);
     CAPTURE(outcome.err);
     CHECK(outcome.status == 2);
     CHECK(outcome.err.starts_with("tetpbd: "));
@@ -277,8 +269,7 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   const std::string end = "positions[i] = Position(";
   REQUIRE(text.find(end) != std::string::npos);
   // The free end of the beam falls: at a certain speed its numbers end.
-  text.insert(text.find(end),
-              "if ((phases & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
+  text.insert(text.find(end), "if ((phases & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");
   std::ofstream(folder.path / "shaders/solvers/corrections.glsl") << text;
   const std::string common = "--scene beam --mode node --iterations 2 --substeps 1 ";
   const Outcome bad = program("--shaders shaders run " + common + "--steps 60 --positions --out bad", folder);
@@ -341,8 +332,7 @@ TEST_CASE("an interrupted run leaves whole files") {
   const json stats = json::parse(read(folder.path / "out/stats.json"));
   CHECK(stats["timing"]["steps"].get<long>() > 0);
   CHECK(stats["timing"]["steps"].get<long>() < 1000000);
-  const std::size_t frames = stats["timing"]["steps"].get<std::size_t>() / 10 + 1,
-                    n = stats["mesh"]["vertices"];
+  const std::size_t frames = stats["timing"]["steps"].get<std::size_t>() / 10 + 1, n = stats["mesh"]["vertices"];
   CHECK(stats["frames"]["count"] == frames);
   CHECK(fs::file_size(folder.path / "out/trajectory.npy") == 128 + frames * n * 12);
 }
@@ -357,8 +347,7 @@ TEST_CASE("a run that measures every tenth step has the same state, rows and end
   CHECK(all["state_hash"] == some["state_hash"]);
   CHECK(all["error"]["tet_volume_rms"] == some["error"]["tet_volume_rms"]);
   CHECK(all["energy"]["final"] == some["energy"]["final"]);
-  std::istringstream csv_all(read(folder.path / "all/stats.csv")),
-      csv_some(read(folder.path / "some/stats.csv"));
+  std::istringstream csv_all(read(folder.path / "all/stats.csv")), csv_some(read(folder.path / "some/stats.csv"));
   std::vector<std::string> rows, few;
   for (std::string line; std::getline(csv_all, line);) rows.push_back(line);
   for (std::string line; std::getline(csv_some, line);) few.push_back(line);
@@ -372,9 +361,7 @@ TEST_CASE("a run that measures every tenth step has the same state, rows and end
 
 TEST_CASE("the scene that a run writes gives the same run wherever it lies") {
   const Folder folder;
-  const auto stats = [&](const std::string& out) {
-    return json::parse(read(folder.path / out / "stats.json"));
-  };
+  const auto stats = [&](const std::string& out) { return json::parse(read(folder.path / out / "stats.json")); };
   const auto replayed = [&](const std::string& arguments) {
     CAPTURE(arguments);
     const Outcome first = program("run " + arguments + " --out a/b", folder);
@@ -425,8 +412,7 @@ TEST_CASE("the camera of a run turns about the bodies, or goes along a path") {
   REQUIRE(program(run + "turned --turntable 0.6 --set camera.azimuth=10" + still, folder).status == 0);
   for (const int azimuth : {10, 70}) {  // 0.1 s later
     const std::string out = "at" + std::to_string(azimuth);
-    REQUIRE(program(run + out + " --set camera.azimuth=" + std::to_string(azimuth) + still, folder).status ==
-            0);
+    REQUIRE(program(run + out + " --set camera.azimuth=" + std::to_string(azimuth) + still, folder).status == 0);
     const auto frame = [&](const std::string& of) {
       return read_png(folder.path / of / (azimuth == 10 ? "frame_00000.png" : "frame_00020.png")).rgba;
     };
@@ -479,8 +465,7 @@ TEST_CASE("frames for other programs are of the size that their heads say") {
   CHECK(bytes("surface.pc2") == 32 + 3 * surface * 12);
   for (const char* file : {"vtk/frame_00000.vtu", "vtk/frame_00006.vtu", "ply/frame_00003.ply"})
     CHECK(bytes(file) > 1000);
-  CHECK(read(out / "frames.pvd").find("timestep=\"0.015\" file=\"vtk/frame_00003.vtu\"") !=
-        std::string::npos);
+  CHECK(read(out / "frames.pvd").find("timestep=\"0.015\" file=\"vtk/frame_00003.vtu\"") != std::string::npos);
   for (const auto& entry : fs::recursive_directory_iterator(out))
     CHECK(entry.path().string().find(".part") == std::string::npos);
   const Outcome unknown = program("run --scene beam --export fbx", folder);

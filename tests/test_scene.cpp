@@ -35,8 +35,7 @@ std::string error_of(const std::string& text, const SceneOverrides& overrides = 
   return "";
 }
 
-const std::string block =
-    R"("bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}])";
+const std::string block = R"("bodies": [{"block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0, 1, 0]}])";
 
 bool has(const std::string& text, const std::string& word) { return text.find(word) != std::string::npos; }
 
@@ -53,12 +52,10 @@ TEST_CASE("scenes that ask for too much are refused") {
   for (int i = 0; i < 40; ++i) path += ".a";
   overrides.set = {path + "=1"};
   CHECK(has(error_of("{" + block + "}", overrides), "no key needs"));
-  CHECK(
-      has(error_of("{" + block + ", \"description\": \"" + std::string(1 << 20, 'x') + "\"}"), "too large"));
+  CHECK(has(error_of("{" + block + ", \"description\": \"" + std::string(1 << 20, 'x') + "\"}"), "too large"));
   std::string boxes, bodies;
   for (int i = 0; i < 101; ++i) boxes += std::string(i ? "," : "") + R"({"low": [0, 0, 0]})";
-  CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [1, 1, 1]}, "fixed": [)" + boxes + "]}]}"),
-            "100 boxes"));
+  CHECK(has(error_of(R"({"bodies": [{"block": {"cells": [1, 1, 1]}, "fixed": [)" + boxes + "]}]}"), "100 boxes"));
   CHECK(load_scene(SceneFile("{" + block + R"(, "name": "a\n\u001b[2J"})").path.string()).name == "a??[2J");
 }
 
@@ -74,12 +71,10 @@ TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(has(error_of("{" + block + R"(, "solver": {"omega": "big"}})"), "'omega' cannot be big"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"iterations": 2.5}})"), "'iterations'"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"mode": "magic"}})"), "node, constraint, cpu"));
-  CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "twist"]}})"),
-            "stretch, bend, volume"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "twist"]}})"), "stretch, bend, volume"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "stretch"]}})"), "once"));
   CHECK(has(error_of("{" + block + R"(, "world": {"gravity": null}})"), "'gravity'"));
-  CHECK(has(error_of("{" + block + R"(, "world": {"obstacles": [{"point": [0,0,0], "normal": [0,0,0]}]}})"),
-            "normal"));
+  CHECK(has(error_of("{" + block + R"(, "world": {"obstacles": [{"point": [0,0,0], "normal": [0,0,0]}]}})"), "normal"));
   CHECK(has(error_of("{" + block + R"(, "camera": {"fov": 1}})"), "camera.fov"));
   CHECK(has(error_of("{" + block + R"(, "duration": -1})"), "duration"));
   CHECK(has(error_of(R"({"bodies": [{"block": {"size": [1, 1], "cells": [2, 2, 2]}}]})"), "three numbers"));
@@ -89,8 +84,7 @@ TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "block": {}}]})"), "needs one of"));
   CHECK(has(error_of(R"({"bodies": [{"mesh": "no_such.ply"}]})"), "no_such.ply"));
   CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "height": 0}]})"), "height"));
-  CHECK(
-      has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "colour": 1}]})"), "'bodies.0.colour' is not known"));
+  CHECK(has(error_of(R"({"bodies": [{"mesh": "bunny.ply", "colour": 1}]})"), "'bodies.0.colour' is not known"));
 }
 
 TEST_CASE("the command line overrides, and its errors name the flag") {
@@ -156,8 +150,8 @@ TEST_CASE("every deformation does what it says and leaves the rest shape") {
                moved = glm::distance(bounds(jittered).centre(), bounds(mesh.positions).centre());
   CHECK(moved > 0.001 * size);
   CHECK(moved < 0.2 * size);
-  CHECK(glm::length(glm::normalize(jittered[1] - jittered[0]) -
-                    glm::normalize(mesh.positions[1] - mesh.positions[0])) > 1e-3);
+  CHECK(glm::length(glm::normalize(jittered[1] - jittered[0]) - glm::normalize(mesh.positions[1] - mesh.positions[0])) >
+        1e-3);
   CHECK(bounds(deformed("random")).size() <= bounds(mesh.positions).size());
 }
 
@@ -169,8 +163,8 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
   const auto model = build_model(load_scene(file.path.string()));
   CHECK(model->bodies.size() == 2);
   const auto moved = [&](int seed) {  // each body by its own numbers
-    const auto other = build_model(load_scene(
-        file.path.string(), {.deform = "jitter:0.1", .set = {"solver.seed=" + std::to_string(seed)}}));
+    const auto other = build_model(
+        load_scene(file.path.string(), {.deform = "jitter:0.1", .set = {"solver.seed=" + std::to_string(seed)}}));
     std::vector<glm::dvec3> ways;
     for (const Body& body : other->bodies)
       ways.push_back(other->positions[body.first_vertex] - model->positions[body.first_vertex]);
@@ -182,8 +176,8 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
   int fixed = 0;
   for (double w : model->inverse_masses) fixed += w == 0;
   CHECK(fixed == 4);
-  const std::vector<glm::dvec3> second(
-      model->positions.begin() + std::ptrdiff_t(model->bodies[1].first_vertex), model->positions.end());
+  const std::vector<glm::dvec3> second(model->positions.begin() + std::ptrdiff_t(model->bodies[1].first_vertex),
+                                       model->positions.end());
   CHECK(bounds(second).low.y == doctest::Approx(2));
   CHECK(bounds(second).high.y == doctest::Approx(5));
   CHECK(bounds(second).centre().x == doctest::Approx(4));
@@ -197,12 +191,12 @@ TEST_CASE("fixed boxes, several bodies, transforms and obstacles build") {
 
 TEST_CASE("every shipped scene runs in every mode") {
   GlTest gl;
-  CHECK(scene_names() ==
-        std::vector<std::string>{
-            "armadillo-drop", "beam",          "bowl",        "bowl-32", "bunny-drop",     "clamped-bunny",
-            "cloth-on-bunny", "dragon-drop",   "folded-ears", "funnel",  "hung-armadillo", "jelly-beam",
-            "jelly-bunny",    "muscle",        "press",       "ring",    "rollers",        "soft-beam",
-            "spikes",         "squishy-balls", "stack",       "stairs",  "twisted-beams"});
+  CHECK(scene_names() == std::vector<std::string>{"armadillo-drop", "beam",          "bowl",           "bowl-32",
+                                                  "bunny-drop",     "clamped-bunny", "cloth-on-bunny", "dragon-drop",
+                                                  "folded-ears",    "funnel",        "hung-armadillo", "jelly-beam",
+                                                  "jelly-bunny",    "muscle",        "press",          "ring",
+                                                  "rollers",        "soft-beam",     "spikes",         "squishy-balls",
+                                                  "stack",          "stairs",        "twisted-beams"});
   std::map<std::string, int> runs;
   for (const SolverMode& mode : pbd_modes()) runs[mode.name] = 0;
   for (const std::string& name : scene_names()) {
@@ -215,8 +209,7 @@ TEST_CASE("every shipped scene runs in every mode") {
     for (const SolverMode& mode : modes) {
       if (taken && !is_long_run()) break;
       CAPTURE(std::string(mode.name));
-      std::map<std::string, std::string> parameters = {
-          {"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}};
+      std::map<std::string, std::string> parameters = {{"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}};
       if (!mode.compliance && name == "cloth-on-bunny") continue;           // its bending needs some
       if (mode.name != std::string("node") && name == "bowl-32") continue;  // large
       taken = true, ++runs.at(mode.name);
@@ -256,8 +249,7 @@ TEST_CASE("a body as JSON reads back as the same body, and a setting that is no 
   for (const std::string& body :
        std::vector<std::string>{R"("block": {"size": [1, 2, 3], "cells": [2, 1, 1]}, "spin": [0, 2, 0])",
                                 R"("mesh": "bunny.ply", "height": 2)", R"("tet": )" + tet}) {
-    const SceneFile file("{\"bodies\": [{" + body +
-                         ", \"fixed\": [{\"low\": [0, 0, 0]}], \"heavy\": " + heavy + "}]}");
+    const SceneFile file("{\"bodies\": [{" + body + ", \"fixed\": [{\"low\": [0, 0, 0]}], \"heavy\": " + heavy + "}]}");
     const auto written = body_json(load_scene(file.path.string()).bodies[0]).dump();
     const SceneFile again("{\"bodies\": [" + written + "]}");
     CHECK(body_json(load_scene(again.path.string()).bodies[0]).dump() == written);
@@ -268,8 +260,7 @@ TEST_CASE("a body as JSON reads back as the same body, and a setting that is no 
 
 TEST_CASE("scale, heavy vertices and a single tet") {
   const auto model = [](const std::string& body) {
-    const auto file =
-        std::filesystem::temp_directory_path() / ("tetpbd_heavy_" + std::to_string(getpid()) + ".json");
+    const auto file = std::filesystem::temp_directory_path() / ("tetpbd_heavy_" + std::to_string(getpid()) + ".json");
     std::ofstream(file) << "{\"bodies\": [" << body << "]}";
     const auto result = build_model(load_scene(file.string()));
     std::filesystem::remove(file);

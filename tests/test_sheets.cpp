@@ -88,8 +88,7 @@ TEST_CASE("sheets: gradients of isobend match finite differences, flat, curved a
       for (auto& p : at_rest) p = scale * glm::dvec3(unit(generator), unit(generator), unit(generator));
       for (auto& p : x) p = scale * glm::dvec3(unit(generator), unit(generator), unit(generator));
       const auto rest = Isobend::rest(at_rest.data());
-      CHECK(std::abs(Isobend::evaluate<double>(at_rest.data(), rest.data()).C) <
-            1e-12 * (1 + std::abs(rest[3])));
+      CHECK(std::abs(Isobend::evaluate<double>(at_rest.data(), rest.data()).C) < 1e-12 * (1 + std::abs(rest[3])));
       const auto c = Isobend::evaluate<double>(x.data(), rest.data());
       for (std::size_t j = 0; j < 4; ++j)
         for (int a = 0; a < 3; ++a) {
@@ -315,14 +314,12 @@ TEST_CASE("sheets: a ball and another sheet fall on one that is held, and stay o
   const TetMesh held = make_sheet({1, 1}, {16, 16}), other = make_sheet({0.4, 0.5}, {8, 10});
   TetMesh ball = make_block({0.2, 0.2, 0.2}, {4, 4, 4});
   for (auto& p : ball.positions)
-    if (const double l = glm::length(p); l > 0)
-      p *= std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) / l;
+    if (const double l = glm::length(p); l > 0) p *= std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) / l;
   finish_tets(ball, "ball");
   std::vector<std::uint32_t> rim;
   for (std::uint32_t i = 0; i < held.positions.size(); ++i)
     if (std::max(std::abs(held.positions[i].x), std::abs(held.positions[i].z)) > 0.499) rim.push_back(i);
-  const auto add = [&](const TetMesh& mesh, double aside, double height,
-                       const std::vector<std::uint32_t>& fixed) {
+  const auto add = [&](const TetMesh& mesh, double aside, double height, const std::vector<std::uint32_t>& fixed) {
     auto start = mesh.positions;
     for (auto& p : start) p += glm::dvec3(aside, height, 0.01);
     add_body(*model, "body", mesh, 300, start, glm::dvec3(0), glm::dvec3(0), fixed);

@@ -32,8 +32,7 @@ TEST_CASE("positions and velocities keep 48 bits on their way to the GPU and bac
   for (int cells : {1, 2, 3, 4, 5, 6, 7}) {
     auto model = std::make_shared<Model>(*block_model({cells, 1, 1}));
     for (std::size_t i = 0; i < model->velocities.size(); ++i)
-      model->velocities[i] = {std::sqrt(2.0 + double(i)), -std::sqrt(3.0 + double(i)),
-                              std::sqrt(5.0 + double(i))};
+      model->velocities[i] = {std::sqrt(2.0 + double(i)), -std::sqrt(3.0 + double(i)), std::sqrt(5.0 + double(i))};
     Settings settings = quick("node");
     settings.gravity = 0;  // no half-step start: velocities as given
     const Sim sim = create_sim(model, settings);

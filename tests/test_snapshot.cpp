@@ -106,8 +106,7 @@ TEST_CASE("snapshot: mode newton goes back into shorter substeps, and out of the
   std::vector<std::uint64_t> hashes;
   std::vector<int> finer;
   for (int s = 0; s < 60; ++s) {
-    kept.push_back(keep(sim)), hashes.push_back(state_hash(sim)),
-        finer.push_back(sim.adaptive.substep_factor);
+    kept.push_back(keep(sim)), hashes.push_back(state_hash(sim)), finer.push_back(sim.adaptive.substep_factor);
     step(sim);
   }
   CHECK(finer.front() == 1);
@@ -156,8 +155,8 @@ TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and
       step(sim);
     }
     if (!on_cpu(sim)) CHECK(touched(sim).touches > 0);
-    for (const std::size_t back : is_long_run() ? std::vector<std::size_t>{7, 3, 11, 30, 0, 15}
-                                                : std::vector<std::size_t>{11, 3, 20}) {
+    for (const std::size_t back :
+         is_long_run() ? std::vector<std::size_t>{7, 3, 11, 30, 0, 15} : std::vector<std::size_t>{11, 3, 20}) {
       CAPTURE(back);
       restore_snapshot(sim, kept[back].snapshot, kept[back].buffer);
       for (std::size_t s = back + 1; s < hashes.size(); ++s) {
@@ -169,8 +168,7 @@ TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and
   }
 }
 
-TEST_CASE(
-    "snapshot: back in time in another mode, in contact, is the same as starting there from that state") {
+TEST_CASE("snapshot: back in time in another mode, in contact, is the same as starting there from that state") {
   GlTest gl;
   auto model = std::make_shared<Model>();
   const TetMesh block = make_block(glm::dvec3(0.5), {2, 2, 2});
@@ -186,8 +184,7 @@ TEST_CASE(
     if (touching) apply_preset(settings, material_presets(), "rubber");
     return settings;
   };
-  for (const bool touching :
-       {true, false})  // without a material: hard bodies, moved as rigid ones on the ground
+  for (const bool touching : {true, false})  // without a material: hard bodies, moved as rigid ones on the ground
     for (const char* first : {"node", "constraint", "cpu", "explicit", "newton"}) {
       const bool forces = find_solver_mode(first)->leapfrog || find_solver_mode(first)->implicit;
       if (forces && !touching) continue;

@@ -115,8 +115,7 @@ TEST_CASE("the float GPU solvers converge to the exact step as the double ones d
       states[solver] = solver == 0 ? reference_after(sim, 1, Sweep::jacobi) : (step(sim), read_state(sim));
       left[solver] = error_to(*model, exact, states[solver]) / error_to(*model, exact, start);
     }
-    const double node = error_to(*model, states[0], states[1]),
-                 constraint = error_to(*model, states[0], states[2]);
+    const double node = error_to(*model, states[0], states[1]), constraint = error_to(*model, states[0], states[2]);
     MESSAGE(iterations << " iterations: left of the stretch: double " << left[0] << ", node " << left[1]
                        << ", constraint " << left[2] << "; distance to double over size: node " << node
                        << ", constraint " << constraint);

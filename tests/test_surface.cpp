@@ -101,17 +101,9 @@ TEST_CASE("surface: every defect is named, counted and placed") {
     CHECK(check_surface(empty).defect != "");
   }
   SUBCASE("one-sided: the projective plane on six vertices") {
-    s = {{{0, 0, 1}, {1, 0, 0}, {0.3, 1, 0}, {-0.8, 0.6, 0.1}, {-0.8, -0.6, 0}, {0.3, -1, 0.2}},
-         {{0, 1, 2},
-          {0, 2, 3},
-          {0, 3, 4},
-          {0, 4, 5},
-          {0, 5, 1},
-          {1, 2, 4},
-          {2, 3, 5},
-          {3, 4, 1},
-          {4, 5, 2},
-          {5, 1, 3}}};
+    s = {
+        {{0, 0, 1}, {1, 0, 0}, {0.3, 1, 0}, {-0.8, 0.6, 0.1}, {-0.8, -0.6, 0}, {0.3, -1, 0.2}},
+        {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}, {0, 5, 1}, {1, 2, 4}, {2, 3, 5}, {3, 4, 1}, {4, 5, 2}, {5, 1, 3}}};
     const SurfaceCheck check = check_surface(s);
     CHECK(check.euler_characteristic == 1);
     CHECK(check.defect == "surface has only one side");
@@ -121,7 +113,7 @@ TEST_CASE("surface: every defect is named, counted and placed") {
 
 TEST_CASE("surface: orientation is mended, part by part") {
   SurfaceMesh s = joined(cube(), cube({3, 0, 0}));
-  std::swap(s.triangles[4][0], s.triangles[4][1]);  // one in the first part
+  std::swap(s.triangles[4][0], s.triangles[4][1]);                                        // one in the first part
   for (std::size_t t = 12; t < 24; ++t) std::swap(s.triangles[t][0], s.triangles[t][1]);  // all of the second
   CHECK(signed_volume(s) < 0.9);
   const SurfaceCheck check = check_surface(s);
@@ -140,8 +132,7 @@ TEST_CASE("surface: welding") {
   for (const Triangle& t : whole.triangles) {
     const auto base = static_cast<std::uint32_t>(soup.positions.size());
     for (const std::uint32_t v : t)
-      soup.positions.push_back(whole.positions[v] +
-                               glm::dvec3(3e-8 * static_cast<double>(soup.positions.size() % 3)));
+      soup.positions.push_back(whole.positions[v] + glm::dvec3(3e-8 * static_cast<double>(soup.positions.size() % 3)));
     soup.triangles.push_back({base, base + 1, base + 2});
   }
   soup.positions.emplace_back(0.5, 0.5, 0.5);  // no triangle
@@ -163,8 +154,7 @@ TEST_CASE("surface: welding") {
   SurfaceMesh row;  // pairs 0.9 tolerances apart, wherever they stand in the grid
   for (int i = 0; i < 300; ++i) {
     const glm::dvec3 at(i * 3.7, i * 5.3, i * -7.1);
-    row.positions.insert(row.positions.end(),
-                         {at, at + glm::dvec3(0.5, 0.5, -0.5), at + glm::dvec3(9, 0, 0)});
+    row.positions.insert(row.positions.end(), {at, at + glm::dvec3(0.5, 0.5, -0.5), at + glm::dvec3(9, 0, 0)});
     row.positions.push_back(at + glm::dvec3(0, 9, 0));
     const auto v = static_cast<std::uint32_t>(4 * i);
     row.triangles.insert(row.triangles.end(), {{v, v + 2, v + 3}, {v + 1, v + 3, v + 2}});
@@ -215,11 +205,10 @@ TEST_CASE("surface files: polygons, comments, each format") {
   const std::string quads = "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n";
   const std::string points = "0 0 0\n2 0 0\n0 2 0\n2 2 0\n0 0 2\n2 0 2\n0 2 2\n2 2 2\n";
   CHECK(volume_of("quads.off", "OFF\n8 6 0\n" + points + quads) == doctest::Approx(8));
-  CHECK(
-      volume_of("quads.ply",
-                "ply\nformat ascii 1.0\ncomment a box\nelement vertex 8\nproperty float x\nproperty float y\n"
-                "property float z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n" +
-                    points + quads) == doctest::Approx(8));
+  CHECK(volume_of("quads.ply",
+                  "ply\nformat ascii 1.0\ncomment a box\nelement vertex 8\nproperty float x\nproperty float y\n"
+                  "property float z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n" +
+                      points + quads) == doctest::Approx(8));
   std::string obj = "# a box\no box\n";
   for (std::size_t at = 0; at < points.size(); at += 6) obj += "v " + points.substr(at, 6);
   obj += "v 9 9 9\n";  // without a face
@@ -264,9 +253,7 @@ TEST_CASE("surface files: a polygon with a notch is cut inside, coordinates keep
   CHECK(s.positions[11].x == 1.000000000001);
   double area = 0;
   for (const Triangle& t : s.triangles)
-    area += glm::length(
-                glm::cross(s.positions[t[1]] - s.positions[t[0]], s.positions[t[2]] - s.positions[t[0]])) /
-            2;
+    area += glm::length(glm::cross(s.positions[t[1]] - s.positions[t[0]], s.positions[t[2]] - s.positions[t[0]])) / 2;
   CHECK(area == doctest::Approx(2 * 3 + 8));
   const SurfaceCheck check = check_surface(s);
   CHECK(check.defect == "");
@@ -291,8 +278,7 @@ TEST_CASE("surface files: bad input is one clear line with status 2") {
   CHECK(contains(error(folder.write("noise.ply", "not a mesh at all\n")), "cannot be read"));
   CHECK(contains(error(folder.write("noise.off", std::string(300, '\x7f'))), "file"));
   CHECK(contains(error(folder.write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")), folder.path.string()));
-  CHECK(contains(error(folder.write("line.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nl 2 3\n")),
-                 folder.path.string()));
+  CHECK(contains(error(folder.write("line.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nl 2 3\n")), folder.path.string()));
 
   const std::string good = ascii_ply(cube());
   CHECK(load_surface(folder.write("good.ply", good)).triangles.size() == 12);
@@ -330,8 +316,7 @@ TEST_CASE("surface files: bad input is one clear line with status 2") {
   for (std::size_t cut = 2; cut < 70; ++cut) {  // through the last eight faces
     CAPTURE(cut);
     const std::string ply = error(folder.write("cut.ply", lines.substr(0, lines.size() - cut)));
-    CHECK(
-        (contains(ply, "file ends before its last face") || contains(ply, "line has no value of the face")));
+    CHECK((contains(ply, "file ends before its last face") || contains(ply, "line has no value of the face")));
     const std::string text_off = error(folder.write("cut.off", off.substr(0, off.size() - cut)));
     CHECK((contains(text_off, "file ends before its last face") || contains(text_off, "line has no corner")));
   }
@@ -358,8 +343,8 @@ TEST_CASE("subprocess: output, failures, time and memory limits") {
   const std::string eat = "x=$(head -c 100000000 /dev/zero | tr '\\0' x); echo ${#x}";
   CHECK(run_subprocess({"sh", "-c", eat}, {60, std::size_t{4} << 30}).output == "100000000\n");
   CHECK(run_subprocess({"sh", "-c", eat}, {60, std::size_t{64} << 20}).output == "");
-  CHECK(run_subprocess({"head", "-c", "10000000", "/dev/zero"}, {60, std::size_t{4} << 30, 1000})
-            .output.size() < 100000);
+  CHECK(run_subprocess({"head", "-c", "10000000", "/dev/zero"}, {60, std::size_t{4} << 30, 1000}).output.size() <
+        100000);
   int status = 0;
   CHECK(::waitpid(-1, &status, WNOHANG) == -1);  // no child is left
 }

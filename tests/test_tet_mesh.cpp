@@ -16,8 +16,7 @@ namespace {
 TetMesh block_without(const glm::ivec3& cells, const std::function<bool(const glm::dvec3&)>& removed) {
   TetMesh mesh = make_block(glm::dvec3(cells), cells);  // cells of one metre
   std::erase_if(mesh.tets, [&](const Tet& t) {
-    return removed(
-        (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]] + mesh.positions[t[3]]) / 4.0);
+    return removed((mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]] + mesh.positions[t[3]]) / 4.0);
   });
   finish_tets(mesh, "test");
   return mesh;
@@ -59,8 +58,7 @@ TEST_CASE("block: one corner tet gives its vertex a quarter of its mass") {
   TetMesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2, 3}}, {}};
   finish_tets(mesh, "test");
   for (const double m : lumped_masses(mesh, 24)) CHECK(m == doctest::Approx(1));
-  CHECK(tet_edges(mesh) ==
-        std::vector<std::array<std::uint32_t, 2>>{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}});
+  CHECK(tet_edges(mesh) == std::vector<std::array<std::uint32_t, 2>>{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}});
 }
 
 TEST_CASE("report: a block, a ring, a cavity, two parts") {
@@ -77,8 +75,8 @@ TEST_CASE("report: a block, a ring, a cavity, two parts") {
   CHECK(block.volume == doctest::Approx(1));
   CHECK(block.smallest_tet_volume == doctest::Approx(block.mean_tet_volume));
 
-  const MeshReport ring = report(block_without(
-      {3, 3, 1}, [](const glm::dvec3& c) { return std::abs(c.x) < 0.5 && std::abs(c.y) < 0.5; }));
+  const MeshReport ring =
+      report(block_without({3, 3, 1}, [](const glm::dvec3& c) { return std::abs(c.x) < 0.5 && std::abs(c.y) < 0.5; }));
   CHECK(ring.tets == 48);
   CHECK(ring.euler_characteristic == 0);
   CHECK(ring.genus == 1);
@@ -169,15 +167,13 @@ TEST_CASE("tet files: every writer's file reads back the same") {
     CHECK(surface.positions.size() == report(mesh).surface_vertices);
     CHECK(check.volume == doctest::Approx(mesh_volume(mesh)).epsilon(1e-5));
   }
-  for (const auto& entry : fs::directory_iterator(folder.path))
-    CHECK(!contains(entry.path().string(), ".part"));
+  for (const auto& entry : fs::directory_iterator(folder.path)) CHECK(!contains(entry.path().string(), ".part"));
 }
 
 TEST_CASE("tet files: writing is whole or not at all") {
   Folder folder;
   const TetMesh mesh = make_block({1, 1, 1}, {1, 1, 1});
-  CHECK(
-      contains(error_of([&] { write_mesh(folder.path / "none" / "a.msh", mesh); }), "1 cannot be written: "));
+  CHECK(contains(error_of([&] { write_mesh(folder.path / "none" / "a.msh", mesh); }), "1 cannot be written: "));
   CHECK(contains(error_of([&] { write_mesh(folder.path / "a.vtk", mesh); }), "unknown mesh format '.vtk'"));
   fs::create_directory(folder.path / "b.ele");
   CHECK(contains(error_of([&] { write_mesh(folder.path / "b.node", mesh); }), "cannot be written"));
@@ -215,8 +211,7 @@ TEST_CASE("tet files: bad node and ele") {
   CHECK(contains(error(node4, "2000000000 4 0\n1 1 2 3 4\n"), "bytes can hold"));
   CHECK(contains(error(node4, "1 4 0\n1 1 2 3\n"), "line has no node of the tet"));
   CHECK(contains(error(node4, "1 3 0\n1 1 2 3\n"), "3 nodes per tet"));
-  CHECK(
-      contains(error("4 2 0 0 # and a comment long enough for four nodes\n", ele), "not three-dimensional"));
+  CHECK(contains(error("4 2 0 0 # and a comment long enough for four nodes\n", ele), "not three-dimensional"));
   CHECK(contains(error("4 3 0 0\n1 0 0 zero # and a comment as above\n", ele), "'zero' is not a number"));
   CHECK(contains(error("4 3 0 0\n5 0 0 0 # and a comment as above\n", ele), "neither 0 nor 1"));
   CHECK(contains(error("2 3 0 0\n1 0 0 0\n3 0 0 0\n", ele), "node 3 stands where 2 should"));

@@ -105,8 +105,7 @@ TEST_CASE("tetgen: defects are named with their source") {
   SurfaceMesh open = cube();
   open.triangles.pop_back();
   CHECK(contains(error(open), "surface is open: 3 edges with one triangle only"));
-  CHECK(contains(error(joined(cube({0, 0, 0}, 3), cube({1, 1, 1}))),
-                 "parts of the surface lie inside one another: "));
+  CHECK(contains(error(joined(cube({0, 0, 0}, 3), cube({1, 1, 1}))), "parts of the surface lie inside one another: "));
   CHECK(contains(error({}), "too few triangles"));
   CHECK(!fs::exists(folder.cache()));  // no failure is kept
 }
@@ -208,8 +207,6 @@ TEST_CASE("mesh command: reports, writes, passes errors on") {
   CHECK(run_mesh_command(bunny, "pY", folder.path / "bunny.msh", false) == 0);
   CHECK(load_tets(folder.path / "bunny.msh").tets.size() == 9736);
   CHECK(run_mesh_command(folder.path / "bunny.msh", "", {}, true) == 0);
-  CHECK(contains(error_of([&] { run_mesh_command(folder.path / "none.ply", "pY", {}, false); }),
-                 "no such file"));
-  CHECK(contains(error_of([&] { run_mesh_command(bunny, "pY", folder.path / "a.b", true); }),
-                 "unknown mesh format"));
+  CHECK(contains(error_of([&] { run_mesh_command(folder.path / "none.ply", "pY", {}, false); }), "no such file"));
+  CHECK(contains(error_of([&] { run_mesh_command(bunny, "pY", folder.path / "a.b", true); }), "unknown mesh format"));
 }

@@ -239,8 +239,7 @@ TEST_CASE("record: a grab without a radius, as older ones are, is of one vertex"
   RunOptions options = small(folder.path / "again");
   options.replay = file;
   CHECK(run_replay(options) == 0);
-  CHECK(run_program::read(options.out / "replay.json").find(fmt::format("{:016x}", wanted)) !=
-        std::string::npos);
+  CHECK(run_program::read(options.out / "replay.json").find(fmt::format("{:016x}", wanted)) != std::string::npos);
 }
 
 TEST_CASE("record: what cannot be done again is said, with its line") {
@@ -261,13 +260,10 @@ TEST_CASE("record: what cannot be done again is said, with its line") {
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"go\": \"a\"}", "session.jsonl:2"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 1, \"go\": 5}", "step 5 is not known"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"set\": {\"omega\": 9}}", "omega"},
-      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"view\": {\"look\": \"x\"}}",
-       "no look"},
+      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"view\": {\"look\": \"x\"}}", "no look"},
       {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"view\": {\"cut\": 1}}", "no line of"},
-      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"lane\": 2, \"set\": {}}",
-       "no lane 3"},
-      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"end\": [\"0\"]}",
-       "other states than"},
+      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"lane\": 2, \"set\": {}}", "no lane 3"},
+      {"{\"step\": 0, \"load\": {\"scene\": \"beam\"}}\n{\"step\": 0, \"end\": [\"0\"]}", "other states than"},
   };
   for (const auto& [text, said] : wrong) {
     CAPTURE(text);

@@ -114,8 +114,8 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
   CHECK(lane_settings(own, "budget_ms=2", "--lane") == own);  // nothing to try it on
   for (const char* none : {"budget_ms=", "budget_ms=-1", "budget_ms=2ms", "budget_ms=inf"})
     CHECK_THROWS_WITH_AS(lane_settings(own, none, "--lane"), doctest::Contains("is no time"), Error);
-  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"),
-                       doctest::Contains("'fast' is no way to solve"), Error);
+  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"), doctest::Contains("'fast' is no way to solve"),
+                       Error);
   CHECK_THROWS_WITH_AS(lane_settings(own, "mode=newton", "--lane"), doctest::Contains("needs forces"), Error);
   for (const Comparison& row : comparisons()) {
     CAPTURE(row.name);
@@ -192,11 +192,11 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   const State state = read_state(sim);
   const auto apart = s.loaded.lane().apart.read_all<float>();
   for (std::size_t v = 0; v < apart.size(); ++v)
-    CHECK(double(apart[v]) ==
-          doctest::Approx(glm::distance(state.positions[v], s.loaded.right->positions[std::size_t(kept)][v]) /
-                          model.size)
-              .epsilon(1e-3)
-              .scale(1e-4));
+    CHECK(
+        double(apart[v]) ==
+        doctest::Approx(glm::distance(state.positions[v], s.loaded.right->positions[std::size_t(kept)][v]) / model.size)
+            .epsilon(1e-3)
+            .scale(1e-4));
   s.view.worst = true;
   for (int i = 0; i < 2; ++i) {  // what was asked for at the start arrives first
     draw_lanes(s, target);
@@ -217,8 +217,7 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   CHECK(glm::distance(r.position, state.positions[r.vertex]) < 1e-9);
   CHECK(r.speed == doctest::Approx(glm::length(state.velocities[r.vertex])).epsilon(1e-6));
   const std::vector<Tet> tet{model.rest.tets[r.tet]};
-  const double ratio =
-      tet_volumes({state.positions, tet, {}})[0] / tet_volumes({model.rest.positions, tet, {}})[0];
+  const double ratio = tet_volumes({state.positions, tet, {}})[0] / tet_volumes({model.rest.positions, tet, {}})[0];
   CHECK(r.volume == doctest::Approx(ratio - 1).epsilon(1e-2).scale(1e-4));
   CHECK(*r.distance == doctest::Approx(double(apart[r.vertex])));
   CHECK_FALSE(r.energy);
@@ -258,8 +257,7 @@ TEST_CASE("window: a history is all of it in even steps, and the newest, plots a
   CHECK(history.values.back() == 7);
   CHECK(history.values.size() == 102);
   for (int i = 1; i < 9; ++i) history.add(7 + i, 402 + i);
-  CHECK(history.times[history.times.size() - 2] ==
-        409);  // eight steps on from 400, of which each eighth is kept
+  CHECK(history.times[history.times.size() - 2] == 409);  // eight steps on from 400, of which each eighth is kept
   CHECK(history.values.back() == 15);
 
   GlTest gl;
@@ -321,8 +319,7 @@ TEST_CASE("window: a map is filled a little in every frame, each cell as a run o
     MotionError error;
     for (long i = 1; i <= steps; ++i) {
       step(sim);
-      if (i == steps || i % std::max(1l, steps / 16) == 0)
-        add_state(error, *right, *sim.model, i, read_state(sim));
+      if (i == steps || i % std::max(1l, steps / 16) == 0) add_state(error, *right, *sim.model, i, read_state(sim));
     }
     CHECK(cell.percent == doctest::Approx(100 * error.rms).epsilon(1e-6));
   }
@@ -546,8 +543,7 @@ TEST_CASE("window: what it keeps is kept, a damaged file is as none") {
     std::ofstream(file) << whole.substr(0, length);
     CHECK(read_preferences(file) == Preferences());
   }
-  for (const char* wrong :
-       {"[]", "{\"dark\": 3}", "{\"recent\": [1]}", "{\"open\": {\"a\": \"b\"}}", "null", "\xff"}) {
+  for (const char* wrong : {"[]", "{\"dark\": 3}", "{\"recent\": [1]}", "{\"open\": {\"a\": \"b\"}}", "null", "\xff"}) {
     CAPTURE(wrong);
     std::ofstream(file) << wrong;
     CHECK(read_preferences(file) == Preferences());
@@ -566,8 +562,7 @@ TEST_CASE("window: what the mouse holds follows it without a spike, in every lan
   const TetMesh& rest = sim.model->rest;
   Pick pick;  // a corner at the end
   const auto along = [&](std::uint32_t a, std::uint32_t b) {
-    return glm::dot(rest.positions[a], glm::dvec3(1, 0.1, 0.1)) <
-           glm::dot(rest.positions[b], glm::dvec3(1, 0.1, 0.1));
+    return glm::dot(rest.positions[a], glm::dvec3(1, 0.1, 0.1)) < glm::dot(rest.positions[b], glm::dvec3(1, 0.1, 0.1));
   };
   for (std::uint32_t v = 0; v < rest.positions.size(); ++v)
     if (along(pick.vertex, v)) pick.vertex = v;
@@ -595,8 +590,7 @@ TEST_CASE("window: what the mouse holds follows it without a spike, in every lan
   CHECK(s.grab->position.y > s.grab->start.y + s.hold->slack);
   move_held(s.loaded.lane().sim, *s.hold, s.hold->starts[0] - glm::dvec3(0, 9, 0));
   const State below = read_state(sim);
-  for (std::size_t i = 1; i < s.hold->vertices.size(); ++i)
-    CHECK(below.positions[s.hold->vertices[i]].y > -1e-6);
+  for (std::size_t i = 1; i < s.hold->vertices.size(); ++i) CHECK(below.positions[s.hold->vertices[i]].y > -1e-6);
   const auto held = s.hold->vertices;
   let_go(s);
   for (const Lane& lane : s.loaded.lanes)
@@ -633,8 +627,7 @@ TEST_CASE("window: where it is slow, it says what would be faster") {
   s.playing = true;
   const auto said = [&] {
     const auto advice = faster_way(s);
-    if (advice && !advice->words.empty())
-      CHECK_NOTHROW(lane_settings(s.loaded.sim().settings, advice->words, ""));
+    if (advice && !advice->words.empty()) CHECK_NOTHROW(lane_settings(s.loaded.sim().settings, advice->words, ""));
     return advice ? advice->said : "";
   };
   CHECK(said() == "");

@@ -198,12 +198,10 @@ TEST_CASE("carry: a fine sphere on coarse tets follows every affine motion of th
   const CarriedSurface own = carry_boundary(tets);
   const auto boundary = carried_positions(own, tets.tets, tets.positions);
   for (std::size_t t = 0; t < own.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k)
-      CHECK(boundary[own.triangles[t][k]] == tets.positions[tets.surface[t][k]]);
+    for (std::size_t k = 0; k < 3; ++k) CHECK(boundary[own.triangles[t][k]] == tets.positions[tets.surface[t][k]]);
   SurfaceMesh elsewhere = fine;
   for (auto& p : elsewhere.positions) p += glm::dvec3(1, 0, 0);
-  CHECK(contains(error_of([&] { carry(elsewhere, tets, "far.obj"); }),
-                 "2 surface does not fit its tets: vertex"));
+  CHECK(contains(error_of([&] { carry(elsewhere, tets, "far.obj"); }), "2 surface does not fit its tets: vertex"));
 }
 
 TEST_CASE("repair: mends what needs no choice, leaves a sound surface as it is") {
@@ -284,15 +282,13 @@ TEST_CASE("scene: a body's fine surface, beside bodies without") {
   const Folder folder;
   write_surface(folder.path / "fine.obj", sphere(10));
   const auto scene_with = [&](const std::string& first) {
-    return load_scene(
-        folder
-            .write("s.json", fmt::format(R"({{"bodies": [{{{}, "height": 1, "position": [2, 1, 0]}},
+    return load_scene(folder
+                          .write("s.json", fmt::format(R"({{"bodies": [{{{}, "height": 1, "position": [2, 1, 0]}},
       {{"block": {{"size": [1, 1, 1], "cells": [1, 1, 1]}}}}]}})",
-                                         first))
-            .string());
+                                                       first))
+                          .string());
   };
-  const Scene scene =
-      scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]}, "surface": "fine.obj")");
+  const Scene scene = scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]}, "surface": "fine.obj")");
   const auto model = build_model(scene);
   const CarriedSurface& carried = model->carried;
   CHECK(carried.triangles.size() == 1200 + 12);
@@ -303,14 +299,11 @@ TEST_CASE("scene: a body's fine surface, beside bodies without") {
   CHECK(bounds({x.begin() + std::ptrdiff_t(fine.positions.size()), x.end()}).high == glm::dvec3(0.5, 1, 0.5));
   const std::string json = body_json(scene.bodies[0]).dump();
   CHECK(contains(json, "fine.obj"));
-  CHECK(build_model(scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]})"))
-            ->carried.triangles.empty());
-  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": false)"); }),
-                 "needs its \"wrap\""));
+  CHECK(build_model(scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]})"))->carried.triangles.empty());
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": false)"); }), "needs its \"wrap\""));
   CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": {"voxels": 3})"); }),
                  "'bodies.0.wrap.voxels' must be a whole number from 8 to 1000, not 3"));
-  CHECK(
-      contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": true)"); }), "must be an object"));
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": true)"); }), "must be an object"));
 }
 
 TEST_CASE("run: a broken mesh becomes a body, and files have its surface" * needs_openvdb) {
@@ -320,8 +313,8 @@ TEST_CASE("run: a broken mesh becomes a body, and files have its surface" * need
   write_surface(folder.path / "open.obj", open);
   std::ofstream(folder.path / "s.json") << R"({"bodies": [{"mesh": "open.obj", "wrap": {"voxels": 16}}]})";
   const auto done = run_program::program(
-      "run --scene s.json --steps 2 --export ply,pc2,vtk --positions --png-every 2 --size 64x48 --out o",
-      folder, "TETPBD_CACHE=cache");
+      "run --scene s.json --steps 2 --export ply,pc2,vtk --positions --png-every 2 --size 64x48 --out o", folder,
+      "TETPBD_CACHE=cache");
   CHECK(done.status == 0);
   CHECK(contains(done.err, "open.obj: surface is open: "));
   CHECK(contains(done.err, "so it was wrapped with 16 voxels across"));

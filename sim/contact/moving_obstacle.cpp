@@ -38,8 +38,8 @@ MovingObstacle plane_obstacle(const glm::dvec3& normal, double d, const Settings
 }  // namespace
 
 MovingObstacle::Surface MovingObstacle::find_surface(const glm::dvec3& x) const {
-  Surface surface = Formulas<double>{texels, kind->distance}.surface_of(
-      solid, glm::transpose(pose.axes) * (x - pose.centre));
+  Surface surface =
+      Formulas<double>{texels, kind->distance}.surface_of(solid, glm::transpose(pose.axes) * (x - pose.centre));
   surface.normal = pose.axes * surface.normal;
   return surface;
 }
@@ -52,8 +52,7 @@ MovingObstacle::Surface MovingObstacle::find_contact(const glm::dvec3& x, const 
   return surface;
 }
 
-MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double friction,
-                               double restitution) {
+MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double friction, double restitution) {
   MovingObstacle moving;
   moving.kind = o.kind, moving.solid = describe_solid(o), moving.reach = bound_reach(o);
   if (o.field) moving.texels = o.field->values.data();
@@ -71,8 +70,7 @@ MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double
   return moving;
 }
 
-std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start,
-                                         double h) {
+std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start, double h) {
   const Order order = order_obstacles(model);
   std::vector<MovingObstacle> list;
   if (settings.ground) list.push_back(plane_obstacle({0, 1, 0}, settings.ground_height, settings));
@@ -87,9 +85,7 @@ std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& set
 
 std::vector<const Obstacle*> solid_obstacles(const Model& model) { return order_obstacles(model).solids; }
 
-bool has_obstacles(const Model& model, const Settings& settings) {
-  return settings.ground || !model.obstacles.empty();
-}
+bool has_obstacles(const Model& model, const Settings& settings) { return settings.ground || !model.obstacles.empty(); }
 
 void check_obstacles(const Model& model) {
   constexpr std::size_t most = MAX_OBSTACLES - 1;

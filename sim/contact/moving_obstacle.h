@@ -52,8 +52,7 @@ struct MovingObstacle {
   Surface find_contact(const glm::dvec3& x, const glm::dvec3& way) const;
 };
 /// `friction`, `restitution`: where the obstacle has none of its own.
-MovingObstacle moving_obstacle(const Obstacle& obstacle, double start, double h, double friction,
-                               double restitution);
+MovingObstacle moving_obstacle(const Obstacle& obstacle, double start, double h, double friction, double restitution);
 
 /// Of a vertex on it: the obstacle's own, else the body's own, else the world's.
 inline double friction_on(const MovingObstacle& o, const Model& model, std::size_t vertex) {
@@ -62,8 +61,7 @@ inline double friction_on(const MovingObstacle& o, const Model& model, std::size
 
 /// All of a substep of h that begins at `start`. Half spaces that are no more than planes come first, with
 /// the ground of the settings at their head.
-std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start,
-                                         double h = 0);
+std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start, double h = 0);
 /// Those of the model that are more than planes, in the order of a step.
 std::vector<const Obstacle*> solid_obstacles(const Model& model);
 bool has_obstacles(const Model& model, const Settings& settings);

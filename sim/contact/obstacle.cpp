@@ -11,9 +11,7 @@
 
 namespace tetpbd {
 
-bool moves(const Obstacle& o) {
-  return o.velocity != glm::dvec3(0) || o.spin != glm::dvec3(0) || !o.keyframes.empty();
-}
+bool moves(const Obstacle& o) { return o.velocity != glm::dvec3(0) || o.spin != glm::dvec3(0) || !o.keyframes.empty(); }
 
 glm::dmat3 rotation_of(const glm::dvec3& degrees) {
   const glm::dvec3 angle = glm::radians(degrees);

@@ -29,9 +29,8 @@ struct Obstacle {
   double radius = 0, half_length = 0;
   glm::dvec3 half{0};  ///< m, half lengths along its own axes
   std::filesystem::path image, mesh;
-  std::vector<std::vector<double>>
-      heights;          ///< rows along x, one behind the other along z; 0: bottom, 1: top
-  glm::dvec3 scale{1};  ///< of a mesh, as of a body's
+  std::vector<std::vector<double>> heights;  ///< rows along x, one behind the other along z; 0: bottom, 1: top
+  glm::dvec3 scale{1};                       ///< of a mesh, as of a body's
   double height = 0;
   int voxels = 64;                              ///< along the longest side of a mesh
   std::optional<double> friction, restitution;  ///< none: the world's

@@ -24,8 +24,7 @@ SurfaceMesh height_block(const Obstacle& o) {
   SurfaceMesh block;
   const auto at = [&](int i, int k, bool top) {
     const double y = top ? double(o.field->values[std::size_t(i + size.x * k)]) : -o.half.y;
-    block.positions.emplace_back(o.half.x * (2.0 * i / (size.x - 1) - 1), y,
-                                 o.half.z * (2.0 * k / (size.z - 1) - 1));
+    block.positions.emplace_back(o.half.x * (2.0 * i / (size.x - 1) - 1), y, o.half.z * (2.0 * k / (size.z - 1) - 1));
   };
   for (int k = 0; k < size.z; ++k)
     for (int i = 0; i < size.x; ++i) at(i, k, true);
@@ -47,9 +46,7 @@ SurfaceMesh height_block(const Obstacle& o) {
   for (const glm::ivec2& p : rim) at(p.x, p.y, false);
   for (int r = 0; r < count; ++r) {
     const int next = (r + 1) % count;
-    const auto top = [&](int place) {
-      return rim[std::size_t(place)].x + size.x * rim[std::size_t(place)].y;
-    };
+    const auto top = [&](int place) { return rim[std::size_t(place)].x + size.x * rim[std::size_t(place)].y; };
     quad(top(r), below + r, below + next, top(next));
   }
   return block;
@@ -65,8 +62,7 @@ Corners contour(const Obstacle& o) {
   std::vector<double> distances;
   for (int z = 0; z <= cells; ++z)
     for (int y = 0; y <= cells; ++y)
-      for (int x = 0; x <= cells; ++x)
-        distances.push_back(formulas.surface_of(solid, place({x, y, z})).distance);
+      for (int x = 0; x <= cells; ++x) distances.push_back(formulas.surface_of(solid, place({x, y, z})).distance);
   const auto distance = [&](const glm::ivec3& at) {
     return distances[std::size_t(at.x + (cells + 1) * (at.y + (cells + 1) * at.z))];
   };
@@ -129,8 +125,7 @@ Corners rounded(const glm::vec3& half, float disk, float round) {
     }
     for (const auto* end : {&rows.front(), &rows.back()}) {
       const glm::vec3 axis(0, (*end)[0].normal.y < 0 ? -1 : 1, 0);
-      add_triangle(all, {axis * (half.y + round), axis}, {(*end)[j].position, axis},
-                   {(*end)[next].position, axis});
+      add_triangle(all, {axis * (half.y + round), axis}, {(*end)[j].position, axis}, {(*end)[next].position, axis});
     }
   }
   return all;
@@ -141,10 +136,9 @@ Corners smoothed(const SurfaceMesh& surface) {
   for (const auto& [a, b, c] : surface.triangles)
     areas.push_back(
         glm::cross(surface.positions[b] - surface.positions[a], surface.positions[c] - surface.positions[a]));
-  const Grouped at =
-      group_by_key(areas.size(), surface.positions.size(), [&](std::size_t t, const auto& emit) {
-        for (const std::uint32_t v : surface.triangles[t]) emit(v, std::uint32_t(t));
-      });
+  const Grouped at = group_by_key(areas.size(), surface.positions.size(), [&](std::size_t t, const auto& emit) {
+    for (const std::uint32_t v : surface.triangles[t]) emit(v, std::uint32_t(t));
+  });
   Corners all;
   for (std::size_t t = 0; t < areas.size(); ++t)
     for (const std::uint32_t v : surface.triangles[t]) {
@@ -153,8 +147,7 @@ Corners smoothed(const SurfaceMesh& surface) {
         const glm::dvec3& other = areas[at.values[i]];
         if (glm::dot(other, areas[t]) >= 0.766 * glm::length(other) * glm::length(areas[t])) normal += other;
       }
-      all.push_back(
-          {glm::vec3(surface.positions[v]), glm::vec3(normal / std::max(glm::length(normal), 1e-300))});
+      all.push_back({glm::vec3(surface.positions[v]), glm::vec3(normal / std::max(glm::length(normal), 1e-300))});
     }
   return all;
 }

@@ -34,8 +34,7 @@ ObstacleRecord record_block(const MovingObstacle& o, int first) {
   block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
   block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
   block.velocity = glm::vec3(o.velocity), block.spin = glm::vec3(o.spin);
-  block.friction = float(o.friction), block.own_friction = o.own_friction,
-  block.restitution = float(o.restitution);
+  block.friction = float(o.friction), block.own_friction = o.own_friction, block.restitution = float(o.restitution);
   return block;
 }
 
@@ -45,8 +44,7 @@ std::vector<std::shared_ptr<const DistanceField>> obstacle_fields(const Model& m
   return fields;
 }
 
-std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<float>& values,
-                                       const char* remedy) {
+std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<float>& values, const char* remedy) {
   GLint most = 0;
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
   if (values.size() > std::size_t(most))
@@ -81,8 +79,7 @@ std::vector<std::string> obstacle_defines(const Model& model) {
 }
 
 bool share_kernels(const Model& model, const Model& other) {
-  return obstacle_defines(model) == obstacle_defines(other) &&
-         obstacle_fields(model) == obstacle_fields(other) &&
+  return obstacle_defines(model) == obstacle_defines(other) && obstacle_fields(model) == obstacle_fields(other) &&
          model.obstacles.empty() == other.obstacles.empty();
 }
 

@@ -27,8 +27,7 @@ class PairContact {
     double fastest = 0;
     for (const glm::dvec3& speed : v) fastest = std::max(fastest, glm::length(speed));
     double margin = std::min(std::max(pair_margin(mesh_), 2.2 * fastest * h), model_->size) + mesh_.thickness;
-    if (held.empty())
-      margin += 2 * measure_overlap(*model_, x, self_).deepest;  // bodies that start in each other
+    if (held.empty()) margin += 2 * measure_overlap(*model_, x, self_).deepest;  // bodies that start in each other
     const auto contacts = find(x, margin, held);
     std::vector<int> counts(x.size(), 0);
     for (const Contact& c : contacts)
@@ -111,8 +110,7 @@ class PairContact {
     CellGrid grid(1.2 * mesh_.edge);
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto& [i, j, k, body] = mesh_.triangles[t];
-      const glm::dvec3 low = glm::min(x[i], glm::min(x[j], x[k])),
-                       high = glm::max(x[i], glm::max(x[j], x[k]));
+      const glm::dvec3 low = glm::min(x[i], glm::min(x[j], x[k])), high = glm::max(x[i], glm::max(x[j], x[k]));
       if (near(body, low - most, high + most)) grid.add({low, high}, t);
     }
     std::vector<glm::dvec3> normals(x.size(), glm::dvec3(0));
@@ -136,16 +134,15 @@ class PairContact {
       const State::Held was = s < all_held.size() ? all_held[s] : State::Held{};
       grid.for_each({own - reach, own + reach}, [&](std::uint32_t t) {
         const auto& [i, j, k, other] = mesh_.triangles[t];
-        if (other == body && (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) ||
-                              neighbours(vertex, k, body)))
+        if (other == body &&
+            (!self_ || neighbours(vertex, i, body) || neighbours(vertex, j, body) || neighbours(vertex, k, body)))
           return;
         const double other_thickness = double(mesh_.thicknesses[other]);
         const glm::dvec3 a = x[i] - own, b = x[j] - own, c = x[k] - own;
         auto m = Formulas<double>{}.meet(a, b, c);
         bool under = false;
         if (other_thickness > 0) {  // query.comp
-          under =
-              was.target != ~0u && share_a_vertex(was.target, t) ? was.under != 0 : glm::dot(m.face, a) > 0;
+          under = was.target != ~0u && share_a_vertex(was.target, t) ? was.under != 0 : glm::dot(m.face, a) > 0;
           m = Formulas<double>{}.meet_sheet(a, b, c, under);
         }
         if (other == body && std::abs(m.gap) > pair_margin(mesh_)) return;  // a thin part's other side
@@ -160,8 +157,7 @@ class PairContact {
         if (m.rank < best.meeting.rank) best = contact, held[s] = by;
       });
       if (nearest.gap > 0) {  // meet.comp, where only the eight nearest are known
-        std::ranges::sort(deeper, {},
-                          [](const auto& d) { return std::pair(d.first.meeting.rank, d.second.target); });
+        std::ranges::sort(deeper, {}, [](const auto& d) { return std::pair(d.first.meeting.rank, d.second.target); });
         const auto found = std::ranges::find_if(deeper, [&](const auto& d) {
           return (d.first.meeting.gap < 0 || nearest.in_doubt) && is_behind(x, vertex, d.second.target);
         });
@@ -193,8 +189,7 @@ class PairContact {
       Contact best{};
       best.meeting.rank = margin;
       const auto from_own = [&](std::uint32_t i) { return x[i] - x[own.vertex[0]]; };
-      const glm::dvec3 p = from_own(own.vertex[1]), left = from_own(own.beside[0]),
-                       right = from_own(own.beside[1]);
+      const glm::dvec3 p = from_own(own.vertex[1]), left = from_own(own.beside[0]), right = from_own(own.beside[1]);
       grid.for_each({b.low - margin, b.high + margin}, [&](std::uint32_t e) {
         if (e <= s) return;  // of two edges, the first looks for the second
         const PairMesh::Edge& other = mesh_.edges[e];

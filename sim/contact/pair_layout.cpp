@@ -63,15 +63,13 @@ std::vector<SurfaceSlice> cut_slices(const PairMesh& mesh) {
   std::vector<SurfaceSlice> slices;
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
     const std::uint32_t body = mesh.vertices[v].body;
-    if (slices.empty() || slices.back().body != body || v - slices.back().first == most)
-      slices.push_back({body, v, v});
+    if (slices.empty() || slices.back().body != body || v - slices.back().first == most) slices.push_back({body, v, v});
     slices.back().end = v + 1;
   }
   return slices;
 }
 
-std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices,
-                                      const PairRanges& ranges) {
+std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices, const PairRanges& ranges) {
   std::vector<glm::uvec4> edge_vertices, tet_vertices, tet_beyond;
   std::vector<std::uint32_t> edge_bodies, first_around{0};
   std::vector<glm::uvec2> around;

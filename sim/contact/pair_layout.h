@@ -46,8 +46,7 @@ PairRanges lay_out_pairs(const PairSizes& sizes);
 /// Parts of the surface's vertices that belong to one body.
 std::vector<pair_layout::SurfaceSlice> cut_slices(const PairMesh& mesh);
 /// The contents of `mesh`.
-std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices,
-                                      const PairRanges& ranges);
+std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices, const PairRanges& ranges);
 /// Of lists, up to the end of boxes: nothing touches, and boxes are empty.
 std::vector<std::byte> make_empty_lists(const PairRanges& ranges);
 

@@ -55,8 +55,8 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
     keys.emplace_back(hilbert_key(centre(mesh.triangles[t]), box), t);
-  std::ranges::sort(
-      keys, {}, [&](const auto& k) { return std::tuple(mesh.triangles[k.second][3], k.first, k.second); });
+  std::ranges::sort(keys, {},
+                    [&](const auto& k) { return std::tuple(mesh.triangles[k.second][3], k.first, k.second); });
   auto triangles = mesh.triangles;
   std::vector<std::uint32_t> leaf_of(rest.positions.size(), ~0u);  // the first that has the vertex
   for (std::size_t t = 0; t < keys.size(); ++t) {
@@ -65,11 +65,9 @@ void order_in_leaves(const TetMesh& rest, PairMesh& mesh) {
     if (mesh.leaves.empty() || mesh.leaves.back().body != body || t - mesh.leaves.back().triangles[0] == most)
       mesh.leaves.push_back({body, {std::uint32_t(t), 0}, {0, 0}, {0, 0}});
     mesh.leaves.back().triangles[1] = std::uint32_t(t) + 1;
-    for (const std::uint32_t v : {i, j, k})
-      leaf_of[v] = std::min(leaf_of[v], std::uint32_t(mesh.leaves.size() - 1));
+    for (const std::uint32_t v : {i, j, k}) leaf_of[v] = std::min(leaf_of[v], std::uint32_t(mesh.leaves.size() - 1));
   }
-  std::ranges::sort(mesh.vertices, {},
-                    [&](const PairMesh::Item& v) { return std::pair(leaf_of[v.vertex], v.vertex); });
+  std::ranges::sort(mesh.vertices, {}, [&](const PairMesh::Item& v) { return std::pair(leaf_of[v.vertex], v.vertex); });
   std::ranges::stable_sort(mesh.edges, {}, [&](const PairMesh::Edge& e) { return leaf_of[e.vertex[0]]; });
   std::size_t v = 0, e = 0;
   for (std::uint32_t l = 0; l < mesh.leaves.size(); ++l) {
@@ -114,8 +112,7 @@ void add_tets(const TetMesh& rest, PairMesh& mesh) {
   }
   std::ranges::sort(faces, {}, &Face::sorted);
   for (std::size_t k = 0; k + 1 < faces.size(); ++k)
-    if (faces[k].sorted == faces[k + 1].sorted)
-      *faces[k].value = faces[k + 1].own, *faces[k + 1].value = faces[k].own;
+    if (faces[k].sorted == faces[k + 1].sorted) *faces[k].value = faces[k + 1].own, *faces[k + 1].value = faces[k].own;
 }
 
 PairMesh pair_mesh(const Model& model) {

@@ -25,9 +25,7 @@ bool contacts_lag(const Model& model, const Settings& settings) {
 
 namespace {
 
-float unsorted(std::uint32_t bits) {
-  return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
-}
+float unsorted(std::uint32_t bits) { return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits); }
 
 void give_pairs(Sim& sim) {
   const Pairs& p = sim.pairs;
@@ -166,8 +164,7 @@ Pairs make_pairs(const SolverInput& input) {
   p.lists = checked(Buffer("contacts", p.ranges.lists.bytes));
   p.lists.write(0, empty.size(), empty.data());
   p.spheres = checked(Buffer("spheres around triangles", sizeof(glm::vec4) * sizes.targets()));
-  p.sums = checked(
-      Buffer("corrections by contacts", std::vector<std::byte>(p.ranges.sums.bytes), GL_DYNAMIC_COPY));
+  p.sums = checked(Buffer("corrections by contacts", std::vector<std::byte>(p.ranges.sums.bytes), GL_DYNAMIC_COPY));
   p.empty = Buffer("no contacts", empty);
   p.readback = Buffer("contacts read-back", empty.size(), nullptr, GL_STREAM_READ);
 
@@ -183,8 +180,7 @@ Pairs make_pairs(const SolverInput& input) {
   const auto kernel = [&](const char* name, const char* variant) {
     std::vector<std::string> all = defines;
     all.push_back(variant);
-    return Program::compute(fmt::format("contact/bodies/{}.comp", name), scheme_words(input), all,
-                            most_blocks);
+    return Program::compute(fmt::format("contact/bodies/{}.comp", name), scheme_words(input), all, most_blocks);
   };
   const auto counted = [&](const char* name, std::size_t number, const char* variant = "ONE_VARIANT",
                            const char* what = "") {
@@ -223,8 +219,7 @@ void resolve_body_contacts(Sim& sim, int left) {
   // each other.
   const double margin =
       std::min(std::max(p.margin, 1.1 * closing * h), sim.model->size) + 2 * std::exchange(p.overlap, 0);
-  const double serve =
-      std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
+  const double serve = std::max(1.0, std::floor(margin / (h * std::max(closing, 0.5 * (p.fastest + gained)) + 1e-30)));
   // Numbers of contacts that share a vertex, where the next substep wants those that this one sees coming.
   const bool ahead = p.lag && sim.plan.substeps > 1, lagged = ahead && left > 0 && p.counted && p.since >= 0;
   if (p.since < 0 || (!lagged && p.counted && (p.phases & PHASE_SHARED_LAST) == 0)) p.sums.clear();
@@ -239,8 +234,7 @@ void resolve_body_contacts(Sim& sim, int left) {
   Pass& meet = lagged ? p.meet_and_push : p.meet;
   const bool implicit = solver_mode(s).implicit;
   // Corrections of one pass bring things nearer to those of the next.
-  const float closed_most =
-      implicit ? 1e30f : float(std::max({closing, p.fastest + gained, margin / (2 * s.dt)}) * h);
+  const float closed_most = implicit ? 1e30f : float(std::max({closing, p.fastest + gained, margin / (2 * s.dt)}) * h);
   sim.recorder.use(meet.program).set("closed_most", closed_most);
   // Implicit substeps are long, so what one pass leaves is much: a stack sinks in by 0.7 % after 1, 0.02
   // after 8.
@@ -250,8 +244,7 @@ void resolve_body_contacts(Sim& sim, int left) {
   }
   p.counted = ahead;
   if (ahead) p.side = 1 - p.side;
-  p.phases =
-      lagged ? PHASE_TOUCHED | (p.side ? PHASE_SHARED_SIDE : 0u) | (left == 1 ? PHASE_SHARED_LAST : 0u) : 0u;
+  p.phases = lagged ? PHASE_TOUCHED | (p.side ? PHASE_SHARED_SIDE : 0u) | (left == 1 ? PHASE_SHARED_LAST : 0u) : 0u;
   give_quantized(sim);
 }
 
@@ -268,8 +261,7 @@ void start_pairs(Sim& sim, const State& state) {
     bodies.push_back({of_body(state.positions), of_body(state.velocities)});
   }
   decide(sim, bodies);
-  p.overlap =
-      p.near ? measure_overlap(*sim.model, state.positions, sim.settings.contact == "self").deepest : 0;
+  p.overlap = p.near ? measure_overlap(*sim.model, state.positions, sim.settings.contact == "self").deepest : 0;
   std::vector<std::uint32_t> words(p.lists.bytes() / 4, ~0u);  // nothing is held
   p.empty.read(0, p.empty.bytes(), words.data());
   p.lists.write(0, p.lists.bytes(), words.data());

@@ -37,11 +37,11 @@ struct PairMesh {
   std::vector<pair_layout::SurfaceLeaf> leaves;         ///< none before order_in_leaves()
   std::vector<Tet> tets;                                ///< those near the surface; none before add_tets()
   std::vector<std::uint32_t> behind;                    ///< by triangle its tet, or none
-  std::vector<Edge> edges;         ///< of solids, where they are convex and sharp at rest
-  std::vector<Item> vertices;      ///< each once, by body
-  std::vector<float> thicknesses;  ///< m, by body: how near a sheet lets others come; of solids 0
-  double edge = 1;                 ///< m, the mean
-  double thickness = 0;            ///< m, the largest
+  std::vector<Edge> edges;                              ///< of solids, where they are convex and sharp at rest
+  std::vector<Item> vertices;                           ///< each once, by body
+  std::vector<float> thicknesses;                       ///< m, by body: how near a sheet lets others come; of solids 0
+  double edge = 1;                                      ///< m, the mean
+  double thickness = 0;                                 ///< m, the largest
 };
 PairMesh pair_mesh(const Model& model);
 /// Triangles, vertices and edges that are near each other at rest come together, body by body.
@@ -63,8 +63,8 @@ struct PairNumbers {
   double overlap = 0;               ///< m, how deep they start in each other
   double fastest = 0, closing = 0;  ///< m/s, any body, and two that are near, by the last answer
   long since = -1;                  ///< substeps since candidates were looked for; below 0: never
-  unsigned side = 0;     ///< of the numbers of contacts that share a vertex, that of the next substep
-  bool counted = false;  ///< and it is known
+  unsigned side = 0;                ///< of the numbers of contacts that share a vertex, that of the next substep
+  bool counted = false;             ///< and it is known
 };
 
 /// Part of a Sim.

@@ -14,9 +14,7 @@ namespace tetpbd {
 /// Whether hard bodies are carried: rigid_in_contact(), and there is something to touch. Beside a soft one
 /// none is: a kernel would need more than 8 storage blocks for records and multipliers.
 inline bool touches_rigidly(const Model& model, const Settings& settings) {
-  const auto is_rigid = [&](const Body& body) {
-    return rigid_in_contact(settings, body_material(body, settings));
-  };
+  const auto is_rigid = [&](const Body& body) { return rigid_in_contact(settings, body_material(body, settings)); };
   return has_obstacles(model, settings) && !any_material(model, settings, compliant) &&
          std::ranges::any_of(model.bodies, is_rigid);
 }
@@ -59,8 +57,8 @@ class RigidContact {
   // The vertices that would touch an obstacle next; none if one is fixed.
   template <class Place>
   std::vector<std::size_t> near_contacts(const Substep& s, const std::vector<double>& inverse_masses,
-                                         const Place& place, const std::vector<glm::dvec3>& v,
-                                         std::size_t first, std::size_t end) const {
+                                         const Place& place, const std::vector<glm::dvec3>& v, std::size_t first,
+                                         std::size_t end) const {
     std::vector<std::size_t> found;
     for (std::size_t i = first; i < end; ++i) {
       if (!(inverse_masses[i] > 0)) return {};
@@ -76,8 +74,8 @@ class RigidContact {
 
   // False for a body without inertia about some axis.
   template <class Place>
-  bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place,
-            std::vector<glm::dvec3>& v, std::size_t first, std::size_t end, GuardCounts& counts) const {
+  bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place, std::vector<glm::dvec3>& v,
+            std::size_t first, std::size_t end, GuardCounts& counts) const {
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
     double mass = 0;
     Rules::Rigid body{};
@@ -110,9 +108,8 @@ class RigidContact {
       // Of vertex i at arm: a normal and the gap there, how the obstacle moves, brakes and rebounds.
       const auto consider = [&](std::size_t i, const glm::dvec3& arm, const glm::dvec3& n, double gap,
                                 const glm::dvec3& surface, const MovingObstacle& o) {
-        const double least =
-            Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
-                                   gap - Rules{}.closed_gap * model_.size, s.h, fall, o.restitution);
+        const double least = Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
+                                                    gap - Rules{}.closed_gap * model_.size, s.h, fall, o.restitution);
         ++place;
         const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
         if (!(over > most)) return;
@@ -122,8 +119,7 @@ class RigidContact {
       for (const std::size_t i : near) {
         const glm::dvec3 arm = at(i) - body.centre;
         for (const MovingObstacle& o : s.obstacles) {
-          const glm::dvec3 surface = o.velocity_at(at(i)),
-                           way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
+          const glm::dvec3 surface = o.velocity_at(at(i)), way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
           const auto ahead = o.surface_ahead(at(i), s.h * surface + way, way);
           consider(i, arm, ahead.normal, ahead.distance, surface, o);
         }

@@ -62,8 +62,6 @@ template <class T, class Value>
 void write(const Buffer& buffer, Range<T> range, const std::vector<Value>& values) {
   if (!values.empty()) buffer.write(range.at, values.size() * sizeof(Value), values.data());
 }
-inline std::vector<float> to_floats(const std::vector<double>& values) {
-  return {values.begin(), values.end()};
-}
+inline std::vector<float> to_floats(const std::vector<double>& values) { return {values.begin(), values.end()}; }
 
 }  // namespace tetpbd

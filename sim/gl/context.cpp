@@ -45,8 +45,7 @@ std::vector<EGLDeviceEXT> query_devices() {
 }
 
 std::string device_string(EGLDeviceEXT device, EGLint name) {
-  const auto query =
-      reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
+  const auto query = reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
   const char* text = query ? query(device, name) : nullptr;
   return text ? text : "";
 }
@@ -69,8 +68,7 @@ EGLContext make_context(EGLDisplay display, bool debug, bool any_version, bool r
       {EGL_NONE, EGL_NONE}};
   const EGLContext context =
       eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes[any_version ? 3 : 0]);
-  if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
-    return context;
+  if (context == EGL_NO_CONTEXT || eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) return context;
   eglDestroyContext(display, context);
   return EGL_NO_CONTEXT;
 }
@@ -144,13 +142,10 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
   const std::vector<EGLDeviceEXT> devices = query_devices();
   if (device >= int(devices.size()))
     throw Error("no such GPU", fmt::format("--gpu {}", device), "tetpbd info lists them");
-  const auto display_of = [](EGLDeviceEXT one) {
-    return eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr);
-  };
+  const auto display_of = [](EGLDeviceEXT one) { return eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr); };
   std::vector<EGLDisplay> displays;
   for (EGLDeviceEXT one : devices)
-    if (device < 0 ? !is_software(one) : one == devices[std::size_t(device)])
-      displays.push_back(display_of(one));
+    if (device < 0 ? !is_software(one) : one == devices[std::size_t(device)]) displays.push_back(display_of(one));
   if (device < 0)
     displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
   for (const bool any_version : {false, true})

@@ -53,14 +53,13 @@ void check_available(const std::string& label, std::size_t bytes) {
   const auto available = available_bytes(held);
   if (available && std::int64_t(bytes) > *available)
     throw Error("out of GPU memory",
-                fmt::format("buffer '{}' of {} bytes beside {} of others, {} are available", label, bytes,
-                            held, std::max<std::int64_t>(*available, 0)),
+                fmt::format("buffer '{}' of {} bytes beside {} of others, {} are available", label, bytes, held,
+                            std::max<std::int64_t>(*available, 0)),
                 smaller, 1);
 }
 
 // New memory for the buffer that is bound there.
-void allocate(GLenum target, const std::string& label, std::size_t bytes, const void* data, GLenum usage,
-              bool check) {
+void allocate(GLenum target, const std::string& label, std::size_t bytes, const void* data, GLenum usage, bool check) {
   if (check) clear_errors();
   glBufferData(target, GLsizeiptr(bytes), data, usage);
   if (!check) return;
@@ -72,9 +71,7 @@ void allocate(GLenum target, const std::string& label, std::size_t bytes, const 
 }  // namespace
 
 Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum usage)
-    : Owned(new_buffer(), std::int64_t(bytes)),
-      label_(std::move(label)),
-      whole_at_once_(usage == GL_STREAM_DRAW) {
+    : Owned(new_buffer(), std::int64_t(bytes)), label_(std::move(label)), whole_at_once_(usage == GL_STREAM_DRAW) {
   check_available(label_, bytes);
   glBindBuffer(GL_COPY_WRITE_BUFFER, id());
   allocate(GL_COPY_WRITE_BUFFER, label_, std::max<std::size_t>(bytes, 4), data, usage, true);
@@ -117,8 +114,7 @@ void copy_buffer(GLuint from, std::size_t offset, GLuint to, std::size_t at, std
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   glBindBuffer(GL_COPY_READ_BUFFER, from);
   glBindBuffer(GL_COPY_WRITE_BUFFER, to);
-  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GLintptr(offset), GLintptr(at),
-                      GLsizeiptr(bytes));
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, GLintptr(offset), GLintptr(at), GLsizeiptr(bytes));
 }
 
 void Buffer::clear() const {

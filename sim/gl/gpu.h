@@ -86,8 +86,7 @@ struct Named : Owned<GLuint, delete_named<kind>> {
     GLuint id = 0;
     if constexpr (kind == GL_VERTEX_ARRAY) glGenVertexArrays(1, &id), glBindVertexArray(id);
     if constexpr (kind == GL_TEXTURE) glGenTextures(1, &id), glBindTexture(target, id);
-    if constexpr (kind == GL_RENDERBUFFER)
-      glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id);
+    if constexpr (kind == GL_RENDERBUFFER) glGenRenderbuffers(1, &id), glBindRenderbuffer(GL_RENDERBUFFER, id);
     if constexpr (kind == GL_FRAMEBUFFER) glGenFramebuffers(1, &id), glBindFramebuffer(GL_FRAMEBUFFER, id);
     if constexpr (kind == GL_SAMPLER) glGenSamplers(1, &id), glBindSampler(0, id), glBindSampler(0, 0);
     return id;
@@ -122,9 +121,7 @@ class Buffer : public Owned<GLuint, delete_buffer> {
   void write(std::size_t offset, std::size_t bytes, const void* data) const;
   /// Items of one size, one after the other in `data`, each to an offset of its own.
   void write_each(const std::vector<std::size_t>& offsets, std::size_t bytes, const void* data) const;
-  void read(std::size_t offset, std::size_t bytes, void* data) const {
-    read_buffer(id(), offset, bytes, data);
-  }
+  void read(std::size_t offset, std::size_t bytes, void* data) const { read_buffer(id(), offset, bytes, data); }
   void copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const {
     copy_buffer(id(), offset, to.id(), at, bytes);
   }
@@ -153,8 +150,7 @@ struct Fence : Owned<GLsync, delete_fence> {
 bool reached(GLsync fence, bool wait, const char* what);
 /// What a buffer held when the GPU came to `fence`, once; nothing before (with `wait`: waits) or without one.
 template <class T>
-std::optional<std::vector<T>> poll_readback(Fence& fence, const Buffer& buffer, const char* what,
-                                            bool wait = false) {
+std::optional<std::vector<T>> poll_readback(Fence& fence, const Buffer& buffer, const char* what, bool wait = false) {
   if (!fence || !reached(fence.id(), wait, what)) return std::nullopt;
   fence = Fence();
   return buffer.read_all<T>();

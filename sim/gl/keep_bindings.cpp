@@ -14,13 +14,12 @@ struct Target {
   GLenum target, binding;
 };
 // glBindBufferBase() binds to the generic target as well.
-constexpr std::array<Target, 6> targets = {
-    {{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},
-     {GL_COPY_WRITE_BUFFER, GL_COPY_WRITE_BUFFER},
-     {GL_UNIFORM_BUFFER, GL_UNIFORM_BUFFER_BINDING},
-     {GL_SHADER_STORAGE_BUFFER, GL_SHADER_STORAGE_BUFFER_BINDING},
-     {GL_ATOMIC_COUNTER_BUFFER, GL_ATOMIC_COUNTER_BUFFER_BINDING},
-     {GL_DISPATCH_INDIRECT_BUFFER, GL_DISPATCH_INDIRECT_BUFFER_BINDING}}};
+constexpr std::array<Target, 6> targets = {{{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},
+                                            {GL_COPY_WRITE_BUFFER, GL_COPY_WRITE_BUFFER},
+                                            {GL_UNIFORM_BUFFER, GL_UNIFORM_BUFFER_BINDING},
+                                            {GL_SHADER_STORAGE_BUFFER, GL_SHADER_STORAGE_BUFFER_BINDING},
+                                            {GL_ATOMIC_COUNTER_BUFFER, GL_ATOMIC_COUNTER_BUFFER_BINDING},
+                                            {GL_DISPATCH_INDIRECT_BUFFER, GL_DISPATCH_INDIRECT_BUFFER_BINDING}}};
 
 }  // namespace
 

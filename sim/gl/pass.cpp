@@ -11,8 +11,7 @@ namespace tetpbd {
 void check_block(const std::string& label, std::size_t bytes, std::size_t most) {
   if (bytes > most)
     throw Error("a storage buffer is too large",
-                fmt::format("'{}' of {} bytes, the driver allows {}", label, bytes, most),
-                "use a smaller mesh", 1);
+                fmt::format("'{}' of {} bytes, the driver allows {}", label, bytes, most), "use a smaller mesh", 1);
 }
 
 std::size_t Recorder::place(const std::string& block) {
@@ -68,8 +67,7 @@ void Recorder::run(Pass& pass, std::initializer_list<DispatchParameter> paramete
     else
       glBindBufferBase(GL_SHADER_STORAGE_BUFFER, GLuint(k), range.buffer);
   }
-  for (const DispatchParameter& parameter : parameters)
-    pass.program.set_changed(parameter.name, parameter.value);
+  for (const DispatchParameter& parameter : parameters) pass.program.set_changed(parameter.name, parameter.value);
   DispatchCount* counted_as = counting || timing ? &count(pass, what, bytes) : nullptr;
   if (timing) counted_as->timer.begin();
   if (pass.work_groups) {

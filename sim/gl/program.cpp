@@ -79,8 +79,8 @@ Program::Program(std::string label, const std::vector<std::string>& stages, cons
   number_storage_blocks(most_blocks);
 }
 
-Program Program::compute(const std::string& file, const ShaderWords& words,
-                         const std::vector<std::string>& defines, std::size_t most_blocks) {
+Program Program::compute(const std::string& file, const ShaderWords& words, const std::vector<std::string>& defines,
+                         std::size_t most_blocks) {
   std::string label = file.substr(0, file.rfind('.'));
   if (const auto kind = words.words.find("KIND"); kind != words.words.end()) label += " " + kind->second;
   for (const Substitutions& item : words.each)
@@ -94,16 +94,14 @@ void Program::number_storage_blocks(std::size_t most) {
   for (GLint k = 0; k < count; ++k) {
     std::string name(256, '\0');
     GLsizei length = 0;
-    glGetProgramResourceName(id(), GL_SHADER_STORAGE_BLOCK, GLuint(k), GLsizei(name.size()), &length,
-                             name.data());
+    glGetProgramResourceName(id(), GL_SHADER_STORAGE_BLOCK, GLuint(k), GLsizei(name.size()), &length, name.data());
     storage_blocks_.push_back(name.substr(0, std::size_t(length)));
     glShaderStorageBlockBinding(id(), GLuint(k), GLuint(k));
   }
   if (storage_blocks_.size() > most)
-    throw Error(
-        "a kernel has too many storage blocks",
-        fmt::format("{} of at most {}: {}", storage_blocks_.size(), most, fmt::join(storage_blocks_, ", ")),
-        "merge some, or leave out what it does not need", 1);
+    throw Error("a kernel has too many storage blocks",
+                fmt::format("{} of at most {}: {}", storage_blocks_.size(), most, fmt::join(storage_blocks_, ", ")),
+                "merge some, or leave out what it does not need", 1);
 }
 
 void Program::set_changed(const char* name, unsigned value) const {
@@ -118,8 +116,7 @@ void Program::set_changed(const char* name, unsigned value) const {
 }
 
 GLint Program::location(const char* name) const {
-  if (const auto found = locations_.find(std::string_view(name)); found != locations_.end())
-    return found->second;
+  if (const auto found = locations_.find(std::string_view(name)); found != locations_.end()) return found->second;
   const GLint location = glGetUniformLocation(id(), name);
   // One that nothing uses has no location either and yet is no mistake.
   if (location < 0 && !std::regex_search(text_, std::regex(fmt::format("\nuniform [^;]*\\b{}\\b", name))))

@@ -32,8 +32,7 @@ std::string read_shader_file(const std::string& name) {
   if (const std::string& folder = shader_folder(); !folder.empty()) {
     std::ifstream file(fs::path(folder) / name, std::ios::binary);
     if (!file)
-      throw Error("no such shader", folder + "/" + name,
-                  "point --shaders or TETPBD_SHADERS at a copy of shaders/");
+      throw Error("no such shader", folder + "/" + name, "point --shaders or TETPBD_SHADERS at a copy of shaders/");
     return {std::istreambuf_iterator<char>(file), {}};
   }
   for (const auto& [key, text] : embedded_shaders())
@@ -47,15 +46,13 @@ std::vector<std::string> expand_pattern(const std::string& pattern) {
   if (star == std::string::npos) return {pattern};
   std::vector<std::string> names;
   for (const auto& [key, text] : embedded_shaders())
-    if (key.starts_with(pattern.substr(0, star)) && key.ends_with(pattern.substr(star + 1)))
-      names.push_back(key);
+    if (key.starts_with(pattern.substr(0, star)) && key.ends_with(pattern.substr(star + 1))) names.push_back(key);
   return names;
 }
 
 std::string substitute(std::string text, const Substitutions& words) {
   for (const auto& [key, value] : words | std::views::reverse)  // KIND_ROW before KIND
-    for (std::size_t at; (at = text.find("$" + key)) != std::string::npos;)
-      text.replace(at, key.size() + 1, value);
+    for (std::size_t at; (at = text.find("$" + key)) != std::string::npos;) text.replace(at, key.size() + 1, value);
   return text;
 }
 

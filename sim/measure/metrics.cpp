@@ -49,9 +49,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
     result.centre += m.bodies[b].mass * centre;
     result.angular_momentum += of_body(M_ANGULAR) + glm::cross(centre, of_body(M_MOMENTUM));
   }
-  const auto rms = [](double squares, std::size_t count) {
-    return count ? std::sqrt(squares / double(count)) : 0.0;
-  };
+  const auto rms = [](double squares, std::size_t count) { return count ? std::sqrt(squares / double(count)) : 0.0; };
   const auto vector = [&](std::size_t at) { return glm::dvec3(sums[at], sums[at + 1], sums[at + 2]); };
   double deeper = 0, most = m.vertices / 1000;
   for (int octaves = 0; octaves < DEPTHS && deeper <= most; ++octaves) {
@@ -88,8 +86,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
   const bool all_made = made.present.size() >= measured_kinds &&
                         std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
-  const ConstraintSystem own =
-      all_made ? ConstraintSystem{} : build_constraints(model.rest, "stretch,bend,volume");
+  const ConstraintSystem own = all_made ? ConstraintSystem{} : build_constraints(model.rest, "stretch,bend,volume");
   const std::vector<ConstraintList>& lists = (all_made ? made : own).lists;
   Metrics m;
   for (std::size_t k = 0; k < measured_kinds; ++k) {
@@ -123,8 +120,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   m.rest = Buffer("metrics rest", rest);
   m.partials = Buffer("metrics partials", M_ROW * METRICS_GROUPS * sizeof(float));
   for (std::size_t slot = 0; slot < ring_size; ++slot)
-    m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr,
-                        GL_STREAM_READ);
+    m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr, GL_STREAM_READ);
   for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
     m.passes.push_back({Program::compute(fmt::format("measure/{}.comp", name), {}, obstacle_defines(model))});
   m.vertices = double(model.positions.size());
@@ -147,8 +143,7 @@ void measure(Metrics& m, const Sim& sim) {
     recorder.give("Row", m.rows[slot].id(), b * M_STRIDE * sizeof(float), M_STRIDE * sizeof(float));
     // About four tets per invocation before there are more groups; of a sheet, edges.
     const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
-    const unsigned groups =
-        unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
+    const unsigned groups = unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
     for (Pass& pass : m.passes) {
       const Program& kernel = recorder.use(pass.program);
       kernel.set("vertex_range", body.vertices);
@@ -183,10 +178,9 @@ std::optional<Measurement> collect(Metrics& m, bool wait) {
 Measurement nothing_measured() {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Measurement m;
-  for (double* value :
-       {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
-        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
-        &m.potential, &m.elastic, &m.contacts, &m.penetration_max, &m.penetration_999})
+  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
+                        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
+                        &m.potential, &m.elastic, &m.contacts, &m.penetration_max, &m.penetration_999})
     *value = nan;
   m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
   return m;
@@ -216,8 +210,8 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   const double spun = glm::length(errors.first->angular_momentum), moved = sim.model->size * now.speed;
   const double scale = spun > 0.01 * moved ? spun : moved;
   if (scale > 0)
-    errors.angular_drift = std::fmax(
-        errors.angular_drift, glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
+    errors.angular_drift =
+        std::fmax(errors.angular_drift, glm::length(now.angular_momentum - errors.first->angular_momentum) / scale);
 }
 
 }  // namespace tetpbd

@@ -25,19 +25,18 @@ struct Measurement {
   double inverted_tets = 0;
   double stretch_rms = 0;  ///< of (l - d) / d over edges
   double stretch_max = 0;
-  double bend_rms_rad = 0;    ///< of the angle error over hinges
-  double rigid_distance = 0;  ///< RMS (by mass) distance to the rigidly aligned rest shape, over the size
-  glm::dvec3 momentum{0};     ///< kg m/s
+  double bend_rms_rad = 0;            ///< of the angle error over hinges
+  double rigid_distance = 0;          ///< RMS (by mass) distance to the rigidly aligned rest shape, over the size
+  glm::dvec3 momentum{0};             ///< kg m/s
   glm::dvec3 angular_momentum{0};     ///< kg m^2/s about the centre of mass of all
   double speed = 0;                   ///< sum m |v|, kg m/s: what drift is relative to
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
   double elastic = 0;                 ///< J, of a material
   double contacts = 0;                ///< pairs of a vertex and an obstacle, or the ground, that it touches
-  double penetration_max =
-      0;  ///< of the vertex deepest in an obstacle, over the body's size; NaN without one
-  double penetration_999 = 0;  ///< that 99.9 % of vertices are under
-  double non_finite = 0;       ///< vertices with a position or velocity that is not finite
+  double penetration_max = 0;         ///< of the vertex deepest in an obstacle, over the body's size; NaN without one
+  double penetration_999 = 0;         ///< that 99.9 % of vertices are under
+  double non_finite = 0;              ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }
   double energy() const { return kinetic + potential; }
 };

@@ -28,8 +28,7 @@ bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vec
   for (const auto& [t, o] : {std::pair(a, b), std::pair(b, a)}) {
     const glm::dvec3 n = glm::cross(corner(o, 1) - corner(o, 0), corner(o, 2) - corner(o, 0));
     for (std::size_t c = 0; c < 3; ++c) {
-      const double from = glm::dot(n, corner(t, c) - corner(o, 0)),
-                   to = glm::dot(n, corner(t, c + 1) - corner(o, 0));
+      const double from = glm::dot(n, corner(t, c) - corner(o, 0)), to = glm::dot(n, corner(t, c + 1) - corner(o, 0));
       if (!(from * to < 0)) continue;
       const glm::dvec3 p = corner(t, c) + (corner(t, c + 1) - corner(t, c)) * (from / (from - to));
       bool within = true;
@@ -103,8 +102,7 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
   CellGrid grid(cell);
   std::vector<std::uint32_t> body_of(model.rest.tets.size());
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
-    for (std::size_t t = model.bodies[b].first_tet; t < model.bodies[b].first_tet + model.bodies[b].tets;
-         ++t) {
+    for (std::size_t t = model.bodies[b].first_tet; t < model.bodies[b].first_tet + model.bodies[b].tets; ++t) {
       body_of[t] = b;
       const auto& [i, j, k, l] = model.rest.tets[t];
       const Bounds box = bounds({x[i], x[j], x[k], x[l]});
@@ -115,9 +113,8 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
     grid.for_each({x[item.vertex], x[item.vertex]}, [&](std::uint32_t t) {
       const Tet& tet = model.rest.tets[t];
       const bool own = body_of[t] == item.body;
-      if (own && (!self || std::ranges::any_of(tet, [&](std::uint32_t v) {
-            return glm::distance(rest[v], rest[item.vertex]) < near;
-          })))
+      if (own && (!self || std::ranges::any_of(
+                               tet, [&](std::uint32_t v) { return glm::distance(rest[v], rest[item.vertex]) < near; })))
         return;
       if (depth > 0 || !is_in(x[item.vertex], tet, x)) return;
       double least = 1e30;

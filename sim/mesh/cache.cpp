@@ -81,8 +81,6 @@ void keep_cached(const std::string& name, std::string bytes, std::uint64_t key) 
 
 std::optional<TetMesh> read_mesh(std::uint64_t key) { return parse_mesh(read_cached(mesh_file(key)), key); }
 
-void keep_mesh(std::uint64_t key, const TetMesh& mesh) {
-  keep_cached(mesh_file(key), key, mesh.positions, mesh.tets);
-}
+void keep_mesh(std::uint64_t key, const TetMesh& mesh) { keep_cached(mesh_file(key), key, mesh.positions, mesh.tets); }
 
 }  // namespace tetpbd

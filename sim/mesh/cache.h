@@ -61,8 +61,7 @@ void keep_cached(const std::string& name, std::uint64_t key, const std::vector<T
 }
 
 /// Of the surface's bits, the switches and the program that fills it.
-std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches,
-                       const std::filesystem::path& program);
+std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, const std::filesystem::path& program);
 /// Nothing when it is not there, damaged, cut short, or of another key.
 std::optional<TetMesh> read_mesh(std::uint64_t key);
 void keep_mesh(std::uint64_t key, const TetMesh& mesh);

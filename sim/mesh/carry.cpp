@@ -33,8 +33,7 @@ TetGrid make_grid(const TetMesh& mesh) {
   grid.cell = std::max(box.size() / 200, std::cbrt(mesh_volume(mesh) / double(mesh.tets.size())));
   grid.size = glm::ivec3((box.high - box.low) / grid.cell) + 1;
   grid.tets = group_by_key(
-      mesh.tets.size(), std::size_t(grid.size.x * grid.size.y * grid.size.z),
-      [&](std::size_t t, const auto& emit) {
+      mesh.tets.size(), std::size_t(grid.size.x * grid.size.y * grid.size.z), [&](std::size_t t, const auto& emit) {
         glm::dvec3 low(INFINITY), high(-INFINITY);
         for (const std::uint32_t v : mesh.tets[t])
           low = glm::min(low, mesh.positions[v]), high = glm::max(high, mesh.positions[v]);
@@ -85,11 +84,9 @@ CarriedVertex carried_by(const glm::dvec3& p, const TetMesh& mesh, const TetGrid
       for (int y = -r; y <= r; ++y)
         for (int x = -r; x <= r; x += std::max(std::abs(y), std::abs(z)) == r ? 1 : std::max(2 * r, 1)) {
           const glm::ivec3 c = middle + glm::ivec3(x, y, z);
-          if (glm::any(glm::lessThan(c, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(c, grid.size)))
-            continue;
+          if (glm::any(glm::lessThan(c, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(c, grid.size))) continue;
           const auto key = std::size_t((c.z * grid.size.y + c.y) * grid.size.x + c.x);
-          for (std::uint32_t i = grid.tets.first[key]; i < grid.tets.first[key + 1]; ++i)
-            try_tet(grid.tets.values[i]);
+          for (std::uint32_t i = grid.tets.first[key]; i < grid.tets.first[key + 1]; ++i) try_tet(grid.tets.values[i]);
         }
   double largest = 0;
   for (const double w : weights) largest = std::max(largest, std::abs(w));
@@ -107,9 +104,8 @@ CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std:
   const TetGrid grid = make_grid(mesh);
   const double farthest = reach * bounds(mesh.positions).size();
   CarriedSurface result{std::vector<CarriedVertex>(surface.positions.size()), surface.triangles};
-  parallel_for(surface.positions.size(), [&](std::size_t v) {
-    result.vertices[v] = carried_by(surface.positions[v], mesh, grid, farthest);
-  });
+  parallel_for(surface.positions.size(),
+               [&](std::size_t v) { result.vertices[v] = carried_by(surface.positions[v], mesh, grid, farthest); });
   const auto lost = std::ranges::find(result.vertices, none, &CarriedVertex::tet);
   if (lost == result.vertices.end()) return result;
   const auto v = std::size_t(lost - result.vertices.begin());

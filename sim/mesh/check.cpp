@@ -46,8 +46,7 @@ SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::si
     }
   std::ranges::sort(uses, {}, [](const EdgeUse& use) { return std::tuple(use.low, use.high, use.triangle); });
   for (std::uint32_t i = 0; i < uses.size(); ++i)
-    if (i == 0 || uses[i].low != uses[i - 1].low || uses[i].high != uses[i - 1].high)
-      topology.edges.push_back(i);
+    if (i == 0 || uses[i].low != uses[i - 1].low || uses[i].high != uses[i - 1].high) topology.edges.push_back(i);
   topology.edges.push_back(std::uint32_t(uses.size()));
 
   // Each triangle is in two sets, as it is (2 t) and turned (2 t + 1): what is in one agrees.
@@ -128,9 +127,8 @@ void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, 
   }
   for (const double v : volume) check.volume += std::abs(v);
   look_for(
-      check, "surface is flat", "part without volume", "parts without volume",
-      "give it thickness or remove it", topology.patches,
-      [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
+      check, "surface is flat", "part without volume", "parts without volume", "give it thickness or remove it",
+      topology.patches, [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
       [&](std::size_t p) { return near(place[p]); });
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
     const bool inward = volume[topology.patch[i]] < 0;
@@ -144,15 +142,14 @@ void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, 
 std::array<double, 6> dihedral_angles(const TetMesh& mesh, const Tet& tet) {
   const glm::dvec3 &a = mesh.positions[tet[0]], &b = mesh.positions[tet[1]], &c = mesh.positions[tet[2]],
                    &d = mesh.positions[tet[3]];
-  const std::array<glm::dvec3, 4> normals{glm::cross(c - b, d - b), glm::cross(d - a, c - a),
-                                          glm::cross(b - a, d - a), glm::cross(c - a, b - a)};
+  const std::array<glm::dvec3, 4> normals{glm::cross(c - b, d - b), glm::cross(d - a, c - a), glm::cross(b - a, d - a),
+                                          glm::cross(c - a, b - a)};
   std::array<double, 6> angles{};
   std::size_t n = 0;
   for (std::size_t i = 0; i < 4; ++i)
     for (std::size_t j = i + 1; j < 4; ++j)  // atan2, not acos: exact to the last digits for slivers too
-      angles[n++] =
-          std::atan2(glm::length(glm::cross(normals[i], normals[j])), -glm::dot(normals[i], normals[j])) *
-          180 / std::numbers::pi;
+      angles[n++] = std::atan2(glm::length(glm::cross(normals[i], normals[j])), -glm::dot(normals[i], normals[j])) *
+                    180 / std::numbers::pi;
   return angles;
 }
 
@@ -192,8 +189,8 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
       3 * triangles.size(), [&](std::size_t i) { return triangles[i / 3][i % 3] >= positions.size(); },
       [](std::size_t i) { return fmt::format("in triangle {}", i / 3); });
   look_for(
-      check, "positions are not finite numbers", "vertex", "vertices", "export the mesh again",
-      positions.size(), [&](std::size_t v) { return !std::isfinite(reach(v)); }, at_vertex);
+      check, "positions are not finite numbers", "vertex", "vertices", "export the mesh again", positions.size(),
+      [&](std::size_t v) { return !std::isfinite(reach(v)); }, at_vertex);
   look_for(
       check, "positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh",
       positions.size(), [&](std::size_t v) { return reach(v) > largest_coordinate; }, at_vertex);
@@ -243,13 +240,12 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
       [&](std::size_t e) { return topology.uses_of(e) == 1; }, at_edge);
   look_for(
       check, "parts of the surface touch in single vertices", "vertex", "vertices",
-      "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)",
-      topology.fans.size(), [&](std::size_t v) { return topology.fans[v] > 1; },
-      [&](std::size_t v) { return near(positions[v]); });
+      "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)", topology.fans.size(),
+      [&](std::size_t v) { return topology.fans[v] > 1; }, [&](std::size_t v) { return near(positions[v]); });
   look_for(
-      check, "surface has only one side", "edge where it cannot be oriented",
-      "edges where it cannot be oriented", "cut it open and close it as a solid", topology.one_sided.size(),
-      [](std::size_t) { return true; }, [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
+      check, "surface has only one side", "edge where it cannot be oriented", "edges where it cannot be oriented",
+      "cut it open and close it as a solid", topology.one_sided.size(), [](std::size_t) { return true; },
+      [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
   if (check.defect.empty()) orient(surface, topology, size, check);
   return check;
 }
@@ -265,8 +261,7 @@ TetMesh sheet_of(SurfaceMesh surface, const std::string& source) {
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     std::size_t& one = first[topology.patch[t]];
     one = std::min(one, t);
-    if (topology.turned[t] != topology.turned[one])
-      std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+    if (topology.turned[t] != topology.turned[one]) std::swap(surface.triangles[t][1], surface.triangles[t][2]);
   }
   const double thickness = 1e-3 * bounds(surface.positions).size();
   return {std::move(surface.positions), {}, std::move(surface.triangles), false, thickness};
@@ -300,8 +295,7 @@ std::string repair(SurfaceMesh& surface) {
       ++t;
   }
   say(dropped, "triangle without area dropped", "triangles without area dropped");
-  say(flipped, "triangle without area turned into its neighbour",
-      "triangles without area turned into neighbours");
+  say(flipped, "triangle without area turned into its neighbour", "triangles without area turned into neighbours");
   const std::size_t all = triangles.size();
   std::set<Triangle> seen;
   std::erase_if(triangles, [&](Triangle t) {

@@ -62,8 +62,7 @@ SubprocessEnd run_subprocess(const std::vector<std::string>& arguments, const Su
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (interrupted())
-    throw Error("interrupted", "while a mesh was filled", "start again; nothing was written", 1);
+  if (interrupted()) throw Error("interrupted", "while a mesh was filled", "start again; nothing was written", 1);
   if (WIFSIGNALED(status)) {
     const int number = WTERMSIG(status);
     end.reason = fmt::format("it was ended by signal {} ({})", number, ::strsignal(number));

@@ -187,8 +187,7 @@ Polygons read_ply(const fs::path& file) {
         const double length = property.length ? value(*property.length) : 1;
         if (!(length >= 0)) text.fail("length of a list is negative");
         const bool is_list = property.name.starts_with("vertex_ind");
-        const bool is_face = is_list && element.name == "face",
-                   is_strip = is_list && element.name == "tristrips";
+        const bool is_face = is_list && element.name == "face", is_strip = is_list && element.name == "tristrips";
         if (is_face) mesh.faces.emplace_back();
         Polygon strip;  // each corner ends a triangle, every other one turned; -1 ends the strip
         for (double k = 0; k < length; ++k) {
@@ -275,16 +274,14 @@ void weld(SurfaceMesh& surface, double tolerance) {
   }
   for (Triangle& t : surface.triangles)
     for (std::uint32_t& v : t) v = kept[v];
-  std::erase_if(surface.triangles,
-                [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+  std::erase_if(surface.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
   drop_unused_vertices(surface.positions, surface.triangles);
 }
 
 bool is_surface_file(const fs::path& file) { return reader_of(file) != std::end(readers); }
 
 SurfaceMesh load_as_is(const fs::path& file) {
-  if (!is_surface_file(file))
-    throw Error("not a surface format", file.string(), "use .ply, .obj, .stl or .off");
+  if (!is_surface_file(file)) throw Error("not a surface format", file.string(), "use .ply, .obj, .stl or .off");
   Polygons mesh = reader_of(file)->second(file);
   SurfaceMesh surface{std::move(mesh.positions), {}};
   if (surface.positions.size() >= 0xffffffffu)
@@ -292,8 +289,8 @@ SurfaceMesh load_as_is(const fs::path& file) {
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     for (const std::uint32_t v : mesh.faces[f])
       if (v >= surface.positions.size())
-        throw Error(fmt::format("face {} names vertex {} of {}", f, v, surface.positions.size()),
-                    file.string(), "it is damaged: fetch or export it again");
+        throw Error(fmt::format("face {} names vertex {} of {}", f, v, surface.positions.size()), file.string(),
+                    "it is damaged: fetch or export it again");
     if (mesh.faces[f].size() > most_corners)
       throw Error(fmt::format("face {} has {} corners", f, mesh.faces[f].size()), file.string(),
                   "export the surface as triangles");

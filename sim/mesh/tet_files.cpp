@@ -19,8 +19,7 @@ TetMesh read_msh(const fs::path& file) {
   text.require_line("its format");
   const std::string version(text.word("version"));
   if (text.integer("file type") != 0)
-    throw Error("binary .msh is not supported", file.string(),
-                "save it as ASCII (gmsh -bin 0, version 2.2 or 4.1)");
+    throw Error("binary .msh is not supported", file.string(), "save it as ASCII (gmsh -bin 0, version 2.2 or 4.1)");
   const bool blocks = version == "4.1";
   if (!blocks && version != "2" && !version.starts_with("2."))
     throw Error(fmt::format(".msh version {} is not supported", version.substr(0, 40)), file.string(),
@@ -55,8 +54,7 @@ TetMesh read_msh(const fs::path& file) {
     for (std::uint32_t& v : mesh.tets.emplace_back()) {
       const long long number = text.integer("node of the tet");
       const auto found = index_of.find(number);
-      if (found == index_of.end())
-        text.fail(fmt::format("element names node {}, which is not there", number));
+      if (found == index_of.end()) text.fail(fmt::format("element names node {}, which is not there", number));
       v = found->second;
     }
   };
@@ -102,16 +100,14 @@ TetMesh read_node_ele(const fs::path& file) {
     const long long number = nodes.integer("node number"), index = std::ssize(mesh.positions);
     if (index == 0) base = number;
     if (base != 0 && base != 1) nodes.fail(fmt::format("first node is {}, neither 0 nor 1", number));
-    if (number != base + index)
-      nodes.fail(fmt::format("node {} stands where {} should", number, base + index));
+    if (number != base + index) nodes.fail(fmt::format("node {} stands where {} should", number, base + index));
     mesh.positions.push_back(nodes.position());
   });
   TextFile elements(named(".ele"), '#');
   elements.require_line("the number of tets");
   const std::size_t tet_count = elements.count("number of tets");
   const long long corners = elements.integer("nodes per tet"), last = base + std::ssize(mesh.positions) - 1;
-  if (corners != 4 && corners != 10)
-    elements.fail(fmt::format("{} nodes per tet, neither 4 nor 10", corners));
+  if (corners != 4 && corners != 10) elements.fail(fmt::format("{} nodes per tet, neither 4 nor 10", corners));
   elements.lines(tet_count, "tet", [&] {
     elements.integer("tet number");
     for (std::uint32_t& v : mesh.tets.emplace_back()) {

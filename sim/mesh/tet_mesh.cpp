@@ -22,8 +22,7 @@ constexpr std::array<Triangle, 4> outward_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}
 double longest_edge(const TetMesh& mesh, const Tet& tet) {
   double longest = 0;
   for (const std::uint32_t a : tet)
-    for (const std::uint32_t b : tet)
-      longest = std::max(longest, glm::distance(mesh.positions[a], mesh.positions[b]));
+    for (const std::uint32_t b : tet) longest = std::max(longest, glm::distance(mesh.positions[a], mesh.positions[b]));
   return longest;
 }
 
@@ -59,8 +58,7 @@ void orient_tets(TetMesh& mesh, const std::string& source) {
     Tet& t = mesh.tets[i];
     const double volume = tet_volume(mesh, t);
     const bool is_flat = 6 * std::abs(volume) <= no_volume * std::pow(longest_edge(mesh, t), 3);
-    if (is_flat && flat++ == 0)
-      first = fmt::format("first tet {} near {}", i, point_text(mesh.positions[t[0]]));
+    if (is_flat && flat++ == 0) first = fmt::format("first tet {} near {}", i, point_text(mesh.positions[t[0]]));
     if (volume < 0) std::swap(t[2], t[3]);
   }
   if (flat > 0)
@@ -139,17 +137,15 @@ TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
       for (std::uint32_t y = 0; y < counts.y; ++y)
         for (std::uint32_t x = 0; x < counts.x; ++x) visit(glm::uvec3(x, y, z));
   };
-  each_of(nodes, [&](const glm::uvec3& at) {
-    mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5));
-  });
+  each_of(nodes,
+          [&](const glm::uvec3& at) { mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5)); });
   const glm::uvec3 step(1, nodes.x, nodes.x * nodes.y);
   constexpr std::array<std::array<int, 3>, 6> orders{
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
   each_of(glm::uvec3(cells), [&](const glm::uvec3& at) {
     const std::uint32_t corner = at.x + at.y * step.y + at.z * step.z;
     for (const auto& [i, j, k] : orders)
-      mesh.tets.push_back(
-          {corner, corner + step[i], corner + step[i] + step[j], corner + step[0] + step[1] + step[2]});
+      mesh.tets.push_back({corner, corner + step[i], corner + step[i] + step[j], corner + step[0] + step[1] + step[2]});
   });
   finish_tets(mesh, "block");
   return mesh;
@@ -172,8 +168,7 @@ TetMesh make_sheet(const std::array<double, 2>& size, const std::array<int, 2>& 
   const auto row = std::uint32_t(cells[0] + 1);
   for (int z = 0; z <= cells[1]; ++z)
     for (int x = 0; x <= cells[0]; ++x)
-      surface.positions.emplace_back(size[0] * (double(x) / cells[0] - 0.5), 0,
-                                     size[1] * (double(z) / cells[1] - 0.5));
+      surface.positions.emplace_back(size[0] * (double(x) / cells[0] - 0.5), 0, size[1] * (double(z) / cells[1] - 0.5));
   for (std::uint32_t z = 0; z < std::uint32_t(cells[1]); ++z)
     for (std::uint32_t x = 0; x + 1 < row; ++x) {
       const std::uint32_t a = z * row + x, b = a + 1, c = a + row, d = c + 1;  // upwards: z, then x
@@ -234,8 +229,7 @@ std::vector<std::array<std::uint32_t, 2>> tet_edges(const TetMesh& mesh) {
   Grouped others = group_by_key(mesh.tets.size() + mesh.surface.size(), mesh.positions.size(), each);
   std::vector<std::array<std::uint32_t, 2>> edges;
   for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
-    const auto first = others.values.begin() + others.first[v],
-               end = others.values.begin() + others.first[v + 1];
+    const auto first = others.values.begin() + others.first[v], end = others.values.begin() + others.first[v + 1];
     std::sort(first, end);
     const auto last = std::unique(first, end);
     for (auto other = first; other != last; ++other) edges.push_back({v, *other});

@@ -47,8 +47,7 @@ SurfaceMesh load_surface(const std::filesystem::path& file);
 void weld(SurfaceMesh& surface, double tolerance);
 /// Drops positions that no element names; the others stay in their order. Indices must be in range.
 template <std::size_t N>
-void drop_unused_vertices(std::vector<glm::dvec3>& positions,
-                          std::vector<std::array<std::uint32_t, N>>& elements) {
+void drop_unused_vertices(std::vector<glm::dvec3>& positions, std::vector<std::array<std::uint32_t, N>>& elements) {
   std::vector<std::uint32_t> number(positions.size(), 0);
   for (const auto& element : elements)
     for (const std::uint32_t v : element) number[v] = 1;

@@ -58,16 +58,14 @@ void throw_intersections(const SurfaceMesh& surface, const fs::path& input, cons
   if (pairs == 0) return;
   const std::size_t facet = std::strtoul(printed.c_str() + printed.find(mark) + mark.size(), nullptr, 10);
   const Triangle& t = surface.triangles.at(std::max<std::size_t>(facet, 1) - 1);
-  const glm::dvec3 first =
-      (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
+  const glm::dvec3 first = (surface.positions[t[0]] + surface.positions[t[1]] + surface.positions[t[2]]) / 3.0;
   throw NotSolid("surface intersects itself",
                  fmt::format("{} pair{} of triangles, first near {} in {}", pairs, pairs == 1 ? "" : "s",
                              point_text(first), source),
                  "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
 }
 
-TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seconds,
-            const std::string& source) {
+TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seconds, const std::string& source) {
   const TemporaryFolder folder;
   const fs::path input = folder.path / "surface.off", output = folder.path / "surface.1.node";
   write_surface(input, surface);
@@ -89,8 +87,7 @@ std::string checked_switches(const std::string& switches) {
   const std::string where = fmt::format("TetGen switches '{}'", switches);
   const char* hint = "use p with Y, q, a and others, for example pYq1.85o/140 (docs: Meshes)";
   if (clean.size() > 200) throw Error("too long", where, hint);
-  const std::regex known(
-      "(?:[pYqOSTMXAVCDLlbxzJQ][0-9./]*(?:e[-+]?[0-9]+)?|a[0-9.]+(?:e[-+]?[0-9]+)?|o/[0-9.]+)*");
+  const std::regex known("(?:[pYqOSTMXAVCDLlbxzJQ][0-9./]*(?:e[-+]?[0-9]+)?|a[0-9.]+(?:e[-+]?[0-9]+)?|o/[0-9.]+)*");
   std::smatch match;
   std::regex_search(clean, match, known, std::regex_constants::match_continuous);
   if (match.length() != std::ptrdiff_t(clean.size()))
@@ -113,10 +110,10 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
   finish_tets(mesh, source);
   // TetGen fills everything inside the outermost surface: volumes of parts inside one another count twice.
   if (check.components > 1 && std::abs(mesh_volume(mesh) - check.volume) > 1e-6 * check.volume)
-    throw NotSolid("parts of the surface lie inside one another",
-                   fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume,
-                               mesh_volume(mesh), source),
-                   "remove the inner parts: cavities are not supported");
+    throw NotSolid(
+        "parts of the surface lie inside one another",
+        fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume, mesh_volume(mesh), source),
+        "remove the inner parts: cavities are not supported");
   keep_mesh(key, mesh);
   return mesh;
 }

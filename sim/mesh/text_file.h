@@ -29,8 +29,7 @@ inline void require_readable(const std::filesystem::path& file) {
   if (!exists(status)) throw Error("no such file", file.string(), "check the path");
   if (!is_regular_file(status))
     throw Error(is_directory(status) ? "is a folder" : "is no plain file", file.string(), "name a mesh file");
-  if (file_size(file, failed) == 0 || failed)
-    throw Error("file is empty", file.string(), "fetch or export it again");
+  if (file_size(file, failed) == 0 || failed) throw Error("file is empty", file.string(), "fetch or export it again");
 }
 
 /// Walks through the words of a text file. What does not parse throws Error with the file and line.
@@ -92,8 +91,8 @@ class TextFile {
     T value{};
     const auto [end, code] = std::from_chars(first, last, value);
     if (code != std::errc{} || end != last)
-      fail(fmt::format("'{}' is not a {}number ({})", found.substr(0, 40),
-                       std::is_integral_v<T> ? "whole " : "", wanted));
+      fail(fmt::format("'{}' is not a {}number ({})", found.substr(0, 40), std::is_integral_v<T> ? "whole " : "",
+                       wanted));
     return value;
   }
   long long integer(std::string_view wanted) { return number<long long>(wanted); }

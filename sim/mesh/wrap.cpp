@@ -109,9 +109,7 @@ void keep_outermost(SurfaceMesh& surface) {
   std::vector<Triangle> kept;
   for (Part& part : parts) {
     const glm::dvec3& p = surface.positions[surface.triangles[part.triangles[0]][0]];
-    const auto surrounds = [&](const Part& other) {
-      return other.kept && is_inside(p, surface, other.triangles);
-    };
+    const auto surrounds = [&](const Part& other) { return other.kept && is_inside(p, surface, other.triangles); };
     part.kept = part.volume * parts[0].volume > 0 && std::ranges::none_of(parts, surrounds);
     if (part.kept)
       for (const std::uint32_t t : part.triangles) kept.push_back(surface.triangles[t]);
@@ -137,12 +135,10 @@ struct Polygons {
   }
 };
 
-vdb::FloatGrid::Ptr distances(const Polygons& mesh, float band, bool is_signed,
-                              vdb::Int32Grid* nearest = nullptr) {
+vdb::FloatGrid::Ptr distances(const Polygons& mesh, float band, bool is_signed, vdb::Int32Grid* nearest = nullptr) {
   vdb::initialize();
-  return vdb::tools::meshToVolume<vdb::FloatGrid>(
-      mesh, *vdb::math::Transform::createLinearTransform(1.0), band, band,
-      is_signed ? 0 : vdb::tools::UNSIGNED_DISTANCE_FIELD, nearest);
+  return vdb::tools::meshToVolume<vdb::FloatGrid>(mesh, *vdb::math::Transform::createLinearTransform(1.0), band, band,
+                                                  is_signed ? 0 : vdb::tools::UNSIGNED_DISTANCE_FIELD, nearest);
 }
 
 SurfaceMesh level_set(const Polygons& mesh, double distance) {
@@ -188,13 +184,11 @@ std::vector<float> grid_values(const Polygons& mesh, const glm::ivec3& size, boo
     vdb::Vec3d corners[3], uvw;
     for (std::size_t k = 0; k < 3; ++k) mesh.getIndexSpacePoint(std::size_t(t), k, corners[k]);
     const vdb::Vec3d p(at.x, at.y, at.z);
-    const auto d = float(
-        (vdb::math::closestPointOnTriangleToPoint(corners[0], corners[1], corners[2], p, uvw) - p).length());
+    const auto d =
+        float((vdb::math::closestPointOnTriangleToPoint(corners[0], corners[1], corners[2], p, uvw) - p).length());
     if (d < values[i]) values[i] = d, owners[i] = t;
   };
-  each(0, [&](const glm::ivec3& at, std::size_t i) {
-    offer(at, i, look_nearest.getValue({at.x, at.y, at.z}));
-  });
+  each(0, [&](const glm::ivec3& at, std::size_t i) { offer(at, i, look_nearest.getValue({at.x, at.y, at.z})); });
   for (unsigned sweep = 0; sweep < 16; ++sweep)
     each(sweep, [&](const glm::ivec3& at, std::size_t i) {
       for (int a = 0; a < 3; ++a) {
@@ -256,8 +250,8 @@ SurfaceMesh wrap(const SurfaceMesh& surface, const WrapOptions& options, const s
   throw Error("wrap is no solid: " + defect, source, "take other voxels or more thickness for \"wrap\"");
 }
 
-Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches,
-                    const std::optional<WrapOptions>& options, bool always, const std::string& source) {
+Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches, const std::optional<WrapOptions>& options,
+                    bool always, const std::string& source) {
   if (!options) return {tetrahedralise(surface, switches, 600, source), ""};
   const std::string how = fmt::format("wrap {} {} {}", options->voxels, options->thickness, always);
   const std::uint64_t key = mesh_key(surface, checked_switches(switches) + how, "");
@@ -274,8 +268,7 @@ Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches,
       return {tetrahedralise(surface, switches, 600, source), ""};
     } catch (const NotSolid& refusal) {
       if (!can_wrap())
-        throw Error(refusal.what(), "it could be wrapped, but for OpenVDB",
-                    "install libopenvdb-dev and build again");
+        throw Error(refusal.what(), "it could be wrapped, but for OpenVDB", "install libopenvdb-dev and build again");
       why = refusal.what();
       why = why.substr(0, why.find(" in " + source));
     }

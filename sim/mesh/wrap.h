@@ -28,7 +28,7 @@ struct Filled {
 };
 /// tetrahedralise(), and where it finds no solid, or with `always`, the wrap in place of the surface; without
 /// `options` never. Wraps are cached as TetGen's results are. Throws Error for what no wrap mends.
-Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches,
-                    const std::optional<WrapOptions>& options, bool always, const std::string& source);
+Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches, const std::optional<WrapOptions>& options,
+                    bool always, const std::string& source);
 
 }  // namespace tetpbd

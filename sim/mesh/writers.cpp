@@ -43,8 +43,7 @@ void write_surface(const fs::path& file, const SurfaceMesh& surface) {
         "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         vertices, triangles);
   const auto out = std::back_inserter(text);
-  for (const glm::dvec3& p : surface.positions)
-    fmt::format_to(out, "{}{} {} {}\n", obj ? "v " : "", p.x, p.y, p.z);
+  for (const glm::dvec3& p : surface.positions) fmt::format_to(out, "{}{} {} {}\n", obj ? "v " : "", p.x, p.y, p.z);
   for (const Triangle& t : surface.triangles)
     fmt::format_to(out, "{} {} {} {}\n", obj ? "f" : "3", t[0] + obj, t[1] + obj, t[2] + obj);
   write_file(file, text);
@@ -64,15 +63,14 @@ void write_mesh(const fs::path& file, const TetMesh& mesh) {
   for (const glm::dvec3& p : mesh.positions)
     fmt::format_to(std::back_inserter(nodes), "{} {} {} {}\n", node++, p.x, p.y, p.z);
   for (const Tet& t : mesh.tets)
-    fmt::format_to(std::back_inserter(tets), "{}{} {} {} {} {}\n", tet++, msh ? " 4 2 1 1" : "", t[0] + msh,
-                   t[1] + msh, t[2] + msh, t[3] + msh);
+    fmt::format_to(std::back_inserter(tets), "{}{} {} {} {} {}\n", tet++, msh ? " 4 2 1 1" : "", t[0] + msh, t[1] + msh,
+                   t[2] + msh, t[3] + msh);
   if (msh)
     return write_file(file, fmt::format("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n{}$EndNodes\n"
                                         "$Elements\n{}\n{}$EndElements\n",
                                         mesh.positions.size(), nodes, mesh.tets.size(), tets));
   write_file(fs::path(file).replace_extension(".ele"), fmt::format("{} 4 0\n{}", mesh.tets.size(), tets));
-  write_file(fs::path(file).replace_extension(".node"),
-             fmt::format("{} 3 0 0\n{}", mesh.positions.size(), nodes));
+  write_file(fs::path(file).replace_extension(".node"), fmt::format("{} 3 0 0\n{}", mesh.positions.size(), nodes));
 }
 
 }  // namespace tetpbd

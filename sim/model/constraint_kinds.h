@@ -29,10 +29,9 @@ struct ConstraintKind {
   double most_compliance;       ///< the largest that settings take; 0: only a material has this kind
   int values = 1;               ///< numbers that describe a constraint at rest
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
-  bool curved =
-      false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
-  bool tet = false;   ///< NAME_jacobian(): the volume over that at rest
-  bool rate = false;  ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
+  bool curved = false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
+  bool tet = false;             ///< NAME_jacobian(): the volume over that at rest
+  bool rate = false;            ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
   constexpr bool of_material() const { return most_compliance == 0; }
 };
 
@@ -48,12 +47,8 @@ constexpr int first_kind = __COUNTER__ + 1;
 
 // A row: what it is called, its formula, the vertices of each, and what these measure at rest.
 struct Stretch {
-  static constexpr ConstraintKind row{.name = "stretch",
-                                      .arity = 2,
-                                      .noun = "edges",
-                                      .compliance_unit = "m/N",
-                                      .most_compliance = 1,
-                                      .curved = true};
+  static constexpr ConstraintKind row{
+      .name = "stretch", .arity = 2, .noun = "edges", .compliance_unit = "m/N", .most_compliance = 1, .curved = true};
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.stretch(x, rest, id);
@@ -107,12 +102,8 @@ struct NeoHookean {
 };
 ADD_KIND(NeoHookean)
 struct Dashpot {
-  static constexpr ConstraintKind row{.name = "dashpot",
-                                      .arity = 2,
-                                      .noun = "edges",
-                                      .compliance_unit = "m/(N s)",
-                                      .most_compliance = 0,
-                                      .rate = true};
+  static constexpr ConstraintKind row{
+      .name = "dashpot", .arity = 2, .noun = "edges", .compliance_unit = "m/(N s)", .most_compliance = 0, .rate = true};
   template <class real, class Math = glsl::LibraryMath>
   static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
     return Formulas<real, Math>{}.dashpot(x, rest, id);

@@ -18,7 +18,7 @@ struct ConstraintList {
   int arity = 0;
   std::vector<std::uint32_t> vertices;  ///< arity * count
   std::vector<double> rest;
-  std::vector<double> compliance{};  ///< of a material, the kind's components each; else empty: the settings'
+  std::vector<double> compliance{};            ///< of a material, the kind's components each; else empty: the settings'
   std::vector<double> stiffness{}, damping{};  ///< k and s, where bodies differ; else empty: the settings'
   /// s, of constraint c, where it resists its rate; `all`: of those that have none of their own.
   double damping_at(std::size_t c, double all) const { return damping.empty() ? all : damping[c]; }

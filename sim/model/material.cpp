@@ -62,8 +62,7 @@ void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m)
 // Dashpots along edges, tau times as damping as those springs are stiff.
 void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame& m, double tau) {
   const auto volume = [&](std::size_t t) { return 1 / (6 * tets.rest[8 * t + 6]); };
-  for (const double k : spring_stiffness(edges, tets, m.mu, volume))
-    edges.compliance.push_back(1 / (k * tau));
+  for (const double k : spring_stiffness(edges, tets, m.mu, volume)) edges.compliance.push_back(1 / (k * tau));
 }
 
 }  // namespace
@@ -74,12 +73,10 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
                 "give constraints stretch and isobend their compliance, and material none");
   ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
   const Lame m = lame(material.young_modulus, material.poisson_ratio);
-  if (material.material == "springs")
-    make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
+  if (material.material == "springs") make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
   if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
   if (system.present[index_of<Dashpot>])
-    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m,
-                  material.constraint_damping);
+    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m, material.constraint_damping);
   return system;
 }
 

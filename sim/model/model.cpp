@@ -98,7 +98,7 @@ void check_settings(const Model& model, const Settings& settings) {
 void renumber(Model& model) {
   const std::size_t count = model.rest.positions.size();
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(count);  // along the curve, vertex
-  std::vector<std::uint32_t> old(count), now(count);  // vertex i was old[i]; vertex i is now now[i]
+  std::vector<std::uint32_t> old(count), now(count);                 // vertex i was old[i]; vertex i is now now[i]
   for (const Body& body : model.bodies) {
     const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
     const Bounds box = bounds({model.rest.positions.begin() + first, model.rest.positions.begin() + end});

@@ -87,9 +87,7 @@ Elements in_original_numbers(const Model& model, Elements elements) {
     for (std::uint32_t& v : element) v = model.original[v];
   return elements;
 }
-inline std::vector<Tet> original_tets(const Model& model) {
-  return in_original_numbers(model, model.rest.tets);
-}
+inline std::vector<Tet> original_tets(const Model& model) { return in_original_numbers(model, model.rest.tets); }
 
 /// Start positions that are not the rest shape: none, flatten, line, point, random, mirror, stretch:F,
 /// squash:F, twist:DEGREES, jitter:F (moved by up to F of its size along each axis and turned by up to F of a

@@ -35,8 +35,7 @@ const std::vector<Parameter>& parameters() {
                                    constraint_kinds[k].noun)});
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
-        all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver",
-                       KindMember{&S::compliance, k},
+        all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver", KindMember{&S::compliance, k},
                        fmt::format("softness of {}, of a spring 1 over its stiffness; 0: as hard as "
                                    "iterations make it. Above 0 it brings mass_splitting with it",
                                    constraint_kinds[k].noun),
@@ -54,8 +53,8 @@ const std::vector<Parameter>& parameters() {
          "springs: from 0.25",
          0, 0.499, "", false, Effect::rebuild},
         {"constraint_damping", "solver", &S::constraint_damping,
-         "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0,
-         10, "s", true},
+         "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0, 10, "s",
+         true},
         {"omega", "solver", &S::omega,
          "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
          "above 2 it may not; with compliance at most 2",
@@ -76,10 +75,9 @@ const std::vector<Parameter>& parameters() {
          "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower it if "
          "a body that is much deformed fails",
          0.01, 1},
-        {"dt", "solver", &S::dt, "time that one step simulates; shorter steps are more accurate", 1e-6, 1,
-         "s", true},
-        {"damping", "solver", &S::damping,
-         "slows all motion, also free fall: velocity decays by exp(-damping t)", 0, 1000, "1/s"},
+        {"dt", "solver", &S::dt, "time that one step simulates; shorter steps are more accurate", 1e-6, 1, "s", true},
+        {"damping", "solver", &S::damping, "slows all motion, also free fall: velocity decays by exp(-damping t)", 0,
+         1000, "1/s"},
         {"gravity", "world", &S::gravity, "pull downwards: 9.81 on Earth, 0 in space", -1000, 1000, "m/s^2"},
         {"ground", "world", &S::ground, "whether there is a ground to fall onto"},
         {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
@@ -95,8 +93,8 @@ const std::vector<Parameter>& parameters() {
          "hard bodies (all k 1, stretch among them, no compliance) that touch something move as rigid ones; "
          "off, as in the paper: they rebound by what the corrections add",
          0, 1, "", false, Effect::rebuild},
-        {"seed", "solver", &S::seed, "number that chooses among random starts and masses", 0, 2147483647, "",
-         false, Effect::restart},
+        {"seed", "solver", &S::seed, "number that chooses among random starts and masses", 0, 2147483647, "", false,
+         Effect::restart},
     };
     all.insert(all.end(), others.begin(), others.end());
     return all;
@@ -147,8 +145,7 @@ namespace {
 
 std::string range_text(const Parameter& row) {
   const char* kind = std::holds_alternative<int Settings::*>(row.member) ? "whole number" : "number";
-  return fmt::format("give a {} from {:g} to {:g}{}{}", kind, row.low, row.high, *row.unit ? " " : "",
-                     row.unit);
+  return fmt::format("give a {} from {:g} to {:g}{}{}", kind, row.low, row.high, *row.unit ? " " : "", row.unit);
 }
 
 bool in_range(const Parameter& row, double value) {
@@ -164,14 +161,12 @@ void check_words(const Parameter& row, const std::string& text, const std::strin
       refuse(row, "'" + text + "'", where,
              did_you_mean(word, allowed) + fmt::format("choose from {}", fmt::join(allowed, ", ")));
   for (std::size_t i = 0; i < words.size(); ++i)
-    if (std::count(words.begin(), words.end(), words[i]) > 1)
-      refuse(row, "'" + text + "'", where, "name each once");
+    if (std::count(words.begin(), words.end(), words[i]) > 1) refuse(row, "'" + text + "'", where, "name each once");
 }
 
 }  // namespace
 
-void set_parameter(Settings& settings, const Parameter& row, const std::string& text,
-                   const std::string& where) {
+void set_parameter(Settings& settings, const Parameter& row, const std::string& text, const std::string& where) {
   with_value(settings, row, [&]<class T>(T& target) {
     if constexpr (std::is_same_v<T, bool>) {
       if (text != "true" && text != "false" && text != "1" && text != "0")
@@ -216,8 +211,7 @@ void set_mode(Settings& settings, const std::string& word, const std::string& wh
   if (!find_solver_mode(word))
     refuse(row, "'" + word + "'", where,
            did_you_mean(word, choices(row)) + fmt::format("choose from {}", fmt::join(choices(row), ", ")));
-  if (!solver_mode(settings).solves_like(*find_solver_mode(word)))
-    settings.iterations = settings.substeps = automatic;
+  if (!solver_mode(settings).solves_like(*find_solver_mode(word))) settings.iterations = settings.substeps = automatic;
   settings.mode = word;
 }
 
@@ -264,8 +258,8 @@ bool uses(const Material& material, const ConstraintKind& kind) {
 }
 
 bool rigid_in_contact(const Settings& settings, const Material& material) {
-  return settings.rigid_contact && settings.contact == "none" && hard(material) &&
-         uses(material, Stretch::row) && !solver_mode(settings).published;
+  return settings.rigid_contact && settings.contact == "none" && hard(material) && uses(material, Stretch::row) &&
+         !solver_mode(settings).published;
 }
 
 bool hard(const Material& material) {

@@ -29,9 +29,8 @@ struct World {
 
 /// What a body is made of: a material model and its moduli, or kinds of constraint and their numbers.
 struct Material {
-  std::string material =
-      "none";                  ///< the model; else in place of kinds, stiffness and compliance (material.h)
-  double young_modulus = 1e6;  ///< Pa
+  std::string material = "none";  ///< the model; else in place of kinds, stiffness and compliance (material.h)
+  double young_modulus = 1e6;     ///< Pa
   double poisson_ratio = 0.3;
   double constraint_damping = 0;  ///< s
   std::string constraints = "stretch,bend,volume";
@@ -88,8 +87,7 @@ struct KindMember {
 struct Parameter {
   std::string name;     ///< scene key; the flag is --name with - for _
   const char* section;  ///< scene section: "solver" or "world"
-  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*, KindMember>
-      member;
+  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*, KindMember> member;
   std::string help;
   double low = 0, high = 1;  ///< allowed range; numbers only
   const char* unit = "";
@@ -114,8 +112,7 @@ const std::vector<Parameter>& parameters();
 const Parameter* find_parameter(const std::string& name);  ///< name with - or _; nullptr if there is none
 
 /// Sets one value given as text; throws Error naming the key, `where` and the allowed values.
-void set_parameter(Settings& settings, const Parameter& parameter, const std::string& text,
-                   const std::string& where);
+void set_parameter(Settings& settings, const Parameter& parameter, const std::string& text, const std::string& where);
 /// Value as text, the way set_parameter reads it.
 std::string parameter_text(const Settings& settings, const Parameter& parameter);
 std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"

@@ -60,8 +60,7 @@ Objective make_objective(const Implicit& run, const Start& start) {
 
 // The planes of obstacles over the step, as each vertex meets them that goes from where it is to `to`.
 // Returns by how much they have changed there, m.
-double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obstacles, const Points& to,
-                   Objective& o) {
+double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obstacles, const Points& to, Objective& o) {
   const std::vector<glm::dvec4> before = std::move(o.planes);
   o.plane_count = obstacles.size(), o.planes.clear();
   double most = 0;
@@ -70,9 +69,8 @@ double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obsta
       const glm::dvec3 from = run.now.positions[i], way = to[i] - from - run.h * obstacle.velocity_at(from);
       const auto met = obstacle.surface_met(to[i], way);
       const bool near = obstacle.kind->flat || met.distance < glm::length(way) + 1e-3 * run.input.model.size;
-      o.planes.push_back(near && o.masses[i] > 0
-                             ? glm::dvec4(met.normal, glm::dot(met.normal, to[i]) - met.distance)
-                             : glm::dvec4(0, 0, 0, -1));
+      o.planes.push_back(near && o.masses[i] > 0 ? glm::dvec4(met.normal, glm::dot(met.normal, to[i]) - met.distance)
+                                                 : glm::dvec4(0, 0, 0, -1));
       if (before.empty()) continue;
       const glm::dvec4 was = before[o.planes.size() - 1];
       const double gap = glm::dot(glm::dvec3(was), to[i]) - was.w;
@@ -103,9 +101,8 @@ std::vector<Objective::Drag> drags(const Model& model, const Objective& o, const
 Minimum solve(const Implicit& run, const Start& start) {
   Objective o = make_objective(run, start);
   const auto obstacles = obstacles_at(run.input.model, run.input.settings, run.time[0], run.h);
-  const bool rubs =
-      std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
-      std::ranges::any_of(run.input.model.bodies, [](const Body& b) { return b.friction.has_value(); });
+  const bool rubs = std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
+                    std::ranges::any_of(run.input.model.bodies, [](const Body& b) { return b.friction.has_value(); });
   find_planes(run, obstacles, o.predicted, o);
   o.drags = drags(run.input.model, o, start, obstacles, run.touching);
   const int most_rounds = run.most > 0 ? 0 : 50;
@@ -158,10 +155,9 @@ void advance(Implicit& run, long steps) {
       minimum = solve(run, start);
     }
     if (!minimum.converged)
-      throw Error(
-          "the reference did not converge",
-          fmt::format("{} after {}, residual {:.1e}", minimum.reason, minimum.iterations, minimum.residual),
-          "take shorter steps", 1);
+      throw Error("the reference did not converge",
+                  fmt::format("{} after {}, residual {:.1e}", minimum.reason, minimum.iterations, minimum.residual),
+                  "take shorter steps", 1);
     run.before = run.now;
     for (std::size_t i = 0; i < minimum.positions.size(); ++i) {
       if (run.anew[i] > 0) --run.anew[i];

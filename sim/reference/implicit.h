@@ -21,7 +21,7 @@ struct Implicit {
                                    ///< before: at the start, and after an impact
   std::vector<Touching> touching;  ///< now
   std::vector<double> time = {0};  ///< s, one number
-  int most = 0;  ///< Newton steps at most, each with the friction found so far; 0: to the end
+  int most = 0;                    ///< Newton steps at most, each with the friction found so far; 0: to the end
 };
 /// Throws Error for compliances not above 0.
 Implicit implicit(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);

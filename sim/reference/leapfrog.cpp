@@ -16,11 +16,10 @@ namespace {
 template <class F>
 void for_each_spring(const Leapfrog& run, F&& visit) {
   std::size_t offset = 0;
-  for_each_elastic<true>(run.input.system, run.compliances,
-                         [&](auto kind, const ConstraintList& list, auto&& alpha) {
-                           visit(kind, list, alpha, offset);
-                           offset += list.vertices.size();
-                         });
+  for_each_elastic<true>(run.input.system, run.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
+    visit(kind, list, alpha, offset);
+    offset += list.vertices.size();
+  });
 }
 
 // Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha,
@@ -41,8 +40,7 @@ Points accelerations(Leapfrog& run) {
         double size = kind.row.rate ? 0 : C;
         const double resists = kind.row.rate ? 1 : list.damping_at(c, dashpots ? 0 : all);
         for (std::size_t j = 0; j < arity; ++j) size += resists * glm::dot(gradient[j], run.v[vertices[j]]);
-        for (std::size_t j = 0; j < arity; ++j)
-          run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
+        for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
       }
     });
   });
@@ -61,8 +59,8 @@ Points accelerations(Leapfrog& run) {
 // Out of a plane, at `depth` behind it after moving by `moved` along, as inelastically as a vertex can: what
 // it sank by is taken back, and of its slip what friction holds. Written anew: with the solvers' formula it
 // would share their mistakes.
-void touch(const glm::dvec3& n, double depth, double friction, const glm::dvec3& moved, double h,
-           glm::dvec3& x, glm::dvec3& v) {
+void touch(const glm::dvec3& n, double depth, double friction, const glm::dvec3& moved, double h, glm::dvec3& x,
+           glm::dvec3& v) {
   if (depth <= 0) return;
   const glm::dvec3 slip = moved - n * glm::dot(n, moved);
   const double length = glm::length(slip), held = std::min(length, friction * depth);
@@ -79,9 +77,8 @@ Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, c
     vertices.insert(vertices.end(), list.vertices.begin(), list.vertices.end());
   });
   run.parts.resize(vertices.size());
-  run.at_vertex = group_by_key(vertices.size(), positions.size(), [&](std::size_t part, auto&& emit) {
-    emit(vertices[part], std::uint32_t(part));
-  });
+  run.at_vertex = group_by_key(vertices.size(), positions.size(),
+                               [&](std::size_t part, auto&& emit) { emit(vertices[part], std::uint32_t(part)); });
   return run;
 }
 
@@ -161,8 +158,7 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
   return (std::sqrt(damped * damped + 4) - damped) / omega;
 }
 
-double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances,
-                           const Points& positions) {
+double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
   double stiffest = 0;
   for_each_elastic(input.system, compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
@@ -176,8 +172,7 @@ double stiffest_constraint(const ReferenceInput& input, const Compliances& compl
       for (int k = 0; k < kind.row.components; ++k)
         for (std::size_t j = 0; j < arity; ++j) {
           const glm::dvec3 g = component(value, k).second[j];
-          sum += input.inverse_masses[vertices[j]] * input.system.at_vertex[vertices[j]] * glm::dot(g, g) /
-                 alpha(c)[k];
+          sum += input.inverse_masses[vertices[j]] * input.system.at_vertex[vertices[j]] * glm::dot(g, g) / alpha(c)[k];
         }
       stiffest = std::max(stiffest, sum);
     }

@@ -48,7 +48,6 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
 
 /// How stiff the stiffest constraint is, 1/s^2 (method.md eq. 39b): the largest eigenvalue of M^-1 K is at
 /// most this where each has its part of its vertices' masses, but for what bends and turns.
-double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances,
-                           const Points& positions);
+double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances, const Points& positions);
 
 }  // namespace tetpbd

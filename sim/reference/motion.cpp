@@ -24,10 +24,9 @@ namespace {
 // Far below what changes a motion to four digits; of the leapfrog's, the part of its stable step.
 constexpr double rigid_step_length = 4e-5;  // s
 constexpr double part_of_stable = 0.5;
-constexpr long implicit_steps = 8;  // in one of the scene
-constexpr double most_stable =
-    3000;                           // stable steps in one of the scene: shorter ones cost more than Newton's
-constexpr double most_bytes = 9e6;  // of positions kept, as long as they are 20 instants or more
+constexpr long implicit_steps = 8;    // in one of the scene
+constexpr double most_stable = 3000;  // stable steps in one of the scene: shorter ones cost more than Newton's
+constexpr double most_bytes = 9e6;    // of positions kept, as long as they are 20 instants or more
 constexpr std::size_t least_instants = 21;
 constexpr double seconds_between_saves = 20;
 
@@ -44,16 +43,13 @@ void require_answer(const ReferenceInput& input) {
   const Settings& settings = input.settings;
   const char* hint =
       "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
-  const auto refuse = [&](const std::string& what) {
-    throw Error("the scene has no right motion", what, hint);
-  };
+  const auto refuse = [&](const std::string& what) { throw Error("the scene has no right motion", what, hint); };
   const bool soft = any_material(input.model, settings, compliant);
   const auto check = [&](const Material& own) {
     if (!soft && !uses(own, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");
     for (std::size_t k = 0; own.material == "none" && k < kind_count; ++k) {
       if (!uses(own, constraint_kinds[k])) continue;
-      if (own.stiffness[k] != 1)
-        refuse(fmt::format("k_{} is {}", constraint_kinds[k].name, own.stiffness[k]));
+      if (own.stiffness[k] != 1) refuse(fmt::format("k_{} is {}", constraint_kinds[k].name, own.stiffness[k]));
       if (soft && own.compliance[k] == 0)
         refuse(fmt::format("compliance_{} is 0 and another is not", constraint_kinds[k].name));
     }
@@ -88,8 +84,7 @@ Pair rigid_pair(const ReferenceInput& input) {
 template <class Make, class Arrays>
 Pair pair_of(double dt, long steps, const Make& make, const Arrays& arrays) {
   using Run = decltype(make(dt));
-  auto runs = std::make_shared<std::array<Run, 2>>(
-      std::array{make(dt / double(steps)), make(dt / double(2 * steps))});
+  auto runs = std::make_shared<std::array<Run, 2>>(std::array{make(dt / double(steps)), make(dt / double(2 * steps))});
   Pair pair;
   pair.step = (*runs)[1].h;
   pair.advance = [runs, steps] { advance((*runs)[0], steps), advance((*runs)[1], 2 * steps); };
@@ -127,8 +122,7 @@ Pair implicit_pair(const ReferenceInput& input) {
 
 // What is done so far, for a later run to take up; its checksum has `key` in it, the scene and the number of
 // steps.
-void save_unfinished(const std::filesystem::path& file, std::uint64_t key, const Motion& motion,
-                     const Pair& pair) {
+void save_unfinished(const std::filesystem::path& file, std::uint64_t key, const Motion& motion, const Pair& pair) {
   std::string bytes;
   put_array(bytes, motion.rows), put_array(bytes, motion.kept);
   for (const Points& positions : motion.positions) put_array(bytes, positions);
@@ -218,9 +212,8 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   Motion motion;
   motion.method = method;
   const bool soft = any_material(input.model, input.settings, compliant);
-  const double stable = !soft || method == "implicit"
-                            ? 0
-                            : stable_step(input, reference_compliances(input), input.model.rest.positions);
+  const double stable =
+      !soft || method == "implicit" ? 0 : stable_step(input, reference_compliances(input), input.model.rest.positions);
   const bool touching = bodies_touch(input.model, input.settings);
   if (method.empty())
     motion.method = !soft                                                   ? "rigid body"
@@ -274,8 +267,7 @@ bool is_kept(const Motion& motion, long step) { return std::ranges::binary_searc
 void add_state(MotionError& error, const Motion& motion, const Model& model, long step, const State& state) {
   const auto found = std::ranges::find(motion.kept, step);
   if (found == motion.kept.end()) return;
-  const State right{motion.positions[std::size_t(found - motion.kept.begin())], {}},
-      start{motion.positions[0], {}};
+  const State right{motion.positions[std::size_t(found - motion.kept.begin())], {}}, start{motion.positions[0], {}};
   error.final = error_to(model, right, state);
   const double moved = error_to(model, start, right);
   error.relative = moved > 0 ? error.final / moved : 0;

@@ -46,8 +46,7 @@ std::uint64_t scene_key(const Model& model, const Settings& settings);
 /// taken up again. Throws Error for scenes without a right answer (k between 0 and 1, fixed vertices and k =
 /// 1, compliance of some kinds only), and Interrupted.
 Motion find_motion(const ReferenceInput& input, long steps, const std::string& method = {},
-                   const std::filesystem::path& unfinished = {},
-                   const std::function<void(long)>& progress = {});
+                   const std::filesystem::path& unfinished = {}, const std::function<void(long)>& progress = {});
 
 /// How far a run is from the right motion: RMS distances by mass over the body's size (reference.h,
 /// error_to).

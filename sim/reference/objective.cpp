@@ -92,16 +92,14 @@ Points gradient(const Objective& o, const Points& positions) {
   Points g(positions.size());
   for (std::size_t i = 0; i < g.size(); ++i)
     g[i] = o.masses[i] * (o.inertia * (positions[i] - o.predicted[i]) - o.gravity);
-  for_each_constraint(o, positions,
-                      [&](auto kind, const auto* v, auto& x, const double* rest, auto& springs) {
-                        const auto c = unclamped<decltype(kind)>(x, rest);
-                        for (int k = 0; k < kind.row.components; ++k) {
-                          const auto [C, of] = component(c, k);
-                          const auto [stiffness, offset] = springs[std::size_t(k)];
-                          for (std::size_t j = 0; j < x.size(); ++j)
-                            g[v[j]] += stiffness * (C - offset) * of[j];
-                        }
-                      });
+  for_each_constraint(o, positions, [&](auto kind, const auto* v, auto& x, const double* rest, auto& springs) {
+    const auto c = unclamped<decltype(kind)>(x, rest);
+    for (int k = 0; k < kind.row.components; ++k) {
+      const auto [C, of] = component(c, k);
+      const auto [stiffness, offset] = springs[std::size_t(k)];
+      for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += stiffness * (C - offset) * of[j];
+    }
+  });
   for (const Objective::Drag& drag : o.drags) {
     const glm::dvec3 way = drag_displacement(drag, positions);
     g[drag.vertex] += drag.force / std::max(glm::length(way), drag.reach) * way;
@@ -123,8 +121,7 @@ struct Factor : Eigen::SimplicialLDLT<Sparse> {
 // differences of the gradient over 1e-5 of the smallest side: truncation and rounding are both near 1e-10
 // relative, and Newton converges with far worse.
 template <class Kind, std::size_t arity, class Springs>
-auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, const Springs& springs,
-                        bool project) {
+auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, const Springs& springs, bool project) {
   constexpr int n = 3 * int(arity);
   using Matrix = Eigen::Matrix<double, n, n>;
   using Vector = Eigen::Matrix<double, n, 1>;
@@ -161,8 +158,7 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
   }
   if (project) {
     const Eigen::SelfAdjointEigenSolver<Matrix> modes(hessian);
-    hessian = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).asDiagonal() *
-              modes.eigenvectors().transpose();
+    hessian = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).asDiagonal() * modes.eigenvectors().transpose();
   }
   return hessian;
 }
@@ -176,22 +172,20 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
     const double mass = o.masses[std::size_t(row / 3)];
     entries.emplace_back(row, row, mass > 0 ? mass * o.inertia : 1.0);
   }
-  for_each_constraint(o, positions,
-                      [&](auto kind, const auto* vertices, auto& x, const double* rest, auto& springs) {
-                        const auto local = constraint_hessian<decltype(kind)>(x, rest, springs, project);
-                        for (int r = 0; r < int(local.rows()); ++r)
-                          for (int c = 0; c < int(local.cols()); ++c) {
-                            const std::uint32_t to = vertices[r / 3], from = vertices[c / 3];
-                            const int row = 3 * int(to) + r % 3, column = 3 * int(from) + c % 3;
-                            if (row >= column && o.masses[to] > 0 && o.masses[from] > 0)
-                              entries.emplace_back(row, column, local(r, c));
-                          }
-                      });
+  for_each_constraint(o, positions, [&](auto kind, const auto* vertices, auto& x, const double* rest, auto& springs) {
+    const auto local = constraint_hessian<decltype(kind)>(x, rest, springs, project);
+    for (int r = 0; r < int(local.rows()); ++r)
+      for (int c = 0; c < int(local.cols()); ++c) {
+        const std::uint32_t to = vertices[r / 3], from = vertices[c / 3];
+        const int row = 3 * int(to) + r % 3, column = 3 * int(from) + c % 3;
+        if (row >= column && o.masses[to] > 0 && o.masses[from] > 0) entries.emplace_back(row, column, local(r, c));
+      }
+  });
   for (const Objective::Drag& drag : o.drags) {
     const glm::dvec3 way = drag_displacement(drag, positions);
     const double length = glm::length(way);
-    glm::dmat3 local = drag.force / std::max(length, drag.reach) *
-                       (glm::dmat3(1) - glm::outerProduct(drag.normal, drag.normal));
+    glm::dmat3 local =
+        drag.force / std::max(length, drag.reach) * (glm::dmat3(1) - glm::outerProduct(drag.normal, drag.normal));
     if (length > drag.reach) local -= drag.force / (length * length * length) * glm::outerProduct(way, way);
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c <= r; ++c)
@@ -247,8 +241,7 @@ struct ActiveSet {
     for (std::size_t i = 0; i < x.size(); ++i)
       for (std::size_t p = 0; p < o.plane_count && o.masses[i] > 0; ++p) {
         char& now = held[i * o.plane_count + p];
-        const char next =
-            now ? glm::dot(glm::dvec3(o.plane(i, p)), forces[i]) > 0 : gap(i, p, step[i]) < -slack;
+        const char next = now ? glm::dot(glm::dvec3(o.plane(i, p)), forces[i]) > 0 : gap(i, p, step[i]) < -slack;
         changed = changed || next != now;
         now = next;
       }
@@ -345,8 +338,7 @@ Minimum newton(const Objective& o, Points start, int most) {
   NewtonStep newton;
   while (!result.converged) {
     newton.exact = true;
-    if (!newton_step(factor, set, gradient(o, x), newton))
-      return result.reason = "the Hessian has no factors", result;
+    if (!newton_step(factor, set, gradient(o, x), newton)) return result.reason = "the Hessian has no factors", result;
     result.residual = std::sqrt(std::max(-newton.descent, 0.0) / o.unit);
     result.converged = newton.exact && result.residual <= minimum_tolerance;
     // The step at hand is taken even so: it squares what is left.

@@ -37,9 +37,7 @@ struct Objective {
   /// Each vertex with mass is kept in `plane_count` half spaces (n, d), n . x >= d; by vertex.
   std::vector<glm::dvec4> planes{};
   std::size_t plane_count = 0;
-  const glm::dvec4& plane(std::size_t vertex, std::size_t p) const {
-    return planes[vertex * plane_count + p];
-  }
+  const glm::dvec4& plane(std::size_t vertex, std::size_t p) const { return planes[vertex * plane_count + p]; }
   /// Resists moving along a plane: |t| force, where the way t from `from` is longer than `reach`, and
   /// smoothly below.
   struct Drag {
@@ -84,8 +82,7 @@ void for_each_elastic(const ConstraintSystem& system, const Compliances& complia
     const bool own = !list.compliance.empty();
     if constexpr (decltype(kind)::row.rate && !rates) return;
     if (list.count() == 0 || (!own && std::isinf(*all))) return;
-    visit(kind, list,
-          [&list, all, own](std::size_t c) { return own ? &list.compliance[c * components] : all; });
+    visit(kind, list, [&list, all, own](std::size_t c) { return own ? &list.compliance[c * components] : all; });
   });
 }
 

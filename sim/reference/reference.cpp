@@ -11,8 +11,7 @@ namespace tetpbd {
 void require_compliances(const ConstraintSystem& system, const Compliances& compliances) {
   for (std::size_t k = 0; k < compliances.size(); ++k)
     if (system.lists[k].count() > 0 && system.lists[k].compliance.empty() && !(compliances[k] > 0))
-      throw Error("compliance must be above 0",
-                  fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
+      throw Error("compliance must be above 0", fmt::format("{} of {}", compliances[k], constraint_kinds[k].name),
                   "rigid_step is the limit of 0, infinity leaves a kind out");
 }
 

@@ -62,16 +62,14 @@ std::vector<Contact> find_contacts(const RigidBody& b, const std::vector<MovingO
                                    const glm::dmat3& inverse) {
   std::vector<Contact> found;
   const glm::dvec3 spin = angular_velocity(b);
-  const auto add = [&](std::size_t number, const glm::dvec3& arm, const glm::dvec3& n,
-                       const MovingObstacle& o) {
+  const auto add = [&](std::size_t number, const glm::dvec3& arm, const glm::dvec3& n, const MovingObstacle& o) {
     const glm::dvec3 side = std::abs(n.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
     const glm::dvec3 t = glm::normalize(glm::cross(n, side));
     Contact c;
     c.number = number, c.arm = arm, c.surface = o.velocity_at(b.centre + arm);
     c.friction = o.own_friction ? o.friction : b.friction.value_or(o.friction), c.restitution = o.restitution;
     c.axes = glm::dmat3(n, t, glm::cross(n, t));
-    const glm::dmat3 cross(glm::cross(c.arm, c.axes[0]), glm::cross(c.arm, c.axes[1]),
-                           glm::cross(c.arm, c.axes[2]));
+    const glm::dmat3 cross(glm::cross(c.arm, c.axes[0]), glm::cross(c.arm, c.axes[1]), glm::cross(c.arm, c.axes[2]));
     c.response = glm::dmat3(1 / b.mass) + glm::transpose(cross) * inverse * cross;
     c.scale = 1 / (c.response[0][0] + c.response[1][1] + c.response[2][2]);
     c.approach = glm::dot(n, b.velocity + glm::cross(spin, c.arm) - c.surface);
@@ -144,8 +142,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
       const glm::dvec3 arm = b.rotation * b.rest[i - b.first];
       const double apart = glm::length(b.centre + arm - model.positions[i]),
                    slip = glm::length(b.velocity + glm::cross(spin, arm) - model.velocities[i]);
-      if (apart > 1e-6 * model.size ||
-          slip > 1e-6 * (glm::length(b.velocity) + glm::length(spin) * model.size))
+      if (apart > 1e-6 * model.size || slip > 1e-6 * (glm::length(b.velocity) + glm::length(spin) * model.size))
         throw Error("no rigid body", fmt::format("{} starts deformed, or deforming", body.name),
                     "k = 1 has a right motion from the rest shape only");
     });
@@ -171,8 +168,7 @@ void advance(RigidBody& b, const Model& model, const Settings& settings, double 
     spin += inverse * glm::cross(c.arm, push);
   };
   for (Contact& c : contacts) {
-    const auto last =
-        std::ranges::lower_bound(b.impulses, c.number, {}, [](const auto& of) { return of.first; });
+    const auto last = std::ranges::lower_bound(b.impulses, c.number, {}, [](const auto& of) { return of.first; });
     if (last != b.impulses.end() && last->first == c.number) give(c, c.impulse = last->second);
   }
   // Each contact's impulse as it would be if the others stood, in turn, until they change nothing (de Saxce

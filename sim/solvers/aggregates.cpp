@@ -23,8 +23,8 @@ struct Nearest {
 };
 
 // Dijkstra from all seeds at once.
-void spread(const Model& model, const Grouped& neighbours, const std::vector<std::uint32_t>& seeds,
-            std::size_t first, Nearest& nearest) {
+void spread(const Model& model, const Grouped& neighbours, const std::vector<std::uint32_t>& seeds, std::size_t first,
+            Nearest& nearest) {
   using Entry = std::pair<double, std::uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   for (std::size_t s = first; s < seeds.size(); ++s) {
@@ -49,15 +49,13 @@ void spread(const Model& model, const Grouped& neighbours, const std::vector<std
 
 // Around evenly spread vertices (they are numbered along a curve), moved to the middle of what is nearest to
 // them a few times over (k-means).
-Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wanted,
-                std::vector<std::uint32_t>& seeds) {
+Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wanted, std::vector<std::uint32_t>& seeds) {
   const std::size_t vertices = model.positions.size();
   std::vector<std::uint32_t> moving;
   for (std::uint32_t v = 0; v < vertices; ++v)
     if (model.inverse_masses[v] > 0) moving.push_back(v);
   wanted = std::min(wanted, moving.size());
-  for (std::size_t s = 0; s < wanted; ++s)
-    seeds.push_back(moving[(2 * s + 1) * moving.size() / (2 * wanted)]);
+  for (std::size_t s = 0; s < wanted; ++s) seeds.push_back(moving[(2 * s + 1) * moving.size() / (2 * wanted)]);
   Nearest nearest;
   for (int round = 0; round < 6; ++round) {
     nearest.seed.assign(vertices, none);
@@ -69,8 +67,7 @@ Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wante
     if (round == 5) break;
     std::vector<glm::dvec4> centres(seeds.size(), glm::dvec4(0));
     for (const std::uint32_t v : moving)
-      if (nearest.seed[v] != none)
-        centres[nearest.seed[v]] += model.masses[v] * glm::dvec4(model.rest.positions[v], 1);
+      if (nearest.seed[v] != none) centres[nearest.seed[v]] += model.masses[v] * glm::dvec4(model.rest.positions[v], 1);
     std::vector<double> best(seeds.size(), std::numeric_limits<double>::max());
     for (const std::uint32_t v : moving) {
       const std::uint32_t s = nearest.seed[v];
@@ -103,10 +100,9 @@ std::vector<Weights> smoothed(const Model& model, const Grouped& neighbours, con
             found->second += factor * weight;
         }
       };
-      const auto all = std::span(neighbours.values)
-                           .subspan(neighbours.first[v], neighbours.first[v + 1] - neighbours.first[v]);
-      const auto count =
-          std::ranges::count_if(all, [&](std::uint32_t u) { return model.inverse_masses[u] > 0; });
+      const auto all =
+          std::span(neighbours.values).subspan(neighbours.first[v], neighbours.first[v + 1] - neighbours.first[v]);
+      const auto count = std::ranges::count_if(all, [&](std::uint32_t u) { return model.inverse_masses[u] > 0; });
       add(weights[v], count > 0 ? 0.4 : 1);
       for (const std::uint32_t u : all)
         if (model.inverse_masses[u] > 0) add(weights[u], 0.6 / double(count));
@@ -157,8 +153,8 @@ std::uint64_t cache_key(const Model& model, const Grouped& neighbours, std::size
 
 bool take_aggregates(std::string_view bytes, std::uint64_t key, std::size_t vertices, Aggregates& result) {
   const auto sound = [&](const std::array<Share, 4>& shares) {
-    return std::ranges::all_of(
-        shares, [&](const Share& s) { return s.weight == 0 || s.aggregate < result.all.size(); });
+    return std::ranges::all_of(shares,
+                               [&](const Share& s) { return s.weight == 0 || s.aggregate < result.all.size(); });
   };
   return take_sealed(bytes, key, result.all, result.of_vertex) && result.of_vertex.size() == vertices &&
          std::ranges::all_of(result.of_vertex, sound);

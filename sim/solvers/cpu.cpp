@@ -15,8 +15,7 @@ Solver create(const SolverInput& input) {
   const auto pbd = std::make_shared<CpuPbd<real>>(input.model, input.system);
   solver.substep = [pbd](Sim& sim, int) {
     pbd->change_model(*sim.model);
-    add_guards(
-        sim, pbd->step(sim.host, sim.settings, sim.inverse_masses, Sweep::gauss_seidel, simulated_time(sim)));
+    add_guards(sim, pbd->step(sim.host, sim.settings, sim.inverse_masses, Sweep::gauss_seidel, simulated_time(sim)));
   };
   return solver;
 }

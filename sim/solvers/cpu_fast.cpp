@@ -142,8 +142,7 @@ template <class Kind>
 }
 
 template <class Kind>
-[[gnu::always_inline]] inline void scatter(const Batch<Kind>& batch, Work& work,
-                                           const Columns<Kind>& columns) {
+[[gnu::always_inline]] inline void scatter(const Batch<Kind>& batch, Work& work, const Columns<Kind>& columns) {
   const auto add = [&](std::size_t lane, std::size_t count) __attribute__((always_inline)) {
 #pragma GCC unroll 4
     for (std::size_t j = 0; j < std::size_t(Kind::row.arity); ++j) {
@@ -162,9 +161,8 @@ template <class Kind>
 
 // Corrections in place of positions; false, and multipliers as they were, if a guard triggered.
 template <class Kind, bool damped>
-[[gnu::always_inline]] inline bool evaluate(Batch<Kind>& batch, const Softness<Kind>* softness,
-                                            const Rule<float>& rule, Columns<Kind>& columns,
-                                            [[maybe_unused]] const Columns<Kind>& starts) {
+[[gnu::always_inline]] inline bool evaluate(Batch<Kind>& batch, const Softness<Kind>* softness, const Rule<float>& rule,
+                                            Columns<Kind>& columns, [[maybe_unused]] const Columns<Kind>& starts) {
   constexpr std::size_t arity = std::size_t(Kind::row.arity), components = std::size_t(Kind::row.components),
                         values = std::size_t(Kind::row.values);
   static constexpr std::uint32_t no_ids[4] = {};  // for guards' directions only, and those are not used here
@@ -192,8 +190,7 @@ template <class Kind, bool damped>
     if constexpr (damped) {
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
-        start[j] =
-            j == 0 ? glm::vec3(0) : glm::vec3(starts[j][0][lane], starts[j][1][lane], starts[j][2][lane]);
+        start[j] = j == 0 ? glm::vec3(0) : glm::vec3(starts[j][0][lane], starts[j][1][lane], starts[j][2][lane]);
       if constexpr (components == 1) {
         const auto then = Kind::template evaluate<float, LaneMath>(start, rest_values<Kind>(rest), no_ids);
         c.C = Kind::row.rate ? constraint_change(c, then, x, start) : c.C + gamma * (c.C - then.C);
@@ -208,8 +205,7 @@ template <class Kind, bool damped>
       multipliers[0][lane] = batch.multipliers[0][lane] + m.lambda;
       guards[lane] = m.guards;
     } else {
-      for (std::size_t part = 0; part < components; ++part)
-        c.C[part] += a[part] * batch.multipliers[part][lane];
+      for (std::size_t part = 0; part < components; ++part) c.C[part] += a[part] * batch.multipliers[part][lane];
       const auto m = Formulas<float, LaneMath>{}.multiplier(c, w, limit, a, share);
 #pragma GCC unroll 4
       for (std::size_t j = 0; j < arity; ++j)
@@ -250,8 +246,8 @@ template <class Kind, bool damped>
 }
 
 // By the kind's number.
-WIDEST void project_kind(Work& work, int kind, std::size_t begin, std::size_t end, const Rule<float>& rule,
-                         bool first, GuardCounts& guards) {
+WIDEST void project_kind(Work& work, int kind, std::size_t begin, std::size_t end, const Rule<float>& rule, bool first,
+                         GuardCounts& guards) {
   for_each_kind([&](auto is, int number) __attribute__((always_inline)) {
     if (number != kind) return;
     if (!work.starts.empty())
@@ -323,8 +319,7 @@ class FastPbd {
         const std::size_t before = batches.size(), end = colours.first[colour + 1];
         for (std::size_t begin = colours.first[colour], next; begin < end; begin = next) {
           next = end_of_batch(colours.list, begin, end);
-          fill(batches.emplace_back(), std::get<Softnesses<decltype(is)>>(work_.softnesses), colours.list,
-               begin, next);
+          fill(batches.emplace_back(), std::get<Softnesses<decltype(is)>>(work_.softnesses), colours.list, begin, next);
         }
         turns_.push_back({kind, before, batches.size()});
       }
@@ -338,8 +333,7 @@ class FastPbd {
   void change_model(const Model& model) { model_ = &model, pairs_.change_model(model); }
 
   /// As CpuPbd::step, in another order.
-  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
-                   double time) {
+  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, double time) {
     const Plan plan = plan_for(settings);
     Substep substep(*model_, settings, plan, time);
     RigidContact contact(*model_, settings);
@@ -349,9 +343,7 @@ class FastPbd {
     const bool damped = any_material(*model_, settings, tetpbd::damped);
     work_.starts.resize(damped ? x.size() : 0);
     predicted_.resize(x.size());
-    const auto move_to = [&](std::size_t i, const glm::dvec3& p) {
-      x[i].row = Row{p.x, p.y, p.z, inverse_masses[i]};
-    };
+    const auto move_to = [&](std::size_t i, const glm::dvec3& p) { x[i].row = Row{p.x, p.y, p.z, inverse_masses[i]}; };
     for (std::size_t i = 0; i < x.size(); ++i) move_to(i, state.positions[i]);
     GuardCounts guards{};
     Barrier barrier(threads_);
@@ -375,9 +367,8 @@ class FastPbd {
         });
         for (int iteration = 0; iteration < plan.iterations; ++iteration) {
           solve(settings, plan.h, thread, threads, iteration == 0, barrier, counts);
-          for_each_free_vertex([&](std::size_t i) {
-            move_to(i, substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i]));
-          });
+          for_each_free_vertex(
+              [&](std::size_t i) { move_to(i, substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i])); });
         }
         for_each_free_vertex([&](std::size_t i) {
           if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;
@@ -423,8 +414,8 @@ class FastPbd {
   }
 
   template <class Kind>
-  static void fill(Batch<Kind>& batch, Softnesses<Kind>& softnesses, const ConstraintList& list,
-                   std::size_t begin, std::size_t end) {
+  static void fill(Batch<Kind>& batch, Softnesses<Kind>& softnesses, const ConstraintList& list, std::size_t begin,
+                   std::size_t end) {
     constexpr std::size_t arity = std::size_t(Kind::row.arity), values = std::size_t(Kind::row.values),
                           components = std::size_t(Kind::row.components);
     batch.count = std::uint32_t(end - begin);
@@ -441,8 +432,8 @@ class FastPbd {
 
   // One iteration's constraints, colour after colour. Small colours are left to the first thread: neighbours
   // among them then need no barrier.
-  void solve(const Settings& settings, double h, std::size_t thread, std::size_t threads, bool first,
-             Barrier& barrier, GuardCounts& guards) {
+  void solve(const Settings& settings, double h, std::size_t thread, std::size_t threads, bool first, Barrier& barrier,
+             GuardCounts& guards) {
     bool shared_before = true;
     for (const Turn& turn : turns_) {
       const std::size_t count = turn.end - turn.begin;

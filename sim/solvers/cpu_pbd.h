@@ -37,8 +37,8 @@ struct Rule {
 
 /// How much C changed from `then` to c, without cancellation; at positions x and start.
 template <class Constraint, class Vector>
-[[gnu::always_inline]] inline auto constraint_change(const Constraint& c, const Constraint& then,
-                                                     const Vector* x, const Vector* start) {
+[[gnu::always_inline]] inline auto constraint_change(const Constraint& c, const Constraint& then, const Vector* x,
+                                                     const Vector* start) {
   decltype(c.C) sum = 0;
   for (std::size_t j = 0; j < std::size(c.gradient); ++j)
     sum += decltype(c.C)(0.5) * glm::dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);
@@ -49,9 +49,9 @@ template <class Constraint, class Vector>
 /// a vertex where it is (at), where it was at the substep's start (start), its inverse mass (weight), and
 /// takes its correction (move).
 template <class Kind, class real, class Vertices>
-[[gnu::always_inline]] inline void project(const std::uint32_t* ids, const real* rest,
-                                           const double* compliance, const Rule<real>& rule,
-                                           real* multipliers, Vertices&& vertices, GuardCounts& guards) {
+[[gnu::always_inline]] inline void project(const std::uint32_t* ids, const real* rest, const double* compliance,
+                                           const Rule<real>& rule, real* multipliers, Vertices&& vertices,
+                                           GuardCounts& guards) {
   constexpr int components = Kind::row.components;
   constexpr std::size_t arity = std::size_t(Kind::row.arity);
   glm::vec<3, real> local[arity];
@@ -68,8 +68,7 @@ template <class Kind, class real, class Vertices>
     if (rule.gamma > 0) {
       const auto here = std::to_array(local);
       const auto then = evaluate([&](std::uint32_t v) { return vertices.start(v); });
-      c.C =
-          Kind::row.rate ? constraint_change(c, then, here.data(), local) : c.C + rule.gamma * (c.C - then.C);
+      c.C = Kind::row.rate ? constraint_change(c, then, here.data(), local) : c.C + rule.gamma * (c.C - then.C);
     }
     c.C += a[0] * multipliers[0];
     const auto m = Formulas<real>{}.multiplier(c, w, rule.k, rule.limit, a[0], rule.share);
@@ -83,8 +82,7 @@ template <class Kind, class real, class Vertices>
     for (int k = 0; k < components; ++k) multipliers[k] += m.lambda[k];
     triggered = m.guards;
     for (std::size_t j = 0; j < arity; ++j)
-      vertices.move(ids[j],
-                    glm::dvec3(w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j])));
+      vertices.move(ids[j], glm::dvec3(w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j])));
   }
   if (triggered)
     for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
@@ -124,8 +122,8 @@ class CpuPbd {
 
   /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26). Returns how often each guard
   /// triggered.
-  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses,
-                   Sweep sweep, double time = 0) {
+  GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep,
+                   double time = 0) {
     const bool jacobi = sweep == Sweep::jacobi, soft = any_material(*model_, settings, compliant);
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(*model_, settings) : model_->size;
@@ -156,10 +154,9 @@ class CpuPbd {
           std::size_t number = 0;
           for (auto& item : std::get<Items<decltype(kind)>>(items_)) {
             if (iteration == 0) item.multipliers = {};
-            if (!own.stiffness.empty())
-              rule.set(own.stiffness[number], own.damping[number], kind.row), ++number;
-            project<decltype(kind)>(item.vertices.data(), item.rest.data(), compliance, rule,
-                                    item.multipliers.data(), vertices, guards);
+            if (!own.stiffness.empty()) rule.set(own.stiffness[number], own.damping[number], kind.row), ++number;
+            project<decltype(kind)>(item.vertices.data(), item.rest.data(), compliance, rule, item.multipliers.data(),
+                                    vertices, guards);
             if (compliance) compliance += decltype(kind)::row.components;
           }
         });

@@ -33,9 +33,7 @@ double explicit_substeps(const Model& model, const Settings& s) {
 
 namespace {
 
-ReferenceInput reference_input(const Sim& sim) {
-  return {*sim.model, sim.system, sim.settings, sim.inverse_masses};
-}
+ReferenceInput reference_input(const Sim& sim) { return {*sim.model, sim.system, sim.settings, sim.inverse_masses}; }
 
 // As kernels note it (project.glsl).
 double stiffest(const Sim& sim, const std::vector<glm::dvec3>& positions) {
@@ -48,8 +46,7 @@ Plan make_plan(const Settings& settings, double longest, double stiffening) {
   constexpr double most = 100000;
   const double wanted = at_rest > most ? at_rest : std::min(at_rest * stiffening, most);
   if (wanted > most)
-    throw Error("the body is too stiff for mode explicit",
-                fmt::format("a step takes {:.3g} substeps", wanted),
+    throw Error("the body is too stiff for mode explicit", fmt::format("a step takes {:.3g} substeps", wanted),
                 fmt::format("at most {:g}: use another mode, a softer material or a shorter dt", most));
   Plan plan = plan_for(settings);
   plan.substeps = std::max(plan.substeps, int(std::ceil(wanted)));
@@ -71,8 +68,7 @@ void watch_stiffness(Sim& sim) {
   AdaptiveSubsteps& w = sim.adaptive;
   const auto answer = poll_notes(sim);
   const double noted_h = std::exchange(w.noted_h, sim.plan.h);
-  if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front()))
-    return;  // 0: nothing was noted yet
+  if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front())) return;  // 0: nothing was noted yet
   const double stiffer = answer->front() / (noted_h * noted_h * w.at_rest);
   const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next answer, if it goes on so
   w.stiffer = stiffer;
@@ -80,8 +76,7 @@ void watch_stiffness(Sim& sim) {
   // Up at once; down a quarter at a time, as bodies swing.
   w.calm_readbacks = needed < w.stiffening ? w.calm_readbacks + 1 : 0;
   if (needed > w.stiffening) set_stiffening(sim, needed);
-  if (w.calm_readbacks == 16)
-    w.calm_readbacks = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
+  if (w.calm_readbacks == 16) w.calm_readbacks = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
 }
 
 void start(Sim& sim, const State& state) {
@@ -110,8 +105,7 @@ void retune(Sim& sim, const Settings* before) {
 
 Solver create_explicit_solver(const SolverInput& input) {
   Solver solver;
-  const auto pass =
-      std::make_shared<Pass>(make_vertex_patch_pass(solver, input, "solvers/explicit.comp", false));
+  const auto pass = std::make_shared<Pass>(make_vertex_patch_pass(solver, input, "solvers/explicit.comp", false));
   add_prediction(solver, input);
   solver.watches = true;
   solver.start = start;

@@ -41,8 +41,7 @@ void run_substep(Sim& sim, JacobiPasses& jacobi) {
     unsigned phases = PHASE_SOLVE;
     if (!apart && iteration == 0) phases |= PHASE_PREDICT;
     if (!apart && iteration + 1 == iterations) phases |= PHASE_FINISH;
-    for (std::size_t pass = 0; pass + 1 < jacobi.passes.size(); ++pass)
-      run_kernel(sim, jacobi.passes[pass], phases);
+    for (std::size_t pass = 0; pass + 1 < jacobi.passes.size(); ++pass) run_kernel(sim, jacobi.passes[pass], phases);
     move_vertices(sim, last, phases);
   }
   if (apart) move_vertices(sim, last, PHASE_FINISH);
@@ -61,9 +60,9 @@ void add_jacobi(Solver& solver, const SolverInput& input, JacobiPasses passes) {
 void add_prediction(Solver& solver, const SolverInput& input) {
   constexpr unsigned group = 256;
   const std::size_t count = input.model.positions.size();
-  const auto pass = std::make_shared<Pass>(
-      Program::compute("solvers/predict.comp", scheme_words(input), vertex_defines(input)),
-      work_groups(count, group), count * (sizeof(Position) + sizeof(Velocity) + 16));
+  const auto pass =
+      std::make_shared<Pass>(Program::compute("solvers/predict.comp", scheme_words(input), vertex_defines(input)),
+                             work_groups(count, group), count * (sizeof(Position) + sizeof(Velocity) + 16));
   solver.predict = [pass](Sim& sim) {
     sim.recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
     run_kernel(sim, *pass);
@@ -83,8 +82,7 @@ Pass make_patch_pass(Solver& solver, const SolverInput& input, const Patches& pa
   std::size_t bytes = words.bytes() + 16 * patches.vertices.size();  // and quantized positions
   add_buffer(solver, input.tuning, "Patches", std::move(words));
   if (input.compliant && multipliers) {
-    add_buffer(solver, input.tuning, "Multipliers",
-               Buffer("multipliers", std::vector<float>(patches.records.size())));
+    add_buffer(solver, input.tuning, "Multipliers", Buffer("multipliers", std::vector<float>(patches.records.size())));
     bytes += 2 * 4 * patches.records.size();  // read and written
   }
   const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
@@ -97,8 +95,7 @@ Pass make_patch_pass(Solver& solver, const SolverInput& input, const Patches& pa
                   define("MAX_OWNED", owned), define("CHUNKED", patches.chunked),
                   define("COUNT_GUARDS", input.tuning.count_guards)});
   const std::size_t most_blocks = contacts_lag(input.model, input.settings) ? 10 : 8;
-  return {Program::compute(shader, {{}, kind_words(input.system)}, defines, most_blocks), patches.count,
-          bytes};
+  return {Program::compute(shader, {{}, kind_words(input.system)}, defines, most_blocks), patches.count, bytes};
 }
 
 Pass make_average_pass(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {

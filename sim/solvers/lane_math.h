@@ -17,8 +17,7 @@ struct LaneMath {
     const float above = upper ? small - large : small;
     const float below = upper ? small + large : large;
     const float t = above / (below > 0 ? below : 1.0f), z = t * t;
-    const float series =
-        ((8.05374449538e-2f * z - 1.38776856032e-1f) * z + 1.99777106478e-1f) * z - 3.33329491539e-1f;
+    const float series = ((8.05374449538e-2f * z - 1.38776856032e-1f) * z + 1.99777106478e-1f) * z - 3.33329491539e-1f;
     float angle = (upper ? 0.785398163f : 0.0f) + (series * z * t + t);
     angle = ax < ay ? 1.57079633f - angle : angle;
     angle = x < 0 ? 3.14159265f - angle : angle;

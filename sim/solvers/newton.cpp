@@ -46,8 +46,7 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   n.begin = pass("begin", groups(std::max(sizes.vertices, count)), 2 * vector);
   n.predict = pass("predict", groups(sizes.vertices), 12 * vector);
   n.start = pass("start", count + groups(sizes.tets), 4 * 80 * sizes.tets);
-  n.linearise =
-      pass("linearise", groups(sizes.edges), sizeof(newton::EdgeBlock) * sizes.edges + 4 * sizes.uses * 30);
+  n.linearise = pass("linearise", groups(sizes.edges), sizeof(newton::EdgeBlock) * sizes.edges + 4 * sizes.uses * 30);
   n.residual = pass("residual", turns, of_matrix + 9 * vector);
   n.update = pass("update", count + groups(sizes.vertices), 15 * vector);
   n.coarse = pass("coarse", groups(sizes.row_lanes * unknowns), 4 * unknowns * unknowns);
@@ -124,8 +123,7 @@ void adapt_substeps(Sim& sim, Newton& n) {
     ++w.refined_readbacks;
   if (w.substep_factor == 1 && w.calm_readbacks == 0 && w.refined_readbacks < most)
     set_substep_factor(sim, n, refined_substeps);
-  if (w.substep_factor > 1 && w.calm_readbacks == enough)
-    w.refined_readbacks = 0, set_substep_factor(sim, n, 1);
+  if (w.substep_factor > 1 && w.calm_readbacks == enough) w.refined_readbacks = 0, set_substep_factor(sim, n, 1);
   if (w.substep_factor > 1 && w.refined_readbacks == most) set_substep_factor(sim, n, 1);
 }
 
@@ -174,9 +172,7 @@ void retune(Sim& sim, Newton& n, const Settings* before) {
   make_plan(sim);
   if (!before) return;
   const Buffer& mesh = sim.solver.buffers[n.mesh];
-  const auto forces = [](const Settings& s) {
-    return std::tuple(s.compliance, s.constraint_damping, plan_for(s).h);
-  };
+  const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping, plan_for(s).h); };
   const bool others = !same_constraints(*sim.model, *before, sim.settings);
   for (std::size_t k = 0; others && k < kind_count; ++k) {
     write(mesh, n.layout.constraints[k].values, to_floats(sim.system.lists[k].rest));
@@ -200,8 +196,7 @@ Solver create_newton_solver(const SolverInput& input) {
     add_buffer(solver, input.tuning, block, std::move(buffer));
     return solver.buffers.size() - 1;
   };
-  n.vectors =
-      add("Vectors", Buffer("vectors", fill_newton_vectors(input.model, *levels, n.layout), GL_DYNAMIC_COPY));
+  n.vectors = add("Vectors", Buffer("vectors", fill_newton_vectors(input.model, *levels, n.layout), GL_DYNAMIC_COPY));
   add("Blocks", Buffer("matrix", std::max<std::size_t>(sizes.edges, 1) * sizeof(newton::EdgeBlock)));
   n.mesh = add("Mesh", Buffer("constraints and edges", fill_newton_mesh(input.system, *levels, n.layout)));
   n.coarse_matrix = add("Coarse", Buffer("coarse matrix", fill_newton_coarse(input, *levels, n.layout)));
@@ -216,8 +211,7 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.carried = [made](Sim& sim, Carried& all) {
     const std::vector<Buffer>& buffers = sim.solver.buffers;
     for (const std::size_t slot : {newton::WAY, newton::GAIN})
-      all.ranges.push_back(
-          {&buffers[made->vectors], made->layout.slots[slot].at, made->layout.slots[slot].bytes()});
+      all.ranges.push_back({&buffers[made->vectors], made->layout.slots[slot].at, made->layout.slots[slot].bytes()});
     all.ranges.push_back({&buffers[made->sums], made->layout.rotations.at, made->layout.rotations.bytes()});
   };
   return solver;

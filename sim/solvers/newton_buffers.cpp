@@ -32,8 +32,7 @@ NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& sys
 }
 
 NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels) {
-  const std::size_t group =
-      std::max<std::size_t>(tuned({0, 128}, input.tuning).group, NewtonSizes::row_lanes);
+  const std::size_t group = std::max<std::size_t>(tuned({0, 128}, input.tuning).group, NewtonSizes::row_lanes);
   const std::size_t rows = group / NewtonSizes::lanes, vertices = input.model.positions.size();
   std::size_t largest = 0, tets = 0;
   for (const auto& [first, end] : levels.free_bodies) largest = std::max<std::size_t>(largest, end - first);
@@ -185,8 +184,7 @@ std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const Newton
   std::vector<glm::vec4> contents(layout.coarse.bytes / sizeof(glm::vec4), glm::vec4(0)), centres;
   for (const Aggregate& a : levels.aggregates.all) centres.emplace_back(glm::vec3(a.centre), float(a.reach));
   put(std::as_writable_bytes(std::span(contents)), layout.centres, centres);
-  put(std::as_writable_bytes(std::span(contents)), Range<float>{layout.coarse_inverse.at, inverse.size()},
-      inverse);
+  put(std::as_writable_bytes(std::span(contents)), Range<float>{layout.coarse_inverse.at, inverse.size()}, inverse);
   return contents;
 }
 

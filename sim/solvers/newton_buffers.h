@@ -56,8 +56,7 @@ struct NewtonBuffers {
 NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system);
 
 /// The contents of `vectors`, at rest.
-std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels,
-                                           const NewtonBuffers& layout);
+std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels, const NewtonBuffers& layout);
 std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
                                         const NewtonBuffers& layout);
 /// The contents of `coarse`.

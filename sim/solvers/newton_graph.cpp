@@ -20,8 +20,8 @@ NewtonGraph build_newton_graph(const ConstraintSystem& system, std::size_t verti
     const std::size_t arity = std::size_t(list.arity), pairs = arity * (arity - 1) / 2;
     if (list.count() >= MOST_CONSTRAINTS)
       throw Error("too many constraints for mode newton",
-                  fmt::format("{} of {}", list.count(), constraint_kinds[k].noun),
-                  "use a smaller mesh or another mode", 1);
+                  fmt::format("{} of {}", list.count(), constraint_kinds[k].noun), "use a smaller mesh or another mode",
+                  1);
     parallel_for(list.count(), [&](std::size_t c) {
       NewtonGraph::Use* use = &graph.uses[begin + pairs * c];
       const auto ends = list.ends(c);
@@ -29,8 +29,7 @@ NewtonGraph build_newton_graph(const ConstraintSystem& system, std::size_t verti
         for (std::uint32_t j = i + 1; j < arity; ++j) {
           const bool turned = ends[i] > ends[j];
           const std::uint32_t low = turned ? j : i, high = turned ? i : j;
-          *use++ = {std::uint64_t(ends[low]) << 32 | ends[high],
-                    PACKED_USE(std::uint32_t(c), kind, low, high)};
+          *use++ = {std::uint64_t(ends[low]) << 32 | ends[high], PACKED_USE(std::uint32_t(c), kind, low, high)};
         }
     });
     begin += pairs * list.count(), ++kind;
@@ -53,8 +52,8 @@ namespace {
 
 // A constraint's block of the matrix at rest, as element_N.glsl has it.
 template <class Kind>
-glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList& list, std::size_t c, int i,
-                                 int j, double h) {
+glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList& list, std::size_t c, int i, int j,
+                                 double h) {
   constexpr std::size_t arity = std::size_t(Kind::row.arity);
   const Settings& settings = input.settings;
   std::array<glm::dvec3, arity> x;
@@ -83,8 +82,8 @@ std::vector<glm::dmat3> compute_blocks_at_rest(const SolverInput& input, const N
           std::uint32_t kind = USE_KIND(use);
           for_each_kind([&](auto row, int k) {
             if (input.system.present[std::size_t(k)] && kind-- == 0)
-              of_edge[e] += compute_block_at_rest<decltype(row)>(
-                  input, input.system.lists[std::size_t(k)], USE_CONSTRAINT(use), USE_I(use), USE_J(use), h);
+              of_edge[e] += compute_block_at_rest<decltype(row)>(input, input.system.lists[std::size_t(k)],
+                                                                 USE_CONSTRAINT(use), USE_I(use), USE_J(use), h);
           });
         }
       },

@@ -34,15 +34,13 @@ Cut cut_for(std::size_t vertices, bool solids, bool software) {
 
 Pass make_vertex_patch_pass(Solver& solver, const SolverInput& input, const char* shader, bool multipliers) {
   const std::size_t vertices = input.model.positions.size();
-  const Cut cut =
-      tuned(cut_for(vertices, !solid_obstacles(input.model).empty(), input.software), input.tuning);
+  const Cut cut = tuned(cut_for(vertices, !solid_obstacles(input.model).empty(), input.software), input.tuning);
   if (cut.patch > std::min<std::size_t>(cut.group, Patches::most_vertices - 4))
     throw Error("a patch does not fit a work-group",
                 fmt::format("{} vertices, work-groups of {}", cut.patch, cut.group),
                 "an invocation for each vertex, 252 at most");
   solver.quantized_buffers = 2;
-  Pass pass =
-      make_patch_pass(solver, input, vertex_patches(input.system, cut.patch), shader, cut.group, multipliers);
+  Pass pass = make_patch_pass(solver, input, vertex_patches(input.system, cut.patch), shader, cut.group, multipliers);
   pass.bytes += vertices * (2 * sizeof(Position) + 16);
   solver.vertex_patches = pass.work_groups;
   return pass;

@@ -38,8 +38,7 @@ Solver create_paper_solver(const SolverInput& input) {
     const std::size_t arity = std::size_t(constraint_kinds[k].arity), count = input.system.lists[k].count();
     Buffer records = record_buffer(shuffled(input.system.lists[k]), constraint_kinds[k].name);
     check_storage(input.tuning, records.label(), records.bytes());
-    const std::size_t bytes =
-        count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
+    const std::size_t bytes = count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
     jacobi.passes.push_back(
         {.program = Program::compute("solvers/paper.comp", {kinds[index++], {}},
                                      {fmt::format("GROUP_SIZE {}", group), fmt::format("COUNT {}", count)}),

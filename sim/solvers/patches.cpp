@@ -23,8 +23,7 @@ struct Chunk {
 // Adds constraints to one chunk after the other.
 class ChunkWriter {
  public:
-  explicit ChunkWriter(const ConstraintSystem& system)
-      : system_(system), local_(system.at_vertex.size(), none) {}
+  explicit ChunkWriter(const ConstraintSystem& system) : system_(system), local_(system.at_vertex.size(), none) {}
   /// The vertex's number in the chunk, which has it from now on.
   std::uint32_t vertex(std::uint32_t v) {
     if (local_[v] == none) {
@@ -101,13 +100,12 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
       // sum would wait for each other.
       const std::size_t stride = (records.size() + 31) / 32;
       for (std::size_t start = 0; start < stride; ++start)
-        for (std::size_t r = start; r < records.size(); r += stride)
-          write_record(system.lists[k], records[r]);
+        for (std::size_t r = start; r < records.size(); r += stride) write_record(system.lists[k], records[r]);
     }
     for (std::size_t v = 0; v < result.largest; ++v) {
       const std::uint32_t vertex = chunk.vertices[v < chunk.vertices.size() ? v : 0];
-      result.vertices[number * result.largest + v] = {
-          vertex, std::bit_cast<std::uint32_t>(float(system.at_vertex[vertex]))};
+      result.vertices[number * result.largest + v] = {vertex,
+                                                      std::bit_cast<std::uint32_t>(float(system.at_vertex[vertex]))};
     }
   };
   for (std::size_t p = 0; p < patches.size(); ++p)
@@ -181,8 +179,7 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
       for (std::size_t v = p * part, end = std::min(v + part, vertices), taken = 0; v < end; v += taken) {
         taken = std::min(own, end - v);
         auto chunks = patch_of(writer, v, v + taken);
-        for (; chunks.size() > 1 && taken > 1; chunks = patch_of(writer, v, v + taken))
-          taken -= (taken + 15) / 16;
+        for (; chunks.size() > 1 && taken > 1; chunks = patch_of(writer, v, v + taken)) taken -= (taken + 15) / 16;
         of_part[p].push_back(std::move(chunks));
       }
   };

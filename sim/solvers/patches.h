@@ -29,8 +29,7 @@ struct Patches {
 
 /// Pairs of words of a record of the list.
 inline std::size_t record_pairs(const ConstraintList& list) {
-  const std::size_t values =
-      list.rest.size() + list.compliance.size() + list.stiffness.size() + list.damping.size();
+  const std::size_t values = list.rest.size() + list.compliance.size() + list.stiffness.size() + list.damping.size();
   return (1 + values / std::max<std::size_t>(list.count(), 1) + 1) / 2;
 }
 

@@ -31,8 +31,7 @@ static const std::vector<SolverMode> rows = {
      .pairs = true,
      .jacobi = true},
     {.name = "constraint",
-     .help =
-         "Jacobi on the GPU, a constraint adds to its vertices with integer atomics: as right, mostly slower",
+     .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics: as right, mostly slower",
      .create = MADE_BY(create_constraint_solver),
      .pairs = true,
      .jacobi = true},
@@ -93,8 +92,7 @@ const std::vector<SolverMode>& solver_modes() {
 }
 
 const SolverMode* find_solver_mode(const std::string& name) {
-  const auto row =
-      std::find_if(rows.begin(), rows.end(), [&](const SolverMode& mode) { return name == mode.name; });
+  const auto row = std::find_if(rows.begin(), rows.end(), [&](const SolverMode& mode) { return name == mode.name; });
   return row == rows.end() ? nullptr : &*row;
 }
 
@@ -117,9 +115,9 @@ Tuning tuning_from_environment() {
   const char* variable = std::getenv("TETPBD_TUNE");
   for (const std::string& assignment : split(variable ? variable : "", ',')) {
     unsigned* target = nullptr;
-    for (const auto& [name, member] : {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
-                                       std::pair("row=", &tuning.row), std::pair("lanes=", &tuning.lanes),
-                                       std::pair("threads=", &tuning.threads)})
+    for (const auto& [name, member] :
+         {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch), std::pair("row=", &tuning.row),
+          std::pair("lanes=", &tuning.lanes), std::pair("threads=", &tuning.threads)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
@@ -159,8 +157,7 @@ std::vector<std::string> vertex_defines(const SolverInput& input) {
   std::vector<std::string> defines = obstacle_defines(input.model);
   for (const std::string& own :
        {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),
-        define("BODY_COUNT", input.model.bodies.size()),
-        define("CONTACTS", contacts_lag(input.model, input.settings)),
+        define("BODY_COUNT", input.model.bodies.size()), define("CONTACTS", contacts_lag(input.model, input.settings)),
         define("VERTICES", bodies_touch(input.model, input.settings) ? input.model.positions.size() : 0)})
     defines.push_back(own);
   return defines;

@@ -21,10 +21,9 @@ struct Carried;
 /// constraint is evaluated once (constraint and cpu modes), and once a vertex of it in node mode.
 /// Behind them, what was left out (DROP_...).
 using GuardCounts = std::array<std::uint64_t, GUARDS + DROPS>;
-inline constexpr std::array<const char*, GUARDS> guard_names = {
-    "direction", "hinge", "angle", "volume_floor", "collapsed", "limit", "not_finite"};
-inline constexpr std::array<const char*, DROPS> drop_names = {"rigid_contacts", "rigid_sweeps",
-                                                              "rigid_range"};
+inline constexpr std::array<const char*, GUARDS> guard_names = {"direction", "hinge", "angle",     "volume_floor",
+                                                                "collapsed", "limit", "not_finite"};
+inline constexpr std::array<const char*, DROPS> drop_names = {"rigid_contacts", "rigid_sweeps", "rigid_range"};
 
 /// What a mode does with a simulation; its file makes it, with whatever else it keeps inside these functions.
 struct Solver {
@@ -58,12 +57,12 @@ struct Solver {
 /// How kernels are cut into invocations; 0: by the mesh's size or the driver's limit. For measurements and
 /// tests.
 struct Tuning {
-  unsigned group = 0;       ///< invocations of a work-group of the solving kernel, a power of two up to 1024
-  unsigned patch = 0;       ///< constraints of a patch in mode constraint, vertices of one in mode node
-  unsigned row = 0;         ///< most work-groups in a dispatch's first dimension
-  std::size_t storage = 0;  ///< most bytes of a storage buffer
-  unsigned lanes = 0;       ///< invocations that look for what a vertex touches, a power of two up to 8
-  unsigned threads = 0;     ///< of mode cpu-fast; 0: as many as the machine has cores and work is for
+  unsigned group = 0;         ///< invocations of a work-group of the solving kernel, a power of two up to 1024
+  unsigned patch = 0;         ///< constraints of a patch in mode constraint, vertices of one in mode node
+  unsigned row = 0;           ///< most work-groups in a dispatch's first dimension
+  std::size_t storage = 0;    ///< most bytes of a storage buffer
+  unsigned lanes = 0;         ///< invocations that look for what a vertex touches, a power of two up to 8
+  unsigned threads = 0;       ///< of mode cpu-fast; 0: as many as the machine has cores and work is for
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };
 /// From the variable TETPBD_TUNE, as in "patch=8,group=128"; throws Error for anything else.
@@ -85,20 +84,18 @@ struct SolverMode {
   const char* name = "";
   const char* help = "";
   Solver (*create)(const SolverInput&) = nullptr;
-  bool compliance = true;  ///< and compliance
-  bool implicit = false;   ///< forces, in implicit steps
-  bool leapfrog = false;   ///< forces in place of corrections: substeps are as many as stay stable
-  bool pairs = false;      ///< and contact between bodies
-  bool jacobi = false;     ///< corrections are averaged or masses split
-  bool cpu = false;        ///< steps on the CPU: `Sim::host` is the state
-  bool all_cores = false;  ///< of it
-  bool published = false;  ///< as in the paper: corrections are averaged, hard bodies rebound by them
-  bool offered = true;     ///< in --mode and the window; else in bench and compare alone
+  bool compliance = true;             ///< and compliance
+  bool implicit = false;              ///< forces, in implicit steps
+  bool leapfrog = false;              ///< forces in place of corrections: substeps are as many as stay stable
+  bool pairs = false;                 ///< and contact between bodies
+  bool jacobi = false;                ///< corrections are averaged or masses split
+  bool cpu = false;                   ///< steps on the CPU: `Sim::host` is the state
+  bool all_cores = false;             ///< of it
+  bool published = false;             ///< as in the paper: corrections are averaged, hard bodies rebound by them
+  bool offered = true;                ///< in --mode and the window; else in bench and compare alone
   int iterations = 1, substeps = 20;  ///< where nothing is asked for; of leapfrog the least, 1
   /// Whether iterations and substeps mean the same in both: corrections, leapfrog or implicit steps.
-  bool solves_like(const SolverMode& other) const {
-    return leapfrog == other.leapfrog && implicit == other.implicit;
-  }
+  bool solves_like(const SolverMode& other) const { return leapfrog == other.leapfrog && implicit == other.implicit; }
 };
 /// Those that are offered.
 const std::vector<SolverMode>& solver_modes();

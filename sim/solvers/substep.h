@@ -12,8 +12,7 @@ namespace tetpbd {
 /// Whether Jacobi shares masses out among a vertex's constraints; else it averages corrections. With
 /// compliance always: with averages, a constraint's multiplier would not be what its vertices were moved by.
 inline bool splits_masses(const Model& model, const Settings& settings) {
-  return (settings.mass_splitting && !solver_mode(settings).published) ||
-         any_material(model, settings, compliant);
+  return (settings.mass_splitting && !solver_mode(settings).published) || any_material(model, settings, compliant);
 }
 
 /// What moves a vertex in a substep besides its constraints.
@@ -43,8 +42,7 @@ struct Substep {
     return x + h * v;
   }
   /// Vertex i at x, out of all obstacles (eqs. 11-12).
-  glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted,
-                              const glm::dvec3& v) const {
+  glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v) const {
     for (const MovingObstacle& o : obstacles) {
       const glm::dvec3 way = h * (v - o.velocity_at(x)) + (x - predicted);
       const auto met = o.surface_met(x, way);

@@ -105,11 +105,10 @@ void read_msh(std::string_view bytes) {
 void check(SurfaceMesh surface) {
   const SurfaceMesh before = surface;
   const SurfaceCheck check = check_surface(surface);
-  require(surface.positions.size() == before.positions.size() &&
-              surface.triangles.size() == before.triangles.size(),
+  require(surface.positions.size() == before.positions.size() && surface.triangles.size() == before.triangles.size(),
           "a check keeps what is there");
-  require(before.positions.empty() || std::memcmp(surface.positions.data(), before.positions.data(),
-                                                  24 * before.positions.size()) == 0,
+  require(before.positions.empty() ||
+              std::memcmp(surface.positions.data(), before.positions.data(), 24 * before.positions.size()) == 0,
           "a check only turns triangles");
   if (!check.defect.empty()) return;
   require_finite(surface.positions);
@@ -208,8 +207,7 @@ void build_if_small(const Scene& scene) {
   std::size_t cells = 0;
   for (const BodyDescription& body : scene.bodies) {
     if (!body.block) return;
-    cells += std::size_t(body.block->cells.x) * std::size_t(body.block->cells.y) *
-             std::size_t(body.block->cells.z);
+    cells += std::size_t(body.block->cells.x) * std::size_t(body.block->cells.y) * std::size_t(body.block->cells.z);
   }
   if (cells > 100) return;
   const auto model = build_model(scene);

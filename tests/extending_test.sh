@@ -16,10 +16,10 @@ rm -rf "$2" && mkdir -p "$2" && cd "$2" && mkdir copy run
 fail() { echo "extending: $*" >&2; exit 1; }
 
 cp -r "$sources"/{CMakeLists.txt,cmake,shaders,sim,render,app,tests} copy/
-rm copy/tests/test_*.cpp  # those of the page are what is built
+rm copy/tests/*/test_*.cpp  # those of the page are what is built
 cat >copy/tests/CMakeLists.txt <<'CMAKE'
 find_package(doctest REQUIRED)
-file(GLOB TEST_SOURCES test_*.cpp)
+file(GLOB TEST_SOURCES */test_*.cpp)
 add_executable(tetpbd_tests main.cpp ${TEST_SOURCES})
 target_link_libraries(tetpbd_tests PRIVATE tetpbd_sim doctest::doctest)
 CMAKE
@@ -39,7 +39,7 @@ apply() {  # block.txt, as $what says
       [[ $path == copy/tests/* ]] || files=$((files + 1)) ;;
     row:*)
       text=${path#* after: } path=${path%% after: *}
-      [[ $path != copy/tests/test_* || -e $path ]] || cp "$sources/${path#copy/}" "$path"
+      [[ $path != copy/tests/*/test_* || -e $path ]] || cp "$sources/${path#copy/}" "$path"
       local line
       line=$(grep -nFm1 -- "$text" "$path" | cut -d: -f1) || fail "no line of $path holds: $text"
       sed -i "${line}r block.txt" "$path"

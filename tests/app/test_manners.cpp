@@ -1,0 +1,74 @@
+// What the command line says of words it does not know, and of flags that change nothing.
+#include <doctest/doctest.h>
+
+#include "sim/model/did_you_mean.h"
+#include "tests/app/run_program.h"
+
+using namespace tetpbd;
+using namespace run_program;
+
+TEST_CASE("did you mean: the nearest word, where one is near") {
+  const std::vector<std::string> known{"colour", "steps", "substeps", "bunny-drop", "node"};
+  CHECK(did_you_mean("color", known) == "did you mean 'colour'? ");
+  CHECK(did_you_mean("step", known) == "did you mean 'steps'? ");
+  CHECK(did_you_mean("sbustep", known) == "did you mean 'substeps'? ");
+  CHECK(did_you_mean("bunny", known) == "did you mean 'bunny-drop'? ");
+  CHECK(did_you_mean("ndoe", known) == "did you mean 'node'? ");
+  CHECK(did_you_mean("magic", known) == "");
+  CHECK(did_you_mean("", known) == "");
+  CHECK(did_you_mean(std::string(5000, 'x'), known) == "");
+}
+
+TEST_CASE("manners: words that are not known get the one that was meant") {
+  const Folder folder;
+  const auto refused = [&](const std::string& words, const std::string& said) {
+    const Outcome outcome = program(words, folder);
+    CAPTURE(words);
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == 2);
+    CHECK(outcome.err.find(said) != std::string::npos);
+  };
+  refused("run --color volume", "did you mean '--colour'?");
+  refused("run --step 5 --mode node", "not known here: --step 5: tetpbd run: did you mean '--steps'?");
+  refused("rnu", "did you mean 'run'?");
+  refused("compare --png-every 5", "it is an option of tetpbd run");
+  refused("run a b c", "not known here: a b c");
+  refused("run --scene bunny-drp", "did you mean 'bunny-drop'?");
+  refused("run --scene hard/nope", "hard/needle");
+  refused("run --scene hard/twisted", "did you mean 'hard/twisted-720'?");
+  refused("run --mode cpu-fsat", "did you mean 'cpu-fast'?");
+  refused("run --look wires", "did you mean 'wire'?");
+  refused("run --solver substep", "did you mean 'substeps'?");
+  refused("run --set solver.omga=1", "did you mean 'omega'?");
+  refused("map --x omga=1,2", "did you mean 'omega'?");
+  refused("compare --hard-cases --iterations 3", "--iterations");
+  refused("run --replay x.jsonl --mode node", "--mode");
+  refused("run --replay x.jsonl --explain", "--explain");
+}
+
+TEST_CASE("manners: flags that change nothing say so, others do not, both spellings of scenes are known") {
+  const Folder folder;
+  const std::string beam = "--scenes beam --steps 1 --set bodies.0.block.cells=[2,1,1] --out o ";
+  const auto said = [&](const std::string& words) {
+    const Outcome outcome = program("run " + beam + words, folder);
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == 0);
+    return outcome.err;
+  };
+  CHECK(said("--mode node --omega 1.2 --substeps 3 --k-bend 0.5") == "");
+  CHECK(said("--mode cpu --omega 1.2") == "tetpbd: --omega changes nothing: mode cpu averages nothing\n");
+  CHECK(said("--mode node --stability 0.3").find("--stability changes nothing: it is of mode explicit") !=
+        std::string::npos);
+  CHECK(said("--mode explicit --material springs --iterations 3 --substeps 3 --k-stretch 0.5") ==
+        "tetpbd: --k-stretch changes nothing: the material stands in its place\n"
+        "tetpbd: --iterations changes nothing: mode explicit has no iterations\n");
+  CHECK(said("--mode node --young-modulus 1e5").find("there is no material") != std::string::npos);
+  CHECK(said("--mode node --constraints stretch --k-bend 0.5").find("bend is not among") != std::string::npos);
+  // On a CPU that pretends to be a GPU, a mode is taken that suits it, unless one is named.
+  const Outcome chosen = program("run " + beam, folder), named = program("run --mode node " + beam, folder);
+  const bool software = program("info", folder).out.find("software: a CPU") != std::string::npos;
+  CHECK((chosen.out.find("solver: cpu-fast") != std::string::npos) == software);
+  CHECK(named.out.find("solver:") == std::string::npos);
+  const std::string help = program("run --help", folder).out;
+  CHECK(help.find("cpu-fast: Gauss-Seidel by colours") != std::string::npos);
+}

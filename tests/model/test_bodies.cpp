@@ -1,0 +1,231 @@
+// Bodies with materials and friction of their own: each moves as if it were alone with settings that have
+// them.
+
+#include "sim/measure/metrics.h"
+#include "sim/model/material.h"
+#include "sim/reference/leapfrog.h"
+#include "sim/reference/motion.h"
+#include "sim/sim.h"
+#include "tests/gl_test.h"
+#include "tests/reference/reference_scenes.h"
+
+using namespace reference_scenes;
+
+namespace {
+
+struct Made {
+  const char* name;
+  Material material;
+  double friction;
+};
+
+Material of_model(const char* model, double young_modulus, double poisson_ratio, double damping) {
+  Material m;
+  m.material = model, m.young_modulus = young_modulus, m.poisson_ratio = poisson_ratio;
+  m.constraint_damping = damping;
+  return m;
+}
+
+// Of kinds, each with the compliance, and with k.
+Material of_kinds(const char* kinds, double compliance, double k, double damping) {
+  Material m;
+  m.constraints = kinds, m.constraint_damping = damping;
+  m.stiffness.fill(k), m.compliance.fill(compliance);
+  return m;
+}
+
+const std::vector<Made>& soft_bodies() {
+  static const std::vector<Made> all = {{"rubber", of_model("neo-hookean", 2e5, 0.4, 0), 0.1},
+                                        {"damped", of_model("neo-hookean", 1e5, 0.3, 0.003), 0.9},
+                                        {"springs", of_model("springs", 1e5, 0.3, 0.002), 0.0},
+                                        {"kinds", of_kinds("stretch,volume", 2e-6, 1, 0), 0.4}};
+  return all;
+}
+// And those that only corrections have.
+std::vector<Made> all_bodies() {
+  std::vector<Made> all = soft_bodies();
+  all.push_back({"stiff", of_kinds("stretch,bend,volume", 0, 1, 0), 0.6});
+  all.push_back({"half", of_kinds("stretch,volume", 0, 0.5, 0), 0.2});
+  return all;
+}
+
+constexpr double apart = 4;  // m, from one to the next
+
+void add(Model& model, const char* name, double at) {
+  TetMesh mesh = make_block({1, 0.7, 0.5}, {3, 2, 2});
+  generator.seed(5);
+  for (auto& p : mesh.positions) p += noise(0.02);
+  finish_tets(mesh, "block");
+  std::vector<glm::dvec3> positions = mesh.positions;
+  for (auto& p : positions) p = glm::dvec3(p.x + at, 1.05 * p.y + 0.4, p.z);
+  add_body(model, name, mesh, 1000, positions, {0.6, -1, 0.2}, {0.1, 0.3, -0.2}, {});
+}
+
+std::shared_ptr<Model> together(const std::vector<Made>& bodies) {
+  auto model = std::make_shared<Model>();
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    add(*model, bodies[b].name, apart * double(b));
+    model->bodies[b].material = bodies[b].material, model->bodies[b].friction = bodies[b].friction;
+  }
+  return model;
+}
+std::shared_ptr<Model> alone(const Made& body, std::size_t number) {
+  auto model = std::make_shared<Model>();
+  add(*model, body.name, apart * double(number));
+  return model;
+}
+Settings of_body(Settings settings, const Made& body) {
+  static_cast<Material&>(settings) = body.material;
+  settings.friction = body.friction;
+  settings.rigid_contact = false;  // no hard body is carried beside a soft one
+  return settings;
+}
+
+// m, the farthest that a vertex of body b is from where it is alone.
+double difference(const Model& model, std::size_t b, const State& state, const State& own) {
+  double most = 0;
+  for (std::size_t i = 0; i < own.positions.size(); ++i)
+    most = std::max(most, glm::distance(state.positions[model.bodies[b].first_vertex + i], own.positions[i]));
+  return most;
+}
+
+State part(const Model& model, std::size_t b, const State& state) {
+  const Body& body = model.bodies[b];
+  const auto first = state.positions.begin() + std::ptrdiff_t(body.first_vertex);
+  return {{first, first + std::ptrdiff_t(body.vertices)}, {}};
+}
+
+Settings settings_for(const SolverMode& mode) {
+  Settings settings;
+  settings.mode = mode.name;
+  settings.substeps = mode.implicit ? 4 : mode.leapfrog ? 60 : 10;
+  settings.iterations = mode.implicit ? 12 : automatic;
+  settings.friction = 0.3, settings.mass_splitting = true;
+  return settings;
+}
+
+State run(Sim& sim, int steps) {
+  for (int s = 0; s < steps; ++s) step(sim);
+  return read_state(sim);
+}
+
+}  // namespace
+
+TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in every mode") {
+  for (const SolverMode& mode : solver_modes()) {
+    CAPTURE(std::string(mode.name));
+    const auto bodies = mode.leapfrog || mode.implicit ? soft_bodies() : all_bodies();
+    const auto model = together(bodies);
+    const Settings settings = settings_for(mode);
+    Settings any = settings;  // of no body
+    static_cast<Material&>(any) = of_model("neo-hookean", 3e4, 0.2, 0.01);
+    Sim all = create_sim(model, any);
+    const State state = run(all, 40);
+    // Among as many bodies, for mode newton solves for all of them at once and starts where few tets suffer.
+    const auto alike = std::make_shared<Model>(*model);
+    for (Body& body : alike->bodies) body.material.reset(), body.friction.reset();
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      CAPTURE(std::string(bodies[b].name));
+      Sim own = create_sim(alike, of_body(settings, bodies[b]));
+      const double most = difference(*model, b, state, part(*model, b, run(own, 40)));
+      CHECK(most < 1e-5);
+    }
+  }
+}
+
+TEST_CASE("bodies: the reference has each one's material and friction") {
+  const auto& bodies = soft_bodies();
+  const auto model = together(bodies);
+  Settings settings;
+  static_cast<Material&>(settings) = of_model("neo-hookean", 3e4, 0.2, 0.01);
+  const ConstraintSystem system = build_constraints(*model, settings);
+  const ReferenceInput input{*model, system, settings, model->inverse_masses};
+  const State start{model->positions, model->velocities};
+  const double h = 1e-4;
+  Leapfrog explicit_run = leapfrog(input, reference_compliances(input), start, h);
+  advance(explicit_run, 1000);
+  const State state = make_state(explicit_run);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    CAPTURE(std::string(bodies[b].name));
+    const auto own_model = alone(bodies[b], b);
+    const Settings own_settings = of_body(settings, bodies[b]);
+    const ConstraintSystem own_system = build_constraints(*own_model, own_settings);
+    const ReferenceInput own{*own_model, own_system, own_settings, own_model->inverse_masses};
+    Leapfrog run = leapfrog(own, reference_compliances(own), {own_model->positions, own_model->velocities}, h);
+    advance(run, 1000);
+    CHECK(difference(*model, b, state, make_state(run)) < 1e-9);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "bodies: elastic energy is the sum of what each has alone") {
+  const auto& bodies = soft_bodies();
+  const auto model = together(bodies);
+  Settings settings = settings_for(*find_solver_mode("node"));
+  const auto elastic = [](Sim& sim) {
+    Metrics metrics = create_metrics(*sim.model, sim.system);
+    measure(metrics, sim);
+    return collect(metrics, true)->elastic;
+  };
+  Sim all = create_sim(model, settings);
+  double sum = 0;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Sim own = create_sim(alone(bodies[b], b), of_body(settings, bodies[b]));
+    sum += elastic(own);
+  }
+  CHECK(sum > 1);
+  CHECK(elastic(all) == doctest::Approx(sum).epsilon(1e-5));
+}
+
+TEST_CASE_FIXTURE(GlTest, "bodies: settings are of those without a material of their own, also live") {
+  const std::vector<Made> bodies = {soft_bodies()[0], soft_bodies()[3]};
+  const auto model = together(bodies);
+  model->bodies[1].material.reset(), model->bodies[1].friction.reset();
+  for (const SolverMode& mode : solver_modes()) {
+    CAPTURE(std::string(mode.name));
+    Settings settings = of_body(settings_for(mode), bodies[1]);
+    Sim sim = create_sim(model, settings);
+    run(sim, 3);
+    settings.compliance.fill(8e-6), settings.friction = 0.7;
+    apply_settings(sim, settings);
+    Sim fresh = create_sim(model, settings);
+    write_state(sim, {model->positions, model->velocities});
+    write_state(fresh, {model->positions, model->velocities});
+    const State changed = run(sim, 20), made = run(fresh, 20);
+    CHECK(difference(*model, 0, changed, made) < 1e-9);
+    CHECK(changed.positions == made.positions);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of theirs") {
+  auto model = std::make_shared<Model>();
+  add(*model, "below", 0), add(*model, "above", 0.1);
+  for (std::size_t i = model->bodies[1].first_vertex; i < model->positions.size(); ++i)
+    model->positions[i].y += 0.8, model->velocities[i] = {1, -2, 0};
+  for (const char* name : {"node", "cpu-double", "newton"}) {
+    CAPTURE(name);
+    const SolverMode& mode = *find_solver_mode(name);
+    Settings settings = of_body(settings_for(mode), soft_bodies()[0]);
+    settings.contact = "bodies", settings.ground = false;
+    const auto centre_after = [&](double world, std::optional<double> below, std::optional<double> above) {
+      auto own = std::make_shared<Model>(*model);
+      own->bodies[0].friction = below, own->bodies[1].friction = above;
+      settings.friction = world;
+      Sim sim = create_sim(own, settings);
+      return run(sim, 30).velocities[own->bodies[1].first_vertex].x;
+    };
+    const double as_world = centre_after(0.6, {}, {}), as_bodies = centre_after(0, 0.9, 0.4);
+    CHECK(as_bodies == doctest::Approx(as_world).epsilon(1e-3));
+    CHECK(std::abs(centre_after(0, {}, {}) - as_world) > 1e-2);
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "bodies: a mode that cannot have a body's material says which body it is") {
+  const auto model = together(all_bodies());
+  Settings settings;
+  settings.mode = "explicit", settings.material = "neo-hookean";
+  CHECK_THROWS_WITH(create_sim(model, settings), doctest::Contains("body stiff"));
+  Sim sim = create_sim(model, settings_for(*find_solver_mode("node")));
+  CHECK_THROWS_WITH(apply_settings(sim, settings), doctest::Contains("body stiff"));
+  settings.mode = "paper", settings.material = "none";
+  CHECK_THROWS_WITH(create_sim(model, settings), doctest::Contains("one material"));
+}

@@ -25,7 +25,7 @@ MeasuredRun baseline_run(const Model& model, const Settings& settings, long step
       advance();
       run.wall_ms.push_back(1e3 * seconds_since(begin));
     }
-    const Motion::Row now = measured(model, settings, state(), double(s) * settings.dt);
+    const Motion::Row now = measure_motion(model, settings, state(), double(s) * settings.dt);
     Measurement& m = run.measurements.emplace_back();
     m.step = s, m.time = now.time;
     m.centre = now.centre, m.kinetic = now.kinetic, m.potential = now.potential;

@@ -84,7 +84,7 @@ struct FrameWriter {
       frame.values = distances.id();
     }
     if (!png && !film) return;
-    renew(frame, sim);
+    update(frame, sim);
     move_camera(s);
     if (*frame.options.scale().title && !frame.options.hold_range)
       frame.options.range() = fitted_range(frame.options.scale(), read_values(renderer, frame));

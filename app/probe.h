@@ -32,7 +32,7 @@ struct Probe {
   Reading next;
   std::size_t lane = 0;
   std::optional<Reading> reading;  ///< the last; none beside the bodies
-  bool asked() const { return bool(picker.answered) || bool(copied); }
+  bool asked() const { return bool(picker.requested) || bool(copied); }
 };
 
 /// Replaces a question that has not been answered.

@@ -237,7 +237,7 @@ void restart(Session& s) {
 void go_back(Session& s) {
   let_go(s);
   attempt(s, [&] {
-    if (!check_finite(s.loaded.sim(), true)) return;
+    if (!check_finite(s.loaded.sim(), true)) return say(s, "the state is finite again");
     note(s, {{"back", true}});
     if (!restore_checkpoint(s.loaded.sim())) return say(s, "no good state is kept: reset (R)");
     start_afresh(s);

@@ -232,7 +232,7 @@ void hover(Input& in) {
   Probe& probe = s.loaded.probe;
   constexpr double rest = 0.25;  // s
   if (!s.probing || in.drag != Drag::none || !on_view(in) || s.now - in.rested < rest) {
-    probe.reading.reset(), probe.copied = {}, probe.picker.answered = {};
+    probe.reading.reset(), probe.copied = {}, probe.picker.requested = {};
     in.seen = {};
     return;
   }

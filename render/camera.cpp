@@ -6,20 +6,16 @@
 
 namespace tetpbd {
 
-void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees) {
-  camera.azimuth = std::remainder(camera.azimuth + azimuth_degrees, 360.0f);
-  // Straight up or down, "up" on the screen has no direction.
-  camera.elevation = std::clamp(camera.elevation + elevation_degrees, -89.0f, 89.0f);
-}
-
-namespace {
-
-// Tangent of half the vertical field of view.
-float half_height(const Camera& camera, float aspect) {
+// The tangent of half the vertical field of view.
+static float half_height(const Camera& camera, float aspect) {
   return std::tan(glm::radians(camera.fov) * 0.5f) / std::min(aspect, 1.0f);
 }
 
-}  // namespace
+void orbit(Camera& camera, float azimuth_degrees, float elevation_degrees) {
+  camera.azimuth = std::remainder(camera.azimuth + azimuth_degrees, 360.0f);
+  // A camera that looks straight up or down has no direction that is up on the screen.
+  camera.elevation = std::clamp(camera.elevation + elevation_degrees, -89.0f, 89.0f);
+}
 
 void pan(Camera& camera, float dx, float dy, int shorter_side) {
   const float metres = 2.0f * camera.distance * half_height(camera, 1) / float(std::max(shorter_side, 1));
@@ -37,7 +33,7 @@ void follow(Camera& camera, const glm::vec3& goal, float seconds) {
 void keep_in_view(Camera& camera, const glm::vec3& point, float aspect) {
   const glm::mat3 rotation(view_matrix(camera));
   const float tan_y = half_height(camera, aspect);
-  const glm::vec3 off = rotation * (point - camera.target);  // z towards the eye
+  const glm::vec3 off = rotation * (point - camera.target);  // its z points towards the eye
   const float nearer = 0.5f * camera.distance, depth = camera.distance - std::clamp(off.z, -nearer, nearer);
   const glm::vec3 most{0.55f * depth * tan_y * aspect, 0.55f * depth * tan_y, nearer};
   camera.target += glm::transpose(rotation) * (off - glm::clamp(off, -most, most));
@@ -52,7 +48,7 @@ Camera camera_at(const std::vector<CameraKey>& path, double time) {
   const float u = float((time - b.time) / (c.time - b.time)), v = 1 - u;
   const float before = float((c.time - b.time) / (c.time - a.time)),
               after = float((c.time - b.time) / (d.time - b.time));
-  // The cubic whose slope at a key is that between its neighbours.
+  // A cubic whose slope at each key is that between the key's neighbours.
   const auto mixed = [&](auto part) {
     return v * v * (1 + 2 * u) * (b.camera.*part) + u * u * (1 + 2 * v) * (c.camera.*part) +
            u * v * v * before * (c.camera.*part - a.camera.*part) -
@@ -69,7 +65,7 @@ void frame_box(Camera& camera, const glm::vec3& low, const glm::vec3& high, floa
   float distance = 1e-3f;
   for (int corner = 0; corner < 8; ++corner) {
     const glm::vec3 point{corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y, corner & 4 ? high.z : low.z};
-    const glm::vec3 p = rotation * (point - camera.target);  // z towards the eye
+    const glm::vec3 p = rotation * (point - camera.target);  // its z points towards the eye
     distance = std::max({distance, p.z + margin * std::abs(p.x) / tan_x, p.z + margin * std::abs(p.y) / tan_y});
   }
   camera.distance = distance;

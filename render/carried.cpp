@@ -11,10 +11,10 @@
 namespace tetpbd {
 namespace {
 
-constexpr double edge_cosine = 0.574;  // 55 degrees, as the tets' own boundary has it
+constexpr double edge_cosine = 0.574;  // 55 degrees, as for the tets' own boundary
 
-// 12 bits each of the place in the square to which an octahedron unfolds.
-std::uint32_t packed_normal(glm::dvec3 n) {
+// Packs a direction into 12 bits for each coordinate in the square to which an octahedron unfolds.
+std::uint32_t pack_normal(glm::dvec3 n) {
   n /= std::max(std::abs(n.x) + std::abs(n.y) + std::abs(n.z), 1e-300);
   glm::dvec2 at(n);
   if (n.z < 0) at = {std::copysign(1 - std::abs(n.y), n.x), std::copysign(1 - std::abs(n.x), n.y)};
@@ -22,9 +22,9 @@ std::uint32_t packed_normal(glm::dvec3 n) {
   return part(at.x) | part(at.y) << 12;
 }
 
-// Three weights of 24 bits each, with a third of the normal's 24 bits above each; the tet.
-glm::uvec4 packed(const CarriedVertex& vertex, const glm::dvec3& normal) {
-  const std::uint32_t bits = packed_normal(normal);
+// Packs three weights of 24 bits, each with a third of the normal's 24 bits above it, and the tet.
+glm::uvec4 pack(const CarriedVertex& vertex, const glm::dvec3& normal) {
+  const std::uint32_t bits = pack_normal(normal);
   const auto word = [&](int k) {
     const double steps = (double(vertex.weights[k]) + 4) * 2097152;
     return std::uint32_t(std::clamp(std::llround(steps), 0ll, 0xffffffll)) | (bits >> (8 * k) & 0xffu) << 24;
@@ -45,16 +45,16 @@ bool shows_carried(const Renderer& renderer, const ViewOptions& options) {
   if (renderer.carried.triangles.empty() || options.look != Look::surface || options.is_cut() ||
       options.colour == Colour::patch)
     return false;
-  GLint most = 0;  // texels: GL promises 65536
+  GLint most = 0;  // texels of a buffer texture, at least 65536
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
   return 3 * renderer.mesh.positions.size() <= std::size_t(most) && renderer.mesh.tets.size() <= std::size_t(most);
 }
 
-// A vertex on an edge has a normal for each side, and so becomes several.
+// A vertex on a sharp edge has a normal for each side, and so becomes several.
 void make_carried(Renderer& renderer) {
   const CarriedSurface& surface = renderer.carried;
-  const auto positions = carried_positions(surface, renderer.mesh.tets, renderer.mesh.positions);
   const auto& triangles = surface.triangles;
+  const auto positions = carried_positions(surface, renderer.mesh.tets, renderer.mesh.positions);
   struct Corner {
     glm::dvec3 normal;  // of the triangle
     double angle;
@@ -79,7 +79,7 @@ void make_carried(Renderer& renderer) {
       for (std::uint32_t j = around.first[v]; j < around.first[v + 1]; ++j)
         if (const Corner& other = corners[around.values[j]]; glm::dot(other.normal, corner.normal) >= edge_cosine)
           sum += other.normal * other.angle;
-      const glm::uvec4 vertex = packed(surface.vertices[v], sum);
+      const glm::uvec4 vertex = pack(surface.vertices[v], sum);
       const auto found = std::find(vertices.begin() + std::ptrdiff_t(own), vertices.end(), vertex);
       indices[around.values[i]] = std::uint32_t(found - vertices.begin());
       if (found == vertices.end()) vertices.push_back(vertex);
@@ -101,11 +101,9 @@ void draw_carried(Renderer& renderer, const Frame& frame, const Program& program
       {UNIT_TETS, GL_RGBA32UI, tet_buffer(renderer).id()},
       {UNIT_REST, GL_RGBA32F, rest_buffer(renderer).id()},
       {UNIT_COFACTORS, GL_RGBA32F, renderer.cofactors.values.id()},
-      {UNIT_VALUES, GL_R32F, values ? values : renderer.cofactors.values.id()}};  // some buffer there
-  for (std::size_t i = 0; i < std::size(buffers); ++i) {
-    const auto& [unit, format, buffer] = buffers[i];
-    attach(unit, renderer.carried_texels[i], format, buffer);
-  }
+      {UNIT_VALUES, GL_R32F, values ? values : renderer.cofactors.values.id()}};  // GL wants some buffer there
+  for (auto texture = renderer.carried_texels.begin(); const auto& [unit, format, buffer] : buffers)
+    attach(unit, *texture++, format, buffer);
   glActiveTexture(GL_TEXTURE0);
   glEnable(GL_CLIP_DISTANCE0);
   glBindVertexArray(renderer.carried_array.id());

@@ -1,15 +1,15 @@
-// Fine surfaces that ride on the tets (sim/mesh/carry.h), drawn in place of the tets' boundary.
+// Draws surfaces embedded in the tets (sim/mesh/carry.h) in place of the tets' boundary.
 #pragma once
 
 #include "render/renderer.h"
 
 namespace tetpbd {
 
-/// Whether this picture shows one: what shows triangles, cuts or numbers of what is simulated shows the tets.
+/// Whether a picture shows the embedded surface. Views of simulated triangles, cuts and patches show the tets instead.
 bool shows_carried(const Renderer& renderer, const ViewOptions& options);
-/// 16 bytes a vertex, and indices; when first asked for.
+/// Makes its buffers: 16 bytes a vertex, and indices.
 void make_carried(Renderer& renderer);
-/// With its program in use; its cofactors are behind a barrier.
+/// Draws it with `program` in use. `values` is a buffer of floats by vertex, or 0.
 void draw_carried(Renderer& renderer, const Frame& frame, const Program& program, GLuint values);
 
 }  // namespace tetpbd

@@ -1,4 +1,4 @@
-// What a picture is drawn of: a simulation as it stands.
+// Makes the frame of a picture from the present state of a simulation.
 #include "render/frame.h"
 
 #include <iterator>
@@ -9,8 +9,8 @@
 
 namespace tetpbd {
 
-// Vertices within 10^-5 of the size of an obstacle that is no half space (the GPU finds those on planes), as
-// metrics count them. Waits for the GPU.
+// Vertices that touch obstacles other than half spaces, for which the GPU finds them itself. As in metrics, they are
+// nearer than 10^-5 of the size. Waits for the GPU.
 static std::vector<std::uint32_t> find_touching(const Sim& sim) {
   auto obstacles = obstacles_at(*sim.model, sim.settings, simulated_time(sim));
   std::erase_if(obstacles, [](const MovingObstacle& o) { return o.kind->flat; });
@@ -28,7 +28,7 @@ static std::vector<std::uint32_t> find_touching(const Sim& sim) {
   return touching;
 }
 
-void renew(Frame& frame, const Sim& sim) {
+void update(Frame& frame, const Sim& sim) {
   frame.time = simulated_time(sim);
   frame.pairs = sim.pairs && sim.pairs.near ? &sim.pairs : nullptr;
   if (frame.options.contacts) frame.touching = find_touching(sim);
@@ -45,13 +45,13 @@ Frame make_frame(const Sim& sim, const Camera& camera, const ViewOptions& option
   frame.material = energy_material(sim.settings);
   frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
   frame.model = sim.model;
-  renew(frame, sim);
-  const auto held = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };
+  update(frame, sim);
+  const auto is_pinned = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };
   for (const Body& body : sim.model->bodies) {
     const auto vertices =
         std::views::iota(std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices));
-    if (!std::ranges::all_of(vertices, held))  // a body that stands fast as a whole needs no dots
-      std::ranges::copy_if(vertices, std::back_inserter(frame.pinned), held);
+    if (!std::ranges::all_of(vertices, is_pinned))  // a body that is pinned as a whole needs no dots
+      std::ranges::copy_if(vertices, std::back_inserter(frame.pinned), is_pinned);
   }
   frame.target = target.framebuffer.id();
   return frame;

@@ -1,4 +1,4 @@
-// shaders/render/layout.glsl as C++: the same text, so the two cannot drift apart.
+// shaders/render/layout.glsl as C++. It is the same text, so the two cannot drift apart.
 #pragma once
 
 #include <glm/glm.hpp>

@@ -21,7 +21,7 @@ using glm::clamp, glm::mix, glm::vec3, std::abs, std::cos, std::sin;
 
 constexpr ImU32 ink = IM_COL32(48, 51, 56, 255), paper = IM_COL32(249, 249, 249, 184);
 
-// Makes a context the current one for a while.
+// Makes a context the current one until the end of a scope.
 struct Current {
   ImGuiContext* before = ImGui::GetCurrentContext();
   explicit Current(ImGuiContext* context) { ImGui::SetCurrentContext(context); }
@@ -71,7 +71,7 @@ void set_font(ImFontAtlas& atlas, float size) {
   atlas.Clear();
   ImFontConfig config;
   config.FontDataOwnedByAtlas = false;
-  // The atlas reads it only, but takes no const.
+  // The atlas only reads the font, but its parameter is not const.
   atlas.AddFontFromMemoryTTF(const_cast<unsigned char*>(_binary_font_ttf_start),
                              int(_binary_font_ttf_end - _binary_font_ttf_start), size, &config);
 }
@@ -115,7 +115,7 @@ void draw_legend(Legend& legend, const Viewport& viewport, const ViewOptions& op
     ImGui_ImplOpenGL3_DestroyFontsTexture();
     ImGui_ImplOpenGL3_CreateFontsTexture();
   }
-  // Dear ImGui draws to a viewport at the framebuffer's lower left, from the top.
+  // Dear ImGui's viewport begins at the framebuffer's lower left, and its y runs down from the top.
   const ImVec2 low(float(viewport.x), 0), high(low.x + float(viewport.width), float(viewport.height));
   io.DisplaySize = ImVec2(high.x, high.y + float(viewport.y));
   ImGui_ImplOpenGL3_NewFrame();

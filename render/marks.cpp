@@ -12,11 +12,10 @@ namespace {
 
 constexpr glm::vec3 contact_colour(0.95f, 0.35f, 0.0f);
 
-// Pixels of marks of this size at 720 lines.
+// The size in pixels of a mark that has `size` in a picture of 720 lines.
 float scaled(const Frame& frame, float size) { return size * std::max(1.0f, float(frame.viewport.height) / 720.0f); }
 
-// Seen through the bodies, which hide where they stand. Vertices within 10^-5 of the size of the ground or a
-// wall, as metrics count them.
+// Dots on vertices within 10^-5 of the size of the ground or a wall, as in metrics, seen through the bodies.
 void draw_contacts(Renderer& renderer, const Frame& frame) {
   const Program& program = use(renderer, "contacts");
   program.set("colour", contact_colour);
@@ -28,26 +27,26 @@ void draw_contacts(Renderer& renderer, const Frame& frame) {
   glEnable(GL_DEPTH_TEST);
 }
 
-// Along which normals vertices and edges leave the bodies that they are in, redder as these are deeper, to a
-// thousandth of the size.
-void draw_touches(Renderer& renderer, const Frame& frame) {
+// Arrows at vertices and edges that are in another body, along the normal by which they leave it, and the redder the
+// deeper they are, up to a thousandth of the size.
+void draw_body_contacts(Renderer& renderer, const Frame& frame) {
   const Pairs& pairs = *frame.pairs;
   const float size = glm::length(renderer.rest_high - renderer.rest_low);
-  const std::size_t count = pairs.items, bytes = count * sizeof(TouchArrow);
-  if (renderer.touches.bytes() != bytes) renderer.touches = Buffer("arrows of contacts", bytes);
-  if (renderer.touches_sizes != pairs.sizes) {
+  const std::size_t count = pairs.items, bytes = count * sizeof(ContactArrow);
+  if (renderer.contact_arrows.bytes() != bytes) renderer.contact_arrows = Buffer("arrows of contacts", bytes);
+  if (renderer.contact_sizes != pairs.sizes) {
     renderer.passes["touches"] = {Program::compute("render/touches.comp", {}, pairs.sizes)};
-    renderer.touches_sizes = pairs.sizes;
+    renderer.contact_sizes = pairs.sizes;
   }
   Recorder& recorder = renderer.recorder;
-  recorder.give("Positions", frame.positions), recorder.give("Arrows", renderer.touches);
+  recorder.give("Positions", frame.positions), recorder.give("Arrows", renderer.contact_arrows);
   recorder.give("PairMesh", pairs.mesh), recorder.give("PairLists", pairs.lists);
   run_over(renderer, kernel(renderer, "touches"), count);
   recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
-  const GLuint arrows = renderer.touches.id();
-  attribute(ATTRIBUTE_HIGH, arrows, 3, sizeof(TouchArrow), offsetof(TouchArrow, from));
-  attribute(ATTRIBUTE_VALUE, arrows, 1, sizeof(TouchArrow), offsetof(TouchArrow, depth));
-  attribute(ATTRIBUTE_VELOCITY, arrows, 3, sizeof(TouchArrow), offsetof(TouchArrow, along));
+  const GLuint arrows = renderer.contact_arrows.id();
+  attribute(ATTRIBUTE_HIGH, arrows, 3, sizeof(ContactArrow), offsetof(ContactArrow, from));
+  attribute(ATTRIBUTE_VALUE, arrows, 1, sizeof(ContactArrow), offsetof(ContactArrow, depth));
+  attribute(ATTRIBUTE_VELOCITY, arrows, 3, sizeof(ContactArrow), offsetof(ContactArrow, along));
   for (const GLuint none : {ATTRIBUTE_LOW, ATTRIBUTE_REST}) attribute(none, 0, 1, 0, 0);
   const Program& program = use(renderer, "contact arrows");
   program.set("seconds", 0.04f * size);
@@ -61,9 +60,8 @@ void draw_touches(Renderer& renderer, const Frame& frame) {
   bind_vertices(renderer, frame);
 }
 
-// Of a few hundred vertices of the surface.
 void draw_arrows(Renderer& renderer, const Frame& frame) {
-  constexpr std::size_t about = 300;
+  constexpr std::size_t about = 300;  // arrows
   if (!renderer.arrow_vertices) {
     std::vector<std::uint32_t> vertices;
     for (const Triangle& triangle : renderer.mesh.surface)
@@ -97,7 +95,7 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
     const std::vector<GLsizei> ones(vertices.size(), 1);
     glMultiDrawArrays(GL_POINTS, first.data(), ones.data(), GLsizei(first.size()));
   };
-  batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers its own pin
+  batch(frame.grabbed, glm::vec3(0.90f, 0.32f, 0.02f), 12.0f);  // first, so that it covers the vertex's own pin
   batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_DEPTH_TEST);
   if (frame.options.contacts) batch(frame.touching, contact_colour, 7.0f);
@@ -113,7 +111,7 @@ void draw_marks(Renderer& renderer, const Frame& frame) {
   bind_vertices(renderer, frame);
   glEnable(GL_PROGRAM_POINT_SIZE);
   if (frame.options.contacts) draw_contacts(renderer, frame);
-  if (frame.options.contacts && frame.pairs) draw_touches(renderer, frame);
+  if (frame.options.contacts && frame.pairs) draw_body_contacts(renderer, frame);
   if (frame.options.arrows) draw_arrows(renderer, frame);
   draw_dots(renderer, frame);
   glDisable(GL_PROGRAM_POINT_SIZE);

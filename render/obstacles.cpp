@@ -16,7 +16,7 @@ bool looks_alike(const Obstacle& a, const Obstacle& b) {
          a.field == b.field && a.surface == b.surface;
 }
 
-// Made where obstacles are others than before: the window changes them.
+// Makes the surfaces anew if the obstacles have changed, as they may in the window.
 void make_surfaces(ObstacleSurfaces& surfaces, const Model& model) {
   if (std::ranges::equal(model.obstacles, surfaces.made_of, looks_alike)) return;
   std::vector<ObstacleCorner> corners;

@@ -1,4 +1,4 @@
-// Obstacles: surfaces to be drawn, and how far they reach.
+// Draws obstacles, and finds how far they reach.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -12,7 +12,7 @@ namespace tetpbd {
 struct Renderer;
 struct Frame;
 
-/// Of all obstacles in their own coordinates, made again when one is another.
+/// The surfaces of all obstacles in their own coordinates.
 struct ObstacleSurfaces {
   std::vector<Obstacle> made_of;
   std::vector<int> first;  ///< corner of each obstacle; one more at the end
@@ -20,13 +20,13 @@ struct ObstacleSurfaces {
   VertexArray array;
 };
 
-/// Of `box` and the obstacles at that time that have an extent, as far as these are within `reach` of it.
+/// The bounds of `box` and of obstacles of finite extent at a time (s), as far as these are within `reach` (m) of it.
 Bounds with_obstacles(const Bounds& box, const Model& model, double time, double reach);
-/// Whether there are others than half spaces.
+/// Whether there are obstacles other than half spaces.
 bool has_surfaces(const Frame& frame);
-/// The frame's ground and half spaces, n.x = w; the ground first.
+/// The frame's ground, if any, and then its half spaces, as planes n.x = w.
 std::vector<glm::vec4> find_planes(const Frame& frame);
-/// To the image or, with `shadow`, to the map.
+/// Draws to the image or, with `shadow`, to the shadow map.
 void draw_obstacles(Renderer& renderer, const Frame& frame, bool shadow);
 
 }  // namespace tetpbd

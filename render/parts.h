@@ -1,4 +1,4 @@
-// The parts of a picture, which renderer.cpp puts together.
+// The parts of a picture, which renderer.cpp draws together.
 #pragma once
 
 #include "render/carried.h"
@@ -6,20 +6,19 @@
 
 namespace tetpbd {
 
-/// The buffer of the values of this frame by vertex, found where they have to be, and their copy on its way
-/// back; 0 where there are none.
+/// The buffer of this frame's values by vertex, or 0 if it shows none; with `worst` also copies them for readback.
 GLuint find_values(Renderer& renderer, const Frame& frame);
-/// What a fine surface needs beside the positions.
+/// Finds the cofactors of the deformation gradients, by which the normals of an embedded surface turn.
 void fill_cofactors(Renderer& renderer, const Frame& frame);
-/// The surface, three corners a triangle.
+/// Finds the corners of the surface, three of each triangle.
 void fill_corners(Renderer& renderer, const Frame& frame, GLuint values);
-/// To the image or, with `shadow`, to the map.
+/// Draws to the image or, with `shadow`, to the shadow map.
 void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool shadow);
-/// The projection of the light, as far as something of this frame needs it, fitted by the GPU itself.
+/// Fits the light's projection to the bodies, on the GPU, if anything in this frame needs it.
 void fit_light(Renderer& renderer, const Frame& frame);
 void draw_shadow_map(Renderer& renderer, const Frame& frame, GLuint values);
 void bind_shadows(const Shadow& shadow);
-/// What light arrives on so many planes, as fine as the picture needs it.
+/// Finds the light that arrives on the first `count` planes, as finely as the picture needs it.
 void light_planes(Renderer& renderer, const Frame& frame, int count);
 
 }  // namespace tetpbd

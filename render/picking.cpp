@@ -9,23 +9,13 @@
 namespace tetpbd {
 
 namespace {
+
 constexpr std::uint32_t none = ~0u;
-}
 
-Picker make_picker(const TetMesh& mesh) {
-  Picker picker;
-  picker.kernel = {Program::compute("render/pick.comp")};
-  picker.triangles = Buffer("pick triangles", mesh.surface);
-  picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
-  return picker;
-}
-
-namespace {
-
-void ask(Picker& picker, Pass& pass, GLuint positions, const Buffer& elements, std::size_t count, const Ray& ray) {
+void start(Picker& picker, Pass& pass, GLuint positions, const Buffer& elements, std::size_t count, const Ray& ray) {
   picker.ray = ray;
-  const std::array<std::uint32_t, 3> start{none, none, none};
-  picker.result.write(0, sizeof start, start.data());
+  const std::array nothing{none, none, none};
+  picker.result.write(0, sizeof nothing, nothing.data());
   Recorder& recorder = picker.recorder;
   recorder.begin();
   const Program& kernel = recorder.use(pass.program);
@@ -40,14 +30,22 @@ void ask(Picker& picker, Pass& pass, GLuint positions, const Buffer& elements, s
     pass.work_groups = stage < 2 ? work_groups(count, 128) : 1;
     recorder.run(pass);
   }
-  picker.answered = Fence::here();
+  picker.requested = Fence::here();
 }
 
 }  // namespace
 
+Picker make_picker(const TetMesh& mesh) {
+  Picker picker;
+  picker.kernel = {Program::compute("render/pick.comp")};
+  picker.triangles = Buffer("pick triangles", mesh.surface);
+  picker.result = Buffer("pick result", 3 * sizeof(std::uint32_t), nullptr, GL_STREAM_READ);
+  return picker;
+}
+
 void request(Picker& picker, GLuint positions, const Ray& ray) {
   picker.inside = false;
-  ask(picker, picker.kernel, positions, picker.triangles, picker.triangles.bytes() / sizeof(Triangle), ray);
+  start(picker, picker.kernel, positions, picker.triangles, picker.triangles.bytes() / sizeof(Triangle), ray);
 }
 
 void request(Picker& picker, Renderer& renderer, const Frame& frame, const Ray& ray) {
@@ -56,15 +54,15 @@ void request(Picker& picker, Renderer& renderer, const Frame& frame, const Ray& 
   if (!picker.tets_kernel) picker.tets_kernel = {Program::compute("render/pick.comp", {}, {"TETS"})};
   bind_view(renderer, frame);
   picker.recorder.give("Rest", rest_buffer(renderer));
-  ask(picker, picker.tets_kernel, frame.positions, tet_buffer(renderer), renderer.mesh.tets.size(), ray);
+  start(picker, picker.tets_kernel, frame.positions, tet_buffer(renderer), renderer.mesh.tets.size(), ray);
 }
 
 std::optional<Pick> poll(Picker& picker, bool wait) {
-  const auto answer = poll_readback<std::uint32_t>(picker.answered, picker.result, "picking", wait);
-  if (!answer) return std::nullopt;
-  const std::uint32_t element = answer->at(1), vertex = answer->at(2);
+  const auto result = poll_readback<std::uint32_t>(picker.requested, picker.result, "picking", wait);
+  if (!result) return std::nullopt;
+  const std::uint32_t element = result->at(1), vertex = result->at(2);
   if (element == none) return Pick{.ray = picker.ray};
-  return Pick{true, picker.inside, element, vertex, std::bit_cast<float>(answer->at(0)), picker.ray};
+  return Pick{true, picker.inside, element, vertex, std::bit_cast<float>(result->at(0)), picker.ray};
 }
 
 }  // namespace tetpbd

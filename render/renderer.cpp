@@ -16,7 +16,7 @@ namespace tetpbd {
 
 namespace {
 
-/// Shader files, and what they define.
+/// The shader files of a program, and their defines.
 struct Recipe {
   std::vector<std::string> files, defines;
 };
@@ -53,13 +53,13 @@ Program compile(const std::string& name) {
   return Program(name, files, {}, defines);
 }
 
-// Turns the hue about the grey axis: clay, then teal, ochre, plum and so on, of like lightness.
-glm::vec3 turned(const glm::vec3& colour, float degrees) {
+// Turns a colour's hue about the grey axis, which keeps its lightness.
+glm::vec3 turn_hue(const glm::vec3& colour, float degrees) {
   const glm::mat3 turn(glm::rotate(glm::mat4(1.0f), glm::radians(degrees), glm::vec3(1.0f)));
   return glm::clamp(turn * colour, 0.02f, 1.0f);
 }
 
-// n.x <= w of what is shown of the rest shape.
+// The plane (n, w): only the part of the rest shape where n.x <= w is shown.
 glm::vec4 cut_plane(const Renderer& renderer, const ViewOptions& options) {
   const glm::vec3 n = options.cut_direction(), middle = 0.5f * (renderer.rest_low + renderer.rest_high);
   const float half = glm::dot(glm::abs(n), 0.5f * (renderer.rest_high - renderer.rest_low));
@@ -71,7 +71,7 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   View view{};
   const glm::mat4 seen = view_matrix(frame.camera);
   view.camera = projection_matrix(frame.camera, float(frame.viewport.width) / float(frame.viewport.height)) * seen;
-  // 55 degrees: the shipped meshes have folds of 50 that ought to look round, and would show as saw teeth.
+  // An edge is sharp from 55 degrees on: the shipped meshes have folds of 50 that ought to look round.
   view.eye = glm::vec4(eye(frame.camera), options.smooth_normals ? 0.574f : 2.0f);
   view.right = glm::vec4(seen[0][0], seen[1][0], seen[2][0], options.shadow ? 1.0f : 0.0f);
   view.colour = glm::vec4(float(options.colour), float(options.range().low), float(options.range().high),
@@ -87,7 +87,7 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   std::ranges::copy(planes, view.planes);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {
-    const glm::vec3 colour = glm::convertSRGBToLinear(turned(options.body_colour, turns[i % turns.size()]));
+    const glm::vec3 colour = glm::convertSRGBToLinear(turn_hue(options.body_colour, turns[i % turns.size()]));
     view.palette[i] = glm::vec4(colour, 1.0f) * (i < turns.size() ? 1.0f : 0.8f);
   }
   return view;
@@ -106,7 +106,7 @@ void draw_plane(Renderer& renderer, const Frame& frame, int number, const glm::v
   program.set("extent", wall ? 2.0f * rest_size : std::max(5.0f * frame.camera.distance, 4.0f * rest_size));
   program.set("opacity", behind ? 0.25f : wall ? 0.85f : 1.0f);
   program.set("grid", frame.options.grid ? 1.0f : 0.0f);
-  // What lies on the plane, or penetrates it a little, shall be neither flickering nor hidden from behind.
+  // Walls and planes seen from behind hide nothing, and bodies on a plane or slightly in it do not flicker.
   glDepthMask(behind || wall ? GL_FALSE : GL_TRUE);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(1.0f, 4.0f);
@@ -116,8 +116,8 @@ void draw_plane(Renderer& renderer, const Frame& frame, int number, const glm::v
   glDepthMask(GL_TRUE);
 }
 
-// The ground hides the background, and both are hidden by bodies drawn before. Walls, and a ground seen from
-// below, let what is behind them through.
+// The ground hides the background, and bodies drawn before hide both. Walls and a ground seen from below are
+// transparent. Leaves blending on.
 void draw_surroundings(Renderer& renderer, const Frame& frame) {
   const std::vector<glm::vec4> planes = find_planes(frame);
   const bool solid = frame.ground && !is_behind(planes[0], frame.camera);
@@ -132,9 +132,9 @@ void draw_surroundings(Renderer& renderer, const Frame& frame) {
   for (std::size_t i = solid; i < planes.size(); ++i) draw_plane(renderer, frame, int(i), planes[i]);
 }
 
-// However drawing ends, by a shader that does not compile, too.
-struct Afterwards {
-  ~Afterwards() {
+// Resets the GL state when drawing ends, also by the error of a shader that does not compile.
+struct ResetState {
+  ~ResetState() {
     for (GLenum what :
          {GL_BLEND, GL_DEPTH_TEST, GL_FRAMEBUFFER_SRGB, GL_SCISSOR_TEST, GL_POLYGON_OFFSET_FILL, GL_DEPTH_CLAMP})
       glDisable(what);
@@ -154,21 +154,22 @@ void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool sha
     glDrawElements(kind, GLsizei(indices.bytes() / sizeof(std::uint32_t)), GL_UNSIGNED_INT, nullptr);
   };
   const Look look = frame.options.look;
-  const bool cut = frame.options.is_cut(), graph = look == Look::graph && !shadow;
+  const bool cut = frame.options.is_cut(), graph = look == Look::graph && !shadow,
+             carried = shows_carried(renderer, frame.options);
   if (graph && !renderer.graph) renderer.graph = Buffer("graph indices", tet_edges(renderer.mesh));
   if (cut) glEnable(GL_CLIP_DISTANCE0);
-  if (graph) {  // all of it, mixed
+  if (graph) {  // blended, so that edges within a body show
     glEnable(GL_BLEND);
     glDepthMask(GL_FALSE);
     elements("graph", GL_LINES, renderer.graph);
     glDepthMask(GL_TRUE);
   } else if (look == Look::tets) {
     elements("tets", GL_LINES_ADJACENCY, tet_buffer(renderer));
-  } else if (shows_carried(renderer, frame.options)) {
+  } else if (carried) {
     draw_carried(renderer, frame, use(renderer, shadow ? "carried shadow" : "carried"), values);
   }
-  const bool own = look != Look::tets && !graph && !shows_carried(renderer, frame.options);
-  const auto all = glm::ivec2(0, 3 * renderer.mesh.surface.size());
+  const bool own = look != Look::tets && !graph && !carried;
+  const glm::ivec2 all(0, 3 * renderer.mesh.surface.size());
   const std::vector<glm::ivec2> parts = own ? std::vector{all} : renderer.sheets;
   if (!graph && !parts.empty()) {
     use(renderer, shadow ? "surface shadow" : "surface");
@@ -220,7 +221,7 @@ const Buffer& tet_buffer(Renderer& renderer) {
 const Buffer& rest_buffer(Renderer& renderer) {
   if (renderer.rest) return renderer.rest;
   std::vector<glm::vec4> rest;
-  std::size_t next = 1;  // body
+  std::size_t next = 1;  // the body after that of the vertex
   for (const glm::dvec3& p : renderer.mesh.positions) {
     while (next < renderer.bodies.size() && rest.size() >= renderer.bodies[next]) ++next;
     rest.emplace_back(glm::vec3(p), float(next - 1));
@@ -235,7 +236,7 @@ void bind_view(Renderer& renderer, const Frame& frame) {
   renderer.view.bind_uniform(BIND_RENDER_VIEW);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   fit_light(renderer, frame);
-  // Without a light the block is bound all the same, for GL wants some buffer there; its content is not read.
+  // GL wants some buffer in the block even if there is no light, in which case shaders do not read it.
   (renderer.shadow.light ? renderer.shadow.light : renderer.view).bind_uniform(BIND_RENDER_LIGHT);
 }
 
@@ -264,13 +265,15 @@ Renderer make_renderer(const Model& model) {
 
 void draw(Renderer& renderer, const Frame& frame) {
   if (frame.viewport.width < 1 || frame.viewport.height < 1) return;  // a minimised window
-  const Afterwards afterwards;
+  const ResetState reset;
   const ViewOptions& options = frame.options;
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
-  const int planes = options.backdrop && !frame.over ? int(find_planes(frame).size()) : 0;
-  const bool lit_planes = options.shadow && planes > 0, tets = options.look == Look::tets;
-  if (tets || options.look == Look::graph || options.is_cut() || renderer.bodies.size() > 1) rest_buffer(renderer);
+  const bool surroundings = options.backdrop && !frame.over;
+  const bool tets = options.look == Look::tets, graph = options.look == Look::graph;
+  const int planes = surroundings ? int(find_planes(frame).size()) : 0;
+  const bool lit_planes = options.shadow && planes > 0;
+  if (tets || graph || options.is_cut() || renderer.bodies.size() > 1) rest_buffer(renderer);
   bind_view(renderer, frame);
   const GLuint values = find_values(renderer, frame);
   const bool carried = shows_carried(renderer, options);
@@ -294,21 +297,17 @@ void draw(Renderer& renderer, const Frame& frame) {
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
-  const bool surroundings = options.backdrop && !frame.over, mixed = options.look == Look::graph;
   glDisable(GL_BLEND);
   if (!frame.over) draw_obstacles(renderer, frame, false);
-  if (surroundings && mixed) draw_surroundings(renderer, frame);
-  if (frame.opacity == 1)
-    glDisable(GL_BLEND);
-  else
-    glEnable(GL_BLEND);
-  if (frame.over) {  // behind what is there already in the same place, or the two would flicker
+  if (surroundings && graph) draw_surroundings(renderer, frame);
+  (frame.opacity == 1 ? glDisable : glEnable)(GL_BLEND);
+  if (frame.over) {  // behind the body drawn before in the same place, or the two would flicker
     glEnable(GL_POLYGON_OFFSET_FILL);
     glPolygonOffset(2.0f, 16.0f);
   }
   draw_bodies(renderer, frame, values, false);
   glDisable(GL_POLYGON_OFFSET_FILL);
-  if (surroundings && !mixed) draw_surroundings(renderer, frame);
+  if (surroundings && !graph) draw_surroundings(renderer, frame);
   glEnable(GL_BLEND);
   draw_marks(renderer, frame);
   if (!options.has_scale() && frame.caption.empty()) return;
@@ -321,7 +320,7 @@ void reload_shaders(Renderer& renderer) {
   for (const auto& [name, pass] : renderer.passes)
     if (recipes.contains(name)) fresh[name] = {compile(name)};
   renderer.passes = std::move(fresh);
-  renderer.touches_sizes.clear();
+  renderer.contact_sizes.clear();
 }
 
 }  // namespace tetpbd

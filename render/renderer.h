@@ -1,4 +1,4 @@
-// Draws bodies straight from the simulation's position buffer, plain or coloured by error.
+// Draws bodies straight from the simulation's position buffer, plain or coloured by a value.
 #pragma once
 
 #include <array>
@@ -17,32 +17,32 @@
 
 namespace tetpbd {
 
-/// What each vertex gathers, in fixed order: items[offsets[v] .. offsets[v + 1]); nothing where it has a
-/// value alone.
+/// Values that vertices gather from items[offsets[v]] .. items[offsets[v + 1]], in that order. There are no items
+/// where a value depends on its vertex alone.
 struct VertexGather {
   Buffer offsets, items;
-  Buffer values;  ///< a float by vertex; or all SurfaceCorner
+  Buffer values;  ///< floats by vertex, cofactors by vertex, or SurfaceCorner by corner
   explicit operator bool() const { return bool(values); }
 };
 
-/// The key light's depth image of bodies and obstacles, fitted to where they are by the GPU (no read-back).
+/// The key light and its depth image of bodies and obstacles, which the GPU fits to them without readback.
 struct Shadow {
-  int size = 0, depth_size = 0;  ///< texels a side, wanted and made
-  Buffer bounds, light;          ///< light: the uniform block
-  Buffer centre;                 ///< a copy of its `centre`, on its way back
+  int size = 0, depth_size = 0;  ///< texels a side, as needed and as `depth` has them
+  Buffer bounds, light;          ///< `light`: the uniform block
+  Buffer centre;                 ///< a copy of the light's `centre` for readback
   Fence centre_copied;
   Texture depth;
-  Texture planes;  ///< what light arrives on each: maps beside each other
+  Texture planes;  ///< the light that arrives on planes, in maps beside each other
   int planes_size = 0, planes_count = 0;
   Framebuffer framebuffer;
   Sampler compared, plain;
 };
 
-/// Only what was once asked for exists: buffers, programs, the shadow map.
+/// Buffers, programs and the shadow map are made when first needed.
 struct Renderer {
   TetMesh mesh;
   std::vector<std::size_t> bodies;  ///< the first vertex of each
-  std::vector<glm::ivec2> sheets;   ///< corners of triangles, the first and how many, of each that has no tets
+  std::vector<glm::ivec2> sheets;   ///< corners of triangles, the first and their number, of each body without tets
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
   std::map<std::string, Pass> passes;
   Recorder recorder;
@@ -50,17 +50,17 @@ struct Renderer {
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer graph;            ///< edges' vertices
-  Buffer arrow_vertices, touches;
-  std::vector<std::string> touches_sizes;  ///< ... these Pairs::sizes
+  Buffer arrow_vertices, contact_arrows;
+  std::vector<std::string> contact_sizes;  ///< Pairs::sizes for which `contact_arrows` was made
   Buffer rest;                             ///< vec4: rest position and body
-  CarriedSurface carried;                  ///< of all bodies, or empty
+  CarriedSurface carried;                  ///< embedded surface of all bodies, or empty
   Buffer carried_vertices, carried_triangles;
   VertexArray carried_array;
   std::array<Texture, 5> carried_texels;
-  VertexGather cofactors;  ///< of deformation gradients, by vertex: cofactors.comp
-  VertexGather corners;    ///< of the surface, three a triangle; values: corners.comp
+  VertexGather cofactors;  ///< cofactors of deformation gradients, by vertex (cofactors.comp)
+  VertexGather corners;    ///< corners of the surface, three of each triangle (corners.comp)
   std::map<Colour, VertexGather> values;
-  Buffer values_copy;  ///< on its way back
+  Buffer values_copy;  ///< for readback
   Fence values_copied;
   ObstacleSurfaces obstacles;
   Shadow shadow;
@@ -69,33 +69,33 @@ struct Renderer {
 
 Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies = {});
 Renderer make_renderer(const Model& model);
-/// Leaves framebuffer, viewport and scissor at the frame's; depth test, blending and sRGB encoding off.
+/// Draws a picture. Leaves framebuffer, viewport and scissor at the frame's, and depth test, blending and sRGB off.
 void draw(Renderer& renderer, const Frame& frame);
-/// Puts what shaders know of the view in place, without which nothing is drawn.
+/// Fills and binds the uniform blocks of the view and the light.
 void bind_view(Renderer& renderer, const Frame& frame);
-/// A vertex attribute of a buffer, or zeros where there is none.
+/// Sets a vertex attribute from a buffer, or to zeros if `buffer` is 0.
 void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset,
                GLenum type = GL_FLOAT);
-/// The vertex attributes of all but the surface; `values` by vertex, 0: none.
+/// Sets the vertex attributes of all but the surface; `values` is a buffer by vertex, or 0.
 void bind_vertices(Renderer& renderer, const Frame& frame, GLuint values = 0);
-/// The program or kernel of that name, made when first asked for, in use.
+/// Puts the program or kernel of that name in use, which is compiled when first needed.
 const Program& use(Renderer& renderer, const std::string& name);
 Pass& kernel(Renderer& renderer, const std::string& name);
-/// Dispatches a kernel over so many items, in work-groups of 128.
+/// Dispatches a kernel over `count` items, in work-groups of 128.
 void run_over(Renderer& renderer, Pass& pass, std::size_t count);
-/// The tetrahedra's vertices, rest positions with bodies: made when first asked for.
+/// The vertices of the tets, and the rest positions with bodies, made when first needed.
 const Buffer& tet_buffer(Renderer& renderer);
 const Buffer& rest_buffer(Renderer& renderer);
-/// The middle of the bodies' bounds in a frame drawn with `follow`, once, some frames later (`wait`: now).
+/// The centre of the bodies' bounds in a frame drawn with `follow`, once, some frames later; with `wait`, waits.
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);
-/// What colours show of each vertex, now; empty where they show nothing. Waits for the GPU.
+/// The present values by vertex that colours show; empty if they show none. Waits for the GPU.
 std::vector<float> read_values(Renderer& renderer, const Frame& frame);
-/// The values by vertex that a frame drawn with `worst` coloured, once, some frames later (`wait`: now).
+/// The values by vertex of a frame drawn with `worst`, once, some frames later; with `wait`, waits.
 std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait = false);
-/// How far vertices are from where `answers` has them, over `size` (m): both buffers of Position;
-/// `distances`, floats, is made.
-void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, double size, Buffer& distances);
-/// Compiles what is in use again. Throws Error and keeps the old ones if one does not compile.
+/// Fills `distances` (floats by vertex) with the distances of `positions` and `reference` over `size` (m). Both are
+/// buffers of Position.
+void measure_distances(Renderer& renderer, GLuint positions, GLuint reference, double size, Buffer& distances);
+/// Compiles all programs in use again. Throws Error and keeps the old ones if one does not compile.
 void reload_shaders(Renderer& renderer);
 
 }  // namespace tetpbd

@@ -1,4 +1,4 @@
-// The key light: its projection, its depth image, and what of it arrives on planes.
+// The key light: its projection, its depth image, and the light that arrives on planes.
 #include <cstddef>
 #include <tuple>
 #include <utility>
@@ -10,7 +10,7 @@ namespace tetpbd {
 
 namespace {
 
-// Farther from the bodies, in their size, obstacles play no part in the light.
+// Obstacles farther from the bodies than this, in their size, play no part in the light.
 constexpr float obstacle_reach = 3;
 
 void make_map(Shadow& shadow) {
@@ -60,7 +60,7 @@ void fit_light(Renderer& renderer, const Frame& frame) {
   program.set("obstacles_low", glm::vec3(obstacles.low));
   program.set("obstacles_high", glm::vec3(obstacles.high));
   program.set("reach", obstacle_reach * rest_size);
-  // Centre and radius of what is worth a shadow: a blown-up vertex must not take the whole map.
+  // The centre and radius of the region that the map may cover, so that one vertex far away does not spoil it.
   program.set("limit", glm::vec4(frame.camera.target, 4.0f * std::max(frame.camera.distance, rest_size)));
   Recorder& recorder = renderer.recorder;
   recorder.give("Positions", frame.positions);

@@ -11,19 +11,19 @@ namespace tetpbd {
 
 namespace {
 
-std::size_t bytes_of(int width, int height) { return std::size_t(width) * std::size_t(height) * 4; }
+std::size_t image_bytes(int width, int height) { return std::size_t(width) * std::size_t(height) * 4; }
 
-Renderbuffer storage(const char* label, const Target& target, int samples, GLenum format) {
+Renderbuffer make_storage(const char* label, const Target& target, int samples, GLenum format) {
   Renderbuffer buffer(label);
   clear_errors();
   glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, target.width, target.height);
   check_memory(fmt::format("image '{}', {}x{} with {} samples,", label, target.width, target.height, samples),
-               bytes_of(target.width, target.height) * std::size_t(std::max(samples, 1)));
+               image_bytes(target.width, target.height) * std::size_t(std::max(samples, 1)));
   return buffer;
 }
 
-Framebuffer framebuffer_of(const char* label, const Target& target, const Renderbuffer& colour,
-                           const Renderbuffer& depth) {
+Framebuffer make_framebuffer(const char* label, const Target& target, const Renderbuffer& colour,
+                             const Renderbuffer& depth) {
   Framebuffer framebuffer(label);
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour.id());
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth.id());
@@ -34,7 +34,7 @@ Framebuffer framebuffer_of(const char* label, const Target& target, const Render
   return framebuffer;
 }
 
-// The framebuffer to read from, after resolving samples where there are any.
+// Resolves samples, if there are any, and returns the framebuffer to read from.
 GLuint resolve(const Target& target) {
   if (!target.samples) return target.framebuffer.id();
   glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.id());
@@ -58,16 +58,15 @@ Target make_target(int width, int height, int samples) {
     throw Error("bad image size", fmt::format("{}x{}", width, height),
                 fmt::format("use 1 to {} pixels a side", largest));
   Target target;
-  target.width = width;
-  target.height = height;
+  target.width = width, target.height = height;
   samples = std::min({samples, int(most), 8});
   target.samples = samples < 2 ? 0 : int(std::bit_floor(unsigned(samples)));
-  target.colour = storage("target colour", target, target.samples, GL_SRGB8_ALPHA8);
-  target.depth = storage("target depth", target, target.samples, GL_DEPTH_COMPONENT32F);
-  target.framebuffer = framebuffer_of("target", target, target.colour, target.depth);
+  target.colour = make_storage("target colour", target, target.samples, GL_SRGB8_ALPHA8);
+  target.depth = make_storage("target depth", target, target.samples, GL_DEPTH_COMPONENT32F);
+  target.framebuffer = make_framebuffer("target", target, target.colour, target.depth);
   if (target.samples) {
-    target.resolved_colour = storage("target resolved colour", target, 0, GL_SRGB8_ALPHA8);
-    target.resolved = framebuffer_of("target resolved", target, target.resolved_colour, {});
+    target.resolved_colour = make_storage("target resolved colour", target, 0, GL_SRGB8_ALPHA8);
+    target.resolved = make_framebuffer("target resolved", target, target.resolved_colour, {});
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   return target;
@@ -90,7 +89,7 @@ void present(const Target& target, GLuint framebuffer, int x, int y) {
 }
 
 void ReadBack::push(const Target& target) {
-  Buffer pixels("frame read-back", bytes_of(target.width, target.height), nullptr, GL_STREAM_READ);
+  Buffer pixels("frame read-back", image_bytes(target.width, target.height), nullptr, GL_STREAM_READ);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, resolve(target));
   glBindBuffer(GL_PIXEL_PACK_BUFFER, pixels.id());
   glReadPixels(0, 0, target.width, target.height, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
@@ -104,8 +103,8 @@ std::optional<Image> ReadBack::poll(bool wait) {
   auto rows = poll_readback<std::uint8_t>(fence, pixels, "reading a frame back", wait);
   if (!rows) return std::nullopt;
   Image image{width, height, std::move(*rows)};
-  const auto row = [&](int y) { return image.rgba.begin() + std::ptrdiff_t(bytes_of(image.width, y)); };
-  for (int y = 0; y < image.height / 2; ++y)  // rows come bottom first
+  const auto row = [&](int y) { return image.rgba.begin() + std::ptrdiff_t(image_bytes(image.width, y)); };
+  for (int y = 0; y < image.height / 2; ++y)  // GL gives the bottom row first
     std::swap_ranges(row(y), row(y + 1), row(image.height - 1 - y));
   pending_.pop_front();
   return image;

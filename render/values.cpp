@@ -1,5 +1,5 @@
-// What is found for each vertex before a picture is drawn: values that colours show, cofactors of a fine
-// surface, corners of the surface.
+// Finds values by vertex before a picture is drawn: those that colours show, the cofactors of an embedded surface, and
+// the corners of the surface.
 #include <cstddef>
 
 #include "render/layout.h"
@@ -10,7 +10,7 @@ namespace tetpbd {
 
 namespace {
 
-// What the corners of elements gather: the other corners of each, in the order of `others`.
+// The items of a vertex are the other corners of each of its elements, in the order of `others`.
 template <std::size_t N>
 VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint32_t, N>>& elements,
                     const std::array<std::array<std::size_t, N - 1>, N>& others, const std::string& label,
@@ -25,18 +25,18 @@ VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint3
   return {Buffer(label + " offsets", grouped.first), Buffer(label + " items", items), Buffer(label, bytes)};
 }
 
-// Dispatches a kernel over all vertices; `values` by vertex. What it reads is behind a barrier.
+// Dispatches a kernel that fills `values` over all vertices. Its inputs are behind a barrier.
 void fill(Renderer& renderer, Pass& pass, GLuint positions, const Buffer& values) {
   renderer.recorder.give("Positions", positions);
-  renderer.recorder.give("Rest", renderer.rest);  // not all need it
+  renderer.recorder.give("Rest", renderer.rest);
   renderer.recorder.give("Values", values);
   run_over(renderer, pass, renderer.mesh.positions.size());
 }
 
-// The other corners of a tet, by corner; even permutations, which keep the sign of the volume.
+// The other corners of a tet, by corner, in even permutations, which keep the sign of the volume.
 constexpr std::array<std::array<std::size_t, 3>, 4> even{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
-// The name of the buffer of values, made when first asked for and filled by their program.
+// Fills a buffer of gathered values, made when first needed, and returns its name.
 GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, Pass& pass, const auto& make) {
   if (!values) values = make(renderer.mesh);
   renderer.recorder.give("Offsets", values.offsets), renderer.recorder.give("Items", values.items);
@@ -44,7 +44,7 @@ GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, Pa
   return values.values.id();
 }
 
-// Of the frame's colour; 0 where there are none.
+// Fills the values of the frame's colour and returns their buffer; 0 if there are none.
 GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   const Colour colour = frame.options.colour;
   if (colour == Colour::plain) return 0;
@@ -118,7 +118,7 @@ void fill_corners(Renderer& renderer, const Frame& frame, GLuint values) {
   pass.program.set("rested", rested ? 1 : 0);
   Recorder& recorder = renderer.recorder;
   recorder.give("Positions", frame.positions);
-  // What is not asked for is not read, but GL wants some buffer in every block.
+  // GL wants some buffer in every block, also in those that the kernel does not read.
   recorder.give("Rest", rested ? rest_buffer(renderer) : renderer.triangles);
   recorder.give("Values", values ? values : renderer.triangles.id());
   recorder.give("Triangles", renderer.triangles);
@@ -140,12 +140,12 @@ std::optional<std::vector<float>> poll_values(Renderer& renderer, bool wait) {
   return poll_readback<float>(renderer.values_copied, renderer.values_copy, "reading values", wait);
 }
 
-void measure_distances(Renderer& renderer, GLuint positions, GLuint answers, double size, Buffer& distances) {
+void measure_distances(Renderer& renderer, GLuint positions, GLuint reference, double size, Buffer& distances) {
   if (!distances) distances = Buffer("vertex values, motion", renderer.mesh.positions.size() * sizeof(float));
   renderer.recorder.begin();
   Pass& pass = kernel(renderer, "distances");
   pass.program.set("scale", float(1 / size));
-  renderer.recorder.give("Answers", answers);
+  renderer.recorder.give("Reference", reference);
   renderer.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // the step's positions
   fill(renderer, pass, positions, distances);
 }

@@ -1,10 +1,9 @@
-// Positions and velocities as unevaluated sums high + low. `precise` keeps the compiler from "simplifying" the errors
-// away.
+// Positions and velocities as unevaluated sums high + low. `precise` keeps the compiler from dropping rounding errors.
 struct DoubleSingle {
   vec3 high;
   vec3 low;
 };
-// a + b, renormalised: high is the float nearest to the sum (Knuth's two-sum, then a fast one).
+// a + b, normalised so that `high` is the float nearest to the sum (Knuth's two-sum, then a fast one).
 DoubleSingle add_double(DoubleSingle a, vec3 b) {
   precise vec3 s = a.high + b;
   precise vec3 t = s - a.high;
@@ -13,7 +12,7 @@ DoubleSingle add_double(DoubleSingle a, vec3 b) {
   precise vec3 low = e - (high - s);
   return DoubleSingle(high, low);
 }
-// a - b, rounded to float: exact to the last bit or two for neighbours.
+// a - b, rounded to float, for neighbours exact to the last bit or two.
 vec3 relative(Position a, Position b) {
   precise vec3 d = (a.high - b.high) + (a.low - b.low);
   return d;

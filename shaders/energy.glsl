@@ -1,8 +1,8 @@
-// Elastic energy of a tetrahedron with corners p, at rest r; compiled as GLSL and as C++.
+// The elastic energy of a tet, compiled as GLSL and as C++.
 float six_volumes(vec3 p[4]) { return dot(cross(p[1] - p[0], p[2] - p[0]), p[3] - p[0]); }
 
-// Elastic energy over the volume at rest, J/m^3. `material`: Lame's mu and lambda in Pa, then 1 for stable neo-Hookean
-// (method.md, "Materials"), 2 for springs; 0: there is none.
+// The elastic energy, J/m^3 at rest, of a tet with corners p, at rest r. `material` has Lame's mu and lambda in Pa,
+// then 1 for stable neo-Hookean (method.md, "Materials"), 2 for springs, or 0 for no energy.
 float tet_energy(vec3 p[4], vec3 r[4], vec4 material) {
   float J = six_volumes(p) / six_volumes(r);
   if (material.z == 2.0f) {

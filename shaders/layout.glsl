@@ -1,7 +1,7 @@
 // Buffer layouts and binding numbers, read by GLSL and by C++ (sim/gl/layout.h). Units are SI.
 //
-// A position is an unevaluated sum high + low of two floats a component (about 48 bits): what one float would drop of
-// a small h*v is kept (method.md, "What float drops").
+// A position is an unevaluated sum high + low of two floats a component (about 48 bits). It keeps the part of a small
+// h*v that one float would drop (method.md, "What float drops").
 struct Position {
   vec3 high;
   float inverse_mass;  // 1/kg; 0: fixed
@@ -14,7 +14,7 @@ struct Velocity {
   vec3 low;
   float _1;
 };
-// A constraint: its vertices and rest value (error measures; the solvers have streams or patches).
+// A constraint with its vertices and rest value, for error measures; the solvers have streams or patches.
 struct Record2 {
   uint vertices[2];
   float rest;
@@ -23,16 +23,16 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
-#define MAX_OBSTACLES 31  // of a step, the ground among them: bits of a word, beside one (newton/vectors.glsl)
-#define MAX_PLANES 8      // of them half spaces at rest that are no more than their planes
+#define MAX_OBSTACLES 31     // of a step, with the ground; each has a bit of a word in newton/layout.glsl
+#define MAX_PLANES 8         // half spaces at rest among them that have no properties of their own
 #define RIGID_SUMS 21
-#define RIGID_SPEED 1024.0  // m/s, the fastest that sums hold
-#define RIGID_PARTS 256.0  // of a quantum: of 2^23 vertices they do not overflow
-#define MOST_TOUCHES 16  // contacts of a hard body that carry it
-#define LEAST_HEALTH 0.1  // of a step of mode newton; an inverted tet: 0 (method.md, "Implicit steps")
-#define HEALTH_TURNING 0.05  // at most, where a part of a body turns further in a substep than ...
-#define TURN_LIMIT 0.15  // ... rad
-// Everything of a step that does not change within it (a uniform block, std140).
+#define RIGID_SPEED 1024.0   // m/s, the fastest velocity that sums can hold
+#define RIGID_PARTS 256.0    // parts of a quantum, of which sums over 2^23 vertices do not overflow
+#define MOST_TOUCHES 16      // contacts by which a hard body moves
+#define LEAST_HEALTH 0.1     // health below which mode newton takes shorter substeps (method.md, "Implicit steps")
+#define HEALTH_TURNING 0.05  // health at most where a part of a body turns further than TURN_LIMIT in a substep
+#define TURN_LIMIT 0.15      // rad
+// The constants of a step (a uniform block, std140).
 struct Step {
   vec3 gravity;             // m/s^2
   float h;                  // s, one substep
@@ -53,19 +53,20 @@ struct Step {
   float body_size;          // m, of the largest body at rest
   float restitution;        // of hard bodies
   float drag;               // 1/s, rate at which velocity decays (mode newton)
-  float kick;               // of a substep after longer or shorter ones: accelerations times this (mode explicit)
-  float turn_limit;         // rad; what turns further in a substep is noted (mode newton)
+  float kick;               // factor on accelerations in a substep after longer or shorter ones (mode explicit)
+  float turn_limit;         // rad; turning further in a substep lowers the health (mode newton)
   float _0;
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind
 };
 
-// Any other obstacle at the end of a substep (a uniform block, std140). Its own coordinates are from its centre.
+// An obstacle that is more than a plane, at the end of a substep (a uniform block, std140). Its coordinates have their
+// origin at its centre.
 struct ObstacleRecord {
   vec3 centre;
   int kind;         // the row of the table of kinds
-  vec3 centre_low;  // what `centre` drops
+  vec3 centre_low;  // the low part of `centre`
   float friction;
   vec3 right;       // its x axis
   float restitution;
@@ -74,30 +75,30 @@ struct ObstacleRecord {
   vec3 front;       // z
   float spacing;    // m, of a field's points (heights: the least)
   vec3 extent;      // half lengths along its axes
-  float trust;      // what is left of a distance where it may be too long (heights), 0 to 1
+  float trust;      // factor on distances that may be too long (heights), 0 to 1
   vec3 velocity;    // of the centre over the substep
   int first;        // of a field's values
   vec3 spin;        // rad/s
   int convex;       // 1: lies behind the plane at any nearest point
   vec3 origin;      // of a field's points
-  int own_friction; // 1: not the world's, which gives way to a body's
+  int own_friction; // 1: its own, 0: the world's, before which a body's has precedence
   ivec3 cells;      // points of a field along each axis
   int _0;
 };
 
-// A hard body that touches obstacles (contact/rigid.glsl). Momenta and impulses per mass of the body.
+// A hard body that touches obstacles (contact/rigid.glsl). Momenta and impulses are over the mass of the body.
 struct RigidSide {
   int sums[RIGID_SUMS];  // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and
                          // products; then what is finer than a quantum of velocity and arm x velocity
-  uint near;              // how many vertices would touch an obstacle next
+  uint near;              // number of vertices that would touch an obstacle in the next substep
   uint fixed_vertices;
-  uint carried;           // 1: all velocities are the body's in this substep
-  uint touching;          // how many contacts carried it
-  uint soon;              // 1: a vertex would be in a few substeps
+  uint carried;           // 1: in this substep the vertices move as a rigid body
+  uint touching;          // number of contacts by which it moved
+  uint soon;              // 1: a vertex would touch an obstacle in a few substeps
   uint _2, _3;
   vec3 origin;            // of arms
   uint summed;            // 1: there are sums on this side
-  vec3 velocity;          // where carried
+  vec3 velocity;          // m/s, of a rigid body
   float _0;
   vec3 angular;
   float _1;
@@ -112,8 +113,8 @@ struct RigidRecord {
   RigidSide sides[2];
 };
 
-// Guards: what a projection does where the plain formula has no answer or a harmful one (method.md, "Guards"). Bits, in
-// the order of their counters.
+// Guards of projections where the plain formula has no result or a harmful one (method.md, "Guards"), as bits in the
+// order of their counters.
 #define GUARD_DIRECTION 1u    // stretch: coincident vertices part along a pseudo-random direction
 #define GUARD_HINGE 2u        // bend: a wing on its edge has no angle: skipped
 #define GUARD_ANGLE 4u        // bend: the error was clamped to 1 rad
@@ -122,31 +123,28 @@ struct RigidRecord {
 #define GUARD_LIMIT 32u       // a correction was longer than the body: shortened
 #define GUARD_NOT_FINITE 64u  // a correction was not a number: dropped
 #define GUARDS 7
-// What is left out where a fixed size or a number of turns does not suffice: counters of the block Check, always
-// counted, for that costs nothing where it does.
+// Counters in the block Check of what is dropped where a fixed size or number of sweeps does not suffice.
 #define DROP_CONTACTS 0  // a hard body in a substep had more contacts than MOST_TOUCHES
 #define DROP_SWEEPS 1    // its impulses had not settled
 #define DROP_RANGE 2     // a vertex of it was beyond what sums hold
 #define DROPS 3
 
-// What a dispatch does (a dispatch parameter); bits.
+// The phases of a substep that a dispatch does (a dispatch parameter), as bits.
 #define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v
 #define PHASE_SOLVE 2u    // corrections, then contacts
 #define PHASE_SIDE 8u     // which side of hard bodies' records (contact/rigid.glsl)
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
-#define PHASE_WATCH 16u   // mode explicit: notes how stiff constraints are
+#define PHASE_WATCH 16u   // mode explicit: records the stiffness of constraints
 #define PHASE_CHANGED 32u // mode explicit: the substeps before were longer or shorter
-#define PHASE_TOUCHED 64u       // contacts of bodies corrected the substep before; it is not in yet
-#define PHASE_SHARED_SIDE 128u  // which numbers of contacts are of this substep (pairs/sums.glsl)
-#define PHASE_SHARED_LAST 256u  // the next look at contacts counts exactly, so these begin at 0 as well
+#define PHASE_TOUCHED 64u       // first applies the corrections that contact of bodies found after the last substep
+#define PHASE_SHARED_SIDE 128u  // the side of the contact counts that is this substep's (contact/bodies/sums.glsl)
+#define PHASE_SHARED_LAST 256u  // resets this side of the counts too, as the next ones are exact
 
-// Storage blocks have names alone: sim/gl/pass.h gives them binding points.
-// Uniform blocks.
+// Binding points of uniform blocks; storage blocks get theirs by name (sim/gl/pass.h).
 #define BIND_STEP 0
 #define BIND_OBSTACLES 1
-// Texture units of the simulation: the fields of all obstacles, one after the other.
-#define UNIT_FIELDS 15
-// The friction of each vertex, where bodies have their own.
-#define UNIT_FRICTION 14
-// Atomic counters.
+// Texture units of the simulation.
+#define UNIT_FIELDS 15    // the signed distance fields of all obstacles, one after the other
+#define UNIT_FRICTION 14  // the friction of each vertex, where bodies have their own
+// Binding points of atomic counters.
 #define BIND_GUARDS 0

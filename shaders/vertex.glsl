@@ -1,5 +1,5 @@
-// What happens to a vertex besides gathering corrections or forces. Whoever includes this file includes a scheme of
-// solvers/ that says how a vertex moves: corrections.glsl or leapfrog.glsl.
+// The motion of a vertex, apart from gathering its corrections or forces. A kernel that includes this file also
+// includes a scheme of solvers/, corrections.glsl or leapfrog.glsl, that defines move_vertex().
 #include "vertex_state.glsl"
 #include "contact/obstacles.glsl"
 
@@ -12,7 +12,7 @@ DoubleSingle predict_position(DoubleSingle x, DoubleSingle v) {
   return add_double(add_double(x, move), params.h * v.low);
 }
 // The inverse mass that constraints see. With mass splitting (Tonge et al. 2012) each of n_i constraints has 1/n_i of
-// the mass: the average over them then keeps momentum (method.md eq. 13m).
+// the mass, so that their average keeps momentum (method.md eq. 13m).
 float weight_of(Position own) {
   return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass;
 }
@@ -22,7 +22,8 @@ float weight_of(Position own) {
 #endif
 #if CONTACTS
 #include "contact/bodies/sums.glsl"
-// What contact with other bodies found after the last substep: where it stops the vertex, its velocity changes as well.
+// Applies the corrections of contact with other bodies after the last substep. Those that stop the vertex also change
+// its velocity.
 void apply_contacts(uint i, inout Position own, inout Velocity speed) {
   uint side = (phases & PHASE_SHARED_SIDE) != 0u ? 1u : 0u, now = shared_at(i, side), then = shared_at(i, 1u - side);
   int shared_now = sharing[now], shared_then = sharing[then];
@@ -42,11 +43,10 @@ void apply_contacts(uint i, inout Position own, inout Velocity speed) {
 }
 #endif
 
-// Moves vertex i, which is not fixed; returns where its neighbours see it.
+// Moves vertex i, which is not fixed, and returns the position that its neighbours see.
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction);
 
-// Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases
-// predict or finish.
+// Reads and writes vertex i alone. `own`: its position; `speed`: its velocity, read if the phases predict or finish.
 void advance(uint i, Position own, Velocity speed, vec3 correction) {
 #if CONTACTS
   if ((phases & PHASE_TOUCHED) != 0u) apply_contacts(i, own, speed);

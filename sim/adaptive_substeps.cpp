@@ -8,27 +8,27 @@
 namespace tetpbd {
 
 std::optional<std::vector<float>> poll_notes(Sim& sim) {
-  AdaptiveSubsteps& w = sim.adaptive;
-  const auto answer = poll_readback<float>(w.requested, w.readback, "watching the solver", true);
-  sim.check.words.copy_to(w.readback, 0, 8, 8);
-  w.nothing.copy_to(sim.check.words, 8, 0, 8);
-  w.requested = Fence::here();
-  return answer;
+  AdaptiveSubsteps& a = sim.adaptive;
+  const auto values = poll_readback<float>(a.requested, a.readback, "watching the solver", true);
+  sim.check.words.copy_to(a.readback, 0, 8, 8);
+  a.nothing.copy_to(sim.check.words, 8, 0, 8);
+  a.requested = Fence::here();
+  return values;
 }
 
 bool poll_convergence(Sim& sim) {
-  AdaptiveSubsteps& w = sim.adaptive;
-  const auto answer = poll_notes(sim);
-  if (!answer) return false;
-  w.residual = (*answer)[0], w.health = (*answer)[1];
-  w.largest_residual = std::max(w.largest_residual, w.residual);
-  w.least_health = std::min(w.least_health, w.health);
+  AdaptiveSubsteps& a = sim.adaptive;
+  const auto values = poll_notes(sim);
+  if (!values) return false;
+  a.residual = (*values)[0], a.health = (*values)[1];
+  a.largest_residual = std::max(a.largest_residual, a.residual);
+  a.least_health = std::min(a.least_health, a.health);
   return true;
 }
 
 const AdaptiveSubsteps& adaptive_values(Sim& sim) {
   const KeepBindings kept;
-  if (solver_mode(sim.settings).implicit)  // the answer that is under way, then of what came since
+  if (solver_mode(sim.settings).implicit)  // first what was requested before, then what steps recorded since
     for (int turn = 0; turn < 2; ++turn) poll_convergence(sim);
   return sim.adaptive;
 }
@@ -38,11 +38,11 @@ void forget_readbacks(Sim& sim) {
   if (sim.adaptive.readback) sim.adaptive.nothing.copy_to(sim.check.words, 8, 0, 8);
 }
 
-void add_carried(Carried& all, AdaptiveSubsteps& watch, const Buffer& words) {
-  if (!watch.readback) return;
-  all.add(watch.readback), all.ranges.push_back({&words, 8, 8});
-  all.add_values(static_cast<AdaptiveValues&>(watch));
-  all.add_readback(watch.requested);
+void add_carried(Carried& all, AdaptiveSubsteps& adaptive, const Buffer& words) {
+  if (!adaptive.readback) return;
+  all.add(adaptive.readback), all.ranges.push_back({&words, 8, 8});
+  all.add_values(static_cast<AdaptiveValues&>(adaptive));
+  all.add_readback(adaptive.requested);
 }
 
 }  // namespace tetpbd

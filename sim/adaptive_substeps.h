@@ -1,5 +1,5 @@
-// What the kernels of modes explicit and newton note of a step, which decides how many substeps the next ones
-// take; the answer comes back some steps later, always as many, so that a run is the same every time.
+// What decides how many substeps the next steps of modes explicit and newton take. Kernels record it during a step,
+// and the CPU reads it back always the same number of steps later, so that a run is the same every time.
 #pragma once
 
 #include <optional>
@@ -12,50 +12,50 @@ namespace tetpbd {
 struct Sim;
 
 struct AdaptiveValues {
-  // Mode explicit.
-  double at_rest = 0;      ///< 1/s^2, the stiffest constraint there; 0: not in mode explicit
-  double stiffening = 1;   ///< by how much shorter than at rest a substep is, because the body is stiffer
-  double stiffer = 1;      ///< than at rest, by the last answer
-  int calm_readbacks = 0;  ///< answers in a row that asked for longer substeps
-  bool changed = false;    ///< substeps are others than in the last step
-  int most_substeps = 0;   ///< of a step, since the start
-  double noted_h = 0;      ///< s, the substep that the answer was noted in
+  // Mode explicit; `calm_readbacks` and `most_substeps` of both.
+  double at_rest = 0;      ///< 1/s^2, of the stiffest constraint at rest (method.md eq. 39b); 0 in other modes
+  double stiffening = 1;   ///< how many times shorter a substep is than at rest, because the body is stiffer
+  double stiffer = 1;      ///< how many times `at_rest` the stiffest constraint was at the last readback
+  int calm_readbacks = 0;  ///< readbacks in a row after which fewer substeps would do
+  bool changed = false;    ///< the number of substeps is not that of the last step
+  int most_substeps = 0;   ///< of any step since the start
+  double noted_h = 0;      ///< s, the length of a substep when values were last requested
 
-  // Mode newton: the residual before the last iteration over that of Newton's start, and the length of the
-  // first step of conjugate gradients, which is near 1 where the second level knows the body, small where it
-  // is left out, and taken for 0 where a tet is inverted and for 0.05 where a part of a body turns by more
-  // than 0.15 rad in a substep of the settings; the last answer, and the worst since the start.
-  double residual = 0, largest_residual = 0, health = 1, least_health = 1;
-  int substep_factor = 1;     ///< substeps for each one of the settings
-  int refined_readbacks = 0;  ///< answers since they are more; too many: it does not help
+  // Mode newton: the residual before the last iteration over that at Newton's start, and the length of the first step
+  // of conjugate gradients: near 1 where the coarse level represents the body, small where it is missing. It counts
+  // as 0 where a tet is inverted, as 0.05 where a part of a body turns by over 0.15 rad in a substep of the settings.
+  double residual = 0, largest_residual = 0;  ///< at the last readback, and the largest since the start
+  double health = 1, least_health = 1;        ///< the length of that first step, and the least since the start
+  int substep_factor = 1;                     ///< substeps for each one of the settings
+  int refined_readbacks = 0;                  ///< readbacks since there are more, to notice that they do not help
 };
 
-constexpr int refined_substeps = 4;  ///< as many substeps
+constexpr int refined_substeps = 4;  ///< the larger `substep_factor`
 
 /// Part of a Sim (sim.h), whose solver keeps it up to date.
 struct AdaptiveSubsteps : AdaptiveValues {
-  static constexpr long every = 2;  ///< steps: from one question to the next, which brings its answer
-  Buffer readback, nothing;         ///< of words of the kernels' block (vertex_state.glsl)
+  static constexpr long every = 2;  ///< steps from one request to the next, which reads the last one back
+  Buffer readback, nothing;         ///< two values of the kernels' block Check (vertex_state.glsl), and their start
   Fence requested;
-  AdaptiveSubsteps& operator=(const AdaptiveValues& numbers) {
-    return static_cast<AdaptiveValues&>(*this) = numbers, *this;
+  AdaptiveSubsteps& operator=(const AdaptiveValues& values) {
+    return static_cast<AdaptiveValues&>(*this) = values, *this;
   }
 };
 
-/// What kernels noted since it was last asked, and asks again; none the first time.
+/// Reads back what kernels recorded up to the last request, if there was one, and requests the next.
 std::optional<std::vector<float>> poll_notes(Sim& sim);
-/// The same in mode newton; whether there was an answer.
+/// The same in mode newton, into `adaptive`; whether anything was read back.
 bool poll_convergence(Sim& sim);
 /// As of the last step. Waits.
 const AdaptiveSubsteps& adaptive_values(Sim& sim);
-/// What kernels noted of other settings or another state.
+/// Drops what kernels recorded with other settings or from another state.
 void forget_readbacks(Sim& sim);
-/// `words`: the kernels' block that holds what they noted.
-void add_carried(Carried& all, AdaptiveSubsteps& watch, const Buffer& words);
+/// `words`: the kernels' block Check.
+void add_carried(Carried& all, AdaptiveSubsteps& adaptive, const Buffer& words);
 
-/// By how much shorter a substep is, of `stability` times the longest stable at rest, where the stiffest
-/// constraint is `stiffer` times as stiff as at rest: enough to stay within 0.7 of what is stable, in steps
-/// of a quarter of an octave, at most 32.
+/// How many times shorter than at rest a substep has to be where the stiffest constraint is `stiffer` times as stiff.
+/// A substep at rest is `stability` times the longest stable one; the result keeps it within 0.7 of what is stable,
+/// in steps of a quarter of an octave, at most 32.
 double stiffening_for(double stiffer, double stability);
 
 }  // namespace tetpbd

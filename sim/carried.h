@@ -1,5 +1,5 @@
-// What a step hands on to the next. Each owner names its ranges of buffers and one plain struct; snapshots,
-// checkpoints and the timeline copy what that list names and know of nothing else.
+// The carried state: what a step leaves for the next. Each owner names its ranges of buffers and one plain struct;
+// snapshots, checkpoints and the timeline copy what that list names and know of nothing else.
 #pragma once
 
 #include <cstddef>
@@ -20,11 +20,11 @@ struct CarriedRange {
   std::size_t first, bytes;
 };
 
-/// In a GPU mode; a CPU mode carries its State.
+/// Of a GPU mode; a CPU mode carries its State.
 struct Carried {
   std::vector<CarriedRange> ranges;                ///< positions and velocities first
   std::vector<std::span<std::byte>> values;        ///< of plain structs
-  std::vector<std::pair<Fence*, bool>> readbacks;  ///< of buffers among the ranges; whether one is under way
+  std::vector<std::pair<Fence*, bool>> readbacks;  ///< into buffers among the ranges; whether one is under way
   /// All of a buffer.
   void add(const Buffer& buffer) { ranges.push_back({&buffer, 0, buffer.bytes()}); }
   template <class Values>
@@ -35,15 +35,15 @@ struct Carried {
   void add_readback(Fence& fence) { readbacks.emplace_back(&fence, bool(fence)); }
 };
 
-/// When it was at a step; time runs on from there by dt.
+/// A step and when it was; from there on each step takes dt.
 struct TimeOrigin {
   long step = 0;
   double time = 0;  ///< s
 };
 
-/// The numbers of a Sim itself that a step hands on.
+/// The values that a Sim itself carries.
 struct StepValues {
-  long steps = 0;             ///< taken since the start
+  long steps = 0;             ///< since the start
   TimeOrigin origin;          ///< ask simulated_time()
   double quantum = 1;         ///< m, of quantized positions
   bool needs_predict = true;  ///< the quantized positions are not those of the next step
@@ -57,14 +57,14 @@ struct NonFinite {
   std::uint32_t vertex = 0;
 };
 
-/// All that a step hands on, copied: whoever goes back to it goes on with the same bits. What lies in buffers
-/// was copied to one that the owner of the snapshot keeps.
+/// A copy of the carried state: steps after going back to it give the same bits. The ranges of buffers are copied to
+/// a buffer that the owner of the snapshot keeps.
 struct Snapshot {
-  Settings settings;  ///< as asked
+  Settings settings;  ///< as the user gave them
   Plan plan;
   StepValues step;
   std::vector<std::byte> values{};  ///< those of Carried, one after the other
-  std::vector<bool> readbacks{};    ///< under way
+  std::vector<bool> readbacks{};    ///< whether each was under way
   std::optional<NonFinite> found{};
   std::optional<State> host{};  ///< of a CPU mode
   std::size_t at = 0;           ///< first byte in the buffer

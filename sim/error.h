@@ -1,4 +1,4 @@
-// Errors a user can cause or mend: one line "WHAT: WHERE: MEND", printed by main as "tetpbd: ...".
+// Errors that a user can cause or repair: one line "WHAT: WHERE: REPAIR", which main prints after "tetpbd: ".
 #pragma once
 
 #include <stdexcept>
@@ -13,10 +13,10 @@ inline std::string printable(std::string text) {
   return text;
 }
 
-/// Exit status 2: bad input or usage; 1: it ran and something failed.
+/// Exit status 2: bad input or usage; 1: the program ran and something failed.
 struct Error : std::runtime_error {
-  Error(const std::string& what, const std::string& where, const std::string& mend, int status = 2)
-      : std::runtime_error(part(what) + ": " + part(where) + ": " + part(mend)), exit_status(status) {}
+  Error(const std::string& what, const std::string& where, const std::string& repair, int status = 2)
+      : std::runtime_error(part(what) + ": " + part(where) + ": " + part(repair)), exit_status(status) {}
   int exit_status;
 
  private:
@@ -26,7 +26,7 @@ struct Error : std::runtime_error {
   }
 };
 
-/// The GPU was reset and everything on it is lost: nothing but ending the program is left.
+/// The GPU was reset and everything on it is lost, so the program can only end.
 struct ContextLost : Error {
   using Error::Error;
 };

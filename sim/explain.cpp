@@ -7,56 +7,32 @@
 
 namespace tetpbd {
 
-namespace {
-
-// The second of two steps, because only the first after a change from outside predicts; then all is as it
-// was.
-void count_step(Sim& sim) {
-  const Buffer kept("explained", snapshot_bytes(sim));
-  const Snapshot before = take_snapshot(sim, kept, 0);
-  step(sim);
-  sim.recorder.counting = true;
-  step(sim);
-  sim.recorder.counting = false;
-  restore_snapshot(sim, before, kept);
-}
-
-}  // namespace
-
 Explanation explain(Sim& sim, int timed_steps) {
   const KeepBindings kept;
-  Pairs& p = sim.pairs;
+  const Pairs& p = sim.pairs;
   Explanation result;
   const auto add = [&](const Buffer& buffer) {
     if (!buffer) return;
     result.buffers.push_back({buffer.label(), buffer.bytes()});
     result.bytes += buffer.bytes();
   };
-  for (const Buffer* buffer : {&sim.positions,
-                               &sim.velocities,
-                               &sim.predicted,
-                               &sim.quantized[0],
-                               &sim.quantized[1],
-                               &sim.step_block,
-                               &sim.guard_counts,
-                               &sim.check.words,
-                               &sim.check.read_back,
-                               &sim.check.checkpoint,
-                               &sim.rigid_bodies,
-                               &sim.obstacles.records,
-                               &sim.obstacles.fields,
-                               &p.mesh,
-                               &p.rest,
-                               &p.spheres,
-                               &p.lists,
-                               &p.sums,
-                               &p.empty,
-                               &p.readback})
-    add(*buffer);
+  const auto add_all = [&](const auto&... buffers) { (add(buffers), ...); };
+  add_all(sim.positions, sim.velocities, sim.predicted, sim.quantized[0], sim.quantized[1], sim.step_block,
+          sim.guard_counts, sim.check.words, sim.check.read_back, sim.check.checkpoint, sim.rigid_bodies,
+          sim.obstacles.records, sim.obstacles.fields, p.mesh, p.rest, p.spheres, p.lists, p.sums, p.empty, p.readback);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 
-  if (timed_steps == 0) count_step(sim);
+  if (timed_steps == 0) {
+    // The second of two steps is counted, because only the first after a change from outside predicts.
+    const Buffer stored("explained", snapshot_bytes(sim));
+    const Snapshot before = take_snapshot(sim, stored, 0);
+    step(sim);
+    sim.recorder.counting = true;
+    step(sim);
+    sim.recorder.counting = false;
+    restore_snapshot(sim, before, stored);
+  }
   const double steps = std::max(timed_steps, 1);
   for (DispatchCount& counted : sim.recorder.counted) {
     double sum = 0;

@@ -11,7 +11,7 @@
 namespace tetpbd {
 namespace fs = std::filesystem;
 
-// The extension stays: programs choose formats by it.
+// The extension stays, because programs choose formats by it.
 PartFile::PartFile(const fs::path& name)
     : file(name),
       part(name.parent_path() /

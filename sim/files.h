@@ -7,7 +7,7 @@
 
 namespace tetpbd {
 
-/// What is written as `part` becomes `file` by finish(); without it, it is removed.
+/// finish() renames `part` to `file`; the destructor removes a `part` that is left.
 struct PartFile {
   std::filesystem::path file, part;
   explicit PartFile(const std::filesystem::path& name);
@@ -17,12 +17,12 @@ struct PartFile {
   void finish() const;  ///< throws Error (status 1)
 };
 
-/// Text that is written as it comes; the file appears when close() has succeeded. Both throw Error.
+/// Text that is written bit by bit; the file appears when close() has succeeded. All functions throw Error.
 class GrowingFile {
  public:
   explicit GrowingFile(const std::filesystem::path& file);
   void add(const std::string& text);
-  void overwrite_start(const std::string& text);  ///< what is known at the end only
+  void overwrite_start(const std::string& text);  ///< for what is known only at the end
   void close();
 
  private:

@@ -17,29 +17,32 @@ Error error_of(const NonFinite& found, const std::string& where) {
                "use a smaller dt, more substeps or a lower stiffness", 1);
 }
 
-void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only) {
+void copy_ranges(FiniteCheck& check, const std::vector<CarriedRange>& ranges, const Buffer& to, std::size_t at,
+                 bool good_only) {
   Recorder& recorder = check.recorder;
   recorder.begin();
   recorder.give("Check", check.words);
-  // Only the part, for together they may be larger than a block; from where GL lets any block begin.
+  // Only the range is bound, because a whole buffer may be larger than a block may be. GL lets every block begin at
+  // multiples of 256 bytes.
   const auto give = [&](const char* block, const Buffer& buffer, std::size_t first, std::size_t bytes) {
     const std::size_t before = first % 256;
     recorder.give(block, buffer.id(), first - before, before + bytes);
     return unsigned(before / 4);
   };
-  for (const auto& [from, first, to, at, bytes] : parts) {
+  for (const auto& [from, first, bytes] : ranges) {
     const unsigned words = unsigned(bytes / 4);
-    const unsigned from_at = give("From", *from, first, bytes), to_at = give("To", *to, at, bytes);
+    const unsigned from_at = give("From", *from, first, bytes), to_at = give("To", to, at, bytes);
     check.copy.work_groups = std::min<std::size_t>(work_groups(words, 256), 1024);
     recorder.run(check.copy,
                  {{"count", words}, {"from_at", from_at}, {"to_at", to_at}, {"good_only", unsigned(good_only)}});
+    at += bytes;
   }
   recorder.barrier(GL_BUFFER_UPDATE_BARRIER_BIT);  // restoring reads what was written
 }
 
 namespace {
 
-// As floats, which is what the GPU and all files get.
+// Values are tested as floats, because the GPU and files get those.
 std::optional<NonFinite> non_finite(const State& state, long step) {
   const auto finite = [](const glm::dvec3& v) {
     return std::isfinite(float(v.x)) && std::isfinite(float(v.y)) && std::isfinite(float(v.z));
@@ -49,18 +52,18 @@ std::optional<NonFinite> non_finite(const State& state, long step) {
   return std::nullopt;
 }
 
-// On the GPU unless it has seen a vertex that was not finite.
+// The GPU drops the copy if it has seen a vertex that was not finite.
 void keep_checkpoint(Sim& sim) {
   FiniteCheck& check = sim.check;
   const std::size_t bytes = snapshot_bytes(sim);
   if (check.checkpoint.bytes() != bytes) check.checkpoint = Buffer("checkpoint", bytes);
   check.kept.push_back(take_snapshot(sim, check.checkpoint, 0, true));
-  // The CPU is at most two questions ahead of what it knows.
-  constexpr std::size_t most = 2 + 2 * FiniteCheck::ask_every / FiniteCheck::checkpoint_every;
+  // The CPU is at most two requests ahead of what it knows.
+  constexpr std::size_t most = 2 + 2 * FiniteCheck::request_every / FiniteCheck::checkpoint_every;
   if (check.kept.size() > most) check.kept.pop_front();
 }
 
-// Since the checkpoint others may have been pinned.
+// Vertices may have been pinned or unpinned since the checkpoint.
 void restore_pins(Sim& sim) {
   const auto positions = sim.positions.read_all<Position>();
   VertexList pinned, unpinned;
@@ -72,22 +75,21 @@ void restore_pins(Sim& sim) {
   pin(sim, pinned), unpin(sim, unpinned);
 }
 
-void take_answer(FiniteCheck& check, bool wait) {
-  const auto answer =
+void poll_check(FiniteCheck& check, bool wait) {
+  const auto values =
       poll_readback<std::uint32_t>(check.requested, check.read_back, "checking for numbers that are not finite", wait);
-  if (!answer) return;
-  const std::uint32_t step = (*answer)[0], vertex = (*answer)[1];
-  if (step != ~0u) check.found = {long(step), vertex};
-  check.known = check.asked_step;
+  if (!values) return;
+  if (const std::uint32_t step = (*values)[0]; step != ~0u) check.found = {long(step), (*values)[1]};
+  check.known = check.requested_step;
 }
 
-// Asks the GPU about the steps so far, unless a question is under way.
-void ask(Sim& sim) {
+// Requests a readback about the steps so far, unless one is under way.
+void request_check(Sim& sim) {
   FiniteCheck& check = sim.check;
   if (check.found || check.requested || check.known >= sim.steps) return;
   check.words.copy_to(check.read_back, 0, 0, check.read_back.bytes());
   check.requested = Fence::here();
-  check.asked_step = sim.steps;
+  check.requested_step = sim.steps;
 }
 
 }  // namespace
@@ -95,7 +97,7 @@ void ask(Sim& sim) {
 void start_check(Sim& sim, const State* given) {
   FiniteCheck& check = sim.check;
   check.requested = {};
-  check.first = check.known = sim.steps;
+  check.known = sim.steps;
   check.found = given ? non_finite(*given, sim.steps) : std::nullopt;
   check.kept.clear();
   if (!on_cpu(sim)) check.words.write(0, 8, std::array{~0u, ~0u}.data());
@@ -107,10 +109,10 @@ void check_step(Sim& sim) {
   if (check.found) return;
   if (on_cpu(sim)) {
     check.found = non_finite(sim.host, sim.steps);
-  } else if (sim.steps % FiniteCheck::ask_every == 0) {
+  } else if (sim.steps % FiniteCheck::request_every == 0) {
     check_context();
-    take_answer(check, true);  // the CPU is never further ahead than two questions
-    ask(sim);
+    poll_check(check, true);  // waits, so that the CPU is never more than two requests ahead
+    request_check(sim);
   }
   if (!check.found && sim.steps % FiniteCheck::checkpoint_every == 0) keep_checkpoint(sim);
 }
@@ -120,20 +122,20 @@ const std::optional<NonFinite>& check_finite(Sim& sim, bool wait) {
   if (check.found || on_cpu(sim)) return check.found;
   const KeepBindings kept;
   check_context();
-  take_answer(check, wait);
-  ask(sim);
-  if (wait) take_answer(check, true);
+  poll_check(check, wait);
+  request_check(sim);
+  if (wait) poll_check(check, true);
   return check.found;
 }
 
 bool restore_checkpoint(Sim& sim) {
   FiniteCheck& check = sim.check;
-  if (!check.found || check.found->step == check.first) return false;
+  if (!check.found) return false;
   const auto after =
       std::ranges::find_if(check.kept, [&](const Snapshot& kept) { return kept.step.steps >= check.found->step; });
-  if (after == check.kept.begin()) return false;
+  if (after == check.kept.begin()) return false;  // none is older, or none was kept because the start is not finite
   const KeepBindings kept;
-  // Both are made anew while it is gone back to.
+  // Copies, because restoring starts the check anew.
   const Snapshot then = *std::prev(after);
   const Buffer from = std::exchange(check.checkpoint, {});
   restore_snapshot(sim, then, from);

@@ -1,6 +1,5 @@
-// Whether a simulation is still made of numbers. The last kernel of a step notes the first vertex that is not
-// finite (shaders/vertex_state.glsl); the answer comes back late. The last good state is kept as a
-// checkpoint.
+// Whether the state is still finite. The last kernel of a step records the first vertex that is not
+// (shaders/vertex_state.glsl), which the CPU reads back some steps later. The last good state is kept as a checkpoint.
 #pragma once
 
 #include <deque>
@@ -13,32 +12,26 @@
 
 namespace tetpbd {
 
-/// What users are told; `where` names the run if there are several.
+/// For users; `where` names the run if there are several.
 Error error_of(const NonFinite& found, const std::string& where = "");
 
 /// Part of a Sim (sim.h), whose steps keep it up to date.
 struct FiniteCheck {
-  static constexpr long ask_every = 32, checkpoint_every = 64;  ///< steps
-  Buffer words, read_back;  ///< the kernels' block, and its copy for an answer under way
+  static constexpr long request_every = 32, checkpoint_every = 64;  ///< steps
+  Buffer words, read_back;                                          ///< the kernels' block Check, and its readback
   Fence requested;
   Pass copy;  ///< checkpoint.comp
   Recorder recorder;
-  Buffer checkpoint;          ///< of the last snapshot before a state that is not finite
-  std::deque<Snapshot> kept;  ///< the last ones: which of them `checkpoint` holds, the answer tells
-  long first = 0;             ///< step of the state that was last given, the first checkpoint if it is finite
-  long known = 0;             ///< GPU: steps up to this one are finite, or `found` says which is not
-  long asked_step = 0;        ///< the step that the answer under way is of
+  Buffer checkpoint;          ///< ranges of the last snapshot before a state that is not finite
+  std::deque<Snapshot> kept;  ///< the last ones; the step in `found` tells which of them `checkpoint` belongs to
+  long known = 0;             ///< in GPU modes, the last step that is known to be finite, or not by `found`
+  long requested_step = 0;    ///< the last step before the readback that is under way
   std::optional<NonFinite> found;
 };
 
-/// Bytes, multiples of four.
-struct CopiedPart {
-  const Buffer* from;
-  std::size_t first;
-  const Buffer* to;
-  std::size_t at, bytes;
-};
-/// Of what kernels wrote, by a kernel; `good_only`: unless a state was not finite. Queued.
-void copy_parts(FiniteCheck& check, const std::vector<CopiedPart>& parts, bool good_only);
+/// Copies ranges one after the other into `to` from byte `at` on, by a kernel; with `good_only`, unless a state was
+/// not finite. Queued.
+void copy_ranges(FiniteCheck& check, const std::vector<CarriedRange>& ranges, const Buffer& to, std::size_t at,
+                 bool good_only);
 
 }  // namespace tetpbd

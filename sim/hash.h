@@ -1,4 +1,4 @@
-// FNV-1a: tells states, scenes and damaged files apart. Not cryptographic: it finds accidents.
+// FNV-1a tells states, scenes and damaged files apart. It finds accidents, not attacks.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@ namespace tetpbd {
 
 constexpr std::uint64_t fnv_basis = 14695981039346656037ull;
 
-/// Goes on from `hash`, that of what came before.
+/// `hash`: that of the bytes before these.
 inline std::uint64_t hash_bytes(std::string_view bytes, std::uint64_t hash = fnv_basis) {
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
   return hash;
 }
 
-/// Of the bits of a list of values without padding.
+/// Hashes the bits of a list of values, whose type must have no padding.
 template <class List>
 std::uint64_t hash_values(const List& values, std::uint64_t hash = fnv_basis) {
   return hash_bytes({reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof *std::data(values)},

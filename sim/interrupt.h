@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM as a flag that long work looks at between its parts, so that files stay whole.
+// SIGINT and SIGTERM set a flag that long work tests between its parts, so that files stay whole.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@ namespace signals {
 inline volatile std::sig_atomic_t caught = 0;
 inline std::chrono::steady_clock::time_point first;
 
-// `timeout` signals its child, then its child's group: that is one wish in two signals, a moment apart.
+// The program `timeout` signals its child and then its child's group, so two signals within 0.2 s count as one.
 inline void catch_one(int signal) {
   const auto now = std::chrono::steady_clock::now();
   if (!caught) {
@@ -25,14 +25,14 @@ inline void catch_one(int signal) {
 }
 }  // namespace signals
 
-/// From here on the first signal only sets the flag; a second one ends the program at once.
+/// From now on the first signal only sets the flag; a second one ends the program at once.
 inline void catch_interrupts() {
   signals::caught = 0;
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, signals::catch_one);
 }
 inline bool interrupted() { return signals::caught != 0; }
 
-/// Thrown out of a measurement, which is nothing when it is not whole.
+/// Thrown by a measurement, which is worth nothing unless it is complete.
 struct Interrupted : Error {
   Interrupted() : Error("interrupted", "while measuring", "what was finished is written", 1) {}
 };

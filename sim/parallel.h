@@ -1,4 +1,4 @@
-// Loops over independent items on several cores (OpenMP). Results never depend on how many.
+// Loops over independent items on several cores (OpenMP). Results never depend on the number of cores.
 #pragma once
 
 #include <omp.h>
@@ -13,11 +13,11 @@
 
 namespace tetpbd {
 
-/// Calls f(first, end) for parts of 0 .. count that follow each other, one a thread and `least` items or more
-/// each; what f writes must depend on the item alone. Rethrows what the first part that failed threw.
+/// Calls f(first, end) for consecutive parts of 0 .. count, one for each thread, of at least `least` items each. What f
+/// writes must depend on the item alone. Rethrows what the first part that failed threw.
 template <class F>
 void parallel_parts(std::size_t count, std::size_t least, F&& f) {
-  const int threads = std::clamp(omp_get_max_threads(), 1, 16);  // more are bound by memory
+  const int threads = std::clamp(omp_get_max_threads(), 1, 16);  // beyond 16, memory is the limit
   const std::size_t parts = std::clamp<std::size_t>(count / least, 1, std::size_t(threads));
   std::vector<std::exception_ptr> failed(parts);
 #pragma omp parallel for num_threads(int(parts)) schedule(static, 1)
@@ -30,7 +30,7 @@ void parallel_parts(std::size_t count, std::size_t least, F&& f) {
     if (e) std::rethrow_exception(e);
 }
 
-/// Calls f(item) for 0 .. count, `least` items or more to a thread.
+/// Calls f(item) for 0 .. count, with at least `least` items to a thread.
 template <class F>
 void parallel_for(std::size_t count, std::size_t least, F&& f) {
   parallel_parts(count, least, [&](std::size_t first, std::size_t end) {
@@ -42,8 +42,8 @@ void parallel_for(std::size_t count, F&& f, std::size_t least = 8192) {
   parallel_for(count, least, std::forward<F>(f));
 }
 
-/// Sorts items none of which are equal. Not by __gnu_parallel::sort: that ends the program where a comparison
-/// throws or memory runs out.
+/// Sorts items, of which no two may be equal. __gnu_parallel::sort would end the program where a comparison throws or
+/// memory runs out.
 template <class T>
 void parallel_sort(std::span<T> items) {
   const std::size_t threads = std::size_t(std::max(omp_get_max_threads(), 1)), count = items.size();
@@ -56,11 +56,12 @@ void parallel_sort(std::span<T> items) {
     });
 }
 
-/// Values by key: those of k are values[first[k]] .. values[first[k + 1]], in the order of their items.
+/// The values of key k are values[first[k]] up to values[first[k + 1]], in the order of their items.
 struct Grouped {
   std::vector<std::uint32_t> first, values;
 };
-/// Counting sort. each(item, emit) calls emit(key, value), the same each time; fewer than 2^32 values in all.
+/// Counting sort. each(item, emit) calls emit(key, value), the same both times that it is called for an item; there are
+/// fewer than 2^32 values in all.
 template <class Each>
 Grouped group_by_key(std::size_t items, std::size_t keys, Each&& each) {
   Grouped result{std::vector<std::uint32_t>(keys + 1, 0), {}};

@@ -1,4 +1,4 @@
-// The rotation that fits best (Kabsch, Acta Cryst. A32, 1976; Horn 1987).
+// The best rotation between two sets of points (Kabsch, Acta Cryst. A32, 1976; Horn 1987).
 #pragma once
 
 #include <Eigen/Dense>
@@ -8,10 +8,9 @@ namespace tetpbd {
 
 struct BestRotation {
   glm::dmat3 R{1};
-  bool unique = false;  ///< false: points on a line, in one place or mirrored allow several
+  bool unique = false;  ///< false: several fit as well, of points on a line, in one place or mirrored
 };
-/// The R with the largest trace(R^T A), for A = sum w x X^T about both centres: it turns the X nearest to the
-/// x.
+/// The R with the largest trace(R^T A). With A = sum w x X^T about both centres it turns the points X nearest to x.
 inline BestRotation best_rotation(const glm::dmat3& A) {
   const Eigen::Map<const Eigen::Matrix3d> a(&A[0].x);
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -19,7 +18,7 @@ inline BestRotation best_rotation(const glm::dmat3& A) {
   BestRotation best;
   Eigen::Map<Eigen::Matrix3d>(&best.R[0].x) =
       svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
-  // A turn about the axes of the two smallest values costs their (signed) sum: 0 leaves it undecided.
+  // Turning in the plane of the two smallest values costs their (signed) sum: at 0 any such turn fits as well.
   const Eigen::Vector3d values = svd.singularValues();
   best.unique = values(1) + sign * values(2) > 1e-12 * values(0);
   return best;

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cmath>
-#include <numeric>
 #include <tuple>
 
 #include "sim/contact/moving_obstacle.h"
@@ -14,46 +12,18 @@
 #include "sim/model/material.h"
 
 namespace tetpbd {
-
 namespace {
 
-constexpr unsigned group_size = 256;  // of rigid_contact
-
-// As they are before anything is known of the bodies' motion.
-std::vector<RigidRecord> rigid_records(const Model& model, const Settings& settings) {
-  std::vector<RigidRecord> records;
-  for (const Body& body : model.bodies) {
-    RigidRecord& record = records.emplace_back();
-    record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
-    record.one_piece = body.one_piece && rigid_in_contact(settings, body_material(body, settings));
-    const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
-    record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
-  }
-  return records;
-}
-
-// What the driver allows, where nothing lower is asked for.
+// Fills in the driver's limits where nothing lower is asked for.
 Tuning within_limits(Tuning tuning) {
   const unsigned row = unsigned(most_work_groups_in_row());
-  if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // there, one after the other
+  if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // lanes run one after the other in software
   if (tuning.lanes > 8 || !std::has_single_bit(tuning.lanes))
     throw Error("no such tuning", fmt::format("lanes={}", tuning.lanes), "a power of two up to 8");
   if (tuning.row == 0 || tuning.row > row) tuning.row = row;
   const std::size_t storage = std::size_t(capabilities().storage_bytes);
   if (tuning.storage == 0 || tuning.storage > storage) tuning.storage = storage;
   return tuning;
-}
-
-SolverInput solver_input(const Sim& sim) {
-  const Settings& s = sim.settings;
-  return {*sim.model,
-          sim.system,
-          s,
-          sim.plan,
-          sim.tuning,
-          is_software_renderer(),
-          any_material(*sim.model, s, compliant),
-          touches_rigidly(*sim.model, s)};
 }
 
 // Everything but the state.
@@ -68,7 +38,9 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
   const std::size_t count = sim.model->positions.size();
-  const SolverInput input = solver_input(sim);
+  SolverInput input{*sim.model, sim.system, sim.settings, sim.plan, sim.tuning, is_software_renderer()};
+  input.compliant = any_material(*sim.model, settings, compliant);
+  input.rigid = touches_rigidly(*sim.model, settings);
   const auto defines = vertex_defines(input);
   sim.obstacles = make_obstacles(*sim.model);
   sim.solver = solver_mode(settings).create(input);
@@ -88,7 +60,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   if (sim.solver.quantized_buffers > 1) sim.quantized[1] = buffer("quantized positions, other side", quantized_bytes);
   if (input.rigid) {
     sim.rigid_bodies = buffer("hard bodies", sim.model->bodies.size() * sizeof(RigidRecord) + 8 * count);
-    sim.rigid_contact = {Program::compute("contact/rigid_contact.comp", {}, defines), work_groups(count, group_size),
+    sim.rigid_contact = {Program::compute("contact/rigid_contact.comp", {}, defines), work_groups(count, 256),
                          4 * count};
   }
   if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(input);
@@ -103,7 +75,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   return sim;
 }
 
-// The constraints of other settings, if the solver needs only be told their numbers.
+// Takes over the constraints of other settings, if they differ from the present ones in numbers alone.
 bool adopt_constraints(Sim& sim, const Settings& settings) {
   if (same_constraints(*sim.model, settings, sim.settings)) return true;
   if (!sim.solver.takes_constraints) return false;
@@ -116,9 +88,9 @@ bool adopt_constraints(Sim& sim, const Settings& settings) {
   return true;
 }
 
-// Made whole beside the old one: no room, or a shader that does not compile, leaves that running.
+// Makes a whole simulation beside the old one, which stays as it was where memory or a shader fails.
 void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Model>& model) {
-  if (check_finite(sim, true)) restore_checkpoint(sim);  // it has nothing better to start from
+  if (check_finite(sim, true)) restore_checkpoint(sim);
   State state = read_state(sim);
   Sim fresh = make_sim(
       model, settings, sim.tuning,
@@ -137,29 +109,31 @@ void add_upwards(const Sim& sim, State& state, double speed) {
     if (sim.inverse_masses[i] > 0) state.velocities[i].y += speed;
 }
 
-// What is decided from a state before its first step.
-void start_from(Sim& sim, const State& state) {
+// Takes over settings for which the kernels stay. Throws where the solver cannot.
+void adopt_settings(Sim& sim, const Settings& settings) {
+  const TimeOrigin origin = sim.origin;
+  if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, simulated_time(sim)};
+  const Settings before = std::exchange(sim.settings, settings);
+  const double fall = half_substep_fall(before, sim.plan);
+  const Plan plan = std::exchange(sim.plan, plan_for(settings));
+  try {
+    sim.solver.retune(sim, &before);
+  } catch (...) {
+    sim.settings = before, sim.plan = plan, sim.origin = origin;
+    throw;
+  }
   forget_readbacks(sim);
-  start_pairs(sim, state);
-  sim.solver.start(sim, state);
-}
-
-void adopt(Sim& sim, const State& state) {
-  if (on_cpu(sim)) sim.host = state;
-  upload(sim, state);
-  sim.quantum = choose_quantum(sim, state);
   write_step_block(sim);
-  start_check(sim, &state);
-}
-
-// Velocities of mid-substep that were `fall` behind become those with the settings and the plan of now.
-void retime_velocities(Sim& sim, double fall) {
   const double upwards = half_substep_fall(sim.settings, sim.plan) - fall;
   if (upwards == 0) return;
   State state = read_state(sim);
   add_upwards(sim, state, upwards);
   write_velocities(sim, state);
   if (on_cpu(sim)) sim.host = std::move(state);
+}
+
+void clear_drops(Sim& sim) {
+  sim.check.words.write(4 * sizeof(GLuint), DROPS * sizeof(GLuint), std::array<GLuint, DROPS>{}.data());
 }
 
 }  // namespace
@@ -185,15 +159,9 @@ bool same_constraints(const Model& model, const Settings& a, const Settings& b) 
     return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio,
                       dashpots ? s.constraint_damping : 0);
   };
-  // Where bodies differ, constraints carry the settings' numbers too.
+  // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
   return decides(a) == decides(b) && (!has_own_materials(model) || numbers(a) == numbers(b));
-}
-
-void forget_contacts(Sim& sim) {
-  if (!sim.rigid_bodies) return;
-  const auto records = rigid_records(*sim.model, sim.settings);
-  sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
 }
 
 void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
@@ -201,10 +169,6 @@ void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
   if (!share_kernels(*sim.model, *model)) return remake(sim, sim.settings, model);
   sim.model = std::move(model);
   write_step_block(sim);
-}
-
-static void clear_drops(Sim& sim) {
-  sim.check.words.write(4 * sizeof(GLuint), DROPS * sizeof(GLuint), std::array<GLuint, DROPS>{}.data());
 }
 
 void reset(Sim& sim) {
@@ -224,9 +188,15 @@ void forget_all(Sim& sim) {
 
 void start_with(Sim& sim, State state, double fall) {
   const KeepBindings kept;
-  start_from(sim, state);
+  forget_readbacks(sim);
+  start_pairs(sim, state);
+  sim.solver.start(sim, state);  // may change the plan, on which the fall depends
   add_upwards(sim, state, half_substep_fall(sim.settings, sim.plan) - fall);
-  adopt(sim, state);
+  if (on_cpu(sim)) sim.host = state;
+  upload(sim, state);
+  sim.quantum = choose_quantum(sim, state);
+  write_step_block(sim);
+  start_check(sim, &state);
 }
 
 void write_state(Sim& sim, const State& state) { start_with(sim, state, half_substep_fall(sim.settings, sim.plan)); }
@@ -242,28 +212,6 @@ Carried carried(Sim& sim) {
   add_carried(all, sim.pairs);
   return all;
 }
-
-namespace {
-
-// The kernels stay. Throws where the solver cannot take the settings.
-void adopt_settings(Sim& sim, const Settings& settings) {
-  const TimeOrigin origin = sim.origin;
-  if (settings.dt != sim.settings.dt) sim.origin = {sim.steps, simulated_time(sim)};
-  const Settings before = std::exchange(sim.settings, settings);
-  const double fall = half_substep_fall(before, sim.plan);
-  const Plan plan = std::exchange(sim.plan, plan_for(settings));
-  try {
-    sim.solver.retune(sim, &before);
-  } catch (...) {
-    sim.settings = before, sim.plan = plan, sim.origin = origin;
-    throw;
-  }
-  forget_readbacks(sim);
-  write_step_block(sim);
-  retime_velocities(sim, fall);
-}
-
-}  // namespace
 
 void apply_settings(Sim& sim, const Settings& settings) {
   const KeepBindings kept;
@@ -307,9 +255,11 @@ std::vector<std::pair<std::string, std::uint64_t>> dropped(Sim& sim) {
   const GuardCounts counts = guard_counts(sim);
   const PairNumbers pairs = touched(sim);
   std::vector<std::pair<std::string, std::uint64_t>> all;
-  for (std::size_t d = 0; d < DROPS; ++d) all.emplace_back(drop_names[d], counts[GUARDS + d]);
-  all.emplace_back("contact_candidates", pairs.crowded), all.emplace_back("contact_speed", pairs.outrun);
-  std::erase_if(all, [](const auto& item) { return item.second == 0; });
+  const auto add = [&](const char* name, std::uint64_t count) {
+    if (count > 0) all.emplace_back(name, count);
+  };
+  for (std::size_t d = 0; d < DROPS; ++d) add(drop_names[d], counts[GUARDS + d]);
+  add("contact_candidates", pairs.crowded), add("contact_speed", pairs.outrun);
   return all;
 }
 

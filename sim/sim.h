@@ -1,15 +1,13 @@
-// A simulation: a model, settings, GPU buffers and the passes of a step. Any number can live side by side.
-// step.cpp takes steps, sim.cpp makes and sets simulations, state.cpp reads and writes them, finite_check.cpp
-// goes back to good states, explain.cpp says what one costs. Whoever uses it calls these functions and reads
-// its members; only they write them.
+// A simulation: a model, settings, GPU buffers and the passes of a step. Any number can live side by side. Callers use
+// these functions and read the members, which only these functions write.
 //
-// In a program that uses GL itself, a simulation belongs to the context that is current when it is made,
-// which has to be current in each call and when it is destroyed. After a call the program in use, textures
-// and the buffers of generic targets are bound as they were before it (keep_bindings.h); vertex arrays,
-// framebuffers, pixel storage and all else that drawing uses are never touched. Indexed buffers are not put
-// back, because there are too many to ask for: calls bind uniform buffers 0 and 1, storage buffers from 0 on
-// and atomic counter buffer 0. When a simulation is destroyed, GL unbinds its buffers there, and Mesa then
-// unbinds what the generic target has as well. GL errors that nobody asked for are dropped.
+// In a program that uses GL itself, a simulation belongs to the context that is current when it is made, which has to
+// be current in each call and when it is destroyed. A call leaves the program in use, textures and the buffers of
+// generic targets bound as before (keep_bindings.h) and touches nothing else that drawing uses, such as vertex arrays.
+//
+// Indexed buffers are not put back, because there are too many to ask for: calls bind uniform buffers 0 and 1, storage
+// buffers from 0 on and atomic counter buffer 0. When a simulation is destroyed, GL unbinds its buffers there, and Mesa
+// then unbinds that of the generic target as well. GL errors that nobody asked for are dropped.
 #pragma once
 
 #include <memory>
@@ -31,26 +29,24 @@ namespace tetpbd {
 
 struct Sim : StepValues {
   std::shared_ptr<const Model> model;
-  Settings settings;  ///< what was asked for
-  Plan plan;          ///< what a step takes
+  Settings settings;  ///< as the user gave them
+  Plan plan;          ///< what the next step takes
   ConstraintSystem system;
   std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
 
   Buffer positions;     ///< Position
   Buffer velocities;    ///< Velocity
-  Buffer predicted;     ///< Velocity (a pair as well), from the first iteration of a substep to the last
-  Buffer quantized[2];  ///< what neighbours see (quantized.glsl); a double-buffered solver reads one and
-                        ///< writes the other
+  Buffer predicted;     ///< DoubleSingle of each vertex, padded as a Velocity, from the first iteration to the last
+  Buffer quantized[2];  ///< positions that neighbours see (quantized.glsl); a solver may read one and write the other
   Buffer step_block;    ///< Step
   Obstacles obstacles;
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
-  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies in contact (contact/rigid.glsl), and their vertices
-                        ///< that touch
-  Pass rigid_contact;   ///< before each substep, where there are any
+  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies in contact, and their vertices in contact (contact/rigid.glsl)
+  Pass rigid_contact;   ///< before each substep, where there are hard bodies
   Pairs pairs;          ///< contact between bodies, where there is any
   Tuning tuning;
-  double longest_substep = 0;       ///< s, that is stable at rest, of mode explicit
+  double longest_substep = 0;       ///< s, the longest that is stable at rest, in mode explicit
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
   State host;   ///< state of a CPU mode; the GPU buffers follow it
@@ -65,14 +61,13 @@ struct Sim : StepValues {
 /// Throws Error where settings do not go together, or the driver's limits do not allow the size.
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
-/// How many substeps mode explicit takes of a step at rest, within some percent; settings that have forces.
+/// How many substeps mode explicit takes for a step at rest, within some percent. The settings must have forces.
 double explicit_substeps(const Model& model, const Settings& settings);
-/// Takes over new settings; positions stay, and velocities are those of the new half substep. Makes the
-/// solver again if the mode, the constraint kinds or whether there is compliance changed; where
-/// that fails, throws and leaves the simulation as it was.
+/// Takes over new settings; positions stay, and velocities become those of the new half substep. Makes the solver again
+/// if the mode, the constraint kinds or whether there is compliance changed; where that fails, throws and leaves the
+/// simulation as it was.
 void apply_settings(Sim& sim, const Settings& settings);
-/// Builds the shaders again (after an edit in the shader folder); throws and keeps the old ones if they do
-/// not compile.
+/// Builds the shaders again, after an edit in the shader folder; throws and keeps the old ones if they do not compile.
 void rebuild_shaders(Sim& sim);
 /// Queues one step on the GPU (CPU modes: steps, then uploads). Does not wait.
 void step(Sim& sim);
@@ -86,72 +81,69 @@ inline bool on_cpu(const Sim& sim) { return solver_mode(sim.settings).cpu; }
 inline double simulated_time(const Sim& sim) {
   return sim.origin.time + double(sim.steps - sim.origin.step) * sim.settings.dt;
 }
-/// Goes on with a model that differs in its obstacles alone; the state stays. Throws Error where there are
-/// too many, and leaves the simulation as it was.
+/// Goes on with a model that differs in its obstacles alone; the state stays. Throws Error where there are too many
+/// obstacles, and leaves the simulation as it was.
 void change_obstacles(Sim& sim, std::shared_ptr<const Model> model);
-/// All that a step hands on to the next, as the mode of now has it.
+/// The carried state in the present mode.
 Carried carried(Sim& sim);
-/// Of steps so far nothing is known any more.
+/// Forgets all steps so far: time and counts start at 0.
 void forget_all(Sim& sim);
-/// Goes on from a state whose velocities were `fall` behind (half_substep_fall()).
+/// Goes on from a state whose velocities are behind by `fall` (half_substep_fall()), in m/s.
 void start_with(Sim& sim, State state, double fall);
-/// m, of positions that neighbours see.
+/// m, the quantum of positions that neighbours see.
 double choose_quantum(const Sim& sim, const State& state);
-/// Settings and plan, for the kernels of the next steps.
+/// Tells kernels the settings and the plan. `substeps_before`: of a step, if the plan had others until now, else 0.
 void write_step_block(Sim& sim, int substeps_before = 0);
-/// For solvers. A kernel of a substep; kernels find the quantized positions that are read now, after others
-/// were given or after vertices moved; what a CPU mode counted.
+/// For solvers: dispatches a kernel of a substep; `what` and `bytes` as in Recorder::run().
 void run_kernel(Sim& sim, Pass& pass, unsigned phases = 0, const char* what = "", std::size_t bytes = 0);
+/// For solvers: gives kernels the quantized positions to read and to write.
 void give_quantized(Sim& sim);
+/// For solvers: the same after a kernel wrote them, so that with two buffers reading and writing change places.
 void turn_quantized(Sim& sim);
+/// For solvers on the CPU: adds what they counted.
 void add_guards(Sim& sim, const GuardCounts& counts);
-/// What is known of hard bodies in contact, before something else moves them.
-void forget_contacts(Sim& sim);
-/// m/s that velocities of mid-substep are behind of those at the substep's end, by gravity; 0 where they are
-/// of the end.
+/// m/s by which velocities of mid-substep are behind those at the substep's end, because of gravity; 0 in modes whose
+/// velocities are those at the end.
 double half_substep_fall(const Settings& settings, const Plan& plan);
-/// Whether both make the same constraints of a model.
+/// Whether a model has the same constraints with both.
 bool same_constraints(const Model& model, const Settings& a, const Settings& b);
 State make_state(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);
-/// A state that is not finite is taken, and found by check_finite() at once.
+/// A state that is not finite is accepted, and check_finite() finds it at once.
 void write_state(Sim& sim, const State& state);
-/// A value as the sum of two floats.
-void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low);
+/// Splits a value into the sum of two floats.
+void split_double_single(const glm::dvec3& value, glm::vec3& high, glm::vec3& low);
 void write_velocities(const Sim& sim, const State& state);
-/// The GPU's buffers of a state that CPU code stepped.
+/// Writes the GPU's buffers of positions and velocities.
 void upload(Sim& sim, const State& state);
-/// FNV-1a over the bits of all positions (high and low) and velocities; equal states give equal hashes.
-/// Waits.
+/// FNV-1a over the bits of all positions and velocities; equal states give equal hashes. Waits.
 std::uint64_t state_hash(const Sim& sim);
-/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count.
-/// Waits.
+/// How often each guard triggered since the start or the last reset; zeros if GPU kernels do not count. Waits.
 GuardCounts guard_counts(Sim& sim);
-/// What was left out since then because a fixed size or number of turns did not suffice, by name, where it
-/// was; also in GPU modes. Waits.
+/// How much was left out since then because a fixed size or number of turns did not suffice, by name, without zeros.
+/// GPU modes always count it. Waits.
 std::vector<std::pair<std::string, std::uint64_t>> dropped(Sim& sim);
 
-/// Starts anew from the state of now, of which nothing is known but that it was `given`, if it was.
+/// Starts the check anew with the present state; `given` is that state where it comes from outside and may not be
+/// finite, else null.
 void start_check(Sim& sim, const State* given);
-/// After a step.
+/// To be called after each step.
 void check_step(Sim& sim);
-/// The first state that was not finite, once it is known; with `wait`, of all steps so far. Throws
-/// ContextLost.
+/// The first state that was not finite, as far as is known; with `wait`, of all steps so far. Throws ContextLost.
 const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
-/// Back to the last good state that was kept, at most 64 steps before the one found, and to its step; false
-/// where there is none.
+/// Goes back to the last checkpoint before the state found, at most 64 steps earlier; false where there is none.
 bool restore_checkpoint(Sim& sim);
 
-/// Pinned vertices stay where they are or are put (infinite mass). Any number costs one or two writes to the
-/// GPU, none of which waits.
+/// Pinned vertices have infinite mass and stay where they are or are put. Any number of them costs one or two writes to
+/// the GPU, none of which waits.
 using VertexList = std::vector<std::uint32_t>;
 void pin(Sim& sim, const VertexList& vertices);
 void unpin(Sim& sim, const VertexList& vertices);
 inline void pin(Sim& sim, std::uint32_t vertex) { pin(sim, VertexList{vertex}); }
 inline void unpin(Sim& sim, std::uint32_t vertex) { unpin(sim, VertexList{vertex}); }
 bool is_pinned(const Sim& sim, std::uint32_t vertex);
-/// Puts each somewhere, in metres.
+/// `positions` in metres, one for each vertex.
 void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions);
 inline void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
   move_pinned(sim, VertexList{vertex}, {position});
@@ -167,7 +159,7 @@ struct Explanation {
     std::size_t work_groups;
     long per_step;             ///< 0: only after a change from outside
     std::size_t bytes;         ///< of one dispatch
-    std::optional<double> ms;  ///< of one, the mean of those that were timed
+    std::optional<double> ms;  ///< of one dispatch, the mean of those that were timed
   };
   std::vector<Item> buffers;
   std::vector<Kernel> dispatches;
@@ -176,7 +168,8 @@ struct Explanation {
   double ms_per_step = 0;
   std::size_t bytes_per_step = 0;  ///< read and written by all dispatches; caches may serve part of it
 };
-/// What the simulation allocates and dispatches. Waits for what is timed.
+/// What the simulation allocates and dispatches; `timed_steps`: how many were taken with the recorder timing, if any.
+/// Waits for what is timed.
 Explanation explain(Sim& sim, int timed_steps = 0);
 
 }  // namespace tetpbd

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "sim/gl/keep_bindings.h"
-namespace tetpbd {
 
+namespace tetpbd {
 namespace {
 
 State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
@@ -15,7 +15,7 @@ State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
   return make_state(positions, velocities);
 }
 
-// Everything, so that the next steps are those that followed then.
+// Restores everything, so that the next steps give the same bits as those that followed then.
 void restore_all(Sim& sim, const Snapshot& then, const Buffer& from) {
   const std::byte* byte = then.values.data();
   for (const std::span<std::byte> values : carried(sim).values)
@@ -25,7 +25,7 @@ void restore_all(Sim& sim, const Snapshot& then, const Buffer& from) {
   sim.solver.refresh(sim);
   write_step_block(sim);
   if (then.host) sim.host = *then.host, upload(sim, *then.host);
-  Carried now = carried(sim);  // of the sides that were read then
+  Carried now = carried(sim);  // after `step`, which says which sides of double buffers were read
   std::size_t at = then.at;
   for (const CarriedRange& range : now.ranges) {
     from.copy_to(*range.buffer, range.first, at, range.bytes);
@@ -47,9 +47,9 @@ std::size_t snapshot_bytes(Sim& sim) {
 }
 
 std::size_t snapshot_memory(const Sim& sim) {
-  const std::size_t of_host =
+  const std::size_t host_bytes =
       sim.model->positions.size() * 2 * sizeof(glm::dvec3) + sim.host.held.size() * sizeof(State::Held);
-  return sizeof(Snapshot) + (on_cpu(sim) ? of_host : 0);
+  return sizeof(Snapshot) + (on_cpu(sim) ? host_bytes : 0);
 }
 
 Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_only) {
@@ -61,12 +61,7 @@ Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_onl
   for (const std::span<std::byte> values : all.values)
     taken.values.insert(taken.values.end(), values.begin(), values.end());
   for (const auto& [fence, under_way] : all.readbacks) taken.readbacks.push_back(under_way);
-  std::vector<CopiedPart> copied;
-  for (const CarriedRange& range : all.ranges) {
-    copied.push_back({range.buffer, range.first, &to, at, range.bytes});
-    at += range.bytes;
-  }
-  if (!copied.empty()) copy_parts(sim.check, copied, good_only);
+  if (!all.ranges.empty()) copy_ranges(sim.check, all.ranges, to, at, good_only);
   return taken;
 }
 

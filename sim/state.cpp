@@ -1,4 +1,4 @@
-// The state of a simulation: positions and velocities to and from the GPU, and vertices that are pinned.
+// The state of a simulation: its positions and velocities to and from the GPU, and pinned vertices.
 #include <span>
 
 #include "sim/gl/keep_bindings.h"
@@ -8,9 +8,9 @@
 
 namespace tetpbd {
 
-// Not inlined: GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
-// so that their low parts are lost (a test guards against it).
-[[gnu::noinline]] void split_pair(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
+// Not inlined, because GCC 12.2 at -O3 vectorises callers' loops and takes float(x) for x in the left-over elements,
+// whose low parts are then lost (a test guards against it).
+[[gnu::noinline]] void split_double_single(const glm::dvec3& value, glm::vec3& high, glm::vec3& low) {
   for (int a = 0; a < 3; ++a) {
     const volatile float rounded = float(value[a]);
     high[a] = rounded;
@@ -20,12 +20,29 @@ namespace tetpbd {
 
 namespace {
 
-Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constraints) {
+Position to_gpu(const Sim& sim, std::size_t vertex, const glm::dvec3& x) {
   Position p{};
-  split_pair(x, p.high, p.low);
-  p.inverse_mass = float(inverse_mass);
-  p.constraints = float(constraints);
+  split_double_single(x, p.high, p.low);
+  p.inverse_mass = float(sim.inverse_masses[vertex]);
+  p.constraints = float(sim.system.at_vertex[vertex]);
   return p;
+}
+
+// Writes the member at byte `member` of each vertex's Record.
+template <class Record, class Value>
+void write_vertices(Sim& sim, const Buffer& to, std::size_t member, const VertexList& vertices,
+                    const std::vector<Value>& values) {
+  if (vertices.empty()) return;
+  std::vector<std::size_t> offsets;
+  for (const std::uint32_t v : vertices) offsets.push_back(v * sizeof(Record) + member);
+  to.write_each(offsets, sizeof(Value), values.data());
+  sim.needs_predict = true;
+}
+
+void write_inverse_masses(Sim& sim, const VertexList& vertices) {
+  std::vector<float> values;
+  for (const std::uint32_t v : vertices) values.push_back(float(sim.inverse_masses[v]));
+  write_vertices<Position>(sim, sim.positions, offsetof(Position, inverse_mass), vertices, values);
 }
 
 }  // namespace
@@ -33,15 +50,13 @@ Position to_gpu(const glm::dvec3& x, double inverse_mass, std::uint32_t constrai
 void write_velocities(const Sim& sim, const State& state) {
   std::vector<Velocity> velocities(state.velocities.size());
   parallel_for(velocities.size(),
-               [&](std::size_t i) { split_pair(state.velocities[i], velocities[i].high, velocities[i].low); });
+               [&](std::size_t i) { split_double_single(state.velocities[i], velocities[i].high, velocities[i].low); });
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
 void upload(Sim& sim, const State& state) {
   std::vector<Position> positions(state.positions.size());
-  parallel_for(positions.size(), [&](std::size_t i) {
-    positions[i] = to_gpu(state.positions[i], sim.inverse_masses[i], sim.system.at_vertex[i]);
-  });
+  parallel_for(positions.size(), [&](std::size_t i) { positions[i] = to_gpu(sim, i, state.positions[i]); });
   sim.positions.write(0, positions.size() * sizeof(Position), positions.data());
   write_velocities(sim, state);
   sim.needs_predict = true;
@@ -69,27 +84,6 @@ std::uint64_t state_hash(const Sim& sim) {
   return hash;
 }
 
-namespace {
-
-// A member of each vertex's record in a buffer of `Record`s.
-template <class Record, class Value>
-void write_vertices(Sim& sim, const Buffer& to, std::size_t member, const VertexList& vertices,
-                    const std::vector<Value>& values) {
-  if (vertices.empty()) return;
-  std::vector<std::size_t> offsets;
-  for (const std::uint32_t v : vertices) offsets.push_back(v * sizeof(Record) + member);
-  to.write_each(offsets, sizeof(Value), values.data());
-  sim.needs_predict = true;
-}
-
-void write_inverse_masses(Sim& sim, const VertexList& vertices) {
-  std::vector<float> values;
-  for (const std::uint32_t v : vertices) values.push_back(float(sim.inverse_masses[v]));
-  write_vertices<Position>(sim, sim.positions, offsetof(Position, inverse_mass), vertices, values);
-}
-
-}  // namespace
-
 void pin(Sim& sim, const VertexList& vertices) {
   const KeepBindings kept;
   for (const std::uint32_t v : vertices) {
@@ -112,9 +106,8 @@ void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dv
   const KeepBindings kept;
   std::vector<Position> records;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const std::uint32_t v = vertices[i];
-    records.push_back(to_gpu(positions[i], sim.inverse_masses[v], sim.system.at_vertex[v]));
-    if (on_cpu(sim)) sim.host.positions[v] = positions[i];
+    records.push_back(to_gpu(sim, vertices[i], positions[i]));
+    if (on_cpu(sim)) sim.host.positions[vertices[i]] = positions[i];
   }
   write_vertices<Position>(sim, sim.positions, 0, vertices, records);
 }

@@ -1,8 +1,11 @@
-// A step (method.md, "A step"): dt / substeps at a time, predict, solve x iterations, finish.
+// A step (method.md, "A step"): each substep predicts, solves as often as there are iterations, and finishes.
 #include <algorithm>
+#include <numeric>
 
 #include "sim/contact/moving_obstacle.h"
+#include "sim/contact/rigid_contact.h"
 #include "sim/gl/keep_bindings.h"
+#include "sim/model/material.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -37,10 +40,24 @@ void give_buffers(Sim& sim) {
   for (const auto& [block, buffer] : sim.solver.bindings) recorder.give(block, buffer);
   give_quantized(sim);
   if (!sim.guard_counts) return;
-  // Counters have 32 bits: read before they can wrap.
+  // Counters have 32 bits and are read before they can wrap.
   const double per_step = 4.0 * double(sim.system.count()) * sim.plan.iterations * sim.plan.substeps;
   if (sim.steps % std::max(1L, long(2e9 / std::max(per_step, 1.0))) == 0) guard_counts(sim);
   glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
+}
+
+// Resets the records of hard bodies, because vertices were moved from outside.
+void forget_contacts(Sim& sim) {
+  if (!sim.rigid_bodies) return;
+  std::vector<RigidRecord> records;
+  for (const Body& body : sim.model->bodies) {
+    RigidRecord& record = records.emplace_back();
+    record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
+    record.one_piece = body.one_piece && rigid_in_contact(sim.settings, body_material(body, sim.settings));
+    const auto mass = sim.model->masses.begin() + std::ptrdiff_t(body.first_vertex);
+    record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
+  }
+  sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
 }
 
 void begin_on_gpu(Sim& sim, bool moving) {
@@ -49,17 +66,11 @@ void begin_on_gpu(Sim& sim, bool moving) {
   plan_body_contacts(sim);
   bind_obstacles(sim.obstacles);
   if (sim.timed) sim.timer.begin();
-  sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be drawn from what this overwrites
+  sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be reading these buffers
   if (!sim.needs_predict) return;
   forget_contacts(sim);
   sim.solver.predict(sim);
   sim.needs_predict = false;
-}
-
-void end_on_gpu(Sim& sim) {
-  // Vertex fetches and copies read the state next.
-  sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  if (sim.timed) sim.timer.end();
 }
 
 void move_rigid_bodies(Sim& sim) {
@@ -74,10 +85,10 @@ void move_rigid_bodies(Sim& sim) {
 
 void step(Sim& sim) {
   const KeepBindings kept;  // a caller may use GL as well
-  sim.solver.prepare(sim);  // late answers, number of substeps, preconditioner
+  sim.solver.prepare(sim);  // readbacks, number of substeps, preconditioner
   const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
   if (on_cpu(sim)) {
-    sim.solver.substep(sim, 0);  // all of them, for its threads meet at the end of each
+    sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
     upload(sim, sim.host);
   } else {
     begin_on_gpu(sim, moving);
@@ -87,7 +98,9 @@ void step(Sim& sim) {
       sim.solver.substep(sim, k);
       resolve_body_contacts(sim, sim.plan.substeps - 1 - k);
     }
-    end_on_gpu(sim);
+    // Vertex fetches and copies read the state next.
+    sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    if (sim.timed) sim.timer.end();
   }
   ++sim.steps;
   if (on_cpu(sim) && moving) write_obstacles(sim);

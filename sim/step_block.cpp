@@ -1,4 +1,4 @@
-// What kernels are told of a step: the settings and the plan as layout.glsl has them.
+// The step's block, which tells kernels the settings and the plan (Step in layout.glsl).
 #include <cmath>
 #include <limits>
 
@@ -7,9 +7,9 @@
 
 namespace tetpbd {
 
-// The quantum: a power of two, so that multiplying by it is exact, and small, with room for vertices
-// of a constraint 16 sizes apart (of the largest body, or of what the state stretches most). Everything that
-// is computed from quantized positions is blurred by it.
+// A power of two, so that multiplying by it is exact, and as small as leaves room for vertices of a constraint that are
+// 16 times as far apart as the largest body is, or the most stretched constraint. It limits the precision of whatever
+// is computed from quantized positions.
 double choose_quantum(const Sim& sim, const State& state) {
   double reach = sim.model->size;
   for (const ConstraintList& list : sim.system.lists) {
@@ -56,7 +56,7 @@ void write_step_block(Sim& sim, int substeps_before) {
   }
   sim.step_block.write(0, sizeof block, &block);
   write_obstacles(sim);
-  sim.needs_predict = true;  // the quantized positions hold a prediction with the old h and gravity
+  sim.needs_predict = true;  // the quantized positions are predicted with the old h and gravity
 }
 
 }  // namespace tetpbd

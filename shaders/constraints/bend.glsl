@@ -1,8 +1,8 @@
 // Bending: C = angle - rest in radians, the signed dihedral angle of two triangles that share the edge x2 -> x3, with
-// wings x0 and x1 (paper eqs. 6-15 with the sign that arccos loses; method.md eqs. 7-9). atan of sine and cosine is
-// exact to 2e-7 rad near flat, where float arccos is wrong by 5e-4 and its derivative divides by zero. |C| is clamped
-// to 1 rad: an angle that has turned further is brought back in several iterations. Without it, projecting bending at k
-// = 1 can diverge even in double precision.
+// wings x0 and x1 (paper eqs. 6-15 with the sign that arccos loses; method.md eqs. 7-9).
+
+// The atan of sine and cosine is exact to 2e-7 rad near flat, where arccos in float is wrong by 5e-4 and its derivative
+// divides by zero.
 real hinge_angle(vec3 x[4]) {
   vec3 e = x[3] - x[2];
   vec3 n0 = cross(x[2] - x[0], x[3] - x[0]);
@@ -28,12 +28,14 @@ Constraint4 bend(vec3 x[4], real rest, Ids ids) {
   vec3 a = n0 / (sound ? aa : real(1));
   vec3 b = n1 / (sound ? bb : real(1));
   vec3 u = e / (sound ? l : real(1));
-  // Sides are differences of positions relative to x0, so each is known to rounding times the hinge's extent; a
-  // normal's direction then to that times a side over the normal's length.
+  // Sides are differences of positions relative to x0, so each is known to rounding times the hinge's extent, and a
+  // normal's direction to that times a side over the normal's length.
   vec3 a2 = x[2] - x[0], a3 = x[3] - x[0], b0 = x[1] - x[0], b2 = x[2] - x[1], b3 = x[3] - x[1];
   real a22 = dot(a2, a2), a33 = dot(a3, a3), b22 = dot(b2, b2), b33 = dot(b3, b3);
   real longest = max(max(max(a22, a33), max(b22, b33)), dot(b0, b0));
   real noise = pi + real(4) * (longest + quantization_size * sqrt(longest)) / (sound ? sqrt(min(aa, bb)) : real(1));
+  // An angle more than 1 rad off is brought back in several iterations: projecting all of it at k = 1 can diverge even
+  // in double precision.
   c.C = sound ? clamp(apply_dead_zone(turn, noise), real(-1), real(1)) : real(0);
   c.guards = !sound ? GUARD_HINGE : abs(turn) > real(1) ? GUARD_ANGLE : 0u;
   c.floor = real(0);

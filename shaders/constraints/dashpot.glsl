@@ -1,5 +1,5 @@
-// Dashpot: C = |x0 - x1|, in metres, of which only the change in a substep counts (a viscous material's, method.md eq.
-// 38).
+// The dashpot of a viscous material (method.md eq. 38): C = |x0 - x1| in metres, of which only the change in a substep
+// counts.
 Constraint2 dashpot(vec3 x[2], real rest, Ids ids) {
   Constraint2 c;
   vec3 d = x[0] - x[1];

@@ -1,8 +1,8 @@
-// Isometric bending (Bergou and others 2006): C = +-|L| - its value at rest, without unit, of L = sum k_j x_j, with
-// wings x0 and x1 and the edge x2 -> x3. The sign is that of the side to which the hinge is folded, so that of two
-// mirrored shapes one is at rest (as cubic shells tell them apart, Garg and others 2007). `rest`: weights k of x1, x2
-// and x3, which cotangents at rest give (constraint_kinds.h), and +-|L| there. All k sum to 0 and do not change, so C^2
-// / 2 is quadratic in x where the rest shape is flat.
+// Isometric bending (Bergou and others 2006) of wings x0 and x1 about the edge x2 -> x3: C = +-|L| - its value at rest,
+// L = sum k_j x_j, without unit. The k add up to 0 and do not change, so C^2 / 2 is quadratic in x where the rest shape
+// is flat. By the sign only one of two mirrored shapes is at rest, as in cubic shells (Garg and others 2007).
+
+// `rest` has the weights k of x1, x2 and x3, which cotangents at rest give (constraint_kinds.h), and +-|L| there.
 Constraint4 isobend(vec3 x[4], const real rest[4], Ids ids) {
   Constraint4 c;
   vec3 d1 = x[1] - x[0], d2 = x[2] - x[0], d3 = x[3] - x[0];
@@ -11,7 +11,7 @@ Constraint4 isobend(vec3 x[4], const real rest[4], Ids ids) {
   real spread = sqrt(k0 * k0 + rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
   real noise =
       abs(rest[0]) * length(d1) + abs(rest[1]) * length(d2) + abs(rest[2]) * length(d3) + spread * quantization_size;
-  // Where it is flat, L has no direction but the way to bend: across the surface.
+  // Where the hinge is flat, L has no direction, and the hinge bends across the surface.
   vec3 across = cross(d3 - d2, d1);
   real area = length(across);
   bool bent = l > real(4) * rounding * noise, sound = bent || area > real(0);

@@ -1,9 +1,12 @@
 // Stable neo-Hookean elasticity of a tet (Smith, de Goes and Kim 2018, eq. 14) as two constraints (method.md eqs.
-// 29-31): with I the sum of squared singular values of the deformation gradient and J its determinant,
-//   C_0 = sqrt(I - log(I + 1)),  C_1 = J - alpha,  alpha = 1 + 3 mu / (4 lambda),
-// and compliances 1 / (mu V), 1 / (lambda V), the energy C^2 / (2 compliance) is Smith's. At rest neither is 0: their
-// forces cancel. `rest`: the inverse of the metric of the sides at rest (a a, a b, a d, b b, b d, d d), 1 over 6
-// volumes, alpha. A tet in a point or on a line has no gradient: it stays so until another moves its vertices.
+// 29-31), C_0 = sqrt(I - log(I + 1)) and C_1 = J - alpha, alpha = 1 + 3 mu / (4 lambda), where I is the sum of squared
+// singular values of the deformation gradient and J its determinant.
+
+// With compliances 1 / (mu V) and 1 / (lambda V) the energy C^2 / (2 compliance) is Smith's. At rest neither C is 0,
+// and their forces cancel. A tet in a point or on a line has no gradient, and stays so until another tet moves its
+// vertices.
+
+// `rest` has the inverse of the metric of the sides at rest (a a, a b, a d, b b, b d, d d), 1 over 6 volumes, alpha.
 Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
   Constraint4x2 c;
   vec3 a = x[1] - x[0];
@@ -13,7 +16,7 @@ Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
   vec3 toward_b = rest[1] * a + rest[3] * b + rest[4] * d;
   vec3 toward_d = rest[2] * a + rest[4] * b + rest[5] * d;
   real I = dot(toward_a, a) + dot(toward_b, b) + dot(toward_d, d);
-  // Near 0 the difference has no digits left, and its series has.
+  // Near 0 the difference has no digits left, but its series has.
   real square = I > real(0.03) ? I - log(I + real(1)) : I * I * (real(0.5) - I * (real(1) / real(3) - real(0.25) * I));
   c.C[0] = sqrt(max(square, real(0)));
   real share = c.C[0] > real(1e-15) ? I / ((I + real(1)) * c.C[0]) : real(1.4142135623730951);
@@ -32,8 +35,8 @@ real neo_hookean_jacobian(vec3 x[4], const real rest[8]) {
   return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]) * rest[6];
 }
 // A block of the Hessian of the energy, with compliances a[0] and a[1], and a quarter of the difference of the
-// gradients. The part that can be negative, (J - alpha) Hess J, is taken up to where it meets the positive one: that of
-// I over the largest singular value. At rest it just does, as a body turns freely.
+// gradients. The part that can be negative, (J - alpha) Hess J, is limited to the positive part, of I, over the largest
+// singular value. At rest it is just that large, because a body turns freely.
 EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i, int j) {
   vec3 s1 = x[1] - x[0], s2 = x[2] - x[0], s3 = x[3] - x[0];
   vec3 t1 = rest[0] * s1 + rest[1] * s2 + rest[2] * s3;

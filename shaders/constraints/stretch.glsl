@@ -1,5 +1,5 @@
 // Stretch: C = |x0 - x1| - rest, in metres (paper eqs. 4-5; method.md eq. 6).
-// Coincident vertices have no direction: they part along a pseudo-random one of their own.
+// Coincident vertices have no direction, so they part along a pseudo-random one of their own.
 Constraint2 stretch(vec3 x[2], real rest, Ids ids) {
   Constraint2 c;
   vec3 d = x[0] - x[1];
@@ -13,7 +13,7 @@ Constraint2 stretch(vec3 x[2], real rest, Ids ids) {
   c.floor = real(0);
   return c;
 }
-// What C Hess C has of use: a stretched edge resists turning; that of a compressed one would not be positive.
+// The positive part of C Hess C: a stretched edge resists turning. That of a compressed edge would not be positive.
 mat3 stretch_curvature(Constraint2 c, vec3 x[2], int i, int j) {
   vec3 n = c.gradient[0];
   return (mat3(real(1)) - outerProduct(n, n)) * (-max(c.C, real(0)) / max(length(x[0] - x[1]), real(1e-30)));

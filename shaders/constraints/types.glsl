@@ -1,14 +1,13 @@
-// What every constraint formula returns, and what a solver makes of it. GLSL and C++ (sim/model/formulas.h): `real` is
-// float or double, vec3 follows it. No formula returns early: at least one driver makes loops of that which cost more
-// than all the rest (docs/decisions.md). C and its gradient by each vertex; `floor` bounds sum |gradient|^2 from below
-// where the gradient can vanish with C still large (same unit as |gradient|^2; 0 where it cannot); `guards`: bits of
-// layout.glsl's GUARD_*. `ids`: what id_of(ids, j) finds the number of the constraint's vertex j by; asked for in
-// guards only.
+// What every constraint formula returns, and what a solver makes of it, as GLSL and as C++ (sim/model/formulas.h):
+// `real` is float or double, and vec3 is of the same type. No formula returns early: at least one driver makes loops of
+// that, which cost more than all the rest (docs/decisions.md).
+
+// C and its gradient by each vertex. Guards alone ask for a vertex's number, id_of(ids, j).
 struct Constraint2 {
   real C;
   vec3 gradient[2];
-  real floor;
-  uint guards;
+  real floor;   // of sum |gradient|^2 where the gradient can vanish with C still large, else 0
+  uint guards;  // bits of layout.glsl's GUARD_*
 };
 struct Constraint4 {
   real C;
@@ -16,15 +15,15 @@ struct Constraint4 {
   real floor;
   uint guards;
 };
-// Two that are solved together: C[k] and its gradient by each vertex.
+// Two components that are solved together, C[k] and its gradient by each vertex.
 struct Constraint4x2 {
   real C[2];
   vec3 gradient[2][4];
   uint guards;
 };
 
-// Blocks of Hessians (mode newton; method.md eq. 41), of vertices i and j != i: what the gradient of i gains per way of
-// j. Chosen by conditions: an array with an index that is not constant would lie in memory.
+// A block of a Hessian (mode newton; method.md eq. 41) is the gradient of vertex i by the position of j != i.
+// Conditions choose what belongs to a vertex, because an array with a variable index would lie in memory.
 vec3 chosen(int j, vec3 v0, vec3 v1, vec3 v2, vec3 v3) { return j == 0 ? v0 : j == 1 ? v1 : j == 2 ? v2 : v3; }
 vec3 gradient_of(Constraint2 c, int j) { return j == 0 ? c.gradient[0] : c.gradient[1]; }
 vec3 gradient_of(Constraint4 c, int j) { return chosen(j, c.gradient[0], c.gradient[1], c.gradient[2], c.gradient[3]); }
@@ -37,8 +36,8 @@ struct EdgePart {
   vec3 force;
 };
 
-// A direction for two vertices in one place: of unit length, the opposite one for (b, a), and unlike that of other
-// pairs, so that a body that has collapsed to a point does not unfold along a line only.
+// A unit vector for two vertices in one place, the opposite one for (b, a). It differs from that of other vertices, so
+// that a body that has collapsed to a point does not unfold along a line only.
 vec3 any_direction(uint a, uint b) {
   uint h = min(a, b) * 0x9E3779B9u + max(a, b) * 0x85EBCA6Bu;
   h = (h ^ (h >> 16)) * 0x7FEB352Du;
@@ -50,18 +49,15 @@ vec3 any_direction(uint a, uint b) {
   return (a < b ? real(1) : real(-1)) * (d / length(d));
 }
 
-// A constraint error that rounding alone can make is no error: without this, rounding noise of 1e-9 m divided by a
-// substep of 1e-6 s becomes a velocity (method.md, "What float drops").
-// `noise`: the size that C is known to rounding of. Positions themselves are known to rounding * quantization_size (0
-// where they are kept in full).
+// An error C that rounding alone can make is none: rounding of 1e-9 m over a substep of 1e-6 s would be a velocity
+// (method.md, "What float drops"). C is known to rounding * noise, and positions to rounding * quantization_size, which
+// is 0 where they are kept in full.
 real apply_dead_zone(real C, real noise) { return abs(C) <= real(4) * rounding * noise ? real(0) : C; }
 
-// Of a constraint with inverse masses w: sum w |grad C|^2, the largest w^2 |grad C|^2, and what bounds the sum from
-// below.
 struct Weighted {
-  real sum;
-  real longest;
-  real least;
+  real sum;      // of w |grad C|^2 over the vertices, with inverse masses w
+  real longest;  // w^2 |grad C|^2
+  real least;    // what bounds the sum from below
 };
 Weighted weighted(Constraint2 c, real w[2]) {
   real g0 = dot(c.gradient[0], c.gradient[0]), g1 = dot(c.gradient[1], c.gradient[1]);
@@ -77,14 +73,15 @@ Weighted weighted(Constraint4 c, real w[4]) {
   return Weighted(sum, longest, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));
 }
 
-// The multiplier (method.md eqs. 4, 25-26): lambda w_j grad_j C moves vertex j, by `max_correction` (one body size) at
-// most. XPBD's (Macklin, Mueller and Chentanez 2016), of which PBD's is the one with a = 0 and share = 1: `c.C` is the
-// whole residual, C + a lambda + gamma (C - C at the substep's start), with a = alpha / h^2 and gamma = tau / h;
-// `share` is (1 + gamma) / omega: the relaxation leaves a alone, so that one iteration of a short substep is right too.
+// The multiplier of XPBD (Macklin, Mueller and Chentanez 2016; method.md eqs. 4, 25-26), and of PBD with a = 0 and
+// share = 1. Vertex j moves by lambda w_j grad_j C, at most by max_correction.
 struct Multiplier {
   real lambda;  // 0 where it is no number
-  uint guards;  // that it took
+  uint guards;  // those that triggered
 };
+// Here c.C is the whole residual, C + a lambda + gamma (C - C at the substep's start), with a = alpha / h^2 and gamma =
+// tau / h. The relaxation in share = (1 + gamma) / omega leaves a alone, so that one iteration of a short substep is
+// right too.
 Multiplier bounded(real C, uint guards, Weighted s, real sum, real k, real max_correction) {
   real lambda = sum > real(0) ? -(k * C) / sum : real(0);
   real squared = lambda * lambda * s.longest;
@@ -102,8 +99,8 @@ Multiplier multiplier(Constraint4 c, real w[4], real k, real max_correction, rea
   return bounded(c.C, c.guards, s, share * max(s.sum, s.least) + a, k, max_correction);
 }
 
-// Of two constraints (method.md eq. 32): (share grad C W grad C^T + a) lambda = -C. As above, `c.C` is the whole
-// residual.
+// The multipliers of two components (method.md eq. 32): (share grad C W grad C^T + a) lambda = -C, with the whole
+// residual in c.C.
 struct Multiplier2 {
   real lambda[2];
   uint guards;
@@ -139,4 +136,11 @@ Multiplier2 multiplier(Constraint4x2 c, real w[4], real max_correction, real a[2
   m.lambda[1] = number ? m.lambda[1] * scale : real(0);
   m.guards = c.guards | (!number ? GUARD_NOT_FINITE : beyond ? GUARD_LIMIT : 0u);
   return m;
+}
+// b of method.md eq. 39b, times h^2.
+real stiffness_bound(Constraint4x2 c, real w[4], real a[2]) {
+  real b = real(0);
+  for (int j = 0; j < 4; ++j)
+    b += w[j] * (dot(c.gradient[0][j], c.gradient[0][j]) / a[0] + dot(c.gradient[1][j], c.gradient[1][j]) / a[1]);
+  return b;
 }

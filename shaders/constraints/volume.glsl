@@ -1,7 +1,5 @@
-// Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so an inverted tet is pushed back
-// (paper eqs. 16-21; method.md eq. 10). The gradient vanishes when a tet collapses to a line; `floor` (0.7 % of a
-// regular tet's at rest) keeps the correction under about ten times the tet's size there. A tet on a line has no
-// gradient at all: its vertices part in pseudo-random directions.
+// Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so that an inverted tet is pushed
+// back (paper eqs. 16-21; method.md eq. 10).
 Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   Constraint4 c;
   vec3 a = x[1] - x[0];
@@ -16,13 +14,15 @@ Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   real noise = side * side * (side + real(3) * quantization_size);
   c.C = apply_dead_zone(dot(c.gradient[3], d) - rest, noise * sixth);
   c.guards = 0u;
+  // The gradient vanishes where a tet collapses to a line. The floor, 0.7 % of a regular tet's at rest, keeps the
+  // correction under about ten times the tet's size there.
   real area = pow(abs(rest), real(2) / real(3));
   c.floor = real(0.01) * area * area;
   real sum = real(0);
   for (int j = 0; j < 4; ++j) sum += dot(c.gradient[j], c.gradient[j]);
   if (sum <= real(1e-10) * c.floor) {
-    // Two pairs push each other apart, so momentum stays. Large, so that the step is small, a few hundredths of the
-    // tet: it is to break the symmetry, and the true gradient takes over.
+    // Vertices part two by two, so that momentum stays, in pseudo-random directions. Gradients are large, so that the
+    // step is a few hundredths of the tet: it breaks the symmetry, and the true gradient takes over.
     c.gradient[0] = any_direction(id_of(ids, 0), id_of(ids, 1)) * (real(9) * area);
     c.gradient[1] = -c.gradient[0];
     c.gradient[2] = any_direction(id_of(ids, 2), id_of(ids, 3)) * (real(9) * area);
@@ -31,7 +31,7 @@ Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   }
   return c;
 }
-// The volume over that at rest.
+// The volume over the volume at rest.
 real volume_jacobian(vec3 x[4], real rest) {
   return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]) / (real(6) * rest);
 }

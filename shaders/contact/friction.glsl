@@ -1,4 +1,4 @@
-// Coulomb friction of a vertex's body.
+// The friction coefficient of a vertex's body.
 #ifndef FRICTION_OF_BODIES
 #define FRICTION_OF_BODIES
 #if BODY_FRICTION

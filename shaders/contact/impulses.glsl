@@ -1,25 +1,23 @@
-// A rigid body on obstacles: inelastic impacts and Coulomb friction by impulses, each contact in turn (method.md eqs.
-// 34-37). GLSL and C++ (sim/model/formulas.h). Impulses and momenta per mass of the body.
+// Contact of a rigid body with obstacles: inelastic impacts and Coulomb friction by impulses, each contact in turn
+// (method.md eqs. 34-37). Impulses and momenta are per mass of the body. GLSL and C++ (sim/model/formulas.h).
 struct Rigid {
   vec3 centre;
   vec3 velocity;
   vec3 spin;  // rad/s
   mat3 inverse_inertia;
-  bool unsettled;  // impulses still changed when it was left
+  bool unsettled;  // impulses did not converge
 };
 struct Touch {
   vec3 normal;
   vec3 arm;       // from the centre
-  real least;     // the normal velocity that is left, at least
+  real least;     // the least normal velocity allowed
   vec3 impulse;
-  mat3 response;  // velocity there per impulse there
+  mat3 response;  // velocity at the contact per impulse
   mat3 stopping;  // its inverse
-#if SOLIDS  // else obstacles rest, and have the world's friction
-  vec3 surface;   // the obstacle's velocity there
+  vec3 surface;   // the obstacle's velocity at the contact
   real friction;
-#endif
 };
-// The inverse inertia from the second moments of the mass about the centre; 0 where it has none, as all is on a line.
+// From the second moments of the mass about the centre; 0 if there is no inertia about some axis, as of a line.
 mat3 inverse_inertia_of(mat3 moments) {
   real trace = moments[0][0] + moments[1][1] + moments[2][2];
   mat3 inertia = mat3(trace) - moments;
@@ -27,32 +25,28 @@ mat3 inverse_inertia_of(mat3 moments) {
 }
 bool has_inertia(Rigid b) { return b.inverse_inertia[0][0] > real(0); }
 vec3 velocity_at(Rigid b, vec3 arm) { return b.velocity + cross(b.spin, arm); }
-// `approach`: normal velocity before; under what gravity alone makes of it in two substeps there is no rebound. `gap`:
-// closed in h at most, but for one that rounding may have opened.
-const real closed_gap = real(1e-6);  // of the body's size
+// The least normal velocity allowed after one of `approach`. A body rebounds only if it is faster than gravity makes it
+// in two substeps (`fall`: in one); else it may close `gap` in h, less closed_gap.
+const real closed_gap = real(1e-6);  // of the body's size, which rounding may have opened
 real least_velocity(real approach, real gap, real h, real fall, real restitution) {
   return restitution > real(0) && approach < real(-2) * fall ? -restitution * approach : -max(gap, real(0)) / h;
 }
 Touch touch_at(Rigid b, vec3 normal, vec3 arm, real least, vec3 impulse, vec3 surface, real friction) {
   mat3 turn = mat3(real(0), arm.z, -arm.y, -arm.z, real(0), arm.x, arm.y, -arm.x, real(0));  // turn * p = cross(arm, p)
   mat3 response = mat3(real(1)) + transpose(turn) * b.inverse_inertia * turn;
-#if SOLIDS
   return Touch(normal, arm, least, impulse, response, inverse(response), surface, friction);
-#else
-  return Touch(normal, arm, least, impulse, response, inverse(response));
-#endif
 }
 Rigid pushed(Rigid b, vec3 arm, vec3 impulse) {
   b.velocity += impulse;
   b.spin += b.inverse_inertia * cross(arm, impulse);
   return b;
 }
-// The impulse at a contact while all others stay as they are: the one that stops it, if friction can; else the limit of
-// friction against the slip that is left. `velocity`: there, with the contact's impulse so far in it.
-vec3 impulse_at(Touch t, vec3 velocity, real friction) {
+// The impulse at a contact while all others stay as they are: the one that stops it, if friction can; else friction is
+// at its limit, against the remaining slip. `velocity`: relative to the obstacle, with the contact's impulse so far.
+vec3 impulse_at(Touch t, vec3 velocity) {
   vec3 n = t.normal, was = t.impulse, impulse = was - t.stopping * (velocity - t.least * n);
   real push = dot(impulse, n), grip = length(impulse - push * n);
-  if (push <= real(0) || grip > friction * push) {
+  if (push <= real(0) || grip > t.friction * push) {
     impulse = was;
     for (int turn = 0; turn < 8; ++turn) {
       vec3 now = velocity + t.response * (impulse - was);
@@ -63,26 +57,20 @@ vec3 impulse_at(Touch t, vec3 velocity, real friction) {
       real speed = dot(slip, slip);
       if (speed > real(0)) held -= slip * (speed / dot(slip, t.response * slip));
       grip = length(held);
-      if (grip > friction * push) held *= friction * push / grip;
+      if (grip > t.friction * push) held *= t.friction * push / grip;
       impulse = held + push * n;
     }
   }
   return impulse;
 }
-#if SOLIDS
-#define SLIP_OF(k, v) (v - contacts[k].surface), contacts[k].friction
-#else
-#define SLIP_OF(k, v) v, params.friction
-#endif
 SHARED_TOUCHES
-// Over the contacts in `contacts` until no impulse changes by more than `enough`; a body slower than `still` in the end
-// stands still.
+// Sweeps over `contacts` until no impulse changes by more than `enough`; a body slower than `still` is then stopped.
 Rigid settled(TOUCHES Rigid b, int count, real enough, real still) {
   real change = enough + enough;
   for (int sweep = 0; sweep < 200 && change > enough; ++sweep) {
     change = real(0);
     for (int k = 0; k < count; ++k) {
-      vec3 arm = contacts[k].arm, impulse = impulse_at(contacts[k], SLIP_OF(k, velocity_at(b, arm))),
+      vec3 arm = contacts[k].arm, impulse = impulse_at(contacts[k], velocity_at(b, arm) - contacts[k].surface),
            more = impulse - contacts[k].impulse;
       b = pushed(b, arm, more);
       change = max(change, length(more));

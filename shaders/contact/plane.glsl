@@ -1,10 +1,10 @@
 struct Surface {
   vec3 normal;    // outward
-  real distance;  // from it, of a point
+  real distance;  // signed, of a point from it
 };
-// Contact with a half space n.x >= d, as an inequality constraint with Coulomb friction at the level of positions
-// (method.md eqs. 11-12). `depth`: n.x - d (negative inside); `moved`: the vertex's displacement so far in this
-// substep. Friction takes back the tangential part of the displacement, at most friction * the normal correction.
+// Contact with a half space n.x >= d as a constraint on positions, with Coulomb friction (method.md eqs. 11-12), which
+// takes back the tangential displacement by at most friction * the normal correction. `depth`: n.x - d; `moved`: the
+// vertex's displacement so far in this substep.
 vec3 plane_correction(vec3 n, real depth, vec3 moved, real friction) {
   vec3 slip = moved - n * dot(moved, n);
   real length_squared = dot(slip, slip);

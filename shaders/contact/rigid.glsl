@@ -1,14 +1,14 @@
-// Hard bodies that touch (method.md, "Contact of a hard body"): what a vertex tells of itself at the end of a substep,
-// for rigid_contact.comp, and whether its body is carried as a rigid one in this substep. Two sides take turns: one is
-// read, the other written.
+// Contact of hard bodies (method.md, "Contact of a hard body"): what vertices add to the records of their bodies at the
+// end of a substep for rigid_contact.comp, and whether a body is moved as a rigid one in this substep. Records have two
+// sides, of which one is read and the other written, in turn.
 layout(std430) buffer RigidBodies {
   RigidRecord rigid_bodies[BODY_COUNT];
-  uint near[];  // by side and body: vertices that would touch an obstacle next, in any order
+  uint near[];  // by side and body the vertices that will be in an obstacle after the next substep, in any order
 };
 shared int rigid_sums[RIGID_SUMS];
 
 uint side_now() { return (phases & PHASE_SIDE) != 0u ? 1u : 0u; }
-uint body_of(uint i) {  // the last that starts at i or before
+uint body_of(uint i) {  // the last that starts at vertex i or before
   uint low = 0u, high = BODY_COUNT;
   while (low + 1u < high) {
     uint middle = (low + high) / 2u;
@@ -17,13 +17,14 @@ uint body_of(uint i) {  // the last that starts at i or before
   }
   return low;
 }
-// From the origin of its body.
+// The position relative to the origin of its body.
 vec3 arm_of(DoubleSingle x, vec3 origin) { return (x.high - origin) + x.low; }
 
-// A body's record as vertices ask for it.
+// What vertices read of a body's record.
 struct RigidState {
   uint body;
-  bool carried, summed;
+  bool carried;  // moved as a rigid body in this substep
+  bool summed;   // its sums are needed
   vec3 origin;
   float mass;
 };
@@ -32,13 +33,13 @@ RigidState state_of(uint b) {
   return RigidState(b, rigid_bodies[b].sides[s].carried != 0u, rigid_bodies[b].sides[s].summed != 0u,
                     rigid_bodies[b].sides[s].origin, rigid_bodies[b].mass);
 }
-RigidState group_state;  // of the body that the work-group's first vertex belongs to
+RigidState group_state;  // of the body of the work-group's first vertex
 RigidState state_at(uint i) {
   uint b = body_of(i);
   if (b == group_state.body) return group_state;
   return state_of(b);
 }
-// A work-group whose first vertex is i begins; needs a barrier behind it.
+// Begins a work-group whose first vertex is i; a barrier must follow.
 void begin_sums(uint i) {
   if (gl_LocalInvocationIndex < RIGID_SUMS) rigid_sums[gl_LocalInvocationIndex] = 0;
   group_state = state_of(body_of(min(i, params.vertex_count - 1u)));
@@ -47,10 +48,10 @@ void add_quanta(uint b, int which, float quanta) {
   if (b == group_state.body) atomicAdd(rigid_sums[which], int(quanta));
   else atomicAdd(rigid_bodies[b].sides[side_now()].sums[which], int(quanta));
 }
-// Of 2^-30: weights add up to 1, so no sum overflows.
+// In quanta of 2^-30: weights add up to 1, so no sum overflows.
 float quanta_of(float value) { return clamp(value, -1.0, 1.0) * 1073741824.0; }
 void add_rigid_sum(uint b, int which, float value) { add_quanta(b, which, round(quanta_of(value))); }
-// Of momenta, which are small beside RIGID_SPEED: `rest` counts parts of a quantum.
+// For momenta, which are small compared with RIGID_SPEED: sum `rest` counts parts of a quantum.
 void add_rigid_sum(uint b, int which, int rest, float value) {
   float quanta = quanta_of(value), whole = round(quanta);
   add_quanta(b, which, whole);
@@ -60,7 +61,7 @@ void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].f
 void note_range(vec3 value) {
   if (any(greaterThan(abs(value), vec3(1.0)))) atomicAdd(dropped[DROP_RANGE], 1u);
 }
-// Vertex i is at x with velocity v and will be at `next`.
+// Adds vertex i at x, with velocity v, that will be at `next`.
 void note_motion(RigidState state, uint i, DoubleSingle x, DoubleSingle v, DoubleSingle next, float inverse_mass) {
   uint b = state.body, s = side_now();
   bool inside = will_touch(x, next, 1.0);
@@ -75,7 +76,7 @@ void note_motion(RigidState state, uint i, DoubleSingle x, DoubleSingle v, Doubl
     add_rigid_sum(b, 9 + a, weight * arm[a] * arm[a]);
     add_rigid_sum(b, 12 + a, weight * arm[a] * arm[(a + 1) % 3]);
   }
-  if (state.carried) return;  // then its momenta are known
+  if (state.carried) return;  // its momenta are known
   vec3 rate = (v.high + v.low) / RIGID_SPEED, speed = clamp(rate, vec3(-1.0), vec3(1.0));
   vec3 turn = 0.5 * cross(arm, speed);
   note_range(rate);
@@ -84,7 +85,7 @@ void note_motion(RigidState state, uint i, DoubleSingle x, DoubleSingle v, Doubl
     add_rigid_sum(b, 6 + a, 18 + a, weight * turn[a]);
   }
 }
-// What the work-group has added up goes to its body.
+// Adds the work-group's sums to those of its body.
 void end_sums() {
   barrier();
   uint k = gl_LocalInvocationIndex;

@@ -1,6 +1,6 @@
-// Contact of hard bodies (method.md, "Contact of a hard body"), before each substep: a body of which a vertex would get
-// into an obstacle gets the velocities of a rigid body in inelastic frictional contact. Every work-group finds them for
-// itself.
+// Contact of hard bodies (method.md, "Contact of a hard body"): before a substep in which a vertex would get into an
+// obstacle, its body gets the velocities of a rigid body in inelastic frictional contact. Each work-group with vertices
+// of the body computes its motion anew.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
@@ -11,11 +11,11 @@ layout(local_size_x = 256) in;
 #include "contact/impulses.glsl"
 shared Rigid before, body;  // the centre from the body's origin; momenta per mass
 shared uint worst, worst_place;
-shared uint places[MOST_TOUCHES];  // of the touches: vertex * MAX_OBSTACLES + obstacle
+shared uint places[MOST_TOUCHES];  // of the contacts: vertex * MAX_OBSTACLES + obstacle
 
 DoubleSingle position_of(uint i) { return DoubleSingle(positions[i].high, positions[i].low); }
 
-// The rigid motion of body b, from its sums on side s.
+// The motion of body b before contact, from its sums on side s.
 Rigid rigid_motion(uint b, uint s) {
   float sums[RIGID_SUMS];
   for (int k = 0; k < RIGID_SUMS; ++k) sums[k] = float(rigid_bodies[b].sides[s].sums[k]) / 1073741824.0;
@@ -29,7 +29,7 @@ Rigid rigid_motion(uint b, uint s) {
   motion.centre = reach * c;
   motion.inverse_inertia = inverse_inertia_of(moments * (reach * reach));
   vec3 angular;
-  if (rigid_bodies[b].sides[s].carried != 0u) {  // known better than from sums
+  if (rigid_bodies[b].sides[s].carried != 0u) {  // more exact than sums
     motion.velocity = rigid_bodies[b].sides[s].velocity;
     angular = rigid_bodies[b].sides[s].angular;
   } else {
@@ -41,33 +41,76 @@ Rigid rigid_motion(uint b, uint s) {
   return motion;
 }
 
-// What a vertex at x meets of an obstacle: the gap now; how the obstacle moves there, brakes and rebounds.
-struct Meeting {
+// Of a vertex with an obstacle: the signed distance now; the obstacle's velocity there, friction and restitution.
+struct Contact {
   vec3 normal;
   float gap;
   vec3 velocity;
   float friction, restitution;
 };
-Meeting meeting_with(int k, uint vertex, DoubleSingle x, vec3 arm) {
+Contact contact_with(int k, uint vertex, DoubleSingle x, vec3 arm) {
   vec3 velocity = (velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale;
   Surface surface = surface_before(k, x, velocity);
-  return Meeting(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex),
+  return Contact(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex),
                  obstacle_restitution(k));
 }
-// The normal velocity at a contact may not be under this.
-float least_at(Meeting m, vec3 arm) {
+// The least normal velocity that the contact allows.
+float least_at(Contact m, vec3 arm) {
   return least_velocity(dot(m.normal, velocity_at(before, arm) - m.velocity), m.gap - closed_gap * params.body_size,
                         params.h, params.h * length(params.gravity), m.restitution);
 }
-void take_in(int k, uint place, vec3 origin, vec3 impulse) {
+void add_contact(int k, uint place, vec3 origin, vec3 impulse) {
   DoubleSingle x = position_of(place / MAX_OBSTACLES);
   vec3 arm = arm_of(x, origin) - before.centre;
-  Meeting m = meeting_with(int(place % MAX_OBSTACLES), place / MAX_OBSTACLES, x, arm);
+  Contact m = contact_with(int(place % MAX_OBSTACLES), place / MAX_OBSTACLES, x, arm);
   contacts[k] = touch_at(before, m.normal, arm, least_at(m, arm), impulse, m.velocity, m.friction);
   places[k] = place;
 }
-
-// Of body b, with `count` of its vertices that touch; false if it has no inertia. Side s is read, the other written.
+// Finds the contact of one of `count` vertices that the body's motion violates most, and by more than `loose` (m/s);
+// worst_place is ~0 if there is none.
+void find_worst(uint b, uint s, uint count, vec3 origin, float loose) {
+  uint lane = gl_LocalInvocationIndex;
+  if (lane == 0u) {
+    worst = 0u;
+    worst_place = ~0u;
+  }
+  barrier();
+  float most = loose;
+  uint place = ~0u;
+  for (uint k = lane; k < count; k += gl_WorkGroupSize.x) {
+    uint vertex = near[s * params.vertex_count + rigid_bodies[b].first + k];
+    DoubleSingle x = position_of(vertex);
+    vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
+    for (int p = 0; p < obstacle_count(); ++p) {
+      Contact m = contact_with(p, vertex, x, arm);
+      float over = least_at(m, arm) - dot(m.normal, speed - m.velocity);
+      if (over > most || (over == most && vertex * MAX_OBSTACLES + uint(p) < place)) {
+        most = over;
+        place = vertex * MAX_OBSTACLES + uint(p);
+      }
+    }
+  }
+  if (place != ~0u) atomicMax(worst, floatBitsToUint(most));
+  barrier();
+  if (place != ~0u && floatBitsToUint(most) == worst) atomicMin(worst_place, place);
+  barrier();
+}
+// For the next substep, on side o.
+void write_contacts(uint b, uint o, int touching, bool full) {
+  uint lane = gl_LocalInvocationIndex;
+  if (lane < uint(touching)) {
+    rigid_bodies[b].sides[o].touches[lane] = places[lane];
+    rigid_bodies[b].sides[o].impulses[lane] = vec4(contacts[lane].impulse, 0.0);
+  }
+  if (lane == 0u) {
+    if (full) atomicAdd(dropped[DROP_CONTACTS], 1u);
+    if (body.unsettled) atomicAdd(dropped[DROP_SWEEPS], 1u);
+    rigid_bodies[b].sides[o].touching = uint(touching);
+    rigid_bodies[b].sides[o].velocity = body.velocity;
+    rigid_bodies[b].sides[o].angular = length(body.spin) > 0.0 ? inverse(body.inverse_inertia) * body.spin : vec3(0.0);
+  }
+}
+// Finds the motion of body b with `count` vertices near obstacles from side s; false if the body has no inertia.
 bool find_motion(uint b, uint s, uint count, bool writes) {
   uint lane = gl_LocalInvocationIndex;
   int touching = int(rigid_bodies[b].sides[s].touching);
@@ -77,46 +120,22 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
   barrier();
   if (!has_inertia(before)) return false;
   if (lane < uint(touching))
-    take_in(int(lane), rigid_bodies[b].sides[s].touches[lane], origin, rigid_bodies[b].sides[s].impulses[lane].xyz);
+    add_contact(int(lane), rigid_bodies[b].sides[s].touches[lane], origin, rigid_bodies[b].sides[s].impulses[lane].xyz);
   Rigid now = before;
   now.velocity = (now.velocity + params.h * params.gravity) * params.velocity_scale;
   now.spin *= params.velocity_scale;
   float enough = 2e-7 * length(now.velocity) + 2e-5 * fall, loose = 1e-3 * fall + 4.0 * enough;
   barrier();
-  if (lane == 0u) {  // starts from the impulses before
+  if (lane == 0u) {  // starts from the impulses of the substep before
     for (int k = 0; k < touching; ++k) now = pushed(now, contacts[k].arm, contacts[k].impulse);
     body = settled(now, touching, enough, still);
   }
-  // Contacts are taken in as the motion found so far breaks them, the worst first.
   bool full = false;
-  for (int round = 0;; ++round) {
-    if (lane == 0u) {
-      worst = 0u;
-      worst_place = ~0u;
-    }
-    barrier();
-    float most = loose;
-    uint place = ~0u;
-    for (uint k = lane; k < count; k += gl_WorkGroupSize.x) {
-      uint vertex = near[s * params.vertex_count + rigid_bodies[b].first + k];
-      DoubleSingle x = position_of(vertex);
-      vec3 arm = arm_of(x, origin) - body.centre, speed = velocity_at(body, arm);
-      for (int p = 0; p < obstacle_count(); ++p) {
-        Meeting m = meeting_with(p, vertex, x, arm);
-        float over = least_at(m, arm) - dot(m.normal, speed - m.velocity);
-        if (over > most || (over == most && vertex * MAX_OBSTACLES + uint(p) < place)) {
-          most = over;
-          place = vertex * MAX_OBSTACLES + uint(p);
-        }
-      }
-    }
-    if (place != ~0u) atomicMax(worst, floatBitsToUint(most));
-    barrier();
-    if (place != ~0u && floatBitsToUint(most) == worst) atomicMin(worst_place, place);
-    barrier();
+  for (int round = 0;; ++round) {  // adds the worst contact as long as the motion violates any
+    find_worst(b, s, count, origin, loose);
     if (worst_place == ~0u) break;
-    int at = touching;
-    bool known = false;  // then contacts contradict each other, as where a body is jammed, and more sweeps do not help
+    int at = touching;  // or one without an impulse, to be replaced
+    bool known = false;  // contacts contradict each other, as those of a jammed body; more sweeps would not help
     for (int k = touching - 1; k >= 0; --k) {
       if (contacts[k].impulse == vec3(0.0)) at = k;
       known = known || places[k] == worst_place;
@@ -126,23 +145,12 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     touching = max(touching, at + 1);
     barrier();
     if (lane == 0u) {
-      take_in(at, worst_place, origin, vec3(0.0));
+      add_contact(at, worst_place, origin, vec3(0.0));
       body = settled(body, touching, enough, still);
     }
     barrier();
   }
-  uint o = 1u - s;
-  if (writes && lane < uint(touching)) {
-    rigid_bodies[b].sides[o].touches[lane] = places[lane];
-    rigid_bodies[b].sides[o].impulses[lane] = vec4(contacts[lane].impulse, 0.0);
-  }
-  if (writes && lane == 0u) {
-    if (full) atomicAdd(dropped[DROP_CONTACTS], 1u);
-    if (body.unsettled) atomicAdd(dropped[DROP_SWEEPS], 1u);
-    rigid_bodies[b].sides[o].touching = uint(touching);
-    rigid_bodies[b].sides[o].velocity = body.velocity;
-    rigid_bodies[b].sides[o].angular = length(body.spin) > 0.0 ? inverse(body.inverse_inertia) * body.spin : vec3(0.0);
-  }
+  if (writes) write_contacts(b, 1u - s, touching, full);
   return true;
 }
 

@@ -1,19 +1,17 @@
-// One work-group: adds the partial sums into the row, then finds the centre of mass and the rotation that brings the
-// rest shape nearest (Horn 1987: the largest eigenvector of a symmetric 4x4 matrix, here by cyclic Jacobi rotations).
+// One work-group adds the partial sums into the row, then finds the centre of mass and the rotation that best aligns
+// the rest shape (Horn 1987: the largest eigenvector of a symmetric 4x4 matrix, here by cyclic Jacobi rotations).
 #include "measure/reduce.glsl"
 
 void main() {
   int me = int(gl_LocalInvocationIndex);
-  if (me < M_ANGULAR) row[me] = total_of(me);
-  if (me != 0) return;  // works from the partial sums, not from what its neighbours write
+  if (me < M_ANGULAR) row[me] = total(me);
+  if (me != 0) return;  // the rest reads the partial sums, not the row that other invocations write
   vec3 centre;
-  for (int a = 0; a < 3; ++a) centre[a] = total_of(M_MOMENT + a) / mass;
-  // covariance[b][a] = sum m x_a X_b. The rest positions are about their centre of mass, so x needs no centring.
-  float s[9];
-  float scale = 0.0;
-  for (int k = 0; k < 9; ++k) s[k] = total_of(M_COVARIANCE + k), scale = max(scale, abs(s[k]));
+  for (int a = 0; a < 3; ++a) centre[a] = total(M_MOMENT + a) / mass;
+  // s[3*a + b] = sum m X_a x_b. The rest positions X are about their centre of mass, so x needs no centring.
+  float s[9], scale = 0.0;
+  for (int k = 0; k < 9; ++k) s[k] = total(M_COVARIANCE + k), scale = max(scale, abs(s[k]));
   for (int k = 0; k < 9; ++k) s[k] = scale > 0.0 ? s[k] / scale : 0.0;
-  // Sab = sum X_a x_b, with s[3*a + b] = sum m X_a x_b
   float xx = s[0], xy = s[1], xz = s[2], yx = s[3], yy = s[4], yz = s[5], zx = s[6], zy = s[7], zz = s[8];
   mat4 n = mat4(xx + yy + zz, yz - zy, zx - xz, xy - yx,
                 yz - zy, xx - yy - zz, xy + yx, zx + xz,

@@ -1,6 +1,6 @@
 // Bindings and results of the measuring kernels, read by GLSL and C++.
-#define METRICS_GROUPS 64      // of a reduction at most; always as many for a mesh, so that sums keep their order
-#define METRICS_SIZE 256       // their size
+#define METRICS_GROUPS 64      // work-groups of a reduction at most; the number depends on the mesh alone
+#define METRICS_SIZE 256       // invocations of a work-group
 
 // Sums over one body, in this order in a row. The first group comes from constraints, the second from vertices, the
 // third from vertices once the centre and rotation are known.
@@ -21,7 +21,7 @@
 #define M_CONTACTS 26          // pairs of a vertex and an obstacle that it touches
 #define M_NON_FINITE 27        // vertices with a position or velocity that is not finite
 #define M_PENETRATION 28       // m, of the vertex that is deepest in an obstacle
-#define M_DEPTHS 29            // DEPTHS: vertices inside by so much of the size, from 1 on, each half an octave less
+#define M_DEPTHS 29            // DEPTHS: vertices by depth over the size, from 1 on in steps of half an octave
 #define DEPTHS 32
 #define M_ANGULAR 61           // 3: sum m r x u about the centre of mass
 #define M_RIGID_SQUARES 64     // sum m |x - c - R X|^2

@@ -1,5 +1,4 @@
-// Distance to the rigidly aligned rest shape (method.md eq. 20), and angular momentum about the centre of mass, of one
-// body.
+// One body's distance to its rigidly aligned rest shape (method.md eq. 20), and angular momentum about its centre.
 #include "measure/reduce.glsl"
 layout(std430) readonly buffer Velocities { Velocity velocities[]; };
 layout(std430) readonly buffer Rest { vec4 rest[]; };
@@ -20,6 +19,6 @@ void main() {
     squares += at_rest.w * dot(apart, apart);
     angular += at_rest.w * cross(r, u);
   }
-  for (int a = 0; a < 3; ++a) store_partial(M_ANGULAR + a, angular[a], false);
-  store_partial(M_RIGID_SQUARES, squares, false);
+  for (int a = 0; a < 3; ++a) store_partial(M_ANGULAR + a, angular[a]);
+  store_partial(M_RIGID_SQUARES, squares);
 }

@@ -27,26 +27,26 @@ void main() {
     kinetic += 0.5 * m * dot(v, v);
     height += m * p.high.y;
     covariance += m * outerProduct(x, at_rest.xyz);
-    float outside_by = 0.0;
+    float least_gap = 0.0;
     for (int k = 0; k < obstacle_count(); ++k) {
       float gap = obstacle_distance(k, DoubleSingle(p.high, p.low));
       if (gap < touching) contacts += 1.0;
-      outside_by = min(outside_by, gap);
+      least_gap = min(least_gap, gap);
     }
-    deepest = max(deepest, -outside_by);
-    int octaves = int(-2.0 * log2(-outside_by * 1e-5 / touching));
-    if (outside_by < 0.0 && octaves < DEPTHS) atomicAdd(depths[max(octaves, 0)], 1u);
+    deepest = max(deepest, -least_gap);
+    int octaves = int(-2.0 * log2(-least_gap * 1e-5 / touching));
+    if (least_gap < 0.0 && octaves < DEPTHS) atomicAdd(depths[max(octaves, 0)], 1u);
   }
   for (int a = 0; a < 3; ++a) {
-    store_partial(M_MOMENT + a, moment[a], false);
-    store_partial(M_MOMENTUM + a, momentum[a], false);
-    for (int b = 0; b < 3; ++b) store_partial(M_COVARIANCE + 3 * a + b, covariance[a][b], false);
+    store_partial(M_MOMENT + a, moment[a]);
+    store_partial(M_MOMENTUM + a, momentum[a]);
+    for (int b = 0; b < 3; ++b) store_partial(M_COVARIANCE + 3 * a + b, covariance[a][b]);
   }
-  store_partial(M_SPEED, speed, false);
-  store_partial(M_KINETIC, kinetic, false);
-  store_partial(M_HEIGHT, height, false);
-  store_partial(M_CONTACTS, contacts, false);
-  store_partial(M_NON_FINITE, non_finite, false);
-  store_partial(M_PENETRATION, deepest, true);
+  store_partial(M_SPEED, speed);
+  store_partial(M_KINETIC, kinetic);
+  store_partial(M_HEIGHT, height);
+  store_partial(M_CONTACTS, contacts);
+  store_partial(M_NON_FINITE, non_finite);
+  store_partial(M_PENETRATION, deepest);
   if (me < DEPTHS) partials[(M_DEPTHS + me) * METRICS_GROUPS + gl_WorkGroupID.x] = float(depths[me]);
 }

@@ -1,4 +1,5 @@
-// A vertex with where its velocity takes it in `seconds`. CONTACTS: an arrow so long along a normal, coloured by depth.
+// An arrow from a vertex along its displacement in `seconds`. With CONTACTS `velocity` is the normal at a contact, and
+// the colour shows its depth.
 #include "render/view.glsl"
 layout(location = ATTRIBUTE_HIGH) in vec3 high;
 layout(location = ATTRIBUTE_LOW) in vec3 low;
@@ -6,11 +7,11 @@ layout(location = ATTRIBUTE_REST) in vec4 rest;
 layout(location = ATTRIBUTE_VELOCITY) in vec3 velocity;
 uniform float seconds;
 #ifdef CONTACTS
-layout(location = ATTRIBUTE_VALUE) in float depth;  // m; below 0: none
-uniform float deepest;                              // m, and more, is red
+layout(location = ATTRIBUTE_VALUE) in float depth;  // m; below 0: no contact
+uniform float deepest;                              // m; from here on arrows are red
 #endif
 out Arrow {
-  vec4 from, to;  // clip space; from.w 0: none
+  vec4 from, to;  // clip space; from.w 0: no arrow
   vec3 colour;
 } arrow;
 

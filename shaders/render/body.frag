@@ -1,19 +1,11 @@
 #include "render/view.glsl"
 #include "render/colour.glsl"
 #include "render/light.glsl"
-
-in Point {
-  vec3 position;
-  vec3 normal;
-  vec3 edge;
-  float value;
-  flat vec3 albedo;
-} point;
-
+#include "render/point_in.glsl"
 layout(location = 0) out vec4 result;
 
-// How much of this pixel the triangle's edges cover, lines one pixel wide of which each side draws its half. Of
-// triangles a few pixels wide they would be all one sees: there they give way.
+// The part of this pixel that the triangle's edges cover. They are lines one pixel wide, of which each side draws its
+// half, and fade where triangles are only a few pixels wide.
 float edge_cover(vec3 barycentric) {
   vec3 dx = dFdx(barycentric), dy = dFdy(barycentric), pixel = sqrt(dx * dx + dy * dy);
   vec3 cover = clamp(1.0 - barycentric / max(pixel, vec3(1e-9)), 0.0, 1.0);

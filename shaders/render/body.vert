@@ -1,4 +1,4 @@
-// A vertex of tetrahedra and edges straight from the simulation's buffer.
+// A vertex of tets or edges, straight from the simulation's buffer.
 #include "render/view.glsl"
 layout(location = ATTRIBUTE_HIGH) in vec3 high;
 layout(location = ATTRIBUTE_LOW) in vec3 low;
@@ -13,8 +13,7 @@ out Corner {
 
 void main() {
   corner.position = high + low;
-  // A value that is no number has no colour: such a corner goes the way of one without a place, and takes its faces
-  // along.
+  // A value that is not finite has no colour, so that its faces are dropped like those of a vertex that is not finite.
   if (!finite(vec3(value * 1e-30))) corner.position = vec3(uintBitsToFloat(0x7f800000u));
   corner.value = value;
   corner.rest = rest;

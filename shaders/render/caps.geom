@@ -1,4 +1,4 @@
-// Where the cut goes through a tetrahedron: a triangle or a quadrilateral on the side that is left.
+// The section of a tet with the cut: a triangle or a quadrilateral.
 layout(lines_adjacency) in;
 layout(triangle_strip, max_vertices = 6) out;
 #include "render/faces.glsl"
@@ -15,7 +15,7 @@ void main() {
     else low[lows++] = i;
   }
   if (highs == 0 || lows == 0) return;
-  // The cut edges, in the order around the polygon.
+  // The points of the cut on edges of the tet, in their order around the polygon.
   vec3 at[4];
   float shown[4];
   int n = 0;
@@ -31,7 +31,7 @@ void main() {
   bool turned = dot(area, p[high[0]] - at[0]) < 0.0;
   vec3 normal = (turned ? -area : area) / max(length(area), 1e-30);
   for (int t = 2; t < n; ++t) {
-    // An edge of the triangle that is none of the polygon is not drawn: its coordinate stays 1.
+    // An inner edge of the polygon is not drawn, since its coordinate stays 1.
     vec3 inner = vec3(0.0, float(n == 4 && t == 2), float(n == 4 && t == 3));
     for (int k = 0; k < 3; ++k) {
       int i = turned ? 2 - k : k, from = i == 0 ? 0 : t + i - 2;

@@ -1,8 +1,8 @@
-// A vertex of a fine surface that rides on tetrahedra, straight from the simulation's buffer, to the image or the
-// shadow map. Vertex shaders need not have storage buffers in GL 4.3, hence textures.
+// A vertex of an embedded surface, from the simulation's positions to the image or the shadow map. Vertex shaders may
+// lack storage buffers in GL 4.3, hence textures.
 #include "render/view.glsl"
 #include "render/point.glsl"
-layout(location = ATTRIBUTE_CARRIED) in uvec4 carried;  // as carried.cpp packs it
+layout(location = ATTRIBUTE_CARRIED) in uvec4 carried;  // packed by carried.cpp
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;  // two texels each: Position
 layout(binding = UNIT_TETS) uniform usamplerBuffer tets;
 layout(binding = UNIT_REST) uniform samplerBuffer rest;
@@ -10,8 +10,8 @@ layout(binding = UNIT_COFACTORS) uniform samplerBuffer cofactors;  // three colu
 layout(binding = UNIT_VALUES) uniform samplerBuffer values;
 uniform int valued;
 
-// From an octahedron unfolded to a square.
-vec3 unpacked_normal(uint bits) {
+// Unpacks a direction from an octahedron unfolded to a square.
+vec3 unpack_normal(uint bits) {
   vec2 at = vec2(bits & 0xfffu, bits >> 12) / 2047.0 - 1.0;
   vec3 n = vec3(at, 1.0 - abs(at.x) - abs(at.y));
   float fold = max(-n.z, 0.0);
@@ -22,7 +22,7 @@ vec3 unpacked_normal(uint bits) {
 void main() {
   vec3 last = vec3(carried.xyz & 0xffffffu) * (1.0 / 2097152.0) - 4.0;  // 24 bits of -4 to 4
   float weights[4] = float[](1.0 - last.x - last.y - last.z, last.x, last.y, last.z);
-  vec3 n = unpacked_normal(carried.x >> 24 | (carried.y >> 24) << 8 | (carried.z >> 24) << 16);
+  vec3 n = unpack_normal(carried.x >> 24 | (carried.y >> 24) << 8 | (carried.z >> 24) << 16);
   uvec4 tet = texelFetch(tets, int(carried.w));
   vec3 p = vec3(0.0), normal = vec3(0.0);
   float value = 0.0;

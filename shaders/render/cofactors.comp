@@ -1,6 +1,5 @@
-// Of each vertex the cofactors of the mean deformation gradient F of its tetrahedra, by volume at rest: what turns the
-// normals of a surface that rides on them. Means of vertices, mixed within a tetrahedron, leave no kinks where
-// tetrahedra meet.
+// The cofactors at each vertex of the mean deformation gradient F of its tets, weighted by volume at rest, which turn
+// the normals of an embedded surface. Interpolated within tets, such means leave no kinks where tets join.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"
@@ -23,7 +22,5 @@ void main() {
     volume += dot(cross(p, q), s);
   }
   f = volume > 0.0 ? f * (1.0 / volume) : mat3(1.0);
-  cofactors[3u * v] = vec4(cross(f[1], f[2]), 0.0);
-  cofactors[3u * v + 1u] = vec4(cross(f[2], f[0]), 0.0);
-  cofactors[3u * v + 2u] = vec4(cross(f[0], f[1]), 0.0);
+  for (uint k = 0u; k < 3u; ++k) cofactors[3u * v + k] = vec4(cross(f[(k + 1u) % 3u], f[(k + 2u) % 3u]), 0.0);
 }

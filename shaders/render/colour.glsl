@@ -1,5 +1,5 @@
-// Colour maps, compiled as GLSL and as C++. They are straight lines and arcs in OKLab (B. Ottosson, 2020), where equal
-// steps look equally large; the result is linear sRGB.
+// Colour maps as linear sRGB, compiled as GLSL and as C++. They are straight lines and arcs in OKLab (B. Ottosson,
+// 2020), where equal steps look equally large.
 
 vec3 oklab_to_linear(vec3 lab) {
   float l = lab.x + 0.3963377774f * lab.y + 0.2158037573f * lab.z;
@@ -13,7 +13,7 @@ vec3 oklab_to_linear(vec3 lab) {
               -0.0041960863f * l - 0.7034186147f * m + 1.7076147010f * s);
 }
 
-// -1 blue, 0 near white, 1 red: lightness falls equally to both sides, so that neither sign looks larger.
+// From blue at -1 over near white at 0 to red at 1. Lightness falls equally to both sides: neither sign looks larger.
 vec3 diverging_colour(float t) {
   t = clamp(t, -1.0f, 1.0f);
   float a = abs(t);
@@ -23,7 +23,7 @@ vec3 diverging_colour(float t) {
   return clamp(oklab_to_linear(vec3(lightness, chroma * cos(hue), chroma * sin(hue))), vec3(0.0f), vec3(1.0f));
 }
 
-// 0 dark violet, through blue-green, to 1 yellow: lightness grows evenly, so that it also reads in grey.
+// From dark violet at 0 over blue-green to yellow at 1. Lightness grows evenly, so that it also reads in grey.
 vec3 sequential_colour(float t) {
   t = clamp(t, 0.0f, 1.0f);
   float lightness = mix(0.30f, 0.91f, t);
@@ -32,14 +32,13 @@ vec3 sequential_colour(float t) {
   return clamp(oklab_to_linear(vec3(lightness, chroma * cos(hue), chroma * sin(hue))), vec3(0.0f), vec3(1.0f));
 }
 
-// The number of something: neighbours in number are far apart in hue.
+// The colour of a number; successive numbers are far apart in hue.
 vec3 number_colour(float number) {
   float hue = 2.399963f * number, lightness = 0.62f + 0.06f * sin(1.7f * number);  // radians, the golden angle
   return clamp(oklab_to_linear(vec3(lightness, 0.11f * cos(hue), 0.11f * sin(hue))), vec3(0.0f), vec3(1.0f));
 }
 
-// What `value` looks like on a scale from `low` to `high`; kinds 1 (volume) and 2 (stretch) are signed, 6 (patch)
-// counts.
+// The colour of `value` on a scale from `low` to `high`. Kinds 1 (volume) and 2 (stretch) are signed, 6 (patch) counts.
 vec3 scale_colour(int kind, float value, float low, float high) {
   if (kind == 6) return number_colour(value);
   float t = (value - low) / (high - low);

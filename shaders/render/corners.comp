@@ -1,12 +1,12 @@
-// The corners of the surface's triangles as they are drawn, a thread each: place, value, and as normal the sum,
-// weighted by angles, of those of the triangles around the vertex that lie within the angle of an edge of its own. So
-// edges stay sharp without a geometry shader; GPUs made for computing have few units for those.
+// The corners of the surface's triangles as they are drawn, an invocation each. A corner's normal is the mean, weighted
+// by angles, of the triangles around its vertex that make no sharp edge with its own. Geometry shaders would do it
+// slowly on GPUs made for computing.
 #include "render/view.glsl"
 #include "render/gathered.glsl"
 layout(std430) readonly buffer Triangles { uint triangles[]; };
 layout(std430) readonly buffer Values { float values[]; };
 layout(std430) writeonly buffer Corners { SurfaceCorner corners[]; };
-uniform int valued, rested;  // whether there are values, and rest positions with bodies
+uniform int valued, rested;  // 1: there are values; there are rest positions with bodies
 
 vec3 normal_at(uint v, vec3 face) {
   vec3 x = position(v), sum = vec3(0.0);
@@ -30,7 +30,7 @@ void main() {
   for (uint k = 0u; k < 3u; ++k) {
     uint other = triangles[first + k];
     p[k] = position(other);
-    // A value that is no number has no colour.
+    // A value that is not finite has no colour.
     shown = shown && finite(p[k]) && (valued == 0 || finite(vec3(values[other] * 1e-30)));
   }
   vec3 area = cross(p[1] - p[0], p[2] - p[0]);
@@ -39,7 +39,7 @@ void main() {
   vec4 r = rested != 0 ? rest[v] : vec4(0.0);
   SurfaceCorner corner;
   corner.position = shown ? p[c - first] : vec3(0.0);
-  // Numbers are not mixed: a triangle has the colour of its first corner.
+  // Numbers of patches are not interpolated: a triangle has that of its first corner.
   corner.value = valued == 0 ? 0.0 : values[int(view.colour.x) == COLOUR_PATCH ? triangles[first] : v];
   corner.normal_xy = packSnorm2x16(normal.xy);
   corner.normal_z_body = packSnorm2x16(vec2(normal.z, r.w / 32767.0));

@@ -1,4 +1,4 @@
-// What the geometry shaders take in and give out.
+// The inputs and outputs of the geometry shaders of bodies.
 #include "render/view.glsl"
 #include "render/point.glsl"
 
@@ -8,7 +8,7 @@ in Corner {
   vec4 rest;
 } corner[];
 
-// Numbers are not mixed: an element has the colour of its first corner.
+// Numbers of patches are not interpolated: an element has that of its first corner.
 float shown_value(int i) { return corner[int(view.colour.x) == COLOUR_PATCH ? 0 : i].value; }
 
 void emit(vec3 edge, vec3 position, vec3 normal, float value, vec3 albedo) {

@@ -1,5 +1,5 @@
-// Values of vertices, each gathered from its items in fixed order, so the same every time. TETS: the mean over its
-// tetrahedra of what values.glsl has of `kind`. Otherwise the mean over its edges of L/L0 - 1.
+// Values by vertex: with TETS the mean of tet_value() over its tets, otherwise the mean of L/L0 - 1 over its edges.
+// Sums are in fixed order, so that they are the same every time.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/finite.glsl"
@@ -30,7 +30,7 @@ float gathered(uint v) {
   uint n = 0u;
   for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
     float e = error(v, k);
-    if (!finite(vec3(e * 1e-25))) continue;  // energies are large numbers
+    if (!finite(vec3(e * 1e-25))) continue;  // energies may be large
     sum += e;
     ++n;
   }

@@ -1,17 +1,14 @@
-// Material, lights and shadows. All colours linear; irradiances over pi, so that a white face under all of them is
-// about 1.
+// Material, lights and shadows. Colours are linear, and irradiances are over pi, so that a white face is about 1.
 layout(binding = UNIT_SHADOW) uniform sampler2DShadow shadow_map;
 layout(binding = UNIT_SHADOW_DEPTH) uniform sampler2D shadow_depth;
 layout(binding = UNIT_PLANES) uniform sampler2D plane_light;
 
 const vec3 key_colour = vec3(0.75, 0.715, 0.665);
 const vec3 sky_colour = vec3(0.425, 0.45, 0.485);
-const float bounced = 0.34;       // by what lies below
-const float roughness = 0.3;      // of the bodies, GGX's alpha
-const float mirrored = 0.04;      // by a plastic, seen head on
-
-// How far the maps of planes reach beyond the bodies' shadows.
-const float plane_reach = 1.5;
+const float bounced = 0.34;     // part of the light that the ground reflects
+const float roughness = 0.3;    // GGX's alpha of the bodies
+const float mirrored = 0.04;    // reflectance of plastic, seen head on
+const float plane_reach = 1.5;  // size of the maps of planes over that of the shadow map
 
 vec3 background_colour(float y) {
   const vec3 low = vec3(0.815, 0.810, 0.800), high = vec3(0.620, 0.670, 0.720);
@@ -20,7 +17,7 @@ vec3 background_colour(float y) {
 
 vec3 light_space(vec3 position) { return (light.matrix * vec4(position, 1.0)).xyz; }
 
-// Parts of the key light and of the sky that arrive at a point of a plane (plane_light.comp): one look.
+// The parts of the key light and of the sky that arrive at a point of a plane, as plane_light.comp found them.
 vec2 arriving(vec3 position, float plane) {
   if (view.right.w == 0.0) return vec2(1.0);
   vec2 at = light_space(position).xy / plane_reach;
@@ -28,8 +25,8 @@ vec2 arriving(vec3 position, float plane) {
   return textureLod(plane_light, vec2((at.x * 0.5 + 0.5 + plane) / view.scene.x, at.y * 0.5 + 0.5), 0.0).rg;
 }
 
-// Part of the key light that arrives on a body, from four looks that the sampler filters. The point compared is moved
-// off the surface by more than they are apart, which is what keeps a surface from shadowing itself.
+// The part of the key light that arrives on a body, from four filtered samples of the shadow map. The compared point is
+// moved off the surface by more than they are apart, which keeps a surface from shadowing itself.
 float body_shadow(vec3 position, vec3 normal, float facing) {
   if (view.right.w == 0.0) return 1.0;
   vec3 s = light_space(position + normal * light.centre.w * (1.0 + 1.5 * (1.0 - facing))) * 0.5 + 0.5;
@@ -40,7 +37,8 @@ float body_shadow(vec3 position, vec3 normal, float facing) {
   return 0.25 * lit;
 }
 
-// What arrives on the ground below: from far above, the foot is a small part of what is seen.
+// The light that arrives on the ground below. The higher the position, the smaller a part of the visible ground is the
+// point right below it.
 vec2 below(vec3 position) {
   if (view.scene.y == 0.0 || view.right.w == 0.0) return vec2(1.0);
   vec4 ground = view.planes[0];
@@ -49,14 +47,13 @@ vec2 below(vec3 position) {
              height / (height + 0.35 * light.extent.y + 1e-6));
 }
 
-// From the sky as a part of all, and else from the ground.
+// Light from the surroundings, of which `sky` is the part that the sky takes up and the ground the rest.
 vec3 surroundings(float sky, vec2 on_ground) {
   return mix(bounced * (key_direction.y * key_colour * on_ground.x + sky_colour * on_ground.y), sky_colour, sky);
 }
 
-// Of the bodies, a dull plastic: GGX in the form of B. Karis and others for small machines, under the key light, sky
-// and ground, and a little light beside the camera. Where colours mean something they keep their hue: not `shiny`,
-// under light that has none.
+// The colour of a body of dull plastic (GGX in B. Karis's form for mobile GPUs) under the key light, sky and ground,
+// and a little light beside the camera. Colours that show values are not `shiny` and keep their hue under white light.
 vec3 shade(vec3 albedo, vec3 position, vec3 normal, bool shiny) {
   vec3 to_eye = normalize(view.eye.xyz - position);
   float facing = dot(normal, key_direction), key = max(facing, 0.0);

@@ -3,7 +3,7 @@
 #include "render/point.glsl"
 layout(location = ATTRIBUTE_HIGH) in vec3 own_position;
 layout(location = ATTRIBUTE_NORMAL) in vec3 own_normal;
-uniform vec3 right, up, front, centre;  // where it stands
+uniform vec3 right, up, front, centre;  // its pose
 uniform int chosen;
 
 void main() {

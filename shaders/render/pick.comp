@@ -1,6 +1,6 @@
-// The first triangle, or of TETS the first tetrahedron as it is shown, along a ray. Stage 0: the least distance, as
-// float bits (positive floats sort like their bits). Stage 1: the least triangle at exactly that distance. Stage 2, one
-// thread: its corner nearest to the hit.
+// Finds the first triangle along a ray, or with TETS the first tet as it is shown. Stage 0 finds the least distance, as
+// float bits, which sort like positive floats; stage 1 the least triangle at exactly that distance; stage 2, with one
+// invocation, its corner nearest to the hit.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #include "render/view.glsl"
@@ -14,8 +14,7 @@ layout(std430) buffer Result {
 };
 uniform uint count;
 uniform int stage;
-uniform vec3 origin;
-uniform vec3 direction;
+uniform vec3 origin, direction;
 
 vec3 position(uint v) { return positions[v].high + positions[v].low; }
 
@@ -23,8 +22,8 @@ vec3 position(uint v) { return positions[v].high + positions[v].low; }
 #define CORNERS 4u
 layout(std430) readonly buffer Rest { vec4 rest[]; };
 
-// Where the ray comes into what the cut leaves of the tetrahedron, or a negative number. All that bounds it is a + b t
-// >= 0: its coordinates, and the cut's plane, which is one of the rest shape and so one of these.
+// The distance at which the ray enters the part of the tet that the cut leaves, or a negative number. That part is
+// bounded by conditions start + rise t >= 0: the tet's barycentric coordinates, and the cut, which is linear in these.
 float hit(uint t) {
   vec3 p[4];
   float kept[4];
@@ -53,8 +52,8 @@ float hit(uint t) {
 }
 #else
 #define CORNERS 3u
-// Distance to the triangle (Moeller, Trumbore 1997), or a negative number. Edges are a hair wider than they are, so
-// that no ray slips between two triangles.
+// The distance to the triangle (Moeller, Trumbore 1997), or a negative number. Triangles are larger by 1e-6, so that no
+// ray slips between two of them.
 float hit(uint t) {
   vec3 a = position(triangles[3u * t]), b = position(triangles[3u * t + 1u]), c = position(triangles[3u * t + 2u]);
   if (!finite(a) || !finite(b) || !finite(c)) return -1.0;
@@ -86,7 +85,7 @@ void main() {
   }
   if (i >= count) return;
   float t = hit(i);
-  if (!(t > 0.0 && t < 1e8)) return;  // beyond what is drawn: a triangle seen edge-on
+  if (!(t > 0.0 && t < 1e8)) return;  // only triangles seen edge-on are hit beyond 1e8 m
   if (stage == 0) atomicMin(distance_bits, floatBitsToUint(t));
   else if (floatBitsToUint(t) == distance_bits) atomicMin(triangle, i);
 }

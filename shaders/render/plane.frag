@@ -1,16 +1,16 @@
-// Ground or wall: a grid with lines every 0.1 m and 1 m that fades into the background, and the bodies' shadow.
+// The ground or a wall, with a grid of lines every 0.1 m and 1 m and the bodies' shadow, fading into the background.
 #include "render/view.glsl"
 #include "render/light.glsl"
-uniform int plane;  // which
+uniform int plane;
 uniform vec3 centre;
 uniform float extent;
-uniform float opacity;  // 1: the ground, which mixes with the background itself and hides it
-uniform float grid;     // strength of the lines
+uniform float opacity;  // 1: the ground, which hides the background and draws it itself where it fades
+uniform float grid;     // opacity of the lines
 in vec3 position;
 in vec2 across;
 layout(location = 0) out vec4 result;
 
-// Cover of the nearest lines, gone before they come closer than about three pixels.
+// The part of a pixel that the nearest lines cover. They fade before they are closer than about three pixels.
 float lines(vec2 p, vec2 pixel, float width) {
   vec2 away = abs(fract(p - 0.5) - 0.5) / max(pixel, vec2(1e-12));
   vec2 cover = clamp(width * 0.5 + 0.5 - away, 0.0, 1.0) * (1.0 - smoothstep(0.06, 0.35, pixel));

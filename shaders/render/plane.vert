@@ -1,10 +1,10 @@
-// A square on the plane of that number around `centre`.
+// A corner of a square on a plane of the view, around the point nearest to `centre`.
 #include "render/view.glsl"
 uniform int plane;
 uniform vec3 centre;
 uniform float extent;
 out vec3 position;
-out vec2 across;  // coordinates along the plane, metres
+out vec2 across;  // m, coordinates along the plane
 
 void main() {
   vec3 n = view.planes[plane].xyz;

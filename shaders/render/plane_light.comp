@@ -1,16 +1,16 @@
-// What of the key light and of the sky arrives on the ground and on walls: of each a map of what the bodies may darken,
-// seen along the light and beside each other, so that a pixel of the picture needs one look.
+// Finds the parts of the key light and of the sky that arrive on the ground and on walls, in one map for each, seen
+// along the light, so that a pixel of the picture needs a single sample.
 #include "render/view.glsl"
 #include "render/light.glsl"
 layout(local_size_x = 16, local_size_y = 16) in;
 layout(rg8, binding = IMAGE_PLANES) writeonly uniform image2D arrived;
 layout(std430) readonly buffer Corners { SurfaceCorner corners[]; };
 uniform uint triangles;
-uniform int map_size;  // texels of a map's side
+uniform int map_size;  // texels a side
 
 shared float parts[256];
 
-// Where the ray of light through a point of the map, in texels, meets the plane.
+// The point where the ray of light through a point of the map, in texels, hits the plane.
 vec3 on_plane(vec2 texel, vec4 plane) {
   vec2 at = (texel / float(map_size) * 2.0 - 1.0) * plane_reach;
   mat4 rows = transpose(light.matrix);
@@ -20,17 +20,17 @@ vec3 on_plane(vec2 texel, vec4 plane) {
   return p + key_direction * (plane.w - dot(plane.xyz, p)) / (abs(along) < 0.02 ? 0.02 : along);
 }
 
-// Point i of n on a disk, evenly spread (sunflower).
+// Point i of n that are spread evenly on a disk like the seeds of a sunflower.
 vec2 disk_point(int i, int n) {
   float radius = sqrt((float(i) + 0.5) / float(n)), angle = 2.399963 * float(i);
   return radius * vec2(cos(angle), sin(angle));
 }
 
-// Sharp at the contact, softer with the distance from what casts the shadow (R. Fernando, Percentage-Closer Soft
-// Shadows, 2005). The plane casts none itself, so there is no bias.
+// The part of the key light, with shadows that are softer the farther their caster is (R. Fernando, Percentage-Closer
+// Soft Shadows, 2005). The plane itself casts none, so there is no bias.
 float key_light(vec3 position) {
-  const float light_size = 0.16;  // widening of the penumbra in metres for each metre
-  const float widest = 0.024;     // of the shadow map
+  const float light_size = 0.16;  // width of the penumbra over the distance of the caster
+  const float widest = 0.024;     // search radius as a part of the shadow map
   vec3 s = light_space(position) * 0.5 + 0.5;
   float metre = 0.5 / light.extent.y, depth = min(s.z, 1.0);
   float narrowest = plane_reach / float(map_size),
@@ -44,15 +44,15 @@ float key_light(vec3 position) {
     blockers += 1.0;
   }
   if (blockers == 0.0) return 1.0;
-  if (blockers == 16.0) return 0.0;  // for no penumbra is wider than the search
+  if (blockers == 16.0) return 0.0;  // no penumbra is wider than the search
   float gap = max(s.z - sum / blockers, 0.0) * light.extent.x,
         radius = clamp(light_size * gap * metre, narrowest, search);
   for (int i = 0; i < 40; ++i) lit += textureLod(shadow_map, vec3(s.xy + radius * disk_point(i, 40), depth), 0.0);
   return lit / 40.0;
 }
 
-// The part of the hemisphere that is hidden by disks, each for a share of the bodies' triangles; a ray that meets a
-// body meets two.
+// The part of the hemisphere that is hidden by disks, each of which stands for a share of the bodies' triangles. Half
+// of their sum counts, since a ray through a body passes two.
 float hidden(vec3 at, vec3 normal, uint begin, uint step_size) {
   const uint most = 256u;
   uint disks = min(triangles, most);
@@ -68,7 +68,8 @@ float hidden(vec3 at, vec3 normal, uint begin, uint step_size) {
   return 0.5 * sum;
 }
 
-// The sky changes little over a few centimetres: found at the corners of the work-group's square, mixed between.
+// The part of the sky that is seen. It varies slowly, so it is found at the corners of the work-group's square and
+// interpolated between.
 float sky_light(vec4 plane, uvec2 tile, uint lane) {
   uint corner = lane & 3u;
   vec3 at = on_plane(16.0 * (vec2(tile) + vec2(float(corner & 1u), float(corner >> 1u))), plane);
@@ -87,7 +88,7 @@ void main() {
   vec4 plane = view.planes[tile.z];
   ivec2 texel = ivec2(16u * tile.xy + gl_LocalInvocationID.xy);
   float open = sky_light(plane, tile.xy, gl_LocalInvocationIndex), along = dot(plane.xyz, key_direction);
-  // Nothing at the rim, beyond which nothing is known; and little on planes that the map sees edge-on.
+  // The sky is not darkened at the rim, beyond which nothing is known, and little on planes that the map sees edge-on.
   vec2 rim = abs((vec2(texel) + 0.5) / float(map_size) * 2.0 - 1.0);
   float known = (1.0 - smoothstep(0.7, 0.98, max(rim.x, rim.y))) * smoothstep(0.02, 0.2, abs(along));
   float lit = along > 0.0 ? key_light(on_plane(vec2(texel) + 0.5, plane)) : 1.0;

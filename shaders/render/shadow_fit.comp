@@ -1,7 +1,6 @@
-// The shadow map's projection around the bodies' bounds: least and greatest x, y, z of all finite positions, as
-// integers of the same order, since minimum and maximum of integers are atomic and do not depend on the order of
-// threads; then, by the work-group that ends last, the projection, which also takes in obstacles. Its size goes in
-// steps and its centre by whole texels, so that shadow edges do not crawl while a body moves.
+// Fits the shadow map's projection to the bodies' bounds. These are found in integers that sort like the floats, since
+// their atomic minimum and maximum do not depend on the order of invocations. The work-group that ends last then finds
+// the projection. Its size is in steps and its centre in whole texels, so that shadow edges do not crawl.
 #include "layout.glsl"
 #include "render/view.glsl"
 layout(local_size_x = 128) in;
@@ -13,9 +12,9 @@ layout(std430) coherent buffer Bounds {
 layout(std430) writeonly buffer Fit { Light fitted; };
 uniform uint count;
 uniform float map_size;  // texels
-uniform vec4 limit;      // centre and radius of what is worth a shadow
-uniform vec3 obstacles_low, obstacles_high;  // bounds of obstacles; the other way round where there are none
-uniform float reach;     // how far from the bodies these matter
+uniform vec4 limit;      // centre and radius of the region that the map may cover
+uniform vec3 obstacles_low, obstacles_high;  // bounds of obstacles; low > high if there are none
+uniform float reach;     // m, the distance from the bodies up to which obstacles count
 
 shared uint low_bits[3], high_bits[3];
 
@@ -49,12 +48,11 @@ void find_bounds(uint i, uint lane) {
 void fit_light() {
   memoryBarrierBuffer();
   vec3 low = limit.xyz, high = limit.xyz;
-  if (bounds[0] <= bounds[3]) {
-    low = clamp(vec3(decoded(bounds[0]), decoded(bounds[1]), decoded(bounds[2])), limit.xyz - limit.w,
-                limit.xyz + limit.w);
-    high = clamp(vec3(decoded(bounds[3]), decoded(bounds[4]), decoded(bounds[5])), limit.xyz - limit.w,
-                 limit.xyz + limit.w);
-  }
+  if (bounds[0] <= bounds[3])
+    for (int a = 0; a < 3; ++a) {
+      low[a] = clamp(decoded(bounds[a]), limit[a] - limit.w, limit[a] + limit.w);
+      high[a] = clamp(decoded(bounds[3 + a]), limit[a] - limit.w, limit[a] + limit.w);
+    }
   for (int a = 0; a < 3; ++a) bounds[a] = ~0u, bounds[3 + a] = 0u;  // for the next picture
   done = 0u;
   vec3 centre = 0.5 * (low + high), bodies = centre;
@@ -73,7 +71,8 @@ void fit_light() {
   float texel = 2.0 * across / map_size;
   vec2 middle = floor(vec2(dot(x, centre), dot(y, centre)) / texel) * texel;
   float depth = dot(abs(z), half_size) * 1.05, front = dot(z, centre) + depth;
-  // Rows of the matrix: ((x.p - middle) / across, the depth below `front` as -1..1).
+  // The rows of the matrix are (x.p - middle.x) / across, (y.p - middle.y) / across, and the depth below `front`,
+  // -1..1.
   vec4 row0 = vec4(x, -middle.x) / across, row1 = vec4(y, -middle.y) / across;
   vec4 row2 = vec4(-z, front) / depth - vec4(0.0, 0.0, 0.0, 1.0);
   fitted.matrix = transpose(mat4(row0, row1, row2, vec4(0.0, 0.0, 0.0, 1.0)));

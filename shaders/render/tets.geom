@@ -1,4 +1,4 @@
-// A tetrahedron as four faces, shrunk towards its centre, or nothing when it is not finite.
+// Draws a tet as four faces, or nothing if it is not finite.
 layout(lines_adjacency) in;
 layout(triangle_strip, max_vertices = 12) out;
 #include "render/faces.glsl"

@@ -1,5 +1,5 @@
-// An arrow for each vertex or sharp edge that is in another body: where it is, along which normal it leaves, and how
-// deep it is, below 0 where there is none. One invocation per record of contact (pairs/pairs.glsl).
+// Makes an arrow for each vertex or sharp edge that is in another body, along the normal by which it leaves, with its
+// depth (below 0: no arrow). There is an invocation for each record of contact.
 #include "layout.glsl"
 #include "render/layout.glsl"
 #define real float
@@ -7,13 +7,13 @@
 layout(local_size_x = 128) in;
 layout(std430) readonly buffer Positions { Position positions[]; };
 #include "contact/bodies/surfaces.glsl"
-layout(std430) writeonly buffer Arrows { TouchArrow arrows[]; };
+layout(std430) writeonly buffer Arrows { ContactArrow arrows[]; };
 vec3 place(uint vertex) { return positions[vertex].high; }
 void main() {
   uint record = gl_WorkGroupID.y * gl_NumWorkGroups.x * 128u + gl_GlobalInvocationID.x;
   if (record >= ITEMS) return;
   uint t = record < counts.records ? records[record].target : NONE, s = records[record].item;
-  arrows[record] = TouchArrow(vec3(0.0), -1.0, vec3(0.0), 0.0);
+  arrows[record] = ContactArrow(vec3(0.0), -1.0, vec3(0.0), 0.0);
   if (t == NONE) return;
   bool under = (t & UNDER) != 0u;
   t &= TARGET;
@@ -34,5 +34,5 @@ void main() {
     n = cross(place(corners.y) - x - a, place(corners.z) - x - a) * (under ? -1.0 : 1.0);
     depth = dot(a, n) / max(length(n), 1e-30);
   }
-  if (length(n) > 0.0) arrows[record] = TouchArrow(x, max(depth, 0.0), normalize(n), 0.0);
+  if (length(n) > 0.0) arrows[record] = ContactArrow(x, max(depth, 0.0), normalize(n), 0.0);
 }

@@ -1,9 +1,9 @@
-// What colours show of a tetrahedron with corners p, at rest r; compiled as GLSL and as C++.
+// The values of a tet with corners p, at rest r, that colours show; compiled as GLSL and as C++.
 #ifndef __cplusplus
 #include "energy.glsl"
 #endif
 
-// The mean over its edges of L/L0 - 1.
+// The mean of L/L0 - 1 over its edges.
 float tet_strain(vec3 p[4], vec3 r[4]) {
   float sum = 0.0f;
   for (int i = 0; i < 4; ++i)
@@ -11,7 +11,7 @@ float tet_strain(vec3 p[4], vec3 r[4]) {
   return sum / 6.0f;
 }
 
-// The largest error of its constraints relative to rest: of edges (kinds 1 and 3) and the volume (2 and 3).
+// The largest error of its constraints relative to rest, where `kinds` is 1: edges, 2: the volume, 3: both.
 float tet_residual(vec3 p[4], vec3 r[4], float kinds) {
   float most = kinds > 1.5f ? abs(six_volumes(p) / six_volumes(r) - 1.0f) : 0.0f;
   if (kinds == 2.0f) return most;

@@ -1,5 +1,5 @@
-// A value of each vertex alone. SPEED: of its velocity, m/s. Otherwise its distance from where `answers` has it, as a
-// part of 1 / `scale`.
+// Values by vertex that need no neighbours: with SPEED the speed in m/s, otherwise `scale` times the distance from the
+// position in `reference`.
 #include "layout.glsl"
 #include "render/layout.glsl"
 layout(local_size_x = 128) in;
@@ -7,7 +7,7 @@ layout(std430) readonly buffer Positions { Position positions[]; };
 #ifdef SPEED
 layout(std430) readonly buffer Velocities { Velocity velocities[]; };
 #else
-layout(std430) readonly buffer Answers { Position answers[]; };
+layout(std430) readonly buffer Reference { Position reference[]; };
 #endif
 layout(std430) writeonly buffer Values { float values[]; };
 uniform uint count;
@@ -19,7 +19,7 @@ void main() {
 #ifdef SPEED
   values[v] = length(velocities[v].high);
 #else
-  // High parts first: what two floats of like size leave is exact.
-  values[v] = scale * length((positions[v].high - answers[v].high) + (positions[v].low - answers[v].low));
+  // High parts are subtracted first, since the difference of two floats of like size is exact.
+  values[v] = scale * length((positions[v].high - reference[v].high) + (positions[v].low - reference[v].low));
 #endif
 }

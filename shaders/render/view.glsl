@@ -3,12 +3,12 @@
 layout(std140, binding = BIND_RENDER_VIEW) uniform ViewBlock { View view; };
 layout(std140, binding = BIND_RENDER_LIGHT) uniform LightBlock { Light light; };
 
-// Towards the key light; fixed in the world, so that shadows stay where they are while the camera turns.
+// The direction towards the key light, which is fixed in the world so that shadows stay while the camera turns.
 const vec3 key_direction = vec3(0.4558, 0.8184, 0.3500);
 
 #include "render/finite.glsl"
 
-// Towards its centre, and away from that of the bodies.
+// Shrinks a tet towards its centre, and moves it away from that of the bodies.
 void shrink_tet(inout vec3 p[4]) {
   vec3 centre = 0.25 * (p[0] + p[1] + p[2] + p[3]);
   vec3 moved = centre + (view.tets.y > 0.0 ? view.tets.y * (centre - light.centre.xyz) : vec3(0.0));

@@ -1,5 +1,5 @@
-// Second half of constraint-centric Jacobi (method.md eqs. 13-14): p += omega * (sum of corrections) / n_i, then
-// contacts; clears the sums. One thread per vertex.
+// The second half of constraint-centric Jacobi (method.md eqs. 13-14): p += omega * (sum of corrections) / n_i, then
+// contacts. It also clears the sums. One invocation per vertex.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"

@@ -1,6 +1,6 @@
 // Constraint-centric Jacobi (paper algorithm 3; method.md eqs. 4, 14), every kind present in one dispatch. A work-group
-// solves a patch of constraints, each of which is in one patch, and adds the patch's sums to the vertices' with global
-// atomics.
+// solves a patch of constraints, each of which is in one patch, and adds the patch's sums to those of the vertices with
+// global atomics.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
@@ -13,11 +13,7 @@ layout(std430) buffer Sums { int correction_sums[]; };
 void main() {
   bool exists = group_index() < PATCH_COUNT;
   Chunk chunk = chunk_at(exists ? group_index() : 0u);
-  clear_sums();
-  load_chunk(chunk.number);
-  barrier();
-  project_chunk(chunk, exists);
-  barrier();
+  sum_corrections(chunk, exists);
   uint count = exists ? chunk.vertices : 0u;
   for (uint k = gl_LocalInvocationIndex; k < count; k += GROUP_SIZE)
     for (uint a = 0u; a < 3u; ++a)

@@ -1,11 +1,11 @@
-// A vertex in a substep of corrections: prediction before the first iteration, contacts in each, velocity after the
-// last (method.md eqs. 1-2, 5, 11-13).
+// How corrections move a vertex in a substep: prediction before the first iteration, contacts in each, and the velocity
+// after the last (method.md eqs. 1-2, 5, 11-13).
 #include "vertex.glsl"
 layout(std430) buffer Predicted { Velocity predicted[]; };  // a DoubleSingle, padded
 
-// Where it will be after the next prediction: what the first iteration starts from.
+// Neighbours see where the next prediction will put the vertex, because the first iteration starts there.
 DoubleSingle seen_by_neighbours(DoubleSingle x, DoubleSingle v) { return predict_position(x, predict_velocity(v)); }
-// At the start of the substep, for damping.
+// Damping compares with the start of the substep.
 DoubleSingle place_before(DoubleSingle x, DoubleSingle v) { return x; }
 
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
@@ -42,7 +42,6 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
 #if COMPLIANT
   if (finishes && params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
-  // After the last iteration neighbours need the next substep's prediction: it is their first iteration's start.
   if (finishes) {
     DoubleSingle here = x;
     x = seen_by_neighbours(x, v);

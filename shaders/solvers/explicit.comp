@@ -1,12 +1,12 @@
-// Mode explicit: a vertex gathers the forces of all constraints on it and moves, in one dispatch (method.md eq. 39). A
-// work-group owns a patch of neighbouring vertices; a constraint on the border of patches is evaluated in each.
+// Mode explicit (method.md eq. 39): every vertex gathers the forces of its constraints and moves, in one dispatch.
+// A work-group owns a patch of neighbouring vertices; a constraint on the border of patches is evaluated in each.
 // Vertices are read from one buffer and written to another.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 #include "solvers/leapfrog.glsl"
-// A projection of infinite softness is a force: nothing is kept from one to the next.
+// A projection of infinite softness is a force, so no multiplier is kept from one to the next.
 float last_multiplier(uint record) { return 0.0; }
 void keep_multiplier(uint record, float lambda) {}
 // The largest h^2 b of the work-group's constraints (method.md eq. 39b).
@@ -19,24 +19,8 @@ void main() {
   bool exists = group_index() < PATCH_COUNT;
   Chunk chunk = chunk_at(exists ? group_index() : 0u);
   uint i = chunk.first + lane;
-
-  clear_sums();
   if (lane == 0u) stiffest_here = 0u;
-  load_chunk(chunk.number);
-  barrier();
-  project_chunk(chunk, exists);
-  barrier();
-#if CHUNKED
-  for (uint next = chunk.next; next != 0u; next = chunk_at(next).next) {
-    load_chunk(next);
-    barrier();
-    project_chunk(chunk_at(next), exists);
-    barrier();
-  }
-#endif
+  sum_corrections(chunk, exists);
   if (lane == 0u && (phases & PHASE_WATCH) != 0u) atomicMax(largest, stiffest_here);
-  if (exists && lane < chunk.owned) {
-    vec3 sum = vec3(sums[3u * lane], sums[3u * lane + 1u], sums[3u * lane + 2u]);
-    advance(i, positions[i], velocities[i], sum * (params.correction_quantum * params.omega));
-  }
+  if (exists && lane < chunk.owned) advance(i, positions[i], velocities[i], averaged_correction(lane));
 }

@@ -1,14 +1,13 @@
-// A vertex in a substep of mode explicit (method.md eq. 39).
+// How leapfrog moves a vertex in a substep of mode explicit (method.md eq. 39).
 #include "vertex.glsl"
 
 DoubleSingle seen_by_neighbours(DoubleSingle x, DoubleSingle v) { return x; }
-// A substep before, for damping.
+// Damping compares with the vertex one substep earlier.
 DoubleSingle place_before(DoubleSingle x, DoubleSingle v) { return predict_position(x, DoubleSingle(-v.high, -v.low)); }
 
-// The force where the vertex is, then the displacement.
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
   DoubleSingle start = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low);
-  // From the middle of the last substep to the middle of this.
+  // The time from the middle of the last substep to the middle of this one.
   float time = (phases & PHASE_CHANGED) != 0u ? params.h * params.kick : params.h;
   v = add_double(add_double(v, correction * (time * params.inverse_h * params.inverse_h)), params.gravity * time);
   v = DoubleSingle(v.high * params.velocity_scale, v.low * params.velocity_scale);

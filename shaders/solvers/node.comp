@@ -1,7 +1,6 @@
-// Node-centric Jacobi (paper algorithm 2): every vertex gathers the corrections of all constraints on it, of every kind
-// present, and moves, in one dispatch. A work-group owns a patch of neighbouring vertices and evaluates each constraint
-// that has one of them; one on the border of patches is evaluated in each. Vertices are read from one buffer and
-// written to another.
+// Node-centric Jacobi (paper algorithm 2): every vertex gathers the corrections of all constraints on it and moves, in
+// one dispatch. A work-group owns a patch of neighbouring vertices; a constraint on the border of patches is evaluated
+// in each. Vertices are read from one buffer and written to another.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
@@ -12,40 +11,22 @@ layout(local_size_x = GROUP_SIZE) in;
 
 void main() {
   uint lane = gl_LocalInvocationIndex;
-  bool exists = group_index() < PATCH_COUNT, solves = (phases & PHASE_SOLVE) != 0u;
+  bool exists = group_index() < PATCH_COUNT;
   Chunk chunk = chunk_at(exists ? group_index() : 0u);
-  uint i = chunk.first + lane, owned = exists ? chunk.owned : 0u;
-  bool mine = lane < owned;
-
-  // Gather: the sum of all corrections on a vertex, over their number, times omega (method.md eqs. 4, 13).
-  if (solves) {
-    clear_sums();
-    load_chunk(chunk.number);
-  }
+  uint i = chunk.first + lane;
+  bool mine = exists && lane < chunk.owned;
 #if RIGID_CONTACT
   begin_sums(chunk.first);
 #endif
-  barrier();
   vec3 correction = vec3(0.0);
-  if (solves) {
-    project_chunk(chunk, exists);
-    barrier();
-#if CHUNKED
-    for (uint next = chunk.next; next != 0u; next = chunk_at(next).next) {
-      load_chunk(next);
-      barrier();
-      project_chunk(chunk_at(next), exists);
-      barrier();
-    }
-#endif
-    if (mine)
-      correction = vec3(sums[3u * lane], sums[3u * lane + 1u], sums[3u * lane + 2u]) *
-                   (params.correction_quantum * params.omega);
+  if ((phases & PHASE_SOLVE) != 0u) {
+    sum_corrections(chunk, exists);
+    if (mine) correction = averaged_correction(lane);
+  } else {
+    barrier();  // Other invocations add to what begin_sums() cleared.
   }
-
-  // Move: prediction before the first iteration of a substep, contacts in each, velocity after the last (eqs. 1-2, 5,
-  // 11-13).
-  if (mine) {  // read here only: fewer registers while constraints are evaluated
+  if (mine) {
+    // The vertex is read only now, so that evaluating constraints takes fewer registers.
     Velocity speed;
     if ((phases & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
     advance(i, positions[i], speed, correction);

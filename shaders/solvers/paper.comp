@@ -1,13 +1,13 @@
-// The paper's constraint-centric kernel as it is published (algorithm 3), the baseline of `bench`: one kind per
-// dispatch, one thread per constraint, and sums of floats by compare-and-swap on their bits, since GL 4.3 has no atomic
-// addition of floats. In whatever order threads arrive, so the last bits differ from run to run.
+// The paper's constraint-centric kernel as published (algorithm 3), the baseline of `bench`: one kind per dispatch, one
+// invocation per constraint. GL 4.3 adds no floats atomically, so sums are made by compare-and-swap on their bits, in
+// whatever order invocations arrive: the last bits differ from run to run.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 layout(std430) buffer Sums { uint correction_sums[]; };
 layout(std430) restrict readonly buffer Records { Record$ARITY records[]; };
-#define Ids uint  // the record
+#define Ids uint  // the record's number
 uint id_of(Ids record, int j) { return records[record].vertices[j]; }
 #include "constraints/types.glsl"
 #include "constraints/$KIND.glsl"

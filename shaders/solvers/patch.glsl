@@ -1,20 +1,21 @@
-// What a work-group does with a patch of constraints (sim/solvers/patches.h): reads its vertices once, evaluates the
-// constraints, an invocation each, and adds up the corrections of the vertices it owns in shared memory. Sums are
-// integers, so their order does not matter and the result is the same bits every time, however constraints are cut into
-// patches. A quantum of them is params.correction_quantum times the vertex's number of constraints, and no correction
-// exceeds params.max_correction = 2^30 quanta over that number: no sum can overflow. All of patches.h's words in pairs:
-// headers of chunks, their vertices, their records.
+// A work-group and its patch of constraints (sim/solvers/patches.h): it reads the patch's vertices once, evaluates one
+// constraint an invocation, and adds up the corrections of the vertices that the patch owns in shared memory. Sums are
+// integers, so that neither their order nor the way constraints are cut into patches changes a bit.
+
+// All data of patches.h in pairs: headers of chunks, their vertices, their records.
 layout(std430) restrict readonly buffer Patches { uvec2 patch_words[]; };
 #if COMPLIANT
 shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
 #endif
 shared ivec4 local_positions[MAX_VERTICES];  // quantized
 shared uint global_ids[MAX_VERTICES];
+// A quantum of a sum is params.correction_quantum times the vertex's number of constraints. No correction exceeds
+// params.max_correction, which is 2^30 quanta over that number, so no sum overflows.
 shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];
-// Bytes of a record: its vertices' numbers in the chunk.
+// The first word of a record has a byte for each vertex: its number in the chunk.
 uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
-// A record's words: its vertices, values at rest, compliances of a material, k and damping of a body's own.
+// The words of a record are its vertices, rest values, a material's compliances, and a body's own k and damping.
 float record_value(uint number, uint word) {
   return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2u][word % 2u]);
 }
@@ -25,39 +26,36 @@ uint id_of(Ids record, int j) { return global_ids[local_id(record, j)]; }
 
 #if COUNT_GUARDS
 layout(binding = BIND_GUARDS) uniform atomic_uint guard_counts[GUARDS];
-// Counts the guards that triggered, where a run asks for it.
-void count_guards(uint guards) {
-  if (guards == 0u) return;
-  if ((guards & GUARD_DIRECTION) != 0u) atomicCounterIncrement(guard_counts[0]);
-  if ((guards & GUARD_HINGE) != 0u) atomicCounterIncrement(guard_counts[1]);
-  if ((guards & GUARD_ANGLE) != 0u) atomicCounterIncrement(guard_counts[2]);
-  if ((guards & GUARD_FLOOR) != 0u) atomicCounterIncrement(guard_counts[3]);
-  if ((guards & GUARD_COLLAPSED) != 0u) atomicCounterIncrement(guard_counts[4]);
-  if ((guards & GUARD_LIMIT) != 0u) atomicCounterIncrement(guard_counts[5]);
-  if ((guards & GUARD_NOT_FINITE) != 0u) atomicCounterIncrement(guard_counts[6]);
-}
 #endif
+// Several patches may have the same constraint: the one that owns its first vertex counts the guards that triggered.
+void count_guards(uint record, uint owned, uint guards) {
+#if COUNT_GUARDS
+  if (local_id(record, 0) >= owned) return;
+  for (int g = 0; g < GUARDS; ++g)
+    if ((guards & (1u << g)) != 0u) atomicCounterIncrement(guard_counts[g]);
+#endif
+}
+void add_correction(uint local, uint owned, vec3 correction) {
+  if (local >= owned) return;
+  ivec3 quanta = ivec3(round(correction * quanta_per_metre[local]));
+  for (uint axis = 0u; axis < 3u; ++axis) atomicAdd(sums[3u * local + axis], quanta[axis]);
+}
 #foreach #include "solvers/$PROJECT.glsl"
 
 // A patch is one chunk, or more where its vertices are too many for one; those it owns come first in each.
 struct Chunk {
   uint number;
-  uint vertices;  // of which the first are
+  uint vertices;
   uint owned;
-  uint first;     // global id of the first owned one (mode node)
-  uint next;      // chunk of the patch; 0: none
+  uint first;  // global id of its first vertex
+  uint next;   // chunk of the patch; 0: none
 };
 Chunk chunk_at(uint number) {
   uvec2 counts = patch_words[CHUNK_PAIRS * number], links = patch_words[CHUNK_PAIRS * number + 1];
   return Chunk(number, counts.x, counts.y, links.x, links.y);
 }
-
-void clear_sums() {
-  for (uint k = gl_LocalInvocationIndex; k < 3 * MAX_OWNED; k += GROUP_SIZE) sums[k] = 0;
-}
-/// A chunk's vertices as their neighbours see them. Needs a barrier behind it.
+// Every chunk has room for as many vertices, so that no load of a vertex waits for the chunk's header.
 void load_chunk(uint number) {
-  // Every chunk has room for as many vertices, so that none waits for its words before it looks for them.
   for (uint k = gl_LocalInvocationIndex; k < MAX_VERTICES; k += GROUP_SIZE) {
     uvec2 vertex = patch_words[VERTICES_AT + MAX_VERTICES * number + k];
     global_ids[k] = vertex.x;
@@ -68,7 +66,7 @@ void load_chunk(uint number) {
     if (k < MAX_OWNED) quanta_per_metre[k] = 1.0 / (params.correction_quantum * uintBitsToFloat(vertex.y));
   }
 }
-/// Adds the corrections of a chunk that is loaded; `exists`: whether there is one. Needs a barrier behind it.
+// Adds the corrections of a loaded chunk's constraints, where there is such a chunk.
 void project_chunk(Chunk chunk, bool exists) {
   #foreach uvec2 records_$KIND = patch_words[CHUNK_PAIRS * chunk.number + 2 + $INDEX];  // the first, and how many
   // Each kind begins with a warp of its own.
@@ -77,4 +75,25 @@ void project_chunk(Chunk chunk, bool exists) {
   for (uint t = gl_LocalInvocationIndex; t < end; t += GROUP_SIZE) {
     #foreach if (t - begin_$KIND < count_$KIND) project_$KIND(records_$KIND.x + $PAIRS * (t - begin_$KIND), owned);
   }
+}
+// Fills `sums` with the corrections of a patch's constraints, in all of its chunks.
+void sum_corrections(Chunk chunk, bool exists) {
+  for (uint k = gl_LocalInvocationIndex; k < 3 * MAX_OWNED; k += GROUP_SIZE) sums[k] = 0;
+  load_chunk(chunk.number);
+  barrier();
+  project_chunk(chunk, exists);
+  barrier();
+#if CHUNKED
+  for (uint next = chunk.next; next != 0u; next = chunk_at(next).next) {
+    load_chunk(next);
+    barrier();
+    project_chunk(chunk_at(next), exists);
+    barrier();
+  }
+#endif
+}
+// The sum of all corrections of an owned vertex, over their number, times omega (method.md eqs. 4, 13).
+vec3 averaged_correction(uint local) {
+  return vec3(sums[3u * local], sums[3u * local + 1u], sums[3u * local + 2u]) *
+         (params.correction_quantum * params.omega);
 }

@@ -1,6 +1,6 @@
-// Where every vertex will be after prediction (method.md eqs. 1-2), as its neighbours see it (mode explicit: where it
-// is): needed once after positions, velocities, pins or settings were changed from outside. Otherwise each substep's
-// last dispatch has done it. One thread per vertex.
+// What neighbours see of every vertex: where prediction will put it (method.md eqs. 1-2), in mode explicit where it is.
+// Needed after positions, velocities, pins or settings were changed from outside; otherwise the last dispatch of each
+// substep has done it. One invocation per vertex.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
@@ -9,8 +9,7 @@ layout(local_size_x = 256) in;
 
 void predict(uint i) {
   Position own = positions[i];
-  DoubleSingle x = DoubleSingle(own.high, own.low);
-  DoubleSingle here = x, v = DoubleSingle(velocities[i].high, velocities[i].low);
+  DoubleSingle x = DoubleSingle(own.high, own.low), here = x, v = DoubleSingle(velocities[i].high, velocities[i].low);
   if (own.inverse_mass > 0.0) x = seen_by_neighbours(x, v);
 #if COMPLIANT
   if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(here, v), 0.0);

@@ -1,5 +1,5 @@
-// One constraint of a chunk: evaluates it and adds its corrections to the sums of its owned vertices (method.md eqs. 4,
-// 25-26).
+// One constraint of a chunk: evaluates it and adds its corrections to the sums of the vertices that the patch owns
+// (method.md eqs. 4, 25-26).
 void project_$KIND(uint number, uint owned) {
   uvec2 record = patch_words[RECORDS_AT + number];  // its vertices, a byte each; rest
   vec3 x[$ARITY];
@@ -35,7 +35,8 @@ void project_$KIND(uint number, uint owned) {
     ivec4 first_start = start_positions[record.x & 255u];
     for (int j = 0; j < $ARITY; ++j) start[j] = between(start_positions[local_id(record.x, j)], first_start);
     Constraint$ARITY then = $KIND(start, rest, record.x);
-#if $RATE  // the change of C, without its cancellation
+#if $RATE
+    // The change of C, without the cancellation that a difference of two values has.
     c.C = 0.0;
     for (int j = 0; j < $ARITY; ++j) c.C += 0.5 * dot(c.gradient[j] + then.gradient[j], x[j] - start[j]);
 #else
@@ -53,16 +54,7 @@ void project_$KIND(uint number, uint owned) {
 #if !$RATE
   NOTE_STIFFNESS(weighted(c, w).sum / a);
 #endif
-#if COUNT_GUARDS
-  if (local_id(record.x, 0) < owned) count_guards(m.guards);  // in one patch of those that have it
-#endif
-  for (int j = 0; j < $ARITY; ++j) {
-    uint local = local_id(record.x, j);
-    if (local < owned && m.lambda != 0.0) {
-      ivec3 quanta = ivec3(round(m.lambda * w[j] * c.gradient[j] * quanta_per_metre[local]));
-      atomicAdd(sums[3u * local], quanta.x);
-      atomicAdd(sums[3u * local + 1u], quanta.y);
-      atomicAdd(sums[3u * local + 2u], quanta.z);
-    }
-  }
+  count_guards(record.x, owned, m.guards);
+  for (int j = 0; j < $ARITY && m.lambda != 0.0; ++j)
+    add_correction(local_id(record.x, j), owned, m.lambda * w[j] * c.gradient[j]);
 }

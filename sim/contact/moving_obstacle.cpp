@@ -1,23 +1,19 @@
 #include "sim/contact/moving_obstacle.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
-#include "sim/error.h"
 #include "sim/model/settings.h"
 
 namespace tetpbd {
 
 namespace {
 
-// Numbers into planes and solids, in the order of the model's list. The ground's place among planes is kept
-// free, so that kernels stay the same where it comes and goes.
 struct Order {
   std::vector<const Obstacle*> planes, solids;
 };
+// The ground's place among the planes stays free where there is no ground, so that switching it needs no other kernels.
 Order order_obstacles(const Model& model) {
   Order order;
   for (const Obstacle& o : model.obstacles) {
@@ -44,10 +40,10 @@ MovingObstacle::Surface MovingObstacle::find_surface(const glm::dvec3& x) const 
   return surface;
 }
 
-MovingObstacle::Surface MovingObstacle::find_contact(const glm::dvec3& x, const glm::dvec3& way) const {
-  const glm::dmat3 back = glm::transpose(pose.axes);
-  const glm::dvec3 to = back * (x - pose.centre);
-  Surface surface = Formulas<double>{texels, kind->distance}.find_contact(solid, to - back * way, to);
+MovingObstacle::Surface MovingObstacle::find_contact(const glm::dvec3& x, const glm::dvec3& displacement) const {
+  const glm::dmat3 into = glm::transpose(pose.axes);
+  const glm::dvec3 to = into * (x - pose.centre);
+  Surface surface = Formulas<double>{texels, kind->distance}.find_contact(solid, to - into * displacement, to);
   surface.normal = pose.axes * surface.normal;
   return surface;
 }
@@ -86,13 +82,6 @@ std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& set
 std::vector<const Obstacle*> solid_obstacles(const Model& model) { return order_obstacles(model).solids; }
 
 bool has_obstacles(const Model& model, const Settings& settings) { return settings.ground || !model.obstacles.empty(); }
-
-void check_obstacles(const Model& model) {
-  constexpr std::size_t most = MAX_OBSTACLES - 1;
-  if (model.obstacles.size() > most)
-    throw Error("too many obstacles", fmt::format("{} of them", model.obstacles.size()),
-                fmt::format("at most {} beside the ground", most));
-}
 
 glm::dvec3 out_of_obstacles(const Model& model, const Settings& settings, double time, glm::dvec3 x) {
   for (const MovingObstacle& o : obstacles_at(model, settings, time)) {

@@ -30,8 +30,8 @@ std::vector<double> obstacle_values(const Obstacle& o) {
 
 namespace {
 
-// How it stands when it is not turned: half spaces have their normal for y.
-glm::dmat3 own_axes(const Obstacle& o) {
+// The axes before rotation; a half space has its normal as y.
+glm::dmat3 unrotated_axes(const Obstacle& o) {
   if (!o.kind->flat) return glm::dmat3(1);
   const glm::dvec3 up = glm::normalize(o.normal);
   const glm::dvec3 side = std::abs(up.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
@@ -39,9 +39,9 @@ glm::dmat3 own_axes(const Obstacle& o) {
   return {right, up, glm::cross(right, up)};
 }
 
-glm::dmat3 turn_by(const glm::dvec3& turn) {
-  const double angle = glm::length(turn);
-  return angle > 0 ? glm::mat3_cast(glm::angleAxis(angle, turn / angle)) : glm::dmat3(1);
+glm::dmat3 rotate_about(const glm::dvec3& axis) {
+  const double angle = glm::length(axis);
+  return angle > 0 ? glm::mat3_cast(glm::angleAxis(angle, axis / angle)) : glm::dmat3(1);
 }
 
 }  // namespace
@@ -51,7 +51,7 @@ void set_heights(Obstacle& o, const std::vector<std::vector<double>>& rows) {
   field->size = {int(rows[0].size()), 1, int(rows.size())};
   const double dx = 2 * o.half.x / (field->size.x - 1), dz = 2 * o.half.z / (field->size.z - 1);
   field->spacing = std::min(dx, dz);
-  double along_x = 0, along_z = 0;  // the steepest
+  double along_x = 0, along_z = 0;  // largest slopes
   for (std::size_t k = 0; k < rows.size(); ++k)
     for (std::size_t i = 0; i < rows[k].size(); ++i) {
       field->values.push_back(float((2 * rows[k][i] - 1) * o.half.y));
@@ -74,7 +74,7 @@ Pose pose_at(const Obstacle& o, double time) {
     }
     last = key, now.centre = key.centre, now.rotation = key.rotation;
   }
-  return {now.centre + time * o.velocity, turn_by(time * o.spin) * rotation_of(now.rotation) * own_axes(o)};
+  return {now.centre + time * o.velocity, rotate_about(time * o.spin) * rotation_of(now.rotation) * unrotated_axes(o)};
 }
 
 }  // namespace tetpbd

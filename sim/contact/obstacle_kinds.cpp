@@ -12,19 +12,20 @@ namespace {
 
 using Rules = Formulas<double>;
 
-glm::dvec3 half_of_mesh(const Obstacle& o) {
+glm::dvec3 mesh_half(const Obstacle& o) {
   if (!o.surface) return glm::dvec3(0.5 * o.height);
-  return 0.5 * (bounds(o.surface->positions).high - bounds(o.surface->positions).low);
+  const Bounds box = bounds(o.surface->positions);
+  return 0.5 * (box.high - box.low);
 }
 
-double reach_of_field(const Obstacle& o) {
+double field_reach(const Obstacle& o) {
   if (!o.field) return 0;
   const glm::dvec3 end = o.field->origin + o.field->spacing * glm::dvec3(o.field->size - 1);
   return glm::length(glm::max(glm::abs(o.field->origin), glm::abs(end)));
 }
 
-// Of the rounding of edges in pictures.
-float edge_of(const glm::dvec3& half) { return 0.04f * float(std::min({half.x, half.y, half.z})); }
+// m, of edges in pictures.
+float rounding_radius(const glm::dvec3& half) { return 0.04f * float(std::min({half.x, half.y, half.z})); }
 
 }  // namespace
 
@@ -48,10 +49,7 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .reads = {"centre", "rotation"},
        .half = [](const Obstacle& o) { return glm::dvec3(o.radius, o.half_length + o.radius, o.radius); },
        .reach = [](const Obstacle& o) { return o.half_length + o.radius; },
-       .picture =
-           [](const Obstacle& o) {
-             return rounded({0, o.half_length, 0}, 0, float(o.radius));
-           }},
+       .picture = [](const Obstacle& o) { return rounded(glm::vec3(0, o.half_length, 0), 0, float(o.radius)); }},
       {.name = "box",
        .distance = &Rules::box_surface,
        .needs = {"half"},
@@ -59,8 +57,8 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .half = [](const Obstacle& o) { return o.half; },
        .picture =
            [](const Obstacle& o) {
-             const float edge = edge_of(o.half);
-             return rounded(glm::vec3(o.half) - edge, 0, edge);
+             const float round = rounding_radius(o.half);
+             return rounded(glm::vec3(o.half) - round, 0, round);
            }},
       {.name = "cylinder",
        .distance = &Rules::cylinder_surface,
@@ -70,8 +68,8 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .reach = [](const Obstacle& o) { return glm::length(glm::dvec2(o.half_length, o.radius)); },
        .picture =
            [](const Obstacle& o) {
-             const float edge = edge_of({o.radius, o.half_length, o.radius});
-             return rounded({0, float(o.half_length) - edge, 0}, float(o.radius) - edge, edge);
+             const float round = rounding_radius({o.radius, o.half_length, o.radius});
+             return rounded({0, float(o.half_length) - round, 0}, float(o.radius) - round, round);
            }},
       {.name = "height-field",
        .distance = &Rules::height_field_surface,
@@ -85,8 +83,8 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .distance = &Rules::mesh_surface,
        .needs = {"mesh"},
        .reads = {"centre", "rotation", "scale", "height", "voxels"},
-       .half = half_of_mesh,
-       .reach = reach_of_field,
+       .half = mesh_half,
+       .reach = field_reach,
        .convex = false,
        .picture = mesh_triangles},
       // The next row goes here.

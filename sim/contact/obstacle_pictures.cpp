@@ -18,16 +18,16 @@ void add_triangle(Corners& all, ObstacleCorner a, ObstacleCorner b, const Obstac
   all.insert(all.end(), {a, b, c});
 }
 
-// The heights with walls around them.
+// The heights with walls around them, closed by no bottom.
 SurfaceMesh height_block(const Obstacle& o) {
   const glm::ivec3 size = o.field->size;
   SurfaceMesh block;
-  const auto at = [&](int i, int k, bool top) {
+  const auto add_vertex = [&](int i, int k, bool top) {
     const double y = top ? double(o.field->values[std::size_t(i + size.x * k)]) : -o.half.y;
     block.positions.emplace_back(o.half.x * (2.0 * i / (size.x - 1) - 1), y, o.half.z * (2.0 * k / (size.z - 1) - 1));
   };
   for (int k = 0; k < size.z; ++k)
-    for (int i = 0; i < size.x; ++i) at(i, k, true);
+    for (int i = 0; i < size.x; ++i) add_vertex(i, k, true);
   const auto quad = [&](int a, int b, int c, int d) {
     block.triangles.push_back({std::uint32_t(a), std::uint32_t(b), std::uint32_t(c)});
     block.triangles.push_back({std::uint32_t(a), std::uint32_t(c), std::uint32_t(d)});
@@ -43,16 +43,16 @@ SurfaceMesh height_block(const Obstacle& o) {
   for (int k = size.z - 1; k > 0; --k) rim.emplace_back(size.x - 1, k);
   for (int i = size.x - 1; i > 0; --i) rim.emplace_back(i, 0);
   const int below = int(block.positions.size()), count = int(rim.size());
-  for (const glm::ivec2& p : rim) at(p.x, p.y, false);
+  for (const glm::ivec2& p : rim) add_vertex(p.x, p.y, false);
+  const auto above = [&](int r) { return rim[std::size_t(r)].x + size.x * rim[std::size_t(r)].y; };
   for (int r = 0; r < count; ++r) {
     const int next = (r + 1) % count;
-    const auto top = [&](int place) { return rim[std::size_t(place)].x + size.x * rim[std::size_t(place)].y; };
-    quad(top(r), below + r, below + next, top(next));
+    quad(above(r), below + r, below + next, above(next));
   }
   return block;
 }
 
-// From the distance on a grid: cubes cut into tets about a diagonal, their crossings moved onto the surface.
+// Marching tetrahedra: a grid's cubes are cut into six tets about a diagonal, and crossings moved onto the surface.
 Corners contour(const Obstacle& o) {
   constexpr int cells = 28;
   const glm::dvec3 low = -1.1 * o.kind->half(o), step = 2.2 * o.kind->half(o) / double(cells);
@@ -77,7 +77,7 @@ Corners contour(const Obstacle& o) {
   const auto cut = [&](const std::array<glm::ivec3, 4>& tet) {
     std::vector<glm::ivec3> in, out;
     for (const glm::ivec3& at : tet) (distance(at) < 0 ? in : out).push_back(at);
-    Corners rim;  // three crossings or, around the cut, four
+    Corners rim;  // three crossings, or four of which the first and last, and the middle two, are not neighbours
     for (const glm::ivec3& a : in)
       for (const glm::ivec3& b : out) rim.push_back(crossing(a, b));
     if (rim.size() >= 3) add_triangle(all, rim[0], rim[1], rim[2]);
@@ -87,12 +87,10 @@ Corners contour(const Obstacle& o) {
     for (int first = 0; first < 3; ++first)
       for (int second = 0; second < 3; ++second) {
         if (first == second) continue;
-        std::array<glm::ivec3, 4> tet;
-        tet.fill({cube % cells, cube / cells % cells, cube / cells / cells});
-        for (int k = 1; k < 4; ++k) ++tet[std::size_t(k)][first];
-        for (int k = 2; k < 4; ++k) ++tet[std::size_t(k)][second];
-        tet[3] = tet[0] + 1;
-        cut(tet);
+        const glm::ivec3 low_corner(cube % cells, cube / cells % cells, cube / cells / cells);
+        glm::ivec3 a = low_corner, b;
+        ++a[first], b = a, ++b[second];
+        cut({low_corner, a, b, low_corner + 1});
       }
   return all;
 }

@@ -1,4 +1,4 @@
-// Triangles of obstacles' surfaces, for pictures alone.
+// Triangles of obstacles' surfaces, used by pictures alone.
 #pragma once
 
 #include "sim/contact/obstacle_kinds.h"
@@ -7,12 +7,12 @@ namespace tetpbd {
 
 using Corners = std::vector<ObstacleCorner>;
 
-/// A ball of radius `round` drawn out: by `half` along the axes and by `disk` about the y axis. Edges of
-/// boxes and cylinders are a little round, which is what catches the light.
+/// The Minkowski sum of a ball of radius `round`, a box of half extents `half` and a disk of radius `disk` about the y
+/// axis: boxes and cylinders have slightly rounded edges, which catch the light.
 Corners rounded(const glm::vec3& half, float disk, float round);
-/// Round where triangles meet at less than 40 degrees.
+/// With smooth normals across edges where triangles meet at less than 40 degrees.
 Corners smoothed(const SurfaceMesh& surface);
-/// The heights with walls around them; the surface that a mesh came with. Nothing before these are there.
+/// The heights with walls around them; a mesh's own surface. None before the scene's files are read.
 Corners height_triangles(const Obstacle& obstacle);
 Corners mesh_triangles(const Obstacle& obstacle);
 

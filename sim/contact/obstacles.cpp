@@ -15,27 +15,28 @@ namespace tetpbd {
 
 namespace {
 
-// How far from its centre it is met by what it carries on `times` its displacement over h, |way - h (v + w x
-// arm)| <= |way| + h (|v| + |w| |arm|): |arm| (1 - times h |w|) <= radius + times h |v| + times |way|.
-glm::vec4 reach_block(const MovingObstacle& o, double h) {
+// The centre, and how far from there a vertex at arm that moves by u may meet the obstacle within `times` substeps.
+// Relative to it the vertex moves by |u - h (v + w x arm)| <= |u| + h (|v| + |w| |arm|) in each, hence
+// |arm| (1 - times h |w|) <= reach + times (h |v| + |u|); kernels add the term with u.
+glm::vec4 bound_contacts(const MovingObstacle& o, double h) {
   constexpr double times = 4;
   const double left = 1 - times * h * glm::length(o.spin), size = glm::length(o.pose.centre);
   const double reach = 1.01 * (o.reach + times * h * glm::length(o.velocity)) / left + 1e-6 * size;
   return {glm::vec3(o.pose.centre), left < 0.5 ? 1e18f : float(std::min(reach, 1e18))};  // squares are finite
 }
 
-ObstacleRecord record_block(const MovingObstacle& o, int first) {
+ObstacleRecord make_record(const MovingObstacle& o, int first) {
   const auto& s = o.solid;
-  ObstacleRecord block{};
-  split_pair(o.pose.centre, block.centre, block.centre_low);
-  block.right = glm::vec3(o.pose.axes[0]), block.up = glm::vec3(o.pose.axes[1]);
-  block.front = glm::vec3(o.pose.axes[2]);
-  block.kind = s.kind, block.convex = s.convex, block.first = first, block.cells = s.cells;
-  block.extent = glm::vec3(s.extent), block.origin = glm::vec3(s.origin);
-  block.radius = float(s.radius), block.spacing = float(s.spacing), block.trust = float(s.trust);
-  block.velocity = glm::vec3(o.velocity), block.spin = glm::vec3(o.spin);
-  block.friction = float(o.friction), block.own_friction = o.own_friction, block.restitution = float(o.restitution);
-  return block;
+  ObstacleRecord record{};
+  split_double_single(o.pose.centre, record.centre, record.centre_low);
+  record.right = glm::vec3(o.pose.axes[0]), record.up = glm::vec3(o.pose.axes[1]);
+  record.front = glm::vec3(o.pose.axes[2]);
+  record.kind = s.kind, record.convex = s.convex, record.first = first, record.cells = s.cells;
+  record.extent = glm::vec3(s.extent), record.origin = glm::vec3(s.origin);
+  record.radius = float(s.radius), record.spacing = float(s.spacing), record.trust = float(s.trust);
+  record.velocity = glm::vec3(o.velocity), record.spin = glm::vec3(o.spin);
+  record.friction = float(o.friction), record.own_friction = o.own_friction, record.restitution = float(o.restitution);
+  return record;
 }
 
 std::vector<std::shared_ptr<const DistanceField>> obstacle_fields(const Model& model) {
@@ -84,7 +85,10 @@ bool share_kernels(const Model& model, const Model& other) {
 }
 
 Obstacles make_obstacles(const Model& model) {
-  check_obstacles(model);
+  constexpr std::size_t most = MAX_OBSTACLES - 1;
+  if (model.obstacles.size() > most)
+    throw Error("too many obstacles", fmt::format("{} of them", model.obstacles.size()),
+                fmt::format("at most {} beside the ground", most));
   Obstacles obstacles;
   if (bodies_have_friction(model)) {
     std::vector<float> values;
@@ -114,9 +118,9 @@ void write_planes(const Model& model, const Settings& settings, Step& block) {
     if (o.is_plane) block.planes[block.plane_count++] = glm::vec4(o.plane);
 }
 
-void write_obstacles(Sim& sim, int list) {
+void write_obstacles(Sim& sim, int first) {
   Obstacles& obstacles = sim.obstacles;
-  if (obstacles.bytes == 0) return;
+  if (obstacles.bytes == 0) return;  // all are planes
   const bool single = on_cpu(sim) || std::ranges::none_of(sim.model->obstacles, moves);
   const int lists = single ? 1 : std::min(sim.plan.substeps + 1, Obstacles::most_lists);
   const double h = sim.plan.h, start = simulated_time(sim) - h;
@@ -125,21 +129,22 @@ void write_obstacles(Sim& sim, int list) {
   for (int l = 0; l < lists; ++l) {
     char* reaches = bytes.data() + std::size_t(l) * obstacles.stride;
     char* records = reaches + fields.size() * sizeof(glm::vec4);
-    int first = 0, k = 0;
-    for (const MovingObstacle& o : obstacles_at(*sim.model, sim.settings, start + (list + l) * h, h)) {
+    int first_value = 0;
+    std::size_t k = 0;
+    for (const MovingObstacle& o : obstacles_at(*sim.model, sim.settings, start + (first + l) * h, h)) {
       if (o.is_plane) continue;
-      const ObstacleRecord record = record_block(o, first);
-      const glm::vec4 reach = reach_block(o, h);
-      std::memcpy(reaches + std::size_t(k) * sizeof reach, &reach, sizeof reach);
-      std::memcpy(records + std::size_t(k) * sizeof record, &record, sizeof record);
-      if (const auto& field = fields[std::size_t(k++)]) first += int(field->values.size());
+      const ObstacleRecord record = make_record(o, first_value);
+      const glm::vec4 reach = bound_contacts(o, h);
+      std::memcpy(reaches + k * sizeof reach, &reach, sizeof reach);
+      std::memcpy(records + k * sizeof record, &record, sizeof record);
+      if (const auto& field = fields[k++]) first_value += int(field->values.size());
     }
   }
   if (obstacles.records.bytes() == bytes.size())
     obstacles.records.write(0, bytes.size(), bytes.data());
   else
     obstacles.records = Buffer("obstacles", bytes, GL_STREAM_DRAW);
-  obstacles.first = obstacles.present = list;
+  obstacles.first = obstacles.present = first;
 }
 
 void bind_next_obstacles(Sim& sim) {

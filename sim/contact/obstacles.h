@@ -1,5 +1,5 @@
-// The obstacles of a simulation on the GPU: planes in the step's block, records of all others for each
-// substep, and the values of their fields. Kernels: shaders/contact/obstacles.glsl.
+// The obstacles of a simulation on the GPU: planes in the step's block, records of all others for each substep, and the
+// values of their distance fields and height fields. Kernels: shaders/contact/obstacles.glsl.
 #pragma once
 
 #include <string>
@@ -14,31 +14,32 @@ namespace tetpbd {
 struct Sim;
 
 struct Obstacles {
-  static constexpr int most_lists = 256;  ///< written at once
-  Buffer records;  ///< ObstacleRecord, and before them how far each is met: a list of the step's start, then
-                   ///< one of the end of each substep; a single list where nothing moves
-  Buffer fields;   ///< one after the other
+  static constexpr int most_lists = 256;  ///< in `records` at once
+  /// Lists at the start of a step and at the end of each substep, or a single list where nothing moves: for each
+  /// obstacle its centre and how far from there contact is possible, then for each its ObstacleRecord.
+  Buffer records;
+  Buffer fields;  ///< of all obstacles, one after the other
   Texture fields_texture;
-  Buffer friction;  ///< by vertex, where bodies have their own; negative: the world's
+  Buffer friction;  ///< by vertex, if any body has its own; negative: the world's
   Texture friction_texture;
-  std::size_t bytes = 0, stride = 0;  ///< of a list; from one to the next
-  int first = 0, present = 0;         ///< which lists `records` begins with, and is of now
+  std::size_t bytes = 0, stride = 0;  ///< of a list; from one list to the next
+  int first = 0, present = 0;         ///< number in the step of the first list in `records`, and of the bound one
 };
 
-/// Definitions for kernels that include contact/obstacles.glsl: what these are made for.
+/// Definitions that contact/obstacles.glsl needs for this model's obstacles.
 std::vector<std::string> obstacle_defines(const Model& model);
-/// Whether kernels and fields that are made for one model serve the other, which has other obstacles.
+/// Whether kernels and fields made for one model can be used for the other.
 bool share_kernels(const Model& model, const Model& other);
-/// Throws Error where there are too many, or their fields are too large.
+/// Throws Error if there are too many obstacles, or their fields are too large.
 Obstacles make_obstacles(const Model& model);
 
-/// Those that are planes.
+/// Writes the obstacles that are planes.
 void write_planes(const Model& model, const Settings& settings, Step& block);
-/// All others: lists of the step from this one on, which becomes the present.
+/// Writes lists of all other obstacles, from number `first` of the step on, which becomes the present one.
 void write_obstacles(Sim& sim, int first = 0);
-/// The present list, for the next kernels.
+/// Binds the present list for the next kernels.
 void bind_obstacles(const Obstacles& obstacles);
-/// The same of the next substep.
+/// Binds the list of the next substep.
 void bind_next_obstacles(Sim& sim);
 
 }  // namespace tetpbd

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "sim/contact/pairs.h"
 
 namespace tetpbd {
@@ -11,17 +9,11 @@ namespace tetpbd {
 using namespace pair_layout;
 
 std::vector<std::string> pair_defines(const PairSizes& sizes) {
-  std::vector<std::string> defines = {fmt::format("BODY_COUNT {}", sizes.bodies)};
-  for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"TRIANGLES", sizes.triangles},
-                                    {"EDGES", sizes.edges},
-                                    {"SURFACE_VERTICES", sizes.vertices},
-                                    {"LEAVES", sizes.leaves},
-                                    {"SLICES", sizes.slices},
-                                    {"TETS", sizes.tets},
-                                    {"LANES", sizes.lanes},
-                                    {"GROUP_SIZE", sizes.group}})
-    defines.push_back(fmt::format("{} {}u", name, value));
-  return defines;
+  return {fmt::format("BODY_COUNT {}", sizes.bodies), fmt::format("TRIANGLES {}u", sizes.triangles),
+          fmt::format("EDGES {}u", sizes.edges),      fmt::format("SURFACE_VERTICES {}u", sizes.vertices),
+          fmt::format("LEAVES {}u", sizes.leaves),    fmt::format("SLICES {}u", sizes.slices),
+          fmt::format("TETS {}u", sizes.tets),        fmt::format("LANES {}u", sizes.lanes),
+          fmt::format("GROUP_SIZE {}u", sizes.group)};
 }
 
 PairRanges lay_out_pairs(const PairSizes& sizes) {
@@ -70,14 +62,11 @@ std::vector<SurfaceSlice> cut_slices(const PairMesh& mesh) {
 }
 
 std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices, const PairRanges& ranges) {
-  std::vector<glm::uvec4> edge_vertices, tet_vertices, tet_beyond;
-  std::vector<std::uint32_t> edge_bodies, first_around{0};
+  std::vector<glm::uvec4> edge_vertices;
   std::vector<glm::uvec2> around;
+  std::vector<std::uint32_t> edge_bodies, first_around{0};
   for (const auto& [v, beside, body] : mesh.edges)
     edge_vertices.emplace_back(v[0], v[1], beside[0], beside[1]), edge_bodies.push_back(body);
-  for (const auto& [v, beyond] : mesh.tets)
-    tet_vertices.emplace_back(v[0], v[1], v[2], v[3]),
-        tet_beyond.emplace_back(beyond[0], beyond[1], beyond[2], beyond[3]);
   std::vector<std::vector<glm::uvec2>> at_vertex(all_vertices);
   for (const auto& triangle : mesh.triangles)
     for (std::size_t c = 0; c < 3; ++c)
@@ -102,8 +91,8 @@ std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vert
   put(contents, ranges.bodies, bodies);
   put(contents, ranges.slices, cut_slices(mesh));
   put(contents, ranges.behind, mesh.behind);
-  put(contents, ranges.tet_vertices, tet_vertices);
-  put(contents, ranges.tet_beyond, tet_beyond);
+  put(contents, ranges.tet_vertices, mesh.tets);
+  put(contents, ranges.tet_beyond, mesh.beyond);
   return contents;
 }
 

@@ -1,5 +1,5 @@
-// shaders/contact/bodies/layout.glsl as C++, and where lists by size lie in the buffers of contact between
-// bodies (pairs/surfaces.glsl, pairs/sums.glsl).
+// shaders/contact/bodies/layout.glsl as C++, and the layout of the buffers of contact between bodies (surfaces.glsl and
+// sums.glsl in the same folder).
 #pragma once
 
 #include "sim/gl/buffer_layout.h"
@@ -18,8 +18,8 @@ static_assert(sizeof(ContactSums) == 28);
 struct PairMesh;
 struct PairSizes {
   std::size_t triangles, edges, vertices, leaves, slices, tets, bodies;
-  std::size_t all_vertices;                 ///< of bodies
-  std::size_t lanes;                        ///< invocations that look for what an item touches
+  std::size_t all_vertices;                 ///< inner ones among them
+  std::size_t lanes;                        ///< invocations that find the candidates of an item
   static constexpr std::size_t group = 64;  ///< invocations of a work-group
   std::size_t items() const { return vertices + edges; }
   std::size_t targets() const { return triangles + edges; }
@@ -34,20 +34,20 @@ struct PairRanges {
   Range<pair_layout::SurfaceLeaf> leaves;
   Range<pair_layout::SurfaceBody> bodies;
   Range<pair_layout::SurfaceSlice> slices;
-  Range<pair_layout::ContactTotals> totals;  ///< of lists, and so on
+  Range<pair_layout::ContactTotals> totals;  ///< this and the following of `lists`
   Range<pair_layout::CandidateCounts> counts;
   Range<pair_layout::BodyBox> boxes;
   Range<float> depths;
   Range<pair_layout::ContactRecord> records;
-  Range<std::int32_t> sharing;  ///< of sums
+  Range<std::int32_t> sharing;  ///< of `sums`
 };
 PairRanges lay_out_pairs(const PairSizes& sizes);
 
-/// Parts of the surface's vertices that belong to one body.
+/// The surface's vertices in parts of at most 1024, each of one body.
 std::vector<pair_layout::SurfaceSlice> cut_slices(const PairMesh& mesh);
-/// The contents of `mesh`.
+/// The contents of `mesh` of PairRanges.
 std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices, const PairRanges& ranges);
-/// Of lists, up to the end of boxes: nothing touches, and boxes are empty.
+/// The contents of `lists` up to the end of boxes, without contacts and with empty boxes.
 std::vector<std::byte> make_empty_lists(const PairRanges& ranges);
 
 }  // namespace tetpbd

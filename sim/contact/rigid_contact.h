@@ -1,5 +1,5 @@
-// Contact of hard bodies on the CPU (method.md, "Contact of a hard body"): while a body touches, it moves as
-// a rigid one. GPU modes: shaders/contact/rigid_contact.comp.
+// Contact of hard bodies on the CPU (method.md, "Contact of a hard body"): a body in contact moves as a rigid one. GPU
+// modes: shaders/contact/rigid_contact.comp.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace tetpbd {
 
-/// Whether hard bodies are carried: rigid_in_contact(), and there is something to touch. Beside a soft one
-/// none is: a kernel would need more than 8 storage blocks for records and multipliers.
+/// Whether hard bodies move as rigid ones: if rigid_in_contact(), and there are obstacles. No body does if any is soft,
+/// because a kernel would need more than 8 storage blocks for records and multipliers.
 inline bool touches_rigidly(const Model& model, const Settings& settings) {
   const auto is_rigid = [&](const Body& body) { return rigid_in_contact(settings, body_material(body, settings)); };
   return has_obstacles(model, settings) && !any_material(model, settings, compliant) &&
@@ -22,22 +22,19 @@ inline bool touches_rigidly(const Model& model, const Settings& settings) {
 class RigidContact {
  public:
   RigidContact(const Model& model, const Settings& settings)
-      : model_(model),
-        settings_(settings),
-        wanted_(touches_rigidly(model, settings)),
-        carried_(model.positions.size()) {}
+      : model_(model), settings_(settings), wanted_(touches_rigidly(model, settings)), moved_(model.positions.size()) {}
 
   bool wanted() const { return wanted_; }  ///< else prepare() does nothing
-  /// Whether vertex i belongs to a body that touches: then its velocity is the body's in the whole substep.
-  bool carries(std::size_t i) const { return carried_[i]; }
+  /// Whether vertex i has the velocity of a rigid body in contact for the whole substep.
+  bool carries(std::size_t i) const { return moved_[i]; }
 
-  /// Where prediction moves vertex i from x; changes v if its body is free.
+  /// The position to which prediction moves vertex i from x; changes v if its body is free.
   glm::dvec3 predict(const Substep& s, std::size_t i, const glm::dvec3& x, glm::dvec3& v) const {
-    return carried_[i] ? x + s.h * v : s.predict(x, v);
+    return moved_[i] ? x + s.h * v : s.predict(x, v);
   }
 
-  /// At the start of a substep: finds bodies that would touch an obstacle, and sets their
-  /// velocities v. `place.at(i)`: of vertex i, m. Counts what was left out.
+  /// At the start of a substep: finds the bodies that would get into an obstacle, and sets their velocities v.
+  /// `place.at(i)` is the position of vertex i, m; `counts` counts contacts left out and sweeps that did not converge.
   template <class Place>
   void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
                std::vector<glm::dvec3>& v, GuardCounts& counts) {
@@ -47,14 +44,14 @@ class RigidContact {
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto near = near_contacts(s, inverse_masses, place, v, first, end);
       const bool moved = !near.empty() && move(s, near, place, v, first, end, counts);
-      std::fill(carried_.begin() + std::ptrdiff_t(first), carried_.begin() + std::ptrdiff_t(end), moved);
+      std::fill(moved_.begin() + std::ptrdiff_t(first), moved_.begin() + std::ptrdiff_t(end), moved);
     }
   }
 
  private:
   using Rules = Formulas<double>;
 
-  // The vertices that would touch an obstacle next; none if one is fixed.
+  // The vertices that would be in an obstacle after the substep; none if one is fixed.
   template <class Place>
   std::vector<std::size_t> near_contacts(const Substep& s, const std::vector<double>& inverse_masses,
                                          const Place& place, const std::vector<glm::dvec3>& v, std::size_t first,
@@ -62,8 +59,8 @@ class RigidContact {
     std::vector<std::size_t> found;
     for (std::size_t i = first; i < end; ++i) {
       if (!(inverse_masses[i] > 0)) return {};
-      glm::dvec3 speed = v[i];
-      const glm::dvec3 here = place.at(std::uint32_t(i)), next = s.predict(here, speed);
+      glm::dvec3 velocity = v[i];
+      const glm::dvec3 here = place.at(std::uint32_t(i)), next = s.predict(here, velocity);
       const auto stops = [&](const MovingObstacle& o) {
         return o.surface_met(next, next - here - s.h * o.velocity_at(here)).distance < 0;
       };
@@ -72,61 +69,65 @@ class RigidContact {
     return found;
   }
 
-  // False for a body without inertia about some axis.
+  // The mean motion of vertices from `first` to `end`; has_inertia() is false if they have none about some axis.
   template <class Place>
-  bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place, std::vector<glm::dvec3>& v,
-            std::size_t first, std::size_t end, GuardCounts& counts) const {
-    const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
+  Rules::Rigid rigid_motion(const Place& place, const std::vector<glm::dvec3>& v, std::size_t first,
+                            std::size_t end) const {
     double mass = 0;
     Rules::Rigid body{};
     for (std::size_t i = first; i < end; ++i) {
       const double m = model_.masses[i];
-      mass += m, body.centre += m * at(i), body.velocity += m * v[i];
+      mass += m, body.centre += m * place.at(std::uint32_t(i)), body.velocity += m * v[i];
     }
     body.centre /= mass, body.velocity /= mass;
     glm::dvec3 angular(0);
     glm::dmat3 moments(0);
     for (std::size_t i = first; i < end; ++i) {
-      const glm::dvec3 arm = at(i) - body.centre;
+      const glm::dvec3 arm = place.at(std::uint32_t(i)) - body.centre;
       angular += model_.masses[i] / mass * glm::cross(arm, v[i]);
       moments += model_.masses[i] / mass * glm::outerProduct(arm, arm);
     }
     body.inverse_inertia = Rules{}.inverse_inertia_of(moments);
-    if (!Rules{}.has_inertia(body)) return false;
     body.spin = body.inverse_inertia * angular;
-    const Rules::Rigid before = body;
+    return body;
+  }
+
+  // Sets the velocities of a body in contact; false if it has no inertia about some axis.
+  template <class Place>
+  bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place, std::vector<glm::dvec3>& v,
+            std::size_t first, std::size_t end, GuardCounts& counts) const {
+    const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
+    const Rules::Rigid before = rigid_motion(place, v, first, end);
+    if (!Rules{}.has_inertia(before)) return false;
+    Rules::Rigid body = before;
     body.velocity = (body.velocity + s.h * s.gravity) * s.velocity_scale, body.spin *= s.velocity_scale;
-    const double fall = s.h * glm::length(s.gravity), enough = 1e-9 * (fall + glm::length(body.velocity));
+    const double fall = s.h * glm::length(s.gravity), enough = 1e-9 * (fall + glm::length(body.velocity)),
+                 loose = 1e-3 * fall + enough;
     const Rules::Rigid falling = body;
-    // Contacts are taken in as the motion found so far breaks them, the worst first.
+    // Adds the worst contact as long as the motion violates any by more than `loose`, m/s.
     Rules::Touch touches[MOST_TOUCHES], worst;
-    std::array<std::size_t, MOST_TOUCHES + 1> places{};  // a number per vertex and obstacle
+    std::array<std::size_t, MOST_TOUCHES + 1> numbers{};  // of the contacts, by vertex and obstacle
     for (int count = 0;; ++count) {
-      const double loose = 1e-3 * fall + enough;
       double most = loose;
-      std::size_t place = 0;
-      // Of vertex i at arm: a normal and the gap there, how the obstacle moves, brakes and rebounds.
-      const auto consider = [&](std::size_t i, const glm::dvec3& arm, const glm::dvec3& n, double gap,
-                                const glm::dvec3& surface, const MovingObstacle& o) {
-        const double least = Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
-                                                    gap - Rules{}.closed_gap * model_.size, s.h, fall, o.restitution);
-        ++place;
-        const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
-        if (!(over > most)) return;
-        most = over, places[std::size_t(count)] = place,
-        worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, friction_on(o, model_, i));
-      };
+      std::size_t number = 0;
       for (const std::size_t i : near) {
         const glm::dvec3 arm = at(i) - body.centre;
         for (const MovingObstacle& o : s.obstacles) {
-          const glm::dvec3 surface = o.velocity_at(at(i)), way = s.h * (Rules{}.velocity_at(falling, arm) - surface);
-          const auto ahead = o.surface_ahead(at(i), s.h * surface + way, way);
-          consider(i, arm, ahead.normal, ahead.distance, surface, o);
+          const glm::dvec3 surface = o.velocity_at(at(i)),
+                           displacement = s.h * (Rules{}.velocity_at(falling, arm) - surface);
+          const auto [n, gap] = o.surface_ahead(at(i), s.h * surface + displacement, displacement);
+          const double least = Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
+                                                      gap - Rules{}.closed_gap * model_.size, s.h, fall, o.restitution);
+          ++number;
+          const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
+          if (!(over > most)) continue;
+          most = over, numbers[std::size_t(count)] = number;
+          worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, friction_on(o, model_, i));
         }
       }
-      const auto taken = places.begin() + count;
-      if (most == loose || std::find(places.begin(), taken, *taken) != taken)
-        break;  // where one is known contacts contradict each other, as where a body is jammed
+      const auto added = numbers.begin() + count;
+      // A known contact means that contacts contradict each other, as those of a jammed body.
+      if (most == loose || std::find(numbers.begin(), added, *added) != added) break;
       if (count == MOST_TOUCHES) {
         ++counts[GUARDS + DROP_CONTACTS];
         break;
@@ -142,7 +143,7 @@ class RigidContact {
   const Model& model_;
   const Settings& settings_;
   bool wanted_;
-  std::vector<char> carried_;
+  std::vector<char> moved_;  // by vertex
 };
 
 }  // namespace tetpbd

@@ -1,6 +1,5 @@
-// Where the members of a storage block lie (std430) whose arrays have sizes that are known when its kernels
-// are compiled: the C++ side of a block's declaration in GLSL, in the same order (tests/test_layout.cpp asks
-// GL).
+// Where the members of a storage block lie (std430), for blocks whose arrays have sizes that are known when their
+// kernels are compiled. Members are added in the order of the block's declaration in GLSL; a test asks GL.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +13,7 @@
 
 namespace tetpbd {
 
-/// Bytes; of a struct that of its largest member: structs with vectors in them have one of their own.
+/// Bytes. A struct has the alignment of its largest member, so structs with vectors specialise this.
 template <class T>
 inline constexpr std::size_t std430_alignment = 4;
 template <glm::length_t N, class T>
@@ -34,20 +33,20 @@ struct BufferLayout {
   };
   std::vector<Member> members;
   std::size_t bytes = 0;  ///< a multiple of 16, the largest alignment
-  /// The next member: an array of so many, or a single one.
+  /// Adds the next member: an array of `count`, or a single value.
   template <class T>
   Range<T> add(const std::string& name, std::size_t count = 1) {
     constexpr std::size_t alignment = std430_alignment<T>;
     static_assert(sizeof(T) % alignment == 0);
-    const std::size_t end = members.empty() ? 0 : members.back().at + members.back().bytes,
-                      at = (end + alignment - 1) / alignment * alignment;
+    const std::size_t end = members.empty() ? 0 : members.back().at + members.back().bytes;
+    const std::size_t at = (end + alignment - 1) / alignment * alignment;
     members.push_back({name, at, std::max<std::size_t>(count, 1) * sizeof(T)});  // GLSL has no empty arrays
     bytes = (at + members.back().bytes + 15) / 16 * 16;
     return {at, count};
   }
 };
 
-/// Into a buffer's contents, or into a buffer: as many bytes as the range has.
+/// Write `values` to a range of a buffer's contents or of a buffer; `get` reads a range of contents.
 template <class T, class Value>
 void put(std::span<std::byte> contents, Range<T> range, const std::vector<Value>& values) {
   if (!values.empty()) std::memcpy(&contents[range.at], values.data(), values.size() * sizeof(Value));

@@ -24,10 +24,9 @@ void GLAPIENTRY on_message(GLenum source, GLenum type, GLuint, GLenum, GLsizei, 
   if (report) reinterpret_cast<GlErrorReport>(report)(text);
 }
 
-std::string gl_string(GLenum name) {
-  const auto* text = reinterpret_cast<const char*>(glGetString(name));
-  return text ? text : "";
-}
+std::string or_empty(const char* text) { return text ? text : ""; }
+
+std::string gl_string(GLenum name) { return or_empty(reinterpret_cast<const char*>(glGetString(name))); }
 
 int gl_integer(GLenum name) {
   GLint value = 0;
@@ -46,16 +45,15 @@ std::vector<EGLDeviceEXT> query_devices() {
 
 std::string device_string(EGLDeviceEXT device, EGLint name) {
   const auto query = reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(eglGetProcAddress("eglQueryDeviceStringEXT"));
-  const char* text = query ? query(device, name) : nullptr;
-  return text ? text : "";
+  return or_empty(query ? query(device, name) : nullptr);
 }
 
 bool is_software(EGLDeviceEXT device) {
   return device_string(device, EGL_EXTENSIONS).find("MESA_device_software") != std::string::npos;
 }
 
-/// Current, or none. `any_version`: what the driver has, so that load_gl() can say it. With `reset`, the
-/// driver tells of a GPU that was reset, and checks no bounds in shaders.
+// Makes a context current; none where that fails. `any_version`: whatever the driver has, so that load_gl() can say it.
+// With `reset`, the driver reports a GPU reset, and it still checks no bounds in shaders.
 EGLContext make_context(EGLDisplay display, bool debug, bool any_version, bool reset) {
   if (display == EGL_NO_DISPLAY || !eglInitialize(display, nullptr, nullptr)) return EGL_NO_CONTEXT;
   if (!eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
@@ -100,7 +98,7 @@ std::size_t most_work_groups_in_row() {
 
 Capabilities load_gl() {
   glewExperimental = GL_TRUE;
-  // GLEW built for GLX answers GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.
+  // GLEW built for GLX returns GLEW_ERROR_NO_GLX_DISPLAY (4) under EGL, with every function loaded.
   const GLenum result = glewInit();
   if (result != GLEW_OK && result != GLEW_ERROR_NO_GLX_DISPLAY)
     throw Error("OpenGL functions did not load", reinterpret_cast<const char*>(glewGetErrorString(result)),
@@ -142,18 +140,17 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
   const std::vector<EGLDeviceEXT> devices = query_devices();
   if (device >= int(devices.size()))
     throw Error("no such GPU", fmt::format("--gpu {}", device), "tetpbd info lists them");
-  const auto display_of = [](EGLDeviceEXT one) { return eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr); };
   std::vector<EGLDisplay> displays;
   for (EGLDeviceEXT one : devices)
-    if (device < 0 ? !is_software(one) : one == devices[std::size_t(device)]) displays.push_back(display_of(one));
+    if (device < 0 ? !is_software(one) : one == devices[std::size_t(device)])
+      displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, one, nullptr));
   if (device < 0)
     displays.push_back(eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
   for (const bool any_version : {false, true})
     for (std::size_t i = 0; i < 2 * displays.size(); ++i) {
-      EGLDisplay display = displays[i / 2];
-      context_ = make_context(display, debug, any_version, i % 2 == 0);
+      display_ = displays[i / 2];
+      context_ = make_context(display_, debug, any_version, i % 2 == 0);
       if (context_ == EGL_NO_CONTEXT) continue;
-      display_ = display;
       capabilities_ = load_gl();
       count_gl_errors();
       return;
@@ -162,7 +159,7 @@ HeadlessContext::HeadlessContext(int device, bool debug) {
               "install a newer driver, or libegl-mesa0 and libgl1-mesa-dri for software rendering", 1);
 }
 
-// The display stays initialised: Mesa unloads its driver with it, and leak checkers then report that driver.
+// The display stays initialised, because Mesa would unload its driver and leak checkers then report that driver.
 HeadlessContext::~HeadlessContext() {
   if (!context_) return;
   eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);

@@ -7,7 +7,7 @@
 
 namespace tetpbd {
 
-/// What the current context offers: all that the program asks a driver beyond GL 4.3's guarantees.
+/// What the current context offers, as far as the program needs to know beyond GL 4.3's guarantees.
 struct Capabilities {
   std::string vendor, renderer, version, shading_language;
   int storage_blocks = 0;          ///< shader storage blocks a compute stage may use (8 guaranteed)
@@ -15,7 +15,7 @@ struct Capabilities {
   int work_group_invocations = 0;  ///< 1024 guaranteed
   int shared_bytes = 0;            ///< shared memory of a work-group
   int samples = 0;                 ///< largest MSAA sample count
-  bool software = false;           ///< a CPU pretends to be a GPU (llvmpipe, softpipe, swrast)
+  bool software = false;           ///< a CPU acts as the GPU (llvmpipe, softpipe, swrast)
 };
 Capabilities capabilities();
 inline bool is_software_renderer() { return capabilities().software; }
@@ -23,28 +23,28 @@ inline bool is_software_renderer() { return capabilities().software; }
 /// Loads GL functions for the current context and checks for GL 4.3. Throws Error with the version found.
 Capabilities load_gl();
 using GlErrorReport = void (*)(const char* text);
-/// Puts a debug callback into the current context if it is a debug context: messages of type ERROR are
-/// counted from now on, and their text goes to `report`, if there is one.
+/// Counts messages of type ERROR from now on and passes their text to `report`, if the current context is a debug
+/// context.
 void count_gl_errors(GlErrorReport report = nullptr);
-/// Number of messages since the start, of all contexts that are counted.
+/// Number of such messages since the start, in all contexts together.
 int gl_error_count();
 
-/// That a dispatch may have in its first dimension; 65535 guaranteed.
+/// The most work-groups that a dispatch may have in its first dimension; 65535 guaranteed.
 std::size_t most_work_groups_in_row();
 /// Number of work-groups of `size` invocations that cover `count`.
 inline std::size_t work_groups(std::size_t count, unsigned size) { return (count + size - 1) / size; }
 
-/// Throws ContextLost if the GPU was reset. Cheap, but not free: once a frame, not once a dispatch.
+/// Throws ContextLost if the GPU was reset. Cheap enough for once a frame, not for once a dispatch.
 void check_context();
 
 /// Names of the EGL devices, in the order of `--gpu N`.
 std::vector<std::string> list_devices();
 
-/// Makes a context current for the calling thread until destroyed. It draws to framebuffer objects only.
+/// A context that is current for the calling thread until destroyed. It draws to framebuffer objects only.
 class HeadlessContext {
  public:
-  /// `device`: index of an EGL device, or -1 for the first that gives GL 4.3, GPUs before software. With
-  /// `debug`, GL errors are counted.
+  /// `device`: index of an EGL device, or -1 for the first that offers GL 4.3, GPUs before software. With `debug`, GL
+  /// errors are counted.
   explicit HeadlessContext(int device = -1, bool debug = false);
   ~HeadlessContext();
   HeadlessContext(const HeadlessContext&) = delete;

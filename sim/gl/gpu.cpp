@@ -12,13 +12,13 @@ namespace tetpbd {
 static const char* const smaller = "use a smaller mesh, a smaller image or fewer samples";
 
 void check_memory(const std::string& what, std::size_t bytes, bool fits) {
-  // Drivers call an absurd size by other names than GL_OUT_OF_MEMORY.
+  // For an absurd size, drivers report other errors than GL_OUT_OF_MEMORY.
   if (glGetError() != GL_NO_ERROR || !fits)
     throw Error("out of GPU memory", fmt::format("{} of {} bytes", what, bytes), smaller, 1);
 }
 
 void clear_errors() {
-  for (int i = 0; i < 100 && glGetError() != GL_NO_ERROR;) ++i;  // a lost context answers an error for ever
+  for (int i = 0; i < 100 && glGetError() != GL_NO_ERROR;) ++i;  // a lost context reports errors for ever
 }
 
 namespace {
@@ -29,22 +29,22 @@ GLuint new_buffer() {
   return id;
 }
 
-// Bytes for a further buffer beside `held` ones, where the driver says how many there are.
+// Bytes available for another buffer beside `held` bytes of others, where the driver says it.
 std::optional<std::int64_t> available_bytes(std::int64_t held) {
   if (const std::int64_t most = gl_live().most_bytes) return most - held;
   GLint kib[4] = {};
   if (GLEW_ATI_meminfo) {
     glGetIntegerv(GL_VBO_FREE_MEMORY_ATI, kib);
-    return (std::int64_t(kib[0]) + kib[2]) << 10;  // the GPU's own, and what it has of the computer's
+    return (std::int64_t(kib[0]) + kib[2]) << 10;  // the GPU's own memory, and the computer's that it may use
   }
   if (!GLEW_NVX_gpu_memory_info) return std::nullopt;
   glGetIntegerv(GL_GPU_MEMORY_INFO_CURRENT_AVAILABLE_VIDMEM_NVX, &kib[0]);
   glGetIntegerv(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX, &kib[1]);
-  // That driver takes a buffer's memory at its first use: what is free now may be promised already.
+  // NVIDIA's driver takes a buffer's memory at its first use, so what is free now may be promised already.
   return std::min(std::int64_t(kib[0]) << 10, (std::int64_t(kib[1]) << 10) - held);
 }
 
-// Small ones are taken on trust: some drivers stop their threads to answer.
+// Bytes from which on a buffer's size is checked: some drivers stop their threads to report memory.
 constexpr std::size_t large = 1 << 20;
 
 void check_available(const std::string& label, std::size_t bytes) {
@@ -58,12 +58,12 @@ void check_available(const std::string& label, std::size_t bytes) {
                 smaller, 1);
 }
 
-// New memory for the buffer that is bound there.
+// Takes new memory for the buffer that is bound to `target`.
 void allocate(GLenum target, const std::string& label, std::size_t bytes, const void* data, GLenum usage, bool check) {
   if (check) clear_errors();
   glBufferData(target, GLsizeiptr(bytes), data, usage);
   if (!check) return;
-  GLint64 made = 0;  // some drivers say nothing of what does not fit
+  GLint64 made = 0;  // some drivers report no error where it does not fit
   glGetBufferParameteri64v(target, GL_BUFFER_SIZE, &made);
   check_memory(fmt::format("buffer '{}'", label), bytes, std::size_t(made) >= bytes);
 }
@@ -78,8 +78,8 @@ Buffer::Buffer(std::string label, std::size_t bytes, const void* data, GLenum us
   label_object(GL_BUFFER, id(), label_);
 }
 
-// Kernels queued before may still read or write the buffer: the barrier here is why pins, uploads, resets and
-// read-backs need none of their own. What no kernel wrote, GL orders by itself.
+// Kernels queued before may still read or write the buffer. The barriers here are why pins, uploads, resets and
+// readbacks need none of their own.
 void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) const {
   if (whole_at_once_ && offset == 0 && bytes == this->bytes()) {
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
@@ -90,8 +90,8 @@ void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) cons
   write_each({offset}, bytes, data);
 }
 
-// Through a buffer of its own: NVIDIA's 580 driver lets a kernel that follows glBufferSubData see the old
-// bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
+// Copies from a buffer of its own, because with NVIDIA's 580 driver a kernel that follows glBufferSubData may see the
+// old bytes, whatever barriers stand between, unless something flushes (docs/decisions.md).
 void Buffer::write_each(const std::vector<std::size_t>& offsets, std::size_t bytes, const void* data) const {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   const Owned<GLuint, delete_buffer> staging(new_buffer());
@@ -124,7 +124,7 @@ void Buffer::clear() const {
 }
 
 bool reached(GLsync fence, bool wait, const char* what) {
-  constexpr GLuint64 slice = 1'000'000'000u;  // ns; a step takes what it takes, a lost GPU is noticed
+  constexpr GLuint64 slice = 1'000'000'000u;  // ns; a step may take longer, but a lost GPU is noticed
   for (;;) {
     const GLenum state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? slice : 0u);
     if (state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED) return true;

@@ -1,7 +1,6 @@
-// The little OpenGL 4.3 core that this program needs: a context (context.h), buffers, programs with includes,
-// fences and timers, all labelled and counted. No direct state access, no buffer storage; of
-// vendors' extensions only how much memory is free, where one says it. Nothing here knows of meshes or
-// solvers.
+// The part of OpenGL 4.3 core that this program needs: a context (context.h), buffers, programs with includes, fences
+// and timers, all labelled and counted. Of vendors' extensions only those are used that say how much memory is free.
+// Nothing here knows of meshes or solvers.
 #pragma once
 
 #include <GL/glew.h>
@@ -20,11 +19,11 @@
 
 namespace tetpbd {
 
-/// What the program holds of GL right now, over all contexts; images' bytes are not counted.
+/// What the program has of GL at present, in all contexts together; images' bytes are not counted.
 struct GlLive {
   long objects = 0;
   std::int64_t buffer_bytes = 0;
-  std::int64_t most_bytes = 0;  ///< as if the GPU had so many for buffers, in tests; 0: it has what it has
+  std::int64_t most_bytes = 0;  ///< in tests, a limit for all buffers together; 0: the GPU's own
 };
 inline GlLive& gl_live() {
   static GlLive live;
@@ -35,7 +34,7 @@ inline void label_object(GLenum kind, GLuint id, const std::string& label) {
   glObjectLabel(kind, id, GLsizei(label.size()), label.data());
 }
 
-/// A GL object that is deleted with its owner. `Name`: GLuint or GLsync; 0 is none.
+/// A GL object that is deleted with its owner. `Name` is GLuint or GLsync, where 0 means none.
 template <class Name, void (*destroy)(Name)>
 class Owned {
  public:
@@ -73,11 +72,11 @@ void delete_named(GLuint id) {
   if constexpr (kind == GL_FRAMEBUFFER) glDeleteFramebuffers(1, &id);
   if constexpr (kind == GL_SAMPLER) glDeleteSamplers(1, &id);
 }
-/// Left bound by its making: a name is an object only once it was bound, and only then has a label.
+/// Construction leaves the object bound, because only a name that was bound is an object and can have a label.
 template <GLenum kind>
 struct Named : Owned<GLuint, delete_named<kind>> {
   Named() = default;
-  /// `target`: of a texture.
+  /// `target` is that of a texture.
   explicit Named(const std::string& label, [[maybe_unused]] GLenum target = GL_TEXTURE_2D)
       : Named::Owned(make(target)) {
     label_object(kind, this->id(), label);
@@ -98,14 +97,14 @@ using Renderbuffer = Named<GL_RENDERBUFFER>;
 using Framebuffer = Named<GL_FRAMEBUFFER>;
 using Sampler = Named<GL_SAMPLER>;
 
-/// Throws Error naming what did not fit if it does not, or the last GL call failed.
+/// Throws Error naming `what` if it does not fit or an earlier GL call failed.
 void check_memory(const std::string& what, std::size_t bytes, bool fits = true);
-/// Forgets GL errors of earlier calls, so that check_memory judges the next alone.
+/// Forgets GL errors of earlier calls, so that check_memory() finds those of the next alone.
 void clear_errors();
 
-/// Of a buffer by its name. Waits for the GPU.
+/// Reads a buffer known by its GL name. Waits for the GPU.
 void read_buffer(GLuint from, std::size_t offset, std::size_t bytes, void* data);
-/// Of what kernels wrote, queued: done when the GPU comes to the next fence.
+/// Copies what kernels wrote. Queued: done when the GPU reaches the next fence.
 void copy_buffer(GLuint from, std::size_t offset, GLuint to, std::size_t at, std::size_t bytes);
 
 /// A buffer of fixed size.
@@ -119,7 +118,7 @@ class Buffer : public Owned<GLuint, delete_buffer> {
 
   const std::string& label() const { return label_; }
   void write(std::size_t offset, std::size_t bytes, const void* data) const;
-  /// Items of one size, one after the other in `data`, each to an offset of its own.
+  /// Writes items of `bytes` each, one after the other in `data`, to an offset of its own each.
   void write_each(const std::vector<std::size_t>& offsets, std::size_t bytes, const void* data) const;
   void read(std::size_t offset, std::size_t bytes, void* data) const { read_buffer(id(), offset, bytes, data); }
   void copy_to(const Buffer& to, std::size_t at, std::size_t offset, std::size_t bytes) const {
@@ -137,7 +136,7 @@ class Buffer : public Owned<GLuint, delete_buffer> {
 
  private:
   std::string label_;
-  bool whole_at_once_ = false;  ///< GL_STREAM_DRAW: a write of all gets new memory, which nothing waits for
+  bool whole_at_once_ = false;  ///< GL_STREAM_DRAW: writing all of it takes new memory, so nothing waits
 };
 
 /// A place in the GPU's queue.
@@ -146,9 +145,10 @@ struct Fence : Owned<GLsync, delete_fence> {
   static Fence here() { return Fence(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)); }
   GLsync sync() const { return id(); }
 };
-/// Whether the GPU has come to the fence; with `wait`, once it has. Throws ContextLost, or Error with `what`.
+/// Whether the GPU has reached the fence; with `wait`, waits until it has. Throws ContextLost, or Error with `what`.
 bool reached(GLsync fence, bool wait, const char* what);
-/// What a buffer held when the GPU came to `fence`, once; nothing before (with `wait`: waits) or without one.
+/// The contents of a readback buffer once the GPU has reached `fence`, which is then reset; nothing before that (with
+/// `wait`, waits) or without a fence.
 template <class T>
 std::optional<std::vector<T>> poll_readback(Fence& fence, const Buffer& buffer, const char* what, bool wait = false) {
   if (!fence || !reached(fence.id(), wait, what)) return std::nullopt;
@@ -156,12 +156,12 @@ std::optional<std::vector<T>> poll_readback(Fence& fence, const Buffer& buffer, 
   return buffer.read_all<T>();
 }
 
-/// GPU time between begin and end by pairs of timestamps, read back when ready (never waits unless asked).
+/// GPU time between begin() and end(), by pairs of timestamps that are read back when ready.
 class Timer {
  public:
   void begin() { begun_ = now(); }
   void end() { spans_.emplace_back(std::move(begun_), now()); }
-  /// Milliseconds of the oldest span that is ready, if any; with `wait`, of the oldest there is.
+  /// Milliseconds of the oldest span if it is ready; with `wait`, waits for it.
   std::optional<double> poll(bool wait = false);
 
  private:
@@ -173,46 +173,46 @@ class Timer {
 
 /// Values of `$NAME` in a shader's text: {"KIND", "stretch"} makes gather_$KIND gather_stretch.
 using Substitutions = std::map<std::string, std::string>;
-/// `words` for the whole text; `each`: a line with #foreach is repeated for every entry, with its words.
+/// `words` apply to the whole text. A line with #foreach is repeated for every entry of `each`, with its words.
 struct ShaderWords {
   Substitutions words;
   std::vector<Substitutions> each;
 };
 
-/// Reads shaders from this folder; empty: those inside the program. TETPBD_SHADERS sets it at start.
+/// The folder that shaders are read from, TETPBD_SHADERS at first; empty: those inside the program.
 void set_shader_folder(const std::string& folder);
 const std::string& shader_folder();
-/// From now on each program writes the text that the compiler gets into this folder: a file for each stage,
-/// called by the program's label, with a number where another text has that name. Empty: no longer.
+/// From now on each program writes the text that the compiler gets into this folder, a file for each stage, named after
+/// the program's label, with a number where another text has that name. Empty: no longer.
 void set_shader_dump(const std::string& folder);
 void dump_shader(const std::string& label, const std::string& stage, const std::string& text);
 /// Changes when a file of the folder changes; 0 without a folder.
 std::int64_t shader_folder_version();
 
-/// The text of shaders/`name`, #include, #foreach and `$NAME` expanded. `files`: the files it is made of, in
-/// order; line N of files[I] stands under #line N I (GLSL has numbers where C has names).
+/// The text of shaders/`name` with #include, #foreach and `$NAME` expanded. `files` gets the files it is made of: line
+/// N of files[I] follows a line "#line N I", because GLSL has numbers where C has names.
 std::string shader_text(const std::string& name, const ShaderWords& words, std::vector<std::string>& files);
 
 /// A linked program. Errors name the shader file and line.
 class Program : public Owned<GLuint, delete_program> {
  public:
   Program() = default;
-  /// A stage of each file by its ending, after `#version 430 core` and `#define`s.
-  /// Throws Error where it uses more storage blocks than `most_blocks`: GL 4.3 guarantees 8 of a kernel.
+  /// Compiles each file as the stage that its ending names, after `#version 430 core` and `#define`s. Throws Error
+  /// where it uses more storage blocks than `most_blocks`; GL 4.3 guarantees 8 for a kernel.
   Program(std::string label, const std::vector<std::string>& stages, const ShaderWords& words = {},
           const std::vector<std::string>& defines = {}, std::size_t most_blocks = 8);
   static Program compute(const std::string& file, const ShaderWords& words = {},
                          const std::vector<std::string>& defines = {}, std::size_t most_blocks = 8);
 
   const std::string& label() const { return label_; }
-  /// The names of the storage blocks that it uses; the k-th has binding point k.
+  /// Names of the storage blocks that the program uses; the k-th has binding point k.
   const std::vector<std::string>& storage_blocks() const { return storage_blocks_; }
   void use() const { glUseProgram(id()); }
-  /// Of the program in use. A uniform that the linker dropped is ignored; one not declared throws Error.
+  /// Set a uniform of the program in use. One that the linker dropped is ignored; one not declared throws Error.
   void set(const char* name, int value) const { glUniform1i(location(name), value); }
   void set(const char* name, unsigned value) const { glUniform1ui(location(name), value); }
   void set(const char* name, float value) const { glUniform1f(location(name), value); }
-  /// Of a dispatch: the same value again costs nothing, nor does a uniform that the kernel does not have.
+  /// For each dispatch: does nothing where the value is the same again or the kernel does not have the uniform.
   void set_changed(const char* name, unsigned value) const;
   void set(const char* name, const glm::uvec2& value) const { glUniform2uiv(location(name), 1, &value.x); }
   void set(const char* name, const glm::vec3& value) const { glUniform3fv(location(name), 1, &value.x); }

@@ -10,44 +10,41 @@ namespace {
 
 constexpr GLenum fields_unit = GL_TEXTURE0 + UNIT_FIELDS;
 
-struct Target {
-  GLenum target, binding;
-};
-// glBindBufferBase() binds to the generic target as well.
-constexpr std::array<Target, 6> targets = {{{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},
-                                            {GL_COPY_WRITE_BUFFER, GL_COPY_WRITE_BUFFER},
-                                            {GL_UNIFORM_BUFFER, GL_UNIFORM_BUFFER_BINDING},
-                                            {GL_SHADER_STORAGE_BUFFER, GL_SHADER_STORAGE_BUFFER_BINDING},
-                                            {GL_ATOMIC_COUNTER_BUFFER, GL_ATOMIC_COUNTER_BUFFER_BINDING},
-                                            {GL_DISPATCH_INDIRECT_BUFFER, GL_DISPATCH_INDIRECT_BUFFER_BINDING}}};
+// Targets and what to ask for their buffers; glBindBufferBase() binds to the generic target as well.
+constexpr GLenum targets[][2] = {{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},
+                                 {GL_COPY_WRITE_BUFFER, GL_COPY_WRITE_BUFFER},
+                                 {GL_UNIFORM_BUFFER, GL_UNIFORM_BUFFER_BINDING},
+                                 {GL_SHADER_STORAGE_BUFFER, GL_SHADER_STORAGE_BUFFER_BINDING},
+                                 {GL_ATOMIC_COUNTER_BUFFER, GL_ATOMIC_COUNTER_BUFFER_BINDING},
+                                 {GL_DISPATCH_INDIRECT_BUFFER, GL_DISPATCH_INDIRECT_BUFFER_BINDING}};
 
 }  // namespace
 
 KeepBindings::KeepBindings() {
   if (!glDispatchCompute) load_gl();
   glGetIntegerv(GL_ACTIVE_TEXTURE, &unit_);
-  if (unit_ == 0) {  // never so in a context that answers
+  if (unit_ == 0) {  // 0 in no context that works
     check_context();
     throw Error("no OpenGL context is current", "this thread", "make one current before the call", 1);
   }
   glGetIntegerv(GL_CURRENT_PROGRAM, &program_);
-  if (program_) {  // one that was deleted lives only as long as it is in use
+  if (program_) {  // a deleted one lives only as long as it is in use, so it cannot be put back
     GLint deleted = 0;
     glGetProgramiv(GLuint(program_), GL_DELETE_STATUS, &deleted);
     if (deleted) program_ = 0;
   }
-  for (std::size_t k = 0; k < targets.size(); ++k) glGetIntegerv(targets[k].binding, &buffers_[k]);
+  for (std::size_t k = 0; k < std::size(targets); ++k) glGetIntegerv(targets[k][1], &buffers_[k]);
   glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[0]);
   glActiveTexture(fields_unit);
   glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[1]);
   glActiveTexture(GLenum(unit_));
 }
 
-// An object that was deleted meanwhile can no longer be bound.
+// An object that was deleted since can no longer be bound.
 KeepBindings::~KeepBindings() {
-  for (std::size_t k = 0; k < targets.size(); ++k) {
+  for (std::size_t k = 0; k < std::size(targets); ++k) {
     const GLuint buffer = GLuint(buffers_[k]);
-    glBindBuffer(targets[k].target, buffer && glIsBuffer(buffer) ? buffer : 0);
+    glBindBuffer(targets[k][0], buffer && glIsBuffer(buffer) ? buffer : 0);
   }
   const auto bind_texture = [](GLenum unit, GLint name) {
     glActiveTexture(unit);

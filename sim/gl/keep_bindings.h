@@ -1,4 +1,4 @@
-// What a caller has bound stays bound across a call into sim.
+// Leaves a caller's bindings as they were across a call into sim.
 #pragma once
 
 #include <GL/glew.h>
@@ -7,11 +7,9 @@
 
 namespace tetpbd {
 
-/// Stands first in the functions that callers use and that touch GL: reads bindings when it is made, and puts
-/// them back when it ends. Kept are the program in use, the active texture unit, the buffer texture of that
-/// unit and of UNIT_FIELDS, and the buffer of each generic target that sim binds. A step of sim touches
-/// nothing else but the indexed buffers, which are too many to ask for. Also loads GL functions if nobody
-/// has, and throws Error where no context is current.
+/// Stands first in functions that callers use and that touch GL. Keeps the program in use, the active texture unit, the
+/// buffer texture of that unit and of UNIT_FIELDS, and the buffer of each generic target that sim binds (sim.h). Also
+/// loads GL functions if nobody has, and throws Error where no context is current.
 class KeepBindings {
  public:
   KeepBindings();

@@ -1,5 +1,4 @@
-// shaders/layout.glsl as C++: the same text, so the two cannot drift apart (a test also asks GL for the
-// offsets).
+// shaders/layout.glsl as C++: the same text, so that the two always agree (a test also asks GL for the offsets).
 #pragma once
 
 #include <glm/glm.hpp>

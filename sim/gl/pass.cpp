@@ -72,7 +72,7 @@ void Recorder::run(Pass& pass, std::initializer_list<DispatchParameter> paramete
   if (timing) counted_as->timer.begin();
   if (pass.work_groups) {
     if (row == 0) row = most_work_groups_in_row();
-    const std::size_t in_row = std::min(pass.work_groups, row);  // types.glsl: group_index
+    const std::size_t in_row = std::min(pass.work_groups, row);  // group_index in types.glsl counts over rows
     glDispatchCompute(GLuint(in_row), GLuint((pass.work_groups + in_row - 1) / in_row), 1);
   } else if (pass.grid.x) {
     glDispatchCompute(pass.grid.x, pass.grid.y, pass.grid.z);

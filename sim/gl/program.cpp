@@ -15,7 +15,7 @@ namespace {
 void delete_shader(GLuint id) { glDeleteShader(id); }
 using Shader = Owned<GLuint, delete_shader>;
 
-// A compiler's log on one line, #line's numbers as file names.
+// Makes a compiler's log one line, with file names in place of the numbers of #line.
 std::string name_files(const std::string& log, const std::vector<std::string>& files) {
   std::istringstream lines(log);
   std::string line, result;
@@ -30,8 +30,8 @@ std::string name_files(const std::string& log, const std::vector<std::string>& f
   return result;
 }
 
-// What the compiler or linker has against it.
-std::optional<std::string> fault(GLuint id, GLenum status) {
+// The compiler's or linker's log where it failed.
+std::optional<std::string> failure_log(GLuint id, GLenum status) {
   const bool linked = status == GL_LINK_STATUS;
   GLint ok = 0;
   (linked ? glGetProgramiv : glGetShaderiv)(id, status, &ok);
@@ -50,7 +50,7 @@ Shader compile(const std::string& stage, const std::string& text, const std::vec
   const char* pointer = text.c_str();
   glShaderSource(shader.id(), 1, &pointer, nullptr);
   glCompileShader(shader.id());
-  if (const auto log = fault(shader.id(), GL_COMPILE_STATUS))
+  if (const auto log = failure_log(shader.id(), GL_COMPILE_STATUS))
     throw Error("shader does not compile", stage, name_files(*log, files), 1);
   return shader;
 }
@@ -73,7 +73,7 @@ Program::Program(std::string label, const std::vector<std::string>& stages, cons
   }
   glLinkProgram(id());
   for (const Shader& shader : shaders) glDetachShader(id(), shader.id());
-  if (const auto log = fault(id(), GL_LINK_STATUS))
+  if (const auto log = failure_log(id(), GL_LINK_STATUS))
     throw Error("shader program does not link", label_, name_files(*log, {}), 1);
   label_object(GL_PROGRAM, id(), label_);
   number_storage_blocks(most_blocks);
@@ -105,20 +105,17 @@ void Program::number_storage_blocks(std::size_t most) {
 }
 
 void Program::set_changed(const char* name, unsigned value) const {
-  const auto found = last_.find(std::string_view(name));
-  if (found == last_.end()) {
-    const GLint location = glGetUniformLocation(id(), name);
-    last_.emplace(name, std::pair(location, value));
-    if (location >= 0) glUniform1ui(location, value);
-  } else if (auto& [location, last] = found->second; location >= 0 && last != value) {
-    glUniform1ui(location, value), last = value;
-  }
+  auto found = last_.find(std::string_view(name));
+  if (found == last_.end()) found = last_.emplace(name, std::pair(glGetUniformLocation(id(), name), ~value)).first;
+  auto& [location, last] = found->second;
+  if (location >= 0 && last != value) glUniform1ui(location, value);
+  last = value;
 }
 
 GLint Program::location(const char* name) const {
   if (const auto found = locations_.find(std::string_view(name)); found != locations_.end()) return found->second;
   const GLint location = glGetUniformLocation(id(), name);
-  // One that nothing uses has no location either and yet is no mistake.
+  // A uniform that is declared and not used has no location either, but is no mistake.
   if (location < 0 && !std::regex_search(text_, std::regex(fmt::format("\nuniform [^;]*\\b{}\\b", name))))
     throw Error("no such uniform", fmt::format("'{}' in {}", name, label_),
                 shader_folder().empty() ? "declare it in the shader" : "declare it in " + shader_folder(), 1);

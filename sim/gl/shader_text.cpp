@@ -40,7 +40,7 @@ std::string read_shader_file(const std::string& name) {
   throw Error("no such shader", name, "it is not one of the files of shaders/", 1);
 }
 
-// Itself; of "FOLDER/*.ENDING" all such files inside the program, by name.
+// The names that a pattern stands for: of "FOLDER/*.ENDING" all such files inside the program, in order; else itself.
 std::vector<std::string> expand_pattern(const std::string& pattern) {
   const std::size_t star = pattern.find('*');
   if (star == std::string::npos) return {pattern};

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <ranges>
 
 #include "shaders/measure/layout.glsl"
@@ -17,19 +17,19 @@ namespace tetpbd {
 
 namespace {
 
-// Of the kinds that are measured, in the order of the table.
+// The names of blocks of the kinds that are measured, in the order of the table.
 constexpr std::array record_blocks = {"Stretch", "Bend", "Volume"};
 constexpr std::size_t ring_size = 16, measured_kinds = std::tuple_size_v<decltype(Metrics::counts)>;
 
-// Lists are sorted by vertex and bodies share none, so each body owns a range of each list.
-glm::uvec2 range_of(const ConstraintList& list, glm::uvec2 vertices) {
+// The constraints of a body. Lists are sorted by vertex and bodies share none, so they are a range of each list.
+glm::uvec2 constraint_range(const ConstraintList& list, glm::uvec2 vertices) {
   const auto numbers = std::views::iota(0u, unsigned(list.count()));
   const auto first_vertex = [&](unsigned c) { return list.vertices[c * std::size_t(list.arity)]; };
   return {std::ranges::lower_bound(numbers, vertices.x, {}, first_vertex) - numbers.begin(),
           std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
 }
 
-// Whether the result is there.
+// Reads a measurement back; false where it has not arrived yet.
 bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   if (!pending.fence.sync()) return true;
   if (!reached(pending.fence.sync(), wait, "measuring")) return false;
@@ -82,7 +82,6 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
 
 Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
   const KeepBindings kept;
-  // Those that are measured; further kinds have no measure.
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
   const bool all_made = made.present.size() >= measured_kinds &&
                         std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
@@ -99,8 +98,8 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     Metrics::BodyRanges ranges;
     const std::size_t first = body.first_vertex, end = first + body.vertices;
     ranges.vertices = {first, end};
-    ranges.edges = range_of(lists[0], ranges.vertices);
-    ranges.hinges = range_of(lists[1], ranges.vertices);
+    ranges.edges = constraint_range(lists[0], ranges.vertices);
+    ranges.hinges = constraint_range(lists[1], ranges.vertices);
     ranges.tets = {body.first_tet, body.first_tet + body.tets};
     glm::dvec3 centre{0};
     for (std::size_t i = first; i < end; ++i) {
@@ -111,8 +110,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     for (std::size_t i = first; i < end; ++i)
       rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
     for (std::size_t t = ranges.tets.x; t < ranges.tets.y; ++t) m.volume += volumes[t];
-    const auto shape = model.rest.positions.begin();
-    ranges.size = bounds({shape + std::ptrdiff_t(first), shape + std::ptrdiff_t(end)}).size();
+    ranges.size = body_bounds(body, model.rest.positions).size();
     m.mass += ranges.mass;
     m.mass_sizes += ranges.mass * ranges.size;
     m.bodies.push_back(ranges);
@@ -141,19 +139,18 @@ void measure(Metrics& m, const Sim& sim) {
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
     recorder.give("Row", m.rows[slot].id(), b * M_STRIDE * sizeof(float), M_STRIDE * sizeof(float));
-    // About four tets per invocation before there are more groups; of a sheet, edges.
+    // An invocation gets about four tets before there are more groups, and of a sheet, four edges.
     const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
     const unsigned groups = unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
     for (Pass& pass : m.passes) {
       const Program& kernel = recorder.use(pass.program);
-      kernel.set("vertex_range", body.vertices);
-      kernel.set("edge_range", body.edges), kernel.set("hinge_range", body.hinges);
-      kernel.set("tet_range", body.tets);
+      kernel.set("vertex_range", body.vertices), kernel.set("edge_range", body.edges);
+      kernel.set("hinge_range", body.hinges), kernel.set("tet_range", body.tets);
       kernel.set("mass", float(body.mass));
       if (&pass == &m.passes[0])
         kernel.set("material", energy_material(body_material(sim.model->bodies[b], sim.settings)));
       kernel.set("touching", float(1e-5 * body.size));
-      const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // these add the groups' sums
+      const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // they add the groups' sums
       pass.work_groups = one_group ? 1 : groups;
       recorder.run(pass, {{"groups", groups}});
     }
@@ -188,25 +185,23 @@ Measurement nothing_measured() {
 
 void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) {
   errors.finite = errors.finite && now.finite();
-  if (!errors.finite) return;  // numbers stay those of the last good state
+  if (!errors.finite) return;  // the errors stay those of the last finite state
   if (!errors.first) errors.first = now, errors.start_energy = errors.max_energy = now.energy();
   errors.last = now;
   errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
   errors.max_energy = std::max(errors.max_energy, now.energy());
   errors.penetration_max = std::fmax(now.penetration_max, errors.penetration_max);
   errors.penetration_999 = std::fmax(now.penetration_999, errors.penetration_999);
-  double mass = 0;
-  for (std::size_t i = 0; i < sim.inverse_masses.size(); ++i) {
-    mass += sim.model->masses[i];
-    if (!(sim.inverse_masses[i] > 0)) errors.free = false;
-  }
-  if (now.contacts > 0 || sim.settings.damping > 0) errors.free = false;
+  const auto is_fixed = [](double inverse_mass) { return !(inverse_mass > 0); };
+  if (now.contacts > 0 || sim.settings.damping > 0 || std::ranges::any_of(sim.inverse_masses, is_fixed))
+    errors.free = false;
   if (!errors.free) return;
+  const double mass = std::accumulate(sim.model->masses.begin(), sim.model->masses.end(), 0.0);
   const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
   const glm::dvec3 expected = errors.first->momentum + mass * gravity * (now.time - errors.first->time);
   if (now.speed > 0)
     errors.linear_drift = std::fmax(errors.linear_drift, glm::length(now.momentum - expected) / now.speed);
-  // Relative to the angular momentum of a spinning body; of one that hardly spins, to size times sum m|v|.
+  // The drift is relative to the angular momentum, or of a body that hardly spins, to its size times sum m|v|.
   const double spun = glm::length(errors.first->angular_momentum), moved = sim.model->size * now.speed;
   const double scale = spun > 0.01 * moved ? spun : moved;
   if (scale > 0)

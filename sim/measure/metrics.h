@@ -1,5 +1,4 @@
-// How right a state is (method.md eqs. 16-24): error, momentum and energy, reduced on the GPU and read back
-// late.
+// Measurements of a state (method.md eqs. 16-24): errors, momentum and energy, reduced on the GPU and read back late.
 #pragma once
 
 #include <array>
@@ -13,8 +12,8 @@
 
 namespace tetpbd {
 
-/// One state, over all bodies. Errors are relative to the rest shape; 0 is exact where every constraint can
-/// be met.
+/// The measurement of one state, over all bodies. Errors are relative to the rest shape; 0 is exact where every
+/// constraint can be met.
 struct Measurement {
   long step = 0;
   double time = 0;                  ///< s
@@ -29,70 +28,71 @@ struct Measurement {
   double rigid_distance = 0;          ///< RMS (by mass) distance to the rigidly aligned rest shape, over the size
   glm::dvec3 momentum{0};             ///< kg m/s
   glm::dvec3 angular_momentum{0};     ///< kg m^2/s about the centre of mass of all
-  double speed = 0;                   ///< sum m |v|, kg m/s: what drift is relative to
+  double speed = 0;                   ///< sum m |v|, kg m/s, to which drift is relative
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
   double elastic = 0;                 ///< J, of a material
   double contacts = 0;                ///< pairs of a vertex and an obstacle, or the ground, that it touches
-  double penetration_max = 0;         ///< of the vertex deepest in an obstacle, over the body's size; NaN without one
-  double penetration_999 = 0;         ///< that 99.9 % of vertices are under
+  double penetration_max = 0;         ///< depth of the deepest vertex over the body's size; NaN without obstacles
+  double penetration_999 = 0;         ///< depth below which 99.9 % of the vertices stay, likewise
   double non_finite = 0;              ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }
   double energy() const { return kinetic + potential; }
 };
 
 struct Metrics {
-  /// Where a body's part of each list is: first and end.
+  /// A body's part of each list: first and end.
   struct BodyRanges {
     glm::uvec2 vertices, edges, hinges, tets;
     double mass = 0, size = 0;
   };
   struct Pending {
-    Fence fence;  ///< none once the result is read
+    Fence fence;  ///< empty once the result is read
     std::size_t slot;
-    Measurement result;  ///< step and time before
+    Measurement result;  ///< only step and time until it is read
     double ground, gravity;
     bool obstacles;
   };
 
   std::vector<BodyRanges> bodies;
-  double mass = 0, volume = 0, mass_sizes = 0,
-         vertices = 0;                  ///< of all bodies; the last sums mass times size
-  std::vector<Buffer> records;          ///< by kind
-  std::array<std::size_t, 3> counts{};  ///< constraints, by kind
+  double mass = 0, volume = 0, vertices = 0;  ///< of all bodies
+  double mass_sizes = 0;                      ///< the sum of mass times size
+  std::vector<Buffer> records;                ///< by kind
+  std::array<std::size_t, 3> counts{};        ///< constraints, by kind
   Buffer rest, partials;
   std::vector<Pass> passes;  ///< in order of dispatch
   Recorder recorder;
-  std::vector<Buffer> rows;     ///< a ring: a row per body in each
+  std::vector<Buffer> rows;     ///< a ring of results, each with a row per body
   std::deque<Pending> pending;  ///< in order
   std::size_t measured = 0;
 };
 
-/// Takes the constraints from `made`, of the same model, if all kinds that are measured are there.
+/// Uses the constraints of `made`, of the same model, if it has all kinds that are measured.
 Metrics create_metrics(const Model& model, const ConstraintSystem& made = {});
 /// Queues a measurement of the current state. Waits only if the ring of results is full.
 void measure(Metrics& metrics, const Sim& sim);
-/// The oldest measurement that is ready; with `wait`, the oldest there is.
+/// The oldest measurement that is ready; with `wait`, the oldest of all.
 std::optional<Measurement> collect(Metrics& metrics, bool wait = false);
 
-/// Where there was nothing to measure: NaN, which files show as null.
+/// A measurement of NaN, which files show as null.
 Measurement nothing_measured();
 
-/// What a run amounts to, from its measurements in order.
+/// The errors of a run, from its measurements in order.
 struct RunErrors {
-  double max_volume_loss_percent = 0;  ///< the paper's: largest 100 (V0 - V) / V0
-  /// Largest |P - (P0 + M g t)| / sum m|v| and |L - L0| / |L0| (of a body that hardly spins: / (size * sum
-  /// m|v|)). NaN while there was nothing to measure: fixed vertices, damping, contact from the start.
+  double max_volume_loss_percent = 0;  ///< the paper's measure, the largest 100 (V0 - V) / V0
+  /// The largest |P - (P0 + M g t)| / sum m|v| and |L - L0| / |L0|, of a body that hardly spins |L - L0| over
+  /// size * sum m|v|. NaN with fixed vertices, damping, or contact from the start.
   double linear_drift = std::numeric_limits<double>::quiet_NaN();
   double angular_drift = std::numeric_limits<double>::quiet_NaN();
   double start_energy = 0, max_energy = 0;          ///< J
-  double penetration_max = 0, penetration_999 = 0;  ///< largest
-  std::optional<Overlap> overlap;                   ///< largest of each, where bodies touch
-  bool free = true;                                 ///< so far no contact and no fixed vertex
-  std::optional<Measurement> first, last;           ///< of states that were finite
+  double penetration_max = 0, penetration_999 = 0;  ///< the largest of all measurements
+  std::optional<Overlap> overlap;                   ///< the largest of each, where bodies touch
+  bool free = true;                                 ///< no contact, damping or fixed vertex so far
+  std::optional<Measurement> first, last;           ///< the first and last finite state
   bool finite = true;
-  std::optional<NonFinite> non_finite;  ///< what check_finite() found, if the caller asked it
+  std::optional<NonFinite> non_finite;  ///< the result of check_finite(), if the caller asked for it
 };
+/// Adds a measurement to the errors of its run.
 void add_measurement(RunErrors& errors, const Measurement& measurement, const Sim& sim);
 
 }  // namespace tetpbd

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include "sim/contact/cell_grid.h"
 #include "sim/contact/pairs.h"
@@ -22,7 +23,7 @@ bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x
   return at.x > 0 && at.y > 0 && at.z > 0 && at.x + at.y + at.z < 1;
 }
 
-// Whether an edge of one triangle goes through the other.
+// Whether an edge of one triangle passes through the other.
 bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vector<glm::dvec3>& x) {
   const auto corner = [&](std::uint32_t t, std::size_t c) { return x[mesh.triangles[t][c % 3]]; };
   for (const auto& [t, o] : {std::pair(a, b), std::pair(b, a)}) {
@@ -40,43 +41,36 @@ bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vec
   return false;
 }
 
-bool apart(const Bounds& a, const Bounds& b) {
+bool are_apart(const Bounds& a, const Bounds& b) {
   return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
 }
 
-// Pairs, of different bodies or also of one.
+// Counts the pairs of triangles that cut each other, of different bodies or with `self` also of one.
 template <class F>
-std::size_t cutting_triangles(const PairMesh& mesh, const std::vector<glm::dvec3>& x, double cell, bool self,
-                              F&& meets_another) {
+std::size_t count_cutting(const PairMesh& mesh, const std::vector<glm::dvec3>& x, double cell, bool self,
+                          F&& may_overlap) {
   std::vector<Bounds> boxes;
   CellGrid grid(cell);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [i, j, k, body] = mesh.triangles[t];
     boxes.push_back({glm::min(x[i], glm::min(x[j], x[k])), glm::max(x[i], glm::max(x[j], x[k]))});
-    if (meets_another(body, boxes[t])) grid.add(boxes[t], t);
+    if (may_overlap(body, boxes[t])) grid.add(boxes[t], t);
   }
   std::vector<std::size_t> counts(boxes.size(), 0);
-  parallel_for(
-      counts.size(),
-      [&](std::size_t t) {
-        std::vector<std::uint32_t> near;
-        grid.for_each(boxes[t], [&](std::uint32_t o) {
-          if (o > t) near.push_back(o);
-        });
-        std::ranges::sort(near);
-        const auto same = std::ranges::unique(near);
-        near.erase(same.begin(), same.end());
-        const auto& own = mesh.triangles[t];
-        for (const std::uint32_t o : near) {
-          const auto& other = mesh.triangles[o];
-          if (apart(boxes[t], boxes[o]) || (other[3] == own[3] && !self)) continue;
-          const bool joined = std::any_of(own.begin(), own.begin() + 3, [&](std::uint32_t v) {
-            return v == other[0] || v == other[1] || v == other[2];
-          });
-          counts[t] += !joined && cuts(mesh, std::uint32_t(t), o, x);
-        }
-      },
-      64);
+  parallel_for(counts.size(), 64, [&](std::size_t t) {
+    std::set<std::uint32_t> near;
+    grid.for_each(boxes[t], [&](std::uint32_t o) {
+      if (o > t && !are_apart(boxes[t], boxes[o])) near.insert(o);
+    });
+    const auto& own = mesh.triangles[t];
+    for (const std::uint32_t o : near) {
+      const auto& other = mesh.triangles[o];
+      if (other[3] == own[3] && !self) continue;
+      const auto is_common = [&](std::uint32_t v) { return v == other[0] || v == other[1] || v == other[2]; };
+      const bool joined = std::any_of(own.begin(), own.begin() + 3, is_common);
+      counts[t] += !joined && cuts(mesh, std::uint32_t(t), o, x);
+    }
+  });
   return std::reduce(counts.begin(), counts.end());
 }
 
@@ -89,55 +83,49 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
   std::vector<Bounds> boxes;
   std::vector<double> sizes;
   for (const Body& body : model.bodies) {
-    const auto first = x.begin() + std::ptrdiff_t(body.first_vertex);
-    boxes.push_back(bounds({first, first + std::ptrdiff_t(body.vertices)}));
-    const auto at_rest = rest.begin() + std::ptrdiff_t(body.first_vertex);
-    sizes.push_back(bounds({at_rest, at_rest + std::ptrdiff_t(body.vertices)}).size());
+    boxes.push_back(body_bounds(body, x));
+    sizes.push_back(body_bounds(body, rest).size());
   }
-  const auto meets_another = [&](std::size_t body, const Bounds& box) {
+  const auto may_overlap = [&](std::size_t body, const Bounds& box) {
     for (std::size_t b = 0; b < boxes.size(); ++b)
-      if (b != body && !apart(box, boxes[b])) return true;
+      if (b != body && !are_apart(box, boxes[b])) return true;
     return self;
   };
   CellGrid grid(cell);
-  std::vector<std::uint32_t> body_of(model.rest.tets.size());
+  std::vector<std::uint32_t> tet_body(model.rest.tets.size());
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
     for (std::size_t t = model.bodies[b].first_tet; t < model.bodies[b].first_tet + model.bodies[b].tets; ++t) {
-      body_of[t] = b;
+      tet_body[t] = b;
       const auto& [i, j, k, l] = model.rest.tets[t];
       const Bounds box = bounds({x[i], x[j], x[k], x[l]});
-      if (meets_another(b, box)) grid.add(box, std::uint32_t(t));
+      if (may_overlap(b, box)) grid.add(box, std::uint32_t(t));
     }
-  const auto depth = [&](const PairMesh::Item& item) {
-    double depth = 0;  // in the first tet that it is in
+  std::vector<double> depths(mesh.vertices.size(), 0);  // in the first tet that a vertex is in
+  parallel_for(depths.size(), 64, [&](std::size_t s) {
+    const auto& item = mesh.vertices[s];
+    const auto is_near = [&](std::uint32_t v) { return glm::distance(rest[v], rest[item.vertex]) < near; };
     grid.for_each({x[item.vertex], x[item.vertex]}, [&](std::uint32_t t) {
       const Tet& tet = model.rest.tets[t];
-      const bool own = body_of[t] == item.body;
-      if (own && (!self || std::ranges::any_of(
-                               tet, [&](std::uint32_t v) { return glm::distance(rest[v], rest[item.vertex]) < near; })))
+      const bool own = tet_body[t] == item.body;
+      if (depths[s] > 0 || (own && (!self || std::ranges::any_of(tet, is_near))) || !is_in(x[item.vertex], tet, x))
         return;
-      if (depth > 0 || !is_in(x[item.vertex], tet, x)) return;
       double least = 1e30;
       for (const auto& [i, j, k, body] : mesh.triangles)
-        if (body == body_of[t] && !(own && glm::distance(rest[i], rest[item.vertex]) < near)) {
+        if (body == tet_body[t] && !(own && is_near(i))) {
           const glm::dvec3 a = x[i] - x[item.vertex], b = x[j] - x[item.vertex], c = x[k] - x[item.vertex];
           const glm::dvec3 w = Formulas<double>{}.nearest_weights(a, b, c);
           least = std::min(least, glm::length(w.x * a + w.y * b + w.z * c));
         }
-      depth = least;
+      depths[s] = least;
     });
-    return depth;
-  };
-  std::vector<double> depths(mesh.vertices.size());
-  parallel_for(
-      depths.size(), [&](std::size_t s) { depths[s] = depth(mesh.vertices[s]); }, 64);
+  });
   Overlap result;
-  result.triangles = cutting_triangles(mesh, x, cell, self, meets_another);
-  if (!depths.empty()) result.deepest = std::ranges::max(depths);
+  result.triangles = count_cutting(mesh, x, cell, self, may_overlap);
+  if (depths.empty()) return result;
+  result.deepest = std::ranges::max(depths);
   for (std::size_t s = 0; s < depths.size(); ++s) depths[s] /= sizes[mesh.vertices[s].body];
   result.inside = std::size_t(std::ranges::count_if(depths, [](double d) { return d > 0; }));
   std::ranges::sort(depths);
-  if (depths.empty()) return result;
   result.largest = depths.back();
   result.part_999 = depths[std::size_t(0.999 * double(depths.size() - 1))];
   return result;

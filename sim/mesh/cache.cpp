@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Change it whenever the file's layout or what is done with TetGen's result changes.
+// To be changed whenever the file's layout or what is done with TetGen's result changes.
 constexpr std::string_view version = "tetpbd cache 4";
 
 std::string mesh_file(std::uint64_t key) { return fmt::format("{:016x}.tets", key); }
@@ -31,7 +31,7 @@ fs::path cache_file(const std::string& name) {
 }
 
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, const fs::path& program) {
-  std::error_code failed;  // of a program that is not there the mark is one that no file has
+  std::error_code failed;  // a program that is not there gives a size and time that no file has
   const auto size = fs::file_size(program, failed);
   const auto written = fs::last_write_time(program, failed).time_since_epoch().count();
   std::string bytes = fmt::format("{}\n{}\n{} {}\n", version, switches, size, written);
@@ -56,14 +56,14 @@ std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key) try
   if (!take_sealed(bytes, key, mesh.positions, mesh.tets)) return {};
   finish_tets(mesh, "cache");
   return mesh;
-} catch (const Error&) {  // damage passes the checksum only by malice, but a cache folder may be shared
+} catch (const Error&) {  // passes the checksum only by malice, but a cache folder may be shared
   return {};
 }
 
 std::string read_cached(const std::string& name) {
   const fs::path file = cache_file(name);
   std::error_code failed;
-  const std::uintmax_t size = fs::file_size(file, failed);  // fails for what is no plain file
+  const std::uintmax_t size = fs::file_size(file, failed);  // fails unless it is a plain file
   if (failed) return {};
   std::string bytes(size, '\0');
   std::ifstream(file, std::ios::binary).read(bytes.data(), std::streamsize(bytes.size()));

@@ -1,5 +1,5 @@
-// The user's cache folder, and in it what takes long to make: TetGen's meshes, mode newton's aggregates. What
-// cannot be read or written costs time, no error.
+// The user's cache folder, for what takes long to make: TetGen's meshes, mode newton's aggregates. A file that cannot
+// be read or written costs time, but is no error.
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,10 @@
 
 namespace tetpbd {
 
-/// In $TETPBD_CACHE, else $XDG_CACHE_HOME/tetpbd, else ~/.cache/tetpbd; empty where there is none of these.
+/// A path in $TETPBD_CACHE, else $XDG_CACHE_HOME/tetpbd, else ~/.cache/tetpbd; empty where none of these is set.
 std::filesystem::path cache_file(const std::string& name);
 
-/// Its count, then its bits.
+/// Appends an array: its count, then its bits.
 template <class T>
 void put_array(std::string& bytes, const std::vector<T>& values) {
   const std::uint64_t count = values.size();
@@ -26,7 +26,7 @@ void put_array(std::string& bytes, const std::vector<T>& values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
-/// Takes an array off the front; false when `bytes` is too short for the count it declares.
+/// Removes an array from the front; false if `bytes` is too short for the count it declares.
 template <class T>
 bool take_array(std::string_view& bytes, std::vector<T>& values) {
   std::uint64_t count = 0;
@@ -40,18 +40,17 @@ bool take_array(std::string_view& bytes, std::vector<T>& values) {
   return true;
 }
 
-/// A checksum of all that is there, with `key` in it, at the end; and off it again, false where it does not
-/// match.
+/// Appends a checksum of all bytes and `key`; unseal() removes it, and returns false where it does not match.
 void seal(std::string& bytes, std::uint64_t key);
 bool unseal(std::string_view& bytes, std::uint64_t key);
-/// Arrays with a seal behind them; false where they are not these, or more.
+/// Reads arrays and the seal behind them; false unless `bytes` has exactly these.
 template <class... T>
 bool take_sealed(std::string_view bytes, std::uint64_t key, std::vector<T>&... arrays) {
   return unseal(bytes, key) && (take_array(bytes, arrays) && ...) && bytes.empty();
 }
-/// A file of the folder; empty when it is not there.
+/// The bytes of a file of the folder; empty if there is none.
 std::string read_cached(const std::string& name);
-/// With a seal.
+/// Writes a file of the folder, with a seal.
 void keep_cached(const std::string& name, std::string bytes, std::uint64_t key);
 template <class... T>
 void keep_cached(const std::string& name, std::uint64_t key, const std::vector<T>&... arrays) {
@@ -60,12 +59,12 @@ void keep_cached(const std::string& name, std::uint64_t key, const std::vector<T
   keep_cached(name, std::move(bytes), key);
 }
 
-/// Of the surface's bits, the switches and the program that fills it.
+/// Depends on the surface's bits, the switches and the program that fills it.
 std::uint64_t mesh_key(const SurfaceMesh& surface, const std::string& switches, const std::filesystem::path& program);
-/// Nothing when it is not there, damaged, cut short, or of another key.
+/// Nothing if the mesh is not there, damaged, cut short or of another key.
 std::optional<TetMesh> read_mesh(std::uint64_t key);
 void keep_mesh(std::uint64_t key, const TetMesh& mesh);
-/// Of a file's bytes.
+/// The same from a file's bytes.
 std::optional<TetMesh> parse_mesh(std::string_view bytes, std::uint64_t key);
 
 }  // namespace tetpbd

@@ -12,18 +12,18 @@
 namespace tetpbd {
 namespace {
 
-constexpr double reach = 0.1;         // of the mesh's size: further out it belongs to another mesh
-constexpr double largest_weight = 3;  // beyond, a flat tet would magnify every error
+constexpr double reach = 0.1;         // of the mesh's size; a vertex further out belongs to another mesh
+constexpr double largest_weight = 3;  // more would let a flat tet magnify every error
 constexpr std::uint32_t none = ~0u;
 
-/// Tets by the cells of a grid that their boxes touch.
+/// Tets by the cells of a grid that their bounding boxes overlap.
 struct TetGrid {
   glm::dvec3 low;
   double cell;
   glm::ivec3 size;
   Grouped tets;
   std::vector<glm::dmat3> to_weights;  ///< of each tet
-  glm::ivec3 cell_of(const glm::dvec3& p) const { return glm::ivec3(glm::floor((p - low) / cell)); }
+  glm::ivec3 find_cell(const glm::dvec3& p) const { return glm::ivec3(glm::floor((p - low) / cell)); }
 };
 
 TetGrid make_grid(const TetMesh& mesh) {
@@ -37,7 +37,7 @@ TetGrid make_grid(const TetMesh& mesh) {
         glm::dvec3 low(INFINITY), high(-INFINITY);
         for (const std::uint32_t v : mesh.tets[t])
           low = glm::min(low, mesh.positions[v]), high = glm::max(high, mesh.positions[v]);
-        const glm::ivec3 a = glm::max(grid.cell_of(low), 0), b = glm::min(grid.cell_of(high), grid.size - 1);
+        const glm::ivec3 a = glm::max(grid.find_cell(low), 0), b = glm::min(grid.find_cell(high), grid.size - 1);
         for (int z = a.z; z <= b.z; ++z)
           for (int y = a.y; y <= b.y; ++y)
             for (int x = a.x; x <= b.x; ++x)
@@ -58,25 +58,28 @@ glm::dvec3 blend(const std::vector<glm::dvec3>& positions, const Tet& tet, const
   return sum;
 }
 
-// Cells further and further around it, until no tet in those left can be nearer.
-CarriedVertex carried_by(const glm::dvec3& p, const TetMesh& mesh, const TetGrid& grid, double farthest) {
-  const glm::ivec3 middle = grid.cell_of(p);
+double largest_magnitude(const Weights& weights) {
+  double largest = 0;
+  for (const double w : weights) largest = std::max(largest, std::abs(w));
+  return largest;
+}
+
+// Searches cells further and further around p, until no tet in those left can be nearer.
+CarriedVertex embed_vertex(const glm::dvec3& p, const TetMesh& mesh, const TetGrid& grid, double farthest) {
+  const glm::ivec3 middle = grid.find_cell(p);
   std::pair<double, std::uint32_t> best{INFINITY, none};
   Weights weights{};
   const auto try_tet = [&](std::uint32_t t) {
     const glm::dvec3 w = grid.to_weights[t] * (p - mesh.positions[mesh.tets[t][0]]);
     const Weights now{1 - w.x - w.y - w.z, w.x, w.y, w.z};
     Weights inside;
-    double sum = 0, largest = 1;
-    for (std::size_t k = 0; k < 4; ++k) {
-      sum += inside[k] = std::max(now[k], 0.0);
-      largest = std::max(largest, std::abs(now[k]));
-    }
+    double sum = 0;
+    for (std::size_t k = 0; k < 4; ++k) sum += inside[k] = std::max(now[k], 0.0);
     for (double& k : inside) k /= sum;
-    // To a point of the tet near it: the distance at least. Flat tets that would magnify it come last.
-    const double away = *std::ranges::min_element(now) > -1e-9
-                            ? 0
-                            : glm::distance(p, blend(mesh.positions, mesh.tets[t], inside)) * largest;
+    // The distance to a point in the tet is an upper bound of that to the tet. Large weights make flat tets come last.
+    const double away = std::ranges::min(now) > -1e-9 ? 0
+                                                      : glm::distance(p, blend(mesh.positions, mesh.tets[t], inside)) *
+                                                            std::max(largest_magnitude(now), 1.0);
     if (std::pair(away, t) < best) best = {away, t}, weights = now;
   };
   for (int r = 0; best.first > r * grid.cell && (r - 1) * grid.cell < farthest; ++r)
@@ -88,9 +91,8 @@ CarriedVertex carried_by(const glm::dvec3& p, const TetMesh& mesh, const TetGrid
           const auto key = std::size_t((c.z * grid.size.y + c.y) * grid.size.x + c.x);
           for (std::uint32_t i = grid.tets.first[key]; i < grid.tets.first[key + 1]; ++i) try_tet(grid.tets.values[i]);
         }
-  double largest = 0;
-  for (const double w : weights) largest = std::max(largest, std::abs(w));
   if (best.second == none) return {none, glm::vec3(0)};
+  const double largest = largest_magnitude(weights);
   const double kept = largest > largest_weight ? (largest_weight - 0.25) / (largest - 0.25) : 1;
   for (double& w : weights) w = 0.25 + (w - 0.25) * kept;
   const bool far = glm::distance(p, blend(mesh.positions, mesh.tets[best.second], weights)) > farthest;
@@ -105,7 +107,7 @@ CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std:
   const double farthest = reach * bounds(mesh.positions).size();
   CarriedSurface result{std::vector<CarriedVertex>(surface.positions.size()), surface.triangles};
   parallel_for(surface.positions.size(),
-               [&](std::size_t v) { result.vertices[v] = carried_by(surface.positions[v], mesh, grid, farthest); });
+               [&](std::size_t v) { result.vertices[v] = embed_vertex(surface.positions[v], mesh, grid, farthest); });
   const auto lost = std::ranges::find(result.vertices, none, &CarriedVertex::tet);
   if (lost == result.vertices.end()) return result;
   const auto v = std::size_t(lost - result.vertices.begin());
@@ -116,17 +118,10 @@ CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std:
 }
 
 CarriedSurface carry_boundary(const TetMesh& mesh) {
-  SurfaceMesh surface{mesh.positions, mesh.surface};
-  std::vector<CarriedVertex> of(mesh.positions.size());
+  CarriedSurface result{std::vector<CarriedVertex>(mesh.positions.size()), mesh.surface};
   for (std::uint32_t t = 0; t < mesh.tets.size(); ++t)
-    for (int k = 0; k < 4; ++k) of[mesh.tets[t][std::size_t(k)]] = {t, glm::vec3(k == 1, k == 2, k == 3)};
-  std::vector<char> used(of.size(), 0);
-  for (const Triangle& t : mesh.surface)
-    for (const std::uint32_t v : t) used[v] = 1;
-  drop_unused_vertices(surface.positions, surface.triangles);
-  CarriedSurface result{{}, std::move(surface.triangles)};
-  for (std::size_t v = 0; v < of.size(); ++v)
-    if (used[v]) result.vertices.push_back(of[v]);
+    for (int k = 0; k < 4; ++k) result.vertices[mesh.tets[t][std::size_t(k)]] = {t, glm::vec3(k == 1, k == 2, k == 3)};
+  drop_unused_vertices(result.vertices, result.triangles);
   return result;
 }
 

@@ -1,4 +1,4 @@
-// A fine surface that rides on coarse tets: every vertex keeps its place in one of them.
+// Embedded surfaces: each vertex of a fine surface keeps its place in one of the coarse tets.
 #pragma once
 
 #include <string>
@@ -10,17 +10,17 @@ namespace tetpbd {
 
 struct CarriedVertex {
   std::uint32_t tet;
-  glm::vec3 weights;  ///< of the tet's corners 1 to 3; corner 0 has what they leave of 1
+  glm::vec3 weights;  ///< of the tet's corners 1 to 3; that of corner 0 makes the sum 1
 };
 struct CarriedSurface {
   std::vector<CarriedVertex> vertices;
   std::vector<Triangle> triangles;
 };
 
-/// Both in one frame. A vertex outside belongs to the nearest tet; one further out than a tenth of the mesh's
-/// size throws Error naming `source`.
+/// Both meshes are in one frame. A vertex outside belongs to the nearest tet; one further out than a tenth of the
+/// mesh's size throws Error naming `source`.
 CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std::string& source);
-/// The mesh's own boundary, its vertices in order.
+/// Embeds the mesh's own boundary; vertices stay in order.
 CarriedSurface carry_boundary(const TetMesh& mesh);
 std::vector<glm::dvec3> carried_positions(const CarriedSurface& surface, const std::vector<Tet>& tets,
                                           const std::vector<glm::dvec3>& positions);

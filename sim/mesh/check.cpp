@@ -1,4 +1,4 @@
-// What is wrong with a surface, and what a mesh of tets is like: both from which triangles meet where.
+// Checks and repairs surfaces and reports on meshes, by which triangles share which edges.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -16,7 +16,7 @@
 namespace tetpbd {
 namespace {
 
-/// One side of a triangle: from corner `side` to the next.
+/// One side of a triangle, from corner `side` to the next.
 struct EdgeUse {
   std::uint32_t low, high;  ///< vertices, low < high
   std::uint32_t triangle, side;
@@ -25,14 +25,14 @@ struct EdgeUse {
 
 struct SurfaceTopology {
   std::vector<EdgeUse> uses;              ///< sorted by (low, high, triangle)
-  std::vector<std::uint32_t> edges;       ///< where each edge begins in `uses`, and the end
-  std::vector<std::uint32_t> patch;       ///< triangle -> patch: joined across edges that two triangles share
-  std::vector<char> turned;               ///< triangle -> whether it is turned against others of its patch
+  std::vector<std::uint32_t> edges;       ///< where each edge begins in `uses`, and the size of `uses`
+  std::vector<std::uint32_t> patch;       ///< of each triangle; a patch is joined by edges that two triangles share
+  std::vector<char> turned;               ///< of each triangle, whether it is turned against others of its patch
   std::vector<std::uint32_t> one_sided;   ///< edges across which no choice of turns makes neighbours agree
-  std::vector<std::uint32_t> fans;        ///< vertex -> number of fans of triangles around it
-  std::size_t patches = 0, vertices = 0;  ///< vertices: those with a triangle
+  std::vector<std::uint32_t> fans;        ///< of each vertex, the number of fans of triangles around it
+  std::size_t patches = 0, vertices = 0;  ///< `vertices`: those with a triangle
   std::size_t edge_count() const { return edges.size() - 1; }
-  std::size_t uses_of(std::size_t edge) const { return edges[edge + 1] - edges[edge]; }
+  std::size_t use_count(std::size_t edge) const { return edges[edge + 1] - edges[edge]; }
 };
 
 // Indices must be in range and no triangle may name a vertex twice.
@@ -49,28 +49,28 @@ SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::si
     if (i == 0 || uses[i].low != uses[i - 1].low || uses[i].high != uses[i - 1].high) topology.edges.push_back(i);
   topology.edges.push_back(std::uint32_t(uses.size()));
 
-  // Each triangle is in two sets, as it is (2 t) and turned (2 t + 1): what is in one agrees.
-  DisjointSets ways(triangles.size() * 2), corners(triangles.size() * 3);
+  // Each triangle is in two sets, as it is (2 t) and turned (2 t + 1). All in a set are oriented alike.
+  DisjointSets orientations(triangles.size() * 2), corners(triangles.size() * 3);
   const auto corner = [&](const EdgeUse& use, std::uint32_t vertex) {
     const bool first = triangles[use.triangle][use.side] == vertex;
     return use.triangle * 3 + (first ? use.side : (use.side + 1) % 3);
   };
   for (std::uint32_t e = 0; e < topology.edge_count(); ++e) {
-    if (topology.uses_of(e) != 2) continue;
+    if (topology.use_count(e) != 2) continue;
     const EdgeUse &a = uses[topology.edges[e]], &b = uses[topology.edges[e] + 1];
     const std::uint32_t i = 2 * a.triangle, agreeing = 2 * b.triangle + (a.forward == b.forward);
-    if (ways.root(i) == ways.root(agreeing ^ 1)) {
+    if (orientations.root(i) == orientations.root(agreeing ^ 1)) {
       topology.one_sided.push_back(e);
     } else {
-      ways.join(i, agreeing);
-      ways.join(i ^ 1, agreeing ^ 1);
+      orientations.join(i, agreeing);
+      orientations.join(i ^ 1, agreeing ^ 1);
     }
     corners.join(corner(a, a.low), corner(b, a.low));
     corners.join(corner(a, a.high), corner(b, a.high));
   }
-  std::vector<std::uint32_t> number(triangles.size() * 2, ~0u);  // of a set's patch, by its root
+  std::vector<std::uint32_t> number(triangles.size() * 2, ~0u);  // number of a set's patch, by the set's root
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    const std::uint32_t as_is = ways.root(2 * t), turned = ways.root(2 * t + 1);
+    const std::uint32_t as_is = orientations.root(2 * t), turned = orientations.root(2 * t + 1);
     if (number[as_is] == ~0u) number[as_is] = number[turned] = std::uint32_t(topology.patches++);
     topology.patch.push_back(number[as_is]);
     topology.turned.push_back(as_is > turned);
@@ -82,16 +82,16 @@ SurfaceTopology surface_topology(const std::vector<Triangle>& triangles, std::si
   return topology;
 }
 
-// Both relative to the bounding box's diagonal d. A triangle under 1e-14 d^2 has a height in the range of
-// float rounding (an equilateral one: sides of 1.5e-7 d). Volume per area and d is a thickness: a sheet of
-// thickness h has about h / (3 d), a wire of thickness h about h / (4 d); rounding alone gives a double-sided
-// sheet up to 1e-8.
+// Over the square of the bounding box's diagonal d: an equilateral triangle of this area has sides of 1.5e-7 d, which
+// is in the range of float rounding.
 constexpr double degenerate_area = 1e-14;
+// Volume over area and d: a sheet of thickness h has about h / (3 d), a wire h / (4 d), and a sheet with two sides in
+// one place up to 1e-8 by rounding alone.
 constexpr double flat_thickness = 1e-7;
 
-// Which of 0 .. count are bad, unless a defect is known already; place() says where the first is.
-void look_for(SurfaceCheck& check, const char* defect, const char* one, const char* many, const char* hint,
-              std::size_t count, const auto& is_bad, const auto& place) {
+// Records how many of 0 .. count are bad, unless a defect is known already; place() says where the first is.
+void find_defect(SurfaceCheck& check, const char* defect, const char* one, const char* many, const char* hint,
+                 std::size_t count, const auto& is_bad, const auto& place) {
   if (!check.defect.empty()) return;
   std::string first;
   for (std::size_t i = 0; i < count; ++i)
@@ -112,9 +112,59 @@ glm::dvec3 area_vector(const SurfaceMesh& s, const Triangle& t) {
   return glm::cross(s.positions[t[1]] - s.positions[t[0]], s.positions[t[2]] - s.positions[t[0]]) * 0.5;
 }
 
+bool is_flat(const SurfaceMesh& s, const Triangle& t, double size) {
+  return glm::length(area_vector(s, t)) <= degenerate_area * size * size;
+}
+
+void check_triangles(const SurfaceMesh& surface, double size, SurfaceCheck& check) {
+  const std::vector<Triangle>& triangles = surface.triangles;
+  if (triangles.size() < 4) {
+    check.defect = "too few triangles to enclose a volume";
+    check.place = fmt::format("{} of them", triangles.size());
+    check.hint = "a closed surface has at least 4";
+    return;
+  }
+  std::vector<Triangle> sorted = triangles;
+  for (Triangle& t : sorted) std::ranges::sort(t);
+  std::ranges::sort(sorted);
+  find_defect(
+      check, "triangles have no area", "triangle", "triangles",
+      "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)", triangles.size(),
+      [&](std::size_t i) { return names_vertex_twice(triangles[i]) || is_flat(surface, triangles[i], size); },
+      [&](std::size_t i) { return near(centroid(surface, triangles[i])); });
+  find_defect(
+      check, "triangles appear more than once", "too many", "too many",
+      "remove the duplicates (a sheet with two sides is no solid)", sorted.size() - 1,
+      [&](std::size_t i) { return sorted[i] == sorted[i + 1]; },
+      [&](std::size_t i) { return near(centroid(surface, sorted[i])); });
+}
+
+void check_edges(const SurfaceMesh& surface, const SurfaceTopology& topology, SurfaceCheck& check) {
+  const auto at_edge = [&](std::size_t edge) {
+    const EdgeUse& use = topology.uses[topology.edges[edge]];
+    return near((surface.positions[use.low] + surface.positions[use.high]) * 0.5);
+  };
+  find_defect(
+      check, "edges have more than two triangles", "edge", "edges",
+      "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)", topology.edge_count(),
+      [&](std::size_t e) { return topology.use_count(e) > 2; }, at_edge);
+  find_defect(
+      check, "surface is open", "edge with one triangle only", "edges with one triangle only",
+      "close its holes (in MeshLab: Close Holes)", topology.edge_count(),
+      [&](std::size_t e) { return topology.use_count(e) == 1; }, at_edge);
+  find_defect(
+      check, "parts of the surface touch in single vertices", "vertex", "vertices",
+      "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)", topology.fans.size(),
+      [&](std::size_t v) { return topology.fans[v] > 1; }, [&](std::size_t v) { return near(surface.positions[v]); });
+  find_defect(
+      check, "surface has only one side", "edge where it cannot be oriented", "edges where it cannot be oriented",
+      "cut it open and close it as a solid", topology.one_sided.size(), [](std::size_t) { return true; },
+      [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
+}
+
 // Turns triangles so that every patch faces outward, and finds the patches without volume.
 void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, SurfaceCheck& check) {
-  const glm::dvec3 centre = bounds(surface.positions).centre();  // small numbers: less rounding
+  const glm::dvec3 centre = bounds(surface.positions).centre();  // smaller numbers round less
   std::vector<double> volume(topology.patches, 0), area(topology.patches, 0);
   std::vector<glm::dvec3> place(topology.patches);
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
@@ -126,7 +176,7 @@ void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, 
     place[patch] = centroid(surface, t);
   }
   for (const double v : volume) check.volume += std::abs(v);
-  look_for(
+  find_defect(
       check, "surface is flat", "part without volume", "parts without volume", "give it thickness or remove it",
       topology.patches, [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
       [&](std::size_t p) { return near(place[p]); });
@@ -147,14 +197,14 @@ std::array<double, 6> dihedral_angles(const TetMesh& mesh, const Tet& tet) {
   std::array<double, 6> angles{};
   std::size_t n = 0;
   for (std::size_t i = 0; i < 4; ++i)
-    for (std::size_t j = i + 1; j < 4; ++j)  // atan2, not acos: exact to the last digits for slivers too
+    for (std::size_t j = i + 1; j < 4; ++j)  // acos would lose the last digits for slivers
       angles[n++] = std::atan2(glm::length(glm::cross(normals[i], normals[j])), -glm::dot(normals[i], normals[j])) *
                     180 / std::numbers::pi;
   return angles;
 }
 
-// A triangle of no area with its corner c on the side a b: the neighbour across that side, cut in two at c,
-// takes its place. Whether there was one such neighbour.
+// A flat triangle has its corner c on its longest side a b. If it has one neighbour across that side, cuts the
+// neighbour in two at c, which replaces both triangles. Whether it did.
 bool flip_flat(SurfaceMesh& surface, std::size_t flat) {
   const Triangle t = surface.triangles[flat];
   const auto side = [&](std::size_t k) {
@@ -170,7 +220,7 @@ bool flip_flat(SurfaceMesh& surface, std::size_t flat) {
   if (count != 1) return false;
   Triangle first = surface.triangles[other], second = first;
   std::ranges::replace(first, a, c), std::ranges::replace(second, b, c);
-  if (std::ranges::count(first, c) > 1) return false;  // it names c already
+  if (std::ranges::count(first, c) > 1) return false;  // the neighbour has c as a corner already
   surface.triangles[other] = first, surface.triangles[flat] = second;
   return true;
 }
@@ -178,86 +228,46 @@ bool flip_flat(SurfaceMesh& surface, std::size_t flat) {
 }  // namespace
 
 SurfaceCheck check_surface(SurfaceMesh& surface) {
+  SurfaceCheck check = check_values(surface);
+  if (check.hopeless) return check;
+  const double size = bounds(surface.positions).size();
+  check_triangles(surface, size, check);
+  if (!check.defect.empty()) return check;
+  const SurfaceTopology topology = surface_topology(surface.triangles, surface.positions.size());
+  check.components = int(topology.patches);
+  check.euler_characteristic = int(topology.vertices) - int(topology.edge_count()) + int(surface.triangles.size());
+  check_edges(surface, topology, check);
+  if (check.defect.empty()) orient(surface, topology, size, check);
+  return check;
+}
+
+SurfaceCheck check_values(const SurfaceMesh& surface) {
   SurfaceCheck check;
-  const std::vector<glm::dvec3>& positions = surface.positions;
-  const std::vector<Triangle>& triangles = surface.triangles;
   const auto at_vertex = [](std::size_t v) { return fmt::format("vertex {}", v); };
   // NaN where a coordinate is.
-  const auto reach = [&](std::size_t v) { return glm::dot(glm::abs(positions[v]), glm::dvec3(1)); };
-  look_for(
+  const auto reach = [&](std::size_t v) { return glm::dot(glm::abs(surface.positions[v]), glm::dvec3(1)); };
+  find_defect(
       check, "triangles name vertices that are not there", "index", "indices", "export the mesh again",
-      3 * triangles.size(), [&](std::size_t i) { return triangles[i / 3][i % 3] >= positions.size(); },
+      3 * surface.triangles.size(),
+      [&](std::size_t i) { return surface.triangles[i / 3][i % 3] >= surface.positions.size(); },
       [](std::size_t i) { return fmt::format("in triangle {}", i / 3); });
-  look_for(
-      check, "positions are not finite numbers", "vertex", "vertices", "export the mesh again", positions.size(),
-      [&](std::size_t v) { return !std::isfinite(reach(v)); }, at_vertex);
-  look_for(
+  find_defect(
+      check, "positions are not finite numbers", "vertex", "vertices", "export the mesh again",
+      surface.positions.size(), [&](std::size_t v) { return !std::isfinite(reach(v)); }, at_vertex);
+  find_defect(
       check, "positions are too far out", "vertex beyond 1e30", "vertices beyond 1e30", "scale the mesh",
-      positions.size(), [&](std::size_t v) { return reach(v) > largest_coordinate; }, at_vertex);
+      surface.positions.size(), [&](std::size_t v) { return reach(v) > largest_coordinate; }, at_vertex);
   check.hopeless = !check.defect.empty();
-  if (check.hopeless) return check;
-  if (triangles.size() < 4) {
-    check.defect = "too few triangles to enclose a volume";
-    check.place = fmt::format("{} of them", triangles.size());
-    check.hint = "a closed surface has at least 4";
-    return check;
-  }
-
-  const double size = bounds(positions).size();
-  std::vector<Triangle> sorted = triangles;
-  for (Triangle& t : sorted) std::ranges::sort(t);
-  std::ranges::sort(sorted);
-  look_for(
-      check, "triangles have no area", "triangle", "triangles",
-      "remove or collapse them (in MeshLab: Remove Zero Area Faces, Merge Close Vertices)", triangles.size(),
-      [&](std::size_t i) {
-        const Triangle& t = triangles[i];
-        return t[0] == t[1] || t[1] == t[2] || t[2] == t[0] ||
-               glm::length(area_vector(surface, t)) <= degenerate_area * size * size;
-      },
-      [&](std::size_t i) { return near(centroid(surface, triangles[i])); });
-  look_for(
-      check, "triangles appear more than once", "too many", "too many",
-      "remove the duplicates (a sheet with two sides is no solid)", sorted.size() - 1,
-      [&](std::size_t i) { return sorted[i] == sorted[i + 1]; },
-      [&](std::size_t i) { return near(centroid(surface, sorted[i])); });
-  if (!check.defect.empty()) return check;
-
-  const SurfaceTopology topology = surface_topology(triangles, positions.size());
-  check.components = int(topology.patches);
-  check.euler_characteristic = int(topology.vertices) - int(topology.edge_count()) + int(triangles.size());
-  const auto at_edge = [&](std::size_t edge) {
-    const EdgeUse& use = topology.uses[topology.edges[edge]];
-    return near((positions[use.low] + positions[use.high]) * 0.5);
-  };
-  look_for(
-      check, "edges have more than two triangles", "edge", "edges",
-      "separate or remove the extra sheets (in MeshLab: Repair Non Manifold Edges)", topology.edge_count(),
-      [&](std::size_t e) { return topology.uses_of(e) > 2; }, at_edge);
-  look_for(
-      check, "surface is open", "edge with one triangle only", "edges with one triangle only",
-      "close its holes (in MeshLab: Close Holes)", topology.edge_count(),
-      [&](std::size_t e) { return topology.uses_of(e) == 1; }, at_edge);
-  look_for(
-      check, "parts of the surface touch in single vertices", "vertex", "vertices",
-      "move the parts apart or join them (in MeshLab: Repair Non Manifold Vertices by splitting)", topology.fans.size(),
-      [&](std::size_t v) { return topology.fans[v] > 1; }, [&](std::size_t v) { return near(positions[v]); });
-  look_for(
-      check, "surface has only one side", "edge where it cannot be oriented", "edges where it cannot be oriented",
-      "cut it open and close it as a solid", topology.one_sided.size(), [](std::size_t) { return true; },
-      [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
-  if (check.defect.empty()) orient(surface, topology, size, check);
   return check;
 }
 
 TetMesh sheet_of(SurfaceMesh surface, const std::string& source) {
   repair(surface);
-  SurfaceMesh checked = surface;
-  const SurfaceCheck check = check_surface(checked);
+  const SurfaceCheck check = check_values(surface);
   if (check.hopeless) throw Error(check.defect, check.place + " in " + source, check.hint);
   if (surface.triangles.empty()) throw Error("sheet has no area", source, "export the surface again");
   const SurfaceTopology topology = surface_topology(surface.triangles, surface.positions.size());
-  std::vector<std::size_t> first(topology.patches, surface.triangles.size());  // it stays as it is
+  std::vector<std::size_t> first(topology.patches, surface.triangles.size());  // of each patch, which the others follow
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     std::size_t& one = first[topology.patch[t]];
     one = std::min(one, t);
@@ -268,44 +278,39 @@ TetMesh sheet_of(SurfaceMesh surface, const std::string& source) {
 }
 
 std::string repair(SurfaceMesh& surface) {
+  if (check_values(surface).hopeless) return {};
   std::vector<std::string> done;
-  const auto say = [&](std::size_t count, const char* one, const char* many) {
+  const auto record = [&](std::size_t count, const char* one, const char* many) {
     if (count > 0) done.push_back(fmt::format("{} {}", count, count == 1 ? one : many));
   };
-  SurfaceMesh mended = surface;
-  auto& triangles = mended.triangles;
-  if (check_surface(mended).hopeless) return {};
-  mended = surface;
+  SurfaceMesh repaired = surface;
+  auto& triangles = repaired.triangles;
   const double size = bounds(surface.positions).size();
-  const auto named_twice = [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; };
-  const std::size_t twice = std::size_t(std::ranges::count_if(triangles, named_twice));
-  std::erase_if(triangles, named_twice);
+  std::size_t dropped = std::erase_if(triangles, names_vertex_twice), flipped = 0;
   const std::size_t before_welding = triangles.size();
-  weld(mended, 0);
-  say(surface.positions.size() - mended.positions.size(), "vertex merged or without a triangle",
-      "vertices merged or without a triangle");
-  std::size_t dropped = twice + before_welding - triangles.size(), flipped = 0;
+  weld(repaired, 0);
+  record(surface.positions.size() - repaired.positions.size(), "vertex merged or without a triangle",
+         "vertices merged or without a triangle");
+  dropped += before_welding - triangles.size();
   for (std::size_t t = 0; t < triangles.size();) {
-    const bool flat = glm::length(area_vector(mended, triangles[t])) <= degenerate_area * size * size;
-    const bool mends = flat && flip_flat(mended, t);
-    flipped += mends, dropped += flat && !mends;
-    if (flat && !mends)
+    const bool flat = is_flat(repaired, triangles[t], size), flips = flat && flip_flat(repaired, t);
+    flipped += flips, dropped += flat && !flips;
+    if (flat && !flips)
       triangles.erase(triangles.begin() + std::ptrdiff_t(t));
     else
       ++t;
   }
-  say(dropped, "triangle without area dropped", "triangles without area dropped");
-  say(flipped, "triangle without area turned into its neighbour", "triangles without area turned into neighbours");
-  const std::size_t all = triangles.size();
+  record(dropped, "triangle without area dropped", "triangles without area dropped");
+  record(flipped, "triangle without area turned into its neighbour", "triangles without area turned into neighbours");
   std::set<Triangle> seen;
-  std::erase_if(triangles, [&](Triangle t) {
+  const std::size_t repeated = std::erase_if(triangles, [&](Triangle t) {
     std::ranges::sort(t);
     return !seen.insert(t).second;
   });
-  say(all - triangles.size(), "repeated triangle dropped", "repeated triangles dropped");
-  drop_unused_vertices(mended.positions, triangles);
-  say(check_surface(mended).flipped_triangles, "triangle turned outward", "triangles turned outward");
-  if (!done.empty()) surface = std::move(mended);
+  record(repeated, "repeated triangle dropped", "repeated triangles dropped");
+  drop_unused_vertices(repaired.positions, triangles);
+  record(check_surface(repaired).flipped_triangles, "triangle turned outward", "triangles turned outward");
+  if (!done.empty()) surface = std::move(repaired);
   return fmt::format("{}", fmt::join(done, ", "));
 }
 
@@ -329,14 +334,14 @@ MeshReport report(const TetMesh& mesh) {
   const SurfaceTopology surface = surface_topology(boundary, mesh.positions.size()),
                         thin = surface_topology(sheets, mesh.positions.size());
   r.surface_vertices = surface.vertices + thin.vertices;
-  for (std::size_t e = 0; e < thin.edge_count(); ++e) r.bends += thin.uses_of(e) == 2;
+  for (std::size_t e = 0; e < thin.edge_count(); ++e) r.bends += thin.use_count(e) == 2;
   // Where parts of the boundary touch in a vertex or an edge they are taken as separate sheets: one vertex
   // for each fan of triangles, one edge for each pair.
   int euler = int(boundary.size());
   for (const std::uint32_t fans : surface.fans) euler += int(fans);
   for (std::size_t e = 0; e < surface.edge_count(); ++e) {
-    r.bends += surface.uses_of(e) == 2;
-    euler -= int(surface.uses_of(e) / 2);
+    r.bends += surface.use_count(e) == 2;
+    euler -= int(surface.use_count(e) / 2);
   }
   r.genus = int(surface.patches) - euler / 2;
 

@@ -1,4 +1,4 @@
-// How far points are from a surface, on a grid: what a solver or a shader looks up in place of triangles.
+// Signed distance fields: distances from a surface on a grid, which solvers and shaders look up in place of triangles.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -9,7 +9,7 @@
 
 namespace tetpbd {
 
-/// Values are at grid points, `origin + spacing * (i, j, k)`; the surface keeps three cells from the border.
+/// Values are at grid points `origin + spacing * (i, j, k)`. The surface is three cells away from the border.
 struct DistanceField {
   glm::ivec3 size{0};
   glm::dvec3 origin{0};
@@ -17,9 +17,9 @@ struct DistanceField {
   std::vector<float> values;  ///< m, negative inside; x fastest
 };
 
-/// With `voxels` cells along the longest side of the surface's box. A surface that encloses nothing (open,
-/// flat) counts as a sheet one cell thick. For tets give {mesh.positions, mesh.surface}. Kept in the cache.
-/// Throws Error naming `source`, also where the program was built without OpenVDB.
+/// With `voxels` cells along the longest side of the surface's bounding box. A surface that encloses nothing (open,
+/// flat) counts as a sheet one cell thick. Cached. Throws Error naming `source`, also where the program was built
+/// without OpenVDB.
 DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::string& source = "surface");
 
 }  // namespace tetpbd

@@ -21,8 +21,8 @@ namespace {
 
 constexpr int not_started = 127;
 
-// Between fork and exec only system calls are safe: other threads may have held any lock.
-[[noreturn]] void become(char* const* words, int output, std::size_t bytes) {
+// Between fork and exec only system calls are safe, because other threads may have had any lock.
+[[noreturn]] void execute(char* const* words, int output, std::size_t bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0}, memory{bytes, bytes};
   ::setrlimit(RLIMIT_CORE, &no_core);
@@ -44,7 +44,7 @@ SubprocessEnd run_subprocess(const std::vector<std::string>& arguments, const Su
   int ends[2];
   const pid_t child = ::pipe2(ends, O_CLOEXEC) == 0 ? ::fork() : -1;
   if (child < 0) throw Error("cannot be started", arguments[0], std::strerror(errno), 1);
-  if (child == 0) become(words.data(), ends[1], limits.bytes);
+  if (child == 0) execute(words.data(), ends[1], limits.bytes);
   ::close(ends[1]);
   SubprocessEnd end{SubprocessEnd::failed, {}, {}};
   const auto start = std::chrono::steady_clock::now();

@@ -10,7 +10,7 @@ namespace tetpbd {
 struct SubprocessLimits {
   double seconds;                              ///< wall clock
   std::size_t bytes = std::size_t{16} << 30;   ///< of memory
-  std::size_t output = std::size_t{64} << 20;  ///< what comes after that many bytes is dropped
+  std::size_t output = std::size_t{64} << 20;  ///< bytes; the rest is dropped
 };
 
 struct SubprocessEnd {

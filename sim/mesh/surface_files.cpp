@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double weld_tolerance = 1e-7;  // of the bounding box's diagonal: about one step of a float
+constexpr double weld_tolerance = 1e-7;  // of the bounding box's diagonal, about the spacing of floats
 constexpr std::size_t most_corners = 1000;
 
 using Polygon = std::vector<std::uint32_t>;
@@ -29,7 +29,7 @@ struct Polygons {
   std::vector<Polygon> faces;
 };
 
-// What is no index becomes one that is out of range.
+// A number that is no index becomes an index out of range.
 std::uint32_t corner(double index) { return index >= 0 && index < 4294967295.0 ? std::uint32_t(index) : ~0u; }
 
 Polygons read_off(const fs::path& file) {
@@ -81,7 +81,7 @@ Polygons read_stl(const fs::path& file) {
     face.push_back(std::uint32_t(mesh.positions.size()));
     mesh.positions.push_back(position);
   };
-  // Text starts with "solid" and so do some binary files. Text has no zero byte in its first 84.
+  // Text starts with "solid", and so do some binary files, but text has no zero byte in its first 84.
   if (head.starts_with("solid") && head.find('\0') == head.npos) {
     std::string last;
     Polygon face;
@@ -107,7 +107,7 @@ Polygons read_stl(const fs::path& file) {
 }
 
 template <class T>
-double value_of(const char* bytes) {
+double read_value(const char* bytes) {
   T value;
   std::memcpy(&value, bytes, sizeof value);
   return double(value);
@@ -118,13 +118,13 @@ struct PlyType {
   double (*value)(const char*);
 };
 constexpr PlyType ply_types[] = {
-    {"char", "int8", 1, value_of<std::int8_t>},    {"uchar", "uint8", 1, value_of<std::uint8_t>},
-    {"short", "int16", 2, value_of<std::int16_t>}, {"ushort", "uint16", 2, value_of<std::uint16_t>},
-    {"int", "int32", 4, value_of<std::int32_t>},   {"uint", "uint32", 4, value_of<std::uint32_t>},
-    {"float", "float32", 4, value_of<float>},      {"double", "float64", 8, value_of<double>}};
+    {"char", "int8", 1, read_value<std::int8_t>},    {"uchar", "uint8", 1, read_value<std::uint8_t>},
+    {"short", "int16", 2, read_value<std::int16_t>}, {"ushort", "uint16", 2, read_value<std::uint16_t>},
+    {"int", "int32", 4, read_value<std::int32_t>},   {"uint", "uint32", 4, read_value<std::uint32_t>},
+    {"float", "float32", 4, read_value<float>},      {"double", "float64", 8, read_value<double>}};
 
 struct PlyProperty {
-  const PlyType *length, *type;  // of a list's length; null for a single value
+  const PlyType *length, *type;  // `length`: of a list's length; null for a single value
   std::string name;
 };
 struct PlyElement {
@@ -189,7 +189,7 @@ Polygons read_ply(const fs::path& file) {
         const bool is_list = property.name.starts_with("vertex_ind");
         const bool is_face = is_list && element.name == "face", is_strip = is_list && element.name == "tristrips";
         if (is_face) mesh.faces.emplace_back();
-        Polygon strip;  // each corner ends a triangle, every other one turned; -1 ends the strip
+        Polygon strip;  // each corner completes a triangle, every other one turned; -1 ends the strip
         for (double k = 0; k < length; ++k) {
           const double number = value(*property.type);
           if (is_face) mesh.faces.back().push_back(corner(number));
@@ -212,26 +212,26 @@ Polygons read_ply(const fs::path& file) {
   return mesh;
 }
 
-// Cuts off ears: corners that turn the polygon's way and have no other corner inside their triangle.
+// Cuts off ears: convex corners with no other corner of the polygon inside their triangle.
 void add_triangles(SurfaceMesh& surface, Polygon corners) {
   const auto& p = surface.positions;
   const auto normal = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     return glm::cross(p[b] - p[a], p[c] - p[a]);
   };
-  glm::dvec3 way(0);
-  for (std::size_t k = 2; k < corners.size(); ++k) way += normal(corners[0], corners[k - 1], corners[k]);
+  glm::dvec3 outward(0);  // normal of the whole polygon
+  for (std::size_t k = 2; k < corners.size(); ++k) outward += normal(corners[0], corners[k - 1], corners[k]);
   while (corners.size() >= 3) {
     const std::size_t n = corners.size();
     const auto is_ear = [&](std::size_t i) {
       const std::uint32_t a = corners[i - 1], b = corners[i], c = corners[(i + 1) % n];
-      return glm::dot(normal(a, b, c), way) > 0 && std::ranges::none_of(corners, [&](std::uint32_t v) {
-               return v != a && v != b && v != c && glm::dot(normal(a, b, v), way) >= 0 &&
-                      glm::dot(normal(b, c, v), way) >= 0 && glm::dot(normal(c, a, v), way) >= 0;
+      return glm::dot(normal(a, b, c), outward) > 0 && std::ranges::none_of(corners, [&](std::uint32_t v) {
+               return v != a && v != b && v != c && glm::dot(normal(a, b, v), outward) >= 0 &&
+                      glm::dot(normal(b, c, v), outward) >= 0 && glm::dot(normal(c, a, v), outward) >= 0;
              });
     };
     std::size_t ear = 1;
     while (ear < n && n > 3 && !is_ear(ear)) ++ear;
-    if (ear == n) ear = 1;  // it crosses itself
+    if (ear == n) ear = 1;  // the polygon crosses itself
     surface.triangles.push_back({corners[ear - 1], corners[ear], corners[(ear + 1) % n]});
     corners.erase(corners.begin() + std::ptrdiff_t(ear));
   }
@@ -240,22 +240,22 @@ void add_triangles(SurfaceMesh& surface, Polygon corners) {
 constexpr std::pair<const char*, Polygons (*)(const fs::path&)> readers[] = {
     {".ply", read_ply}, {".obj", read_obj}, {".stl", read_stl}, {".off", read_off}};
 
-auto reader_of(const fs::path& file) {
+auto find_reader(const fs::path& file) {
   return std::ranges::find(readers, lower_extension(file), [](const auto& row) { return row.first; });
 }
 
 }  // namespace
 
-// A grid of cells eight tolerances wide: a point looks into its own cell, and into a neighbour only where it
-// stands within a tolerance of the wall between them.
+// Looks up vertices in a grid with cells eight tolerances wide: in a point's own cell, and in a neighbour only where
+// the point is within a tolerance of the face between them.
 void weld(SurfaceMesh& surface, double tolerance) {
   const auto& positions = surface.positions;
   const Bounds box = bounds(positions);
-  // A mesh far from the origin has no finer steps than its own numbers, nor would cells be whole numbers.
+  // Far from the origin, coordinates are no finer than this, and the numbers of smaller cells would not be exact.
   const double largest = glm::length(glm::max(glm::abs(box.low), glm::abs(box.high)));
   tolerance = std::max({tolerance, largest * 1e-15, 1e-300});
   const auto cell = [&](const glm::dvec3& p) { return glm::floor((p - box.low) / (8 * tolerance)); };
-  std::unordered_multimap<glm::dvec3, std::uint32_t> cells;  // the vertices kept
+  std::unordered_multimap<glm::dvec3, std::uint32_t> cells;  // vertices that stay
   cells.reserve(positions.size());
   std::vector<std::uint32_t> kept(positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
@@ -274,15 +274,15 @@ void weld(SurfaceMesh& surface, double tolerance) {
   }
   for (Triangle& t : surface.triangles)
     for (std::uint32_t& v : t) v = kept[v];
-  std::erase_if(surface.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+  std::erase_if(surface.triangles, names_vertex_twice);
   drop_unused_vertices(surface.positions, surface.triangles);
 }
 
-bool is_surface_file(const fs::path& file) { return reader_of(file) != std::end(readers); }
+bool is_surface_file(const fs::path& file) { return find_reader(file) != std::end(readers); }
 
 SurfaceMesh load_as_is(const fs::path& file) {
   if (!is_surface_file(file)) throw Error("not a surface format", file.string(), "use .ply, .obj, .stl or .off");
-  Polygons mesh = reader_of(file)->second(file);
+  Polygons mesh = find_reader(file)->second(file);
   SurfaceMesh surface{std::move(mesh.positions), {}};
   if (surface.positions.size() >= 0xffffffffu)
     throw Error("mesh is too large for 32-bit indices", file.string(), "use a coarser one");

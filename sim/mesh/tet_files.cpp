@@ -11,9 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Gmsh's .msh, ASCII: in version 4.1 nodes and elements stand in blocks, in 2 they do not.
-TetMesh read_msh(const fs::path& file) {
-  TextFile text(file);
+// Whether nodes and elements are in blocks, as in version 4.1 of Gmsh's .msh; in version 2 they are not.
+bool read_msh_format(TextFile& text, const fs::path& file) {
   if (!text.next_line() || text.line() != "$MeshFormat")
     text.fail("file does not begin with $MeshFormat, so it is not Gmsh's .msh");
   text.require_line("its format");
@@ -24,12 +23,17 @@ TetMesh read_msh(const fs::path& file) {
   if (!blocks && version != "2" && !version.starts_with("2."))
     throw Error(fmt::format(".msh version {} is not supported", version.substr(0, 40)), file.string(),
                 "save it as version 2.2 or 4.1");
+  return blocks;
+}
 
+TetMesh read_msh(const fs::path& file) {
+  TextFile text(file);
+  const bool blocks = read_msh_format(text, file);
   TetMesh mesh;
-  std::unordered_map<long long, std::uint32_t> index_of;  // a node's number is any
+  std::unordered_map<long long, std::uint32_t> indices;  // by a node's number, which can be any
   const auto read_number = [&] {
     const long long number = text.integer("node number");
-    if (!index_of.try_emplace(number, std::uint32_t(index_of.size())).second)
+    if (!indices.try_emplace(number, std::uint32_t(indices.size())).second)
       text.fail(fmt::format("node {} appears twice", number));
   };
   const auto read_position = [&] { mesh.positions.push_back(text.position()); };
@@ -47,14 +51,14 @@ TetMesh read_msh(const fs::path& file) {
     if (mesh.positions.size() != total)
       text.fail(fmt::format("{} nodes declared, {} found", total, mesh.positions.size()));
   };
-  // What follows an element's number and type; 11: of second order, its corners come first.
+  // Reads what follows an element's number and type: 4 is a tet, 11 one of second order, whose corners come first.
   const auto read_element = [&](long long type) {
     if (type != 4 && type != 11) return;
     for (std::size_t tags = blocks ? 0 : text.count("number of tags"); tags > 0; --tags) text.integer("tag");
     for (std::uint32_t& v : mesh.tets.emplace_back()) {
       const long long number = text.integer("node of the tet");
-      const auto found = index_of.find(number);
-      if (found == index_of.end()) text.fail(fmt::format("element names node {}, which is not there", number));
+      const auto found = indices.find(number);
+      if (found == indices.end()) text.fail(fmt::format("element names node {}, which is not there", number));
       v = found->second;
     }
   };

@@ -13,10 +13,10 @@
 namespace tetpbd {
 namespace {
 
-// |6 V| under this times the longest edge cubed is no volume: at such a height rounding decides the sign.
+// A tet with |6 V| under this times its longest edge cubed has no volume, because rounding decides its sign.
 constexpr double no_volume = 1e-10;
 
-// Faces opposite to corners 0..3, counter-clockwise seen from outside a tet of positive volume.
+// Faces opposite corners 0 to 3, counter-clockwise seen from outside a tet of positive volume.
 constexpr std::array<Triangle, 4> outward_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 double longest_edge(const TetMesh& mesh, const Tet& tet) {
@@ -41,7 +41,7 @@ void check_indices(const TetMesh& mesh, const std::string& source) {
   }
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
     const glm::dvec3 size = glm::abs(mesh.positions[v]);
-    const double largest = size.x + size.y + size.z;  // NaN where one of them is
+    const double largest = size.x + size.y + size.z;  // NaN where a coordinate is
     if (!std::isfinite(largest))
       throw Error(fmt::format("position of vertex {} is not finite", v), source, "export the mesh again");
     if (largest > largest_coordinate)
@@ -66,7 +66,7 @@ void orient_tets(TetMesh& mesh, const std::string& source) {
                 "mesh again with quality switches (such as pYq1.85o/140) or remove them");
 }
 
-// Faces are grouped by their smallest vertex and sorted there: four times as fast as one sort of all.
+// Groups faces by their smallest vertex and sorts each group, which is four times as fast as sorting all.
 void find_boundary(TetMesh& mesh, const std::string& source) {
   const auto outward = [&](std::size_t face) -> Triangle {  // tet * 4 + side
     const Tet& t = mesh.tets[face / 4];
@@ -78,9 +78,9 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
   };
   const Grouped grouped = group_by_key(4 * mesh.tets.size(), mesh.positions.size(), each);
   struct Face {
-    std::pair<std::uint32_t, std::uint32_t> others;  // its vertices beside the smallest, sorted
+    std::pair<std::uint32_t, std::uint32_t> others;  // its two larger vertices, sorted
     std::uint32_t id;
-    bool even;  // outward order is an even permutation of the sorted one
+    bool even;  // whether the outward order is an even permutation of the sorted one
   };
   std::vector<std::uint32_t> boundary;
   std::vector<Face> faces;
@@ -127,22 +127,23 @@ void finish_tets(TetMesh& mesh, const std::string& source) {
   find_boundary(mesh, source);
 }
 
-// Kuhn's subdivision: a tet for each order of walking from the cell's low corner to its high one along the
-// three axes. All cells share the diagonal's direction, so the faces of neighbours match.
+// Kuhn's subdivision: a tet for each order of the axes in which a path leads from the cell's low corner to its high
+// one. All cells share the diagonal's direction, so the faces of neighbours match.
 TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
   TetMesh mesh;
   const glm::uvec3 nodes(cells + 1);
-  const auto each_of = [](const glm::uvec3& counts, const auto& visit) {
+  const auto visit_grid = [](const glm::uvec3& counts, const auto& visit) {
     for (std::uint32_t z = 0; z < counts.z; ++z)
       for (std::uint32_t y = 0; y < counts.y; ++y)
         for (std::uint32_t x = 0; x < counts.x; ++x) visit(glm::uvec3(x, y, z));
   };
-  each_of(nodes,
-          [&](const glm::uvec3& at) { mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5)); });
+  visit_grid(nodes, [&](const glm::uvec3& at) {
+    mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5));
+  });
   const glm::uvec3 step(1, nodes.x, nodes.x * nodes.y);
   constexpr std::array<std::array<int, 3>, 6> orders{
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
-  each_of(glm::uvec3(cells), [&](const glm::uvec3& at) {
+  visit_grid(glm::uvec3(cells), [&](const glm::uvec3& at) {
     const std::uint32_t corner = at.x + at.y * step.y + at.z * step.z;
     for (const auto& [i, j, k] : orders)
       mesh.tets.push_back({corner, corner + step[i], corner + step[i] + step[j], corner + step[0] + step[1] + step[2]});

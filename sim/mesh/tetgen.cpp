@@ -28,7 +28,7 @@ struct TemporaryFolder {
   }
 };
 
-// $TETPBD_TETGEN_PROGRAM, else the one beside ours (a bundle brings its own), else PATH's.
+// $TETPBD_TETGEN_PROGRAM, else the program beside this one (a bundle has its own), else that in PATH.
 std::string tetgen_program() {
   if (const char* named = std::getenv("TETPBD_TETGEN_PROGRAM")) return named;
   std::error_code failed;
@@ -49,7 +49,7 @@ SubprocessEnd run_tetgen(const std::string& switches, const fs::path& input, dou
   return end;
 }
 
-// TetGen's switch d prints the pairs: "Facet #4 intersects facet #5 at triangles: ...", counted from 1.
+// TetGen's switch d prints a line for each pair: "  Facet #4 intersects facet #5 at triangles: ...", counted from 1.
 void throw_intersections(const SurfaceMesh& surface, const fs::path& input, const std::string& source) {
   const std::string printed = run_tetgen("pd", input, 60).output;
   const std::string mark = "  Facet #";
@@ -69,7 +69,7 @@ TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seco
   const TemporaryFolder folder;
   const fs::path input = folder.path / "surface.off", output = folder.path / "surface.1.node";
   write_surface(input, surface);
-  const SubprocessEnd end = run_tetgen(switches + "F", input, seconds);  // F: no files of faces
+  const SubprocessEnd end = run_tetgen(switches + "F", input, seconds);  // F writes no files of faces
   if (end.kind == SubprocessEnd::timed_out)
     throw Error(fmt::format("tetrahedralising with {} took longer than {:g} s", switches, seconds), source,
                 "allow larger tets (a), ask for less quality (q), or use a coarser surface");
@@ -108,7 +108,7 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
   if (!check.defect.empty()) throw NotSolid(check.defect, check.place + " in " + source, check.hint);
   TetMesh mesh = run(surface, switches, time_limit, source);
   finish_tets(mesh, source);
-  // TetGen fills everything inside the outermost surface: volumes of parts inside one another count twice.
+  // TetGen fills everything inside the outermost surface, and then the volumes of the parts do not add up to the tets'.
   if (check.components > 1 && std::abs(mesh_volume(mesh) - check.volume) > 1e-6 * check.volume)
     throw NotSolid(
         "parts of the surface lie inside one another",

@@ -1,4 +1,4 @@
-// Text files line by line, with line numbers for errors.
+// Reads text files line by line, with line numbers in errors.
 #pragma once
 
 #include <fmt/format.h>
@@ -35,7 +35,7 @@ inline void require_readable(const std::filesystem::path& file) {
 /// Walks through the words of a text file. What does not parse throws Error with the file and line.
 class TextFile {
  public:
-  /// `comment`: the character that starts one, '\0' for none.
+  /// `comment`: the character that starts a comment; '\0': there are none.
   explicit TextFile(const std::filesystem::path& file, char comment = '\0') : file_(file), comment_(comment) {
     require_readable(file);
     text_.resize(file_size(file));
@@ -59,11 +59,11 @@ class TextFile {
     line_ = rest_ = {};
     return false;
   }
-  /// The same, where the format requires one: `wanted` says what should stand there.
+  /// The same where the format requires a line: `wanted` says what should be there.
   void require_line(std::string_view wanted) {
     if (!next_line()) fail(fmt::format("file ends before {}", wanted));
   }
-  /// A line each, which must be there; `read` takes its words.
+  /// Calls `read` for each of `count` lines, which must be there.
   template <class Read>
   void lines(std::size_t count, std::string_view what, const Read& read) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -75,7 +75,7 @@ class TextFile {
   std::string_view bytes() const { return text_; }  ///< all of the file
   std::string_view after_line() const { return bytes().substr(std::min(at_, text_.size())); }
 
-  /// Is there another word on the line?
+  /// Whether there is another word on the line.
   bool more() const { return rest_.find_first_not_of(blank) != rest_.npos; }
   std::string_view word(std::string_view wanted) {
     if (!more()) fail(fmt::format("line has no {}", wanted));

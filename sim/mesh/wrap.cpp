@@ -1,4 +1,4 @@
-// All that asks OpenVDB: its headers are heavy, so nothing else includes them.
+// Everything that needs OpenVDB, because its headers take long to compile.
 #include "sim/mesh/wrap.h"
 
 #include <fmt/format.h>
@@ -23,14 +23,14 @@
 namespace tetpbd {
 namespace {
 
-void require_readable_positions(SurfaceMesh surface, const std::string& source) {
-  const SurfaceCheck check = check_surface(surface);
+void require_extent(const SurfaceMesh& surface, const std::string& source) {
+  const SurfaceCheck check = check_values(surface);
   if (check.hopeless) throw Error(check.defect, check.place + " in " + source, check.hint);
   if (surface.triangles.empty() || !(bounds(surface.positions).size() > 0))
     throw Error("surface has no extent", source, "give one with triangles");
 }
 
-// In voxels from `origin`: floats are then as fine for every size and place of the mesh.
+// Positions in voxels from `origin`, so that floats are equally fine for every size and place of the mesh.
 using Grid = std::vector<glm::vec3>;
 Grid in_voxels(const std::vector<glm::dvec3>& positions, const glm::dvec3& origin, double voxel) {
   Grid result;
@@ -38,7 +38,7 @@ Grid in_voxels(const std::vector<glm::dvec3>& positions, const glm::dvec3& origi
   return result;
 }
 
-// Those with an odd number of triangles; without any, inside and outside are apart.
+// Edges with an odd number of triangles; without any, the surface separates inside from outside.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> open_edges(const std::vector<Triangle>& triangles) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> edges, open;
   for (const Triangle& t : triangles)
@@ -52,8 +52,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> open_edges(const std::vecto
   return open;
 }
 
-// Fans over small holes, as scans have them, lest the wrap goes in and the body is hollow. What is wide open,
-// a bowl or a cloth, stays so.
+// Closes small holes, as in scans, by fans, because the wrap would go in and the body be hollow. What is wide open,
+// such as a bowl or a cloth, stays so.
 void close_holes(SurfaceMesh& surface) {
   constexpr double widest = 0.25;  // of the surface's size
   const auto edges = open_edges(surface.triangles);
@@ -74,7 +74,7 @@ void close_holes(SurfaceMesh& surface) {
       surface.triangles.push_back({a, b, middle->second});
 }
 
-// By the solid angles of the triangles (A. Van Oosterom and J. Strackee, 1983): 4 pi inside, 0 outside.
+// Sums the solid angles of the triangles (A. Van Oosterom and J. Strackee, 1983): 4 pi inside, 0 outside.
 bool is_inside(const glm::dvec3& p, const SurfaceMesh& surface, const std::vector<std::uint32_t>& triangles) {
   double angle = 0;
   for (const std::uint32_t t : triangles) {
@@ -87,7 +87,7 @@ bool is_inside(const glm::dvec3& p, const SurfaceMesh& surface, const std::vecto
   return std::abs(angle) > 2 * std::numbers::pi;
 }
 
-// A level set has an inner side, too, where what it surrounds is hollow, and may lie within another part.
+// Drops inner parts: a level set has an inner side where its body is hollow, and a part may lie within another.
 void keep_outermost(SurfaceMesh& surface) {
   DisjointSets joined(surface.positions.size());
   for (const Triangle& t : surface.triangles) joined.join(t[0], t[1]), joined.join(t[1], t[2]);
@@ -122,7 +122,7 @@ void keep_outermost(SurfaceMesh& surface) {
 
 namespace vdb = openvdb;
 
-/// What OpenVDB reads its mesh from.
+/// The interface by which OpenVDB reads a mesh.
 struct Polygons {
   const Grid& points;
   const std::vector<Triangle>& triangles;
@@ -157,9 +157,8 @@ SurfaceMesh level_set(const Polygons& mesh, double distance) {
   return surface;
 }
 
-// Near the surface OpenVDB knows the nearest triangle; from there each grid point takes its neighbours' where
-// that is nearer, in sweeps along all diagonals. (Bands as wide as the grid take OpenVDB itself 20 times as
-// long.)
+// Near the surface OpenVDB finds the nearest triangle. From there, sweeps along all diagonals pass triangles on to
+// neighbours where they are nearer. A band as wide as the grid would take OpenVDB 20 times as long.
 std::vector<float> grid_values(const Polygons& mesh, const glm::ivec3& size, bool is_signed) {
   vdb::Int32Grid nearest(-1);
   const auto grid = distances(mesh, 3, is_signed, &nearest);
@@ -229,15 +228,15 @@ bool can_wrap() { return has_openvdb; }
 
 SurfaceMesh wrap(const SurfaceMesh& surface, const WrapOptions& options, const std::string& source) {
   require_openvdb("wrapping", source);
-  require_readable_positions(surface, source);
+  require_extent(surface, source);
   const Bounds box = bounds(surface.positions);
   SurfaceMesh closed = surface;
   close_holes(closed);
   std::string defect;
-  // A level set may touch itself within a cell: another grid cuts it elsewhere.
+  // A level set may touch itself within a cell, and another grid cuts it elsewhere.
   for (const double finer : {1.0, 1.07, 0.93, 1.15}) {
     const double voxel = box.size() / options.voxels / finer;
-    const glm::dvec3 origin = box.low - 0.37 * voxel;  // so that flat sides lie between grid points
+    const glm::dvec3 origin = box.low - 0.37 * voxel;  // so that flat sides are between grid points
     const Grid points = in_voxels(closed.positions, origin, voxel);
     SurfaceMesh result = level_set({points, closed.triangles}, options.thickness);
     keep_outermost(result);
@@ -281,7 +280,7 @@ Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches, con
 
 DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::string& source) {
   require_openvdb("a distance field", source);
-  require_readable_positions(surface, source);
+  require_extent(surface, source);
   constexpr int margin = 3;  // cells
   const Bounds box = bounds(surface.positions);
   const glm::dvec3 extent = box.high - box.low;
@@ -298,7 +297,7 @@ DistanceField distance_field(const SurfaceMesh& surface, int voxels, const std::
   bool is_signed = open_edges(surface.triangles).empty();
   if (is_signed) {
     field.values = grid_values({points, surface.triangles}, field.size, true);
-    is_signed = std::ranges::min(field.values) < 0;  // else two-sided sheets
+    is_signed = std::ranges::min(field.values) < 0;  // a sheet with two sides has no inside
   }
   if (!is_signed) {
     field.values = grid_values({points, surface.triangles}, field.size, false);

@@ -1,4 +1,4 @@
-// A solid around any triangles whatever: for surfaces that TetGen cannot fill.
+// Wraps: solids around any triangles, for surfaces that TetGen cannot fill.
 #pragma once
 
 #include <optional>
@@ -15,19 +15,19 @@ struct WrapOptions {
 
 /// Whether the program was built with OpenVDB.
 bool can_wrap();
-/// The outer side of all that is nearer than `thickness` to a triangle, or to one across a hole narrower than
-/// a quarter of the surface: closed, and a solid. Throws Error.
+/// The closed surface around all points nearer than `thickness` to a triangle, where holes narrower than a quarter of
+/// the surface count as triangles. Throws Error.
 SurfaceMesh wrap(const SurfaceMesh& surface, const WrapOptions& options, const std::string& source);
 
-/// load_surface() without welding and dropping: for repair(), which says what it does.
+/// load_surface() without welding and dropping, for repair(), which says what it does.
 SurfaceMesh load_as_is(const std::filesystem::path& file);
 
 struct Filled {
   TetMesh mesh;
   std::string note;  ///< what was wrapped, and why; empty where the surface itself was filled
 };
-/// tetrahedralise(), and where it finds no solid, or with `always`, the wrap in place of the surface; without
-/// `options` never. Wraps are cached as TetGen's results are. Throws Error for what no wrap mends.
+/// Tetrahedralizes the surface, or its wrap where the surface is no solid or with `always`; without `options` never
+/// wraps. Results are cached. Throws Error for what no wrap repairs.
 Filled fill_or_wrap(const SurfaceMesh& surface, const std::string& switches, const std::optional<WrapOptions>& options,
                     bool always, const std::string& source);
 

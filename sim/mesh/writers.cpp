@@ -1,4 +1,4 @@
-// Text with all digits; STL binary, in floats.
+// Writes text with all digits, and STL in binary with floats.
 #include <fmt/format.h>
 
 #include <iterator>
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 std::string stl_bytes(const SurfaceMesh& s) {
   std::string bytes = "tetpbd boundary surface";
   bytes.resize(80, '\0');
-  const auto put = [&bytes](const auto& value) {  // little-endian, as every machine this runs on
+  const auto put = [&bytes](const auto& value) {  // little-endian, as are all supported machines
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
   put(std::uint32_t(s.triangles.size()));

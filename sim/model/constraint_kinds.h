@@ -1,6 +1,6 @@
-// The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and
-// a row here; its stiffness k_NAME and compliance compliance_NAME (unless it is
-// a material's), its kernels and its CPU loops follow. Order is the order of projection in Gauss-Seidel.
+// The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and a row
+// here, from which follow its stiffness k_NAME, its compliance compliance_NAME (unless only a material has the kind),
+// its kernels and its CPU loops. Gauss-Seidel projects the kinds in the order of the rows.
 #pragma once
 
 #include <array>
@@ -15,22 +15,22 @@
 
 namespace tetpbd {
 
-/// For whoever evaluates a constraint without a mesh.
+/// Vertex numbers for callers that evaluate a constraint without a mesh.
 inline constexpr std::uint32_t any_ids[4] = {0, 1, 2, 3};
 
-/// The hinges of the surface: both wings, then their edge; each edge that two triangles share.
+/// The vertices of every edge that two triangles of the surface share: both wings, then the ends of the edge.
 std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh);
 
 struct ConstraintKind {
   const char* name;
   int arity;                    ///< vertices, 2 or 4
-  const char* noun;             ///< what has it, as help texts call them
-  const char* compliance_unit;  ///< 1 over that of C^2 / J
-  double most_compliance;       ///< the largest that settings take; 0: only a material has this kind
+  const char* noun;             ///< what the constraints hold, as help texts call it
+  const char* compliance_unit;  ///< of unit(C)^2 / J
+  double most_compliance = 1;   ///< the largest that settings accept; 0: only a material has this kind
   int values = 1;               ///< numbers that describe a constraint at rest
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
   bool curved = false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
-  bool tet = false;             ///< NAME_jacobian(): the volume over that at rest
+  bool tet = false;             ///< has NAME_jacobian(), the volume over that at rest
   bool rate = false;            ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
   constexpr bool of_material() const { return most_compliance == 0; }
 };
@@ -45,40 +45,34 @@ constexpr int first_kind = __COUNTER__ + 1;
     using type = Kind;                      \
   };
 
-// A row: what it is called, its formula, the vertices of each, and what these measure at rest.
+/// evaluate(positions, rest, vertex numbers) of a row, by its formula; `rest` is a number or points to several.
+#define FORMULA(name)                                                                        \
+  template <class real, class Math = glsl::LibraryMath>                                      \
+  static auto evaluate(glm::vec<3, real>* x, auto rest, const std::uint32_t* id = any_ids) { \
+    return Formulas<real, Math>{}.name(x, rest, id);                                         \
+  }
+
+// A row says what the kind is called, its formula, the vertices of every constraint, and what these measure at rest.
 struct Stretch {
   static constexpr ConstraintKind row{
-      .name = "stretch", .arity = 2, .noun = "edges", .compliance_unit = "m/N", .most_compliance = 1, .curved = true};
-  template <class real, class Math = glsl::LibraryMath>
-  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real, Math>{}.stretch(x, rest, id);
-  }
+      .name = "stretch", .arity = 2, .noun = "edges", .compliance_unit = "m/N", .curved = true};
+  FORMULA(stretch)
   static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
 ADD_KIND(Stretch)
 struct Bend {
   static constexpr ConstraintKind row{"bend", 4, "hinges", "rad^2/J", 1e4};
-  template <class real, class Math = glsl::LibraryMath>
-  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real, Math>{}.bend(x, rest, id);
-  }
+  FORMULA(bend)
   static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
-  // The clamp of the formula to 1 rad is for errors, not for rest angles.
+  // Not the formula's C: its clamp to 1 rad is for errors, not for rest angles.
   static double rest(glm::dvec3* x) { return Formulas<double>{}.hinge_angle(x); }
 };
 ADD_KIND(Bend)
 struct Volume {
-  static constexpr ConstraintKind row{.name = "volume",
-                                      .arity = 4,
-                                      .noun = "tets' volumes",
-                                      .compliance_unit = "m^3/Pa",
-                                      .most_compliance = 1,
-                                      .tet = true};
-  template <class real, class Math = glsl::LibraryMath>
-  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real, Math>{}.volume(x, rest, id);
-  }
+  static constexpr ConstraintKind row{
+      .name = "volume", .arity = 4, .noun = "tets' volumes", .compliance_unit = "m^3/Pa", .tet = true};
+  FORMULA(volume)
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
@@ -93,21 +87,15 @@ struct NeoHookean {
                                       .components = 2,
                                       .curved = true,
                                       .tet = true};
-  template <class real, class Math = glsl::LibraryMath>
-  static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real, Math>{}.neo_hookean(x, rest, id);
-  }
+  FORMULA(neo_hookean)
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
-  static std::array<double, 8> rest(glm::dvec3* x);  // alpha is the material's (material.cpp), 1 till then
+  static std::array<double, 8> rest(glm::dvec3* x);  // the last is alpha, which material.cpp sets
 };
 ADD_KIND(NeoHookean)
 struct Dashpot {
   static constexpr ConstraintKind row{
       .name = "dashpot", .arity = 2, .noun = "edges", .compliance_unit = "m/(N s)", .most_compliance = 0, .rate = true};
-  template <class real, class Math = glsl::LibraryMath>
-  static auto evaluate(glm::vec<3, real>* x, real rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real, Math>{}.dashpot(x, rest, id);
-  }
+  FORMULA(dashpot)
   static auto vertices(const TetMesh& mesh) { return tet_edges(mesh); }
   static double rest(glm::dvec3* x) { return evaluate(x, 0.0).C; }
 };
@@ -119,10 +107,7 @@ struct Isobend {
                                       .compliance_unit = "1/J",
                                       .most_compliance = 1e8,
                                       .values = 4};
-  template <class real, class Math = glsl::LibraryMath>
-  static auto evaluate(glm::vec<3, real>* x, const real* rest, const std::uint32_t* id = any_ids) {
-    return Formulas<real, Math>{}.isobend(x, rest, id);
-  }
+  FORMULA(isobend)
   static auto vertices(const TetMesh& mesh) { return hinges(mesh); }
   static std::array<double, 4> rest(glm::dvec3* x);
 };
@@ -133,7 +118,7 @@ template <int... I>
 std::tuple<typename KindAt<I>::type...> list_kinds(std::integer_sequence<int, I...>);
 using Kinds = decltype(list_kinds(std::make_integer_sequence<int, __COUNTER__ - first_kind>()));
 
-/// A constraint's rest values as its formula takes them: a number, or where there are several.
+/// A constraint's rest values as its formula takes them: the number, or a pointer to several.
 template <class Kind, class real>
 auto rest_values(const real* values) {
   if constexpr (Kind::row.values == 1)
@@ -141,7 +126,7 @@ auto rest_values(const real* values) {
   else
     return values;
 }
-/// A component of what a formula returns: C, and its gradient by each vertex.
+/// Component k of what a formula returns: C, and a pointer to its gradients by vertex.
 template <class Constraint>
 auto component(const Constraint& c, int k) {
   if constexpr (std::is_array_v<decltype(c.C)>)
@@ -155,8 +140,8 @@ constexpr std::size_t kind_count = std::tuple_size_v<Kinds>;
 /// Calls f(Kind{}, index) for every kind, in order.
 template <class F>
 constexpr void for_each_kind(F&& f) {
-  [&]<std::size_t... I>(std::index_sequence<I...>) { (f(std::tuple_element_t<I, Kinds>{}, int(I)), ...); }
-  (std::make_index_sequence<kind_count>{});
+  int index = 0;
+  std::apply([&](auto... kind) { (f(kind, index++), ...); }, Kinds());
 }
 
 template <template <class> class Of, class... Kind>
@@ -165,7 +150,7 @@ std::tuple<Of<Kind>...> of_each(std::tuple<Kind...>);
 template <template <class> class Of>
 using OfEachKind = decltype(of_each<Of>(Kinds()));
 
-/// Where a kind stands in the table, and in the settings' arrays by kind.
+/// A kind's number in the table and in the settings' arrays.
 template <class Kind>
 constexpr std::size_t index_of = [] {
   std::size_t index = 0;
@@ -177,9 +162,6 @@ constexpr std::size_t index_of = [] {
 
 /// The rows of the table.
 inline constexpr std::array<ConstraintKind, kind_count> constraint_kinds =
-    []<std::size_t... I>(std::index_sequence<I...>) {
-  return std::array<ConstraintKind, kind_count>{std::tuple_element_t<I, Kinds>::row...};
-}
-(std::make_index_sequence<kind_count>{});
+    std::apply([](auto... kind) { return std::array{decltype(kind)::row...}; }, Kinds());
 
 }  // namespace tetpbd

@@ -12,15 +12,14 @@ namespace tetpbd {
 namespace {
 
 template <class Kind>
-ConstraintList list_of(const TetMesh& mesh) {
-  constexpr std::size_t arity = std::size_t(Kind::row.arity);
+ConstraintList build_list(const TetMesh& mesh) {
+  constexpr std::size_t arity = std::size_t(Kind::row.arity), values = std::size_t(Kind::row.values);
   const auto& all = Kind::vertices(mesh);
-  constexpr std::size_t values = std::size_t(Kind::row.values);
   ConstraintList list{Kind::row.arity, std::vector<std::uint32_t>(all.size() * arity),
                       std::vector<double>(all.size() * values)};
   parallel_for(all.size(), [&](std::size_t c) {
     std::copy_n(all[c].begin(), arity, list.vertices.begin() + std::ptrdiff_t(c * arity));
-    // Relative to the first vertex, like the solvers: at rest C is zero for each of them.
+    // Positions are relative to the first vertex, as in the solvers, so that they find C = 0 at rest.
     std::array<glm::dvec3, arity> x;
     for (std::size_t j = 0; j < arity; ++j) x[j] = mesh.positions[all[c][j]] - mesh.positions[all[c][0]];
     const std::array<double, values> rest{Kind::rest(x.data())};
@@ -32,23 +31,23 @@ ConstraintList list_of(const TetMesh& mesh) {
 }  // namespace
 
 std::vector<std::array<std::uint32_t, 4>> hinges(const TetMesh& mesh) {
-  // Each directed edge of the surface once; an edge and its opposite make a hinge.
+  // Each directed edge of the surface is a side; two opposite sides make a hinge.
   struct Side {
-    std::uint32_t low, high, wing;
+    std::uint32_t low, high;
     bool forward;
+    std::uint32_t wing;
+    auto operator<=>(const Side&) const = default;
   };
   std::vector<Side> sides;
   sides.reserve(mesh.surface.size() * 3);
   for (const Triangle& t : mesh.surface)
     for (std::size_t c = 0; c < 3; ++c) {
       const std::uint32_t a = t[c], b = t[(c + 1) % 3];
-      sides.push_back({std::min(a, b), std::max(a, b), t[(c + 2) % 3], a < b});
+      sides.push_back({std::min(a, b), std::max(a, b), a < b, t[(c + 2) % 3]});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
-    return std::tie(l.low, l.high, l.forward, l.wing) < std::tie(r.low, r.high, r.forward, r.wing);
-  });
+  std::ranges::sort(sides);
   std::vector<std::array<std::uint32_t, 4>> result;
-  // A non-manifold edge of four sides (two bodies of tets that touch along it) makes no hinge.
+  // A non-manifold edge of four sides, where two parts of a body touch along it, makes no hinge.
   for (std::size_t i = 0; i < sides.size();) {
     std::size_t end = i;
     while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
@@ -76,7 +75,7 @@ std::array<double, 4> Isobend::rest(glm::dvec3* x) {
   std::array<double, 4> values{-scale * (cotangent(2, 1, 3) + cotangent(3, 1, 2)),
                                scale * (cotangent(3, 0, 2) + cotangent(3, 1, 2)),
                                scale * (cotangent(2, 0, 3) + cotangent(2, 1, 3)), 0};
-  // A wing without area has no weights: there the constraint does nothing.
+  // A wing without area has no weights: the constraint of such a hinge does nothing.
   if (!std::isfinite(values[0] + values[1] + values[2])) return {};
   values[3] = evaluate<double>(x, values.data()).C;
   return values;
@@ -93,8 +92,8 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names
   system.at_vertex.assign(mesh.positions.size(), 0);
   const auto wanted = split(names, ',');
   for_each_kind([&]<class Kind>(Kind, int) {
-    const bool present = std::find(wanted.begin(), wanted.end(), Kind::row.name) != wanted.end();
-    ConstraintList list = present ? list_of<Kind>(mesh) : ConstraintList{Kind::row.arity, {}, {}, {}};
+    const bool is_wanted = std::ranges::find(wanted, Kind::row.name) != wanted.end();
+    ConstraintList list = is_wanted ? build_list<Kind>(mesh) : ConstraintList{Kind::row.arity, {}, {}};
     for (std::uint32_t v : list.vertices) ++system.at_vertex[v];
     system.present.push_back(list.count() > 0);
     system.lists.push_back(std::move(list));

@@ -1,4 +1,4 @@
-// The constraints of a mesh: one list per kind.
+// The constraints of a mesh, in one list per kind.
 #pragma once
 
 #include <algorithm>
@@ -12,21 +12,21 @@
 
 namespace tetpbd {
 
-/// Constraints of one kind: `arity` vertices and the kind's rest values each (m, rad or m^3 where there is
-/// one), from positions in double.
+/// Constraints of one kind: each has `arity` vertices and the kind's rest values (a single one in m, rad or m^3).
 struct ConstraintList {
   int arity = 0;
   std::vector<std::uint32_t> vertices;  ///< arity * count
   std::vector<double> rest;
-  std::vector<double> compliance{};            ///< of a material, the kind's components each; else empty: the settings'
-  std::vector<double> stiffness{}, damping{};  ///< k and s, where bodies differ; else empty: the settings'
-  /// s, of constraint c, where it resists its rate; `all`: of those that have none of their own.
+  std::vector<double> compliance{};            ///< by component, of a material; empty: the settings' compliance
+  std::vector<double> stiffness{}, damping{};  ///< k, and s, where bodies differ; empty: those of the settings
+  /// The damping of constraint c in seconds; `all` is that of lists without their own.
   double damping_at(std::size_t c, double all) const { return damping.empty() ? all : damping[c]; }
   std::size_t count() const { return vertices.size() / std::size_t(std::max(arity, 1)); }
-  std::span<const std::uint32_t> ends(std::size_t c) const {  ///< of constraint c
+  /// The vertices of constraint c.
+  std::span<const std::uint32_t> ends(std::size_t c) const {
     return std::span(vertices).subspan(c * std::size_t(arity), std::size_t(arity));
   }
-  /// Constraint c of a list of the same kind.
+  /// Appends constraint c of a list of the same kind.
   void add(const ConstraintList& from, std::size_t c) {
     const auto append = [&](auto& to, const auto& values) {
       const std::size_t each = values.size() / from.count();
@@ -38,13 +38,13 @@ struct ConstraintList {
   }
 };
 
-/// The constraints of a mesh of the kinds that `names` ("stretch,volume") lists.
 struct ConstraintSystem {
   std::vector<ConstraintList> lists;     ///< one per kind, empty for a kind left out
-  std::vector<bool> present;             ///< by kind
+  std::vector<bool> present;             ///< by kind, whether its list has any
   std::vector<std::uint32_t> at_vertex;  ///< n_i, constraints of all kinds on vertex i
   std::size_t count() const;
 };
+/// The constraints of a mesh of the kinds that `names` ("stretch,volume") lists.
 ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names);
 
 }  // namespace tetpbd

@@ -8,6 +8,7 @@ namespace tetpbd {
 
 namespace {
 
+// The number of letters left out, put in, exchanged for others, or swapped with the next (Damerau and Levenshtein).
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before, last, row(b.size() + 1);
   std::iota(row.begin(), row.end(), 0);

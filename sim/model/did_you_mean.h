@@ -1,4 +1,4 @@
-// What somebody may have meant who wrote a word that is not known.
+// Suggestions for words that are not known.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace tetpbd {
 
-/// "did you mean 'colour'? ", or nothing where no known word is near: of those that begin with it or differ
-/// in a third of its letters at most (left out, put in, another one, two that changed places), the nearest.
+/// "did you mean 'colour'? ", or an empty text where no known word is near. Near are words that begin with this one or
+/// differ from it in at most a third of its letters (left out, put in, exchanged, two of them swapped).
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace tetpbd

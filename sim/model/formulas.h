@@ -1,4 +1,4 @@
-// The constraint formulas of shaders/ as C++: one text for GLSL, float and double.
+// The formulas of shaders/ for constraints and contact as C++: one text serves GLSL, float and double.
 #pragma once
 
 #include <cmath>
@@ -11,20 +11,11 @@ namespace tetpbd::glsl {
 
 using namespace glm;
 
-/// The library functions that formulas call; another such struct can take their place (sim/lane_math.h).
+/// The library functions that formulas call; LaneMath (sim/solvers/lane_math.h) can replace them.
 struct LibraryMath {
-  template <class real>
-  static real atan(real y, real x) {
-    return std::atan2(y, x);
-  }
-  template <class real>
-  static real pow(real x, real y) {
-    return std::pow(x, y);
-  }
-  template <class real>
-  static real log(real x) {
-    return std::log(x);
-  }
+  static auto atan(auto y, auto x) { return std::atan2(y, x); }
+  static auto pow(auto x, auto y) { return std::pow(x, y); }
+  static auto log(auto x) { return std::log(x); }
 };
 
 template <class Real, class Math = LibraryMath>
@@ -45,12 +36,12 @@ struct Formulas {
   real texel(int i) const { return real(texels[i]); }
   using Ids = const uint*;
   static uint id_of(Ids ids, int j) { return ids[j]; }
-  // Here GCC 12 takes the initialised `distance` for one that is not.
+  // GCC 12 wrongly warns that `distance` is not initialised.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
   Surface surface_of(Solid s, vec3 p) { return (this->*distance)(s, p); }
 #pragma GCC diagnostic pop
-  // in order of use
+  // The files are in the order in which they use each other.
   // clang-format off
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
@@ -61,14 +52,11 @@ struct Formulas {
 #include "shaders/contact/solid.glsl"
 #include "obstacle_formulas.inc"  // CMake's: every file of shaders/contact/obstacles
 #include "shaders/contact/find_contact.glsl"
-#define SOLIDS 1
-#define SHARED_TOUCHES  // a work-group's in GLSL, the caller's here
+#define SHARED_TOUCHES  // of a work-group in GLSL, of the caller in C++
 #define TOUCHES Touch *contacts,
 #include "shaders/contact/impulses.glsl"
 #undef TOUCHES
 #undef SHARED_TOUCHES
-#undef SLIP_OF
-#undef SOLIDS
 #pragma GCC diagnostic pop
   // clang-format on
 };

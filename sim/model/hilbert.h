@@ -1,4 +1,4 @@
-// Places in space in an order that keeps neighbours together.
+// An order of points in space that keeps neighbours together.
 #pragma once
 
 #include <algorithm>
@@ -9,9 +9,8 @@
 
 namespace tetpbd {
 
-/// Where a point of the box comes on a Hilbert curve through it, 21 bits an axis. Points that are not
-/// numbers, and those outside, count as the nearest of the box.
-/// Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707, 2004.
+/// The place of a point on a Hilbert curve through the box, with 21 bits an axis (J. Skilling, "Programming the Hilbert
+/// curve", AIP Conference Proceedings 707, 2004). A point outside counts as the nearest one inside, NaN as the least.
 inline std::uint64_t hilbert_key(const glm::dvec3& point, const Bounds& box) {
   constexpr int bits = 21;
   constexpr std::uint32_t top = 1u << (bits - 1);

@@ -18,7 +18,7 @@ glm::vec4 energy_material(const Material& material) {
 
 namespace {
 
-// Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest: mu = 4/3 mu_Lame,
+// Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest are mu = 4/3 mu_Lame and
 // lambda = lambda_Lame + 5/6 mu_Lame.
 void make_neo_hookean(ConstraintList& tets, const Lame& m) {
   const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu;
@@ -30,57 +30,36 @@ void make_neo_hookean(ConstraintList& tets, const Lame& m) {
   }
 }
 
-// Springs along edges in all directions alike, of stiffness k over a length L, are isotropic with
-// mu = lambda = (sum k L^2) / (15 V) (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k
-// L^2. `volume(t)`: of tet t at rest.
+// Springs of stiffness k and length L in all directions alike are isotropic with mu = lambda = (sum k L^2) / (15 V)
+// (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k L^2; volume(t) is that of tet t at rest.
 std::vector<double> spring_stiffness(const ConstraintList& edges, const ConstraintList& tets, double mu,
                                      const auto& volume) {
   std::vector<double> stiffness(edges.count());
-  const auto number_of = [&](std::uint32_t a, std::uint32_t b) {  // they are sorted by their vertices
-    const auto vertices = [&](std::size_t e) { return std::pair(edges.ends(e)[0], edges.ends(e)[1]); };
-    return *std::ranges::lower_bound(std::views::iota(std::size_t(0), edges.count()), std::minmax({a, b}), {},
-                                     vertices);
-  };
+  const auto numbers = std::views::iota(std::size_t(0), edges.count());  // sorted by the edges' vertices
+  const auto ends = [&](std::size_t e) { return std::pair(edges.ends(e)[0], edges.ends(e)[1]); };
   for (std::size_t t = 0; t < tets.count(); ++t) {
     const auto v = tets.ends(t);
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t j = 0; j < i; ++j) {
-        const std::size_t e = number_of(v[i], v[j]);
+        const std::size_t e = *std::ranges::lower_bound(numbers, std::minmax({v[i], v[j]}), {}, ends);
         stiffness[e] += 15.0 / 6 * mu * volume(t) / (edges.rest[e] * edges.rest[e]);
       }
   }
   return stiffness;
 }
 
-// What such springs leave of lambda is the volumes'.
+// Springs contribute lambda = mu; constraints of volume add what is missing of lambda.
 void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
   const auto volume = [&](std::size_t t) { return volumes.rest[t]; };
   for (const double k : spring_stiffness(edges, volumes, m.mu, volume)) edges.compliance.push_back(1 / k);
   for (const double V : volumes.rest) volumes.compliance.push_back(V / (m.lambda - m.mu));
 }
 
-// Dashpots along edges, tau times as damping as those springs are stiff.
+// Dashpots lie along edges and damp by tau (s) times the stiffness that springs there would have.
 void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame& m, double tau) {
   const auto volume = [&](std::size_t t) { return 1 / (6 * tets.rest[8 * t + 6]); };
   for (const double k : spring_stiffness(edges, tets, m.mu, volume)) edges.compliance.push_back(1 / (k * tau));
 }
-
-}  // namespace
-
-ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material) {
-  if (mesh.thickness > 0 && material.material != "none")
-    throw Error("a sheet has no material", "material " + material.material,
-                "give constraints stretch and isobend their compliance, and material none");
-  ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
-  const Lame m = lame(material.young_modulus, material.poisson_ratio);
-  if (material.material == "springs") make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
-  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
-  if (system.present[index_of<Dashpot>])
-    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m, material.constraint_damping);
-  return system;
-}
-
-namespace {
 
 TetMesh body_mesh(const Model& model, const Body& body) {
   const auto part = [](const auto& all, std::size_t first, std::size_t count) {
@@ -99,26 +78,38 @@ TetMesh body_mesh(const Model& model, const Body& body) {
   return mesh;
 }
 
-// Adds a body's constraints, with the numbers of its material, which others of their kind may not have.
+// Adds a body's constraints. Other bodies may be of other materials, so each constraint gets its own coefficients.
 void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body& body, const Material& m) {
   for (std::size_t k = 0; k < kind_count; ++k) {
     ConstraintList& list = to.lists[k];
     const ConstraintList& own = from.lists[k];
     const ConstraintKind& kind = constraint_kinds[k];
-    const std::size_t count = own.count();
     for (const std::uint32_t v : own.vertices) list.vertices.push_back(v + std::uint32_t(body.first_vertex));
     list.rest.insert(list.rest.end(), own.rest.begin(), own.rest.end());
     list.compliance.insert(list.compliance.end(), own.compliance.begin(), own.compliance.end());
     list.compliance.resize(list.count() * std::size_t(kind.components), m.compliance[k]);
     list.stiffness.resize(list.count(), m.stiffness[k]);
-    const bool dashpots = m.material == "neo-hookean" && !kind.rate;  // in place of damping of C
-    list.damping.resize(list.count(), dashpots ? 0 : m.constraint_damping);
-    to.present[k] = to.present[k] || count > 0;
+    const bool has_dashpots = m.material == "neo-hookean" && !kind.rate;  // in place of damping of C
+    list.damping.resize(list.count(), has_dashpots ? 0 : m.constraint_damping);
+    to.present[k] = to.present[k] || own.count() > 0;
   }
   for (std::size_t i = 0; i < body.vertices; ++i) to.at_vertex[body.first_vertex + i] = from.at_vertex[i];
 }
 
 }  // namespace
+
+ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material) {
+  if (mesh.thickness > 0 && material.material != "none")
+    throw Error("a sheet has no material", "material " + material.material,
+                "give constraints stretch and isobend their compliance, and material none");
+  ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
+  const Lame m = lame(material.young_modulus, material.poisson_ratio);
+  if (material.material == "springs") make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
+  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  if (system.present[index_of<Dashpot>])
+    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m, material.constraint_damping);
+  return system;
+}
 
 ConstraintSystem build_constraints(const Model& model, const Material& all) {
   if (!has_own_materials(model)) return build_constraints(model.rest, all);

@@ -1,5 +1,4 @@
-// Materials: what Young's modulus and Poisson's ratio make of the constraints of a mesh (method.md,
-// "Materials").
+// Materials turn Young's modulus and Poisson's ratio into the compliances of a mesh (method.md, "Materials").
 #pragma once
 
 #include <vector>
@@ -16,18 +15,16 @@ struct Lame {
 };
 Lame lame(double young_modulus, double poisson_ratio);
 
-/// What tet_energy of shaders/energy.glsl is told of it.
+/// The parameters of tet_energy in shaders/energy.glsl; zeros for material "none".
 glm::vec4 energy_material(const Material& material);
-/// Whether it has one.
 inline bool has_energy(const Material& material) { return material.material != "none"; }
 
-/// The constraints of a mesh of the kinds that its material uses, with the compliances of its model if it has
-/// one.
+/// The constraints of a mesh of the kinds that its material uses, with the material model's compliances.
 ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material);
-/// Those of all bodies, each of what it is made of; `all`: of bodies without a material of their own.
+/// The constraints of all bodies; `all` is the material of bodies without their own.
 ConstraintSystem build_constraints(const Model& model, const Material& all);
 
-/// Materials by name: what a scene's "material": "rubber" puts in place.
+/// Materials by name, as a scene's "material": "rubber" asks for them.
 const std::vector<Preset>& material_presets();
 
 }  // namespace tetpbd

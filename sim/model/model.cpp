@@ -43,13 +43,15 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   glm::dvec3 centre{0};
   double total = 0;
   auto masses = lumped_masses(mesh, density);
-  for (std::size_t i = 0; i < mass_factors.size(); ++i) masses[i] *= mass_factors[i];
-  for (std::size_t i = 0; i < masses.size(); ++i) centre += masses[i] * positions[i], total += masses[i];
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (!mass_factors.empty()) masses[i] *= mass_factors[i];
+    centre += masses[i] * positions[i], total += masses[i];
+  }
   centre /= total;
   for (std::size_t i = 0; i < masses.size(); ++i) {
     model.original.push_back(std::uint32_t(model.original.size()));
     model.masses.push_back(masses[i]);
-    // A vertex of no tet has no mass; it belongs to nothing and stays where it is.
+    // A vertex of no tet has no mass and stays where it is.
     model.inverse_masses.push_back(masses[i] > 0 ? 1 / masses[i] : 0);
     model.positions.push_back(positions[i]);
     model.velocities.push_back(velocity + glm::cross(spin, positions[i] - centre));
@@ -67,13 +69,18 @@ const Body& body_at(const Model& model, std::size_t vertex) {
   return *std::prev(std::ranges::upper_bound(model.bodies, vertex, {}, &Body::first_vertex));
 }
 
+Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions) {
+  const auto first = positions.begin() + std::ptrdiff_t(body.first_vertex);
+  return bounds({first, first + std::ptrdiff_t(body.vertices)});
+}
+
 bool has_own_materials(const Model& model) {
   return std::ranges::any_of(model.bodies, [](const Body& body) { return body.material.has_value(); });
 }
 
-bool any_material(const Model& model, const Material& all, bool (*holds)(const Material&)) {
-  if (!has_own_materials(model)) return holds(all);
-  return std::ranges::any_of(model.bodies, [&](const Body& body) { return holds(body_material(body, all)); });
+bool any_material(const Model& model, const Material& all, bool (*is_such)(const Material&)) {
+  if (!has_own_materials(model)) return is_such(all);
+  return std::ranges::any_of(model.bodies, [&](const Body& body) { return is_such(body_material(body, all)); });
 }
 
 double most_damping(const Model& model, const Material& all) {
@@ -97,11 +104,10 @@ void check_settings(const Model& model, const Settings& settings) {
 
 void renumber(Model& model) {
   const std::size_t count = model.rest.positions.size();
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(count);  // along the curve, vertex
-  std::vector<std::uint32_t> old(count), now(count);                 // vertex i was old[i]; vertex i is now now[i]
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(count);  // place along the curve, vertex
+  std::vector<std::uint32_t> old(count), now(count);                 // vertex i was old[i]; what was i is now[i]
   for (const Body& body : model.bodies) {
-    const auto first = std::ptrdiff_t(body.first_vertex), end = first + std::ptrdiff_t(body.vertices);
-    const Bounds box = bounds({model.rest.positions.begin() + first, model.rest.positions.begin() + end});
+    const Bounds box = body_bounds(body, model.rest.positions);
     parallel_for(body.vertices, [&](std::size_t v) {
       const std::size_t i = body.first_vertex + v;
       keys[i] = {hilbert_key(model.rest.positions[i], box), std::uint32_t(i)};
@@ -113,11 +119,8 @@ void renumber(Model& model) {
     const auto from = rows;
     parallel_for(count, [&](std::size_t i) { rows[i] = from[old[i]]; });
   };
-  reorder(model.rest.positions);
-  reorder(model.inverse_masses);
-  reorder(model.masses);
-  reorder(model.positions);
-  reorder(model.velocities);
+  for (auto* vectors : {&model.rest.positions, &model.positions, &model.velocities}) reorder(*vectors);
+  for (auto* numbers : {&model.inverse_masses, &model.masses}) reorder(*numbers);
   reorder(model.original);
   const auto rename = [&](auto& elements) {
     parallel_for(elements.size(), [&](std::size_t i) {
@@ -139,7 +142,7 @@ double parse_factor(const std::string& how) {
   return value;
 }
 
-// The one nearest the middle.
+// The tet nearest to the centre.
 Tet middle_tet(const std::vector<glm::dvec3>& x, const TetMesh& rest, const glm::dvec3& centre) {
   if (rest.tets.empty()) throw Error("a sheet has no tets", "--deform", "take a deformation of all of it");
   return std::ranges::min(rest.tets, {}, [&](const Tet& t) {
@@ -154,14 +157,14 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
   const Bounds box = bounds(x);
   const glm::dvec3 centre = box.centre();
   std::mt19937 generator(seed);
-  // Not std::uniform_real_distribution: its numbers differ from one standard library to the next.
+  // std::uniform_real_distribution would give other numbers with another standard library.
   const auto unit = [&] { return double(generator()) / 4294967296.0; };
   if (how == "flatten") {
     for (auto& p : x) p.y = centre.y;
   } else if (how == "line") {
     for (auto& p : x) p = {p.x, centre.y, centre.z};
   } else if (how == "point") {
-    for (auto& p : x) p = centre;
+    std::ranges::fill(x, centre);
   } else if (how == "random") {
     for (auto& p : x)
       for (int a = 0; a < 3; ++a) p[a] = box.low[a] + unit() * (box.high[a] - box.low[a]);
@@ -171,7 +174,7 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
     const double factor = parse_factor(how);
     for (auto& p : x) p.y = centre.y + (p.y - centre.y) * factor;
   } else if (how == "invert-one") {
-    // Its first vertex goes through the opposite face.
+    // Its first vertex is mirrored in the opposite face.
     const Tet t = middle_tet(x, rest, centre);
     const glm::dvec3 n = glm::normalize(glm::cross(x[t[2]] - x[t[1]], x[t[3]] - x[t[1]]));
     x[t[0]] -= 2 * glm::dot(x[t[0]] - x[t[1]], n) * n;
@@ -193,7 +196,7 @@ void deform(std::vector<glm::dvec3>& x, const TetMesh& rest, const std::string& 
     const glm::dmat3 turn(glm::rotate(glm::dmat4(1), angle, axis));
     for (auto& p : x) p = centre + move + turn * (p - centre);
   } else if (how == "fold") {
-    // The first surface hinge: one wing is laid onto the other triangle.
+    // One wing of the first hinge of the surface is laid onto the other.
     const auto all = hinges(rest);
     if (all.empty()) return;
     const auto& v = all[0];

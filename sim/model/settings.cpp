@@ -104,15 +104,14 @@ const std::vector<Parameter>& parameters() {
 
 const Parameter* find_parameter(const std::string& name) {
   std::string key = name;
-  std::replace(key.begin(), key.end(), '-', '_');
-  for (const Parameter& row : parameters())
-    if (key == row.name) return &row;
-  return nullptr;
+  std::ranges::replace(key, '-', '_');
+  const auto row = std::ranges::find(parameters(), key, &Parameter::name);
+  return row == parameters().end() ? nullptr : &*row;
 }
 
 std::string flag_name(const Parameter& parameter) {
   std::string name = "--" + parameter.name;
-  std::replace(name.begin(), name.end(), '_', '-');
+  std::ranges::replace(name, '_', '-');
   return name;
 }
 
@@ -139,8 +138,8 @@ std::vector<std::string> choices(const Parameter& parameter) {
 namespace {
 
 [[noreturn]] void refuse(const Parameter& row, const std::string& value, const std::string& where,
-                         const std::string& mend) {
-  throw Error(fmt::format("'{}' cannot be {}", row.name, value.empty() ? "empty" : value), where, mend);
+                         const std::string& hint) {
+  throw Error(fmt::format("'{}' cannot be {}", row.name, value.empty() ? "empty" : value), where, hint);
 }
 
 std::string range_text(const Parameter& row) {
@@ -157,11 +156,11 @@ void check_words(const Parameter& row, const std::string& text, const std::strin
   const bool list = row.name == "constraints";
   const auto words = list ? split(text, ',') : std::vector<std::string>{text};
   for (const std::string& word : words)
-    if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
+    if (std::ranges::find(allowed, word) == allowed.end())
       refuse(row, "'" + text + "'", where,
              did_you_mean(word, allowed) + fmt::format("choose from {}", fmt::join(allowed, ", ")));
   for (std::size_t i = 0; i < words.size(); ++i)
-    if (std::count(words.begin(), words.end(), words[i]) > 1) refuse(row, "'" + text + "'", where, "name each once");
+    if (std::ranges::count(words, words[i]) > 1) refuse(row, "'" + text + "'", where, "name each once");
 }
 
 }  // namespace
@@ -207,10 +206,7 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
 }
 
 void set_mode(Settings& settings, const std::string& word, const std::string& where) {
-  const Parameter& row = *find_parameter("mode");
-  if (!find_solver_mode(word))
-    refuse(row, "'" + word + "'", where,
-           did_you_mean(word, choices(row)) + fmt::format("choose from {}", fmt::join(choices(row), ", ")));
+  if (!find_solver_mode(word)) check_words(*find_parameter("mode"), word, where);
   if (!solver_mode(settings).solves_like(*find_solver_mode(word))) settings.iterations = settings.substeps = automatic;
   settings.mode = word;
 }
@@ -254,7 +250,7 @@ std::string kinds_in_use(const Material& material) {
 
 bool uses(const Material& material, const ConstraintKind& kind) {
   const auto names = split(kinds_in_use(material), ',');
-  return std::find(names.begin(), names.end(), kind.name) != names.end();
+  return std::ranges::find(names, kind.name) != names.end();
 }
 
 bool rigid_in_contact(const Settings& settings, const Material& material) {
@@ -288,7 +284,7 @@ void check_settings(const Settings& settings, const std::string& where) {
   for (const Parameter& row : parameters())
     with_value(settings, row, [&]<class T>(const T& value) {
       if constexpr (std::is_same_v<T, std::string>) {
-        if (row.name != "mode" || !find_solver_mode(value)) check_words(row, value, where);  // also "paper"
+        if (row.name != "mode" || !find_solver_mode(value)) check_words(row, value, where);
       } else if (!in_range(row, double(value)) && !(row.automatic && value == T(automatic)))
         refuse(row, parameter_text(settings, row), where, range_text(row));
     });

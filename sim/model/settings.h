@@ -1,5 +1,4 @@
-// Every number a user can set, each described once: the row gives the command-line flag, the scene key, the
-// widget and the docs.
+// All settings. Each is described once, by a row from which its flag, scene key, widget and documentation follow.
 #pragma once
 
 #include <array>
@@ -13,23 +12,23 @@
 
 namespace tetpbd {
 
-/// Of a count that the mode decides: nothing was asked for.
+/// The value of a count that is left to the mode.
 inline constexpr int automatic = -1;
 
-/// What surrounds all bodies, beside the obstacles of the model.
+/// The surroundings of all bodies, without the obstacles of the model.
 struct World {
   double gravity = 9.81;  ///< m/s^2, downwards
   bool ground = true;
   double ground_height = 0;      ///< m
-  double friction = 0.5;         ///< where an obstacle has none of its own
-  double restitution = 0;        ///< of hard bodies
-  std::string contact = "none";  ///< of bodies with each other: none, bodies, self (pairs.h)
+  double friction = 0.5;         ///< of obstacles and bodies without their own
+  double restitution = 0;        ///< of hard bodies, where an obstacle has none of its own
+  std::string contact = "none";  ///< of bodies with each other: none, bodies, self
   bool operator==(const World&) const = default;
 };
 
-/// What a body is made of: a material model and its moduli, or kinds of constraint and their numbers.
+/// The material of a body: a material model and its moduli, or kinds of constraint and their coefficients.
 struct Material {
-  std::string material = "none";  ///< the model; else in place of kinds, stiffness and compliance (material.h)
+  std::string material = "none";  ///< the model (material.h), in place of kinds, stiffness and compliance
   double young_modulus = 1e6;     ///< Pa
   double poisson_ratio = 0.3;
   double constraint_damping = 0;  ///< s
@@ -49,7 +48,7 @@ struct SolverSettings {
   int iterations = automatic;
   int substeps = automatic;
   double dt = 0.005;       ///< s
-  double stability = 0.4;  ///< of mode explicit: a substep over the longest that is stable at rest
+  double stability = 0.4;  ///< in mode explicit, a substep over the longest that is stable at rest
   double omega = 1.5;
   bool mass_splitting = true;
   double damping = 0;  ///< 1/s
@@ -58,27 +57,25 @@ struct SolverSettings {
   bool operator==(const SolverSettings&) const = default;
 };
 
-/// What was asked for, with one material for all bodies. Nothing but the user changes it; what a step takes
-/// of it is a Plan.
+/// The settings that the user asked for, with one material for all bodies. Only the user changes them; what they mean
+/// for a step is its Plan.
 struct Settings : World, Material, SolverSettings {
   bool operator==(const Settings&) const = default;
 };
 
-/// What a step takes: of `dt`, so many substeps of h seconds, each of so many iterations.
+/// The substeps of a step, `h` long, and the iterations of each.
 struct Plan {
   int substeps = 1, iterations = 1;
   double h = 0;  ///< s
   bool operator==(const Plan&) const = default;
 };
-/// What the mode makes of the settings before anything is known of the bodies: what was asked for, or its own
-/// numbers where nothing was.
+/// The plan before anything is known of the bodies: the numbers that were asked for, or the mode's own.
 Plan plan_for(const Settings& settings);
 
-/// Live: takes effect at the next step. Rebuild: the solver is made again, the state stays. Restart: the
-/// scene starts anew.
+/// When a change takes effect: at the next step; by rebuilding the solver, which keeps the state; at a new start.
 enum class Effect { live, rebuild, restart };
 
-/// Of an array by constraint kind.
+/// An element of an array by constraint kind.
 struct KindMember {
   std::array<double, kind_count> Settings::*array;
   std::size_t kind;
@@ -89,13 +86,13 @@ struct Parameter {
   const char* section;  ///< scene section: "solver" or "world"
   std::variant<double Settings::*, int Settings::*, bool Settings::*, std::string Settings::*, KindMember> member;
   std::string help;
-  double low = 0, high = 1;  ///< allowed range; numbers only
+  double low = 0, high = 1;  ///< allowed range of a number
   const char* unit = "";
   bool logarithmic = false;  ///< slider scale
   Effect effect = Effect::live;
-  bool automatic = false;  ///< also takes the word auto: the mode decides
+  bool automatic = false;  ///< also accepts the word auto, which leaves it to the mode
 };
-/// Calls f with a reference to the parameter's value in `settings`: double, int, bool or std::string.
+/// Calls f with a reference to the parameter's value in `settings`, a double, int, bool or std::string.
 template <class S, class F>
 decltype(auto) with_value(S& settings, const Parameter& parameter, F&& f) {
   return std::visit(
@@ -111,51 +108,47 @@ decltype(auto) with_value(S& settings, const Parameter& parameter, F&& f) {
 const std::vector<Parameter>& parameters();
 const Parameter* find_parameter(const std::string& name);  ///< name with - or _; nullptr if there is none
 
-/// Sets one value given as text; throws Error naming the key, `where` and the allowed values.
+/// Sets one value given as text. Throws Error naming the key, `where` and the allowed values.
 void set_parameter(Settings& settings, const Parameter& parameter, const std::string& text, const std::string& where);
-/// Value as text, the way set_parameter reads it.
+/// The value as a text that set_parameter reads.
 std::string parameter_text(const Settings& settings, const Parameter& parameter);
 std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
-/// The allowed values of a word-valued parameter ("mode"), empty for numbers; "constraints" takes a list of
-/// them.
+/// The allowed words of a parameter, of which "constraints" accepts several; empty for numbers.
 std::vector<std::string> choices(const Parameter& parameter);
-/// Also the modes that are not offered elsewhere. Between corrections, leapfrog and implicit steps a number
-/// of iterations or substeps means something else, so both become automatic. Throws Error naming `where` if
-/// there is no such mode.
+/// Sets the mode, be it one that choices() does not offer. Iterations and substeps become automatic where they mean
+/// something else in the new mode (corrections, leapfrog, implicit steps). Throws Error naming `where` for other words.
 void set_mode(Settings& settings, const std::string& word, const std::string& where);
 
-/// Settings by name: a way to solve (--solver), a material (material.h).
+/// Settings under a name: those of a solver (--solver) or of a material (material.h).
 struct Preset {
   const char *name, *help;
   const char* values;  ///< PARAMETER=TEXT, separated by commas
 };
 const std::vector<Preset>& solver_presets();
-/// Puts the one of that name in place; false if there is none.
+/// Applies the preset of that name; false if there is none.
 bool apply_preset(Settings& settings, const std::vector<Preset>& presets, const std::string& name);
 std::vector<std::string> preset_names(const std::vector<Preset>& presets);
 
-/// Whether constraints are XPBD's (method.md eq. 25): there is a model or damping, or a kind in use has
-/// compliance.
+/// Whether constraints are XPBD's (method.md eq. 25): a material model, damping, or compliance of a kind in use.
 bool compliant(const Material& material);
-/// A kind in use whose constraints have no force, but move as far as iterations do: k below 1, or no
-/// compliance.
+/// The name of a kind in use whose constraints have no force, because its k is below 1 or it has no compliance.
 std::optional<std::string> kind_without_force(const Material& material);
 /// Whether constraints resist their rate.
 bool damped(const Material& material);
-/// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use hold a
-/// shape, all with k = 1.
+/// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use keep a shape and
+/// all have k = 1.
 bool rigid_in_contact(const Settings& settings, const Material& material);
 inline bool rigid_in_contact(const Settings& settings) { return rigid_in_contact(settings, settings); }
-/// All kinds in use have k = 1 and nothing has compliance: the exact answer is a rigid body, if they include
-/// stretch.
+/// Whether all kinds in use have k = 1 and none has compliance. With stretch among them, the exact solution is then the
+/// motion of a rigid body.
 bool hard(const Material& material);
-/// The kinds in use, as `constraints` lists them: the model's, if there is one.
+/// The kinds in use, separated by commas: those of the material model, else `constraints`.
 std::string kinds_in_use(const Material& material);
-bool uses(const Material& material, const ConstraintKind& kind);  ///< whether it is one of them
+bool uses(const Material& material, const ConstraintKind& kind);  ///< whether the kind is in use
 
-/// Throws Error for values out of range, and for those that do not go together; `where` names the file or
-/// flag.
+/// Throws Error for values out of range and for settings that exclude each other; `where` names the file or flag.
 void check_settings(const Settings& settings, const std::string& where);
+/// The parts of a text between separators; empty ones are left out.
 std::vector<std::string> split(const std::string& text, char separator);
 
 }  // namespace tetpbd

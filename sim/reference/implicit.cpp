@@ -12,18 +12,18 @@ namespace tetpbd {
 
 namespace {
 
-// Friction is Coulomb's above this slip, m/s, and grows up to there: what sticks creeps by less.
+// Friction is Coulomb's above this slip, m/s, and proportional to the slip below: a vertex that sticks creeps slower.
 constexpr double least_slip = 1e-6;
 
-// A vertex that has arrived on a plane stands there within a step, and the step after has that behind it.
+// Steps of implicit Euler after an arrival on a plane, so that BDF2 has only instants after the impact to go by.
 constexpr int steps_anew = 3;
 
-// What a step makes of the instants before: x = z + h v, v = w + h times acceleration.
+// The values that a step derives from the instants before: x = z + h v, v = w + h times acceleration.
 struct Start {
   Points z, w;
   std::vector<double> h;
 };
-Start start_of(const Implicit& run) {
+Start find_start(const Implicit& run) {
   Start start{run.now.positions, run.now.velocities, std::vector<double>(run.anew.size(), run.h)};
   for (std::size_t i = 0; i < run.anew.size(); ++i) {
     if (run.anew[i] > 0) continue;
@@ -48,42 +48,43 @@ Objective make_objective(const Implicit& run, const Start& start) {
   }
   o.unit = mass * o.inertia * run.input.model.size * run.input.model.size;
   if (any_material(run.input.model, settings, damped)) {
-    const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
+    const bool has_dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of damping of C
     o.before = constraint_values(o, run.now.positions);
     const std::vector<double> earlier = constraint_values(o, run.before.positions);
     for (std::size_t k = 0; k < earlier.size(); ++k) o.before[k] = (4 * o.before[k] - earlier[k]) / 3;
     o.per_step = 1.5 / run.h;
-    o.damping = dashpots ? 0 : settings.constraint_damping;
+    o.damping = has_dashpots ? 0 : settings.constraint_damping;
   }
   return o;
 }
 
-// The planes of obstacles over the step, as each vertex meets them that goes from where it is to `to`.
-// Returns by how much they have changed there, m.
+// Finds the obstacle planes that vertices may touch in moving to `to`. Returns by how much (m) the planes near vertices
+// have moved there.
 double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obstacles, const Points& to, Objective& o) {
   const std::vector<glm::dvec4> before = std::move(o.planes);
   o.plane_count = obstacles.size(), o.planes.clear();
   double most = 0;
   for (std::size_t i = 0; i < to.size(); ++i)
     for (const MovingObstacle& obstacle : obstacles) {
-      const glm::dvec3 from = run.now.positions[i], way = to[i] - from - run.h * obstacle.velocity_at(from);
-      const auto met = obstacle.surface_met(to[i], way);
-      const bool near = obstacle.kind->flat || met.distance < glm::length(way) + 1e-3 * run.input.model.size;
-      o.planes.push_back(near && o.masses[i] > 0 ? glm::dvec4(met.normal, glm::dot(met.normal, to[i]) - met.distance)
-                                                 : glm::dvec4(0, 0, 0, -1));
+      const glm::dvec3 from = run.now.positions[i], moved = to[i] - from - run.h * obstacle.velocity_at(from);
+      const auto surface = obstacle.surface_met(to[i], moved);
+      const bool near = obstacle.kind->flat || surface.distance < glm::length(moved) + 1e-3 * run.input.model.size;
+      o.planes.push_back(near && o.masses[i] > 0
+                             ? glm::dvec4(surface.normal, glm::dot(surface.normal, to[i]) - surface.distance)
+                             : glm::dvec4(0, 0, 0, -1));
       if (before.empty()) continue;
       const glm::dvec4 was = before[o.planes.size() - 1];
       const double gap = glm::dot(glm::dvec3(was), to[i]) - was.w;
-      if (std::min(gap, met.distance) < 1e-6 * run.input.model.size)
-        most = std::max(most, std::abs(std::max(gap, -1.0) - met.distance));
+      if (std::min(gap, surface.distance) < 1e-6 * run.input.model.size)
+        most = std::max(most, std::abs(std::max(gap, -1.0) - surface.distance));
     }
   return most;
 }
 
-// What the last solution's forces and the way since z make of friction.
-std::vector<Objective::Drag> drags(const Model& model, const Objective& o, const Start& start,
-                                   const std::vector<MovingObstacle>& obstacles,
-                                   const std::vector<Touching>& touching) {
+// Friction by the normal forces of the last solution, against the displacement since z.
+std::vector<Objective::Drag> find_drags(const Model& model, const Objective& o, const Start& start,
+                                        const std::vector<MovingObstacle>& obstacles,
+                                        const std::vector<Touching>& touching) {
   std::vector<Objective::Drag> list;
   for (const Touching& t : touching)
     if (t.force > 0) {
@@ -96,43 +97,40 @@ std::vector<Objective::Drag> drags(const Model& model, const Objective& o, const
   return list;
 }
 
-// Forces depend on friction and friction on them: solved in turn until none changes by more than a part of
-// all of them.
+// Normal forces and friction depend on each other. They are found in turn until none changes by more than 1e-8 of all.
 Minimum solve(const Implicit& run, const Start& start) {
   Objective o = make_objective(run, start);
   const auto obstacles = obstacles_at(run.input.model, run.input.settings, run.time[0], run.h);
-  const bool rubs = std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
-                    std::ranges::any_of(run.input.model.bodies, [](const Body& b) { return b.friction.has_value(); });
+  const bool has_friction =
+      std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
+      std::ranges::any_of(run.input.model.bodies, [](const Body& b) { return b.friction.has_value(); });
   find_planes(run, obstacles, o.predicted, o);
-  o.drags = drags(run.input.model, o, start, obstacles, run.touching);
-  const int most_rounds = run.most > 0 ? 0 : 50;
+  o.drags = find_drags(run.input.model, o, start, obstacles, run.touching);
+  const int most_rounds = run.most > 0 || o.plane_count == 0 ? 0 : 50;
   Minimum minimum = minimise(o, o.predicted, run.most);
-  for (int round = 0; o.plane_count > 0 && round < most_rounds; ++round) {
-    if (!minimum.converged) break;
+  for (int round = 0; minimum.converged && round < most_rounds; ++round) {
     const bool moved = find_planes(run, obstacles, minimum.positions, o) > 1e-9 * run.input.model.size;
-    if (!moved && !rubs) break;
+    if (!moved && !has_friction) break;
     std::vector<double> change(run.now.positions.size(), 0);
     double all = 0, most = 0;
-    for (const Objective::Drag& d : o.drags) all += d.force;
-    const std::vector<Objective::Drag> next = drags(run.input.model, o, start, obstacles, minimum.touching);
-    for (const Objective::Drag& d : o.drags) change[d.vertex] -= d.force;
+    for (const Objective::Drag& d : o.drags) all += d.force, change[d.vertex] -= d.force;
+    std::vector<Objective::Drag> next = find_drags(run.input.model, o, start, obstacles, minimum.touching);
     for (const Objective::Drag& d : next) change[d.vertex] += d.force;
     for (const double c : change) most = std::max(most, std::abs(c));
     if (!moved && most <= 1e-8 * all) break;
-    o.drags = next;
+    o.drags = std::move(next);
     minimum = minimise(o, std::move(minimum.positions));
   }
   return minimum;
 }
 
-// Has those that have just arrived begin anew; false if there are none.
-bool arrivals(Implicit& run, const std::vector<Touching>& touching) {
+// Makes vertices that have just arrived on a plane begin anew; false if there are none.
+bool restart_arrivals(Implicit& run, const std::vector<Touching>& touching) {
   bool any = false;
   for (const Touching& t : touching) {
-    if (run.anew[t.vertex] == steps_anew) continue;
-    const bool arrived = std::ranges::none_of(
-        run.touching, [&](const Touching& old) { return old.vertex == t.vertex && old.plane == t.plane; });
-    if (arrived) run.anew[t.vertex] = steps_anew, any = true;
+    const auto is_same = [&](const Touching& old) { return old.vertex == t.vertex && old.plane == t.plane; };
+    if (run.anew[t.vertex] == steps_anew || std::ranges::any_of(run.touching, is_same)) continue;
+    run.anew[t.vertex] = steps_anew, any = true;
   }
   return any;
 }
@@ -148,12 +146,12 @@ Implicit implicit(const ReferenceInput& input, const Compliances& compliances, c
 
 void advance(Implicit& run, long steps) {
   for (long s = 0; s < steps; ++s) {
-    Start start = start_of(run);
-    Minimum minimum = solve(run, start);
-    while (minimum.converged && arrivals(run, minimum.touching)) {
-      start = start_of(run);
+    Start start;
+    Minimum minimum;
+    do {
+      start = find_start(run);
       minimum = solve(run, start);
-    }
+    } while (minimum.converged && restart_arrivals(run, minimum.touching));
     if (!minimum.converged)
       throw Error("the reference did not converge",
                   fmt::format("{} after {}, residual {:.1e}", minimum.reason, minimum.iterations, minimum.residual),

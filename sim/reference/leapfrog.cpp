@@ -12,7 +12,7 @@ namespace tetpbd {
 
 namespace {
 
-// As for_each_elastic, with the offset of the list's first part.
+// Calls for_each_elastic with the offset of the list's first part in addition.
 template <class F>
 void for_each_spring(const Leapfrog& run, F&& visit) {
   std::size_t offset = 0;
@@ -22,24 +22,26 @@ void for_each_spring(const Leapfrog& run, F&& visit) {
   });
 }
 
-// Accelerations by constraints and gravity, of vertices with mass: f = -(C + tau grad C . v) grad C / alpha,
-// of rates -(grad C . v) grad C / alpha.
+// Accelerations of vertices with mass by gravity and constraints, whose force is -(C + tau grad C . v) grad C / alpha,
+// and -(grad C . v) grad C / alpha where only the rate counts.
 Points accelerations(Leapfrog& run) {
   const double all = run.input.settings.constraint_damping;
-  const bool dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of that of C
+  const bool has_dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of damping of C
   for_each_spring(run, [&](auto kind, const ConstraintList& list, auto&& alpha, std::size_t offset) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
     parallel_for(list.count(), 1024, [&](std::size_t c) {
       const std::uint32_t* vertices = list.vertices.data() + c * arity;
       std::array<glm::dvec3, arity> x;
-      for (std::size_t j = 0; j < arity; ++j) x[j] = run.x[vertices[j]] - run.x[vertices[0]];
+      for (std::size_t j = 0; j < arity; ++j) {
+        x[j] = run.x[vertices[j]] - run.x[vertices[0]];
+        run.parts[offset + c * arity + j] = glm::dvec3(0);
+      }
       const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
-      for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] = glm::dvec3(0);
       for (int k = 0; k < kind.row.components; ++k) {
         const auto [C, gradient] = component(value, k);
         double size = kind.row.rate ? 0 : C;
-        const double resists = kind.row.rate ? 1 : list.damping_at(c, dashpots ? 0 : all);
-        for (std::size_t j = 0; j < arity; ++j) size += resists * glm::dot(gradient[j], run.v[vertices[j]]);
+        const double damping = kind.row.rate ? 1 : list.damping_at(c, has_dashpots ? 0 : all);
+        for (std::size_t j = 0; j < arity; ++j) size += damping * glm::dot(gradient[j], run.v[vertices[j]]);
         for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
       }
     });
@@ -56,20 +58,19 @@ Points accelerations(Leapfrog& run) {
   return a;
 }
 
-// Out of a plane, at `depth` behind it after moving by `moved` along, as inelastically as a vertex can: what
-// it sank by is taken back, and of its slip what friction holds. Written anew: with the solvers' formula it
-// would share their mistakes.
-void touch(const glm::dvec3& n, double depth, double friction, const glm::dvec3& moved, double h, glm::dvec3& x,
-           glm::dvec3& v) {
+// Moves a vertex out of a plane, at `depth` (m) behind it after a displacement `moved` relative to it, without bounce:
+// its depth is undone, and as much of its slip as friction can. The solvers' formula would share their mistakes.
+void resolve_contact(const glm::dvec3& n, double depth, double friction, const glm::dvec3& moved, double h,
+                     glm::dvec3& x, glm::dvec3& v) {
   if (depth <= 0) return;
   const glm::dvec3 slip = moved - n * glm::dot(n, moved);
-  const double length = glm::length(slip), held = std::min(length, friction * depth);
-  const glm::dvec3 correction = depth * n - (length > 0 ? slip * (held / length) : glm::dvec3(0));
+  const double length = glm::length(slip), undone = std::min(length, friction * depth);
+  const glm::dvec3 correction = depth * n - (length > 0 ? slip * (undone / length) : glm::dvec3(0));
   x += correction;
   v += correction / h;
 }
 
-Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
+Leapfrog prepare(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
   require_compliances(input.system, compliances);
   Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}, {0}};
   std::vector<std::uint32_t> vertices;
@@ -85,7 +86,7 @@ Leapfrog prepared(const ReferenceInput& input, const Compliances& compliances, c
 }  // namespace
 
 Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h) {
-  Leapfrog run = prepared(input, compliances, start.positions);
+  Leapfrog run = prepare(input, compliances, start.positions);
   run.h = h;
   run.v = start.velocities;
   const Points a = accelerations(run);
@@ -95,7 +96,7 @@ Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, c
 
 void advance(Leapfrog& run, long steps) {
   const Settings& settings = run.input.settings;
-  const double keep = std::exp(-settings.damping * run.h);
+  const double remaining = std::exp(-settings.damping * run.h);
   std::vector<MovingObstacle> obstacles;
   for (long s = 0; s < steps; ++s, run.time[0] += run.h) {
     if (s == 0 || std::ranges::any_of(run.input.model.obstacles, moves))
@@ -104,13 +105,13 @@ void advance(Leapfrog& run, long steps) {
     parallel_for(a.size(), 4096, [&](std::size_t i) {
       if (run.input.inverse_masses[i] == 0) return;
       const glm::dvec3 before = run.x[i];
-      run.v[i] = (run.v[i] + run.h * a[i]) * keep;
-      run.x[i] += run.h * run.v[i];
-      glm::dvec3& x = run.x[i];
+      run.v[i] = (run.v[i] + run.h * a[i]) * remaining;
+      glm::dvec3& x = run.x[i] += run.h * run.v[i];
       for (const MovingObstacle& obstacle : obstacles) {
-        const glm::dvec3 way = x - before - run.h * obstacle.velocity_at(x);
-        const auto met = obstacle.surface_met(x, way);
-        touch(met.normal, -met.distance, friction_on(obstacle, run.input.model, i), way, run.h, x, run.v[i]);
+        const glm::dvec3 moved = x - before - run.h * obstacle.velocity_at(x);
+        const auto surface = obstacle.surface_met(x, moved);
+        const double friction = friction_on(obstacle, run.input.model, i);
+        resolve_contact(surface.normal, -surface.distance, friction, moved, run.h, x, run.v[i]);
       }
     });
     run.pairs.resolve(settings, run.x, run.v, run.held, run.input.inverse_masses, run.h);
@@ -130,7 +131,7 @@ State make_state(Leapfrog& run) {
 
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
                    int iterations) {
-  Leapfrog run = prepared(input, compliances, positions);  // at rest, so that nothing is damped
+  Leapfrog run = prepare(input, compliances, positions);  // velocities are zero, so nothing is damped
   std::mt19937 random(1);
   Points p(positions.size());
   for (glm::dvec3& q : p) q = {draw_unit(random), draw_unit(random), draw_unit(random)};

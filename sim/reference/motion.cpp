@@ -21,25 +21,25 @@ namespace tetpbd {
 
 namespace {
 
-// Far below what changes a motion to four digits; of the leapfrog's, the part of its stable step.
+// Steps are far shorter than what changes a motion to four digits.
 constexpr double rigid_step_length = 4e-5;  // s
-constexpr double part_of_stable = 0.5;
-constexpr long implicit_steps = 8;    // in one of the scene
-constexpr double most_stable = 3000;  // stable steps in one of the scene: shorter ones cost more than Newton's
-constexpr double most_bytes = 9e6;    // of positions kept, as long as they are 20 instants or more
+constexpr double part_of_stable = 0.5;      // of the longest stable step, in leapfrog steps
+constexpr long implicit_steps = 8;          // in a step of the scene
+constexpr double most_stable = 3000;        // stable steps in a step of the scene; more of them cost more than Newton's
+constexpr double most_bytes = 9e6;          // of stored positions, where these are `least_instants` or more
 constexpr std::size_t least_instants = 21;
 constexpr double seconds_between_saves = 20;
 
 /// The same motion in longer and in shorter steps, advanced side by side.
-struct Pair {
-  double step = 0;                      ///< s, the shorter
-  std::function<void()> advance;        ///< both, by a step of the scene
-  std::function<State()> coarse, fine;  ///< where they are
-  std::function<void(std::string&)> save;
+struct TwoRuns {
+  double step = 0;                         ///< s, the shorter
+  std::function<void()> advance;           ///< advances both by a step of the scene
+  std::function<State()> coarse, fine;     ///< the states of the one in longer and the one in shorter steps
+  std::function<void(std::string&)> save;  ///< empty: not worth saving
   std::function<bool(std::string_view&)> load;
 };
 
-void require_answer(const ReferenceInput& input) {
+void require_reference(const ReferenceInput& input) {
   const Settings& settings = input.settings;
   const char* hint =
       "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
@@ -58,60 +58,58 @@ void require_answer(const ReferenceInput& input) {
   for (const Body& body : input.model.bodies) check(body_material(body, settings));
 }
 
-Pair rigid_pair(const ReferenceInput& input) {
-  struct Run {
-    std::vector<RigidBody> bodies;
-    long steps;
-  };
-  const long steps = std::max(1L, std::lround(input.settings.dt / rigid_step_length));
-  auto runs = std::make_shared<std::array<Run, 2>>();
-  *runs = {Run{rigid_bodies(input.model), steps}, Run{rigid_bodies(input.model), 2 * steps}};
-  Pair pair;
-  pair.step = input.settings.dt / double(2 * steps);
-  pair.advance = [runs, input] {
-    for (Run& run : *runs)
-      for (RigidBody& body : run.bodies)
-        for (long s = 0; s < run.steps; ++s)
-          advance(body, input.model, input.settings, input.settings.dt / double(run.steps));
-  };
-  pair.coarse = [runs, input] { return make_state(input.model, (*runs)[0].bodies); };
-  pair.fine = [runs, input] { return make_state(input.model, (*runs)[1].bodies); };
-  return pair;
-}
-
-// Of make(h), with `steps` of them and twice as many in a step of the scene. `arrays(run, f)` calls f for all
+// Runs of make(h), with `steps` of them and twice as many in a step of the scene. arrays(run, f) calls f for all arrays
 // that a run consists of.
 template <class Make, class Arrays>
-Pair pair_of(double dt, long steps, const Make& make, const Arrays& arrays) {
+TwoRuns make_runs(double dt, long steps, const Make& make, const Arrays& arrays) {
   using Run = decltype(make(dt));
   auto runs = std::make_shared<std::array<Run, 2>>(std::array{make(dt / double(steps)), make(dt / double(2 * steps))});
-  Pair pair;
-  pair.step = (*runs)[1].h;
-  pair.advance = [runs, steps] { advance((*runs)[0], steps), advance((*runs)[1], 2 * steps); };
-  pair.coarse = [runs] { return make_state((*runs)[0]); };
-  pair.fine = [runs] { return make_state((*runs)[1]); };
-  pair.save = [runs, arrays](std::string& bytes) {
+  TwoRuns result;
+  result.step = (*runs)[1].h;
+  result.advance = [runs, steps] { advance((*runs)[0], steps), advance((*runs)[1], 2 * steps); };
+  result.coarse = [runs] { return make_state((*runs)[0]); };
+  result.fine = [runs] { return make_state((*runs)[1]); };
+  result.save = [runs, arrays](std::string& bytes) {
     for (Run& run : *runs) arrays(run, [&](auto& values) { put_array(bytes, values); });
   };
-  pair.load = [runs, arrays](std::string_view& bytes) {
+  result.load = [runs, arrays](std::string_view& bytes) {
     bool whole = true;
     for (Run& run : *runs) arrays(run, [&](auto& values) { whole = whole && take_array(bytes, values); });
     return whole;
   };
-  return pair;
+  return result;
 }
 
-Pair leapfrog_pair(const ReferenceInput& input, double stable) {
+struct RigidRun {
+  ReferenceInput input;
+  double h;
+  std::vector<RigidBody> bodies;
+};
+void advance(RigidRun& run, long steps) {
+  for (RigidBody& body : run.bodies)
+    for (long s = 0; s < steps; ++s) advance(body, run.input.model, run.input.settings, run.h);
+}
+State make_state(const RigidRun& run) { return make_state(run.input.model, run.bodies); }
+
+TwoRuns rigid_runs(const ReferenceInput& input) {
+  const long steps = std::max(1L, std::lround(input.settings.dt / rigid_step_length));
+  const auto make = [&](double h) { return RigidRun{input, h, rigid_bodies(input.model)}; };
+  TwoRuns runs = make_runs(input.settings.dt, steps, make, [](RigidRun&, auto&&) {});
+  runs.save = nullptr;  // a rigid motion takes seconds
+  return runs;
+}
+
+TwoRuns leapfrog_runs(const ReferenceInput& input, double stable) {
   const State start{input.model.positions, input.model.velocities};
-  return pair_of(
+  return make_runs(
       input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
       [&](double h) { return leapfrog(input, reference_compliances(input), start, h); },
       [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.held), each(run.time); });
 }
 
-Pair implicit_pair(const ReferenceInput& input) {
+TwoRuns implicit_runs(const ReferenceInput& input) {
   const State start{input.model.positions, input.model.velocities};
-  return pair_of(
+  return make_runs(
       input.settings.dt, implicit_steps,
       [&](double h) { return implicit(input, reference_compliances(input), start, h); },
       [](Implicit& run, auto&& each) {
@@ -120,33 +118,33 @@ Pair implicit_pair(const ReferenceInput& input) {
       });
 }
 
-// What is done so far, for a later run to take up; its checksum has `key` in it, the scene and the number of
-// steps.
-void save_unfinished(const std::filesystem::path& file, std::uint64_t key, const Motion& motion, const Pair& pair) {
+// Saves an unfinished motion for a later run to continue. `key`, of the scene and the number of steps, is part of the
+// file's checksum.
+void save_unfinished(const std::filesystem::path& file, std::uint64_t key, const Motion& motion, const TwoRuns& runs) {
   std::string bytes;
   put_array(bytes, motion.rows), put_array(bytes, motion.kept);
   for (const Points& positions : motion.positions) put_array(bytes, positions);
-  pair.save(bytes);
+  runs.save(bytes);
   seal(bytes, key);
   write_file(file, bytes);
 }
 
-bool load_unfinished(const std::filesystem::path& file, std::uint64_t key, Motion& motion, const Pair& pair) {
+bool load_unfinished(const std::filesystem::path& file, std::uint64_t key, Motion& motion, const TwoRuns& runs) {
   std::ifstream in(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   std::string_view bytes = text;
   if (!unseal(bytes, key)) return false;
-  Motion held = motion;
-  bool whole = take_array(bytes, held.rows) && take_array(bytes, held.kept);
-  held.positions.resize(held.kept.size());
-  for (Points& positions : held.positions) whole = whole && take_array(bytes, positions);
-  if (whole && pair.load(bytes)) motion = held;
+  Motion loaded = motion;
+  bool whole = take_array(bytes, loaded.rows) && take_array(bytes, loaded.kept);
+  loaded.positions.resize(loaded.kept.size());
+  for (Points& positions : loaded.positions) whole = whole && take_array(bytes, positions);
+  if (whole && runs.load(bytes)) motion = loaded;
   return whole;
 }
 
 }  // namespace
 
-Motion::Row measured(const Model& model, const Settings& settings, const State& state, double time) {
+Motion::Row measure_motion(const Model& model, const Settings& settings, const State& state, double time) {
   Motion::Row row;
   row.time = time;
   const double ground = settings.ground ? settings.ground_height : 0;
@@ -208,7 +206,7 @@ std::uint64_t scene_key(const Model& model, const Settings& settings) {
 
 Motion find_motion(const ReferenceInput& input, long steps, const std::string& method,
                    const std::filesystem::path& unfinished, const std::function<void(long)>& progress) {
-  require_answer(input);
+  require_reference(input);
   Motion motion;
   motion.method = method;
   const bool soft = any_material(input.model, input.settings, compliant);
@@ -225,34 +223,34 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   if ((motion.method == "rigid body") == soft)
     throw Error("no method for this scene", method,
                 "with compliance or a material leapfrog or implicit, for k = 1 a rigid body");
-  const Pair pair = motion.method == "implicit"   ? implicit_pair(input)
-                    : motion.method == "leapfrog" ? leapfrog_pair(input, stable)
-                                                  : rigid_pair(input);
+  const TwoRuns runs = motion.method == "implicit"   ? implicit_runs(input)
+                       : motion.method == "leapfrog" ? leapfrog_runs(input, stable)
+                                                     : rigid_runs(input);
   motion.scene = scene_key(input);
-  motion.dt = input.settings.dt, motion.step = pair.step;
+  motion.dt = input.settings.dt, motion.step = runs.step;
   const double instant_bytes = double(input.model.masses.size() * sizeof(glm::dvec3));
   const auto instants = std::max(least_instants, std::size_t(most_bytes / instant_bytes));
   const long keep_every = long(std::ceil(double(steps) / double(instants - 1)));
   const auto add = [&](long step) {
-    const State fine = pair.fine();
-    motion.rows.push_back(measured(input.model, input.settings, fine, double(step) * motion.dt));
-    motion.rows.back().error = error_to(input.model, fine, pair.coarse());
+    const State fine = runs.fine();
+    motion.rows.push_back(measure_motion(input.model, input.settings, fine, double(step) * motion.dt));
+    motion.rows.back().error = error_to(input.model, fine, runs.coarse());
     if (step % keep_every != 0 && step != steps) return;
     motion.kept.push_back(step);
     motion.positions.push_back(fine.positions);
   };
-  const bool resumable = pair.save && !unfinished.empty();
+  const bool resumable = runs.save && !unfinished.empty();
   const std::uint64_t key = hash_values(motion.method, hash_values(std::array{steps}, motion.scene));
-  if (!resumable || !load_unfinished(unfinished, key, motion, pair)) add(0);
+  if (!resumable || !load_unfinished(unfinished, key, motion, runs)) add(0);
   auto saved = std::chrono::steady_clock::now();
   for (long step = long(motion.rows.size()); step <= steps; ++step) {
-    pair.advance();
+    runs.advance();
     add(step);
     if (progress) progress(step);
     const auto now = std::chrono::steady_clock::now();
     const bool stop = interrupted();
     if (resumable && (stop || std::chrono::duration<double>(now - saved).count() > seconds_between_saves)) {
-      save_unfinished(unfinished, key, motion, pair);
+      save_unfinished(unfinished, key, motion, runs);
       saved = now;
     }
     if (stop) throw Interrupted();
@@ -267,9 +265,9 @@ bool is_kept(const Motion& motion, long step) { return std::ranges::binary_searc
 void add_state(MotionError& error, const Motion& motion, const Model& model, long step, const State& state) {
   const auto found = std::ranges::find(motion.kept, step);
   if (found == motion.kept.end()) return;
-  const State right{motion.positions[std::size_t(found - motion.kept.begin())], {}}, start{motion.positions[0], {}};
-  error.final = error_to(model, right, state);
-  const double moved = error_to(model, start, right);
+  const State reference{motion.positions[std::size_t(found - motion.kept.begin())], {}}, start{motion.positions[0], {}};
+  error.final = error_to(model, reference, state);
+  const double moved = error_to(model, start, reference);
   error.relative = moved > 0 ? error.final / moved : 0;
   error.peak = std::max(error.peak, error.final);
   const double squares = error.rms * error.rms * double(error.instants) + error.final * error.final;

@@ -15,20 +15,20 @@ glm::dvec3 drag_displacement(const Objective::Drag& drag, const Points& position
   return moved - drag.normal * glm::dot(drag.normal, moved);
 }
 
-// What a component of C costs: stiffness / 2 (C - offset)^2.
+// The energy of a component of C: stiffness / 2 (C - offset)^2.
 struct Spring {
   double stiffness = 0, offset = 0;
 };
 
-// Calls visit(Kind{}, vertex indices, positions relative to the first, rest values, a Spring per component)
-// for every constraint with an energy or damping.
+// Calls visit(Kind{}, vertex numbers, positions relative to the first, rest values, a Spring per component) for every
+// constraint with an energy or damping.
 template <class F>
 void for_each_constraint(const Objective& o, const Points& positions, F&& visit) {
   std::size_t number = 0;  // of the component
   for_each_elastic<true>(o.system, o.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
     constexpr ConstraintKind row = decltype(kind)::row;
     constexpr std::size_t arity = std::size_t(row.arity);
-    const double held = row.rate ? 0 : 1;
+    const double elastic = row.rate ? 0 : 1;
     std::array<glm::dvec3, arity> x;
     std::array<Spring, std::size_t(row.components)> springs;
     for (std::size_t c = 0; c < list.count(); ++c) {
@@ -36,15 +36,15 @@ void for_each_constraint(const Objective& o, const Points& positions, F&& visit)
       for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
       const double damped = o.per_step * (row.rate ? 1 : list.damping_at(c, o.damping));
       for (std::size_t k = 0; k < springs.size(); ++k, ++number) {
-        springs[k] = {(held + damped) / alpha(c)[k], 0};
-        if (damped > 0) springs[k].offset = damped / (held + damped) * o.before[number];
+        springs[k] = {(elastic + damped) / alpha(c)[k], 0};
+        if (damped > 0) springs[k].offset = damped / (elastic + damped) * o.before[number];
       }
       visit(kind, vertices, x, &list.rest[c * std::size_t(row.values)], springs);
     }
   });
 }
 
-// E, and the sum of its terms' magnitudes: rounding is relative to that.
+// E, and the sum of its terms' magnitudes, to which rounding is relative.
 struct Energy {
   double value = 0, magnitude = 0;
 };
@@ -66,8 +66,8 @@ Energy evaluate_energy(const Objective& o, const Points& positions) {
     }
   });
   for (const Objective::Drag& drag : o.drags) {
-    const double way = glm::length(drag_displacement(drag, positions));
-    add(drag.force * (way < drag.reach ? way * way / (2 * drag.reach) : way - drag.reach / 2));
+    const double slip = glm::length(drag_displacement(drag, positions));
+    add(drag.force * (slip < drag.reach ? slip * slip / (2 * drag.reach) : slip - drag.reach / 2));
   }
   return e;
 }
@@ -84,9 +84,7 @@ std::vector<double> constraint_values(const Objective& o, const Points& position
   return values;
 }
 
-double energy(const Objective& objective, const Points& positions) {
-  return evaluate_energy(objective, positions).value;
-}
+double energy(const Objective& o, const Points& positions) { return evaluate_energy(o, positions).value; }
 
 Points gradient(const Objective& o, const Points& positions) {
   Points g(positions.size());
@@ -95,31 +93,28 @@ Points gradient(const Objective& o, const Points& positions) {
   for_each_constraint(o, positions, [&](auto kind, const auto* v, auto& x, const double* rest, auto& springs) {
     const auto c = unclamped<decltype(kind)>(x, rest);
     for (int k = 0; k < kind.row.components; ++k) {
-      const auto [C, of] = component(c, k);
+      const auto [C, by_vertex] = component(c, k);
       const auto [stiffness, offset] = springs[std::size_t(k)];
-      for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += stiffness * (C - offset) * of[j];
+      for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += stiffness * (C - offset) * by_vertex[j];
     }
   });
   for (const Objective::Drag& drag : o.drags) {
-    const glm::dvec3 way = drag_displacement(drag, positions);
-    g[drag.vertex] += drag.force / std::max(glm::length(way), drag.reach) * way;
+    const glm::dvec3 slip = drag_displacement(drag, positions);
+    g[drag.vertex] += drag.force / std::max(glm::length(slip), drag.reach) * slip;
   }
   return g;
 }
-
-// -------------------------------------------------------------------------------------------------------------
-// Newton
 
 namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 struct Factor : Eigen::SimplicialLDLT<Sparse> {
-  Eigen::Index entries = -1;  // of the pattern that was analysed
+  Eigen::Index entries = -1;  // of the pattern that was analysed last
 };
 
-// Of s/2 (C - o)^2, summed over components: s (grad C grad C^T + (C - o) Hess C). Hess C by central
-// differences of the gradient over 1e-5 of the smallest side: truncation and rounding are both near 1e-10
-// relative, and Newton converges with far worse.
+// The Hessian of s/2 (C - o)^2 is s (grad C grad C^T + (C - o) Hess C), summed over components. Hess C is found by
+// central differences of the gradient over 1e-5 of the shortest side, where truncation and rounding are both about
+// 1e-10 relative; Newton would converge with far less.
 template <class Kind, std::size_t arity, class Springs>
 auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, const Springs& springs, bool project) {
   constexpr int n = 3 * int(arity);
@@ -127,7 +122,7 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
   using Vector = Eigen::Matrix<double, n, 1>;
   Matrix hessian = Matrix::Zero();
   const auto here = unclamped<Kind>(x, rest);
-  // Sum of s (C - o) grad C, with the C of `here`.
+  // The sum of s (C - o) grad C, with the gradients of `c` and the C of `here`.
   const auto weighted = [&](const auto& c) {
     Vector sum = Vector::Zero();
     for (int k = 0; k < Kind::row.components; ++k)
@@ -135,6 +130,7 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
              Eigen::Map<const Vector>(&component(c, k).second->x);
     return sum;
   };
+  const auto evaluate = [&] { return Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest)); };
   double side = std::numeric_limits<double>::max();
   for (std::size_t i = 0; i < arity; ++i)
     for (std::size_t j = 0; j < i; ++j) side = std::min(side, glm::length(x[i] - x[j]));
@@ -145,9 +141,9 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
       const double start = coordinate;
       coordinate = start + step;
       const double high = coordinate;
-      hessian.col(column) = weighted(Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest)));
+      hessian.col(column) = weighted(evaluate());
       coordinate = start - step;
-      hessian.col(column) -= weighted(Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest)));
+      hessian.col(column) -= weighted(evaluate());
       hessian.col(column) /= high - coordinate;
       coordinate = start;
     }
@@ -163,8 +159,7 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
   return hessian;
 }
 
-// Lower triangle. A fixed vertex has rows of its own, which are the identity's. The pattern is the same at
-// all positions.
+// The lower triangle of the Hessian, with the identity's rows for fixed vertices. Its pattern is that of all positions.
 Sparse assemble(const Objective& o, const Points& positions, bool project) {
   const int rows = 3 * int(positions.size());
   std::vector<Eigen::Triplet<double>> entries;
@@ -182,22 +177,23 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
       }
   });
   for (const Objective::Drag& drag : o.drags) {
-    const glm::dvec3 way = drag_displacement(drag, positions);
-    const double length = glm::length(way);
+    const glm::dvec3 slip = drag_displacement(drag, positions);
+    const double length = glm::length(slip);
     glm::dmat3 local =
         drag.force / std::max(length, drag.reach) * (glm::dmat3(1) - glm::outerProduct(drag.normal, drag.normal));
-    if (length > drag.reach) local -= drag.force / (length * length * length) * glm::outerProduct(way, way);
+    if (length > drag.reach) local -= drag.force / (length * length * length) * glm::outerProduct(slip, slip);
+    const int first = 3 * int(drag.vertex);
     for (int r = 0; r < 3; ++r)
-      for (int c = 0; c <= r; ++c)
-        entries.emplace_back(3 * int(drag.vertex) + r, 3 * int(drag.vertex) + c, local[c][r]);
+      for (int c = 0; c <= r; ++c) entries.emplace_back(first + r, first + c, local[c][r]);
   }
   Sparse hessian(rows, rows);
   hessian.setFromTriplets(entries.begin(), entries.end());
   return hessian;
 }
 
-// A pivot below 1e-14 of its diagonal entry is rounding.
-bool positive_definite(Factor& factor, const Sparse& matrix) {
+// Factorises the matrix and says whether it is positive definite. A pivot below 1e-14 of its diagonal entry is
+// rounding.
+bool factorize(Factor& factor, const Sparse& matrix) {
   if (factor.entries != matrix.nonZeros()) factor.analyzePattern(matrix);
   factor.entries = matrix.nonZeros();
   factor.factorize(matrix);
@@ -209,33 +205,33 @@ bool positive_definite(Factor& factor, const Sparse& matrix) {
 
 Eigen::Map<Eigen::VectorXd> flat(Points& points) { return {&points[0].x, 3 * Eigen::Index(points.size())}; }
 
-// Which planes hold which vertices in a step from x.
+// The planes that hold vertices in a step from x.
 struct ActiveSet {
   const Objective& o;
   const Points& x;
   std::vector<char> held;  // by vertex and plane
-  double slack = 0;        // m, what is no gap
+  double slack = 0;        // m, the largest distance that counts as none
 
   double gap(std::size_t i, std::size_t p, const glm::dvec3& moved) const {
     const glm::dvec4 plane = o.plane(i, p);
     return glm::dot(glm::dvec3(plane), x[i] + moved) - plane.w;
   }
   bool any() const { return std::ranges::find(held, 1) != held.end(); }
-  // What a vertex is free to do, as a projector, and how it first gets onto the planes that hold it.
+  // The projector onto the directions in which a vertex is free, and its displacement onto the planes that hold it.
   std::pair<glm::dmat3, glm::dvec3> freedom(std::size_t i) const {
     glm::dmat3 free(1);
-    glm::dvec3 way(0);
+    glm::dvec3 onto(0);
     for (std::size_t p = 0; p < o.plane_count; ++p) {
       if (!held[i * o.plane_count + p]) continue;
       const glm::dvec3 n(o.plane(i, p)), e = free * n;
       if (glm::dot(e, e) < 1e-12) continue;
-      way -= e * (gap(i, p, way) / glm::dot(n, e));
+      onto -= e * (gap(i, p, onto) / glm::dot(n, e));
       free -= glm::outerProduct(e, e) / glm::dot(e, e);
     }
-    return {free, way};
+    return {free, onto};
   }
-  // Takes in what the step carries through a plane, lets go what its plane would pull at (`forces`: of
-  // planes on vertices). False if all stays.
+  // Adds vertices that the step moves through a plane and drops those that their plane would pull at, by the `forces`
+  // of planes on vertices. False if nothing changes.
   bool update(const Points& step, const Points& forces) {
     bool changed = false;
     for (std::size_t i = 0; i < x.size(); ++i)
@@ -249,36 +245,37 @@ struct ActiveSet {
   }
 };
 
-// The Hessian where held vertices move along their planes only, and across them not at all.
-Sparse constrained(const Sparse& hessian, const ActiveSet& set, Sparse& projector) {
+// The Hessian of steps in which held vertices move along their planes only.
+Sparse constrain(const Sparse& hessian, const ActiveSet& set, Sparse& projector) {
   std::vector<Eigen::Triplet<double>> free, fixed;
   const double scale = hessian.diagonal().sum() / double(hessian.rows());
   for (std::size_t i = 0; i < set.x.size(); ++i) {
-    const glm::dmat3 of = set.freedom(i).first;
+    const glm::dmat3 local = set.freedom(i).first;
+    const int first = 3 * int(i);
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) {
-        free.emplace_back(3 * int(i) + r, 3 * int(i) + c, of[c][r]);
-        if (r >= c) fixed.emplace_back(3 * int(i) + r, 3 * int(i) + c, scale * (double(r == c) - of[c][r]));
+        free.emplace_back(first + r, first + c, local[c][r]);
+        if (r >= c) fixed.emplace_back(first + r, first + c, scale * (double(r == c) - local[c][r]));
       }
   }
-  projector = Sparse(hessian.rows(), hessian.rows());
-  projector.setFromTriplets(free.begin(), free.end());
   Sparse rest(hessian.rows(), hessian.rows());
+  projector = rest;
+  projector.setFromTriplets(free.begin(), free.end());
   rest.setFromTriplets(fixed.begin(), fixed.end());
   const Sparse whole = hessian.selfadjointView<Eigen::Lower>(), moving = projector * whole * projector;
   return Sparse(moving.triangularView<Eigen::Lower>()) + rest;
 }
 
-// The step to the minimum of the energy's second-order model in the half spaces.
+// The step to the minimum of the energy's second-order model among half spaces.
 struct NewtonStep {
-  Points step, forces;  // m; N, of planes
-  double descent = 0;   // of the energy along the step, < 0
-  bool exact = true;    // with the Hessian, not the nearest thing to it that is positive definite: ...
+  Points step, forces;  // m; N, of planes on vertices
+  double descent = 0;   // the energy's slope along the step, < 0
+  bool exact = true;    // by the Hessian itself, which is positive definite
 };
 
-// ... with projected constraint Hessians, and if that is singular still, with a growing multiple of the mass
-// matrix. False where nothing helps.
-bool newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
+// Where the Hessian is not positive definite, those of constraints are projected, and then a growing multiple of the
+// mass matrix is added. False where nothing helps.
+bool find_newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
   const Objective& o = set.o;
   const std::size_t n = set.x.size();
   for (std::size_t i = 0; i < n; ++i)
@@ -296,13 +293,13 @@ bool newton_step(Factor& factor, ActiveSet& set, Points g, NewtonStep& result) {
   };
   constexpr int most_rounds = 50;
   for (int round = 0, attempt = 0; round < most_rounds; ++round) {
-    const bool holds = set.any();
-    while (!positive_definite(factor, holds ? constrained(hessian, set, projector) : hessian)) {
+    const bool is_held = set.any();
+    while (!factorize(factor, is_held ? constrain(hessian, set, projector) : hessian)) {
       if (++attempt > 12) return false;
       next_hessian();
     }
     result.step.assign(n, glm::dvec3(0)), result.forces = g;
-    if (holds) {
+    if (is_held) {
       for (std::size_t i = 0; i < n; ++i) result.step[i] = set.freedom(i).second;
       const Eigen::VectorXd rhs = flat(g) + hessian.selfadjointView<Eigen::Lower>() * flat(result.step);
       const Eigen::VectorXd solved = factor.solve(projector * rhs);
@@ -338,14 +335,15 @@ Minimum newton(const Objective& o, Points start, int most) {
   NewtonStep newton;
   while (!result.converged) {
     newton.exact = true;
-    if (!newton_step(factor, set, gradient(o, x), newton)) return result.reason = "the Hessian has no factors", result;
+    if (!find_newton_step(factor, set, gradient(o, x), newton))
+      return result.reason = "the Hessian has no factors", result;
     result.residual = std::sqrt(std::max(-newton.descent, 0.0) / o.unit);
     result.converged = newton.exact && result.residual <= minimum_tolerance;
-    // The step at hand is taken even so: it squares what is left.
+    // The step is taken even after convergence, since it squares the residual.
     if (!newton.exact && result.residual <= 1e-4 * minimum_tolerance)
       return result.reason = "not a stable, isolated minimum", result;
     if (result.iterations == newton_limit) return result.reason = "too many Newton steps", result;
-    // Armijo; the last steps lower E by less than its rounding, which is allowed for.
+    // Armijo's condition, with an allowance for rounding, by less than which the last steps lower E.
     const Energy before = evaluate_energy(o, x);
     const double rounding = 1e-14 * before.magnitude;
     Points trial = x;
@@ -368,7 +366,7 @@ Minimum newton(const Objective& o, Points start, int most) {
 
 }  // namespace
 
-// Around the first vertex: far from the origin, positions have no digits left for small strains.
+// Positions are relative to the first vertex, since those far from the origin have no digits left for small strains.
 Minimum minimise(Objective o, Points start, int most) {
   const glm::dvec3 origin = o.predicted.empty() ? glm::dvec3(0) : o.predicted[0];
   for (Points* list : {&o.predicted, &start})

@@ -1,5 +1,5 @@
-// The elastic energy of constraints with compliance, in double, and its minimiser by Newton: what a step of
-// implicit Euler or a body at rest amounts to (reference.h).
+// The elastic energy of constraints with compliance, in double, and its minimiser by Newton, which solves a step of an
+// implicit integrator or finds a body's state of rest.
 #pragma once
 
 #include <array>
@@ -12,34 +12,32 @@ namespace tetpbd {
 
 using Points = std::vector<glm::dvec3>;  ///< m, by vertex
 
-/// alpha of each kind, in the order of Kinds: a constraint's energy is C^2 / (2 alpha), so alpha is in
-/// unit(C)^2 / J. Stretch: m^2/J = m/N, one over a spring's stiffness; bend: rad^2/J; volume: m^6/J = m^3/Pa.
-/// Above 0 where there are such constraints (rigid_step is the limit); infinity leaves the kind out. A
-/// material's constraints have their own.
+/// alpha by kind, in unit(C)^2 / J, as a constraint's energy is C^2 / (2 alpha): m/N of stretch (one over a spring's
+/// stiffness), rad^2/J of bend, m^3/Pa of volume. It is above 0 where there are such constraints, infinity leaves the
+/// kind out, and a material's constraints have their own.
 using Compliances = std::array<double, kind_count>;
 
 /// What is minimised, in joules, over the positions x of vertices with mass:
 ///   E(x) = sum m_i (inertia/2 |x_i - y_i|^2 - gravity . (x_i - y_i)) + sum_c C_c(x)^2 / (2 alpha_c).
-/// A hinge that has turned further than 1 rad counts in full: the clamp of bend.glsl is part of the solvers,
-/// not of the energy. E has a kink where a hinge is half a turn from rest.
+/// The clamp of bend.glsl to 1 rad is part of the solvers, not of E, which has a kink where a hinge is half a turn off.
 struct Objective {
   const ConstraintSystem& system;
   Compliances compliances;
   std::vector<double> masses{};  ///< kg; 0: fixed
-  Points predicted{};            ///< y; of fixed vertices, where they are
+  Points predicted{};            ///< y; the positions of fixed vertices
   double inertia = 0;            ///< 1/s^2, 1 / h^2; 0: static
   glm::dvec3 gravity{0};         ///< m/s^2; 0 for a step, whose y has it already
-  double unit = 1;               ///< J, what tolerances are relative to (`Minimum::residual`)
-  /// Damping over a step: E += ((C - before)^2 per_step) / (2 alpha) of kinds of which only the change
-  /// counts, and `damping` times that of the others, but of bodies with their own. Empty: none.
-  std::vector<double> before{};      ///< by component (constraint_values)
+  double unit = 1;               ///< J, to which tolerances are relative (`Minimum::residual`)
+  /// Damping adds (C - before)^2 per_step / (2 alpha) to E for kinds of which only the change counts, and that times
+  /// `damping`, or the list's own, for the others.
+  std::vector<double> before{};      ///< by component (constraint_values); empty: no damping
   double damping = 0, per_step = 0;  ///< s; 1/s
-  /// Each vertex with mass is kept in `plane_count` half spaces (n, d), n . x >= d; by vertex.
+  /// Each vertex with mass stays in `plane_count` half spaces (n, d), n . x >= d; by vertex.
   std::vector<glm::dvec4> planes{};
   std::size_t plane_count = 0;
   const glm::dvec4& plane(std::size_t vertex, std::size_t p) const { return planes[vertex * plane_count + p]; }
-  /// Resists moving along a plane: |t| force, where the way t from `from` is longer than `reach`, and
-  /// smoothly below.
+  /// Friction along a plane has the energy |t| force where the slip t since `from` exceeds `reach`; below, it is
+  /// smooth.
   struct Drag {
     std::uint32_t vertex;
     glm::dvec3 normal, from;
@@ -50,12 +48,11 @@ struct Objective {
 /// C of every component of every constraint that has an energy or damping, in the order of `before`.
 std::vector<double> constraint_values(const Objective& objective, const Points& positions);
 double energy(const Objective& objective, const Points& positions);
-/// dE/dx, newtons; of fixed vertices too, where it is the force they are held with.
+/// dE/dx, N; at fixed vertices it is the force that holds them.
 Points gradient(const Objective& objective, const Points& positions);
 
-/// C, without the clamp to +-1 that bend.glsl has, and its gradient. C = f(x) - rest, so a clamped one is
-/// found by moving `rest` along: at most three times, as hinges turn by pi at most. A spring 1 m too long
-/// gets the same C.
+/// A formula's result without the clamp of C to +-1 that bend.glsl has. As C = f(x) - rest, a clamped C is found by
+/// moving `rest` along, at most three times since hinges turn by pi at most. Springs 1 m too long get the same C.
 template <class Kind, class Positions>
 auto unclamped(Positions& x, const double* rest) {
   auto c = Kind::template evaluate<double>(x.data(), rest_values<Kind>(rest));
@@ -71,8 +68,8 @@ auto unclamped(Positions& x, const double* rest) {
   }
   return c;
 }
-/// Calls visit(Kind{}, list, alpha) for every kind that has constraints and an energy, or `rates` too;
-/// alpha(c) points to the compliances of the components of constraint c.
+/// Calls visit(Kind{}, list, alpha) for every kind that has constraints and an energy, with `rates` also for those of
+/// which only the change counts. alpha(c) points to the compliances of constraint c, by component.
 template <bool rates = false, class F>
 void for_each_elastic(const ConstraintSystem& system, const Compliances& compliances, F&& visit) {
   for_each_kind([&](auto kind, int k) {
@@ -86,27 +83,25 @@ void for_each_elastic(const ConstraintSystem& system, const Compliances& complia
   });
 }
 
-/// A vertex on a plane, and what that pushes it with, N.
+/// A vertex on a plane.
 struct Touching {
   std::uint32_t vertex, plane;
-  double force;
+  double force;  ///< N, of the plane
 };
 struct Minimum {
   Points positions;
   std::vector<Touching> touching;
   int iterations = 0;  ///< Newton steps taken
-  /// Norm of the gradient g in the inverse Hessian, sqrt(g . H^-1 g / unit): a number without unit. In a step
-  /// it bounds the RMS (by mass) distance to the minimiser over the body's size, as H >= M/h^2 but for
-  /// springs in compression. |g| over a typical force would not do: with stiff constraints rounding alone
-  /// makes forces larger than inertia's. Taken before the last step, which leaves about its square.
+  /// sqrt(g . H^-1 g / unit) before the last step, which leaves about its square. As H >= M/h^2 but for compressed
+  /// springs, it bounds the RMS distance (by mass) to the minimiser over the size. |g| over a typical force would not
+  /// do: with stiff constraints, forces by rounding alone exceed those of inertia.
   double residual = 0;
   bool converged = false;   ///< residual <= minimum_tolerance, and the Hessian is positive definite
-  const char* reason = "";  ///< why not
+  const char* reason = "";  ///< why it did not converge
 };
 constexpr double minimum_tolerance = 1e-10;
-/// A minimum of E, by Newton with an Armijo line search, among half spaces with an active set in each step
-/// (Nocedal and Wright 2006, ch. 16); of several minima, the one that `start` leads to.
-/// `most`: Newton steps, after which what there is counts as converged; 0: to convergence.
+/// The minimum of E to which `start` leads, by Newton with an Armijo line search, with an active set of half spaces in
+/// each step (Nocedal and Wright 2006, ch. 16). After `most` Newton steps, if not 0, it counts as converged.
 Minimum minimise(Objective objective, Points start, int most = 0);
 
 }  // namespace tetpbd

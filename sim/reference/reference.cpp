@@ -16,7 +16,6 @@ void require_compliances(const ConstraintSystem& system, const Compliances& comp
 }
 
 double error_to(const Model& model, const State& reference, const State& state) {
-  // The size metrics.cpp takes for rigid_distance: the mean of the bodies' by mass.
   double mass = 0, size = 0, squares = 0;
   for (std::size_t i = 0; i < model.masses.size(); ++i) {
     const glm::dvec3 apart = state.positions[i] - reference.positions[i];
@@ -24,10 +23,9 @@ double error_to(const Model& model, const State& reference, const State& state) 
     squares += model.masses[i] * glm::dot(apart, apart);
   }
   for (const Body& body : model.bodies) {
-    const auto first = model.rest.positions.begin() + std::ptrdiff_t(body.first_vertex);
     double body_mass = 0;
     for (std::size_t i = 0; i < body.vertices; ++i) body_mass += model.masses[body.first_vertex + i];
-    size += body_mass / mass * bounds(Points(first, first + std::ptrdiff_t(body.vertices))).size();
+    size += body_mass / mass * body_bounds(body, model.rest.positions).size();
   }
   return std::sqrt(squares / mass) / size;
 }

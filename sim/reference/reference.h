@@ -1,7 +1,6 @@
-// Right answers, in double, of what the solvers approximate: motions (motion.h) and minima of the energy
-// (objective.h). For comparing, not for speed: a Newton step takes 0.06 s at 3.5k tets and 0.4 s at 10k, a
-// step of the body 3 to 40 of them. No solver takes a motion from this room; mode explicit takes its longest
-// substep (leapfrog.h).
+// References, in double, for what the solvers approximate: motions (motion.h) and minima of the energy (objective.h).
+// They are slow: a Newton step takes 0.06 s at 3.5k tets and 0.4 s at 10k, and a step of a body 3 to 40 of them. The
+// solvers are independent of them, but for the longest substep of mode explicit (leapfrog.h).
 #pragma once
 
 #include <vector>
@@ -14,7 +13,7 @@
 
 namespace tetpbd {
 
-/// What is stepped. Of the settings: dt, substeps, gravity, damping, ground; the stiffnesses k play no part.
+/// The input of a reference run. The stiffnesses k and the solver among the settings play no part.
 struct ReferenceInput {
   const Model& model;
   const ConstraintSystem& system;
@@ -22,11 +21,11 @@ struct ReferenceInput {
   const std::vector<double>& inverse_masses;  ///< 1/kg, 0: fixed
 };
 
-/// Throws Error unless those of the kinds that have constraints are above 0, infinity included.
+/// Throws Error unless the compliances of all kinds that have constraints are above 0 (infinity is allowed).
 void require_compliances(const ConstraintSystem& system, const Compliances& compliances);
 
-/// RMS (by mass) distance of two states over the size of the body (mean by mass of several):
-/// `reference_distance`. No alignment: a displaced state is wrong.
+/// The RMS distance (by mass) of two states over the size of the body, of several the mean by mass. States are not
+/// aligned first: a displaced state has an error.
 double error_to(const Model& model, const State& reference, const State& state);
 
 }  // namespace tetpbd

@@ -18,23 +18,23 @@ glm::dvec3 angular_velocity(const RigidBody& b) {
   return b.rotation * (glm::inverse(b.inertia) * (glm::transpose(b.rotation) * b.angular));
 }
 
-glm::dmat3 turned(const glm::dmat3& rotation, const glm::dvec3& angle) {
+glm::dmat3 rotate(const glm::dmat3& rotation, const glm::dvec3& angle) {
   const double size = glm::length(angle);
   if (size == 0) return rotation;
   return glm::mat3_cast(glm::normalize(glm::angleAxis(size, angle / size) * glm::quat_cast(rotation)));
 }
 
-// Explicit midpoint: no torque acts on the way.
+// The explicit midpoint method; between contacts no torque acts.
 void move(RigidBody& b, double h) {
   b.centre += h * b.velocity;
   const glm::dmat3 start = b.rotation;
-  b.rotation = turned(start, h / 2 * angular_velocity(b));
+  b.rotation = rotate(start, h / 2 * angular_velocity(b));
   const glm::dvec3 spin = angular_velocity(b);
-  b.rotation = turned(start, h * spin);
+  b.rotation = rotate(start, h * spin);
   b.moved += h * (glm::length(b.velocity) + glm::length(spin) * b.radius);
 }
 
-// A body has many vertices, of which few come near an obstacle within many steps.
+// Of a body's many vertices, few come near an obstacle within many steps, so these are found anew only now and then.
 void find_near(RigidBody& b, const std::vector<MovingObstacle>& obstacles, bool moving) {
   if (b.moved <= 0.9 * b.reach && !moving) return;
   b.near.clear(), b.reach = 0.01 * b.radius, b.moved = 0;
@@ -46,46 +46,45 @@ void find_near(RigidBody& b, const std::vector<MovingObstacle>& obstacles, bool 
 }
 
 /// A vertex that touches an obstacle.
-struct Contact {
-  std::size_t number;   ///< of all pairs of obstacles and vertices
+struct ContactPoint {
+  std::size_t number;   ///< obstacle * vertices of the body + vertex
   glm::dvec3 arm;       ///< m, from the centre
   glm::dmat3 axes;      ///< columns: normal, two tangents
-  glm::dmat3 response;  ///< change of the contact's velocity by an impulse there, in those axes
-  double scale;         ///< of the iteration: 1 over the largest that `response` does
+  glm::dmat3 response;  ///< 1/kg, the change of the point's velocity by an impulse there, in those axes
+  double scale;         ///< kg, of the iteration: 1 over a bound of `response`
   double approach;      ///< m/s, normal velocity before
-  glm::dvec3 surface;   ///< m/s, the obstacle's there
+  glm::dvec3 surface;   ///< m/s, velocity of the obstacle there
   double friction, restitution;
   glm::dvec3 impulse{0};  ///< N s, in those axes
 };
 
-std::vector<Contact> find_contacts(const RigidBody& b, const std::vector<MovingObstacle>& obstacles,
-                                   const glm::dmat3& inverse) {
-  std::vector<Contact> found;
+std::vector<ContactPoint> find_contacts(const RigidBody& b, const std::vector<MovingObstacle>& obstacles,
+                                        const glm::dmat3& inverse) {
+  std::vector<ContactPoint> found;
   const glm::dvec3 spin = angular_velocity(b);
-  const auto add = [&](std::size_t number, const glm::dvec3& arm, const glm::dvec3& n, const MovingObstacle& o) {
-    const glm::dvec3 side = std::abs(n.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
-    const glm::dvec3 t = glm::normalize(glm::cross(n, side));
-    Contact c;
-    c.number = number, c.arm = arm, c.surface = o.velocity_at(b.centre + arm);
-    c.friction = o.own_friction ? o.friction : b.friction.value_or(o.friction), c.restitution = o.restitution;
-    c.axes = glm::dmat3(n, t, glm::cross(n, t));
-    const glm::dmat3 cross(glm::cross(c.arm, c.axes[0]), glm::cross(c.arm, c.axes[1]), glm::cross(c.arm, c.axes[2]));
-    c.response = glm::dmat3(1 / b.mass) + glm::transpose(cross) * inverse * cross;
-    c.scale = 1 / (c.response[0][0] + c.response[1][1] + c.response[2][2]);
-    c.approach = glm::dot(n, b.velocity + glm::cross(spin, c.arm) - c.surface);
-    found.push_back(c);
-  };
   for (std::size_t k = 0; k < obstacles.size(); ++k)
     for (const std::uint32_t i : b.near) {
+      const MovingObstacle& o = obstacles[k];
       const glm::dvec3 arm = b.rotation * b.rest[i];
-      const auto surface = obstacles[k].surface_at(b.centre + arm);
-      if (surface.distance <= 0) add(k * b.rest.size() + i, arm, surface.normal, obstacles[k]);
+      const auto [n, distance] = o.surface_at(b.centre + arm);
+      if (!(distance <= 0)) continue;
+      const glm::dvec3 side = std::abs(n.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+      const glm::dvec3 t = glm::normalize(glm::cross(n, side));
+      ContactPoint c;
+      c.number = k * b.rest.size() + i, c.arm = arm, c.surface = o.velocity_at(b.centre + arm);
+      c.friction = o.own_friction ? o.friction : b.friction.value_or(o.friction), c.restitution = o.restitution;
+      c.axes = glm::dmat3(n, t, glm::cross(n, t));
+      const glm::dmat3 cross(glm::cross(arm, c.axes[0]), glm::cross(arm, c.axes[1]), glm::cross(arm, c.axes[2]));
+      c.response = glm::dmat3(1 / b.mass) + glm::transpose(cross) * inverse * cross;
+      c.scale = 1 / (c.response[0][0] + c.response[1][1] + c.response[2][2]);
+      c.approach = glm::dot(n, b.velocity + glm::cross(spin, arm) - c.surface);
+      found.push_back(c);
     }
   return found;
 }
 
-// The impulse nearest to p in Coulomb's cone.
-glm::dvec3 into_cone(const glm::dvec3& p, double friction) {
+// The impulse in Coulomb's cone that is nearest to p.
+glm::dvec3 project_to_cone(const glm::dvec3& p, double friction) {
   const double slip = std::hypot(p.y, p.z);
   if (slip <= friction * p.x) return p;
   if (friction * slip <= -p.x) return glm::dvec3(0);
@@ -93,7 +92,7 @@ glm::dvec3 into_cone(const glm::dvec3& p, double friction) {
   return {normal, p.y * friction * normal / slip, p.z * friction * normal / slip};
 }
 
-// Whether the body's fixed vertices hold it. Throws Error where they leave it free to turn about them.
+// Whether fixed vertices hold the body. Throws Error where it can turn about them.
 bool is_held(const Model& model, const Body& body) {
   std::vector<glm::dvec3> fixed;
   for (std::size_t i = body.first_vertex; i < body.first_vertex + body.vertices; ++i)
@@ -113,8 +112,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
   std::vector<RigidBody> bodies;
   for (const Body& body : model.bodies) {
     RigidBody b;
-    b.first = body.first_vertex;
-    b.held = is_held(model, body), b.friction = body.friction;
+    b.first = body.first_vertex, b.held = is_held(model, body), b.friction = body.friction;
     glm::dvec3 rest_centre(0), momentum(0);
     const auto each = [&](auto&& visit) {
       for (std::size_t i = b.first; i < b.first + body.vertices; ++i) visit(i, model.masses[i]);
@@ -158,42 +156,42 @@ void advance(RigidBody& b, const Model& model, const Settings& settings, double 
   const std::vector<MovingObstacle> obstacles = obstacles_at(model, settings, b.time, h);
   b.time += h;
   find_near(b, obstacles, std::ranges::any_of(model.obstacles, moves));
-  std::vector<Contact> contacts = find_contacts(b, obstacles, inverse);
+  std::vector<ContactPoint> contacts = find_contacts(b, obstacles, inverse);
   b.velocity.y -= h * settings.gravity;
   glm::dvec3 spin = angular_velocity(b);
-  // They begin with the last step's, and so with little to do for a body that lies.
-  const auto give = [&](const Contact& c, const glm::dvec3& impulse) {
-    const glm::dvec3 push = c.axes * impulse;
-    b.velocity += push / b.mass;
-    spin += inverse * glm::cross(c.arm, push);
+  const auto apply = [&](const ContactPoint& c, const glm::dvec3& impulse) {
+    const glm::dvec3 in_world = c.axes * impulse;
+    b.velocity += in_world / b.mass;
+    spin += inverse * glm::cross(c.arm, in_world);
   };
-  for (Contact& c : contacts) {
-    const auto last = std::ranges::lower_bound(b.impulses, c.number, {}, [](const auto& of) { return of.first; });
-    if (last != b.impulses.end() && last->first == c.number) give(c, c.impulse = last->second);
+  // Impulses start from those of the last step, which are nearly those of a body that lies.
+  for (ContactPoint& c : contacts) {
+    const auto last = std::ranges::lower_bound(b.impulses, c.number, {}, [](const auto& one) { return one.first; });
+    if (last != b.impulses.end() && last->first == c.number) apply(c, c.impulse = last->second);
   }
-  // Each contact's impulse as it would be if the others stood, in turn, until they change nothing (de Saxce
-  // and Feng 1998: a step against the velocity, opened by the slip, and back into the cone).
+  // Each contact's impulse is found in turn with the others as they are (de Saxce and Feng 1998: a step against the
+  // velocity, opened by the slip, and a projection to the cone), until the body's motion changes no more. That settles
+  // long before the impulses that the contacts of a flat side share among them.
   constexpr int most_sweeps = 100000;
-  // The body's motion settles long before impulses that the contacts of a flat side share among them.
   const double enough = 1e-13 * (std::abs(settings.gravity) * h + glm::length(b.velocity));
   double change = contacts.empty() ? 0 : 1 + enough;
   for (int sweep = 0; sweep < most_sweeps && change > enough; ++sweep) {
     const glm::dvec3 velocity = b.velocity, turning = spin;
-    for (Contact& c : contacts) {
+    for (ContactPoint& c : contacts) {
       glm::dvec3 u = glm::transpose(c.axes) * (b.velocity + glm::cross(spin, c.arm) - c.surface);
       u.x += c.restitution * std::min(c.approach, 0.0);
       const glm::dvec3 before = c.impulse;
       for (int local = 0; local < 4; ++local) {
         const glm::dvec3 now = u + c.response * (c.impulse - before);
         const glm::dvec3 against(now.x + c.friction * std::hypot(now.y, now.z), now.y, now.z);
-        c.impulse = into_cone(c.impulse - c.scale * against, c.friction);
+        c.impulse = project_to_cone(c.impulse - c.scale * against, c.friction);
       }
-      give(c, c.impulse - before);
+      apply(c, c.impulse - before);
     }
     change = glm::length(b.velocity - velocity) + b.radius * glm::length(spin - turning);
   }
   b.impulses.clear();
-  for (const Contact& c : contacts) {
+  for (const ContactPoint& c : contacts) {
     b.angular += glm::cross(c.arm, c.axes * c.impulse);
     b.impulses.emplace_back(c.number, c.impulse);
   }

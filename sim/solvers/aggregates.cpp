@@ -18,11 +18,11 @@ namespace {
 constexpr std::uint32_t none = ~0u;
 
 struct Nearest {
-  std::vector<std::uint32_t> seed;  // which, by vertex
+  std::vector<std::uint32_t> seed;  // by vertex
   std::vector<double> distance;
 };
 
-// Dijkstra from all seeds at once.
+// Dijkstra's algorithm from all seeds from `first` on at once.
 void spread(const Model& model, const Grouped& neighbours, const std::vector<std::uint32_t>& seeds, std::size_t first,
             Nearest& nearest) {
   using Entry = std::pair<double, std::uint32_t>;
@@ -47,8 +47,8 @@ void spread(const Model& model, const Grouped& neighbours, const std::vector<std
   }
 }
 
-// Around evenly spread vertices (they are numbered along a curve), moved to the middle of what is nearest to
-// them a few times over (k-means).
+// Clusters by k-means: seeds begin evenly spread, as vertices are numbered along a curve, and move to the middle of
+// what is nearest to them a few times.
 Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wanted, std::vector<std::uint32_t>& seeds) {
   const std::size_t vertices = model.positions.size();
   std::vector<std::uint32_t> moving;
@@ -61,7 +61,7 @@ Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wante
     nearest.seed.assign(vertices, none);
     nearest.distance.assign(vertices, std::numeric_limits<double>::max());
     spread(model, neighbours, seeds, 0, nearest);
-    for (const std::uint32_t v : moving)  // a part that no seed is in
+    for (const std::uint32_t v : moving)  // A part without a seed gets one.
       if (nearest.seed[v] == none && seeds.size() < most_aggregates)
         seeds.push_back(v), spread(model, neighbours, seeds, seeds.size() - 1, nearest);
     if (round == 5) break;
@@ -72,8 +72,8 @@ Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wante
     for (const std::uint32_t v : moving) {
       const std::uint32_t s = nearest.seed[v];
       if (s == none) continue;
-      const double off = glm::distance(model.rest.positions[v], glm::dvec3(centres[s]) / centres[s].w);
-      if (off < best[s]) best[s] = off, seeds[s] = v;
+      const double distance = glm::distance(model.rest.positions[v], glm::dvec3(centres[s]) / centres[s].w);
+      if (distance < best[s]) best[s] = distance, seeds[s] = v;
     }
   }
   return nearest;
@@ -81,8 +81,8 @@ Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wante
 
 using Weights = std::vector<std::pair<std::uint32_t, double>>;  // aggregate, weight
 
-// Each round a vertex takes three fifths from its neighbours.
-std::vector<Weights> smoothed(const Model& model, const Grouped& neighbours, const Nearest& nearest) {
+// In each round a vertex takes over three fifths of its weights from its neighbours.
+std::vector<Weights> smooth_weights(const Model& model, const Grouped& neighbours, const Nearest& nearest) {
   std::vector<Weights> weights(nearest.seed.size()), next(nearest.seed.size());
   for (std::size_t v = 0; v < weights.size(); ++v)
     if (nearest.seed[v] != none) weights[v] = {{nearest.seed[v], 1}};
@@ -114,7 +114,8 @@ std::vector<Weights> smoothed(const Model& model, const Grouped& neighbours, con
   return weights;
 }
 
-std::array<Share, 4> shares_of(const Weights& weights) {
+// The four largest weights, which are scaled to add up to 1.
+std::array<Share, 4> make_shares(const Weights& weights) {
   std::array<Share, 4> shares{};
   double sum = 0;
   const std::size_t count = std::min<std::size_t>(weights.size(), 4);
@@ -128,9 +129,8 @@ std::array<Share, 4> shares_of(const Weights& weights) {
 }
 
 using Modes = Eigen::Matrix<double, 3, 6>;
-using Block = Eigen::Matrix<double, 6, 6>;
 
-// Displacements of a vertex with its aggregate: three ways, three turns.
+// How a vertex moves with an aggregate's three translations and three rotations.
 Modes modes(const Model& model, const Aggregates& aggregates, std::size_t v, const Share& share) {
   const Aggregate& aggregate = aggregates.all[share.aggregate];
   const glm::dvec3 r = (model.rest.positions[v] - aggregate.centre) / aggregate.reach;
@@ -141,7 +141,7 @@ Modes modes(const Model& model, const Aggregates& aggregates, std::size_t v, con
   return m * (double(share.weight) / 65535);
 }
 
-// Change it whenever what is made of the same mesh changes.
+// Has to change whenever the aggregates of the same mesh do.
 constexpr std::uint64_t cache_version = 1;
 
 std::uint64_t cache_key(const Model& model, const Grouped& neighbours, std::size_t wanted) {
@@ -151,7 +151,7 @@ std::uint64_t cache_key(const Model& model, const Grouped& neighbours, std::size
   return hash_values(neighbours.values, hash_values(neighbours.first, key));
 }
 
-bool take_aggregates(std::string_view bytes, std::uint64_t key, std::size_t vertices, Aggregates& result) {
+bool parse_aggregates(std::string_view bytes, std::uint64_t key, std::size_t vertices, Aggregates& result) {
   const auto sound = [&](const std::array<Share, 4>& shares) {
     return std::ranges::all_of(shares,
                                [&](const Share& s) { return s.weight == 0 || s.aggregate < result.all.size(); });
@@ -171,21 +171,21 @@ void list_members(Aggregates& result) {
 }  // namespace
 
 Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::size_t wanted) {
-  // Below, making them is as quick as reading them.
+  // Aggregates of smaller meshes are made as quickly as they are read.
   const bool large = model.positions.size() >= 10000;
   const std::uint64_t key = large ? cache_key(model, neighbours, wanted) : 0;
   const std::string file = fmt::format("{:016x}.aggregates", key);
   Aggregates result;
-  if (large && take_aggregates(read_cached(file), key, model.positions.size(), result)) {
+  if (large && parse_aggregates(read_cached(file), key, model.positions.size(), result)) {
     list_members(result);
     return result;
   }
   result = {};
   std::vector<std::uint32_t> seeds;
   const Nearest nearest = cluster(model, neighbours, wanted, seeds);
-  const auto weights = smoothed(model, neighbours, nearest);
+  const auto weights = smooth_weights(model, neighbours, nearest);
   result.of_vertex.resize(weights.size());
-  parallel_for(weights.size(), [&](std::size_t v) { result.of_vertex[v] = shares_of(weights[v]); });
+  parallel_for(weights.size(), [&](std::size_t v) { result.of_vertex[v] = make_shares(weights[v]); });
   result.all.resize(seeds.size());
   list_members(result);
   for (std::size_t a = 0; a < seeds.size(); ++a) {
@@ -209,7 +209,7 @@ Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::s
 std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows) {
   const auto count = Eigen::Index(6 * aggregates.all.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(count, count);
-  // Columns of one aggregate at a time; the matrix is symmetric.
+  // Each thread fills the columns of its aggregates; the matrix is symmetric.
   parallel_for(aggregates.all.size(), 1, [&](std::size_t a) {
     const auto add = [&](const Share& other, std::size_t v, const Eigen::Matrix<double, 6, 3>& from) {
       if (other.weight > 0)
@@ -232,11 +232,11 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
     }
   });
   A = (0.5 * (A + A.transpose())).eval();
-  // An aggregate of one vertex does not turn; what no member feels may have any value.
+  // An aggregate of one vertex has no rotation: whatever an unknown is that no member feels, the matrix stays regular.
   A.diagonal() *= 1 + 1e-6;
   if (count > 0) A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
   const Eigen::LLT<Eigen::MatrixXd> factors(A);
-  Eigen::MatrixXd& inverse = A;  // each part of its columns for itself
+  Eigen::MatrixXd& inverse = A;
   inverse.setIdentity();
   parallel_parts(std::size_t(count), 32, [&](std::size_t first, std::size_t end) {
     factors.solveInPlace(inverse.middleCols(Eigen::Index(first), Eigen::Index(end - first)));

@@ -1,5 +1,5 @@
-// Colours: constraints of one kind cut into sets that share no vertex, so that a set can be solved in any
-// order, or at once.
+// Colours: constraints of one kind cut into sets that share no vertex, so that a set can be solved in any order, or all
+// at once.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@
 namespace tetpbd {
 
 struct Coloured {
-  ConstraintList list;             ///< colour after colour, inside one by the smallest vertex number
+  ConstraintList list;             ///< colour after colour, in a colour by smallest vertex numbers
   std::vector<std::size_t> first;  ///< of each colour, and the end
 };
-/// Each constraint, by its smallest vertex number, has the first colour that none of its vertices has yet.
-/// Deterministic.
+/// Goes through the constraints by their smallest vertex numbers, and gives each the first colour that none of its
+/// vertices has yet.
 Coloured coloured(const ConstraintList& list, std::size_t vertices);
 
 }  // namespace tetpbd

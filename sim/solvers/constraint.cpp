@@ -1,5 +1,5 @@
-// Constraint-centric Jacobi (paper algorithm 3): one dispatch for the constraints of all kinds, a work-group
-// per patch of them, then one that averages.
+// Constraint-centric Jacobi (paper algorithm 3): one dispatch for the constraints of all kinds, with a work-group per
+// patch of them, then one that averages.
 #include "sim/solvers/jacobi.h"
 
 namespace tetpbd {

@@ -1,5 +1,5 @@
-// Non-linear Gauss-Seidel on one CPU core (method.md eq. 15), with contiguous constraints and everything
-// inlined: in float the paper's baseline, in double what stability is held against.
+// Non-linear Gauss-Seidel on one CPU core (method.md eq. 15): in float the paper's baseline, in double what stability
+// is compared with.
 #include <memory>
 
 #include "sim/sim.h"

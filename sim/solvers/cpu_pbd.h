@@ -1,6 +1,5 @@
-// PBD on the CPU, the same step as the GPU's, with the same formulas, in a precision of choice. State is in
-// double, so no small displacement is lost; constraints are evaluated in `real` from differences of
-// positions.
+// PBD on the CPU: the GPU's step with the same formulas. State is in double, so that no small displacement is lost, and
+// constraints are evaluated in `real` from differences of positions.
 #pragma once
 
 #include <array>
@@ -15,11 +14,11 @@
 
 namespace tetpbd {
 
-/// What constraints of a kind share (shaders/constraints/types.glsl, multiplier).
+/// What the constraints of a kind share (shaders/constraints/types.glsl, multiplier).
 template <class real>
 struct Rule {
   real k, limit, a, gamma, share;
-  double softness;  ///< of a material's compliance: 1/s^2, of rates 1/s
+  double softness;  ///< factor of a material's compliance, 1/s^2, of rates 1/s
   double h, omega;
   Rule(const Settings& settings, double substep, std::size_t kind, double longest, double relaxation = 1)
       : limit(real(longest)), h(substep), omega(relaxation) {
@@ -27,15 +26,15 @@ struct Rule {
     a = real(settings.compliance[kind] / (h * h));
     set(settings.stiffness[kind], settings.constraint_damping, constraint_kinds[kind]);
   }
-  /// Of a body with a material of its own; damping in s.
+  /// Takes over k, and damping in s, of a body with a material of its own.
   void set(double stiffness, double damping, const ConstraintKind& kind) {
     k = real(stiffness), gamma = real(damping / h);
-    const bool undamped = kind.rate || kind.components > 1;  // dashpots are in place of damping of these
+    const bool undamped = kind.rate || kind.components > 1;  // Such kinds are damped by dashpots instead.
     share = (undamped ? 1 : 1 + gamma) / real(omega);
   }
 };
 
-/// How much C changed from `then` to c, without cancellation; at positions x and start.
+/// How much C changed from `then`, at positions `start`, to c, at positions x, without cancellation.
 template <class Constraint, class Vector>
 [[gnu::always_inline]] inline auto constraint_change(const Constraint& c, const Constraint& then, const Vector* x,
                                                      const Vector* start) {
@@ -45,9 +44,8 @@ template <class Constraint, class Vector>
   return sum;
 }
 
-/// Projects one constraint (eqs. 4, 25-26, 32). `compliance`: of a material, or null; `vertices` tells of
-/// a vertex where it is (at), where it was at the substep's start (start), its inverse mass (weight), and
-/// takes its correction (move).
+/// Projects one constraint (eqs. 4, 25-26, 32). `compliance` is a material's, or null. `vertices` tells where a vertex
+/// is (at), where it was at the substep's start (start) and its inverse mass (weight), and applies a correction (move).
 template <class Kind, class real, class Vertices>
 [[gnu::always_inline]] inline void project(const std::uint32_t* ids, const real* rest, const double* compliance,
                                            const Rule<real>& rule, real* multipliers, Vertices&& vertices,
@@ -88,14 +86,14 @@ template <class Kind, class real, class Vertices>
     for (std::size_t g = 0; g < GUARDS; ++g) guards[g] += triggered >> g & 1;
 }
 
-/// The longest correction of one constraint, m. Shorter with mass splitting, so that the fixed-point sums are
-/// finer: their rounding is what moves the centre of a free body then.
+/// The longest correction of one constraint, m. It is shorter with mass splitting, so that the fixed-point sums are
+/// finer: only their rounding moves the centre of a free body then.
 inline double longest_correction(const Model& model, const Settings& settings) {
   return splits_masses(model, settings) ? model.size / 64 : model.size;
 }
 
-/// `jacobi`: all corrections from the same positions, averaged with omega / n_i, or with
-/// compliance masses split. `gauss_seidel`: one after the other.
+/// Jacobi makes all corrections from the same positions and averages them with omega / n_i, or splits masses;
+/// Gauss-Seidel projects one constraint after the other.
 enum class Sweep { jacobi, gauss_seidel };
 
 template <class real>
@@ -117,11 +115,10 @@ class CpuPbd {
     });
   }
 
-  /// Goes on with one that differs in its obstacles alone.
+  /// Goes on with a model that differs in its obstacles alone.
   void change_model(const Model& model) { model_ = &model, pairs_.change_model(model); }
 
-  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26). Returns how often each guard
-  /// triggered.
+  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26).
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep,
                    double time = 0) {
     const bool jacobi = sweep == Sweep::jacobi, soft = any_material(*model_, settings, compliant);
@@ -196,7 +193,7 @@ class CpuPbd {
   PairContact pairs_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;
-  // Of materials; else empty.
+  // What materials give constraints, else empty.
   struct Own {
     std::vector<double> compliance, stiffness, damping;
   };

@@ -1,7 +1,6 @@
-// Leapfrog on the GPU (method.md, "Explicit steps"): a substep is one dispatch, and there are as many as stay
-// stable. A body that deforms becomes stiffer than it is at rest, and a substep that was stable is too long
-// then: kernels note the stiffest constraint of a step, and the answer comes back some steps later, always as
-// many, so that a run is the same every time.
+// Leapfrog on the GPU (method.md, "Explicit steps"): a substep is one dispatch, and there are as many as stay stable.
+// As a body deforms it may become stiffer, and a substep that was stable too long. So kernels note the stiffest
+// constraint of a step, and the readback comes always as many steps later, so that a run is the same every time.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -11,13 +10,12 @@
 #include "sim/model/material.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/sim.h"
-#include "sim/solvers/node.h"
+#include "sim/solvers/jacobi.h"
 
 namespace tetpbd {
 
 double stiffening_for(double stiffer, double stability) {
-  // The bound moves with the largest eigenvalue but not exactly, and the body goes on deforming until the
-  // answer comes.
+  // The bound follows the largest eigenvalue, but not exactly, and the body goes on deforming until the readback.
   constexpr double safe = 0.7, most = 32;
   const double needed = std::sqrt(stiffer) * stability / std::max(safe, stability);
   if (!(needed > 1)) return 1;
@@ -35,12 +33,13 @@ namespace {
 
 ReferenceInput reference_input(const Sim& sim) { return {*sim.model, sim.system, sim.settings, sim.inverse_masses}; }
 
-// As kernels note it (project.glsl).
+// The value that kernels note (NOTE_STIFFNESS).
 double stiffest(const Sim& sim, const std::vector<glm::dvec3>& positions) {
   return stiffest_constraint(reference_input(sim), sim.settings.compliance, positions);
 }
 
-// As many substeps as are asked for, or as stay stable, `stiffening` times as short as at rest.
+// Takes as many substeps as are asked for, or more where stability needs them: a stable one is `longest` at rest, else
+// 1 / stiffening of that.
 Plan make_plan(const Settings& settings, double longest, double stiffening) {
   const double at_rest = longest > 0 ? settings.dt / (settings.stability * longest) : 0;
   constexpr double most = 100000;
@@ -54,7 +53,7 @@ Plan make_plan(const Settings& settings, double longest, double stiffening) {
   return plan;
 }
 
-// Other accelerations come in by halves where the length of a substep changes (PHASE_CHANGED).
+// Where the length of a substep changes, the next change of velocities spans half of either length (PHASE_CHANGED).
 void set_stiffening(Sim& sim, double stiffening) {
   const int before = sim.plan.substeps;
   sim.adaptive.stiffening = stiffening;
@@ -66,14 +65,14 @@ void set_stiffening(Sim& sim, double stiffening) {
 
 void watch_stiffness(Sim& sim) {
   AdaptiveSubsteps& w = sim.adaptive;
-  const auto answer = poll_notes(sim);
+  const auto notes = poll_notes(sim);
   const double noted_h = std::exchange(w.noted_h, sim.plan.h);
-  if (!answer || !(answer->front() > 0) || !std::isfinite(answer->front())) return;  // 0: nothing was noted yet
-  const double stiffer = answer->front() / (noted_h * noted_h * w.at_rest);
-  const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next answer, if it goes on so
+  if (!notes || !(notes->front() > 0) || !std::isfinite(notes->front())) return;  // 0: nothing was noted yet
+  const double stiffer = notes->front() / (noted_h * noted_h * w.at_rest);
+  const double next = stiffer + std::max(0.0, stiffer - w.stiffer);  // by the next readback, if it goes on so
   w.stiffer = stiffer;
   const double needed = stiffening_for(next, sim.settings.stability);
-  // Up at once; down a quarter at a time, as bodies swing.
+  // The number of substeps rises at once, and falls in small steps, because bodies swing.
   w.calm_readbacks = needed < w.stiffening ? w.calm_readbacks + 1 : 0;
   if (needed > w.stiffening) set_stiffening(sim, needed);
   if (w.calm_readbacks == 16) w.calm_readbacks = 0, set_stiffening(sim, std::max(1.0, w.stiffening * std::exp2(-0.25)));
@@ -120,8 +119,7 @@ Solver create_explicit_solver(const SolverInput& input) {
     unsigned phases = PHASE_PREDICT | PHASE_SOLVE | PHASE_FINISH | sim.pairs.phases;
     if (substep == 0 && sim.adaptive.readback)
       phases |= PHASE_WATCH | (std::exchange(sim.adaptive.changed, false) ? PHASE_CHANGED : 0u);
-    const std::size_t velocities = 2 * sim.model->positions.size() * sizeof(Velocity);
-    run_kernel(sim, *pass, phases, "", velocities);
+    run_kernel(sim, *pass, phases, "", 2 * sim.model->positions.size() * sizeof(Velocity));
     turn_quantized(sim);
   };
   return solver;

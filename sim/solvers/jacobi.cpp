@@ -1,7 +1,5 @@
 #include "sim/solvers/jacobi.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <memory>
 
@@ -12,26 +10,20 @@ namespace tetpbd {
 
 namespace {
 
-std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
-
-// What it wrote is read from then on.
 void move_vertices(Sim& sim, Pass& pass, unsigned phases) {
+  // How often velocities and predicted positions are read or written.
+  static constexpr struct {
+    const char* name;
+    std::size_t accesses;
+  } variants[] = {{"", 0}, {", predict", 3}, {", finish", 3}, {", predict, finish", 2}};
   const bool predicts = phases & PHASE_PREDICT, finishes = phases & PHASE_FINISH;
-  // Velocities and predicted positions, there or back.
-  const std::size_t bytes = sim.model->positions.size() * sizeof(Velocity) *
-                            (predicts && finishes   ? 2
-                             : predicts || finishes ? 3
-                                                    : 0);
-  run_kernel(sim, pass, phases | (predicts ? sim.pairs.phases : 0),
-             predicts && finishes ? ", predict, finish"
-             : predicts           ? ", predict"
-             : finishes           ? ", finish"
-                                  : "",
-             bytes);
+  const auto& [name, accesses] = variants[predicts + 2 * finishes];
+  run_kernel(sim, pass, phases | (predicts ? sim.pairs.phases : 0), name,
+             accesses * sim.model->positions.size() * sizeof(Velocity));
   turn_quantized(sim);
 }
 
-// Prediction and velocities ride on the first and last iteration, but where the mode has them apart.
+// The first iteration predicts and the last one makes velocities, unless the mode has dispatches of their own for that.
 void run_substep(Sim& sim, JacobiPasses& jacobi) {
   const int iterations = sim.plan.iterations;
   const bool apart = jacobi.unfused || iterations == 0;

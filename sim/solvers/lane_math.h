@@ -1,5 +1,5 @@
-// Functions that compilers call from the library one lane at a time, written so that a loop over lanes
-// vectorises. For float only.
+// Functions of float that compilers would call from the library one lane at a time, written so that a loop over lanes
+// is vectorized.
 #pragma once
 
 #include <bit>
@@ -23,7 +23,7 @@ struct LaneMath {
     angle = x < 0 ? 3.14159265f - angle : angle;
     return y < 0 ? -angle : angle;
   }
-  /// x^(2/3) of x >= 0, to 5e-7 of itself from 1e-30 on: what formulas ask for, whatever the second argument.
+  /// x^(2/3) of x >= 0, which is all that formulas ask for, to 5e-7 of itself from 1e-30 on.
   static float pow(float x, float) {
     // A third of the exponent is 5 % off; Halley's iteration for the cube root triples the digits.
     float root = std::bit_cast<float>(std::bit_cast<std::int32_t>(x) / 3 + 709921077);
@@ -33,7 +33,7 @@ struct LaneMath {
     }
     return root * root;
   }
-  /// Of x > 0, to 2e-7 of the larger of 1 and the result. Polynomial of Cephes' logf (Moshier 1989).
+  /// The logarithm of x > 0, to 2e-7 of the larger of 1 and the result. Polynomial of Cephes' logf (Moshier 1989).
   static float log(float x) {
     const std::int32_t bits = std::bit_cast<std::int32_t>(x);
     std::int32_t exponent = (bits >> 23) - 126;

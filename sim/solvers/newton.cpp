@@ -13,23 +13,22 @@ namespace tetpbd {
 
 namespace {
 
-// Of rigid motions of aggregates, made in a thread for certain forces and a certain substep; what was made
-// before serves meanwhile. Taken over so many steps later, waiting if need be: runs are the same whatever the
-// machine does.
+// A refresh of the coarse level, which a thread makes while the present one is in use. It is taken over a fixed number
+// of steps later, waiting if need be, so that runs are the same whatever the machine does.
 struct Refresh {
   std::future<std::vector<glm::vec4>> inverse;
-  long steps = 0;      ///< until then
-  bool again = false;  ///< settings have changed since
+  long steps = 0;      ///< until it is taken over
+  bool again = false;  ///< settings have changed since it began
 };
 
 struct Newton {
   Pass begin, predict, start, linearise, residual, update, coarse, prolong, product, finish;
-  Pass momentum;  ///< none where every body is held
+  Pass momentum;  ///< only where a body is free
   std::shared_ptr<const NewtonLevels> levels;
   NewtonBuffers layout;
-  std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0;  ///< of Solver::buffers
+  std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0;  ///< indices of Solver::buffers
   Refresh refresh;
-  double refreshed_for = 0;  ///< s, the substep of the inverse that was made last
+  double refreshed_for = 0;  ///< s, the substep of the last refresh
 };
 
 Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
@@ -78,7 +77,7 @@ void begin_refresh(Sim& sim, Newton& n) {
                                               plan = sim.plan, levels = n.levels, layout = n.layout] {
     return fill_newton_coarse({*model, system, settings, plan, {}}, *levels, layout);
   });
-  r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as it takes, at real time
+  r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as the thread takes, at real time
 }
 
 void end_refresh(Sim& sim, Newton& n) {
@@ -88,7 +87,7 @@ void end_refresh(Sim& sim, Newton& n) {
   if (n.refresh.again) begin_refresh(sim, n);
 }
 
-// At once, for the plan of now.
+// Refreshes at once, for the present plan.
 void refresh(Sim& sim, Newton& n) {
   while (n.refresh.inverse.valid()) end_refresh(sim, n);
   if (n.refreshed_for == sim.plan.h) return;
@@ -108,12 +107,11 @@ void set_substep_factor(Sim& sim, Newton& n, int times) {
   write_step_block(sim);
 }
 
-// Four times the substeps while the body is unhealthy, or near another that it may touch, and some answers
-// longer. Of a block of 100 MPa and Poisson's ratio 0.495, by 8 iterations, 28 of 37 hard cases end well so,
-// and 7 without. A block that spins at 100 rad/s loses 20 % of its spin in half a second in two substeps of
-// 5 ms, 1 % so.
+// Takes more substeps while a body is unhealthy or near another, and some readbacks longer. With them 28 of 37 hard
+// cases of a block of 100 MPa and Poisson's ratio 0.495 end well by 8 iterations, without 7. A block that spins at 100
+// rad/s loses 20 % of its spin in half a second in two substeps of 5 ms, with them 1 %.
 void adapt_substeps(Sim& sim, Newton& n) {
-  constexpr int enough = 8, most = 100;  // answers
+  constexpr int enough = 8, most = 100;  // readbacks
   AdaptiveSubsteps& w = sim.adaptive;
   const bool near = sim.pairs && sim.pairs.near;
   w.calm_readbacks = w.health < LEAST_HEALTH || near ? 0 : w.calm_readbacks + 1;
@@ -127,7 +125,7 @@ void adapt_substeps(Sim& sim, Newton& n) {
   if (w.substep_factor > 1 && w.refined_readbacks == most) set_substep_factor(sim, n, 1);
 }
 
-// rad/s, of the body that spins the fastest.
+// rad/s of the body that spins fastest.
 double fastest_spin(const Model& model, const State& state) {
   double fastest = 0;
   for (const Body& body : model.bodies) {
@@ -174,11 +172,9 @@ void retune(Sim& sim, Newton& n, const Settings* before) {
   const Buffer& mesh = sim.solver.buffers[n.mesh];
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping, plan_for(s).h); };
   const bool others = !same_constraints(*sim.model, *before, sim.settings);
-  for (std::size_t k = 0; others && k < kind_count; ++k) {
-    write(mesh, n.layout.constraints[k].values, to_floats(sim.system.lists[k].rest));
-    write(mesh, n.layout.constraints[k].compliances, to_floats(sim.system.lists[k].compliance));
-    write(mesh, n.layout.constraints[k].dampings, to_floats(sim.system.lists[k].damping));
-  }
+  for (std::size_t k = 0; others && k < kind_count; ++k)
+    for (const auto& [name, array, range] : constraint_arrays)
+      write(mesh, n.layout.constraints[k].*range, to_floats(sim.system.lists[k].*array));
   if (others || forces(*before) != forces(sim.settings)) begin_refresh(sim, n);
 }
 
@@ -210,7 +206,7 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.refresh = [made](Sim& sim) { refresh(sim, *made); };
   solver.carried = [made](Sim& sim, Carried& all) {
     const std::vector<Buffer>& buffers = sim.solver.buffers;
-    for (const std::size_t slot : {newton::WAY, newton::GAIN})
+    for (const std::size_t slot : {newton::DISPLACEMENT, newton::GAIN})
       all.ranges.push_back({&buffers[made->vectors], made->layout.slots[slot].at, made->layout.slots[slot].bytes()});
     all.ranges.push_back({&buffers[made->sums], made->layout.rotations.at, made->layout.rotations.bytes()});
   };

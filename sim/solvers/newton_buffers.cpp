@@ -11,7 +11,7 @@ namespace tetpbd {
 
 namespace {
 
-// Enough to carry what 3x3 blocks alone do not in a few iterations, and few enough to invert.
+// Enough for what 3x3 blocks alone do not solve in a few iterations, and few enough for a dense inverse.
 std::size_t choose_aggregates(std::size_t vertices) {
   return std::size_t(std::clamp(1.3 * std::sqrt(double(vertices)), 1.0, double(most_aggregates)));
 }
@@ -84,26 +84,20 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
   to.first_member = to.mesh.add<std::uint32_t>("first_member", sizes.aggregates + 1);
   to.members = to.mesh.add<glm::uvec2>("members", sizes.members);
   to.free_bodies = to.mesh.add<newton::FreeBody>("free_bodies", sizes.free_bodies);
-  const auto add_by_kind = [&](const char* what, auto&& add) {
+  const auto for_each_list = [&](const char* what, auto&& add) {
     for (std::size_t k = 0; k < kind_count; ++k)
       if (system.present[k])
         add(fmt::format("{}_{}", what, constraint_kinds[k].name), system.lists[k], to.constraints[k]);
   };
-  using List = const ConstraintList&;
-  add_by_kind("vertices", [&](const std::string& name, List list, auto& of_kind) {
+  for_each_list("vertices", [&](const std::string& name, const ConstraintList& list, auto& ranges) {
     const std::size_t at = list.arity == 2 ? to.mesh.add<glm::uvec2>(name, list.count()).at
                                            : to.mesh.add<glm::uvec4>(name, list.count()).at;
-    of_kind.vertices = {at, list.vertices.size()};
+    ranges.vertices = {at, list.vertices.size()};
   });
-  add_by_kind("values", [&](const std::string& name, List list, auto& of_kind) {
-    of_kind.values = to.mesh.add<float>(name, list.rest.size());
-  });
-  add_by_kind("compliances", [&](const std::string& name, List list, auto& of_kind) {
-    of_kind.compliances = to.mesh.add<float>(name, list.compliance.size());
-  });
-  add_by_kind("dampings", [&](const std::string& name, List list, auto& of_kind) {
-    of_kind.dampings = to.mesh.add<float>(name, list.damping.size());
-  });
+  for (const auto& [what, array, range] : constraint_arrays)
+    for_each_list(what, [&, a = array, r = range](const std::string& name, const ConstraintList& list, auto& ranges) {
+      ranges.*r = to.mesh.add<float>(name, (list.*a).size());
+    });
 
   to.centres = to.coarse.add<glm::vec4>("centres", sizes.aggregates);
   to.coarse_inverse = to.coarse.add<glm::vec4>("coarse_inverse", sizes.unknowns() * sizes.coarse_row());
@@ -148,11 +142,8 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
   for (const NewtonGraph::Use& use : graph.uses) uses.push_back(use.packed);
   for (std::size_t n = 0; n < graph.edge_of.size(); ++n)
     neighbours.push_back({graph.edge_of[n], graph.neighbours.values[n]});
-  for (const auto& of_vertex : aggregates.of_vertex) {
-    shares.emplace_back();
-    for (glm::length_t k = 0; k < 4; ++k)
-      shares.back()[k] = PACKED_SHARE(of_vertex[std::size_t(k)].aggregate, of_vertex[std::size_t(k)].weight);
-  }
+  const auto pack = [](const Share& share) { return PACKED_SHARE(share.aggregate, share.weight); };
+  for (const auto& [a, b, c, d] : aggregates.of_vertex) shares.push_back({pack(a), pack(b), pack(c), pack(d)});
   for (const std::uint32_t m : aggregates.members.values)
     members.push_back({m / 4, aggregates.of_vertex[m / 4][m % 4].weight});
   std::vector<std::byte> contents(layout.mesh.bytes);
@@ -166,16 +157,15 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
   put(contents, layout.free_bodies, free_bodies);
   for (std::size_t k = 0; k < kind_count; ++k) {
     put(contents, layout.constraints[k].vertices, system.lists[k].vertices);
-    put(contents, layout.constraints[k].values, to_floats(system.lists[k].rest));
-    put(contents, layout.constraints[k].compliances, to_floats(system.lists[k].compliance));
-    put(contents, layout.constraints[k].dampings, to_floats(system.lists[k].damping));
+    for (const auto& [name, array, range] : constraint_arrays)
+      put(contents, layout.constraints[k].*range, to_floats(system.lists[k].*array));
   }
   return contents;
 }
 
 std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const NewtonLevels& levels,
                                           const NewtonBuffers& layout) {
-  const double h = input.plan.h * 2 / 3;  // BDF2's
+  const double h = input.plan.h * 2 / 3;  // s, by which BDF2 multiplies a velocity
   std::vector<double> inertia;
   for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
   const std::vector<glm::dmat3> blocks = compute_blocks_at_rest(input, levels.graph, h);

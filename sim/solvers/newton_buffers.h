@@ -1,5 +1,4 @@
-// The buffers of mode newton (newton/newton.glsl): how many of what is in them, where it lies, and what it is
-// at the start.
+// The buffers of mode newton (newton/newton.glsl): sizes, layouts, and first contents.
 #pragma once
 
 #include <array>
@@ -15,25 +14,25 @@ inline constexpr std::size_t std430_alignment<newton::BodyMotion> = 16;
 template <>
 inline constexpr std::size_t std430_alignment<newton::MomentumSums> = 16;
 
-/// What stays when forces or the length of a substep change.
+/// What does not depend on forces and on the length of a substep.
 struct NewtonLevels {
   NewtonGraph graph;
   Aggregates aggregates;
-  std::vector<newton::FreeBody> free_bodies;  ///< those that nothing holds
+  std::vector<newton::FreeBody> free_bodies;  ///< bodies without a fixed vertex
 };
 NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system);
 
-/// Sizes of work-groups and of what kernels work on.
+/// Sizes of work-groups and of the arrays that kernels work on.
 struct NewtonSizes {
   std::size_t vertices, edges, uses, members, aggregates, free_bodies;
   std::size_t group;           ///< invocations of a work-group
   std::size_t product_groups;  ///< work-groups of a product with the matrix
   std::size_t parts;           ///< work-groups that add up a free body's momentum
-  std::size_t tets;            ///< of the kind that has most, which Newton's start is checked for
+  std::size_t tets;            ///< constraints of the largest kind of tets, for which Newton's start is checked
   std::size_t unknowns() const { return 6 * aggregates; }
   std::size_t coarse_row() const { return (unknowns() + 3) / 4; }  ///< vec4s of a row of the coarse matrix
   static constexpr std::size_t lanes = 4;                          ///< invocations for a row of the matrix
-  static constexpr std::size_t row_lanes = 32;                     ///< and for one of the coarse matrix
+  static constexpr std::size_t row_lanes = 32;                     ///< invocations for a row of the coarse matrix
 };
 NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels);
 std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverInput& input);
@@ -53,13 +52,22 @@ struct NewtonBuffers {
   Range<glm::vec4> centres, coarse_inverse;
   Range<glm::vec4> rotations;
 };
+/// The arrays of floats that each kind of constraint has in `mesh`.
+struct ConstraintArray {
+  const char* name;
+  std::vector<double> ConstraintList::*array;
+  Range<float> NewtonBuffers::Constraints::*range;
+};
+inline constexpr ConstraintArray constraint_arrays[] = {
+    {"values", &ConstraintList::rest, &NewtonBuffers::Constraints::values},
+    {"compliances", &ConstraintList::compliance, &NewtonBuffers::Constraints::compliances},
+    {"dampings", &ConstraintList::damping, &NewtonBuffers::Constraints::dampings}};
 NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system);
 
-/// The contents of `vectors`, at rest.
+/// The contents of `vectors` at rest, of `mesh`, and of `coarse`.
 std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels, const NewtonBuffers& layout);
 std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
                                         const NewtonBuffers& layout);
-/// The contents of `coarse`.
 std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const NewtonLevels& levels,
                                           const NewtonBuffers& layout);
 

@@ -50,7 +50,7 @@ NewtonGraph build_newton_graph(const ConstraintSystem& system, std::size_t verti
 
 namespace {
 
-// A constraint's block of the matrix at rest, as element_N.glsl has it.
+// A constraint's block of the matrix at rest, as in element.glsl.
 template <class Kind>
 glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList& list, std::size_t c, int i, int j,
                                  double h) {

@@ -1,5 +1,4 @@
-// The matrix of mode newton as a graph: its edges, what uses of constraints they add up, and its blocks at
-// rest.
+// The matrix of mode newton as a graph: its edges, the uses of constraints that these add up, and its blocks at rest.
 #pragma once
 
 #include "sim/parallel.h"
@@ -24,10 +23,10 @@ struct NewtonGraph {
     std::uint32_t packed;
     auto operator<=>(const Use&) const = default;
   };
-  std::vector<Use> uses;                 ///< in order
-  std::vector<std::uint32_t> first_use;  ///< of each edge, and the end
-  Grouped neighbours;                    ///< of each vertex
-  std::vector<std::uint32_t> edge_of;    ///< by neighbour, times 2, and 1 where the vertex is its second
+  std::vector<Use> uses;                 ///< sorted
+  std::vector<std::uint32_t> first_use;  ///< by edge, and the end
+  Grouped neighbours;                    ///< by vertex
+  std::vector<std::uint32_t> edge_of;    ///< by neighbour: edge * 2, and 1 where the vertex is its second
   std::size_t edges() const { return first_use.size() - 1; }
   std::uint32_t first(std::size_t e) const { return std::uint32_t(uses[first_use[e]].edge >> 32); }
   std::uint32_t second(std::size_t e) const { return std::uint32_t(uses[first_use[e]].edge); }
@@ -35,7 +34,7 @@ struct NewtonGraph {
 /// Throws Error where a kind has more constraints than a use can name.
 NewtonGraph build_newton_graph(const ConstraintSystem& system, std::size_t vertices);
 
-/// By neighbour, J/m^2, for steps of BDF2 of `h` seconds.
+/// Blocks by neighbour, J/m^2, for steps of BDF2 of `h` seconds.
 std::vector<glm::dmat3> compute_blocks_at_rest(const SolverInput& input, const NewtonGraph& graph, double h);
 
 }  // namespace tetpbd

@@ -1,7 +1,4 @@
-// Node-centric Jacobi: one dispatch per iteration, whatever the number of constraint kinds (paper algorithm
-// 2).
-#include "sim/solvers/node.h"
-
+// Node-centric Jacobi: one dispatch per iteration, whatever the number of constraint kinds (paper algorithm 2).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,18 +6,18 @@
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
 #include "sim/gl/layout.h"
+#include "sim/solvers/jacobi.h"
 
 namespace tetpbd {
 
 namespace {
 
-// How vertices are cut into work-groups: by size, not by timing, so that the same mesh is always cut alike. A
-// small mesh needs a patch for every part of the GPU, and an invocation for each of its constraints; a large
-// one gains from large patches, in which fewer constraints belong to two, and from small work-groups, of
-// which a part of the GPU runs many.
-// A kernel that knows more than planes needs so many registers that fewer work-groups run side by side.
-Cut cut_for(std::size_t vertices, bool solids, bool software) {
+// How vertices are cut into work-groups, by size and not by timing, so that the same mesh is always cut alike. A small
+// mesh needs a patch for every part of the GPU, and an invocation for each constraint. A large one gains from large
+// patches, which share fewer constraints, and from small work-groups, of which a part of the GPU runs many.
+Cut choose_cut(std::size_t vertices, bool solids, bool software) {
   if (software) return {64, 64};
+  // A kernel that knows more than planes needs so many registers that fewer work-groups run side by side.
   if (solids && vertices <= 4000) return {32, 512};
   if (solids && vertices <= 14000) return {32, 256};
   if (vertices <= 4000) return {16, 512};
@@ -34,7 +31,7 @@ Cut cut_for(std::size_t vertices, bool solids, bool software) {
 
 Pass make_vertex_patch_pass(Solver& solver, const SolverInput& input, const char* shader, bool multipliers) {
   const std::size_t vertices = input.model.positions.size();
-  const Cut cut = tuned(cut_for(vertices, !solid_obstacles(input.model).empty(), input.software), input.tuning);
+  const Cut cut = tuned(choose_cut(vertices, !solid_obstacles(input.model).empty(), input.software), input.tuning);
   if (cut.patch > std::min<std::size_t>(cut.group, Patches::most_vertices - 4))
     throw Error("a patch does not fit a work-group",
                 fmt::format("{} vertices, work-groups of {}", cut.patch, cut.group),

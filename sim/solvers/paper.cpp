@@ -1,5 +1,5 @@
-// The paper's GPU pipeline as published, the baseline of `bench`: predict, a dispatch per constraint kind
-// with float atomics made of compare-and-swap, average, update; work-groups of 1024; one thread per vertex.
+// The paper's GPU pipeline as published, the baseline of `bench`: predict, a dispatch per constraint kind with float
+// atomics made of compare-and-swap, average, update, in work-groups of 1024.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,9 +13,9 @@ namespace tetpbd {
 
 namespace {
 
-// Neighbours in one work-group swap at the same vertices and wait for each other: on an NVIDIA H200 an
-// iteration on the bunny takes 1.16 times as long in TetGen's order, 1.21 along a curve.
-ConstraintList shuffled(const ConstraintList& list) {
+// Neighbours in one work-group would add to the same vertices and wait for each other: on an NVIDIA H200 an iteration
+// on the bunny takes 1.16 times as long in TetGen's order, and 1.21 times along a curve.
+ConstraintList shuffle(const ConstraintList& list) {
   std::vector<std::size_t> order(list.count());
   std::iota(order.begin(), order.end(), 0);
   std::shuffle(order.begin(), order.end(), std::mt19937(1));
@@ -36,7 +36,7 @@ Solver create_paper_solver(const SolverInput& input) {
   for (std::size_t k = 0, index = 0; k < kind_count; ++k) {
     if (!input.system.present[k]) continue;
     const std::size_t arity = std::size_t(constraint_kinds[k].arity), count = input.system.lists[k].count();
-    Buffer records = record_buffer(shuffled(input.system.lists[k]), constraint_kinds[k].name);
+    Buffer records = record_buffer(shuffle(input.system.lists[k]), constraint_kinds[k].name);
     check_storage(input.tuning, records.label(), records.bytes());
     const std::size_t bytes = count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
     jacobi.passes.push_back(

@@ -13,18 +13,16 @@ namespace {
 
 using Record = std::array<std::uint32_t, 2>;  // vertices, constraint
 
-// A chunk as it is written.
 struct Chunk {
   std::vector<std::uint32_t> vertices;
   std::array<std::vector<Record>, kind_count> records;
   std::size_t owned = 0;
 };
 
-// Adds constraints to one chunk after the other.
 class ChunkWriter {
  public:
   explicit ChunkWriter(const ConstraintSystem& system) : system_(system), local_(system.at_vertex.size(), none) {}
-  /// The vertex's number in the chunk, which has it from now on.
+  /// Adds the vertex to the chunk if it is not there yet, and returns its number in it.
   std::uint32_t vertex(std::uint32_t v) {
     if (local_[v] == none) {
       local_[v] = std::uint32_t(chunk_.vertices.size());
@@ -32,7 +30,7 @@ class ChunkWriter {
     }
     return local_[v];
   }
-  /// False, and nothing done, if it has more vertices than fit.
+  /// Returns false, and adds nothing, if the constraint has more vertices than fit.
   bool add(std::size_t kind, std::uint32_t constraint) {
     const ConstraintList& list = system_.lists[kind];
     const auto ends = list.ends(constraint);
@@ -43,7 +41,7 @@ class ChunkWriter {
     chunk_.records[kind].push_back(record);
     return true;
   }
-  /// The chunk; the next one begins. It owns its first vertices, as many as `owned` if it has more.
+  /// Returns the chunk and begins the next one. The chunk owns at most its first `owned` vertices.
   Chunk close(std::size_t owned = Patches::most_vertices) {
     for (std::uint32_t v : chunk_.vertices) local_[v] = none;
     chunk_.owned = std::min(owned, chunk_.vertices.size());
@@ -53,12 +51,11 @@ class ChunkWriter {
  private:
   static constexpr std::uint32_t none = ~0u;
   const ConstraintSystem& system_;
-  std::vector<std::uint32_t> local_;  // of a vertex, its number in the chunk
+  std::vector<std::uint32_t> local_;  // a vertex's number in the chunk
   Chunk chunk_;
 };
 
-// The chunks of all patches as patches.h lays them out: the first of each patch, then what they need beyond.
-// Each gets the same room for its vertices, the rest of it copies of the first.
+// Lays out the chunks of all patches. Each has room for as many vertices, filled up with copies of its first.
 Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<Chunk>>& patches) {
   Patches result;
   result.count = patches.size();
@@ -84,7 +81,7 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
     words.resize(2 * record_pairs(list));
     for (std::size_t w = 0; w < words.size(); w += 2) result.records.push_back({words[w], words[w + 1]});
   };
-  std::size_t further = patches.size();  // where the next chunk goes that is not the first of its patch
+  std::size_t further = patches.size();  // place of the next chunk that is not the first of its patch
   const auto write = [&](const Chunk& chunk, std::size_t number, std::size_t next) {
     std::uint32_t* words = result.chunks.data() + number * result.chunk_words;
     *words++ = std::uint32_t(chunk.vertices.size());
@@ -96,16 +93,16 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
       *words++ = std::uint32_t(result.records.size());
       const std::vector<Record>& records = chunk.records[k];
       *words++ = std::uint32_t(records.size());
-      // Consecutive threads take constraints far apart, which seldom meet at a vertex: their additions to its
-      // sum would wait for each other.
+      // Consecutive invocations get constraints far apart, which seldom share a vertex: their additions to its sum
+      // would wait for each other.
       const std::size_t stride = (records.size() + 31) / 32;
       for (std::size_t start = 0; start < stride; ++start)
         for (std::size_t r = start; r < records.size(); r += stride) write_record(system.lists[k], records[r]);
     }
     for (std::size_t v = 0; v < result.largest; ++v) {
       const std::uint32_t vertex = chunk.vertices[v < chunk.vertices.size() ? v : 0];
-      result.vertices[number * result.largest + v] = {vertex,
-                                                      std::bit_cast<std::uint32_t>(float(system.at_vertex[vertex]))};
+      const float constraints = float(system.at_vertex[vertex]);
+      result.vertices[number * result.largest + v] = {vertex, std::bit_cast<std::uint32_t>(constraints)};
     }
   };
   for (std::size_t p = 0; p < patches.size(); ++p)
@@ -119,7 +116,7 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
 }  // namespace
 
 Patches constraint_patches(const ConstraintSystem& system, std::size_t most) {
-  // In the order of their vertices, which neighbours in space are near to each other in.
+  // Neighbours in space have vertices with near numbers, so constraints are taken in the order of these.
   std::vector<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>> order;  // vertex, kind, constraint
   for (std::uint32_t k = 0; k < kind_count; ++k)
     for (std::uint32_t c = 0; c < system.lists[k].count(); ++c)
@@ -147,8 +144,8 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
     at[k] = group_by_key(system.lists[k].count(), vertices, [&](std::size_t c, const auto& emit) {
       for (std::uint32_t v : system.lists[k].ends(c)) emit(v, std::uint32_t(c));
     });
-  // A patch of vertices [first, end).
-  const auto patch_of = [&](ChunkWriter& writer, std::size_t first, std::size_t end) {
+  // The chunks of the patch that owns vertices [first, end).
+  const auto make_patch = [&](ChunkWriter& writer, std::size_t first, std::size_t end) {
     std::vector<Chunk> chunks;
     const auto own_vertices = [&] {
       for (std::size_t v = first; v < end; ++v) writer.vertex(std::uint32_t(v));
@@ -158,7 +155,7 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
       std::vector<std::uint32_t> found(at[k].values.begin() + at[k].first[first],
                                        at[k].values.begin() + at[k].first[end]);
       std::ranges::sort(found);
-      found.erase(std::unique(found.begin(), found.end()), found.end());
+      found.erase(std::ranges::unique(found).begin(), found.end());
       for (std::uint32_t c : found) {
         if (writer.add(k, c)) continue;
         chunks.push_back(writer.close(end - first));
@@ -169,8 +166,8 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
     chunks.push_back(writer.close(end - first));
     return chunks;
   };
-  // Parts of so many vertices are cut for themselves, whoever cuts them. A patch has fewer than `own`
-  // vertices where these and the ones that share a constraint with them would not fit a chunk.
+  // Parts of as many vertices are cut on their own, so that the number of threads changes nothing. A patch has fewer
+  // than `own` vertices where these and the ones that share a constraint with them would not fit a chunk.
   constexpr std::size_t part = 4096;
   std::vector<std::vector<std::vector<Chunk>>> of_part((vertices + part - 1) / part);
   const auto cut = [&](std::size_t first_part, std::size_t end_part) {
@@ -178,8 +175,8 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
     for (std::size_t p = first_part; p < end_part; ++p)
       for (std::size_t v = p * part, end = std::min(v + part, vertices), taken = 0; v < end; v += taken) {
         taken = std::min(own, end - v);
-        auto chunks = patch_of(writer, v, v + taken);
-        for (; chunks.size() > 1 && taken > 1; chunks = patch_of(writer, v, v + taken)) taken -= (taken + 15) / 16;
+        auto chunks = make_patch(writer, v, v + taken);
+        for (; chunks.size() > 1 && taken > 1; chunks = make_patch(writer, v, v + taken)) taken -= (taken + 15) / 16;
         of_part[p].push_back(std::move(chunks));
       }
   };

@@ -1,4 +1,4 @@
-// Patches: neighbouring constraints of all kinds, on few vertices, for one work-group each.
+// Patches of neighbouring constraints of all kinds on few vertices, one for each work-group.
 #pragma once
 
 #include <array>
@@ -11,33 +11,33 @@ namespace tetpbd {
 
 /// A patch has one chunk, or more where it has too many vertices for one.
 struct Patches {
-  static constexpr std::size_t most_vertices = 256;  ///< of a chunk: a byte holds their number
-  std::size_t count = 0;                             ///< of patches
-  /// Words of a chunk: how many vertices, how many of these are owned (they come first), the first of them,
-  /// the next chunk of the patch (0: none); then for each kind present its first pair and how many records.
-  /// The patches' first chunks come first.
+  static constexpr std::size_t most_vertices = 256;  ///< in a chunk: a byte holds a vertex's number in it
+  std::size_t count = 0;                             ///< number of patches
+  /// The header of a chunk: how many vertices it has, how many of these the patch owns (they come first), the first of
+  /// them, the patch's next chunk (0: none); then for each kind present its first pair of words and number of records.
+  /// The first chunks of all patches come before all others.
   std::vector<std::uint32_t> chunks;
   std::size_t chunk_words = 0;
-  /// `largest` per chunk: the vertex, and the number of constraints on it as float bits.
+  /// `largest` for each chunk: a vertex, and the number of constraints on it as float bits.
   std::vector<std::array<std::uint32_t, 2>> vertices;
-  /// Constraints, as many pairs of words each as record_pairs() says: its vertices in the chunk, a byte each;
-  /// rest values, a material's compliances, and where bodies differ k and damping, as float bits.
+  /// The records of constraints, record_pairs() pairs of words each: vertices by their numbers in the chunk, a byte
+  /// each; then as float bits rest values, a material's compliances, and where bodies differ k and damping.
   std::vector<std::array<std::uint32_t, 2>> records;
-  std::size_t largest = 0, most_owned = 0;  ///< vertices, owned ones, of any chunk
+  std::size_t largest = 0, most_owned = 0;  ///< most vertices, and most owned ones, of any chunk
   bool chunked = false;                     ///< any patch has several chunks
 };
 
-/// Pairs of words of a record of the list.
+/// How many pairs of words a record of the list has.
 inline std::size_t record_pairs(const ConstraintList& list) {
   const std::size_t values = list.rest.size() + list.compliance.size() + list.stiffness.size() + list.damping.size();
   return (1 + values / std::max<std::size_t>(list.count(), 1) + 1) / 2;
 }
 
-/// Each constraint in one patch of at most `most`; all its vertices are owned.
+/// Patches of at most `most` constraints, which own all their vertices: each constraint is in one patch.
 Patches constraint_patches(const ConstraintSystem& system, std::size_t most);
 
-/// Patches of at most `own` consecutive vertices, which are owned, and of all constraints on these: a
-/// constraint is in each patch that has a vertex of it. `own` is at most most_vertices - 4.
+/// Patches that own at most `own` consecutive vertices, and have all constraints on these: a constraint is in each
+/// patch that owns a vertex of it. `own` is at most most_vertices - 4.
 Patches vertex_patches(const ConstraintSystem& system, std::size_t own);
 
 }  // namespace tetpbd

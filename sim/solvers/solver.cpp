@@ -16,7 +16,7 @@
 
 namespace tetpbd {
 
-// The function in the file of a mode: declared and called in its row.
+// Declares the function that the file of a mode has, and calls it.
 #define MADE_BY(function)                \
   [](const SolverInput& input) {         \
     Solver function(const SolverInput&); \
@@ -41,7 +41,7 @@ static const std::vector<SolverMode> rows = {
      .pairs = true,
      .cpu = true},
     {.name = "cpu-double",
-     .help = "the same in double precision: what stability is held against",
+     .help = "the same in double precision: the reference for stability",
      .create = MADE_BY(create_cpu_double_solver),
      .pairs = true,
      .cpu = true},
@@ -75,24 +75,17 @@ static const std::vector<SolverMode> rows = {
      .offered = false},
 };
 
-namespace {
-
-std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
-
-}  // namespace
-
 const std::vector<SolverMode>& solver_modes() {
   static const std::vector<SolverMode> offered = [] {
     std::vector<SolverMode> some;
-    std::copy_if(rows.begin(), rows.end(), std::back_inserter(some),
-                 [](const SolverMode& mode) { return mode.offered; });
+    std::ranges::copy_if(rows, std::back_inserter(some), &SolverMode::offered);
     return some;
   }();
   return offered;
 }
 
 const SolverMode* find_solver_mode(const std::string& name) {
-  const auto row = std::find_if(rows.begin(), rows.end(), [&](const SolverMode& mode) { return name == mode.name; });
+  const auto row = std::ranges::find(rows, name, &SolverMode::name);
   return row == rows.end() ? nullptr : &*row;
 }
 
@@ -105,9 +98,9 @@ Plan plan_for(const Settings& s) {
 }
 
 const SolverMode& solver_mode(const Settings& settings) {
-  static const SolverMode of_baseline{};
+  static const SolverMode baseline{};
   const SolverMode* mode = find_solver_mode(settings.mode);
-  return mode ? *mode : of_baseline;
+  return mode ? *mode : baseline;
 }
 
 Tuning tuning_from_environment() {
@@ -128,24 +121,29 @@ Tuning tuning_from_environment() {
   return tuning;
 }
 
+std::string define(const char* name, std::size_t value) { return fmt::format("{} {}", name, value); }
+
 std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
   std::vector<Substitutions> words;
-  for (std::size_t k = 0; k < kind_count; ++k)
-    if (system.present[k])
-      words.push_back({{"KIND", constraint_kinds[k].name},
-                       {"ARITY", std::to_string(constraint_kinds[k].arity)},
-                       {"INDEX", std::to_string(words.size())},
-                       {"PAIRS", std::to_string(record_pairs(system.lists[k]))},
-                       {"MATERIAL", system.lists[k].compliance.empty() ? "0" : "1"},
-                       {"OWN", system.lists[k].stiffness.empty() ? "0" : "1"},
-                       {"PROJECT", constraint_kinds[k].components == 1 ? "project" : "project_two"},
-                       {"RATE", constraint_kinds[k].rate ? "1" : "0"},
-                       {"VALUES", std::to_string(constraint_kinds[k].values)},
-                       {"COMPONENTS", std::to_string(constraint_kinds[k].components)},
-                       {"CURVED", constraint_kinds[k].curved ? "1" : "0"},
-                       {"TETS", constraint_kinds[k].tet ? "1" : "0"},
-                       {"KIND_ROW", std::to_string(k / 4)},
-                       {"KIND_COLUMN", std::to_string(k % 4)}});
+  for (std::size_t k = 0; k < kind_count; ++k) {
+    if (!system.present[k]) continue;
+    const ConstraintKind& kind = constraint_kinds[k];
+    const ConstraintList& list = system.lists[k];
+    words.push_back({{"KIND", kind.name},
+                     {"ARITY", std::to_string(kind.arity)},
+                     {"INDEX", std::to_string(words.size())},
+                     {"PAIRS", std::to_string(record_pairs(list))},
+                     {"MATERIAL", list.compliance.empty() ? "0" : "1"},
+                     {"OWN", list.stiffness.empty() ? "0" : "1"},
+                     {"PROJECT", kind.components == 1 ? "project" : "project_two"},
+                     {"RATE", kind.rate ? "1" : "0"},
+                     {"VALUES", std::to_string(kind.values)},
+                     {"COMPONENTS", std::to_string(kind.components)},
+                     {"CURVED", kind.curved ? "1" : "0"},
+                     {"TETS", kind.tet ? "1" : "0"},
+                     {"KIND_ROW", std::to_string(k / 4)},
+                     {"KIND_COLUMN", std::to_string(k % 4)}});
+  }
   return words;
 }
 
@@ -155,11 +153,11 @@ ShaderWords scheme_words(const SolverInput& input) {
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {
   std::vector<std::string> defines = obstacle_defines(input.model);
-  for (const std::string& own :
-       {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),
-        define("BODY_COUNT", input.model.bodies.size()), define("CONTACTS", contacts_lag(input.model, input.settings)),
-        define("VERTICES", bodies_touch(input.model, input.settings) ? input.model.positions.size() : 0)})
-    defines.push_back(own);
+  defines.insert(
+      defines.end(),
+      {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),
+       define("BODY_COUNT", input.model.bodies.size()), define("CONTACTS", contacts_lag(input.model, input.settings)),
+       define("VERTICES", bodies_touch(input.model, input.settings) ? input.model.positions.size() : 0)});
   return defines;
 }
 

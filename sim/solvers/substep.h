@@ -1,3 +1,4 @@
+// What moves a vertex in a substep besides its constraints, on the CPU.
 #pragma once
 
 #include <algorithm>
@@ -9,20 +10,19 @@
 
 namespace tetpbd {
 
-/// Whether Jacobi shares masses out among a vertex's constraints; else it averages corrections. With
-/// compliance always: with averages, a constraint's multiplier would not be what its vertices were moved by.
+/// Whether Jacobi shares a vertex's mass out among its constraints, in place of averaging corrections. With compliance
+/// it always does: with averages, a constraint's multiplier would not be what moved its vertices.
 inline bool splits_masses(const Model& model, const Settings& settings) {
   return (settings.mass_splitting && !solver_mode(settings).published) || any_material(model, settings, compliant);
 }
 
-/// What moves a vertex in a substep besides its constraints.
 struct Substep {
   double h, velocity_scale;
   glm::dvec3 gravity;
   std::vector<MovingObstacle> obstacles;  ///< of the substep that began last
-  bool moving;                            ///< they differ from one substep to the next
+  bool moving;                            ///< obstacles differ from one substep to the next
 
-  /// Of the step's first substep; all live longer than this.
+  /// The first substep of a step that begins at `time`. The model and the settings have to live longer than it.
   Substep(const Model& model, const Settings& settings, const Plan& plan, double time)
       : h(plan.h),
         velocity_scale(std::exp(-settings.damping * h)),
@@ -36,18 +36,18 @@ struct Substep {
   void begin(int substep) {
     if (moving && substep > 0) obstacles = obstacles_at(model_, settings_, time_ + substep * h, h);
   }
-  /// Where prediction moves x (eqs. 1-2); changes v.
+  /// Returns where prediction moves x, and changes v (eqs. 1-2).
   glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
     v = (v + h * gravity) * velocity_scale;
     return x + h * v;
   }
-  /// Vertex i at x, out of all obstacles (eqs. 11-12).
+  /// Returns where vertex i at x goes out of all obstacles (eqs. 11-12).
   glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v) const {
     for (const MovingObstacle& o : obstacles) {
-      const glm::dvec3 way = h * (v - o.velocity_at(x)) + (x - predicted);
-      const auto met = o.surface_met(x, way);
+      const glm::dvec3 displacement = h * (v - o.velocity_at(x)) + (x - predicted);
+      const auto met = o.surface_met(x, displacement);
       if (met.distance < 0)
-        x += Formulas<double>{}.plane_correction(met.normal, met.distance, way, friction_on(o, model_, i));
+        x += Formulas<double>{}.plane_correction(met.normal, met.distance, displacement, friction_on(o, model_, i));
     }
     return x;
   }

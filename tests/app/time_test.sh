@@ -37,8 +37,7 @@ key space; await '^pause'
 forget; to time 0.2 0.5; press 1; release 1; await '^moment [0-9]+$'; await '^state '
 shot back.png
 forget; to time 0.9 0.5; press 1; release 1; await '^moment [0-9]+$'
-shot forth.png
-differ back.png forth.png 3000 "another time"
+await_other back.png forth.png 3000 "another time"
 click loop 0.1; await '^looping true'; await '^loop$'; shot loop.png
 click loop 0.1; await '^looping false'; await '^pause'
 key comma; await '^speed 0.5'

@@ -55,6 +55,7 @@ for k in 1 period 2; do xdotool key $k; pause_for_frame; done
 new_events | grep -qE '^(look|step|colour)' && fail "typing into a slider worked a shortcut"
 xdotool keydown Return; pause_for_frame; xdotool keyup Return
 await '^set omega 1\.2'
+pause_for_frame  # keys are text for a frame more
 # One drag is one change, which a right click, Ctrl+Z and a button take back.
 key ctrl+z; await '^undo'; await '^set omega (2\.[5-9]|3)'
 key ctrl+z; await '^undo'; await '^set omega 1\.5$'
@@ -79,11 +80,11 @@ shot panels.png
 for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
 for colour in volume stretch velocity motion; do key c; await "^colour $colour"; done
 shot plain.png; key w; await '^worst true'
-forget; xdotool mousemove $cx $cy; await '^probe [0-9]+ [0-9]+ '; pause_for_frame; shot probe.png
-differ plain.png probe.png 5000 "the tooltip"
+forget; xdotool mousemove $cx $cy; await '^probe [0-9]+ [0-9]+ '
+await_other plain.png probe.png 5000 "the tooltip"
 key w; await '^worst false'; key c; await '^colour patch'; key c; await '^colour residual'; key c; await '^colour plain'
 for axis in x y z "the view"; do key x; await "^cut 0.5000 along $axis"; done
-shot cut.png; differ plain.png cut.png 5000 "a cut"
+await_other plain.png cut.png 5000 "a cut"
 forget; xdotool keydown alt; xdotool click 5; xdotool keyup alt; await '^cut 0.4800'
 forget; xdotool keydown alt; sleep 0.2; drag 1 $cx $cy 0 40; release 1; xdotool keyup alt; await '^cut 0'
 key x; await '^cut 1.0000'
@@ -103,8 +104,8 @@ click grid 0.1; await '^grid true'
 click "sky and ground" 0.1; await '^sky and ground false'
 click "sky and ground" 0.1; await '^sky and ground true'
 shot view.png
-choose theme dark; await '^scale 1 dark'; sleep 0.3; shot dark.png
-differ view.png dark.png 100000 "the dark theme"
+choose theme dark; await '^scale 1 dark'
+await_other view.png dark.png 100000 "the dark theme"
 choose theme light; await '^scale 1 light'
 choose "text size" "125 %"; await '^scale 1.25 light'; sleep 0.5; shot larger.png
 to "text size" 0.5 0.5; forget; press 3; release 3; await '^back text size 100 %'; await '^scale 1 light'; sleep 0.5
@@ -112,12 +113,12 @@ drag 1 $((vx + vw)) $cy -60 0; release 1; await '^at edge '
 read -r _ _ now _ < <(place view); [[ $now -eq $((vw - 60)) ]] || fail "the panel is not wider by what its edge was dragged"
 drag 1 $((vx + vw - 60)) $cy 60 0; release 1; await "^at view 0 0 $vw "
 click "section View more" 0.1; await '^folded View more'
-key h; await '^help true'; sleep 1; shot help.png
-differ panels.png help.png 20000 "the help overlay"
+key h; await '^help true'
+await_other panels.png help.png 20000 "the help overlay"
 key Escape; await '^help false'; pause_for_frame
 forget; shot before.png
-drag 3 $cx $cy 80 20; release 3; await '^camera'; shot turned.png
-differ before.png turned.png 5000 "turning the view"
+drag 3 $cx $cy 80 20; release 3; await '^camera'
+await_other before.png turned.png 5000 "turning the view"
 drag 1 $((vx + 15)) $((vy + 15)) -80 0; release 1; await '^camera'
 drag 2 $cx $cy 40 0; release 2; await '^camera'
 drag 2 $cx $cy -40 0; release 2; await '^camera'
@@ -129,12 +130,7 @@ key f; await '^frame'
 click play; await '^play'
 forget; shot before.png
 drag 1 $cx $cy 20 -160; await '^grab [0-9]+'
-for _ in $(seq 100); do  # far enough, or long enough
-  sleep 0.3
-  shot pulled.png
-  n=$(compare -metric AE -fuzz 4% before.png pulled.png null: 2>&1)
-  awk -v n="$n" 'BEGIN {exit !(n > 15000)}' && break
-done
+await_other before.png pulled.png 15000 "pulling the body"
 release 1
 await '^release [0-9]+ moved'
 moved=$(new_events | sed -n 's/^release [0-9]* moved //p' | tail -n 1)
@@ -152,8 +148,8 @@ forget; xdotool keydown ctrl; press 1; release 1; xdotool keyup ctrl; await "^un
 
 # ----------------------------------------------------------------------------------------------------------- obstacles
 click "section Obstacles" 0.1; await '^opened Obstacles'; sleep 0.5; shot before.png
-choose "add obstacle" sphere; await '^obstacles 1'; await '^obstacle 1 chosen'; sleep 1; shot obstacle.png
-differ before.png obstacle.png 1000 "an obstacle"
+choose "add obstacle" sphere; await '^obstacles 1'; await '^obstacle 1 chosen'
+await_other before.png obstacle.png 1000 "an obstacle"
 drag 1 $(point "chosen obstacle" 0.5 0.5) 40 0; release 1; await '^obstacle 1 at '; pause_for_frame
 read -r ox oy < <(point "chosen obstacle" 0.5 0.5)
 key Escape; await '^obstacle 0 chosen'
@@ -196,8 +192,8 @@ click "csv 1"; await '^message copied [0-9]+ rows'
 click "svg 1"; await '^message saved plot_000.svg'; grep -q "time per step, ms" plot_000.svg || fail "the saved plot has no axis"
 choose "plotted 2" "energy"; await '^plotted 2 energy'
 xdotool mousemove $((vx + 20)) $((vy + 20)); sleep 4.5; shot lanes.png  # messages go
-key o; await '^overlaid true'; pause_for_frame; shot overlaid.png
-differ lanes.png overlaid.png 20000 "lanes in one place"
+key o; await '^overlaid true'
+await_other lanes.png overlaid.png 20000 "lanes in one place"
 key o; await '^overlaid false'
 key r; await '^reset'
 click play; await '^play'
@@ -219,21 +215,16 @@ click "section Stability map" 0.1; sleep 0.5
 # ------------------------------------------------------------------------------------------------- errors, other scenes
 click "section Side by side" 0.1; sleep 0.5
 type_mesh() {
-  click mesh
+  click mesh; pause_for_frame
   xdotool keydown ctrl keydown a; pause_for_frame; xdotool keyup a keyup ctrl; pause_for_frame
   xdotool type --delay 60 "$1"; pause_for_frame
   new_events | grep -qE '^(look|step|colour|play|panels|follow|screenshot)' && fail "typing a path worked a shortcut"
-  xdotool keydown Return; pause_for_frame; xdotool keyup Return
+  xdotool keydown Return; pause_for_frame; xdotool keyup Return; pause_for_frame
 }
 type_mesh bad.ply; await '^error .*bad.ply'; sleep 0.5; shot error.png
 new_events | grep -q '^scene' && fail "a bad mesh was taken over"
 key s; await '^step [0-9]+'
-# Older messages go by themselves and this one moves up: click where it is now, until it is gone.
-for _ in $(seq 20); do
-  click dismiss
-  for _ in $(seq 10); do new_events | grep -q '^dismissed' && break 2; sleep 0.1; done
-done
-new_events | grep -q '^dismissed' || fail "the message cannot be dismissed"
+click_until dismiss '^dismissed'
 # An error goes with the next scene that loads. What was saved is this scene with its settings.
 type_mesh bad.ply; await '^error .*bad.ply'
 key ctrl+s; await '^message saved block_000.json'
@@ -256,17 +247,17 @@ key s; await '^step 3$'
 
 # A state that is not finite: said, paused, and mended by a reset.
 cp shaders/vertex.glsl good.glsl
-sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.glsl >shaders/vertex.glsl
-cmp -s good.glsl shaders/vertex.glsl && fail "vertex.glsl has no gravity to spoil"
-forget; sleep 1.1; touch shaders/vertex.glsl; await '^message shaders compiled again'
+sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.glsl >bad.glsl
+cmp -s good.glsl bad.glsl && fail "vertex.glsl has no gravity to spoil"
+sleep 1.1; forget; cp bad.glsl shaders/vertex.glsl; await '^message shaders compiled again'
 key m  # also without the plots, where nothing is measured
 key space; await '^error the state is not finite: at step [0-9]+, vertex [0-9]+: '
 new_events | grep -q '^pause' || fail "it did not pause"
 key m
 pause_for_frame; shot not_finite.png
 sleep 4.2  # until older messages are gone and this one stays where it is
-click back; await '^back [0-9]+$'
-differ not_finite.png <(import -window root png:-) 2000 "the body is back"
+click_until back '^back [0-9]+$'
+await_other not_finite.png back.png 2000 "the body is back"
 key space; await '^error the state is not finite'
 forget; sleep 1.1; cp good.glsl shaders/vertex.glsl; await '^message shaders compiled again'
 key r; await '^reset'

@@ -81,7 +81,7 @@ double speed_of(const Sim& sim, std::size_t body, glm::length_t axis) {
 TEST_CASE("pairs: a vertex and a triangle: weights, gap and normal") {
   Formulas<double> f;
   const glm::dvec3 a(0, 0, 0), b(1, 0, 0), c(0, 0, -1);  // looks up
-  const auto at = [&](const glm::dvec3& p) { return f.meet(a - p, b - p, c - p); };
+  const auto at = [&](const glm::dvec3& p) { return f.vertex_triangle_contact(a - p, b - p, c - p); };
   CHECK(at({0.2, 0.3, -0.2}).gap == doctest::Approx(0.3));
   CHECK(at({0.2, -0.3, -0.2}).gap == doctest::Approx(-0.3));
   CHECK(at({0.2, -0.3, -0.2}).normal.y == doctest::Approx(1));
@@ -91,7 +91,7 @@ TEST_CASE("pairs: a vertex and a triangle: weights, gap and normal") {
   CHECK(at({-0.3, 0.4, -0.5}).normal.x == doctest::Approx(-0.6));
   CHECK(at({-0.3, -0.4, -0.5}).normal.y == doctest::Approx(0.8));
   CHECK(at({2, 0.1, 0}).weights[2] == doctest::Approx(-1));
-  CHECK(f.meet(a, a, b).gap > 1e20);  // no area
+  CHECK(f.vertex_triangle_contact(a, a, b).gap > 1e20);  // no area
   // Nearest weights against a search.
   for (int trial = 0; trial < 200; ++trial) {
     const auto part = [&](int k) { return std::sin(12.9898 * trial + 78.233 * k) * 1.5; };
@@ -116,7 +116,7 @@ TEST_CASE("pairs: two edges: weights, gap and normal") {
     const glm::dvec3 a(-1, 0, 0), q(aside, lift, -1), r(aside, lift, 2);
     const glm::dvec3 left(0, -1, -1), right(0, -1, 1), keel_left(aside + 1, lift + 1, 0),
         keel_right(aside - 1, lift + 1, 0);
-    return f.meet_edges(glm::dvec3(2, 0, 0), left - a, right - a, q - a, r - a, keel_right - a, keel_left - a);
+    return f.edge_edge_contact(glm::dvec3(2, 0, 0), left - a, right - a, q - a, r - a, keel_right - a, keel_left - a);
   };
   REQUIRE(glm::dot(glm::cross(glm::dvec3(2, 0, 0), glm::dvec3(1, -1, 1)), {0, 1, 0}) < 0);
   CHECK(at(0.1).gap > 1);  // they do not cross
@@ -131,8 +131,8 @@ TEST_CASE("pairs: two edges: weights, gap and normal") {
   CHECK(at(-0.1, 1.5).gap > 1);  // past the end
   CHECK(at(-0.1, 1.5).rank == doctest::Approx(std::hypot(0.1, 0.5)));
   const glm::dvec3 along(1, 0, 0), o(0);
-  CHECK(f.meet_edges(along, o, o, {0, 1, 0}, {1, 1, 0}, o, o).gap > 1);  // parallel
-  CHECK(f.meet_edges(along, o, o, o, o, o, o).gap > 1);                  // no length
+  CHECK(f.edge_edge_contact(along, o, o, {0, 1, 0}, {1, 1, 0}, o, o).gap > 1);  // parallel
+  CHECK(f.edge_edge_contact(along, o, o, o, o, o, o).gap > 1);                  // no length
 }
 
 TEST_CASE("pairs: sharp edges are those of a block, and none of a ball") {
@@ -623,7 +623,7 @@ TEST_CASE("pairs: contacts are drawn as arrows along the triangles' normals") {
   Sim on_ball = create_sim(std::make_shared<const Model>(other), settings);
   Frame frame = make_frame(on_ball, camera, {.contacts = true}, target);
   for (int s = 0; s < 5; ++s) step(on_ball);
-  renew(frame, on_ball);
+  update(frame, on_ball);
   CHECK(frame.touching.size() >= 1);
   CHECK(frame.touching.size() < 40);
   CHECK(gl_error_count() == 0);

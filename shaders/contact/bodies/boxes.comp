@@ -1,14 +1,13 @@
-// The box around the surface of each body, and how fast it goes: that around the mean velocities of its slices, and the
-// largest root mean square of what a slice deviates from its mean. A single vertex that shakes changes little of this.
-// A work-group per slice; behind these, where candidates are looked for, one per leaf for its box and how far its items
-// look.
+// Broad phase: boxes around the surface of each body and, as one vertex that shakes must not count, around the mean
+// velocities of its slices, with the largest root mean square of deviations from them. There is a work-group per slice
+// and, if candidates are sought, behind these one per leaf for its box and the search radius of its items.
 #include "contact/bodies/pairs.glsl"
 layout(std430) restrict readonly buffer Positions { Position positions[]; };
 layout(std430) restrict readonly buffer Velocities { Velocity velocities[]; };
 shared vec3 lows[GROUP_SIZE];
-shared vec4 highs[GROUP_SIZE];   // w: of squares of speeds
-shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares, or reaches
-// Leaves the box of all invocations, and the sum of their speeds or the largest, at 0.
+shared vec4 highs[GROUP_SIZE];   // w: the largest square of a speed
+shared vec4 speeds[GROUP_SIZE];  // sums of velocities and of their squares, or radii
+// Leaves the box around all invocations, and the sum or the largest of their speeds, in element 0.
 void reduce(uint lane, vec3 low, vec4 high, vec4 speed, bool sum) {
   lows[lane] = low, highs[lane] = high, speeds[lane] = speed;
   barrier();
@@ -22,24 +21,24 @@ void reduce(uint lane, vec3 low, vec4 high, vec4 speed, bool sum) {
     barrier();
   }
 }
-void target(uint t, uvec3 corners, inout vec3 low, inout vec3 high) {
+void add_target(uint t, uvec3 corners, inout vec3 low, inout vec3 high) {
   vec3 a = positions[corners.x].high, b = positions[corners.y].high, c = positions[corners.z].high;
   vec3 lowest = min(a, min(b, c)), highest = max(a, max(b, c)), centre = 0.5 * (lowest + highest);
   pair_spheres[t] = vec4(centre, max(distance(a, centre), max(distance(b, centre), distance(c, centre))));
   low = min(low, lowest), high = max(high, highest);
 }
-void gather(uint s, inout float reach) {
+void add_item(uint s, inout float reach) {
   if (held_by[s] != NONE) reach = max(reach, reach_of(depths[s]));
 }
 void leaf_box(uint leaf, uint lane) {
   vec3 low = vec3(1e30), high = vec3(-1e30);
   float reach = margin;
   for (uint t = leaves[leaf].triangles[0] + lane; t < leaves[leaf].triangles[1]; t += GROUP_SIZE)
-    target(t, uvec3(triangle_vertex(t, 0u), triangle_vertex(t, 1u), triangle_vertex(t, 2u)), low, high);
-  for (uint s = leaves[leaf].vertices[0] + lane; s < leaves[leaf].vertices[1]; s += GROUP_SIZE) gather(s, reach);
+    add_target(t, triangles[t].xyz, low, high);
+  for (uint s = leaves[leaf].vertices[0] + lane; s < leaves[leaf].vertices[1]; s += GROUP_SIZE) add_item(s, reach);
   for (uint e = leaves[leaf].edges[0] + lane; e < leaves[leaf].edges[1]; e += GROUP_SIZE) {
-    target(TRIANGLES + e, uvec3(edge_vertex(e, 0u), edge_vertex(e, 1u), edge_vertex(e, 1u)), low, high);
-    gather(SURFACE_VERTICES + e, reach);
+    add_target(TRIANGLES + e, edge_vertices[e].xyy, low, high);
+    add_item(SURFACE_VERTICES + e, reach);
   }
   reduce(lane, low, vec4(high, 0.0), vec4(reach), false);
   if (lane < 3u) {
@@ -59,7 +58,7 @@ void main() {
   uint body = slices[slice].body, first = slices[slice].first, end = slices[slice].end;
   vec3 low = vec3(1e30);
   vec4 high = vec4(vec3(-1e30), 0.0), speed = vec4(0.0);
-  const uint at_once = 4u;  // what is read does not wait for each other
+  const uint at_once = 4u;  // reads in flight, instead of one after the other
   for (uint s = first + lane; s < end; s += at_once * GROUP_SIZE) {
     vec3 x[at_once], v[at_once];
     for (uint j = 0u; j < at_once; ++j) {
@@ -80,6 +79,6 @@ void main() {
     atomicMax(boxes[body].fastest[lane], sortable(mean[lane]));
   } else if (lane == 3u) {
     atomicMax(boxes[body].spread, floatBitsToUint(sqrt(max(mean.w - dot(mean.xyz, mean.xyz), 0.0))));
-    atomicMax(boxes[body].top, floatBitsToUint(sqrt(highs[0].w)));
+    atomicMax(boxes[body].top_speed, floatBitsToUint(sqrt(highs[0].w)));
   }
 }

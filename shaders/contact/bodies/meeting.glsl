@@ -1,46 +1,39 @@
-// How an item and a target stand to each other, as the kernels of contact ask for it: needs positions and
-// pairs/formulas.glsl.
+// The contact between an item and a target; needs positions and formulas.glsl.
 vec3 from_own(uint vertex, DoubleSingle own) {
   Position p = positions[vertex];
   return relative(DoubleSingle(p.high, p.low), own);
 }
-// `t` with its bits. What a sheet keeps from others is taken off the gap.
-Meeting meeting_of(uint s, uint t) {
+// `t` has its bits. The gap that a sheet keeps is subtracted.
+Contact contact_between(uint s, uint t) {
   bool under = (t & UNDER) != 0u;
   t &= TARGET;
-  uvec4 vertices = vertices_of(s, t);
+  uvec4 vertices = contact_vertices(s, t);
   Position p = positions[vertices.x];
   DoubleSingle own = DoubleSingle(p.high, p.low);
   vec3 b = from_own(vertices.y, own), c = from_own(vertices.z, own), d = from_own(vertices.w, own);
 #if EDGES
   if (item_is_edge(s)) {
-    uvec4 beside = beside_of(s, t);
-    return meet_edges(b, from_own(beside.x, own), from_own(beside.y, own), c, d, from_own(beside.z, own),
-                      from_own(beside.w, own));
+    uvec4 beside = vertices_beside(s, t);
+    return edge_edge_contact(b, from_own(beside.x, own), from_own(beside.y, own), c, d, from_own(beside.z, own),
+                             from_own(beside.w, own));
   }
 #endif
+  Contact m = vertex_triangle_contact(b, c, d);
 #if SHEETS
   float thickness = thickness_of(triangle_body(t));
-  Meeting m;
-  if (thickness > 0.0)
-    m = meet_sheet(b, c, d, under);
-  else
-    m = meet(b, c, d);
+  if (thickness > 0.0) m = vertex_sheet_contact(m, b, c, d, under);
   float apart = max(thickness, thickness_of(surface_body(s)));
   m.gap -= apart;
   m.in_doubt = m.in_doubt && apart == 0.0;
-  return m;
-#else
-  return meet(b, c, d);
 #endif
+  return m;
 }
-Meeting inside(Meeting m) {
+Contact turn_inside(Contact m) {
   m.gap = -m.gap;
   m.normal = -m.normal;
   return m;
 }
-// Whether the vertex is in a tet of the body that triangle t belongs to, a few tets behind it; where a body is inverted
-// that is not known.
+// Whether the vertex is in a tet of the body of triangle t, at most a few tets behind it; false at inverted tets.
 bool is_behind(uint s, uint t) {
   vec3 own = positions[surface_vertex(s)].high;
   uint tet = behind[t];
@@ -56,7 +49,7 @@ bool is_behind(uint s, uint t) {
       if (parts.volumes[k] <= least_share) ++small;
     }
     uint beyond = tet_beyond[tet][least];
-    // One on the surface is not inside, but one on a face between two tets is.
+    // A vertex on the surface is not inside, but one on a face between two tets is.
     if (small == 0u || (small == 1u && beyond != NONE && parts.volumes[least] >= -least_share)) return true;
     tet = beyond;
   }

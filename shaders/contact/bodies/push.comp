@@ -1,5 +1,5 @@
-// The corrections of each contact that meet.comp found. One invocation per record; the last that asks for a vertex
-// moves it.
+// Applies the corrections of each contact that meet.comp found. There is an invocation per record; the work-group of
+// the last that reads a vertex moves it.
 #include "contact/bodies/pairs.glsl"
 #if IMPLICIT
 #include "vertex_state.glsl"
@@ -10,7 +10,7 @@
 #include "contact/bodies/formulas.glsl"
 #include "contact/bodies/meeting.glsl"
 #include "contact/bodies/correct.glsl"
-// Moves a vertex by its sums, and what its neighbours see of it.
+// Moves a vertex by its sums and writes the position that its neighbours see.
 void move(uint i) {
   vec3 stopped, pushed;
   for (uint c = 0u; c < 3u; ++c) {
@@ -25,36 +25,36 @@ void move(uint i) {
   v = add_double(v, stopped * params.inverse_h);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
-#if !IMPLICIT  // the way that BDF2 goes on from stays what forces made it, or a stop takes back two thirds of the
-               // velocity that went in
+#if !IMPLICIT  // BDF2 goes on from the displacement that forces made: from a stopped one it would give back two thirds
+               // of the impact velocity
   x = seen_by_neighbours(x, v);
   quantized_out[i] = quantize(x, weight_of(own));
 #endif
 }
 shared uint moving[8u * GROUP_SIZE], moving_count;
-// This invocation reads the vertices no more; of which it is the last that does, its work-group moves them.
-void leave(uvec4 vertices) {
-  int asks[4];
-  for (uint j = 0u; j < 4u; ++j) asks[j] = atomicAdd(contact_sums[vertices[j]].asks, -1);
+// Ends this invocation's reads of the vertices, and lists those for which it was the last.
+void release(uvec4 vertices) {
+  int readers[4];
+  for (uint j = 0u; j < 4u; ++j) readers[j] = atomicAdd(contact_sums[vertices[j]].readers, -1);
   for (uint j = 0u; j < 4u; ++j)
-    if (asks[j] == 1 && sharing[shared_at(vertices[j], side)] > 0) moving[atomicAdd(moving_count, 1u)] = vertices[j];
+    if (readers[j] == 1 && sharing[shared_at(vertices[j], side)] > 0) moving[atomicAdd(moving_count, 1u)] = vertices[j];
 }
 void push(uint record) {
   uint s = records[record].item, t = records[record].target;
   if (t == NONE) return;
-  uvec4 vertices = vertices_of(s, t & TARGET);
-  Meeting m = meeting_of(s, t);
-  if ((t & INSIDE) != 0u && m.gap > 0.0) m = inside(m);
-  if (m.gap < 0.0) {  // another program found it, and may round otherwise
+  uvec4 vertices = contact_vertices(s, t & TARGET);
+  Contact m = contact_between(s, t);
+  if ((t & INSIDE) != 0u && m.gap > 0.0) m = turn_inside(m);
+  if (m.gap < 0.0) {  // not always, because meet.comp may have rounded differently
     vec4 sum = vec4(0.0);
-    for (uint j = 0u; j < 4u; ++j) sum += part_of(vertices[j], m.weights[j]);
-    Stop by = meeting_correction(m, sum.xyz, push_most, friction_between(vertices));
+    for (uint j = 0u; j < 4u; ++j) sum += vertex_share(vertices[j], m.weights[j]);
+    Stop by = contact_correction(m, sum.xyz, push_most, friction_between(vertices));
     for (uint j = 0u; j < 4u; ++j) correct(vertices[j], m.weights[j], by, sum);
   }
   memoryBarrierBuffer();
-  leave(vertices);
+  release(vertices);
 #if EDGES
-  if (item_is_edge(s)) leave(beside_of(s, t & TARGET));
+  if (item_is_edge(s)) release(vertices_beside(s, t & TARGET));
 #endif
 }
 void main() {

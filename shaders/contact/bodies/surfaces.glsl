@@ -1,6 +1,6 @@
-// Surfaces of bodies, and what contact finds of them. Of several arrays in a block all but the last need a size, which
-// is not 0; long ones are of numbers or vectors (newton/newton.glsl). What may be in something, an item, is a vertex of
-// a surface or, behind these, an edge; what it is in, a target, a triangle or an edge.
+// Surfaces of bodies, and the contacts found between them. An item is a vertex of a surface or, numbered behind these,
+// a sharp edge; its targets are triangles or, numbered behind these, edges. Of several arrays in a block all but the
+// last need a size, which must not be 0.
 #include "contact/bodies/layout.glsl"
 #define ITEMS (SURFACE_VERTICES + EDGES)
 layout(std430) restrict readonly buffer PairMesh {
@@ -23,9 +23,9 @@ layout(std430) restrict buffer PairLists {
   CandidateCounts counts;
   BodyBox boxes[BODY_COUNT];
   uint held_by[ITEMS];  // the target that each item was in last, with its bits, or NONE
-  float depths[ITEMS];  // m, and how deep
-  // Items of leaves that are near another body, in any order, each leaf in work-groups of its own, filled with NONE;
-  // and the leaf of each work-group.
+  float depths[ITEMS];  // m, how deep
+  // Items of leaves that are near another body, each leaf in work-groups of its own that are filled with NONE; then the
+  // leaf of each work-group.
   uint near_vertices[SURFACE_VERTICES + LEAVES * PER_GROUP];
   uint near_edges[EDGES + LEAVES * PER_GROUP];
   uint leaf_of_group[SURFACE_VERTICES / PER_GROUP + LEAVES];

@@ -1,4 +1,4 @@
-// A part of the y axis with a radius.
+// The points within a radius of a part of the y axis.
 Surface capsule_surface(Solid s, vec3 p) {
   vec3 arm = p - vec3(real(0), clamp(p.y, -s.extent.y, s.extent.y), real(0));
   real l = length(arm);

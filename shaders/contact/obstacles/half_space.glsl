@@ -1,2 +1,2 @@
-// Below y = 0.
+// The points below y = 0.
 Surface half_space_surface(Solid s, vec3 p) { return Surface(vec3(real(0), real(1), real(0)), p.y); }

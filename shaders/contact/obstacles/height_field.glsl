@@ -1,5 +1,4 @@
-// Bilinear heights over a grid of x and z: (y - H) / sqrt(1 + |grad H|^2). A block whose top they are, without a
-// bottom.
+// A block without a bottom, whose top has bilinear heights H over a grid of x and z: (y - H) / sqrt(1 + |grad H|^2).
 Surface height_field_surface(Solid s, vec3 p) {
   real dx = real(2) * s.extent.x / real(s.cells.x - 1), dz = real(2) * s.extent.z / real(s.cells.z - 1);
   real u = clamp((p.x + s.extent.x) / dx, real(0), real(s.cells.x - 1));

@@ -1,9 +1,9 @@
-// After a change from outside: no step before this one is known. One invocation per vertex, and per aggregate.
+// Forgets the steps before a change from outside. One invocation per vertex, and per aggregate.
 #include "solvers/newton/newton.glsl"
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (i < VERTICES) {
-    put(WAY, i, vec3(0.0), 0.0);
+    put(DISPLACEMENT, i, vec3(0.0), 0.0);
     put(GAIN, i, vec3(0.0), 0.0);
   }
   if (i < AGGREGATES) rotations[i] = vec4(0.0, 0.0, 0.0, 1.0);

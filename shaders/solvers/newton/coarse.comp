@@ -1,4 +1,4 @@
-// The coarse unknowns y = A_c^-1 r. ROW_LANES invocations per row.
+// The coarse unknowns y = A_c^-1 r. ROW_LANES invocations per row of the inverse.
 #include "solvers/newton/newton.glsl"
 shared float parts[GROUP_SIZE];
 void main() {

@@ -1,6 +1,6 @@
-// A block of the Hessian and a force for every edge of the matrix (method.md eq. 41): what all constraints of both
-// vertices add. The gradients of a constraint sum up to nothing, and so do the blocks of a row: force and diagonal are
-// sums over edges. One invocation per edge.
+// A block of the Hessian and a force for every edge of the matrix (method.md eq. 41), added up over all constraints
+// that both vertices have. The gradients of a constraint add up to zero, and so do the blocks of a row: forces and
+// diagonal blocks are sums over edges. One invocation per edge.
 #define BLOCKS_ARE writeonly
 #include "solvers/newton/newton.glsl"
 #define Ids uvec4  // of the vertices
@@ -8,18 +8,18 @@ uint id_of(Ids ids, int j) { return ids[j]; }
 #include "constraints/types.glsl"
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "solvers/newton/rest.glsl"
-#foreach #include "solvers/newton/element_$COMPONENTS.glsl"
+#foreach #include "solvers/newton/element.glsl"
 
 void main() {
   uint edge = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (edge >= EDGES) return;
-  uint part = start_part(), end = first_use[edge + 1u];
+  uint start = chosen_start(), end = first_use[edge + 1u];
   mat3 block = mat3(0.0);
   vec3 force = vec3(0.0);
   for (uint k = first_use[edge]; k < end; ++k) {
     uint use = uses[k], kind = USE_KIND(use), c = USE_CONSTRAINT(use);
     int i = USE_I(use), j = USE_J(use);
-    #foreach if (kind == $INDEXu) add_$KIND(c, part, i, j, block, force);
+    #foreach if (kind == $INDEXu) add_$KIND(c, start, i, j, block, force);
   }
   for (int c = 0; c < 3; ++c) blocks[edge].columns[c] = vec4(block[c], force[c]);
 }

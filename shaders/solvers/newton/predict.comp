@@ -1,4 +1,5 @@
-// Where inertia carries each vertex (method.md eq. 40), and four places on the way there. One invocation per vertex.
+// Where inertia takes each vertex (method.md eq. 40), and where it is at each of Newton's starts. One invocation per
+// vertex.
 #include "solvers/newton/newton.glsl"
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
@@ -6,11 +7,11 @@ void main() {
   if (i >= VERTICES) return;
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
-  bool fixed_ = own.inverse_mass <= 0.0, known = (floatBitsToUint(at(WAY, i).w) & KNOWN) != 0u;
+  bool fixed_ = own.inverse_mass <= 0.0, known = is_step_known(i);
   float h = known ? params.h * (2.0 / 3.0) : params.h;
   vec3 offset = vec3(0.0), speed = velocities[i].high + velocities[i].low;
   if (known) {
-    offset = at(WAY, i).xyz / 3.0;
+    offset = at(DISPLACEMENT, i).xyz / 3.0;
     speed += at(GAIN, i).xyz / 3.0;
   }
   float drag = 1.0 + params.drag * h;
@@ -19,7 +20,7 @@ void main() {
   put(AIM, i, aim, fixed_ ? 0.0 : drag / (own.inverse_mass * h * h));
   put(OFFSET, i, offset, h);
   for (uint k = 0u; k < 4u; ++k) {
-    ivec4 place = quantize(fixed_ ? x : add_double(x, kept_out(x, start_parts[k] * aim)), 0.0);
-    vectors[(RESIDUAL + k) * VERTICES + i] = intBitsToFloat(place);
+    ivec4 start = quantize(fixed_ ? x : add_double(x, kept_out(x, start_fractions[k] * aim)), 0.0);
+    vectors[(RESIDUAL + k) * VERTICES + i] = intBitsToFloat(start);
   }
 }

@@ -1,6 +1,7 @@
-// A z, row by row, and the dot products with r and z. LANES invocations per vertex; the last work-group that is done
-// adds all dot products up, in the order of the rows.
+// A z, row by row, and its dot products with r and z. LANES invocations per vertex; the last work-group to end adds all
+// dot products up, in the order of the rows.
 #define SUMS_ARE coherent
+#define COLUMNS 1
 #include "solvers/newton/newton.glsl"
 shared vec3 parts[GROUP_SIZE];
 shared bool last;
@@ -9,9 +10,10 @@ void add_up() {
   memoryBarrierBuffer();
   vec2 sum = vec2(0.0);
   for (uint k = lane; k < PRODUCT_GROUPS; k += GROUP_SIZE) sum += group_dots[k];
-  sum = group_sum(sum);
+  columns[0][lane] = vec4(sum, 0.0, 0.0);
+  add_up_columns();
   if (lane == 0u) {
-    dots = sum;
+    dots = columns[0][0].xy;
     products_done = 0u;
   }
 }
@@ -41,9 +43,10 @@ void main() {
     put(PRODUCT, i, sum, 0.0);
     own_dots = vec2(dot(at(RESIDUAL, i).xyz, own), dot(sum, own));
   }
-  own_dots = group_sum(own_dots);
+  columns[0][lane] = vec4(own_dots, 0.0, 0.0);
+  add_up_columns();
   if (lane == 0u) {
-    if (group_index() < PRODUCT_GROUPS) group_dots[group_index()] = own_dots;
+    if (group_index() < PRODUCT_GROUPS) group_dots[group_index()] = columns[0][0].xy;
     memoryBarrierBuffer();
     last = atomicAdd(products_done, 1u) + 1u == gl_NumWorkGroups.x * gl_NumWorkGroups.y;
   }

@@ -1,4 +1,4 @@
-// z: the residual by both levels. One invocation per vertex.
+// z = M^-1 r, by both levels of the preconditioner. One invocation per vertex.
 #include "solvers/newton/newton.glsl"
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
@@ -13,9 +13,9 @@ void main() {
     for (uint k = 0u; k < 4u; ++k) {
       uint share = shares[i][k], aggregate = SHARE_AGGREGATE(share), y = 6u * aggregate;
       vec4 centre = centres[aggregate];
-      vec3 way = vec3(coarse_y[y], coarse_y[y + 1u], coarse_y[y + 2u]);
+      vec3 shift = vec3(coarse_y[y], coarse_y[y + 1u], coarse_y[y + 2u]);
       vec3 turn = vec3(coarse_y[y + 3u], coarse_y[y + 4u], coarse_y[y + 5u]), arm = (rest - centre.xyz) / centre.w;
-      z += turned(rotations[aggregate], way + cross(turn, arm)) * (float(SHARE_WEIGHT(share)) * WEIGHT_UNIT);
+      z += turned(rotations[aggregate], shift + cross(turn, arm)) * (float(SHARE_WEIGHT(share)) * WEIGHT_UNIT);
     }
   }
   put(SEARCH, i, free_part(z, holds, i), 0.0);

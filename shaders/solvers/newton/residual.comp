@@ -3,37 +3,33 @@
 #include "solvers/newton/newton.glsl"
 shared vec3 parts[3][GROUP_SIZE];
 
-// Friction of the last substep's force against the way since it (lagged: Li et al. 2020): resistance per way, and
-// smoothly less below `slip`.
+// Friction by the last substep's normal force against the displacement since then (lagged: Li et al. 2020), over that
+// displacement, N/m. It becomes smoothly less below slip_speed.
 const float slip_speed = 0.05;  // m/s
 float resistance(float friction, float normal_force, vec3 slid) {
-  float way = length(slid), slip = slip_speed * params.h;
-  return friction * normal_force * (way < slip ? (2.0 - way / slip) / slip : 1.0 / way);
+  float distance = length(slid), slip = slip_speed * params.h;
+  return friction * normal_force * (distance < slip ? (2.0 - distance / slip) / slip : 1.0 / distance);
 }
 void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
-  vec4 aim = at(AIM, i), before = at(WAY, i);
+  vec4 aim = at(AIM, i), before = at(DISPLACEMENT, i);
   vec3 r = vec3(0.0);
   uint holds = 0u, touched = floatBitsToUint(before.w) & ~KNOWN;
   float slides = 0.0;
   vec3 inverse_diagonal = vec3(0.0), inverse_across = vec3(0.0);
   if (aim.w > 0.0) {
-    vec3 u = start_of(i, x);
+    vec3 u = start_displacement(i, x);
     r = -force - aim.w * (u - aim.xyz);
     mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z,
                   diagonal.z + aim.w);
     float push = at(GAIN, i).w;
-    float friction = obstacle_friction(findLSB(touched), i);  // of the first of them
+    float friction = obstacle_friction(findLSB(touched), i);  // of the first obstacle that it touches
     if (push > 0.0 && touched != 0u && friction > 0.0) {
       vec3 slid = free_part(u - params.h * obstacle_velocity(findLSB(touched), x), touched, i);
       slides = resistance(friction, push, slid);
       r -= slides * slid;
-      for (int c = 0; c < 3; ++c) {
-        vec3 axis = vec3(0.0);
-        axis[c] = slides;
-        D[c] += free_part(axis, touched, i);
-      }
+      for (int c = 0; c < 3; ++c) D[c] += free_part(mat3(slides)[c], touched, i);
     }
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, aimed(i), u);

@@ -1,15 +1,14 @@
-// Which parts of the way turn a tet over or blow it up; and how each aggregate has turned (Mueller, Bender, Chentanez
-// and Macklin 2016), from the way it stood last. A work-group per aggregate, then an invocation per constraint.
+// How each aggregate has turned since it was last looked at (Mueller, Bender, Chentanez and Macklin 2016), and which of
+// Newton's starts turn a tet over or blow it up. A work-group per aggregate, then an invocation per constraint.
+#define COLUMNS 3
 #include "solvers/newton/newton.glsl"
 #define Ids uint
 uint id_of(Ids ids, int j) { return 0u; }
 #include "constraints/types.glsl"
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "solvers/newton/rest.glsl"
-shared vec4 columns[3][GROUP_SIZE];
+#foreach #include "solvers/newton/start_tet.glsl"
 shared uint bad_here[3];
-
-#foreach #include "solvers/newton/start_$TETS.glsl"
 
 void turn(uint aggregate) {
   uint lane = gl_LocalInvocationIndex, first = first_member[aggregate], end = first_member[aggregate + 1u];
@@ -24,27 +23,17 @@ void turn(uint aggregate) {
     mass += m;
   }
   for (int c = 0; c < 3; ++c) columns[c][lane] = vec4(A[c], mass);
-  barrier();
-  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
-    if (lane < half_size)
-      for (int c = 0; c < 3; ++c) columns[c][lane] += columns[c][lane + half_size];
-    barrier();
-  }
+  add_up_columns();
   if (lane != 0u) return;
   vec4 before = rotations[aggregate], q = before;
-  float small = 0.02 * columns[0][0].w * centre.w * centre.w;  // where points lie on a line, as it was
-  for (int c = 0; c < 3; ++c) {
-    vec3 axis = vec3(0.0);
-    axis[c] = small;
-    A[c] = columns[c][0].xyz + turned(q, axis);
-  }
+  // Where the vertices lie on a line, this keeps the rotation about it as it was.
+  float small = 0.02 * columns[0][0].w * centre.w * centre.w;
+  for (int c = 0; c < 3; ++c) A[c] = columns[c][0].xyz + turned(q, mat3(small)[c]);
   for (int round = 0; round < 12; ++round) {
     vec3 across = vec3(0.0);
     float along = 0.0;
     for (int c = 0; c < 3; ++c) {
-      vec3 axis = vec3(0.0);
-      axis[c] = 1.0;
-      axis = turned(q, axis);
+      vec3 axis = turned(q, mat3(1.0)[c]);
       across += cross(axis, A[c]);
       along += dot(axis, A[c]);
     }
@@ -56,23 +45,22 @@ void turn(uint aggregate) {
     q = normalize(vec4(r * q.xyz + q.w * n + cross(n, q.xyz), r * q.w - dot(n, q.xyz)));
   }
   rotations[aggregate] = q;
-  bool known = (floatBitsToUint(at(WAY, members[first].x).w) & KNOWN) != 0u;
-  if (known && abs(dot(before, q)) < cos(0.5 * params.turn_limit)) atomicMin(least, floatBitsToUint(HEALTH_TURNING));
+  if (is_step_known(members[first].x) && abs(dot(before, q)) < cos(0.5 * params.turn_limit))
+    atomicMin(least, floatBitsToUint(HEALTH_TURNING));
 }
 
 void main() {
-  uint group = group_index();
+  uint group = group_index(), lane = gl_LocalInvocationIndex;
   if (group < AGGREGATES) {
     turn(group);
     return;
   }
-  uint c = (group - AGGREGATES) * GROUP_SIZE + gl_LocalInvocationIndex, bad = 0u;
-  if (gl_LocalInvocationIndex < 3u) bad_here[gl_LocalInvocationIndex] = 0u;
+  uint c = (group - AGGREGATES) * GROUP_SIZE + lane, bad = 0u;
+  if (lane < 3u) bad_here[lane] = 0u;
   barrier();
-  #foreach start_$KIND(c, bad);
-  for (uint part = 0u; part < 3u; ++part)
-    if ((bad & (1u << part)) != 0u) atomicAdd(bad_here[part], 1u);
+  #foreach check_start_$KIND(c, bad);
+  for (uint start = 0u; start < 3u; ++start)
+    if ((bad & (1u << start)) != 0u) atomicAdd(bad_here[start], 1u);
   barrier();
-  if (gl_LocalInvocationIndex < 3u && bad_here[gl_LocalInvocationIndex] > 0u)
-    atomicAdd(bad_starts[gl_LocalInvocationIndex], bad_here[gl_LocalInvocationIndex]);
+  if (lane < 3u && bad_here[lane] > 0u) atomicAdd(bad_starts[lane], bad_here[lane]);
 }

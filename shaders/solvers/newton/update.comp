@@ -1,41 +1,34 @@
-// An iteration's end: step lengths, the vectors of each vertex, and the coarse residual. Iteration 0: its beginning. A
-// work-group per aggregate, then an invocation per vertex.
+// Begins an iteration: step lengths, the vectors of each vertex, the coarse residual; iteration 0 begins at Newton's
+// start. A work-group per aggregate, then an invocation per vertex.
+#define COLUMNS 2
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"
-shared vec3 forces[GROUP_SIZE], torques[GROUP_SIZE];
 
-// The coarse residual of the vectors in `slot`, by its rotated rigid motions. An aggregate that a half space holds has
-// none: it cannot move as one, and the coarse matrix does not know.
+// The coarse residual of the vectors in `slot`, by the aggregate's rotated rigid motions. It is 0 for an aggregate that
+// an obstacle holds, which cannot move as a whole, as the coarse matrix does not know.
 void restrict_to(uint aggregate, uint slot, Lengths l) {
   uint lane = gl_LocalInvocationIndex, end = first_member[aggregate + 1u];
   vec4 centre = centres[aggregate], back = opposite(rotations[aggregate]);
   vec3 force = vec3(0.0), torque = vec3(0.0);
-  float held = 0.0;
+  float holds = 0.0;
   for (uint k = first_member[aggregate] + lane; k < end; k += GROUP_SIZE) {
     uint i = members[k].x;
     float weight = float(members[k].y) * WEIGHT_UNIT;
     vec3 f = weight * turned(back, at(slot, i).xyz);
-    // Only at the beginning: in later iterations other work-groups rewrite residuals meanwhile.
-    if (slot == RESIDUAL && held_by(at(RESIDUAL, i)) != 0u) held = 1.0;
+    // Only at the beginning, because in later iterations other work-groups rewrite residuals meanwhile.
+    if (slot == RESIDUAL && held_by(at(RESIDUAL, i)) != 0u) holds = 1.0;
     force += f;
     torque += cross((at(REST, i).xyz - centre.xyz) / centre.w, f);
   }
-  forces[lane] = force;
-  torques[lane] = torque;
-  barrier();
-  for (uint half_size = GROUP_SIZE / 2u; half_size > 0u; half_size /= 2u) {
-    if (lane < half_size) {
-      forces[lane] += forces[lane + half_size];
-      torques[lane] += torques[lane + half_size];
-    }
-    barrier();
-  }
-  held = slot == RESIDUAL ? group_sum(vec2(held, 0.0)).x : 1.0 - is_free[aggregate];
+  columns[0][lane] = vec4(force, holds);
+  columns[1][lane] = vec4(torque, 0.0);
+  add_up_columns();
   if (lane >= 6u) return;
-  if (slot == RESIDUAL && lane == 0u) is_free[aggregate] = held > 0.0 ? 0.0 : 1.0;
-  float value = held > 0.0 ? 0.0 : lane < 3u ? forces[0][lane] : torques[0][lane - 3u];
+  bool held = slot == RESIDUAL ? columns[0][0].w > 0.0 : is_free[aggregate] == 0.0;
+  float value = held ? 0.0 : columns[lane / 3u][0][lane % 3u];
   uint k = 6u * aggregate + lane;
   if (slot == RESIDUAL) {
+    if (lane == 0u) is_free[aggregate] = held ? 0.0 : 1.0;
     coarse_q[k] = 0.0;
     coarse_r[k] = value;
   } else {

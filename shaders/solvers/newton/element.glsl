@@ -1,10 +1,18 @@
-// A constraint with one value: its energy is C^2 / (2 a), and its rate is resisted by tau / a.
-void add_$KIND(uint number, uint part, int i, int j, inout mat3 block, inout vec3 force) {
+// Adds what a constraint has of an edge, its vertices number i and j: a block of the matrix and the force on i. The
+// energy is C^2 / (2 a); damping resists the rate of C by tau / a. Two components have an energy each.
+void add_$KIND(uint number, uint start, int i, int j, inout mat3 block, inout vec3 force) {
   vec3 x[$ARITY];
   uvec4 ids = uvec4(0u);
   for (uint k = 0u; k < $ARITY; ++k) ids[k] = vertices_$KIND[number][k];
-  ivec4 first = start_at(part, ids[0]);
-  for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(part, ids[k]), first);
+  ivec4 first = start_at(start, ids[0]);
+  for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(start, ids[k]), first);
+#if $COMPONENTS == 2
+  float a[2];
+  for (uint k = 0u; k < 2u; ++k) a[k] = compliances_$KIND[2u * number + k];
+  EdgePart part = $KIND_part(x, rest_$KIND(number), a, i, j);
+  block += part.block;
+  force += part.force;
+#else
   Constraint$ARITY c = $KIND(x, rest_$KIND(number), ids);
 #if $MATERIAL
   float a = compliances_$KIND[number];
@@ -18,13 +26,14 @@ void add_$KIND(uint number, uint part, int i, int j, inout mat3 block, inout vec
   float tau = $RATE == 1 ? 1.0 : params.damping * params.h;
 #endif
   if (tau > 0.0) {
-    // Along the way since z.
+    // The rate is that of the displacement from BDF2's z to Newton's start.
     float h = at(OFFSET, ids[0]).w, rate = 0.0;
     for (int k = 0; k < $ARITY; ++k) {
       uint v = ids[k];
       Position own = positions[v];
-      vec3 moved =
-          own.inverse_mass > 0.0 ? start_of(v, DoubleSingle(own.high, own.low)) - at(OFFSET, v).xyz : vec3(0.0);
+      vec3 moved = vec3(0.0);
+      if (own.inverse_mass > 0.0)
+        moved = start_displacement(v, DoubleSingle(own.high, own.low)) - at(OFFSET, v).xyz;
       rate += dot(c.gradient[k], moved) / h;
     }
     push += tau * rate;
@@ -36,4 +45,5 @@ void add_$KIND(uint number, uint part, int i, int j, inout mat3 block, inout vec
   block += $KIND_curvature(c, x, i, j) * (1.0 / a);
 #endif
   force += (gi - gj) * (push / (a * float($ARITY)));
+#endif
 }

@@ -1,1 +1,0 @@
-void start_$KIND(uint c, inout uint bad) {}

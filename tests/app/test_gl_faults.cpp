@@ -457,8 +457,8 @@ TEST_CASE("shader faults name file and line, or the uniform") {
   CHECK(has(with("render/plane.frag", "uniform float opacity", "const float opacity = 1.0"),
             "no such uniform: 'opacity' in plane"));
   CHECK(has(with("render/point.glsl", "vec3 edge;", "vec2 edge;"), "surface"));
-  CHECK(has(with("render/body.frag", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
-  const std::string unlinked = with("render/body.frag", "in Point {", "in Punkt {");
+  CHECK(has(with("render/point_in.glsl", "vec3 edge;", "vec3 edges;"), "shaders/render/body.frag:"));
+  const std::string unlinked = with("render/point_in.glsl", "in Point {", "in Punkt {");
   CAPTURE(unlinked);
   if (is_software_renderer()) CHECK(has(unlinked, "shader program does not link: surface: "));  // others may link it
   // A kernel that goes wrong in a certain step: blamed, and the last good state stands.

@@ -229,6 +229,7 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in eve
   grounds.push_back({flat});
   for (const std::string mode : {"node", "cpu-double", "newton", "explicit"})
     for (const auto& ground : grounds) {
+      if (!is_long_run() && mode == "cpu-double" && &ground < &grounds[3]) continue;
       const bool soft = mode == "newton" || mode == "explicit";
       if (soft && ground[0].kind->name != std::string(mode == "newton" ? "sphere" : "box")) continue;
       CAPTURE(mode);
@@ -249,6 +250,10 @@ TEST_CASE_FIXTURE(GlTest, "obstacles: bodies come to rest on every shape, in eve
 TEST_CASE_FIXTURE(GlTest, "obstacles: a block slides down a tilted box as Coulomb has it, or sticks, in every mode") {
   for (const std::string mode : {"node", "constraint", "cpu", "cpu-double", "cpu-fast", "newton"})
     for (const double degrees : {25.0, 28.0}) {
+      // The short suite has modes that share a contact at one angle each.
+      if (!is_long_run() && ((mode == "constraint" && degrees < 26) || (mode.starts_with("cpu") && degrees > 26)) &&
+          mode != "cpu-double")
+        continue;
       CAPTURE(mode);
       CAPTURE(degrees);
       const double angle = glm::radians(degrees);

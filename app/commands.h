@@ -46,6 +46,7 @@ struct RunOptions {
   long history_mb = 256;              ///< of the window: for states to go back to; 0: none
   std::filesystem::path record;       ///< of the window: what is done there (record.h); empty: nowhere
   std::filesystem::path replay;       ///< what `run` does in place of a scene's steps
+  bool strict = false;                ///< a doubtful verdict is status 1
   bool progress = false;              ///< show it even if standard error is no terminal
 };
 /// `tetpbd run`: steps a scene without a window and writes frames, video and statistics.
@@ -169,7 +170,8 @@ int run_soak(Scene scene, const SoakOptions& options);
 std::string csv_header();
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 
-ordered_json mesh_json(const MeshReport& report);
+/// `mass` in kg.
+ordered_json mesh_json(const MeshReport& report, double mass);
 ordered_json error_json(const RunErrors& errors);
 /// The distance from the right motion; nulls where there is none.
 ordered_json motion_json(const MeasuredRun& run);

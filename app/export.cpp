@@ -141,8 +141,7 @@ void add_frame(Export& files, const Sim& sim) {
   if (files.trajectory) files.trajectory->add(bytes_of(positions));
   if (files.vtk) {
     write_file(files.folder / "vtk" / (name + ".vtu"), vtu_text(sim, state, positions));
-    files.times +=
-        fmt::format("<DataSet timestep=\"{:.9g}\" file=\"vtk/{}.vtu\"/>\n", double(sim.steps) * sim.settings.dt, name);
+    files.times += fmt::format("<DataSet timestep=\"{:.9g}\" file=\"vtk/{}.vtu\"/>\n", simulated_time(sim), name);
   }
   if (files.cache || files.ply) {
     const SurfaceMesh surface = seen_surface(*sim.model, state.positions);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "app/auto_solver.h"
 #include "app/commands.h"
@@ -9,6 +10,7 @@
 #include "app/files.h"
 #include "app/lanes.h"
 #include "app/probe.h"
+#include "app/verdict.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"
@@ -120,7 +122,9 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   j["settings"] = settings_json(scene, sim.settings);
   j["settings"]["iterations"] = sim.plan.iterations, j["settings"]["substeps"] = sim.plan.substeps;
   if (choice) j["solver_choice"] = solver_choice_json(*choice);
-  j["mesh"] = mesh_json(report(sim.model->rest));
+  j["mesh"] = mesh_json(report(sim.model->rest), std::reduce(sim.model->masses.begin(), sim.model->masses.end()));
+  for (const StartMotion& m : sim.model->start_motions)
+    j["start_motions"].push_back({{"body", m.body}, {"from", m.from}, {"motion", vector(m.motion)}, {"work", m.work}});
   j["device"] = device_json(device);
   j["timing"] = {{"steps", sim.steps},
                  {"gpu_ms_per_step", times(run.gpu_ms)},
@@ -149,11 +153,18 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"final", last.energy()},
                  {"max", errors.last ? errors.max_energy : std::nan("")},
                  {"final_kinetic", last.kinetic},
-                 {"final_potential", last.potential}};
+                 {"final_potential", last.potential},
+                 {"elastic", last.elastic},
+                 {"total", last.total},
+                 {"dissipated", errors.ledger.dissipated()},
+                 {"created", errors.ledger.created},
+                 {"scale", errors.ledger.scale}};
+  if (const auto why = why_not_judged(*sim.model, sim.settings)) j["energy"]["not_judged"] = *why;
   const GuardCounts guards = guard_counts(sim);
   for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
   for (const auto& [name, count] : dropped(sim)) j["dropped"][name] = count;
   j["finite"] = errors.finite;
+  if (errors.finite) j["verdict"] = verdict_json(judge(errors, sim));
   j["non_finite"] = non_finite_json(errors.non_finite);
   j["state_hash"] = hash;
   return j;
@@ -238,7 +249,9 @@ int run_headless(Scene scene, const RunOptions& options) {
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);
-  return 0;
+  const Verdict verdict = judge(run.errors, sim);
+  fmt::print("{}\n", verdict_line(verdict));
+  return verdict.level() == Verdict::wrong || (options.strict && verdict.level() != Verdict::right) ? 1 : 0;
 }
 
 int print_explanation(Scene scene, int gpu, long steps) {

@@ -186,7 +186,7 @@ void hold_lanes(std::vector<Lane>& lanes, const Motion* right) {
   for (Lane& lane : lanes) {
     if (lane.stopped() || lane.sim.steps != now) continue;
     const double distance = error_to(model, answer, read_state(lane.sim));
-    if (std::isfinite(distance)) lane.distance.add(100 * distance, double(now) * lane.sim.settings.dt);
+    if (std::isfinite(distance)) lane.distance.add(100 * distance, simulated_time(lane.sim));
   }
 }
 

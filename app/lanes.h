@@ -31,7 +31,10 @@ struct Lane {
   std::optional<Metrics> metrics{};             ///< made when first shown
   History step_ms{}, volume_error{}, energy{};  ///< J, with the elastic one of a material
   History distance{};                           ///< from what is right, % of the size
-  History depth{};                              ///< of the vertex deepest in an obstacle or another body, % of the size
+  EnergyLedger ledger{};                        ///< since the start, or since somebody last changed something
+  History created{};                            ///< of the ledger, in % of its scale
+  bool gain_said = false;
+  History depth{};   ///< of the vertex deepest in an obstacle or another body, % of the size
   Buffer apart{};    ///< by vertex, the same as last found, as a part of the size; none: not asked for, or not
                      ///< known
   Buffer patches{};  ///< by vertex, the number of its patch (patch_numbers)

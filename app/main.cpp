@@ -300,6 +300,7 @@ void add_commands(CLI::App& app, Arguments& a) {
                               "--turntable", "--camera-path", "--positions-every", "--export",    "--height"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
+  run.add_flag("--strict", a.run.strict, "exit status 1 also where the verdict is doubtful");
   add_progress(run, a.run.progress);
 
   CLI::App& reference =

@@ -405,12 +405,12 @@ void draw_timeline(Session& s) {
   describe_item(s, "loop", "play what is kept again and again");
   ImGui::SameLine();
   ImGui::SetNextItemWidth(-1);
-  const double dt = s.loaded.sim().settings.dt;
   const long first = t.moments.empty() ? 0 : t.moments.front()->step;
   long now = steps_of(s.loaded.lanes), last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
-  std::string text = t.moments.empty() ? "nothing is kept" : fmt::format("{:.3f} s", double(now) * dt);
+  std::string text = t.moments.empty() ? "nothing is kept" : fmt::format("{:.3f} s", simulated_time(s.loaded.sim()));
   if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
-    text += fmt::format(" of {:.3f} .. {:.3f} s", double(first) * dt, double(last) * dt);
+    text += fmt::format(" of {:.3f} .. {:.3f} s", t.moments.front()->time,
+                        std::max(t.moments.back()->time, simulated_time(s.loaded.sim())));
   if (ImGui::SliderScalar("##time", ImGuiDataType_S64, &now, &first, &last, text.c_str(),
                           ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
     show_step(s, now);

@@ -241,7 +241,7 @@ const std::vector<PlotRow>& plot_rows() {
       {"frames per second", "fps", nullptr},      {"time per step", "ms", &Lane::step_ms, true},
       {"volume error", "%", &Lane::volume_error}, {"energy", "J", &Lane::energy},
       {"distance", "%", &Lane::distance, true},   {"distance", "%", &Lane::distance, true, true},
-      {"depth of contacts", "%", &Lane::depth}};
+      {"depth of contacts", "%", &Lane::depth},   {"energy from nothing", "%", &Lane::created}};
   return rows;
 }
 
@@ -258,8 +258,8 @@ std::string plot_csv(const Session& s, const PlotRow& row) {
 
 Chart plot_chart(const Session& s, const PlotRow& row) {
   Chart chart{.title = s.loaded.scene.name + ": " + title_of(s, row),
-              .subtitle = fmt::format("{} tets, {} steps of {:g} s", s.loaded.sim().model->rest.tets.size(),
-                                      s.loaded.sim().steps, s.loaded.sim().settings.dt),
+              .subtitle = fmt::format("{} tets, {} steps to {:g} s", s.loaded.sim().model->rest.tets.size(),
+                                      s.loaded.sim().steps, simulated_time(s.loaded.sim())),
               .x_label = row.over_cost ? "time per step, ms" : "time, s",
               .y_label = fmt::format("{}, {}", title_of(s, row), row.unit)};
   chart.log_x = row.over_cost;

@@ -13,6 +13,7 @@
 #include "app/obstacles.h"
 #include "app/run_loop.h"
 #include "render/obstacles.h"
+#include "sim/contact/starts.h"
 #include "sim/error.h"
 #include "sim/gl/layout.h"
 #include "sim/model/did_you_mean.h"
@@ -35,7 +36,7 @@ fs::path models_folder() {
   return TETPBD_SOURCE_MODELS;
 }
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells, taper)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells, taper, mirror)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Sheet, size, cells)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(WrapOptions, voxels, thickness)
@@ -47,8 +48,8 @@ namespace {
 
 constexpr std::size_t most_bytes = 1u << 20, most_depth = 32, most_tets = 30'000'000;
 
-/// By key: "text"; [low, high] of a number; {"three": of each}; {"least", "most", "of", "each"} of a list;
-/// null for what set_parameter() checks. Further out than 1e6 m even pairs of floats lose a body's shape.
+/// By key: "text"; "true or false"; [low, high] of a number; {"three": of each}; {"least", "most", "of", "each"} of a
+/// list; null for what set_parameter() checks. Further out than 1e6 m even pairs of floats lose a body's shape.
 json schema() {
   json result = json::parse(R"({
     "name": "text", "description": "text", "duration": [1e-6, 1e6],
@@ -57,7 +58,7 @@ json schema() {
       "wrap": {"or": false, "voxels": [8, 1000, "whole number"], "thickness": [1, 20]},
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
-        "taper": [0, 0.95]},
+        "taper": [0, 0.95], "mirror": "true or false"},
       "sheet": {"size": {"least": 2, "most": 2, "of": "two numbers", "each": [1e-6, 1e6]},
         "cells": {"least": 2, "most": 2, "of": "two numbers", "each": [1, 2000, "whole number"]}},
       "thickness": [1e-9, 1e6],
@@ -97,6 +98,8 @@ void check(const json& value, const json& allowed, const std::string& path, cons
   const auto inner = [&](const std::string& key) { return path.empty() ? key : path + "." + key; };
   if (allowed == "text") {
     require(value.is_string(), "a text in quotes");
+  } else if (allowed == "true or false") {
+    require(value.is_boolean(), "true or false");
   } else if (allowed.is_array()) {
     const double low = allowed[0], high = allowed[1], x = value.is_number() ? value.get<double>() : NAN;
     const bool whole = allowed.size() > 2;
@@ -174,6 +177,11 @@ BodyDescription read_body(const json& value, const std::string& where, const std
                 : body.sheet ? "sheet"
                              : (body.mesh.empty() ? body.surface : body.mesh).stem().string();
   body.name = printable(body.name);
+  for (const auto& [key, boxes] : {std::pair("fixed", &body.fixed), std::pair("heavy", &body.heavy)})
+    for (std::size_t b = 0; b < boxes->size(); ++b)
+      if (const auto& box = (*boxes)[b]; glm::any(glm::greaterThan(box.low, box.high)))
+        refuse(fmt::format("'{}.{}.{}' has a \"low\" above its \"high\", so that nothing is inside", where, key, b),
+               file);
   for (fs::path* named : {&body.mesh, &body.surface})
     if (!named->empty()) *named = found_file(*named, folder);
   return body;
@@ -288,7 +296,8 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
 // `own`: becomes the surface that was wrapped, if one was.
 TetMesh mesh_of(const BodyDescription& body, const std::string& scene, SurfaceMesh& own) {
   if (const auto& b = body.block)
-    return b->taper > 0 ? make_spindle(b->size, b->cells, b->taper) : make_block(b->size, b->cells);
+    return b->taper > 0 ? make_spindle(b->size, b->cells, b->taper, b->mirror)
+                        : make_block(b->size, b->cells, b->mirror);
   if (body.sheet) return make_sheet(body.sheet->size, body.sheet->cells);
   if (body.tet) {
     TetMesh mesh{{body.tet->begin(), body.tet->end()}, {{0, 1, 2, 3}}, {}};
@@ -529,6 +538,14 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     std::vector<std::uint32_t> fixed;
     std::vector<double> mass_factors(mesh.positions.size(), 1);
     std::mt19937 generator{std::uint32_t(scene.settings.seed)};
+    for (std::size_t b = 0; b < body.fixed.size(); ++b) {
+      std::size_t inside = 0;
+      while (inside < mesh.positions.size() && !is_in(inside, body.fixed[b])) ++inside;
+      if (inside == mesh.positions.size())
+        throw Error("a fixed region holds no vertex",
+                    fmt::format("'fixed.{}' of body '{}' of {}", b, body.name, scene.name),
+                    "low and high are fractions of the body's bounding box: make it larger");
+    }
     for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
       if (std::ranges::any_of(body.fixed, [&](const auto& box) { return is_in(i, box); })) fixed.push_back(i);
       for (const BodyDescription::Box& heavy : body.heavy) {
@@ -539,6 +556,13 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     if (body.height > 0 && !(own.high.y > own.low.y))
       throw Error("a flat sheet has no height", fmt::format("body '{}' of {}", body.name, scene.name),
                   "give scale or size");
+    const glm::dvec3 extent = own.high - own.low;
+    if (!body.mesh.empty() && body.height == 0)
+      if (const double high = std::max({extent.x, extent.y, extent.z}); high > 50 || high < 1e-3)
+        print_error(
+            fmt::format("tetpbd: {}: body '{}' is {:.3g} m large: are its file's units {}? use --height or its key "
+                        "scale\n",
+                        scene.name, body.name, high, high > 1 ? "millimetres" : "metres"));
     const double scale = body.height > 0 ? body.height / (own.high.y - own.low.y) : 1.0;
     for (auto& p : mesh.positions) p = turn * ((p - own.centre()) * scale);
     const Bounds placed = bounds(mesh.positions);
@@ -555,6 +579,9 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     load_field(model->obstacles.back());
   }
   renumber(*model);
+  model->start_motions = separate_starts(*model, scene.settings);
+  for (const StartMotion& motion : model->start_motions)
+    print_error(fmt::format("tetpbd: {}: {}\n", scene.name, describe(motion)));
   return model;
 }
 

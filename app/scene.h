@@ -22,7 +22,8 @@ struct BodyDescription {
   struct Block {
     glm::dvec3 size{1};  ///< m
     glm::ivec3 cells{1};
-    double taper = 0;  ///< make_spindle()
+    double taper = 0;    ///< make_spindle()
+    bool mirror = true;  ///< every second cell, make_block()
   };
   struct Sheet {
     std::array<double, 2> size{1, 1};  ///< m, along x and z

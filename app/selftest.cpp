@@ -31,7 +31,7 @@ Scene falling_block(bool soft) {
   Scene scene = load_scene("beam");
   BodyDescription& body = scene.bodies[0];
   body.fixed.clear();
-  body.block = {{1, 0.7, 0.7}, {6, 4, 4}};
+  body.block = {.size = {1, 0.7, 0.7}, .cells = {6, 4, 4}, .mirror = false};
   body.position = {0, 0.1, 0}, body.rotation = {10, 20, 30};
   if (soft) scene.settings.material = "neo-hookean", scene.settings.young_modulus = 2e5;
   return scene;

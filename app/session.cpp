@@ -11,6 +11,7 @@
 #include "app/files.h"
 #include "app/reference_command.h"
 #include "app/run_loop.h"
+#include "sim/contact/starts.h"
 #include "sim/error.h"
 
 namespace tetpbd {
@@ -28,7 +29,8 @@ void start_afresh(Session& s) {
   for (Lane& lane : s.loaded.lanes) {
     while (lane.metrics && collect(*lane.metrics, true)) {
     }
-    lane.step_ms = lane.volume_error = lane.energy = lane.distance = lane.depth = {};
+    lane.step_ms = lane.volume_error = lane.energy = lane.distance = lane.depth = lane.created = {};
+    lane.ledger = {}, lane.gain_said = false;
     lane.apart = {};
   }
   s.loaded.disturbed = false;
@@ -77,7 +79,7 @@ void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
     const Settings own = lane.sim.settings;
     apply_settings(lane.sim, of_lanes[i]);
     note(s, {{"lane", i}, {"set", settings_text(of_lanes[i], &own)}});
-    lane.patches = {};
+    lane.patches = {}, lane.ledger = {};
     if (alone && lane.sim.steps > 0) disturb(s);
     if (alone || key_of(lane) == before) continue;
     disturb(s);
@@ -117,6 +119,7 @@ void take_back(Session& s, const char* word, std::vector<Change>& from, std::vec
 void disturb(Session& s) {
   if (!std::exchange(s.loaded.disturbed, true))
     for (Lane& lane : s.loaded.lanes) lane.distance = {}, lane.apart = {};
+  for (Lane& lane : s.loaded.lanes) lane.ledger = {};
 }
 
 void forget_errors(Session& s) {
@@ -139,7 +142,7 @@ void step_lanes(Session& s) {
     step(lane.sim);
     if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
   }
-  if (s.loaded.right && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
+  if (s.loaded.right && !s.loaded.disturbed && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
   if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
@@ -327,6 +330,7 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   begin_timeline(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
+  for (const StartMotion& motion : s.loaded.sim().model->start_motions) say(s, describe(motion));
 }
 
 void load_soon(Session& s, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
@@ -592,6 +596,19 @@ void advance(Session& s, double elapsed) {
   clock.owed = clock.fast ? 0 : std::min(clock.owed, dt);
 }
 
+// Energy that nothing supplied is said once, where the solver is to blame: not while the mouse pulls.
+static void judge_energy(Session& s, Lane& lane, const Measurement& now) {
+  if (s.hold) lane.ledger = {};
+  add_measurement(lane.ledger, now, *lane.sim.model, lane.sim.settings);
+  if (why_not_judged(*lane.sim.model, lane.sim.settings)) return;
+  const double gain = 100 * lane.ledger.relative();
+  lane.created.add(gain, now.time);
+  if (gain > 1 && !std::exchange(lane.gain_said, true))
+    say(s,
+        fmt::format("verdict: doubtful: {:.3g} J came from nothing, {:.3g} % of what the scene has: take more substeps",
+                    lane.ledger.created, gain));
+}
+
 void measure_frame(Session& s, bool stepped) {
   for (Lane& lane : s.loaded.lanes) {
     while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, simulated_time(lane.sim));
@@ -601,6 +618,7 @@ void measure_frame(Session& s, bool stepped) {
     while (const auto now = collect(*lane.metrics)) {
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
+      judge_energy(s, lane, *now);
       const Pairs& pairs = lane.sim.pairs;
       const double in_bodies = pairs ? pairs.depth / lane.sim.model->size : std::nan(""),
                    depth = std::fmax(now->penetration_max, in_bodies);  // of what there is

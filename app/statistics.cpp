@@ -33,6 +33,9 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"kinetic_energy", m.kinetic},
           {"potential_energy", m.potential},
           {"energy", m.energy()},
+          {"elastic_energy", m.elastic},
+          {"total_energy", m.total},
+          {"energy_created", so_far.ledger.created},
           {"centre_x", m.centre.x},
           {"centre_y", m.centre.y},
           {"centre_z", m.centre.z},
@@ -52,7 +55,12 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MeshReport, vertices, surface_vertices, surfa
                                    euler_characteristic, genus, components, volume, smallest_tet_volume,
                                    mean_tet_volume, min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg, slivers,
                                    inverted)
-ordered_json mesh_json(const MeshReport& counts) { return nlohmann::json(counts); }
+ordered_json mesh_json(const MeshReport& counts, double mass) {
+  ordered_json all = nlohmann::json(counts);
+  all["size"] = {counts.size.x, counts.size.y, counts.size.z};
+  all["mass"] = mass;
+  return all;
+}
 
 ordered_json error_json(const RunErrors& errors) {
   const ordered_json all = quantities(errors.last.value_or(nothing_measured()), errors);

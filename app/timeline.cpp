@@ -49,7 +49,7 @@ void show(Session& s, std::size_t index) {
         pinned ? unpin(lane.sim, vertex) : pin(lane.sim, vertex);
     restore_snapshot(lane.sim, then.lanes[i], then.states);
     unpin(lane.sim, then.held);
-    lane.apart = {};
+    lane.apart = {}, lane.ledger = {};
     if (s.loaded.disturbed != then.disturbed) lane.distance = then.distances[i];  // held against something else
   }
   s.loaded.disturbed = then.disturbed;
@@ -104,7 +104,7 @@ void keep_moment(Session& s) {
           if (freed.bytes() == on_gpu) states = std::move(freed);
         }
         if (on_gpu && !states) states = Buffer("moment", on_gpu);
-        auto moment = std::make_unique<Moment>(now);
+        auto moment = std::make_unique<Moment>(now, simulated_time(lanes.front().sim));
         std::size_t at = 0;
         for (Lane& lane : lanes) {
           moment->lanes.push_back(take_snapshot(lane.sim, states, at));
@@ -147,8 +147,8 @@ void loop_on(Session& s) {
   std::size_t index = before;
   for (;;) {
     const std::size_t next = (index + 1) % t.moments.size();
-    const double seconds = next ? double(step_at(t, next) - step_at(t, index)) * dt : dt;
-    if (s.clock.owed < seconds) break;
+    const double seconds = next ? t.moments[next]->time - t.moments[index]->time : dt;
+    if (s.clock.owed < seconds - 1e-9) break;
     s.clock.owed -= seconds;
     s.clock.simulated += seconds;
     index = next;

@@ -16,6 +16,7 @@ struct Session;
 /// All lanes after a step, or at the start.
 struct Moment {
   long step = 0;
+  double time = 0;  ///< s, simulated
   std::vector<Snapshot> lanes;
   std::vector<History> distances;     ///< the last of each lane, if any
   bool disturbed = false;             ///< as in Loaded

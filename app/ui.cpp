@@ -73,8 +73,8 @@ void draw_status(Session& s, const Rect& place) {
   const std::string rest = fmt::format(
       "{0}  step {1}  {0}  {2:.3f} s  {0}  mode {3}  {0}  {4} tets  {0}  {5} vertices  {0}  {6} constraints  "
       "{0}  {7}",
-      dot, sim.steps, double(sim.steps) * sim.settings.dt, sim.settings.mode, sim.model->rest.tets.size(),
-      sim.model->positions.size(), sim.system.count(), s.gl.renderer);
+      dot, sim.steps, simulated_time(sim), sim.settings.mode, sim.model->rest.tets.size(), sim.model->positions.size(),
+      sim.system.count(), s.gl.renderer);
   ImGui::TextUnformatted(rest.c_str());
   ImGui::PopClipRect();
   ImGui::SameLine(place.width - help);

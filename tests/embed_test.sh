@@ -25,7 +25,7 @@ place=$(env -i ${MESA_GL_VERSION_OVERRIDE:+MESA_GL_VERSION_OVERRIDE="$MESA_GL_VE
 
 # The same by tetpbd, whose positions in scenes are those of the bottom: the last vertex ends numpy's file, as float32.
 cat >block.json <<'SCENE'
-{"bodies": [{"block": {"size": [0.4, 0.2, 0.4], "cells": [4, 2, 4]}, "position": [0, 0.2, 0], "density": 1000}],
+{"bodies": [{"block": {"size": [0.4, 0.2, 0.4], "cells": [4, 2, 4], "mirror": false}, "position": [0, 0.2, 0], "density": 1000}],
  "solver": {"mode": "node", "material": "neo-hookean", "young_modulus": 1e5}}
 SCENE
 "$build/tetpbd" run --scene block.json --steps 100 --positions --out out >run.log 2>&1 || fail "tetpbd run: $(cat run.log)"

@@ -11,22 +11,23 @@
 #define M_STRETCH_SQUARES 4    // sum ((l - d)/d)^2
 #define M_STRETCH_MAX 5
 #define M_BEND_SQUARES 6       // sum of squared angle errors, rad^2
-#define M_ELASTIC 7            // J, of a material
-#define M_MOMENT 8             // 3: sum m (x - x0), x0 the body's first vertex
-#define M_MOMENTUM 11          // 3: sum m v
-#define M_SPEED 14             // sum m |v|
-#define M_KINETIC 15           // J
-#define M_HEIGHT 16            // sum m y
-#define M_COVARIANCE 17        // 9: sum m (x - x0) X^T, column by column
-#define M_CONTACTS 26          // pairs of a vertex and an obstacle that it touches
-#define M_NON_FINITE 27        // vertices with a position or velocity that is not finite
-#define M_PENETRATION 28       // m, of the vertex that is deepest in an obstacle
-#define M_DEPTHS 29            // DEPTHS: vertices by depth over the size, from 1 on in steps of half an octave
+#define M_ELASTIC 7            // J, of a material or of constraints with compliance
+#define M_ELASTIC_MIDWAY 8     // J, of positions half a substep before, where velocities are of mid-substep
+#define M_MOMENT 9             // 3: sum m (x - x0), x0 the body's first vertex
+#define M_MOMENTUM 12          // 3: sum m v
+#define M_SPEED 15             // sum m |v|
+#define M_KINETIC 16           // J
+#define M_HEIGHT 17            // sum m y
+#define M_COVARIANCE 18        // 9: sum m (x - x0) X^T, column by column
+#define M_CONTACTS 27          // pairs of a vertex and an obstacle that it touches
+#define M_NON_FINITE 28        // vertices with a position or velocity that is not finite
+#define M_PENETRATION 29       // m, of the vertex that is deepest in an obstacle
+#define M_DEPTHS 30            // DEPTHS: vertices by depth over the size, from 1 on in steps of half an octave
 #define DEPTHS 32
-#define M_ANGULAR 61           // 3: sum m r x u about the centre of mass
-#define M_RIGID_SQUARES 64     // sum m |x - c - R X|^2
-#define M_CENTRE 65            // 3: c - x0
-#define M_ROTATION 68          // 4: quaternion w, x, y, z
-#define M_ORIGIN 72            // 3: x0
-#define M_ROW 75
+#define M_ANGULAR 62           // 3: sum m r x u about the centre of mass
+#define M_RIGID_SQUARES 65     // sum m |x - c - R X|^2
+#define M_CENTRE 66            // 3: c - x0
+#define M_ROTATION 69          // 4: quaternion w, x, y, z
+#define M_ORIGIN 73            // 3: x0
+#define M_ROW 76
 #define M_STRIDE 128           // floats from one body's row to the next: a multiple of any driver's binding alignment

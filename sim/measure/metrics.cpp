@@ -29,6 +29,15 @@ glm::uvec2 constraint_range(const ConstraintList& list, glm::uvec2 vertices) {
           std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
 }
 
+// J over C^2 of the kinds that are measured, of a body without a material model; 0 where a kind has no energy.
+glm::vec3 energy_per_square(const Material& material) {
+  glm::vec3 factors(0);
+  for (std::size_t k = 0; k < measured_kinds && !has_energy(material); ++k)
+    if (uses(material, constraint_kinds[k]) && material.compliance[k] > 0)
+      factors[glm::length_t(k)] = float(0.5 / material.compliance[k]);
+  return factors;
+}
+
 // Reads a measurement back; false where it has not arrived yet.
 bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   if (!pending.fence.sync()) return true;
@@ -37,6 +46,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   Measurement& result = pending.result;
   const std::vector<float> rows = m.rows[pending.slot].read_all<float>();
   std::array<double, M_ROW> sums{};
+  double heights = 0;  // kg m, midway
   const auto largest = [](double a, double b) { return std::isnan(b) ? b : std::max(a, b); };
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const float* row = rows.data() + b * M_STRIDE;
@@ -47,6 +57,8 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
     const auto of_body = [&](std::size_t at) { return glm::dvec3(row[at], row[at + 1], row[at + 2]); };
     const glm::dvec3 centre = of_body(M_ORIGIN) + of_body(M_CENTRE);
     result.centre += m.bodies[b].mass * centre;
+    // From the body's own sums: those of heights lose a body's bounces to what floats drop far from the ground.
+    heights += m.bodies[b].mass * centre.y - pending.midway * double(row[M_MOMENTUM + 1]);
     result.angular_momentum += of_body(M_ANGULAR) + glm::cross(centre, of_body(M_MOMENTUM));
   }
   const auto rms = [](double squares, std::size_t count) { return count ? std::sqrt(squares / double(count)) : 0.0; };
@@ -73,6 +85,8 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.kinetic = sums[M_KINETIC];
   result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
   result.elastic = sums[M_ELASTIC];
+  result.stored = sums[M_ELASTIC_MIDWAY];
+  result.total = result.kinetic + result.stored + pending.gravity * (heights - m.mass * pending.ground);
   result.contacts = sums[M_CONTACTS];
   result.non_finite = sums[M_NON_FINITE];
   return true;
@@ -135,6 +149,7 @@ void measure(Metrics& m, const Sim& sim) {
   recorder.begin();
   recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
   recorder.give("Rest", m.rest), recorder.give("Partials", m.partials);
+  const double midway = solver_mode(sim.settings).implicit ? 0 : 0.5 * sim.plan.h;
   for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
@@ -147,8 +162,12 @@ void measure(Metrics& m, const Sim& sim) {
       kernel.set("vertex_range", body.vertices), kernel.set("edge_range", body.edges);
       kernel.set("hinge_range", body.hinges), kernel.set("tet_range", body.tets);
       kernel.set("mass", float(body.mass));
-      if (&pass == &m.passes[0])
-        kernel.set("material", energy_material(body_material(sim.model->bodies[b], sim.settings)));
+      if (&pass == &m.passes[0]) {
+        const Material& material = body_material(sim.model->bodies[b], sim.settings);
+        kernel.set("material", energy_material(material));
+        kernel.set("energy_per_square", energy_per_square(material));
+        kernel.set("midway", float(midway));
+      }
       kernel.set("touching", float(1e-5 * body.size));
       const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // they add the groups' sums
       pass.work_groups = one_group ? 1 : groups;
@@ -160,6 +179,7 @@ void measure(Metrics& m, const Sim& sim) {
                        {.step = sim.steps, .time = simulated_time(sim)},
                        sim.settings.ground ? sim.settings.ground_height : 0.0,
                        sim.settings.gravity,
+                       midway,
                        has_obstacles(*sim.model, sim.settings)});
 }
 
@@ -175,9 +195,10 @@ std::optional<Measurement> collect(Metrics& m, bool wait) {
 Measurement nothing_measured() {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Measurement m;
-  for (double* value : {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets,
-                        &m.stretch_rms, &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic,
-                        &m.potential, &m.elastic, &m.contacts, &m.penetration_max, &m.penetration_999})
+  for (double* value :
+       {&m.volume, &m.volume_error_percent, &m.tet_volume_rms, &m.tet_volume_max, &m.inverted_tets, &m.stretch_rms,
+        &m.stretch_max, &m.bend_rms_rad, &m.rigid_distance, &m.speed, &m.kinetic, &m.potential, &m.elastic, &m.total,
+        &m.stored, &m.contacts, &m.penetration_max, &m.penetration_999})
     *value = nan;
   m.momentum = m.angular_momentum = m.centre = glm::dvec3(nan);
   return m;
@@ -188,6 +209,7 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   if (!errors.finite) return;  // the errors stay those of the last finite state
   if (!errors.first) errors.first = now, errors.start_energy = errors.max_energy = now.energy();
   errors.last = now;
+  add_measurement(errors.ledger, now, *sim.model, sim.settings);
   errors.max_volume_loss_percent = std::max(errors.max_volume_loss_percent, -now.volume_error_percent);
   errors.max_energy = std::max(errors.max_energy, now.energy());
   errors.penetration_max = std::fmax(now.penetration_max, errors.penetration_max);

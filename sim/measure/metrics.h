@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "sim/measure/ledger.h"
 #include "sim/measure/overlap.h"
 #include "sim/sim.h"
 
@@ -31,11 +32,14 @@ struct Measurement {
   double speed = 0;                   ///< sum m |v|, kg m/s, to which drift is relative
   glm::dvec3 centre{0};               ///< m, of mass
   double kinetic = 0, potential = 0;  ///< J; potential of gravity above the ground (above 0 without one)
-  double elastic = 0;                 ///< J, of a material
-  double contacts = 0;                ///< pairs of a vertex and an obstacle, or the ground, that it touches
-  double penetration_max = 0;         ///< depth of the deepest vertex over the body's size; NaN without obstacles
-  double penetration_999 = 0;         ///< depth below which 99.9 % of the vertices stay, likewise
-  double non_finite = 0;              ///< vertices with a position or velocity that is not finite
+  double elastic = 0;                 ///< J, of materials and of constraints with compliance
+  /// J, all three as the mode's steps conserve them: where velocities are of mid-substep, of positions there.
+  double total = 0;
+  double stored = 0;           ///< J, the elastic part of the total
+  double contacts = 0;         ///< pairs of a vertex and an obstacle, or the ground, that it touches
+  double penetration_max = 0;  ///< depth of the deepest vertex over the body's size; NaN without obstacles
+  double penetration_999 = 0;  ///< depth below which 99.9 % of the vertices stay, likewise
+  double non_finite = 0;       ///< vertices with a position or velocity that is not finite
   bool finite() const { return non_finite == 0; }
   double energy() const { return kinetic + potential; }
 };
@@ -51,6 +55,7 @@ struct Metrics {
     std::size_t slot;
     Measurement result;  ///< only step and time until it is read
     double ground, gravity;
+    double midway;  ///< s, that positions are ahead of velocities
     bool obstacles;
   };
 
@@ -86,9 +91,10 @@ struct RunErrors {
   double angular_drift = std::numeric_limits<double>::quiet_NaN();
   double start_energy = 0, max_energy = 0;          ///< J
   double penetration_max = 0, penetration_999 = 0;  ///< the largest of all measurements
-  std::optional<Overlap> overlap;                   ///< the largest of each, where bodies touch
-  bool free = true;                                 ///< no contact, damping or fixed vertex so far
-  std::optional<Measurement> first, last;           ///< the first and last finite state
+  EnergyLedger ledger;
+  std::optional<Overlap> overlap;          ///< the largest of each, where bodies touch
+  bool free = true;                        ///< no contact, damping or fixed vertex so far
+  std::optional<Measurement> first, last;  ///< the first and last finite state
   bool finite = true;
   std::optional<NonFinite> non_finite;  ///< the result of check_finite(), if the caller asked for it
 };

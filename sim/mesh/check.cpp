@@ -319,6 +319,8 @@ MeshReport report(const TetMesh& mesh) {
   r.vertices = mesh.positions.size();
   r.tets = mesh.tets.size();
   r.surface_triangles = mesh.surface.size();
+  const Bounds box = bounds(mesh.positions);
+  r.size = box.high - box.low;
   r.edges = tet_edges(mesh).size();
   DisjointSets parts(r.vertices);
   std::vector<char> solid(r.vertices, 0);

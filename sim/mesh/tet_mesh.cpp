@@ -129,7 +129,7 @@ void finish_tets(TetMesh& mesh, const std::string& source) {
 
 // Kuhn's subdivision: a tet for each order of the axes in which a path leads from the cell's low corner to its high
 // one. All cells share the diagonal's direction, so the faces of neighbours match.
-TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
+TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells, bool mirrored) {
   TetMesh mesh;
   const glm::uvec3 nodes(cells + 1);
   const auto visit_grid = [](const glm::uvec3& counts, const auto& visit) {
@@ -140,20 +140,27 @@ TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells) {
   visit_grid(nodes, [&](const glm::uvec3& at) {
     mesh.positions.push_back(size * (glm::dvec3(at) / glm::dvec3(cells) - 0.5));
   });
-  const glm::uvec3 step(1, nodes.x, nodes.x * nodes.y);
   constexpr std::array<std::array<int, 3>, 6> orders{
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
   visit_grid(glm::uvec3(cells), [&](const glm::uvec3& at) {
-    const std::uint32_t corner = at.x + at.y * step.y + at.z * step.z;
-    for (const auto& [i, j, k] : orders)
-      mesh.tets.push_back({corner, corner + step[i], corner + step[i] + step[j], corner + step[0] + step[1] + step[2]});
+    glm::uvec3 from = at, to = at + 1u;  // the ends of the diagonal that the cell's six tets share
+    for (int axis = 0; axis < 3 && mirrored; ++axis)
+      if (at[axis] % 2 == 1) std::swap(from[axis], to[axis]);
+    const auto number = [&](const glm::uvec3& node) { return node.x + node.y * nodes.x + node.z * nodes.x * nodes.y; };
+    for (const auto& [i, j, k] : orders) {
+      glm::uvec3 second = from;
+      second[i] = to[i];
+      glm::uvec3 third = second;
+      third[j] = to[j];
+      mesh.tets.push_back({number(from), number(second), number(third), number(to)});
+    }
   });
   finish_tets(mesh, "block");
   return mesh;
 }
 
-TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper) {
-  TetMesh mesh = make_block(size, cells);
+TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper, bool mirrored) {
+  TetMesh mesh = make_block(size, cells, mirrored);
   for (glm::dvec3& p : mesh.positions) {
     const glm::dvec3 u = 2.0 * p / size;  // -1 to 1
     const double thin = 1 - taper * u.y * u.y;

@@ -114,10 +114,12 @@ void write_surface(const std::filesystem::path& file, const SurfaceMesh& surface
 
 /// Orients every tet, drops vertices without one, finds the boundary. Throws Error naming `source`.
 void finish_tets(TetMesh& mesh, const std::string& source);
-/// A block of nx * ny * nz cells, each cut into six tets (Kuhn); size in metres, centred on the origin.
-TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells);
+/// A block of nx * ny * nz cells, each cut into six tets (Kuhn); size in metres, centred on the origin. Diagonals of
+/// all cells point the same way, so that a load along an axis makes the block lean by its mesh alone; mirrored, every
+/// second cell along each axis is the mirror image of the one before, and only the last of an odd count still leans.
+TetMesh make_block(const glm::dvec3& size, const glm::ivec3& cells, bool mirrored = false);
 /// The same with rounded cross-sections along y, thinner by `taper` at the ends.
-TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper);
+TetMesh make_spindle(const glm::dvec3& size, const glm::ivec3& cells, double taper, bool mirrored = false);
 
 /// A sheet of these triangles, which may be open and are turned to agree with their neighbours where possible; its
 /// thickness is a thousandth of its size. Throws Error naming `source`.
@@ -154,6 +156,7 @@ struct MeshReport {
   double min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg;
   std::size_t slivers;  ///< tets with a dihedral angle under 5 or over 175 degrees
   std::size_t inverted;
+  glm::dvec3 size;  ///< m, of the bounding box
 };
 MeshReport report(const TetMesh& mesh);
 

@@ -33,6 +33,13 @@ struct Body {
   bool is_sheet() const { return tets == 0; }
 };
 
+/// A body that started inside something and was moved out before the run (contact/starts.h).
+struct StartMotion {
+  std::string body, from;  ///< its name, and what it was in
+  glm::dvec3 motion{0};    ///< m
+  double work = 0;         ///< J, against gravity
+};
+
 struct Model {
   TetMesh rest;  ///< m; bodies one after the other
   std::vector<Body> bodies;
@@ -44,6 +51,7 @@ struct Model {
   double size = 1;                     ///< m, diagonal of the largest body at rest
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
+  std::vector<StartMotion> start_motions;  ///< already made in `positions`
   /// The surface of all bodies that is drawn and exported in place of `rest.surface`; empty unless a body has its own.
   CarriedSurface carried;
 };

@@ -376,9 +376,9 @@ TEST_CASE("the scene that a run writes gives the same run wherever it lies") {
     return json::parse(read(folder.path / "c/scene.json"));
   };
   std::ofstream(folder.path / "slope.json") << R"({"bodies": [
-    {"block": {"size": [0.4, 0.3, 0.2], "cells": [3, 2, 2]}, "position": [0, 0.1, 0], "velocity": [1, -1, 0.3], "rotation": [10, 20, 30],
+    {"block": {"size": [0.4, 0.3, 0.2], "cells": [3, 2, 2]}, "position": [0, 0.3, 0], "velocity": [1, -1, 0.3], "rotation": [10, 20, 30],
      "heavy": [{"low": [0, 0.5, 0], "ratio": 3, "share": 0.5}], "material": "rubber"},
-    {"tet": [[3, 0, 0], [4, 0, 0.1], [3, 1, 0], [3, 0, 1]], "deform": "stretch:1.3", "material": "rubber"}],
+    {"tet": [[3, 0, 0], [4, 0, 0.1], [3, 1, 0], [3, 0, 1]], "position": [3, 1, 0], "deform": "stretch:1.3", "material": "rubber"}],
     "world": {"obstacles": [{"point": [0.1, 0, 0.3], "normal": [1, 2.7, 0.9]}], "friction": 0.3}})";
   const json slope = replayed("--scene slope.json --steps 25 --mode cpu-double --seed 4 --substeps 7");
   CHECK(slope["solver"]["constraints"] == json({"stretch", "bend", "volume"}));
@@ -480,4 +480,63 @@ TEST_CASE("a cache folder named from where one is holds meshes itself") {
   int files = 0;
   for (const auto& entry : fs::directory_iterator(folder.path / "meshes")) files += entry.is_regular_file();
   CHECK(files == 1);
+}
+
+TEST_CASE("run: its last line is a verdict, and what starts inside something is moved out or refused") {
+  const Folder folder;
+  const auto run = [&](const std::string& scene, const std::string& options = "") {
+    std::ofstream(folder.path / "scene.json") << scene;
+    return program("run --scene scene.json --steps 20 --csv-every 0 " + options, folder);
+  };
+  const auto block = [](const std::string& more) {
+    return R"({"bodies": [{"name": "cube", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, )" + more + "}]";
+  };
+  const Outcome fine = run(block(R"("position": [0, 1, 0])") + "}");
+  CHECK(fine.status == 0);
+  CHECK(fine.out.ends_with("\nverdict: right\n"));
+  const Outcome deep = run(block(R"("position": [0, -0.02, 0])") + "}");
+  CHECK(deep.status == 0);
+  CHECK(deep.err.find("body 'cube' started 0.02 m inside the ground") != std::string::npos);
+  CHECK(deep.out.find("\nverdict: doubtful: body 'cube' started inside the ground and was moved") != std::string::npos);
+  const auto stats = nlohmann::json::parse(read(folder.path / "out/stats.json"));
+  CHECK(stats["start_motions"][0]["work"].get<double>() == doctest::Approx(1000 * 9.81 * 0.02));
+  CHECK(stats["verdict"]["level"] == "doubtful");
+  CHECK(stats["energy"]["created"].get<double>() < 0.01 * stats["energy"]["scale"].get<double>());
+  CHECK(stats["mesh"]["mass"].get<double>() == doctest::Approx(1000));
+  CHECK(run(block(R"("position": [0, -0.02, 0])") + "}", "--strict").status == 1);
+
+  const Outcome held =
+      run(block(R"("position": [0, -0.2, 0], "fixed": [{"low": [0, 1, 0], "high": [1, 1, 1]}])") + "}");
+  CHECK(held.status == 2);
+  CHECK(held.err.find("body 'cube' in the ground") != std::string::npos);
+  const Outcome none =
+      run(block(R"("position": [0, 1, 0], "fixed": [{"low": [0.1, 0, 0], "high": [0.4, 1, 1]}])") + "}");
+  CHECK(none.status == 2);
+  CHECK(none.err.find("a fixed region holds no vertex: 'fixed.0' of body 'cube'") != std::string::npos);
+  const Outcome turned = run(block(R"("position": [0, 1, 0], "fixed": [{"low": [1, 0, 0], "high": [0, 1, 1]}])") + "}");
+  CHECK(turned.status == 2);
+  CHECK(turned.err.find("'bodies.0.fixed.0' has a \"low\" above its \"high\"") != std::string::npos);
+}
+
+TEST_CASE("run: a column of mirrored cells sags without a lean, and one of equal cells leans") {
+  const Folder folder;
+  const auto lean = [&](const std::string& mirror) {
+    std::ofstream(folder.path / "scene.json")
+        << R"({"bodies": [{"block": {"size": [0.2, 0.4, 0.2], "cells": [2, 4, 2])" + mirror +
+               R"(}, "fixed": [{"low": [0, 0, 0], "high": [1, 0.001, 1]}],
+             "material": {"model": "neo-hookean", "young_modulus": 1e5, "poisson_ratio": 0.45}}],
+             "world": {"ground": false}, "solver": {"mode": "newton", "substeps": 2, "iterations": 16, "damping": 4}})";
+    CHECK(program("run --scene scene.json --steps 100", folder).status == 0);
+    const std::string csv = read(folder.path / "out/stats.csv");
+    const auto header = csv.substr(0, csv.find('\n')), last = csv.substr(csv.rfind('\n', csv.size() - 2) + 1);
+    const auto field = [&](const std::string& row, long n) {
+      std::size_t at = 0;
+      for (; n > 0; --n) at = row.find(',', at) + 1;
+      return std::stod(row.substr(at));
+    };
+    return std::abs(field(last, std::ranges::count(header.substr(0, header.find("centre_x")), ',')));
+  };
+  const double mirrored = lean(""), plain = lean(R"(, "mirror": false)");
+  CHECK(mirrored < 1e-6);
+  CHECK(plain > 1e-4);
 }

@@ -1,0 +1,86 @@
+#include "app/verdict.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "sim/solvers/solver.h"
+
+namespace tetpbd {
+
+namespace {
+
+constexpr std::array<const char*, 3> names = {"right", "doubtful", "wrong"};
+
+// The remedy for a solver that does not hold, by what it has most to gain from.
+std::string solver_remedy(const Sim& sim) {
+  const SolverMode& mode = solver_mode(sim.settings);
+  if (mode.leapfrog) return "take a smaller --stability";
+  if (mode.implicit) return "take more --substeps, or mode explicit";
+  return "take more --substeps";
+}
+
+// m, between where the bodies' centre of mass is and where gravity alone would have taken it.
+double distance_from_fall(const Measurement& first, const Measurement& last, const Sim& sim, double mass) {
+  const double t = last.time - first.time;
+  const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
+  return glm::distance(last.centre, first.centre + t * first.momentum / mass + 0.5 * t * t * gravity);
+}
+
+}  // namespace
+
+Verdict judge(const RunErrors& errors, Sim& sim) {
+  Verdict verdict;
+  const auto find = [&](Verdict::Level level, const std::string& what, const std::string& remedy) {
+    verdict.findings.push_back({level, what, remedy});
+  };
+  if (!errors.first || !errors.last) return verdict;
+  const Measurement &first = *errors.first, &last = *errors.last;
+  const EnergyLedger& ledger = errors.ledger;
+  if (!why_not_judged(*sim.model, sim.settings) && ledger.relative() > 0.01)
+    find(ledger.relative() > 100 ? Verdict::wrong : Verdict::doubtful,
+         fmt::format("{:.3g} J came from nothing, {:.3g} % of what the scene has", ledger.created,
+                     100 * ledger.relative()),
+         solver_remedy(sim));
+  double mass = 0;
+  for (const double m : sim.model->masses) mass += m;
+  const double held = sim.settings.ground ? glm::distance(last.centre, first.centre) : INFINITY;
+  const double away = std::min(held, distance_from_fall(first, last, sim, mass));
+  if (away > 1000 * sim.model->size)
+    find(Verdict::wrong, fmt::format("bodies are {:.3g} m from where they could be", away), solver_remedy(sim));
+  if (last.inverted_tets > first.inverted_tets)
+    find(Verdict::doubtful, fmt::format("{} tets are inverted at the end", long(last.inverted_tets)),
+         first.inverted_tets > 0 ? "the mesh has some at the start: repair it" : solver_remedy(sim));
+  if (errors.max_volume_loss_percent > 50)
+    find(Verdict::doubtful, fmt::format("{:.3g} % of the volume was lost", errors.max_volume_loss_percent),
+         "take a stiffer material or " + solver_remedy(sim));
+  if (errors.overlap && errors.overlap->largest > 0.05)
+    find(Verdict::doubtful, fmt::format("bodies were {:.3g} % of a size in each other", 100 * errors.overlap->largest),
+         "take more --substeps");
+  if (solver_mode(sim.settings).implicit && adaptive_values(sim).largest_residual > 1)
+    find(Verdict::doubtful, "a residual did not fall", "take more --iterations");
+  for (const StartMotion& motion : sim.model->start_motions)
+    find(Verdict::doubtful, fmt::format("body '{}' started inside {} and was moved", motion.body, motion.from),
+         "place it outside");
+  std::ranges::stable_sort(verdict.findings, std::greater(), &Verdict::Finding::level);
+  return verdict;
+}
+
+std::string verdict_line(const Verdict& verdict) {
+  std::string line = fmt::format("verdict: {}", names[verdict.level()]);
+  for (std::size_t f = 0; f < verdict.findings.size(); ++f)
+    line += fmt::format("{} {} ({})", f ? ";" : ":", verdict.findings[f].what, verdict.findings[f].remedy);
+  return line;
+}
+
+nlohmann::ordered_json verdict_json(const Verdict& verdict) {
+  nlohmann::ordered_json findings = nlohmann::ordered_json::array();
+  for (const Verdict::Finding& f : verdict.findings)
+    findings.push_back({{"level", names[f.level]}, {"what", f.what}, {"remedy", f.remedy}});
+  return {{"level", names[verdict.level()]}, {"findings", findings}};
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,77 @@
+#include "sim/measure/ledger.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/measure/metrics.h"
+#include "sim/model/material.h"
+#include "sim/solvers/solver.h"
+
+namespace tetpbd {
+
+namespace {
+
+// J that gravity and the material can supply at most, beside what is there: the fall of all bodies to the ground, or by
+// their own size; without gravity a strain of a thousandth.
+double reserve(const Model& model, const Settings& settings) {
+  double fall = 0, strain = 0;
+  const std::vector<double> volumes = tet_volumes(model.rest);
+  for (const Body& body : model.bodies) {
+    double mass = 0, lowest = INFINITY;
+    for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) {
+      mass += model.masses[v];
+      lowest = std::min(lowest, model.positions[v].y);
+    }
+    const double drop = settings.ground ? std::max(0.0, lowest - settings.ground_height) : 0;
+    fall += mass * std::abs(settings.gravity) * std::max(drop, body_bounds(body, model.rest.positions).size());
+    const Material& material = body_material(body, settings);
+    const double modulus = has_energy(material) ? material.young_modulus : 0;
+    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t) strain += 1e-6 * modulus * volumes[t];
+  }
+  return settings.gravity != 0 ? fall : strain;
+}
+
+}  // namespace
+
+void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& model, const Settings& settings) {
+  if (!now.finite()) return;
+  if (now.step < ledger.step) ledger = {};  // somebody went back in time
+  ledger.step = now.step;
+  const double motion = now.total - now.stored;
+  ledger.total = now.total;
+  if (!ledger.begun) {
+    ledger.begun = true;
+    ledger.start = ledger.lowest = now.total, ledger.lowest_motion = motion, ledger.highest = now.potential;
+    ledger.scale = std::max(now.kinetic + now.elastic, reserve(model, settings));
+  }
+  ledger.rise = std::max(ledger.rise, now.total - ledger.lowest);
+  ledger.rise_of_motion = std::max(ledger.rise_of_motion, motion - ledger.lowest_motion);
+  ledger.lowest = std::min(ledger.lowest, now.total);
+  ledger.lowest_motion = std::min(ledger.lowest_motion, motion);
+  const SolverMode& mode = solver_mode(settings);
+  ledger.created = mode.leapfrog || mode.implicit ? ledger.rise : std::min(ledger.rise, ledger.rise_of_motion);
+  // A fall that is deeper than to the ground, as into a bowl below it, is part of what the scene has.
+  ledger.highest = std::max(ledger.highest, now.potential);
+  ledger.scale = std::max(ledger.scale, ledger.highest - now.potential);
+}
+
+std::optional<const char*> why_not_judged(const Model& model, const Settings& settings) {
+  const SolverMode& mode = solver_mode(settings);
+  if (mode.published) return "mode paper corrects positions as published";
+  if (!settings.rigid_contact && any_material(model, settings, hard)) return "rigid_contact is off";
+  if (std::ranges::any_of(model.obstacles, moves)) return "obstacles that move do work";
+  const auto deformed = [&](const Body& body) {
+    if (has_energy(body_material(body, settings))) return false;
+    const std::size_t first = body.first_vertex, end = first + body.vertices;
+    for (std::size_t v = first + 1; v < end; ++v) {
+      const double at_rest = glm::distance(model.rest.positions[v], model.rest.positions[first]);
+      if (std::abs(glm::distance(model.positions[v], model.positions[first]) - at_rest) > 1e-6 * model.size)
+        return true;
+    }
+    return false;
+  };
+  if (std::ranges::any_of(model.bodies, deformed)) return "a body of stiffness starts deformed";
+  return std::nullopt;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,40 @@
+// The energy ledger of a run: where energy came from that nothing supplied (method.md, "Energy").
+#pragma once
+
+#include <optional>
+
+#include "sim/model/model.h"
+
+namespace tetpbd {
+
+struct Measurement;
+
+/// Joules, from the measurements of a run in order.
+struct EnergyLedger {
+  double start = 0;  ///< total of the first measurement
+  double total = 0;  ///< of the last: kinetic, potential and elastic, as the mode's own steps have them
+  /// The largest rise of the total above its least value before. Zero where energy is only lost; a bounce, which turns
+  /// elastic energy back into motion, is no rise. Corrections that have not converged leave more strain than the
+  /// compliance says, which never comes back as motion: in such modes what rises without elastic energy counts as well,
+  /// and the lesser of the two is created.
+  double created = 0;
+  double scale = 0;    ///< what `created` is relative to: all that the scene can turn into motion
+  double highest = 0;  ///< potential energy so far: a deeper fall than the scale is made for makes it larger
+  long step = 0;       ///< of the last measurement
+  bool begun = false;
+  double lowest = 0, lowest_motion = 0;  ///< least total so far, and least without elastic energy
+  double rise = 0, rise_of_motion = 0;   ///< the largest above these
+
+  /// Net loss since the start: by damping, friction, inelastic contact and by the solver itself.
+  double dissipated() const { return begun ? start - total : 0; }
+  /// `created` over `scale`; 0 before anything is known.
+  double relative() const { return scale > 0 ? created / scale : 0; }
+};
+
+void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& model, const Settings& settings);
+
+/// Why energy that is created says nothing about the solver, in a few words; none where it does: the published way of
+/// contact, bodies of stiffness that start deformed, and obstacles that move and so do work.
+std::optional<const char*> why_not_judged(const Model& model, const Settings& settings);
+
+}  // namespace tetpbd

@@ -145,6 +145,7 @@ struct RigidRecord {
 #define BIND_OBSTACLES 1
 // Texture units of the simulation.
 #define UNIT_FIELDS 15    // the signed distance fields of all obstacles, one after the other
+#define UNIT_QUANTA 13    // how much finer the quanta of each vertex are, where some bodies are far smaller
 #define UNIT_FRICTION 14  // the friction of each vertex, where bodies have their own
 // Binding points of atomic counters.
 #define BIND_GUARDS 0

@@ -51,6 +51,7 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
 #if CONTACTS
   if ((phases & PHASE_TOUCHED) != 0u) apply_contacts(i, own, speed);
 #endif
+  begin_body(i);
   DoubleSingle x = DoubleSingle(own.high, own.low);
   if (own.inverse_mass > 0.0) {
     x = move_vertex(i, own, speed, correction);

@@ -54,6 +54,9 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.velocities = buffer("velocities", count * sizeof(Velocity));
   sim.recorder.row = sim.tuning.row, sim.recorder.storage = sim.tuning.storage;
   if (on_cpu(sim)) return sim;
+  if (const std::vector<float> fineness = quantum_fineness(*sim.model, settings); !fineness.empty())
+    std::tie(sim.fineness, sim.fineness_texture) =
+        make_texels("fineness of quanta", fineness, "make bodies of more similar size");
   if (sim.solver.keeps_prediction) sim.predicted = buffer("predicted", count * sizeof(Velocity));
   const std::size_t quantized_bytes = count * 16 * (input.compliant ? 2 : 1);
   if (sim.solver.quantized_buffers > 0) sim.quantized[0] = buffer("quantized positions", quantized_bytes);

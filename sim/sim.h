@@ -39,6 +39,8 @@ struct Sim : StepValues {
   Buffer predicted;     ///< DoubleSingle of each vertex, padded as a Velocity, from the first iteration to the last
   Buffer quantized[2];  ///< positions that neighbours see (quantized.glsl); a solver may read one and write the other
   Buffer step_block;    ///< Step
+  Buffer fineness;      ///< quantum_fineness(), where some bodies are far smaller than others
+  Texture fineness_texture;
   Obstacles obstacles;
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;

@@ -36,6 +36,7 @@ void give_buffers(Sim& sim) {
   sim.step_block.bind_uniform(BIND_STEP);
   recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
   recorder.give("Predicted", sim.predicted), recorder.give("Check", sim.check.words);
+  if (sim.fineness) bind_texels(UNIT_QUANTA, sim.fineness_texture);
   recorder.give("RigidBodies", sim.rigid_bodies), recorder.give("PairSums", sim.pairs.sums);
   for (const auto& [block, buffer] : sim.solver.bindings) recorder.give(block, buffer);
   give_quantized(sim);

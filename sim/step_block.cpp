@@ -12,12 +12,15 @@ namespace tetpbd {
 // is computed from quantized positions.
 double choose_quantum(const Sim& sim, const State& state) {
   double reach = sim.model->size;
+  const std::vector<float> fineness = quantum_fineness(*sim.model, sim.settings);
   for (const ConstraintList& list : sim.system.lists) {
     const std::size_t arity = std::size_t(list.arity);
 #pragma omp parallel for reduction(max : reach)
     for (std::size_t c = 0; c < list.vertices.size(); c += arity)
       for (std::size_t j = 1; j < arity; ++j) {
-        const double apart = glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]);
+        const double fine = fineness.empty() ? 1 : double(fineness[list.vertices[c]]);
+        const double apart =
+            glm::length(state.positions[list.vertices[c + j]] - state.positions[list.vertices[c]]) / fine;
         if (apart > reach && std::isfinite(apart)) reach = apart;
       }
   }

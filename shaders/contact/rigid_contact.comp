@@ -181,6 +181,7 @@ void main() {
       DoubleSingle x = position_of(i);
       vec3 v = velocity_at(body, arm_of(x, origin) - body.centre);
       velocities[i] = Velocity(v, 0.0, vec3(0.0), 0.0);
+      begin_body(i);
       quantized_out[i] = quantize(predict_position(x, DoubleSingle(v, vec3(0.0))), weight_of(positions[i]));
     }
     barrier();

@@ -8,6 +8,7 @@ layout(std430) buffer Sums { ivec4 correction_sums[]; };
 #include "solvers/corrections.glsl"
 
 void average(uint i) {
+  begin_body(i);
   Position own = positions[i];
   Velocity speed;
   if ((phases & (PHASE_PREDICT | PHASE_FINISH)) != 0u) speed = velocities[i];
@@ -18,7 +19,7 @@ void average(uint i) {
 #if FLOAT_SUMS
     if (own.constraints > 0.0) correction = intBitsToFloat(sum).xyz * (params.omega / own.constraints);
 #else
-    correction = vec3(sum.xyz) * (params.correction_quantum * params.omega);
+    correction = vec3(sum.xyz) * (FINE(params.correction_quantum) * params.omega);
 #endif
   }
   advance(i, own, speed, correction);

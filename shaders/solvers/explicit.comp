@@ -22,5 +22,7 @@ void main() {
   if (lane == 0u) stiffest_here = 0u;
   sum_corrections(chunk, exists);
   if (lane == 0u && (phases & PHASE_WATCH) != 0u) atomicMax(largest, stiffest_here);
-  if (exists && lane < chunk.owned) advance(i, positions[i], velocities[i], averaged_correction(lane));
+  if (!exists || lane >= chunk.owned) return;
+  begin_body(i);
+  advance(i, positions[i], velocities[i], averaged_correction(lane));
 }

@@ -21,7 +21,10 @@ void main() {
   vec3 correction = vec3(0.0);
   if ((phases & PHASE_SOLVE) != 0u) {
     sum_corrections(chunk, exists);
-    if (mine) correction = averaged_correction(lane);
+    if (mine) {
+      begin_body(i);
+      correction = averaged_correction(lane);
+    }
   } else {
     barrier();  // Other invocations add to what begin_sums() cleared.
   }

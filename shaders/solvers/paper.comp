@@ -23,6 +23,7 @@ void main() {
   uint index = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (index >= COUNT) return;
   Record$ARITY record = records[index];
+  begin_body(record.vertices[0]);
   vec3 x[$ARITY];
   float w[$ARITY];
   ivec4 first = quantized[record.vertices[0]];
@@ -32,7 +33,7 @@ void main() {
     w[j] = inverse_mass_of(q);
   }
   Constraint$ARITY c = $KIND(x, record.rest, index);
-  float lambda = multiplier(c, w, params.stiffness[$KIND_ROW][$KIND_COLUMN], params.max_correction, 0.0, 1.0).lambda;
+  float lambda = multiplier(c, w, params.stiffness[$KIND_ROW][$KIND_COLUMN], FINE(params.max_correction), 0.0, 1.0).lambda;
   if (lambda == 0.0) return;
   for (int j = 0; j < $ARITY; ++j) {
     vec3 correction = lambda * w[j] * c.gradient[j];

@@ -8,6 +8,7 @@ layout(local_size_x = 256) in;
 #include "solvers/$SCHEME.glsl"
 
 void predict(uint i) {
+  begin_body(i);
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low), here = x, v = DoubleSingle(velocities[i].high, velocities[i].low);
   if (own.inverse_mass > 0.0) x = seen_by_neighbours(x, v);

@@ -2,6 +2,7 @@
 // (method.md eqs. 4, 25-26).
 void project_$KIND(uint number, uint owned) {
   uvec2 record = patch_words[RECORDS_AT + number];  // its vertices, a byte each; rest
+  begin_body(global_ids[record.x & 255u]);
   vec3 x[$ARITY];
   float w[$ARITY];
   ivec4 first = local_positions[record.x & 255u];
@@ -47,7 +48,7 @@ void project_$KIND(uint number, uint owned) {
 #else
   const float a = 0.0, share = 1.0;
 #endif
-  Multiplier m = multiplier(c, w, k, params.max_correction, a, share);
+  Multiplier m = multiplier(c, w, k, FINE(params.max_correction), a, share);
 #if COMPLIANT
   keep_multiplier(number, before + m.lambda);
 #endif

@@ -2,6 +2,7 @@
 // (method.md eq. 32).
 void project_$KIND(uint number, uint owned) {
   uint ids = patch_words[RECORDS_AT + number].x;  // its vertices, a byte each
+  begin_body(global_ids[ids & 255u]);
   vec3 x[4];
   float w[4], rest[$VALUES];
   ivec4 first = local_positions[ids & 255u];
@@ -18,7 +19,7 @@ void project_$KIND(uint number, uint owned) {
     before[k] = last_multiplier(number + k);  // there is one for each pair of words, and a record has several
     c.C[k] += a[k] * before[k];
   }
-  Multiplier2 m = multiplier(c, w, params.max_correction, a, params.share);
+  Multiplier2 m = multiplier(c, w, FINE(params.max_correction), a, params.share);
   for (uint k = 0u; k < 2u; ++k) keep_multiplier(number + k, before[k] + m.lambda[k]);
   NOTE_STIFFNESS(stiffness_bound(c, w, a));
   count_guards(ids, owned, m.guards);

@@ -45,23 +45,6 @@ std::vector<std::shared_ptr<const DistanceField>> obstacle_fields(const Model& m
   return fields;
 }
 
-std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<float>& values, const char* remedy) {
-  GLint most = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
-  if (values.size() > std::size_t(most))
-    throw Error(fmt::format("too many values for the {}", label),
-                fmt::format("{} of them, the driver allows {}", values.size(), most), remedy, 1);
-  std::pair<Buffer, Texture> made{Buffer(label, values), Texture(label, GL_TEXTURE_BUFFER)};
-  glTexBuffer(GL_TEXTURE_BUFFER, GL_R32F, made.first.id());
-  glBindTexture(GL_TEXTURE_BUFFER, 0);
-  return made;
-}
-void bind_texels(int unit, const Texture& texture) {
-  glActiveTexture(GL_TEXTURE0 + GLenum(unit));
-  glBindTexture(GL_TEXTURE_BUFFER, texture.id());
-  glActiveTexture(GL_TEXTURE0);
-}
-
 bool bodies_have_friction(const Model& model) {
   return std::ranges::any_of(model.bodies, [](const Body& body) { return body.friction.has_value(); });
 }

@@ -227,4 +227,8 @@ class Program : public Owned<GLuint, delete_program> {
   mutable std::map<std::string, std::pair<GLint, unsigned>, std::less<>> last_;  // location, value
 };
 
+/// A buffer that shaders read as a samplerBuffer of floats. Throws Error with this remedy where it is too long.
+std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<float>& values, const char* remedy);
+void bind_texels(int unit, const Texture& texture);
+
 }  // namespace tetpbd

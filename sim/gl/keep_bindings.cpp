@@ -8,7 +8,7 @@ namespace tetpbd {
 
 namespace {
 
-constexpr GLenum fields_unit = GL_TEXTURE0 + UNIT_FIELDS;
+constexpr GLenum units[] = {GL_TEXTURE0 + UNIT_FIELDS, GL_TEXTURE0 + UNIT_FRICTION, GL_TEXTURE0 + UNIT_QUANTA};
 
 // Targets and what to ask for their buffers; glBindBufferBase() binds to the generic target as well.
 constexpr GLenum targets[][2] = {{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},
@@ -34,9 +34,11 @@ KeepBindings::KeepBindings() {
     if (deleted) program_ = 0;
   }
   for (std::size_t k = 0; k < std::size(targets); ++k) glGetIntegerv(targets[k][1], &buffers_[k]);
-  glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[0]);
-  glActiveTexture(fields_unit);
-  glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[1]);
+  glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &texture_);
+  for (std::size_t k = 0; k < std::size(units); ++k) {
+    glActiveTexture(units[k]);
+    glGetIntegerv(GL_TEXTURE_BINDING_BUFFER, &textures_[k]);
+  }
   glActiveTexture(GLenum(unit_));
 }
 
@@ -50,8 +52,8 @@ KeepBindings::~KeepBindings() {
     glActiveTexture(unit);
     glBindTexture(GL_TEXTURE_BUFFER, name && glIsTexture(GLuint(name)) ? GLuint(name) : 0);
   };
-  bind_texture(fields_unit, textures_[1]);
-  bind_texture(GLenum(unit_), textures_[0]);
+  for (std::size_t k = 0; k < std::size(units); ++k) bind_texture(units[k], textures_[k]);
+  bind_texture(GLenum(unit_), texture_);
   const GLuint program = GLuint(program_);
   glUseProgram(program && glIsProgram(program) ? program : 0);
 }

@@ -8,8 +8,8 @@
 namespace tetpbd {
 
 /// Stands first in functions that callers use and that touch GL. Keeps the program in use, the active texture unit, the
-/// buffer texture of that unit and of UNIT_FIELDS, and the buffer of each generic target that sim binds (sim.h). Also
-/// loads GL functions if nobody has, and throws Error where no context is current.
+/// buffer texture of that unit and of those that sim uses (UNIT_... in layout.glsl), and the buffer of each generic
+/// target that sim binds (sim.h). Also loads GL functions if nobody has, and throws Error where no context is current.
 class KeepBindings {
  public:
   KeepBindings();
@@ -19,7 +19,8 @@ class KeepBindings {
 
  private:
   GLint program_ = 0, unit_ = 0;
-  std::array<GLint, 2> textures_{};  ///< of the active unit, of UNIT_FIELDS
+  GLint texture_ = 0;                ///< of the active unit
+  std::array<GLint, 3> textures_{};  ///< of the units that sim uses
   std::array<GLint, 6> buffers_{};
 };
 

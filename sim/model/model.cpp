@@ -69,6 +69,19 @@ const Body& body_at(const Model& model, std::size_t vertex) {
   return *std::prev(std::ranges::upper_bound(model.bodies, vertex, {}, &Body::first_vertex));
 }
 
+std::vector<float> quantum_fineness(const Model& model, const Settings& settings) {
+  if (settings.contact != "none") return {};
+  std::vector<float> fineness;
+  bool any = false;
+  for (const Body& body : model.bodies) {
+    const double ratio = body_bounds(body, model.rest.positions).size() / model.size;
+    const bool small = ratio > 0 && ratio < 0.125;
+    fineness.resize(body.first_vertex + body.vertices, small ? float(std::exp2(std::ceil(std::log2(ratio)))) : 1.0f);
+    any = any || small;
+  }
+  return any ? fineness : std::vector<float>{};
+}
+
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions) {
   const auto first = positions.begin() + std::ptrdiff_t(body.first_vertex);
   return bounds({first, first + std::ptrdiff_t(body.vertices)});

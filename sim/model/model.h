@@ -58,6 +58,9 @@ struct Model {
 
 /// The body to which a vertex belongs.
 const Body& body_at(const Model& model, std::size_t vertex);
+/// By vertex: how much finer its body's quanta are than those of the largest body, a power of two up to 1. Empty where
+/// no body is smaller than an eighth of that, and where bodies touch: corrections of contact are sums of common quanta.
+std::vector<float> quantum_fineness(const Model& model, const Settings& settings);
 /// Bounds of the body's vertices, given the positions of all.
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions);
 /// The body's material; `all` is that of the settings, for bodies without their own.

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 
 #include "sim/contact/obstacles.h"
 
@@ -52,6 +54,7 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
 
 std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverInput& input) {
   std::vector<std::string> defines = obstacle_defines(input.model);
+  std::ranges::move(quanta_defines(input), std::back_inserter(defines));
   for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"GROUP_SIZE", sizes.group},
                                     {"LANES", sizes.lanes},
                                     {"ROW_LANES", sizes.row_lanes},

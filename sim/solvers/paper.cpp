@@ -39,12 +39,12 @@ Solver create_paper_solver(const SolverInput& input) {
     Buffer records = record_buffer(shuffle(input.system.lists[k]), constraint_kinds[k].name);
     check_storage(input.tuning, records.label(), records.bytes());
     const std::size_t bytes = count * (4 * (arity + 1) + arity * (16 + 2 * 12));  // an atomic reads and writes
-    jacobi.passes.push_back(
-        {.program = Program::compute("solvers/paper.comp", {kinds[index++], {}},
-                                     {fmt::format("GROUP_SIZE {}", group), fmt::format("COUNT {}", count)}),
-         .work_groups = work_groups(count, group),
-         .bytes = bytes,
-         .records = records.id()});
+    std::vector<std::string> defines = quanta_defines(input);
+    defines.push_back(fmt::format("GROUP_SIZE {}", group)), defines.push_back(fmt::format("COUNT {}", count));
+    jacobi.passes.push_back({.program = Program::compute("solvers/paper.comp", {kinds[index++], {}}, defines),
+                             .work_groups = work_groups(count, group),
+                             .bytes = bytes,
+                             .records = records.id()});
     solver.buffers.push_back(std::move(records));
   }
   jacobi.passes.push_back(make_average_pass(solver, input, group, true));

@@ -151,8 +151,14 @@ ShaderWords scheme_words(const SolverInput& input) {
   return {{{"SCHEME", solver_mode(input.settings).leapfrog ? "leapfrog" : "corrections"}}, {}};
 }
 
+std::vector<std::string> quanta_defines(const SolverInput& input) {
+  return quantum_fineness(input.model, input.settings).empty() ? std::vector<std::string>{}
+                                                               : std::vector<std::string>{"BODY_QUANTA 1"};
+}
+
 std::vector<std::string> vertex_defines(const SolverInput& input) {
   std::vector<std::string> defines = obstacle_defines(input.model);
+  std::ranges::move(quanta_defines(input), std::back_inserter(defines));
   defines.insert(
       defines.end(),
       {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),

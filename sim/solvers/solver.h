@@ -106,6 +106,8 @@ const SolverMode& solver_mode(const Settings& settings);
 ShaderWords scheme_words(const SolverInput& input);
 /// A definition for a shader.
 std::string define(const char* name, std::size_t value);
+/// Definitions for the shaders that read quantized positions (types.glsl).
+std::vector<std::string> quanta_defines(const SolverInput& input);
 /// Definitions for the shaders that move vertices (vertex.glsl).
 std::vector<std::string> vertex_defines(const SolverInput& input);
 /// Words for the shaders, by kind present. INDEX counts the kinds present, KIND_ROW and KIND_COLUMN find the kind in

@@ -127,3 +127,38 @@ TEST_CASE("the float GPU solvers converge to the exact step as the double ones d
     previous = left[1];
   }
 }
+
+TEST_CASE("a small body at rest beside one ten thousand times its size keeps as still as alone") {
+  GlTest gl;
+  const auto model_with = [](bool big) {
+    auto model = std::make_shared<Model>();
+    const auto add = [&](const char* name, const glm::dvec3& size, const glm::ivec3& cells, const glm::dvec3& at,
+                         bool fixed) {
+      TetMesh mesh = make_block(size, cells);
+      for (glm::dvec3& p : mesh.positions) p = rotation_of({20, 0, 30}) * p + at;
+      std::vector<std::uint32_t> held;
+      for (std::uint32_t v = 0; fixed && v < mesh.positions.size(); ++v) held.push_back(v);
+      add_body(*model, name, mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), held);
+    };
+    add("small", {0.02, 0.02, 0.02}, {4, 4, 4}, {0, 0.5, 0}, false);
+    if (big) add("big", {200, 1, 1}, {10, 1, 1}, {0, 10, 20}, true);
+    return model;
+  };
+  for (const std::string mode : {"node", "constraint", "explicit", "newton"}) {
+    CAPTURE(mode);
+    Settings settings;
+    settings.mode = mode, settings.material = "neo-hookean", settings.young_modulus = 2e4;
+    settings.poisson_ratio = 0.4, settings.gravity = 0, settings.ground = false;
+    const auto fastest = [&](bool big) {
+      Sim sim = create_sim(model_with(big), settings);
+      CHECK(bool(sim.fineness) == big);
+      for (int s = 0; s < 20; ++s) step(sim);
+      const State state = read_state(sim);
+      double most = 0;
+      for (std::size_t v = 0; v < 125; ++v) most = std::max(most, glm::length(state.velocities[v]));
+      return most;
+    };
+    const double alone = fastest(false), beside = fastest(true);
+    CHECK(beside < 3 * alone + 1e-6);  // m/s
+  }
+}

@@ -28,6 +28,7 @@ void move(uint i) {
 #if !IMPLICIT  // BDF2 goes on from the displacement that forces made: from a stopped one it would give back two thirds
                // of the impact velocity
   x = seen_by_neighbours(x, v);
+  begin_body(i);
   quantized_out[i] = quantize(x, weight_of(own));
 #endif
 }

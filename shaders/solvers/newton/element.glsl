@@ -4,6 +4,7 @@ void add_$KIND(uint number, uint start, int i, int j, inout mat3 block, inout ve
   vec3 x[$ARITY];
   uvec4 ids = uvec4(0u);
   for (uint k = 0u; k < $ARITY; ++k) ids[k] = vertices_$KIND[number][k];
+  begin_body(ids[0]);
   ivec4 first = start_at(start, ids[0]);
   for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(start, ids[k]), first);
 #if $COMPONENTS == 2

@@ -5,6 +5,7 @@ void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (i < 3u) bad_starts[i] = 0u;
   if (i >= VERTICES) return;
+  begin_body(i);
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
   bool fixed_ = own.inverse_mass <= 0.0, known = is_step_known(i);

@@ -33,7 +33,7 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
     }
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, aimed(i), u);
-      bool there = plane.distance <= 2.0 * params.quantum;
+      bool there = plane.distance <= 2.0 * FINE_AT(params.quantum, i);
       if (there && (dot(plane.normal, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
     }
     mat3 B = inverse(D);

@@ -13,6 +13,7 @@ shared uint bad_here[3];
 void turn(uint aggregate) {
   uint lane = gl_LocalInvocationIndex, first = first_member[aggregate], end = first_member[aggregate + 1u];
   vec4 centre = centres[aggregate];
+  begin_body(members[first].x);
   ivec4 origin = start_at(3u, members[first].x);
   mat3 A = mat3(0.0);
   float mass = 0.0;

@@ -3,6 +3,7 @@ void check_start_$KIND(uint c, inout uint bad) {
 #if $TETS
   if (c >= COUNT_$KIND) return;
   uvec$ARITY ids = vertices_$KIND[c];
+  begin_body(ids[0]);
   float before = 1.0;
   for (uint k = 0u; k < 4u; ++k) {
     uint start = 3u - k;  // The fraction 0 comes first: it says what the tet is like now.

@@ -170,6 +170,8 @@ int run_soak(Scene scene, const SoakOptions& options);
 std::string csv_header();
 std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 
+/// A question about units where a mesh is larger than 50 m or smaller than 1 mm; else empty.
+std::string question_units(const glm::dvec3& size);
 /// `mass` in kg.
 ordered_json mesh_json(const MeshReport& report, double mass);
 ordered_json error_json(const RunErrors& errors);

@@ -116,7 +116,8 @@ ordered_json settings_json(Scene scene, const Settings& settings) {
 }
 
 ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
-                             const ordered_json& hash, const std::optional<SolverChoice>& choice) {
+                             const ordered_json& hash, const std::optional<SolverChoice>& choice,
+                             const Verdict& verdict) {
   ordered_json j;
   j["scene"] = scene.name;
   j["settings"] = settings_json(scene, sim.settings);
@@ -159,12 +160,12 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"dissipated", errors.ledger.dissipated()},
                  {"created", errors.ledger.created},
                  {"scale", errors.ledger.scale}};
-  if (const auto why = why_not_judged(*sim.model, sim.settings)) j["energy"]["not_judged"] = *why;
+  if (const auto why = errors.ledger.not_judged) j["energy"]["not_judged"] = *why;
   const GuardCounts guards = guard_counts(sim);
   for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
   for (const auto& [name, count] : dropped(sim)) j["dropped"][name] = count;
   j["finite"] = errors.finite;
-  if (errors.finite) j["verdict"] = verdict_json(judge(errors, sim));
+  if (errors.finite) j["verdict"] = verdict_json(verdict);
   j["non_finite"] = non_finite_json(errors.non_finite);
   j["state_hash"] = hash;
   return j;
@@ -232,7 +233,8 @@ int run_headless(Scene scene, const RunOptions& options) {
   while (good && found && sim.steps < found->step - 1) step(sim);  // to the last good one, by the same bits
   if (good && found) good = !check_finite(sim, true);
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
-  auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice);
+  const Verdict verdict = judge(run.errors, sim);
+  auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice, verdict);
   statistics["error"]["measured_every"] = options.measure_every;
   if (files)
     statistics["frames"] = {
@@ -249,7 +251,6 @@ int run_headless(Scene scene, const RunOptions& options) {
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);
-  const Verdict verdict = judge(run.errors, sim);
   fmt::print("{}\n", verdict_line(verdict));
   return verdict.level() == Verdict::wrong || (options.strict && verdict.level() != Verdict::right) ? 1 : 0;
 }

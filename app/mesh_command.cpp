@@ -41,9 +41,7 @@ int run_mesh_command(const std::filesystem::path& file, const std::string& switc
   }
   const MeshReport counts = report(mesh);
   put("mesh", mesh_json(counts, 1000 * counts.volume));
-  if (const double high = std::max({counts.size.x, counts.size.y, counts.size.z}); !json && (high > 50 || high < 1e-3))
-    fmt::print("{:.3g} m large: are the file's units {}? use --height or a body's key scale\n", high,
-               high > 1 ? "millimetres" : "metres");
+  if (const std::string units = question_units(counts.size); !json && !units.empty()) fmt::print("{}\n", units);
   if (interrupted()) throw Error("interrupted", file.string(), "start again; nothing was written", 1);
   if (!out.empty()) {
     write_mesh(out, mesh);

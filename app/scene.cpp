@@ -10,6 +10,7 @@
 #include <random>
 
 #include "app/auto_solver.h"
+#include "app/commands.h"
 #include "app/obstacles.h"
 #include "app/run_loop.h"
 #include "render/obstacles.h"
@@ -556,13 +557,9 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     if (body.height > 0 && !(own.high.y > own.low.y))
       throw Error("a flat sheet has no height", fmt::format("body '{}' of {}", body.name, scene.name),
                   "give scale or size");
-    const glm::dvec3 extent = own.high - own.low;
-    if (!body.mesh.empty() && body.height == 0)
-      if (const double high = std::max({extent.x, extent.y, extent.z}); high > 50 || high < 1e-3)
-        print_error(
-            fmt::format("tetpbd: {}: body '{}' is {:.3g} m large: are its file's units {}? use --height or its key "
-                        "scale\n",
-                        scene.name, body.name, high, high > 1 ? "millimetres" : "metres"));
+    if (const std::string units = question_units(own.high - own.low);
+        !body.mesh.empty() && body.height == 0 && !units.empty())
+      print_error(fmt::format("tetpbd: {}: body '{}' is {}\n", scene.name, body.name, units));
     const double scale = body.height > 0 ? body.height / (own.high.y - own.low.y) : 1.0;
     for (auto& p : mesh.positions) p = turn * ((p - own.centre()) * scale);
     const Bounds placed = bounds(mesh.positions);

@@ -11,6 +11,7 @@
 #include "app/files.h"
 #include "app/reference_command.h"
 #include "app/run_loop.h"
+#include "app/verdict.h"
 #include "sim/contact/starts.h"
 #include "sim/error.h"
 
@@ -596,17 +597,14 @@ void advance(Session& s, double elapsed) {
   clock.owed = clock.fast ? 0 : std::min(clock.owed, dt);
 }
 
-// Energy that nothing supplied is said once, where the solver is to blame: not while the mouse pulls.
-static void judge_energy(Session& s, Lane& lane, const Measurement& now) {
-  if (s.hold) lane.ledger = {};
+// Energy that nothing supplied is said once, and not while the mouse pulls: that does work.
+static void follow_energy(Session& s, Lane& lane, const Measurement& now) {
+  if (s.hold) return void(lane.ledger = {});
   add_measurement(lane.ledger, now, *lane.sim.model, lane.sim.settings);
-  if (why_not_judged(*lane.sim.model, lane.sim.settings)) return;
-  const double gain = 100 * lane.ledger.relative();
-  lane.created.add(gain, now.time);
-  if (gain > 1 && !std::exchange(lane.gain_said, true))
-    say(s,
-        fmt::format("verdict: doubtful: {:.3g} J came from nothing, {:.3g} % of what the scene has: take more substeps",
-                    lane.ledger.created, gain));
+  if (lane.ledger.not_judged) return;
+  lane.created.add(100 * lane.ledger.relative(), now.time);
+  const auto gain = judge_energy(lane.ledger, lane.sim);
+  if (gain && !std::exchange(lane.gain_said, true)) say(s, verdict_line({{*gain}}));
 }
 
 void measure_frame(Session& s, bool stepped) {
@@ -618,7 +616,7 @@ void measure_frame(Session& s, bool stepped) {
     while (const auto now = collect(*lane.metrics)) {
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
-      judge_energy(s, lane, *now);
+      follow_energy(s, lane, *now);
       const Pairs& pairs = lane.sim.pairs;
       const double in_bodies = pairs ? pairs.depth / lane.sim.model->size : std::nan(""),
                    depth = std::fmax(now->penetration_max, in_bodies);  // of what there is

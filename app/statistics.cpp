@@ -55,6 +55,13 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MeshReport, vertices, surface_vertices, surfa
                                    euler_characteristic, genus, components, volume, smallest_tet_volume,
                                    mean_tet_volume, min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg, slivers,
                                    inverted)
+std::string question_units(const glm::dvec3& size) {
+  const double largest = std::max({size.x, size.y, size.z});
+  if (largest >= 1e-3 && largest <= 50) return {};
+  return fmt::format("{:.3g} m large: are the file's units {}? use --height or a body's key scale", largest,
+                     largest > 1 ? "millimetres" : "metres");
+}
+
 ordered_json mesh_json(const MeshReport& counts, double mass) {
   ordered_json all = nlohmann::json(counts);
   all["size"] = {counts.size.x, counts.size.y, counts.size.z};

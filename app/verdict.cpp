@@ -32,6 +32,14 @@ double distance_from_fall(const Measurement& first, const Measurement& last, con
 
 }  // namespace
 
+std::optional<Verdict::Finding> judge_energy(const EnergyLedger& ledger, const Sim& sim) {
+  if (ledger.not_judged || !(ledger.relative() > 0.01)) return std::nullopt;
+  return Verdict::Finding{ledger.relative() > 100 ? Verdict::wrong : Verdict::doubtful,
+                          fmt::format("{:.3g} J came from nothing, {:.3g} % of what the scene has", ledger.created,
+                                      100 * ledger.relative()),
+                          solver_remedy(sim)};
+}
+
 Verdict judge(const RunErrors& errors, Sim& sim) {
   Verdict verdict;
   const auto find = [&](Verdict::Level level, const std::string& what, const std::string& remedy) {
@@ -39,12 +47,7 @@ Verdict judge(const RunErrors& errors, Sim& sim) {
   };
   if (!errors.first || !errors.last) return verdict;
   const Measurement &first = *errors.first, &last = *errors.last;
-  const EnergyLedger& ledger = errors.ledger;
-  if (!why_not_judged(*sim.model, sim.settings) && ledger.relative() > 0.01)
-    find(ledger.relative() > 100 ? Verdict::wrong : Verdict::doubtful,
-         fmt::format("{:.3g} J came from nothing, {:.3g} % of what the scene has", ledger.created,
-                     100 * ledger.relative()),
-         solver_remedy(sim));
+  if (const auto gain = judge_energy(errors.ledger, sim)) verdict.findings.push_back(*gain);
   double mass = 0;
   for (const double m : sim.model->masses) mass += m;
   const double held = sim.settings.ground ? glm::distance(last.centre, first.centre) : INFINITY;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct Verdict {
   std::vector<Finding> findings;  ///< the worst first
   Level level() const { return findings.empty() ? right : findings.front().level; }
 };
+
+/// What the ledger says against the solver, if anything.
+std::optional<Verdict::Finding> judge_energy(const EnergyLedger& ledger, const Sim& sim);
 
 /// Judges a run whose states were finite. Wrong: a hundred times the energy there was, or bodies that are nowhere near
 /// where anything could have taken them. Doubtful: what a look at the pictures may not show.

@@ -1,9 +1,9 @@
 // The elastic energy of a tet, compiled as GLSL and as C++.
 float six_volumes(vec3 p[4]) { return dot(cross(p[1] - p[0], p[2] - p[0]), p[3] - p[0]); }
 
-// Stable neo-Hookean energy of a deformation gradient F with determinant J, J/m^3. The terms of first order in the strain
-// cancel on paper; in floats they would leave 1e-7 of the modulus, more than a stiff body ever stores. So it is written in
-// D = F^T F - 1, without them.
+// Stable neo-Hookean energy of a deformation gradient F with determinant J, J/m^3. The terms of first order in the
+// strain cancel on paper; in floats they would leave 1e-7 of the modulus, more than a stiff body ever stores. So it is
+// written in D = F^T F - 1, without them.
 float neo_hookean_energy(mat3 F, float J, float shear, float first) {
   float mu = 4.0f / 3.0f * shear, lambda = first + 5.0f / 6.0f * shear;
   mat3 D = transpose(F) * F;

@@ -41,6 +41,11 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   SolverInput input{*sim.model, sim.system, sim.settings, sim.plan, sim.tuning, is_software_renderer()};
   input.compliant = any_material(*sim.model, settings, compliant);
   input.rigid = touches_rigidly(*sim.model, settings);
+  if (const std::vector<float> fineness = quantum_fineness(*sim.model, settings); !fineness.empty() && !on_cpu(sim)) {
+    std::tie(sim.fineness, sim.fineness_texture) =
+        make_texels("fineness of quanta", fineness, "make bodies of more similar size");
+    input.fine_quanta = true;
+  }
   const auto defines = vertex_defines(input);
   sim.obstacles = make_obstacles(*sim.model);
   sim.solver = solver_mode(settings).create(input);
@@ -54,9 +59,6 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.velocities = buffer("velocities", count * sizeof(Velocity));
   sim.recorder.row = sim.tuning.row, sim.recorder.storage = sim.tuning.storage;
   if (on_cpu(sim)) return sim;
-  if (const std::vector<float> fineness = quantum_fineness(*sim.model, settings); !fineness.empty())
-    std::tie(sim.fineness, sim.fineness_texture) =
-        make_texels("fineness of quanta", fineness, "make bodies of more similar size");
   if (sim.solver.keeps_prediction) sim.predicted = buffer("predicted", count * sizeof(Velocity));
   const std::size_t quantized_bytes = count * 16 * (input.compliant ? 2 : 1);
   if (sim.solver.quantized_buffers > 0) sim.quantized[0] = buffer("quantized positions", quantized_bytes);

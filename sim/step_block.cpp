@@ -12,7 +12,8 @@ namespace tetpbd {
 // is computed from quantized positions.
 double choose_quantum(const Sim& sim, const State& state) {
   double reach = sim.model->size;
-  const std::vector<float> fineness = quantum_fineness(*sim.model, sim.settings);
+  std::vector<float> fineness;
+  if (sim.fineness) fineness = quantum_fineness(*sim.model, sim.settings);
   for (const ConstraintList& list : sim.system.lists) {
     const std::size_t arity = std::size_t(list.arity);
 #pragma omp parallel for reduction(max : reach)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 #include "sim/sim.h"
 #include "sim/solvers/cpu_pbd.h"
@@ -29,6 +30,23 @@ inline std::shared_ptr<const Model> block_model(glm::ivec3 cells = {8, 6, 4}, do
   deform(start, mesh, deformation, 1);
   add_body(*model, "block", mesh, 1000, start, glm::dvec3(0), spin, {});
   return model;
+}
+
+// An icosahedron's faces with its centre, a corner at the bottom.
+inline TetMesh ball_mesh(double radius) {
+  TetMesh mesh;
+  mesh.positions = {{0, 0, 0}, {0, radius, 0}, {0, -radius, 0}};
+  for (int k = 0; k < 10; ++k) {
+    const double a = k * std::numbers::pi / 5, y = radius / std::sqrt(5.0) * (k % 2 ? -1 : 1);
+    mesh.positions.push_back({2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
+  }
+  for (std::uint32_t k = 0; k < 10; ++k) {
+    const std::uint32_t a = 3 + k, b = 3 + (k + 1) % 10, c = 3 + (k + 2) % 10;
+    mesh.tets.push_back({0, a, b, c});
+    mesh.tets.push_back({0, k % 2 ? 2u : 1u, a, c});
+  }
+  finish_tets(mesh, "ball");
+  return mesh;
 }
 
 /// n.x >= d, of a unit normal.

@@ -33,7 +33,8 @@ void main() {
     w[j] = inverse_mass_of(q);
   }
   Constraint$ARITY c = $KIND(x, record.rest, index);
-  float lambda = multiplier(c, w, params.stiffness[$KIND_ROW][$KIND_COLUMN], FINE(params.max_correction), 0.0, 1.0).lambda;
+  float k = params.stiffness[$KIND_ROW][$KIND_COLUMN],
+        lambda = multiplier(c, w, k, FINE(params.max_correction), 0.0, 1.0).lambda;
   if (lambda == 0.0) return;
   for (int j = 0; j < $ARITY; ++j) {
     vec3 correction = lambda * w[j] * c.gradient[j];

@@ -63,7 +63,8 @@ void load_chunk(uint number) {
 #if COMPLIANT
     if (params.damping > 0.0) start_positions[k] = quantized[params.vertex_count + vertex.x];
 #endif
-    if (k < MAX_OWNED) quanta_per_metre[k] = 1.0 / (FINE_AT(params.correction_quantum, vertex.x) * uintBitsToFloat(vertex.y));
+    if (k < MAX_OWNED)
+      quanta_per_metre[k] = 1.0 / (FINE_AT(params.correction_quantum, vertex.x) * uintBitsToFloat(vertex.y));
   }
 }
 // Adds the corrections of a loaded chunk's constraints, where there is such a chunk.
@@ -92,8 +93,8 @@ void sum_corrections(Chunk chunk, bool exists) {
   }
 #endif
 }
-// The sum of all corrections of an owned vertex, over their number, times omega (method.md eqs. 4, 13). The vertex's body
-// has begun.
+// The sum of all corrections of an owned vertex, over their number, times omega (method.md eqs. 4, 13). The
+// vertex's body has begun.
 vec3 averaged_correction(uint local) {
   return vec3(sums[3u * local], sums[3u * local + 1u], sums[3u * local + 2u]) *
          (FINE(params.correction_quantum) * params.omega);

@@ -68,26 +68,21 @@ Shape make_shape(const Model& model, const Body& body) {
   shape.name = body.name;
   const auto& x = model.positions;
   const auto add = [&](const auto& element) {
-    Cell cell;
-    cell.count = int(element.size());
-    std::vector<glm::dvec3> corners;
+    Cell& cell = shape.cells.emplace_back();
+    cell.corners.fill(x[element[0]]);
+    cell.box = {x[element[0]], x[element[0]]};
     for (const std::uint32_t v : element) {
-      corners.push_back(x[v]);
+      cell.corners[std::size_t(cell.count++)] = x[v];
+      cell.box = {glm::min(cell.box.low, x[v]), glm::max(cell.box.high, x[v])};
       cell.bolted = cell.bolted || !(model.inverse_masses[v] > 0);
     }
-    cell.box = bounds(corners);
-    corners.resize(4, corners[0]);
-    std::ranges::copy(corners, cell.corners.begin());
     shape.held = shape.held || cell.bolted;
-    shape.cells.push_back(cell);
   };
   for (std::size_t t = 0; t < body.tets; ++t) add(model.rest.tets[body.first_tet + t]);
   for (std::size_t t = 0; t < body.triangles && body.is_sheet(); ++t) add(model.rest.surface[body.first_triangle + t]);
   for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) shape.mass += model.masses[v];
-  const auto first = x.begin() + std::ptrdiff_t(body.first_vertex);
-  shape.box = bounds({first, first + std::ptrdiff_t(body.vertices)});
+  shape.box = body_bounds(body, x);
   shape.size = shape.box.size();
-  fill_grid(shape);
   return shape;
 }
 
@@ -292,10 +287,11 @@ class Separation {
 
   std::vector<StartMotion> run() {
     for (std::size_t b = 0; b < world_.shapes.size(); ++b) free_of_obstacles(b);
-    if (bodies_touch(model_, settings_))
-      for (std::size_t b = 0; b < world_.shapes.size(); ++b)
-        for (std::size_t o = 0; o < b; ++o)
-          if (overlap(world_.shapes[b], world_.shapes[o])) part(b, o);
+    if (!bodies_touch(model_, settings_)) return std::move(motions_);
+    for (Shape& shape : world_.shapes) fill_grid(shape);
+    for (std::size_t b = 0; b < world_.shapes.size(); ++b)
+      for (std::size_t o = 0; o < b; ++o)
+        if (overlap(world_.shapes[b], world_.shapes[o])) part(b, o);
     return std::move(motions_);
   }
 

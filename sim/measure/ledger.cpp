@@ -41,6 +41,7 @@ void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& 
   ledger.total = now.total;
   if (!ledger.begun) {
     ledger.begun = true;
+    ledger.not_judged = why_not_judged(model, settings);
     ledger.start = ledger.lowest = now.total, ledger.lowest_motion = motion, ledger.highest = now.potential;
     ledger.scale = std::max(now.kinetic + now.elastic, reserve(model, settings));
   }

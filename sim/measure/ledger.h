@@ -22,8 +22,9 @@ struct EnergyLedger {
   double highest = 0;  ///< potential energy so far: a deeper fall than the scale is made for makes it larger
   long step = 0;       ///< of the last measurement
   bool begun = false;
-  double lowest = 0, lowest_motion = 0;  ///< least total so far, and least without elastic energy
-  double rise = 0, rise_of_motion = 0;   ///< the largest above these
+  std::optional<const char*> not_judged;  ///< why_not_judged(), found when it began
+  double lowest = 0, lowest_motion = 0;   ///< least total so far, and least without elastic energy
+  double rise = 0, rise_of_motion = 0;    ///< the largest above these
 
   /// Net loss since the start: by damping, friction, inelastic contact and by the solver itself.
   double dissipated() const { return begun ? start - total : 0; }

@@ -152,8 +152,7 @@ ShaderWords scheme_words(const SolverInput& input) {
 }
 
 std::vector<std::string> quanta_defines(const SolverInput& input) {
-  return quantum_fineness(input.model, input.settings).empty() ? std::vector<std::string>{}
-                                                               : std::vector<std::string>{"BODY_QUANTA 1"};
+  return input.fine_quanta ? std::vector<std::string>{"BODY_QUANTA 1"} : std::vector<std::string>{};
 }
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {

@@ -71,10 +71,11 @@ struct SolverInput {
   const ConstraintSystem& system;
   const Settings& settings;
   Plan plan;
-  Tuning tuning;           ///< `row` and `storage` filled in
-  bool software = false;   ///< OpenGL runs on the CPU
-  bool compliant = false;  ///< a material is (settings.h)
-  bool rigid = false;      ///< hard bodies move as rigid ones in contact (rigid_in_contact(), settings.h)
+  Tuning tuning;             ///< `row` and `storage` filled in
+  bool software = false;     ///< OpenGL runs on the CPU
+  bool compliant = false;    ///< a material is (settings.h)
+  bool fine_quanta = false;  ///< quantum_fineness() is not empty
+  bool rigid = false;        ///< hard bodies move as rigid ones in contact (rigid_in_contact(), settings.h)
 };
 
 /// A row of the table of modes: what the mode is called, what makes it, and what it can do.

@@ -14,27 +14,11 @@
 #include "tests/sim_samples.h"
 
 using namespace tetpbd;
+using samples::ball_mesh;
 
 namespace {
 
 const std::vector<std::string> all_modes = {"node", "constraint", "cpu", "cpu-double", "cpu-fast"};
-
-// An icosahedron's faces with its centre, a corner at the bottom.
-TetMesh ball_mesh(double radius) {
-  TetMesh mesh;
-  mesh.positions = {{0, 0, 0}, {0, radius, 0}, {0, -radius, 0}};
-  for (int k = 0; k < 10; ++k) {
-    const double a = k * std::numbers::pi / 5, y = radius / std::sqrt(5.0) * (k % 2 ? -1 : 1);
-    mesh.positions.push_back({2 * radius / std::sqrt(5.0) * std::cos(a), y, 2 * radius / std::sqrt(5.0) * std::sin(a)});
-  }
-  for (std::uint32_t k = 0; k < 10; ++k) {
-    const std::uint32_t a = 3 + k, b = 3 + (k + 1) % 10, c = 3 + (k + 2) % 10;
-    mesh.tets.push_back({0, a, b, c});
-    mesh.tets.push_back({0, k % 2 ? 2u : 1u, a, c});
-  }
-  finish_tets(mesh, "ball");
-  return mesh;
-}
 
 TetMesh irregular_block() {
   TetMesh mesh = make_block({1, 0.6, 0.3}, {3, 2, 2});

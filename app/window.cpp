@@ -190,7 +190,8 @@ void wheel(Input& in, double turned, bool of_cut) {
 }
 
 void key(Input& in, int code, int modifiers) {
-  if (ImGui::GetIO().WantTextInput || ImGui::GetIO().WantCaptureKeyboard) return;
+  // A slider that the mouse holds has no use for keys, though WantCaptureKeyboard claims them for it.
+  if (ImGui::GetIO().WantTextInput) return;
   modifiers &= GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER | GLFW_MOD_SHIFT;
   if (modifiers == GLFW_MOD_SHIFT) modifiers = 0;
   for (const Shortcut& row : shortcuts())

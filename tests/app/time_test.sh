@@ -52,8 +52,8 @@ key space; await '^pause'
 forget; to time 0.8 0.5; press 1; release 1; await '^moment [0-9]+$'
 forget; xdotool mousemove $((vx + vw / 4)) $((vy + vh / 4)); pause_for_frame
 xdotool click --repeat 2 --delay 60 1; await '^pin [0-9]+'
-click young_modulus 0.7; await '^set young_modulus'
-key space; await '^play'; sleep 1.5
+forget; to young_modulus 0.7 0.5; press 1; await '^set young_modulus'
+key space; await '^play'; release 1; sleep 1.5  # a held slider takes no shortcut away
 key space; await '^pause'; await '^state '
 shot end.png
 of[end]=$(hashes)

@@ -59,7 +59,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
         Substep substep(model, settings, plan, std::exchange(time, time + settings.dt));
         for (int s = 0; s < plan.substeps; ++s) {
           substep.begin(s);
-          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities, left_out);
+          contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities, now.work, left_out);
           for (RigidBody& body : bodies) {
             const bool touches = contact.carries(body.first);
             if (touches) {

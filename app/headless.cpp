@@ -157,6 +157,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"final_potential", last.potential},
                  {"elastic", last.elastic},
                  {"total", last.total},
+                 {"work", errors.ledger.work},
                  {"dissipated", errors.ledger.dissipated()},
                  {"created", errors.ledger.created},
                  {"scale", errors.ledger.scale}};

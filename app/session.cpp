@@ -138,7 +138,11 @@ void step_lanes(Session& s) {
   auto& lanes = s.loaded.lanes;
   for (Lane& lane : lanes) {
     if (lanes.size() > 1 && check_finite(lane.sim)) continue;
-    if (s.grab) move_held(lane.sim, *s.hold, s.grab->position);
+    const auto move = [&] { move_held(lane.sim, *s.hold, s.grab->position); };
+    if (s.grab && lane.metrics && s.measuring)
+      measure_hand(*lane.metrics, lane.sim, move);
+    else if (s.grab)
+      move();
     const auto begin = Steady::now();
     step(lane.sim);
     if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
@@ -597,9 +601,8 @@ void advance(Session& s, double elapsed) {
   clock.owed = clock.fast ? 0 : std::min(clock.owed, dt);
 }
 
-// Energy that nothing supplied is said once, and not while the mouse pulls: that does work.
+// Energy that nothing supplied is said once.
 static void follow_energy(Session& s, Lane& lane, const Measurement& now) {
-  if (s.hold) return void(lane.ledger = {});
   add_measurement(lane.ledger, now, *lane.sim.model, lane.sim.settings);
   if (lane.ledger.not_judged) return;
   lane.created.add(100 * lane.ledger.relative(), now.time);
@@ -614,6 +617,10 @@ void measure_frame(Session& s, bool stepped) {
     if (!s.measuring) continue;
     if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
     while (const auto now = collect(*lane.metrics)) {
+      if (now->by_hand) {
+        add_measurement(lane.ledger, *now, *lane.sim.model, lane.sim.settings);
+        continue;
+      }
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
       follow_energy(s, lane, *now);

@@ -35,6 +35,7 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"energy", m.energy()},
           {"elastic_energy", m.elastic},
           {"total_energy", m.total},
+          {"work", so_far.ledger.work},
           {"energy_created", so_far.ledger.created},
           {"centre_x", m.centre.x},
           {"centre_y", m.centre.y},

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "sim/model/material.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -15,9 +16,31 @@ namespace {
 
 constexpr std::array<const char*, 3> names = {"right", "doubtful", "wrong"};
 
-// The remedy for a solver that does not hold, by what it has most to gain from.
+// The tet that is flattest, where it is so flat that it decides what a solver can do: its volume is below a hundredth
+// of that of a regular one with its longest edge.
+std::optional<std::size_t> find_sliver(const TetMesh& mesh) {
+  constexpr double flat = 0.01;
+  const std::vector<double> volumes = tet_volumes(mesh);
+  std::optional<std::size_t> worst;
+  double least = flat;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    double longest = 0;
+    for (const std::uint32_t a : mesh.tets[t])
+      for (const std::uint32_t b : mesh.tets[t])
+        longest = std::max(longest, glm::distance(mesh.positions[a], mesh.positions[b]));
+    const double shape = 6 * std::sqrt(2.0) * volumes[t] / std::pow(longest, 3);
+    if (shape < least) least = shape, worst = t;
+  }
+  return worst;
+}
+
+// The remedy for a solver that does not hold, by the likeliest cause: the mesh, the mode, the settings.
 std::string solver_remedy(const Sim& sim) {
   const SolverMode& mode = solver_mode(sim.settings);
+  if (const auto tet = find_sliver(sim.model->rest))
+    return fmt::format("the mesh has slivers, the flattest is tet {}: give a cleaner one", *tet);
+  if (!mode.leapfrog && !mode.implicit && any_material(*sim.model, sim.settings, has_energy))
+    return "corrections do not hold such a material: take mode newton or explicit";
   if (mode.leapfrog) return "take a smaller --stability";
   if (mode.implicit) return "take more --substeps, or mode explicit";
   return "take more --substeps";
@@ -59,7 +82,7 @@ Verdict judge(const RunErrors& errors, Sim& sim) {
          first.inverted_tets > 0 ? "the mesh has some at the start: repair it" : solver_remedy(sim));
   if (errors.max_volume_loss_percent > 50)
     find(Verdict::doubtful, fmt::format("{:.3g} % of the volume was lost", errors.max_volume_loss_percent),
-         "take a stiffer material or " + solver_remedy(sim));
+         "take a stiffer material, or: " + solver_remedy(sim));
   if (errors.overlap && errors.overlap->largest > 0.05)
     find(Verdict::doubtful, fmt::format("bodies were {:.3g} % of a size in each other", 100 * errors.overlap->largest),
          "take more --substeps");

@@ -10,9 +10,9 @@ struct Position {
 };
 struct Velocity {
   vec3 high;
-  float _0;
+  float work;  // J that obstacles that move have done on the vertex
   vec3 low;
-  float _1;
+  float _0;
 };
 // A constraint with its vertices and rest value, for error measures; the solvers have streams or patches.
 struct Record2 {

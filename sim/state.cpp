@@ -49,8 +49,10 @@ void write_inverse_masses(Sim& sim, const VertexList& vertices) {
 
 void write_velocities(const Sim& sim, const State& state) {
   std::vector<Velocity> velocities(state.velocities.size());
-  parallel_for(velocities.size(),
-               [&](std::size_t i) { split_double_single(state.velocities[i], velocities[i].high, velocities[i].low); });
+  parallel_for(velocities.size(), [&](std::size_t i) {
+    split_double_single(state.velocities[i], velocities[i].high, velocities[i].low);
+    velocities[i].work = state.work.empty() ? 0 : float(state.work[i]);
+  });
   sim.velocities.write(0, velocities.size() * sizeof(Velocity), velocities.data());
 }
 
@@ -66,6 +68,8 @@ State make_state(const std::vector<Position>& positions, const std::vector<Veloc
   State state;
   for (const Position& p : positions) state.positions.push_back(glm::dvec3(p.high) + glm::dvec3(p.low));
   for (const Velocity& v : velocities) state.velocities.push_back(glm::dvec3(v.high) + glm::dvec3(v.low));
+  if (std::ranges::any_of(velocities, [](const Velocity& v) { return v.work != 0; }))
+    for (const Velocity& v : velocities) state.work.push_back(double(v.work));
   return state;
 }
 
@@ -91,7 +95,8 @@ void pin(Sim& sim, const VertexList& vertices) {
     if (on_cpu(sim)) sim.host.velocities[v] = glm::dvec3(0);
   }
   write_inverse_masses(sim, vertices);
-  write_vertices<Velocity>(sim, sim.velocities, 0, vertices, std::vector<Velocity>(vertices.size()));
+  for (const std::size_t part : {offsetof(Velocity, high), offsetof(Velocity, low)})
+    write_vertices<Velocity>(sim, sim.velocities, part, vertices, std::vector<glm::vec3>(vertices.size()));
 }
 
 void unpin(Sim& sim, const VertexList& vertices) {

@@ -19,15 +19,16 @@
 #define M_KINETIC 16           // J
 #define M_HEIGHT 17            // sum m y
 #define M_COVARIANCE 18        // 9: sum m (x - x0) X^T, column by column
-#define M_CONTACTS 27          // pairs of a vertex and an obstacle that it touches
-#define M_NON_FINITE 28        // vertices with a position or velocity that is not finite
-#define M_PENETRATION 29       // m, of the vertex that is deepest in an obstacle
-#define M_DEPTHS 30            // DEPTHS: vertices by depth over the size, from 1 on in steps of half an octave
+#define M_WORK 27              // J that obstacles that move have done
+#define M_CONTACTS 28          // pairs of a vertex and an obstacle that it touches
+#define M_NON_FINITE 29        // vertices with a position or velocity that is not finite
+#define M_PENETRATION 30       // m, of the vertex that is deepest in an obstacle
+#define M_DEPTHS 31            // DEPTHS: vertices by depth over the size, from 1 on in steps of half an octave
 #define DEPTHS 32
-#define M_ANGULAR 62           // 3: sum m r x u about the centre of mass
-#define M_RIGID_SQUARES 65     // sum m |x - c - R X|^2
-#define M_CENTRE 66            // 3: c - x0
-#define M_ROTATION 69          // 4: quaternion w, x, y, z
-#define M_ORIGIN 73            // 3: x0
-#define M_ROW 76
+#define M_ANGULAR 63           // 3: sum m r x u about the centre of mass
+#define M_RIGID_SQUARES 66     // sum m |x - c - R X|^2
+#define M_CENTRE 67            // 3: c - x0
+#define M_ROTATION 70          // 4: quaternion w, x, y, z
+#define M_ORIGIN 74            // 3: x0
+#define M_ROW 77
 #define M_STRIDE 128           // floats from one body's row to the next: a multiple of any driver's binding alignment

@@ -13,7 +13,7 @@ void main() {
   barrier();
   vec3 moment = vec3(0.0), momentum = vec3(0.0);
   mat3 covariance = mat3(0.0);
-  float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, non_finite = 0.0, deepest = 0.0;
+  float speed = 0.0, kinetic = 0.0, height = 0.0, contacts = 0.0, work = 0.0, non_finite = 0.0, deepest = 0.0;
   for (uint i = vertex_range.x + gl_GlobalInvocationID.x; i < vertex_range.y; i += groups * METRICS_SIZE) {
     Position p = positions[i];
     vec3 x = relative(p, positions[vertex_range.x]);
@@ -26,6 +26,7 @@ void main() {
     speed += m * length(v);
     kinetic += 0.5 * m * dot(v, v);
     height += m * p.high.y;
+    work += velocities[i].work;
     covariance += m * outerProduct(x, at_rest.xyz);
     float least_gap = 0.0;
     for (int k = 0; k < obstacle_count(); ++k) {
@@ -45,6 +46,7 @@ void main() {
   store_partial(M_SPEED, speed);
   store_partial(M_KINETIC, kinetic);
   store_partial(M_HEIGHT, height);
+  store_partial(M_WORK, work);
   store_partial(M_CONTACTS, contacts);
   store_partial(M_NON_FINITE, non_finite);
   store_partial(M_PENETRATION, deepest);

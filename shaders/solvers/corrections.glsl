@@ -38,7 +38,8 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
   } else if (predicts) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
   }
-  if (predicts || finishes) velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+  if (predicts || finishes) velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
+  if (!carried) book_work(i, own.inverse_mass);
 #if COMPLIANT
   if (finishes && params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif

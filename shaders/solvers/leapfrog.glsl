@@ -18,7 +18,8 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
     v = add_double(v, relative(x, free) * params.inverse_h);
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+  velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
+  book_work(i, own.inverse_mass);
   note_unless_finite(i, x.high + x.low, v.high + v.low);
   if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(start, 0.0);
   return x;

@@ -34,16 +34,17 @@ class RigidContact {
   }
 
   /// At the start of a substep: finds the bodies that would get into an obstacle, and sets their velocities v.
-  /// `place.at(i)` is the position of vertex i, m; `counts` counts contacts left out and sweeps that did not converge.
+  /// `place.at(i)` is the position of vertex i, m; `counts` counts contacts left out and sweeps that did not converge;
+  /// what obstacles that move do on a body is added to the `work` of its first vertex, if there is any.
   template <class Place>
   void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
-               std::vector<glm::dvec3>& v, GuardCounts& counts) {
+               std::vector<glm::dvec3>& v, std::vector<double>& work, GuardCounts& counts) {
     if (!wanted_) return;
     for (const Body& body : model_.bodies) {
       if (!body.one_piece || !rigid_in_contact(settings_, body_material(body, settings_))) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto near = near_contacts(s, inverse_masses, place, v, first, end);
-      const bool moved = !near.empty() && move(s, near, place, v, first, end, counts);
+      const bool moved = !near.empty() && move(s, near, place, v, work.empty() ? nullptr : &work[first], body, counts);
       std::fill(moved_.begin() + std::ptrdiff_t(first), moved_.begin() + std::ptrdiff_t(end), moved);
     }
   }
@@ -95,7 +96,8 @@ class RigidContact {
   // Sets the velocities of a body in contact; false if it has no inertia about some axis.
   template <class Place>
   bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place, std::vector<glm::dvec3>& v,
-            std::size_t first, std::size_t end, GuardCounts& counts) const {
+            double* work, const Body& own, GuardCounts& counts) const {
+    const std::size_t first = own.first_vertex, end = first + own.vertices;
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
     const Rules::Rigid before = rigid_motion(place, v, first, end);
     if (!Rules{}.has_inertia(before)) return false;
@@ -106,6 +108,7 @@ class RigidContact {
     const Rules::Rigid falling = body;
     // Adds the worst contact as long as the motion violates any by more than `loose`, m/s.
     Rules::Touch touches[MOST_TOUCHES], worst;
+    int touching = 0;
     std::array<std::size_t, MOST_TOUCHES + 1> numbers{};  // of the contacts, by vertex and obstacle
     for (int count = 0;; ++count) {
       double most = loose;
@@ -133,8 +136,11 @@ class RigidContact {
         break;
       }
       touches[count] = worst;
-      body = Rules{}.settled(touches, body, count + 1, enough, 1e-4 * fall);
+      touching = count + 1;
+      body = Rules{}.settled(touches, body, touching, enough, 1e-4 * fall);
     }
+    for (std::size_t i = first; i < end && work; ++i)
+      for (int k = 0; k < touching; ++k) *work += model_.masses[i] * glm::dot(touches[k].impulse, touches[k].surface);
     counts[GUARDS + DROP_SWEEPS] += body.unsettled;
     for (std::size_t i = first; i < end; ++i) v[i] = Rules{}.velocity_at(body, at(i) - body.centre);
     return true;

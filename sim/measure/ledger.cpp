@@ -37,30 +37,34 @@ void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& 
   if (!now.finite()) return;
   if (now.step < ledger.step) ledger = {};  // somebody went back in time
   ledger.step = now.step;
-  const double motion = now.total - now.stored;
+  if (now.by_hand && ledger.begun) ledger.by_hand += now.total - ledger.total;
   ledger.total = now.total;
+  if (!ledger.begun) ledger.work_before = now.work;
+  ledger.work = ledger.by_hand + now.work - ledger.work_before;
+  ledger.most_work = std::max(ledger.most_work, std::abs(ledger.work));
+  const double total = now.total - ledger.work, motion = total - now.stored;
   if (!ledger.begun) {
     ledger.begun = true;
     ledger.not_judged = why_not_judged(model, settings);
     ledger.start = ledger.lowest = now.total, ledger.lowest_motion = motion, ledger.highest = now.potential;
-    ledger.scale = std::max(now.kinetic + now.elastic, reserve(model, settings));
+    ledger.reserve = std::max(now.kinetic + now.elastic, reserve(model, settings));
   }
-  ledger.rise = std::max(ledger.rise, now.total - ledger.lowest);
+  ledger.rise = std::max(ledger.rise, total - ledger.lowest);
   ledger.rise_of_motion = std::max(ledger.rise_of_motion, motion - ledger.lowest_motion);
-  ledger.lowest = std::min(ledger.lowest, now.total);
+  ledger.lowest = std::min(ledger.lowest, total);
   ledger.lowest_motion = std::min(ledger.lowest_motion, motion);
   const SolverMode& mode = solver_mode(settings);
   ledger.created = mode.leapfrog || mode.implicit ? ledger.rise : std::min(ledger.rise, ledger.rise_of_motion);
   // A fall that is deeper than to the ground, as into a bowl below it, is part of what the scene has.
   ledger.highest = std::max(ledger.highest, now.potential);
-  ledger.scale = std::max(ledger.scale, ledger.highest - now.potential);
+  ledger.reserve = std::max(ledger.reserve, ledger.highest - now.potential);
+  ledger.scale = ledger.reserve + ledger.most_work;
 }
 
 std::optional<const char*> why_not_judged(const Model& model, const Settings& settings) {
   const SolverMode& mode = solver_mode(settings);
   if (mode.published) return "mode paper corrects positions as published";
   if (!settings.rigid_contact && any_material(model, settings, hard)) return "rigid_contact is off";
-  if (std::ranges::any_of(model.obstacles, moves)) return "obstacles that move do work";
   const auto deformed = [&](const Body& body) {
     if (has_energy(body_material(body, settings))) return false;
     const std::size_t first = body.first_vertex, end = first + body.vertices;

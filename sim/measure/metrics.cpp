@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <ranges>
 
@@ -87,6 +86,7 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.elastic = sums[M_ELASTIC];
   result.stored = sums[M_ELASTIC_MIDWAY];
   result.total = result.kinetic + result.stored + pending.gravity * (heights - m.mass * pending.ground);
+  result.work = sums[M_WORK];
   result.contacts = sums[M_CONTACTS];
   result.non_finite = sums[M_NON_FINITE];
   return true;
@@ -181,6 +181,13 @@ void measure(Metrics& m, const Sim& sim) {
                        sim.settings.gravity,
                        midway,
                        has_obstacles(*sim.model, sim.settings)});
+}
+
+void measure_hand(Metrics& m, const Sim& sim, const std::function<void()>& change) {
+  measure(m, sim);
+  change();
+  measure(m, sim);
+  m.pending.back().result.by_hand = true;
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -36,6 +37,8 @@ struct Measurement {
   /// J, all three as the mode's steps conserve them: where velocities are of mid-substep, of positions there.
   double total = 0;
   double stored = 0;           ///< J, the elastic part of the total
+  double work = 0;             ///< J that obstacles that move have done since the start
+  bool by_hand = false;        ///< what the total changed by since the measurement before is work of a hand
   double contacts = 0;         ///< pairs of a vertex and an obstacle, or the ground, that it touches
   double penetration_max = 0;  ///< depth of the deepest vertex over the body's size; NaN without obstacles
   double penetration_999 = 0;  ///< depth below which 99.9 % of the vertices stay, likewise
@@ -76,6 +79,8 @@ struct Metrics {
 Metrics create_metrics(const Model& model, const ConstraintSystem& made = {});
 /// Queues a measurement of the current state. Waits only if the ring of results is full.
 void measure(Metrics& metrics, const Sim& sim);
+/// Changes a state from outside, as a hand does that moves vertices, between two measurements: the difference is work.
+void measure_hand(Metrics& metrics, const Sim& sim, const std::function<void()>& change);
 /// The oldest measurement that is ready; with `wait`, the oldest of all.
 std::optional<Measurement> collect(Metrics& metrics, bool wait = false);
 

@@ -20,7 +20,8 @@ struct State {
   struct Held {
     std::uint32_t target = ~0u, under = 0;
   };
-  std::vector<Held> held{};  ///< by vertex of a surface, in CPU modes where bodies touch
+  std::vector<Held> held{};    ///< by vertex of a surface, in CPU modes where bodies touch
+  std::vector<double> work{};  ///< J that obstacles that move have done on each vertex; empty: none
 };
 
 /// A contiguous part of the rest mesh, and its material.

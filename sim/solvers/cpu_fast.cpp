@@ -73,6 +73,7 @@ class FastPbd {
     work_.starts.resize(any_material(*model_, settings, damped) ? x.size() : 0);
     predicted_.resize(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
+    if (step.substep.moving) state.work.resize(x.size());
     read_positions(state);
 // Loops inside the region itself would be 4 % slower on one thread.
 #pragma omp parallel num_threads(int(threads_))
@@ -117,6 +118,7 @@ class FastPbd {
     Barrier& barrier = step.barrier;
     auto& x = work_.x;
     auto& v = step.state.velocities;
+    auto& done = step.state.work;
     const std::size_t begin = x.size() * thread / barrier.threads, end = x.size() * (thread + 1) / barrier.threads;
     const auto for_each_free_vertex = [&](auto&& act) {
       for (std::size_t i = begin; i < end; ++i)
@@ -127,7 +129,7 @@ class FastPbd {
       if (!work_.starts.empty()) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
       if (contact.wanted() || (substep.moving && s > 0)) {
         barrier.wait(thread);
-        if (thread == 0) substep.begin(s), contact.prepare(substep, step.inverse_masses, work_, v, counts);
+        if (thread == 0) substep.begin(s), contact.prepare(substep, step.inverse_masses, work_, v, done, counts);
         barrier.wait(thread);
       }
       for_each_free_vertex([&](std::size_t i) {
@@ -136,8 +138,10 @@ class FastPbd {
       });
       for (int iteration = 0; iteration < step.plan.iterations; ++iteration) {
         solve(step, thread, iteration == 0, counts);
-        for_each_free_vertex(
-            [&](std::size_t i) { x[i].move_to(substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i])); });
+        for_each_free_vertex([&](std::size_t i) {
+          double* work = substep.moving && !contact.carries(i) ? &done[i] : nullptr;
+          x[i].move_to(substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i], work));
+        });
       }
       for_each_free_vertex([&](std::size_t i) {
         if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;

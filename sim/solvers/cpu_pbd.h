@@ -129,6 +129,7 @@ class CpuPbd {
     RigidContact contact(*model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
+    if (substep.moving) state.work.resize(x.size());
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
     if (jacobi && splits_masses(*model_, settings))
@@ -138,7 +139,7 @@ class CpuPbd {
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
       substep.begin(s);
-      contact.prepare(substep, inverse_masses, vertices, v, guards);
+      contact.prepare(substep, inverse_masses, vertices, v, state.work, guards);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
       predicted = x;
@@ -160,7 +161,8 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
-          x[i] = substep.out_of_obstacles(i, x[i], predicted[i], v[i]);
+          double* work = substep.moving && !contact.carries(i) ? &state.work[i] : nullptr;
+          x[i] = substep.out_of_obstacles(i, x[i], predicted[i], v[i], work);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)

@@ -41,13 +41,17 @@ struct Substep {
     v = (v + h * gravity) * velocity_scale;
     return x + h * v;
   }
-  /// Returns where vertex i at x goes out of all obstacles (eqs. 11-12).
-  glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v) const {
+  /// Returns where vertex i at x goes out of all obstacles (eqs. 11-12), and adds to `work` what they do on it.
+  glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v,
+                              double* work = nullptr) const {
     for (const MovingObstacle& o : obstacles) {
       const glm::dvec3 displacement = h * (v - o.velocity_at(x)) + (x - predicted);
       const auto met = o.surface_met(x, displacement);
-      if (met.distance < 0)
-        x += Formulas<double>{}.plane_correction(met.normal, met.distance, displacement, friction_on(o, model_, i));
+      if (!(met.distance < 0)) continue;
+      const glm::dvec3 correction =
+          Formulas<double>{}.plane_correction(met.normal, met.distance, displacement, friction_on(o, model_, i));
+      if (work) *work += model_.masses[i] / h * glm::dot(correction, o.velocity_at(x));
+      x += correction;
     }
     return x;
   }

@@ -504,6 +504,12 @@ TEST_CASE("run: its last line is a verdict, and what starts inside something is 
   CHECK(stats["energy"]["created"].get<double>() < 0.01 * stats["energy"]["scale"].get<double>());
   CHECK(stats["mesh"]["mass"].get<double>() == doctest::Approx(1000));
   CHECK(run(block(R"("position": [0, -0.02, 0])") + "}", "--strict").status == 1);
+  const std::string stiff = R"(, "solver": {"mode": "node", "material": "neo-hookean", "young_modulus": 1e10}})";
+  CHECK(run(block(R"("position": [0, 0.1, 0], "spin": [3, 2, 1])") + stiff).out.find("take mode newton or explicit") !=
+        std::string::npos);
+  const std::string flat = R"({"bodies": [{"name": "flat", "block": {"size": [1, 0.002, 1], "cells": [4, 1, 4]},
+    "position": [0, 0.1, 0], "spin": [3, 2, 1]}])";
+  CHECK(run(flat + stiff).out.find("the mesh has slivers, the flattest is tet ") != std::string::npos);
 
   const Outcome held =
       run(block(R"("position": [0, -0.2, 0], "fixed": [{"low": [0, 1, 0], "high": [1, 1, 1]}])") + "}");

@@ -24,7 +24,7 @@ void move(uint i) {
                v = DoubleSingle(velocities[i].high, velocities[i].low);
   v = add_double(v, stopped * params.inverse_h);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  velocities[i] = Velocity(v.high, 0.0, v.low, 0.0);
+  velocities[i] = Velocity(v.high, velocities[i].work, v.low, 0.0);
 #if !IMPLICIT  // BDF2 goes on from the displacement that forces made: from a stopped one it would give back two thirds
                // of the impact velocity
   x = seen_by_neighbours(x, v);

@@ -12,6 +12,29 @@ vec3 rigid_displacement(uint i, DoubleSingle x, vec3 u) {
   // Not the turned arm less the arm, a difference that would drop digits.
   return m.displacement + 2.0 * cross(q, cross(q, arm) + m.turn.w * arm);
 }
+#if MOVING_SOLIDS
+// W, of the obstacles that move: what holds the vertex, what pushed it out at the end, and friction, along their
+// velocities.
+float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 residual) {
+  uint touched = floatBitsToUint(at(INVERSE2, i).w);
+  vec3 pushed_out = at(AIM, i).w * (u - free);
+  float rate = 0.0;
+  for (int k = 0; k < obstacle_count(); ++k) {
+    vec3 velocity = obstacle_velocity(k, x);
+    Surface plane = surface_ahead(k, x, free, free);
+    if ((holds & (1u << k)) != 0u) {
+      vec3 n = normal_of(k, i);
+      rate -= dot(n, residual) * dot(n, velocity);
+    }
+    if (plane.distance < 0.0) rate += dot(pushed_out, plane.normal) * dot(plane.normal, velocity);
+  }
+  if (touched != 0u) {
+    vec3 velocity = obstacle_velocity(findLSB(touched), x);
+    rate -= at(INVERSE, i).w * dot(free_part(u - params.h * velocity, touched, i), velocity);
+  }
+  return rate;
+}
+#endif
 void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);
   if (phases > 0u) l = lengths(phases);
@@ -28,7 +51,7 @@ void main() {
   vec3 u = vec3(0.0), v = vec3(0.0), before = velocities[i].high + velocities[i].low;
   vec3 displacement = vec3(0.0), gain = vec3(0.0);
   uint touched = 0u;
-  float push = 0.0;
+  float push = 0.0, work = velocities[i].work;
   if (own.inverse_mass > 0.0) {
     uint holds = held_by(at(RESIDUAL, i));
     Advanced last = advanced(i, l);
@@ -47,14 +70,21 @@ void main() {
         push = max(push, force);
       }
     }
+#if MOVING_SOLIDS
+    work += params.h * work_rate(i, x, free, u, holds, last.residual);
+#endif
     vec3 carried = obstacle_velocity(findLSB(touched), x);  // by the first obstacle that it touches
-    v = carried + free_part(v - carried, touched, i);
-    displacement = free_part(u, touched, i);
+    vec3 stopped = carried + free_part(v - carried, touched, i);
+#if MOVING_SOLIDS
+    work += dot(stopped - v, carried) / own.inverse_mass;
+#endif
+    v = stopped;
+    displacement = params.h * carried + free_part(u - params.h * carried, touched, i);
     gain = free_part(v - before, touched, i);
   }
   x = add_double(x, u);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  velocities[i] = Velocity(v, 0.0, vec3(0.0), 0.0);
+  velocities[i] = Velocity(v, work, vec3(0.0), 0.0);
   note_unless_finite(i, x.high, v);
   put(DISPLACEMENT, i, displacement, uintBitsToFloat(touched | KNOWN));
   put(GAIN, i, gain, push);

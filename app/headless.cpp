@@ -142,6 +142,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
     const PairNumbers pairs = touched(sim);
     j["contact"] = {{"touches", pairs.touches}, {"detections", pairs.detections}};
   }
+  if (!sim.solver.stiffness_shares.empty()) j["stiffness_share"] = sim.solver.stiffness_shares;
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);

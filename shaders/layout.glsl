@@ -53,7 +53,7 @@ struct Step {
   float body_size;          // m, of the largest body at rest
   float restitution;        // of hard bodies
   float drag;               // 1/s, rate at which velocity decays (mode newton)
-  float kick;               // factor on accelerations in a substep after longer or shorter ones (mode explicit)
+  float kick;               // factor on accelerations in a substep after longer or shorter ones (modes explicit and newton)
   float turn_limit;         // rad; turning further in a substep lowers the health (mode newton)
   float _0;
   vec4 stiffness[2];        // by constraint kind
@@ -135,7 +135,7 @@ struct RigidRecord {
 #define PHASE_SIDE 8u     // which side of hard bodies' records (contact/rigid.glsl)
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_WATCH 16u   // mode explicit: records the stiffness of constraints
-#define PHASE_CHANGED 32u // mode explicit: the substeps before were longer or shorter
+#define PHASE_CHANGED 32u // modes explicit and newton: the substeps before were longer or shorter
 #define PHASE_TOUCHED 64u       // first applies the corrections that contact of bodies found after the last substep
 #define PHASE_SHARED_SIDE 128u  // the side of the contact counts that is this substep's (contact/bodies/sums.glsl)
 #define PHASE_SHARED_LAST 256u  // resets this side of the counts too, as the next ones are exact

@@ -164,8 +164,10 @@ void measure(Metrics& m, const Sim& sim) {
       kernel.set("mass", float(body.mass));
       if (&pass == &m.passes[0]) {
         const Material& material = body_material(sim.model->bodies[b], sim.settings);
-        kernel.set("material", energy_material(material));
-        kernel.set("energy_per_square", energy_per_square(material));
+        const auto& shares = sim.solver.stiffness_shares;
+        const float share = shares.empty() ? 1.0f : shares[b];  // what the solver holds it to have
+        kernel.set("material", glm::vec4(share, share, 1, 1) * energy_material(material));
+        kernel.set("energy_per_square", share * energy_per_square(material));
         kernel.set("midway", float(midway));
       }
       kernel.set("touching", float(1e-5 * body.size));

@@ -206,7 +206,29 @@ Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::s
   return result;
 }
 
-std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows) {
+namespace {
+
+// The six rigid motions of a body in coarse unknowns.
+Eigen::MatrixXd rigid_motions(const Aggregates& aggregates, const RigidPart& part, Eigen::Index count) {
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(count, 6);
+  for (const std::uint32_t a : part.aggregates) {
+    const glm::dvec3 arm = aggregates.all[a].centre - part.centre;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 unit(0);
+      unit[axis] = 1;
+      const glm::dvec3 shift = glm::cross(unit, arm);
+      for (int c = 0; c < 3; ++c) motions(6 * Eigen::Index(a) + c, 3 + axis) = shift[c];
+      motions(6 * Eigen::Index(a) + axis, axis) = 1;
+      motions(6 * Eigen::Index(a) + 3 + axis, 3 + axis) = aggregates.all[a].reach;
+    }
+  }
+  return motions;
+}
+
+}  // namespace
+
+std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows,
+                                  const std::vector<RigidPart>& rigid) {
   const auto count = Eigen::Index(6 * aggregates.all.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(count, count);
   // Each thread fills the columns of its aggregates; the matrix is symmetric.
@@ -235,12 +257,18 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
   // An aggregate of one vertex has no rotation: whatever an unknown is that no member feels, the matrix stays regular.
   A.diagonal() *= 1 + 1e-6;
   if (count > 0) A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
+  std::vector<std::pair<Eigen::MatrixXd, Eigen::MatrixXd>> motions;  // with the matrix of each six
+  for (const RigidPart& part : rigid) {
+    const Eigen::MatrixXd N = rigid_motions(aggregates, part, count);
+    motions.emplace_back(N, N.transpose() * A * N);
+  }
   const Eigen::LLT<Eigen::MatrixXd> factors(A);
   Eigen::MatrixXd& inverse = A;
   inverse.setIdentity();
   parallel_parts(std::size_t(count), 32, [&](std::size_t first, std::size_t end) {
     factors.solveInPlace(inverse.middleCols(Eigen::Index(first), Eigen::Index(end - first)));
   });
+  for (const auto& [N, of_motions] : motions) inverse -= N * of_motions.ldlt().solve(N.transpose());
   const std::size_t width = (std::size_t(count) + 3) / 4 * 4;
   std::vector<float> values(width * std::size_t(count), 0.0f);
   parallel_for(std::size_t(count), 64, [&](std::size_t row) {

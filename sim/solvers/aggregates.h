@@ -36,7 +36,14 @@ struct BlockRows {
   const std::vector<double>& inertia;     ///< mass / h^2 by vertex, 0: fixed
   const std::vector<glm::dmat3>& blocks;  ///< as `neighbours`; a diagonal block is inertia less the row's sum of them
 };
-/// The inverse of the coarse matrix, row by row, each filled up with zeros to a multiple of 4.
-std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows);
+/// A body whose aggregates move together as a rigid one, about its centre of mass at rest.
+struct RigidPart {
+  std::vector<std::uint32_t> aggregates;
+  glm::dvec3 centre;
+};
+/// The inverse of the coarse matrix, row by row, each filled up with zeros to a multiple of 4; without what rigid
+/// motions of `rigid` add to it, which a solver then knows better, for it knows what a body touches.
+std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows,
+                                  const std::vector<RigidPart>& rigid);
 
 }  // namespace tetpbd

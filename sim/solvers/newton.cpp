@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <future>
+#include <map>
 #include <memory>
 #include <tuple>
 
@@ -23,19 +24,24 @@ struct Refresh {
 
 struct Newton {
   Pass begin, predict, start, linearise, residual, update, coarse, prolong, product, finish;
-  Pass momentum;  ///< only where a body is free
+  Pass momentum;             ///< only where a body is free
+  Pass start_motion, place;  ///< only where obstacles can stop one
   std::shared_ptr<const NewtonLevels> levels;
   NewtonBuffers layout;
   std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0;  ///< indices of Solver::buffers
   Refresh refresh;
   double refreshed_for = 0;  ///< s, the substep of the last refresh
+  /// The coarse level by the substep it is for, with the present forces: substeps change back and forth.
+  std::map<double, std::vector<glm::vec4>> coarse_levels;
 };
 
 Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   const std::vector<std::string> defines = newton_defines(sizes, input);
   const ShaderWords words{{}, kind_words(input.system)};
-  const auto pass = [&](const char* name, std::size_t work_groups, std::size_t bytes) {
-    return Pass{Program::compute(fmt::format("solvers/newton/{}.comp", name), words, defines),
+  const auto pass = [&](const char* name, std::size_t work_groups, std::size_t bytes, bool at_start = false) {
+    std::vector<std::string> all = defines;
+    all.push_back(fmt::format("AT_START {:d}", at_start));
+    return Pass{Program::compute(fmt::format("solvers/newton/{}.comp", name), words, all),
                 std::max<std::size_t>(work_groups, 1), bytes};
   };
   const auto groups = [&](std::size_t items) { return (items + sizes.group - 1) / sizes.group; };
@@ -53,13 +59,19 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   n.product = pass("product", turns, of_matrix + 4 * vector);
   n.finish = pass("finish", groups(sizes.vertices), 14 * vector);
   if (sizes.free_bodies > 0) n.momentum = pass("momentum", sizes.parts * sizes.free_bodies, 7 * vector);
+  if (sizes.rigid_start) {
+    n.start_motion = pass("momentum", sizes.parts * sizes.free_bodies, 5 * vector, true);
+    n.place = pass("place", groups(sizes.vertices), 8 * vector);
+  }
   return n;
 }
 
 void run_substep(Sim& sim, Newton& n) {
   const unsigned iterations = unsigned(sim.plan.iterations);
-  run_kernel(sim, n.predict), run_kernel(sim, n.start);
-  run_kernel(sim, n.linearise), run_kernel(sim, n.residual);
+  const unsigned changed = std::exchange(sim.adaptive.changed, false) ? PHASE_CHANGED : 0u;
+  run_kernel(sim, n.predict, changed);
+  if (n.place) run_kernel(sim, n.start_motion), run_kernel(sim, n.place, changed);
+  run_kernel(sim, n.start), run_kernel(sim, n.linearise), run_kernel(sim, n.residual);
   for (unsigned k = 0; k < iterations; ++k) {
     run_kernel(sim, n.update, k), run_kernel(sim, n.coarse, k), run_kernel(sim, n.prolong, k);
     run_kernel(sim, n.product, k + 1);
@@ -73,17 +85,18 @@ void begin_refresh(Sim& sim, Newton& n) {
   r.again = r.inverse.valid();
   if (r.again) return;
   n.refreshed_for = sim.plan.h;
-  r.inverse = std::async(std::launch::async, [model = sim.model, system = sim.system, settings = sim.settings,
-                                              plan = sim.plan, levels = n.levels, layout = n.layout] {
-    return fill_newton_coarse({*model, system, settings, plan, {}}, *levels, layout);
-  });
+  r.inverse = std::async(std::launch::async,
+                         [model = sim.model, system = soften(sim.system, *sim.model, sim.solver.stiffness_shares),
+                          settings = sim.settings, plan = sim.plan, levels = n.levels, layout = n.layout] {
+                           return fill_newton_coarse({*model, system, settings, plan, {}}, *levels, layout);
+                         });
   r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as the thread takes, at real time
 }
 
 void end_refresh(Sim& sim, Newton& n) {
-  const std::vector<glm::vec4> inverse = n.refresh.inverse.get();
+  const std::vector<glm::vec4>& level = n.coarse_levels[n.refreshed_for] = n.refresh.inverse.get();
   const Buffer& to = sim.solver.buffers[n.coarse_matrix];
-  to.write(0, to.bytes(), inverse.data());
+  to.write(0, to.bytes(), level.data());
   if (n.refresh.again) begin_refresh(sim, n);
 }
 
@@ -91,6 +104,12 @@ void end_refresh(Sim& sim, Newton& n) {
 void refresh(Sim& sim, Newton& n) {
   while (n.refresh.inverse.valid()) end_refresh(sim, n);
   if (n.refreshed_for == sim.plan.h) return;
+  if (const auto kept = n.coarse_levels.find(sim.plan.h); kept != n.coarse_levels.end()) {
+    const Buffer& to = sim.solver.buffers[n.coarse_matrix];
+    to.write(0, to.bytes(), kept->second.data());
+    n.refreshed_for = sim.plan.h;
+    return;
+  }
   begin_refresh(sim, n), end_refresh(sim, n);
 }
 
@@ -102,9 +121,11 @@ void make_plan(Sim& sim) {
 
 void set_substep_factor(Sim& sim, Newton& n, int times) {
   if (std::exchange(sim.adaptive.substep_factor, times) == times) return;
+  const int before = sim.plan.substeps;
   make_plan(sim);
   refresh(sim, n);
-  write_step_block(sim);
+  write_step_block(sim, before);
+  sim.adaptive.changed = true;
 }
 
 // Takes more substeps while a body is unhealthy or near another, and some readbacks longer. With them 28 of 37 hard
@@ -169,25 +190,38 @@ void prepare(Sim& sim, Newton& n) {
 void retune(Sim& sim, Newton& n, const Settings* before) {
   make_plan(sim);
   if (!before) return;
+  const std::vector<float> shares = stiffness_shares(*sim.model, sim.settings);
+  const bool other_shares = std::exchange(sim.solver.stiffness_shares, shares) != shares;
   const Buffer& mesh = sim.solver.buffers[n.mesh];
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping, plan_for(s).h); };
-  const bool others = !same_constraints(*sim.model, *before, sim.settings);
+  const bool others = other_shares || !same_constraints(*sim.model, *before, sim.settings);
+  const ConstraintSystem system = others ? soften(sim.system, *sim.model, shares) : ConstraintSystem{};
   for (std::size_t k = 0; others && k < kind_count; ++k)
     for (const auto& [name, array, range] : constraint_arrays)
-      write(mesh, n.layout.constraints[k].*range, to_floats(sim.system.lists[k].*array));
-  if (others || forces(*before) != forces(sim.settings)) begin_refresh(sim, n);
+      write(mesh, n.layout.constraints[k].*range, to_floats(system.lists[k].*array));
+  if (!others && forces(*before) == forces(sim.settings)) return;
+  n.coarse_levels.clear();
+  begin_refresh(sim, n);
 }
 
 }  // namespace
 
-Solver create_newton_solver(const SolverInput& input) {
+Solver create_newton_solver(const SolverInput& whole) {
+  Solver solver;
+  solver.stiffness_shares = stiffness_shares(whole.model, whole.settings);
+  const ConstraintSystem softened =
+      solver.stiffness_shares.empty() ? ConstraintSystem{} : soften(whole.system, whole.model, solver.stiffness_shares);
+  const SolverInput input{whole.model,     solver.stiffness_shares.empty() ? whole.system : softened,
+                          whole.settings,  whole.plan,
+                          whole.tuning,    whole.software,
+                          whole.compliant, whole.fine_quanta,
+                          whole.rigid};
   const auto levels = std::make_shared<const NewtonLevels>(build_newton_levels(input.model, input.system));
   const NewtonSizes sizes = measure_newton(input, *levels);
   const auto made = std::make_shared<Newton>(make_passes(input, sizes));
   Newton& n = *made;
   n.levels = levels, n.layout = lay_out_newton_buffers(sizes, input.system);
   n.refreshed_for = input.plan.h;
-  Solver solver;
   const auto add = [&](const char* block, Buffer buffer) {
     add_buffer(solver, input.tuning, block, std::move(buffer));
     return solver.buffers.size() - 1;
@@ -206,9 +240,11 @@ Solver create_newton_solver(const SolverInput& input) {
   solver.refresh = [made](Sim& sim) { refresh(sim, *made); };
   solver.carried = [made](Sim& sim, Carried& all) {
     const std::vector<Buffer>& buffers = sim.solver.buffers;
-    for (const std::size_t slot : {newton::DISPLACEMENT, newton::GAIN})
+    for (const std::size_t slot : {newton::DISPLACEMENT, newton::GAIN, newton::FRICTION})
       all.ranges.push_back({&buffers[made->vectors], made->layout.slots[slot].at, made->layout.slots[slot].bytes()});
     all.ranges.push_back({&buffers[made->sums], made->layout.rotations.at, made->layout.rotations.bytes()});
+    if (made->momentum)
+      all.ranges.push_back({&buffers[made->sums], made->layout.motions.at, made->layout.motions.bytes()});
   };
   return solver;
 }

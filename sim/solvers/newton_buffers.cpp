@@ -6,8 +6,11 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
+#include "sim/contact/moving_obstacle.h"
 #include "sim/contact/obstacles.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -22,13 +25,21 @@ std::size_t choose_aggregates(std::size_t vertices) {
 
 NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system) {
   const std::size_t vertices = model.positions.size();
-  NewtonLevels levels{build_newton_graph(system, vertices), {}, {}};
+  NewtonLevels levels{build_newton_graph(system, vertices), {}, {}, {}};
   levels.aggregates = make_aggregates(model, levels.graph.neighbours, choose_aggregates(vertices));
   for (const Body& body : model.bodies) {
     const auto begin = model.inverse_masses.begin() + std::ptrdiff_t(body.first_vertex);
-    if (std::all_of(begin, begin + std::ptrdiff_t(body.vertices), [](double w) { return w != 0; }))
-      levels.free_bodies.push_back(
-          {std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices)});
+    if (!std::all_of(begin, begin + std::ptrdiff_t(body.vertices), [](double w) { return w != 0; })) continue;
+    const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
+    levels.free_bodies.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices),
+                                  float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0))});
+  }
+  for (std::size_t a = 0; a < levels.aggregates.all.size(); ++a) {
+    const std::uint32_t v = levels.aggregates.members.values[levels.aggregates.members.first[a]] / 4;
+    const auto found = std::ranges::find_if(
+        levels.free_bodies, [v](const newton::FreeBody& body) { return body.first <= v && v < body.end; });
+    levels.aggregate_bodies.push_back(
+        found == levels.free_bodies.end() ? 0u : std::uint32_t(found - levels.free_bodies.begin()) + 1);
   }
   return levels;
 }
@@ -37,7 +48,7 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
   const std::size_t group = std::max<std::size_t>(tuned({0, 128}, input.tuning).group, NewtonSizes::row_lanes);
   const std::size_t rows = group / NewtonSizes::lanes, vertices = input.model.positions.size();
   std::size_t largest = 0, tets = 0;
-  for (const auto& [first, end] : levels.free_bodies) largest = std::max<std::size_t>(largest, end - first);
+  for (const auto& [first, end, mass] : levels.free_bodies) largest = std::max<std::size_t>(largest, end - first);
   for (std::size_t k = 0; k < kind_count; ++k)
     if (constraint_kinds[k].tet) tets = std::max(tets, input.system.lists[k].count());
   return {.vertices = vertices,
@@ -49,6 +60,7 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
           .group = group,
           .product_groups = (vertices + rows - 1) / rows,
           .parts = std::clamp<std::size_t>(largest / 256, 1, 32),
+          .rigid_start = !levels.free_bodies.empty() && has_obstacles(input.model, input.settings),
           .tets = tets};
 }
 
@@ -67,12 +79,43 @@ std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverIn
                                     {"PRODUCT_GROUPS", sizes.product_groups},
                                     {"FREE_BODIES", sizes.free_bodies},
                                     {"PARTS", sizes.parts},
+                                    {"RIGID_START", sizes.rigid_start},
                                     {"COARSE_ROW", sizes.coarse_row()}})
     defines.push_back(fmt::format("{} {}u", name, value));
   for (std::size_t k = 0; k < kind_count; ++k)
     if (input.system.present[k])
       defines.push_back(fmt::format("COUNT_{} {}u", constraint_kinds[k].name, input.system.lists[k].count()));
   return defines;
+}
+
+std::vector<float> stiffness_shares(const Model& model, const Settings& settings) {
+  constexpr double most = 100;  // stiffness over mass, in 1/h^2
+  const double h = settings.dt / settings.substeps;
+  std::vector<float> shares;
+  for (const Body& body : model.bodies) {
+    const Material& material = body_material(body, settings);
+    const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
+    const double all = std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0);
+    const double size = body_bounds(body, model.rest.positions).size();
+    double volume = 0;
+    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)
+      volume += tet_volume(model.rest, model.rest.tets[t]);
+    const Lame m = lame(material.young_modulus, material.poisson_ratio);
+    const double stiffness = has_energy(material) ? 3 * (m.lambda + 2 * m.mu) * volume / (size * size) : 0;
+    shares.push_back(float(std::min(1.0, most * all / (stiffness * h * h))));
+  }
+  return std::ranges::all_of(shares, [](float share) { return share == 1; }) ? std::vector<float>{} : shares;
+}
+
+ConstraintSystem soften(ConstraintSystem system, const Model& model, const std::vector<float>& shares) {
+  for (ConstraintList& list : system.lists)
+    for (std::size_t c = 0; c < list.count() && !list.compliance.empty() && !shares.empty(); ++c) {
+      const auto after = std::ranges::upper_bound(model.bodies, list.ends(c)[0], {}, &Body::first_vertex);
+      const std::size_t each = list.compliance.size() / list.count();
+      for (std::size_t k = 0; k < each; ++k)
+        list.compliance[each * c + k] /= double(shares[std::size_t(after - model.bodies.begin()) - 1]);
+    }
+  return system;
 }
 
 NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system) {
@@ -87,6 +130,7 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
   to.first_member = to.mesh.add<std::uint32_t>("first_member", sizes.aggregates + 1);
   to.members = to.mesh.add<glm::uvec2>("members", sizes.members);
   to.free_bodies = to.mesh.add<newton::FreeBody>("free_bodies", sizes.free_bodies);
+  to.aggregate_bodies = to.mesh.add<std::uint32_t>("aggregate_bodies", sizes.aggregates);
   const auto for_each_list = [&](const char* what, auto&& add) {
     for (std::size_t k = 0; k < kind_count; ++k)
       if (system.present[k])
@@ -103,10 +147,12 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
     });
 
   to.centres = to.coarse.add<glm::vec4>("centres", sizes.aggregates);
+  to.bodies = to.coarse.add<glm::vec4>("bodies", sizes.free_bodies);
   to.coarse_inverse = to.coarse.add<glm::vec4>("coarse_inverse", sizes.unknowns() * sizes.coarse_row());
 
   to.rotations = to.sums.add<glm::vec4>("rotations", sizes.aggregates);
-  to.sums.add<newton::BodyMotion>("motions", sizes.free_bodies);
+  to.motions = to.sums.add<newton::BodyMotion>("motions", sizes.free_bodies);
+  to.sums.add<newton::BodyResponse>("responses", sizes.free_bodies);
   to.sums.add<newton::MomentumSums>("momentum_sums", sizes.free_bodies * sizes.parts);
   to.sums.add<glm::vec2>("group_dots", sizes.product_groups);
   to.sums.add<glm::vec2>("dots");
@@ -127,7 +173,7 @@ std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevel
   std::vector<glm::vec4> vectors(layout.vectors.bytes / sizeof(glm::vec4), glm::vec4(0)), rest;
   for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
   std::uint32_t number = 0;
-  for (const auto& [first, end] : levels.free_bodies) {
+  for (const auto& [first, end, mass] : levels.free_bodies) {
     ++number;
     for (std::uint32_t v = first; v < end; ++v) rest[v].w = std::bit_cast<float>(number);
   }
@@ -137,7 +183,7 @@ std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevel
 
 std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
                                         const NewtonBuffers& layout) {
-  const auto& [graph, aggregates, free_bodies] = levels;
+  const auto& [graph, aggregates, free_bodies, aggregate_bodies] = levels;
   std::vector<std::uint32_t> uses;
   std::vector<glm::uvec2> neighbours;
   std::vector<glm::uvec4> shares;
@@ -158,6 +204,7 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
   put(contents, layout.first_member, aggregates.members.first);
   put(contents, layout.members, members);
   put(contents, layout.free_bodies, free_bodies);
+  put(contents, layout.aggregate_bodies, aggregate_bodies);
   for (std::size_t k = 0; k < kind_count; ++k) {
     put(contents, layout.constraints[k].vertices, system.lists[k].vertices);
     for (const auto& [name, array, range] : constraint_arrays)
@@ -166,17 +213,55 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
   return contents;
 }
 
+namespace {
+
+// Of each free body its centre of mass at rest, and 1/s^2, its stiffness against a force on opposite faces (of a cube E
+// times the edge) over its mass.
+std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& levels,
+                                        const std::vector<glm::dmat3>& blocks) {
+  std::vector<glm::dvec4> bodies;
+  const Grouped& neighbours = levels.graph.neighbours;
+  for (const auto& [first, end, mass] : levels.free_bodies) {
+    double stiffness = 0;  // N m
+    glm::dvec3 centre{0};
+    Bounds box{model.rest.positions[first], model.rest.positions[first]};
+    for (std::uint32_t v = first; v < end; ++v) {
+      const glm::dvec3& x = model.rest.positions[v];
+      centre += model.masses[v] * x;
+      box = {glm::min(box.low, x), glm::max(box.high, x)};
+      for (std::size_t n = neighbours.first[v]; n < neighbours.first[v + 1]; ++n) {
+        const glm::dvec3 edge = model.rest.positions[neighbours.values[n]] - x;
+        const glm::dmat3& block = blocks[n];
+        stiffness += std::abs(block[0][0] + block[1][1] + block[2][2]) / 6 * glm::dot(edge, edge);  // each edge twice
+      }
+    }
+    bodies.emplace_back(centre / double(mass), stiffness / (box.size() * box.size() / 3) / double(mass));
+  }
+  return bodies;
+}
+
+}  // namespace
+
 std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const NewtonLevels& levels,
                                           const NewtonBuffers& layout) {
   const double h = input.plan.h * 2 / 3;  // s, by which BDF2 multiplies a velocity
   std::vector<double> inertia;
   for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
   const std::vector<glm::dmat3> blocks = compute_blocks_at_rest(input, levels.graph, h);
+  std::vector<glm::vec4> bodies;
+  std::vector<RigidPart> rigid;
+  for (const glm::dvec4& body : describe_bodies(input.model, levels, blocks)) {
+    bodies.emplace_back(body);
+    if (has_obstacles(input.model, input.settings)) rigid.push_back({{}, glm::dvec3(body)});
+  }
+  for (std::uint32_t a = 0; a < levels.aggregate_bodies.size() && !rigid.empty(); ++a)
+    if (levels.aggregate_bodies[a] > 0) rigid[levels.aggregate_bodies[a] - 1].aggregates.push_back(a);
   const std::vector<float> inverse =
-      coarse_inverse(input.model, levels.aggregates, {levels.graph.neighbours, inertia, blocks});
+      coarse_inverse(input.model, levels.aggregates, {levels.graph.neighbours, inertia, blocks}, rigid);
   std::vector<glm::vec4> contents(layout.coarse.bytes / sizeof(glm::vec4), glm::vec4(0)), centres;
   for (const Aggregate& a : levels.aggregates.all) centres.emplace_back(glm::vec3(a.centre), float(a.reach));
   put(std::as_writable_bytes(std::span(contents)), layout.centres, centres);
+  put(std::as_writable_bytes(std::span(contents)), layout.bodies, bodies);
   put(std::as_writable_bytes(std::span(contents)), Range<float>{layout.coarse_inverse.at, inverse.size()}, inverse);
   return contents;
 }

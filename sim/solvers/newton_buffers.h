@@ -13,12 +13,15 @@ template <>
 inline constexpr std::size_t std430_alignment<newton::BodyMotion> = 16;
 template <>
 inline constexpr std::size_t std430_alignment<newton::MomentumSums> = 16;
+template <>
+inline constexpr std::size_t std430_alignment<newton::BodyResponse> = 16;
 
 /// What does not depend on forces and on the length of a substep.
 struct NewtonLevels {
   NewtonGraph graph;
   Aggregates aggregates;
-  std::vector<newton::FreeBody> free_bodies;  ///< bodies without a fixed vertex
+  std::vector<newton::FreeBody> free_bodies;    ///< bodies without a fixed vertex
+  std::vector<std::uint32_t> aggregate_bodies;  ///< 1 + number among these, or 0
 };
 NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system);
 
@@ -28,6 +31,7 @@ struct NewtonSizes {
   std::size_t group;           ///< invocations of a work-group
   std::size_t product_groups;  ///< work-groups of a product with the matrix
   std::size_t parts;           ///< work-groups that add up a free body's momentum
+  bool rigid_start;            ///< whether obstacles can stop a free body
   std::size_t tets;            ///< constraints of the largest kind of tets, for which Newton's start is checked
   std::size_t unknowns() const { return 6 * aggregates; }
   std::size_t coarse_row() const { return (unknowns() + 3) / 4; }  ///< vec4s of a row of the coarse matrix
@@ -44,13 +48,16 @@ struct NewtonBuffers {
   Range<glm::uvec2> neighbours, members;
   Range<glm::uvec4> shares;
   Range<newton::FreeBody> free_bodies;
+  Range<std::uint32_t> aggregate_bodies;
   struct Constraints {
     Range<std::uint32_t> vertices;
     Range<float> values, compliances, dampings;
   };
   std::array<Constraints, kind_count> constraints;
   Range<glm::vec4> centres, coarse_inverse;
+  Range<glm::vec4> bodies;
   Range<glm::vec4> rotations;
+  Range<newton::BodyMotion> motions;
 };
 /// The arrays of floats that each kind of constraint has in `mesh`.
 struct ConstraintArray {
@@ -62,6 +69,12 @@ inline constexpr ConstraintArray constraint_arrays[] = {
     {"values", &ConstraintList::rest, &NewtonBuffers::Constraints::values},
     {"compliances", &ConstraintList::compliance, &NewtonBuffers::Constraints::compliances},
     {"dampings", &ConstraintList::damping, &NewtonBuffers::Constraints::dampings}};
+/// By body, the part of its stiffness that mode newton gives it; empty where all have the whole. Sound that crosses a
+/// body in a tenth of a substep is not told from faster sound, and floats would lose inertia beside such stiffness.
+std::vector<float> stiffness_shares(const Model& model, const Settings& settings);
+/// The constraints with these shares of their materials' stiffness.
+ConstraintSystem soften(ConstraintSystem system, const Model& model, const std::vector<float>& shares);
+
 NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system);
 
 /// The contents of `vectors` at rest, of `mesh`, and of `coarse`.

@@ -45,7 +45,8 @@ struct Solver {
   /// Adopts settings that need no other kernels than those `before`, which is null at first. Throws Error where the
   /// mode cannot solve them.
   std::function<void(Sim&, const Settings* before)> retune = [](Sim&, const Settings*) {};
-  bool takes_constraints = false;  ///< retune() also adopts other values of the same constraints
+  std::vector<float> stiffness_shares;  ///< by body, the part of its stiffness that it is given; empty: the whole
+  bool takes_constraints = false;       ///< retune() also adopts other values of the same constraints
   /// Makes at once, for the present plan, what prepare() would make over several steps.
   std::function<void(Sim&)> refresh = [](Sim&) {};
   bool watches = false;  ///< kernels note what the number of substeps follows (adaptive_substeps.h)

@@ -265,7 +265,7 @@ TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inve
           Q(Eigen::Index(3 * v) + c, Eigen::Index(6 * share.aggregate) + mode) += way[c] * share.weight / 65535.0;
       }
   const Eigen::MatrixXd coarse = Q.transpose() * A * Q;
-  const std::vector<float> inverse = coarse_inverse(*model, aggregates, {neighbours, inertia, blocks});
+  const std::vector<float> inverse = coarse_inverse(*model, aggregates, {neighbours, inertia, blocks}, {});
   REQUIRE(inverse.size() == unknowns * width);
   Eigen::MatrixXd found{Eigen::Index(unknowns), Eigen::Index(unknowns)};
   for (std::size_t r = 0; r < unknowns; ++r)
@@ -453,8 +453,8 @@ TEST_CASE("newton: takes shorter substeps while a step goes badly, and then no t
         step(sim);
         steps_with_inverted += inverted_tets(sim) > 0;
       }
-      CHECK((steps_with_inverted > 0) == (run == 0 && how == "none"));
-      CHECK((sim.adaptive.substep_factor == 1 || sim.adaptive.health == float(HEALTH_TURNING)));
+      CHECK(steps_with_inverted == 0);
+      CHECK((sim.adaptive.substep_factor == 1 || sim.adaptive.health < LEAST_HEALTH));
       if (run == 0) continue;
       CHECK(sim.adaptive.most_substeps == 4);
       CHECK(adaptive_values(sim).least_health < 0.1);

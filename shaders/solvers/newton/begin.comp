@@ -5,6 +5,8 @@ void main() {
   if (i < VERTICES) {
     put(DISPLACEMENT, i, vec3(0.0), 0.0);
     put(GAIN, i, vec3(0.0), 0.0);
+    put(FRICTION, i, vec3(0.0), 0.0);
   }
+  if (i < FREE_BODIES) motions[i].held = 0.0;
   if (i < AGGREGATES) rotations[i] = vec4(0.0, 0.0, 0.0, 1.0);
 }

@@ -2,16 +2,6 @@
 // vertex.
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"
-// The displacement by which correcting its body's momentum moves a vertex.
-vec3 rigid_displacement(uint i, DoubleSingle x, vec3 u) {
-  uint body = floatBitsToUint(at(REST, i).w);
-  if (body == 0u) return vec3(0.0);
-  BodyMotion m = motions[body - 1u];
-  vec3 arm = relative(x, DoubleSingle(m.centre_high, m.centre_low)) + u;
-  vec3 q = m.turn.xyz;
-  // Not the turned arm less the arm, a difference that would drop digits.
-  return m.displacement + 2.0 * cross(q, cross(q, arm) + m.turn.w * arm);
-}
 #if MOVING_SOLIDS
 // W, of the obstacles that move: what holds the vertex, what pushed it out at the end, and friction, along their
 // velocities.
@@ -30,7 +20,7 @@ float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 resi
   }
   if (touched != 0u) {
     vec3 velocity = obstacle_velocity(findLSB(touched), x);
-    rate -= at(INVERSE, i).w * dot(free_part(u - params.h * velocity, touched, i), velocity);
+    rate += dot(friction_force(i, x, u, touched, at(INVERSE, i).w), velocity);
   }
   return rate;
 }
@@ -49,17 +39,25 @@ void main() {
   DoubleSingle x = DoubleSingle(own.high, own.low);
   vec4 offset = at(OFFSET, i);
   vec3 u = vec3(0.0), v = vec3(0.0), before = velocities[i].high + velocities[i].low;
-  vec3 displacement = vec3(0.0), gain = vec3(0.0);
+  vec3 displacement = vec3(0.0), gain = vec3(0.0), friction = vec3(0.0);
   uint touched = 0u;
+  bool slips = false;
   float push = 0.0, work = velocities[i].work;
   if (own.inverse_mass > 0.0) {
-    uint holds = held_by(at(RESIDUAL, i));
+    uint holds = held_by(i);
     Advanced last = advanced(i, l);
     vec3 free = start_displacement(i, x) + last.step;
     u = kept_out(x, free);
-    if (phases > 0u && FREE_BODIES > 0u) u += rigid_displacement(i, x, u);
+    float load = 1.0;
+    bool falls = !is_step_known(i);  // an explicit start of BDF2, of what nothing holds
+    if (phases > 0u && FREE_BODIES > 0u) {
+      uint body = floatBitsToUint(at(REST, i).w);
+      u = free + free_part(rigid_displacement(i, x, free), holds, i);
+      u = kept_out(x, u);
+      if (body > 0u) load = motions[body - 1u].load, falls = falls && motions[body - 1u].held == 0.0;
+    }
     v = (u - offset.xyz) / offset.w;
-    if (!is_step_known(i)) v += (0.5 * params.h) * params.gravity;
+    if (falls) v += (0.5 * params.h) * params.gravity;
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, free, free);
       bool held = (holds & (1u << k)) != 0u, clamped = plane.distance < 0.0;
@@ -67,8 +65,16 @@ void main() {
       if (held || clamped) {
         float force = -dot(n, last.residual);
         if (force > 0.0 || clamped) touched |= 1u << k;
-        push = max(push, force);
+        push = max(push, load * force);
       }
+    }
+    uint slid_on = floatBitsToUint(at(INVERSE2, i).w);
+    float slides = at(INVERSE, i).w;
+    slips = friction_limit(i, slid_on) > 0.0 && slides < 0.99 * grip * at(AIM, i).w;
+    if (friction_limit(i, slid_on) > 0.0 && touched != 0u) {
+      vec3 left = free_part(at(FRICTION, i).xyz, slid_on, i);
+      friction = mix(left, friction_force(i, x, u, slid_on, slides), slips ? 1.0 : kept_grip);
+      friction *= min(1.0, obstacle_friction(findLSB(touched), i) * push / max(length(friction), 1e-30));
     }
 #if MOVING_SOLIDS
     work += params.h * work_rate(i, x, free, u, holds, last.residual);
@@ -88,4 +94,5 @@ void main() {
   note_unless_finite(i, x.high, v);
   put(DISPLACEMENT, i, displacement, uintBitsToFloat(touched | KNOWN));
   put(GAIN, i, gain, push);
+  put(FRICTION, i, friction, uintBitsToFloat(slips ? 1u : 0u));
 }

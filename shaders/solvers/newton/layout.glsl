@@ -5,7 +5,7 @@ const uint AIM = 0u;           // displacement that inertia asks for; mass / h^2
 const uint OFFSET = 1u;        // displacement to z of BDF2; h
 const uint DISPLACEMENT = 2u;  // of the last step; bits: a step is known, obstacles touched
 const uint GAIN = 3u;          // of velocity in the last step; the force of obstacles, N
-const uint RESIDUAL = 4u;      // r; bits of obstacles that hold the vertex
+const uint RESIDUAL = 4u;      // r
 const uint SEARCH = 5u;        // z = M^-1 r
 const uint DIRECTION = 6u;     // p
 const uint IMAGE = 7u;         // q = A p
@@ -14,7 +14,9 @@ const uint INVERSE = 9u;       // of A's 3x3 block: xx, yy, zz; resistance to sl
 const uint INVERSE2 = 10u;     // xy, xz, yz; bits of the obstacles on which it slides
 const uint PRODUCT = 11u;      // A z
 const uint REST = 12u;         // position; bits: 1 + number among free bodies, or 0
-const uint SLOTS = 13u;
+const uint FRICTION = 13u;     // force by obstacles, N; between steps 1 where it slips, within a step bits of what holds it
+const uint START = 14u;        // displacement at which Newton starts at most, where bodies start rigidly; 1: of a stiff body that something holds
+const uint SLOTS = 15u;
 const uint KNOWN = 0x80000000u;
 
 // An edge of the matrix: the columns of the block in its first vertex's row and second one's column. Their w are the
@@ -24,6 +26,7 @@ struct EdgeBlock {
 };
 struct FreeBody {
   uint first, end;  // of its vertices
+  float mass;       // kg
 };
 // An edge's use of a constraint, whose vertices i and j it joins; kinds are counted among those present.
 #define PACKED_USE(constraint, kind, i, j) ((constraint) << 7 | (kind) << 4 | (i) << 2 | (j))
@@ -32,6 +35,7 @@ struct FreeBody {
 #define USE_I(use) int((use) >> 2 & 3u)
 #define USE_J(use) int((use) & 3u)
 #define MOST_CONSTRAINTS (1u << 25)  // of a kind
+#define STIFF_BODY 0.1  // stiffness over mass, in 1/h^2, above which a body that touches takes steps of implicit Euler
 // A vertex's share of an aggregate.
 #define PACKED_SHARE(aggregate, weight) ((aggregate) << 16 | (weight))
 #define SHARE_AGGREGATE(share) ((share) >> 16)
@@ -48,15 +52,24 @@ struct Iteration {
 struct BodyMotion {
   vec4 turn;  // a quaternion
   vec3 displacement;
-  float _0;
+  float load;  // what obstacles bear of the body over what its vertices push
   vec3 centre_high;
-  float _1;
+  float held;  // 1: an obstacle pushes the body
   vec3 centre_low;
   float _2;
 };
-// Sums over the vertices of a free body, by column: the excess force, and mass; its moment, and how many are held; the
-// first moments of mass; the second ones, squares and then products.
-#define MOMENTUM_COLUMNS 5
+// How a free body that obstacles hold and rub against answers a force as a rigid one: 6x6, by rows, about an origin.
+struct BodyResponse {
+  float inverse[36];
+  vec4 arm;  // from there to the centre of mass
+};
+// Sums over the vertices of a free body, by column: the excess force, and mass; its moment, and how many are fixed; the
+// first moments of mass; 21 numbers of the upper half of a 6x6 matrix, by rows; the force that obstacles push with, as
+// far as the residual says, and what inertia asks for.
+#define MATRIX_AT 11u  // in floats, of what all columns hold
+#define PUSH_AT 32u
+#define NEED_AT 35u
+#define MOMENTUM_COLUMNS 10
 struct MomentumSums {
   vec4 columns[MOMENTUM_COLUMNS];
 };

@@ -1,59 +1,210 @@
-// The rigid motion that takes back the momentum that a few iterations give a free body which touches nothing (method.md
-// eq. 43). PARTS work-groups per body, of which the last one to end adds up what all of them found, in order.
+// The rigid motion that takes back the momentum that a few iterations leave a free body (method.md eq. 43). Contact holds
+// along its normals, and friction resists as it does in the residual, so that this works on the ground as in flight.
+// Before Newton starts (AT_START) it is the motion by which obstacles stop a body, as rigid as its stiffness makes it.
+// PARTS work-groups per body, of which the last one to end adds up what all of them found, in order.
 #define SUMS_ARE coherent
-#define COLUMNS MOMENTUM_COLUMNS
+#define COLUMNS 5  // at a time
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"
 shared bool last;
+// Of what holds a vertex along a normal, over its inertia: firm, and not so firm that floats lose inertia beside it.
+const float firm = 1e4;
 
+// Solves the 6x6 system K q = b of symmetric K by Cholesky's method. A direction without inertia stays 0.
+float factor[6][6];
+void factorise(float K[6][6]) {
+  for (int j = 0; j < 6; ++j) {
+    float pivot = K[j][j];
+    for (int k = 0; k < j; ++k) pivot -= factor[j][k] * factor[j][k];
+    bool any = pivot > 1e-6 * K[j][j];
+    factor[j][j] = any ? sqrt(pivot) : 0.0;
+    for (int i = j + 1; i < 6; ++i) {
+      float sum = K[i][j];
+      for (int k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
+      factor[i][j] = any ? sum / factor[j][j] : 0.0;
+    }
+  }
+}
+float[6] solved(float b[6]) {
+  float y[6];
+  for (int i = 0; i < 6; ++i) {
+    float sum = b[i];
+    for (int k = 0; k < i; ++k) sum -= factor[i][k] * y[k];
+    y[i] = factor[i][i] > 0.0 ? sum / factor[i][i] : 0.0;
+  }
+  for (int i = 5; i >= 0; --i) {
+    float sum = y[i];
+    for (int k = i + 1; k < 6; ++k) sum -= factor[k][i] * y[k];
+    y[i] = factor[i][i] > 0.0 ? sum / factor[i][i] : 0.0;
+  }
+  return y;
+}
+
+shared float totals[4u * MOMENTUM_COLUMNS];
+float total(uint at) { return totals[at]; }
+vec3 total3(uint at) { return vec3(total(at), total(at + 1u), total(at + 2u)); }
 void write_motion(uint body, DoubleSingle origin) {
-  float mass = columns[0][0].w;
-  vec3 displacement = columns[0][0].xyz / mass, centre = columns[2][0].xyz / mass,
-       d = columns[3][0].xyz - mass * centre * centre, o = columns[4][0].xyz - mass * centre * centre.yzx,
-       moment = columns[1][0].xyz - cross(centre, columns[0][0].xyz);
-  float trace = (d.x + d.y + d.z) * 1.00001;  // a body in one point has no inverse
-  mat3 inertia = mat3(trace - d.x, -o.x, -o.z, -o.x, trace - d.y, -o.y, -o.z, -o.y, trace - d.z);
-  vec3 w = inverse(inertia) * moment;
+  float mass = total(3u), K[6][6], b[6], reach = sqrt((total(MATRIX_AT + 15u) + total(MATRIX_AT + 18u)) / mass);
+  // Turns are measured by how far they take vertices, which makes all six unknowns lengths.
+  uint at = MATRIX_AT;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) K[i][j] = K[j][i] = total(at++) / (i < 3 ? 1.0 : reach) / (j < 3 ? 1.0 : reach);
+  for (int i = 0; i < 6; ++i) b[i] = i < 3 ? total(uint(i)) : total(uint(i) + 1u) / reach;
+  factorise(K);
+  float q[6] = solved(b), rest[6];
+  for (int i = 0; i < 6; ++i) {  // again for what rounding left
+    rest[i] = b[i];
+    for (int j = 0; j < 6; ++j) rest[i] -= K[i][j] * q[j];
+  }
+  float more[6] = solved(rest);
+  for (int i = 0; i < 6; ++i) q[i] += more[i];
+
+  vec3 centre = total3(8u) / mass, w = vec3(q[3], q[4], q[5]) / reach, displacement = vec3(q[0], q[1], q[2]);
+  displacement += cross(w, centre);
   float angle = length(w), most = 0.5;
-  bool good = columns[1][0].w == 0.0 && angle < most;
+  bool good = total(7u) == 0.0 && angle < most && reach > 0.0;
   DoubleSingle middle = add_double(origin, centre);
   vec4 turn = vec4(good && angle > 0.0 ? w * (sin(0.5 * angle) / angle) : vec3(0.0), good ? cos(0.5 * angle) : 1.0);
-  motions[body] = BodyMotion(turn, good ? displacement : vec3(0.0), 0.0, middle.high, 0.0, middle.low, 0.0);
+#if AT_START
+  for (int k = 0; k < 6; ++k) {
+    float unit[6] = float[6](0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    unit[k] = 1.0;
+    float column[6] = solved(unit);
+    for (int i = 0; i < 6; ++i)
+      responses[body].inverse[6 * i + k] = column[i] / (i < 3 ? 1.0 : reach) / (k < 3 ? 1.0 : reach);
+  }
+  responses[body].arm = vec4(centre, 0.0);
+#endif
+  vec3 push = total3(PUSH_AT), need = total3(NEED_AT) + mass * displacement;
+  // At the start there is no residual to compare with.
+  float load = good && dot(push, push) > 0.0 ? clamp(dot(need, push) / dot(push, push), 0.25, 4.0) : 1.0;
+  motions[body] = BodyMotion(turn, good ? displacement : vec3(0.0), load, middle.high, dot(push, push) > 0.0 ? 1.0 : 0.0, middle.low, 0.0);
 }
+
+float sums[4 * MOMENTUM_COLUMNS];
+void add_up() {
+  uint lane = gl_LocalInvocationIndex;
+  for (uint begin = 0u; begin < 4u * MOMENTUM_COLUMNS; begin += 4u * COLUMNS) {
+    for (uint k = 0u; k < 4u * COLUMNS; ++k) columns[k / 4u][lane][k % 4u] = sums[begin + k];
+    add_up_columns();
+    if (lane < 4u * COLUMNS) totals[begin + lane] = columns[lane / 4u][0][lane % 4u];
+    barrier();
+  }
+}
+void add3(uint at, vec3 value) {
+  for (uint c = 0u; c < 3u; ++c) sums[at + c] += value[c];
+}
+// Adds N^T B N, with N = (1, -[arm]x) for a rigid motion of the body.
+void add_block(vec3 arm, mat3 B) {
+  vec3 n[6];
+  for (int c = 0; c < 3; ++c) {
+    n[c] = mat3(1.0)[c];
+    n[3 + c] = cross(n[c], arm);
+  }
+  uint at = MATRIX_AT;
+  for (int i = 0; i < 6; ++i) {
+    vec3 b = B * n[i];
+    for (int j = i; j < 6; ++j) sums[at++] += dot(b, n[j]);
+  }
+}
+// N/m, with which an obstacle resists a vertex of a body: of a stiff one as much as the whole body resists, of a soft one
+// by its own mass, where a tenth of the body's is about what touches of one that lies flat.
+float contact_stiffness(uint i, uint body) {
+  float h = at(OFFSET, i).w, rate = bodies[body].w * h * h;
+  return min(firm, 10.0 * rate) * at(AIM, i).w;
+}
+#if AT_START
+void add_vertex(uint i, uint body, DoubleSingle origin) {
+  DoubleSingle x = position(i);
+  vec4 aim = at(AIM, i);
+  vec3 u = aim.xyz, arm = relative(x, origin) + u, f = vec3(0.0);
+  mat3 B = mat3(aim.w);
+  uint touched = touched_before(i);
+  float limit = friction_limit(i, touched);
+  if (limit > 0.0) {
+    // What slipped in the last step goes on so, and what stuck resists.
+    float sticks = held_by(i) != 0u ? 0.0 : grip * aim.w;
+    f += friction_force(i, x, u, touched, sticks);
+    for (int c = 0; c < 3 && sticks > 0.0; ++c) B[c] += free_part(mat3(sticks)[c], touched, i);
+  }
+  float stiff = contact_stiffness(i, body);
+  for (int k = 0; k < obstacle_count() && aim.w > 0.0; ++k) {
+    Surface plane = surface_ahead(k, x, u, u);
+    if (plane.distance >= 0.0) continue;
+    f -= plane.normal * (stiff * plane.distance);
+    touched = 1u;
+    B += outerProduct(plane.normal * stiff, plane.normal);
+  }
+  sums[PUSH_AT] += touched != 0u ? 1.0 : 0.0;
+  add3(0u, f);
+  sums[3] += aim.w;
+  add3(4u, cross(arm, f));
+  sums[7] += aim.w > 0.0 ? 0.0 : 1.0;
+  add3(8u, aim.w * arm);
+  add_block(arm, B);
+}
+#else
+// Adds what vertex i is short of to be at rest in its step, and how it resists.
+void add_vertex(uint i, uint body, DoubleSingle origin) {
+  Lengths l = lengths(phases);
+  DoubleSingle x = position(i);
+  vec4 aim = at(AIM, i);
+  Advanced now = advanced(i, l);
+  vec3 u = start_displacement(i, x) + now.step, arm = relative(x, origin) + u, f = aim.w * (aim.xyz - u);
+  add3(NEED_AT, -f);
+  mat3 B = mat3(aim.w);
+  uint holds = held_by(i), touched = floatBitsToUint(at(INVERSE2, i).w);
+  float slides = at(INVERSE, i).w;
+  if (friction_limit(i, touched) > 0.0) {
+    f += friction_force(i, x, u, touched, slides);
+    for (int c = 0; c < 3; ++c) B[c] += free_part(mat3(slides)[c], touched, i);
+  }
+  for (int k = 0; k < obstacle_count() && aim.w > 0.0; ++k) {
+    bool held = (holds & (1u << k)) != 0u;
+    Surface plane = surface_ahead(k, x, u, u);
+    if (held) {  // What the obstacle bears is what the residual leaves along its normal.
+      vec3 n = normal_of(k, i);
+      f -= n * dot(n, now.residual);
+      B += outerProduct(n * (firm * aim.w), n);
+      add3(PUSH_AT, n * max(0.0, -dot(n, now.residual)));
+    } else if (plane.distance < 0.0 || surface_ahead(k, x, aim.xyz, aim.xyz).distance < 0.0) {
+      // Also what the start has moved out: without it the body would go back in.
+      float stiff = contact_stiffness(i, body);
+      f -= plane.normal * (stiff * plane.distance);
+      B += outerProduct(plane.normal * stiff, plane.normal);
+    }
+  }
+  add3(0u, f);
+  sums[3] += aim.w;
+  add3(4u, cross(arm, f));
+  sums[7] += aim.w > 0.0 ? 0.0 : 1.0;
+  add3(8u, aim.w * arm);
+  add_block(arm, B);
+}
+#endif
 
 void main() {
   uint lane = gl_LocalInvocationIndex, body = group_index() / PARTS, part = group_index() % PARTS;
   if (body >= FREE_BODIES) return;
   uint first = free_bodies[body].first, end = free_bodies[body].end, slice = (end - first + PARTS - 1u) / PARTS;
   DoubleSingle origin = position(first);
-  Lengths l = lengths(phases);
-  for (int c = 0; c < COLUMNS; ++c) columns[c][lane] = vec4(0.0);
-  for (uint i = first + part * slice + lane; i < min(first + (part + 1u) * slice, end); i += GROUP_SIZE) {
-    DoubleSingle x = position(i);
-    vec4 aim = at(AIM, i);
-    vec3 free = start_displacement(i, x) + advanced(i, l).step, u = kept_out(x, free), arm = relative(x, origin) + u,
-         f = aim.w * (aim.xyz - u);
-    bool held = !(aim.w > 0.0) || u != free || held_by(at(RESIDUAL, i)) != 0u ||
-                (floatBitsToUint(at(DISPLACEMENT, i).w) & ~KNOWN) != 0u;
-    columns[0][lane] += vec4(f, aim.w);
-    columns[1][lane] += vec4(cross(arm, f), held ? 1.0 : 0.0);
-    columns[2][lane].xyz += aim.w * arm;
-    columns[3][lane].xyz += aim.w * arm * arm;
-    columns[4][lane].xyz += aim.w * arm * arm.yzx;
-  }
-  add_up_columns();
+  for (int k = 0; k < 4 * MOMENTUM_COLUMNS; ++k) sums[k] = 0.0;
+  for (uint i = first + part * slice + lane; i < min(first + (part + 1u) * slice, end); i += GROUP_SIZE)
+    add_vertex(i, body, origin);
+  add_up();
   if (PARTS > 1u) {
     if (lane == 0u) {
-      for (uint c = 0u; c < COLUMNS; ++c) momentum_sums[group_index()].columns[c] = columns[c][0];
+      for (uint k = 0u; k < 4u * MOMENTUM_COLUMNS; ++k)
+        momentum_sums[group_index()].columns[k / 4u][k % 4u] = totals[k];
       memoryBarrierBuffer();
       last = atomicAdd(parts_done[body], 1u) + 1u == PARTS;
     }
     barrier();
     if (!last) return;
     memoryBarrierBuffer();
-    for (uint c = 0u; c < COLUMNS; ++c)
-      columns[c][lane] = lane < PARTS ? momentum_sums[body * PARTS + lane].columns[c] : vec4(0.0);
-    add_up_columns();
+    for (uint k = 0u; k < 4u * MOMENTUM_COLUMNS; ++k)
+      sums[k] = lane < PARTS ? momentum_sums[body * PARTS + lane].columns[k / 4u][k % 4u] : 0.0;
+    add_up();
   }
   if (lane == 0u) {
     write_motion(body, origin);

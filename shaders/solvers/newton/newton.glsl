@@ -34,6 +34,7 @@ layout(std430) restrict readonly buffer Mesh {
   uint first_member[AGGREGATES + 1u];
   uvec2 members[max(MEMBERS, 1u)];  // vertex; weight in WEIGHT_UNITs
   FreeBody free_bodies[max(FREE_BODIES, 1u)];
+  uint aggregate_bodies[max(AGGREGATES, 1u)];  // 1 + number among free bodies, or 0
   // Each kind of constraint has vertices, rest values, a material's compliances, and a body's own damping.
   #foreach uvec$ARITY vertices_$KIND[max(COUNT_$KIND, 1u)];
   #foreach float values_$KIND[max($VALUESu * COUNT_$KIND, 1u)];
@@ -43,7 +44,8 @@ layout(std430) restrict readonly buffer Mesh {
 
 #define UNKNOWNS (6u * AGGREGATES)
 layout(std430) restrict readonly buffer Coarse {
-  vec4 centres[max(AGGREGATES, 1u)];  // of mass at rest; reach
+  vec4 centres[max(AGGREGATES, 1u)];              // of mass at rest; reach
+  vec4 bodies[max(FREE_BODIES, 1u)];              // of each free body: centre of mass at rest; 1/s^2, stiffness over mass
   vec4 coarse_inverse[];              // of the coarse matrix: rows of COARSE_ROW, filled up with zeros
 };
 
@@ -53,6 +55,7 @@ layout(std430) restrict readonly buffer Coarse {
 layout(std430) restrict SUMS_ARE buffer Sums {
   vec4 rotations[max(AGGREGATES, 1u)];  // quaternions
   BodyMotion motions[max(FREE_BODIES, 1u)];
+  BodyResponse responses[max(FREE_BODIES, 1u)];
   MomentumSums momentum_sums[max(FREE_BODIES * PARTS, 1u)];
   vec2 group_dots[PRODUCT_GROUPS];  // r . z and z . A z, by work-group of product.comp
   vec2 dots;                        // their sums
@@ -84,7 +87,9 @@ vec3 kept_out(DoubleSingle x, vec3 u) {
   }
   return u;
 }
-vec3 aimed(uint i) { return start_fractions[chosen_start()] * at(AIM, i).xyz; }
+vec3 aimed(uint i) { return start_fractions[chosen_start()] * at(RIGID_START == 1u && AT_START == 0 ? START : AIM, i).xyz; }
+// Whether this step takes the vertex as one of a stiff body that something holds (is_held_stiff(), as the step began).
+bool began_stiff(uint i) { return RIGID_START == 1u && AT_START == 0 && at(START, i).w > 0.0; }
 vec3 start_displacement(uint i, DoubleSingle x) { return kept_out(x, aimed(i)); }
 // In a step an obstacle holds vertex i at the plane that it meets on its way to the start.
 vec3 normal_of(int k, uint i) {
@@ -111,7 +116,44 @@ vec3 free_part(vec3 v, uint bits, uint i) {
   for (int k = 0; k < count; ++k) v -= held[k] * dot(held[k], v);
   return v;
 }
-uint held_by(vec4 residual) { return floatBitsToUint(residual.w); }
+// The displacement against which friction works, where vertex i moves by u.
+vec3 slid_by(uint i, DoubleSingle x, vec3 u, uint touched) {
+  return free_part(u - params.h * obstacle_velocity(findLSB(touched), x), touched, i);
+}
+// Friction is what the last step left of it, and a resistance to sliding (N/m) of so many times inertia's, up to what
+// Coulomb allows. Where it sticks, a part of the force stays for the next step, so that nothing creeps: a spring whose
+// damping is near the critical one, whatever the body's size.
+const float grip = 10.0, kept_grip = 0.25;
+// N, on vertex i where it moves by u and resists sliding by so much, which is 0 where it slips.
+vec3 friction_force(uint i, DoubleSingle x, vec3 u, uint touched, float resistance) {
+  vec3 force = free_part(at(FRICTION, i).xyz, touched, i);
+  return resistance > 0.0 ? force - resistance * slid_by(i, x, u, touched) : force;
+}
+// N, the most that friction does on vertex i, by the last step's push (lagged: Li et al. 2020) and the first obstacle
+// that it touches.
+float friction_limit(uint i, uint touched) {
+  float push = at(GAIN, i).w;
+  if (!(push > 0.0) || touched == 0u || !(at(AIM, i).w > 0.0)) return 0.0;
+  return obstacle_friction(findLSB(touched), i) * push;
+}
+// The displacement by which the rigid motion of its body moves a vertex that has moved by u.
+vec3 rigid_displacement(uint i, DoubleSingle x, vec3 u) {
+  uint body = floatBitsToUint(at(REST, i).w);
+  if (body == 0u) return vec3(0.0);
+  BodyMotion m = motions[body - 1u];
+  vec3 arm = relative(x, DoubleSingle(m.centre_high, m.centre_low)) + u;
+  vec3 q = m.turn.xyz;
+  // Not the turned arm less the arm, a difference that would drop digits.
+  return m.displacement + 2.0 * cross(q, cross(q, arm) + m.turn.w * arm);
+}
+// Whether vertex i is of a body that obstacles push and that sound crosses within a few substeps. That is not followed,
+// and BDF2 would turn its history into energy.
+bool is_held_stiff(uint i) {
+  uint body = floatBitsToUint(at(REST, i).w);
+  return body > 0u && motions[body - 1u].held > 0.0 && bodies[body - 1u].w * params.h * params.h > STIFF_BODY;
+}
+uint touched_before(uint i) { return floatBitsToUint(at(DISPLACEMENT, i).w) & ~KNOWN; }
+uint held_by(uint i) { return floatBitsToUint(at(FRICTION, i).w); }
 
 #ifdef COLUMNS
 // The sums of `columns` over the work-group, in a fixed order, in columns[...][0].

@@ -3,9 +3,9 @@
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (i >= VERTICES) return;
-  vec4 residual = at(RESIDUAL, i), d = at(INVERSE, i), a = at(INVERSE2, i);
-  uint holds = held_by(residual);
-  vec3 r = free_part(residual.xyz, holds, i);
+  vec4 d = at(INVERSE, i), a = at(INVERSE2, i);
+  uint holds = held_by(i);
+  vec3 r = free_part(at(RESIDUAL, i).xyz, holds, i);
   mat3 B = mat3(d.x, a.x, a.y, a.x, d.y, a.z, a.y, a.z, d.z);
   vec3 z = B * r;
   if (at(AIM, i).w > 0.0 && AGGREGATES > 0) {

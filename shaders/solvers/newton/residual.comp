@@ -3,44 +3,49 @@
 #include "solvers/newton/newton.glsl"
 shared vec3 parts[3][GROUP_SIZE];
 
-// Friction by the last substep's normal force against the displacement since then (lagged: Li et al. 2020), over that
-// displacement, N/m. It becomes smoothly less below slip_speed.
-const float slip_speed = 0.05;  // m/s
-float resistance(float friction, float normal_force, vec3 slid) {
-  float distance = length(slid), slip = slip_speed * params.h;
-  return friction * normal_force * (distance < slip ? (2.0 - distance / slip) / slip : 1.0 / distance);
-}
 void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
-  vec4 aim = at(AIM, i), before = at(DISPLACEMENT, i);
+  vec4 aim = at(AIM, i);
   vec3 r = vec3(0.0);
-  uint holds = 0u, touched = floatBitsToUint(before.w) & ~KNOWN;
+  uint holds = 0u, touched = touched_before(i);
   float slides = 0.0;
+  vec3 left = at(FRICTION, i).xyz, friction = vec3(0.0);
   vec3 inverse_diagonal = vec3(0.0), inverse_across = vec3(0.0);
   if (aim.w > 0.0) {
     vec3 u = start_displacement(i, x);
     r = -force - aim.w * (u - aim.xyz);
     mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z,
                   diagonal.z + aim.w);
-    float push = at(GAIN, i).w;
-    float friction = obstacle_friction(findLSB(touched), i);  // of the first obstacle that it touches
-    if (push > 0.0 && touched != 0u && friction > 0.0) {
-      vec3 slid = free_part(u - params.h * obstacle_velocity(findLSB(touched), x), touched, i);
-      slides = resistance(friction, push, slid);
-      r -= slides * slid;
+    float limit = friction_limit(i, touched);
+    if (limit > 0.0) {
+      slides = grip * aim.w;
+      friction = friction_force(i, x, u, touched, slides);
+      float force = length(friction);
+      if (force > limit) {
+        friction *= limit / force;
+        // A stiff body starts where it will be, so that what slips meets the whole limit. Of a soft one the solution
+        // moves a vertex against its friction yet, which therefore has to fall with that.
+        bool stiff = began_stiff(i);
+        slides = stiff ? 0.0 : slides * limit / force;
+        left = stiff ? friction : left * (limit / force);
+      }
+      r += friction;
       for (int c = 0; c < 3; ++c) D[c] += free_part(mat3(slides)[c], touched, i);
     }
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, aimed(i), u);
-      bool there = plane.distance <= 2.0 * FINE_AT(params.quantum, i);
+      // A rigid start moves a vertex out, and a turn may take it a little too far.
+      float moved_out = max(0.0, dot(plane.normal, u - aim.xyz));
+      bool there = plane.distance <= 2.0 * FINE_AT(params.quantum, i) + 0.1 * moved_out;
       if (there && (dot(plane.normal, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
     }
     mat3 B = inverse(D);
     inverse_diagonal = vec3(B[0][0], B[1][1], B[2][2]);
     inverse_across = vec3(B[0][1], B[0][2], B[1][2]);
   }
-  put(RESIDUAL, i, r, uintBitsToFloat(holds));
+  put(RESIDUAL, i, r, 0.0);
+  put(FRICTION, i, left, uintBitsToFloat(holds));
   put(DIRECTION, i, vec3(0.0), 0.0);
   put(IMAGE, i, vec3(0.0), 0.0);
   put(STEP, i, vec3(0.0), 0.0);

@@ -13,10 +13,10 @@ void restrict_to(uint aggregate, uint slot, Lengths l) {
   float holds = 0.0;
   for (uint k = first_member[aggregate] + lane; k < end; k += GROUP_SIZE) {
     uint i = members[k].x;
+    uint held = held_by(i);
     float weight = float(members[k].y) * WEIGHT_UNIT;
-    vec3 f = weight * turned(back, at(slot, i).xyz);
-    // Only at the beginning, because in later iterations other work-groups rewrite residuals meanwhile.
-    if (slot == RESIDUAL && held_by(at(RESIDUAL, i)) != 0u) holds = 1.0;
+    vec3 f = weight * turned(back, free_part(at(slot, i).xyz, held, i));
+    if (held != 0u) holds = 1.0;
     force += f;
     torque += cross((at(REST, i).xyz - centre.xyz) / centre.w, f);
   }
@@ -24,7 +24,7 @@ void restrict_to(uint aggregate, uint slot, Lengths l) {
   columns[1][lane] = vec4(torque, 0.0);
   add_up_columns();
   if (lane >= 6u) return;
-  bool held = slot == RESIDUAL ? columns[0][0].w > 0.0 : is_free[aggregate] == 0.0;
+  bool held = slot == RESIDUAL ? columns[0][0].w > 0.0 && RIGID_START == 0u : is_free[aggregate] == 0.0;
   float value = held ? 0.0 : columns[lane / 3u][0][lane % 3u];
   uint k = 6u * aggregate + lane;
   if (slot == RESIDUAL) {
@@ -58,5 +58,5 @@ void main() {
   put(DIRECTION, i, now.direction, 0.0);
   put(IMAGE, i, now.image, 0.0);
   put(STEP, i, now.step, 0.0);
-  put(RESIDUAL, i, now.residual, at(RESIDUAL, i).w);
+  put(RESIDUAL, i, now.residual, 0.0);
 }

@@ -129,33 +129,62 @@ State make_state(Leapfrog& run) {
   return state;
 }
 
-double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
-                   int iterations) {
-  Leapfrog run = prepare(input, compliances, positions);  // velocities are zero, so nothing is damped
+namespace {
+
+// The largest eigenvalue that power iterations find; `apply` multiplies a vector of that length by the matrix.
+template <class Apply>
+double largest_eigenvalue(std::size_t count, int iterations, Apply&& apply) {
   std::mt19937 random(1);
-  Points p(positions.size());
+  Points p(count);
   for (glm::dvec3& q : p) q = {draw_unit(random), draw_unit(random), draw_unit(random)};
-  const double reach = 1e-7 * input.model.size;
-  double largest = 0;  // 1/s^2
+  double largest = 0;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     double squares = 0;
     for (std::size_t i = 0; i < p.size(); ++i) squares += glm::dot(p[i], p[i]);
-    const double scale = std::sqrt(double(p.size()) / squares);
-    const auto at = [&](double sign) {
-      for (std::size_t i = 0; i < p.size(); ++i)
-        run.x[i] = positions[i] + (input.inverse_masses[i] > 0 ? sign * reach * scale : 0) * p[i];
-      return accelerations(run);
-    };
-    const Points ahead = at(1), behind = at(-1);
+    if (!(squares > 0)) return 0;
+    p = apply(p, std::sqrt(double(p.size()) / squares));
     double sum = 0;
-    for (std::size_t i = 0; i < p.size(); ++i) {
-      const glm::dvec3 next = (behind[i] - ahead[i]) / (2 * reach);
-      sum += glm::dot(next, next);
-      p[i] = next;
-    }
+    for (std::size_t i = 0; i < p.size(); ++i) sum += glm::dot(p[i], p[i]);
     largest = std::sqrt(sum / double(p.size()));
   }
-  const double omega = std::sqrt(1.02 * largest), damped = most_damping(input.model, input.settings) * omega;
+  return largest;
+}
+
+}  // namespace
+
+double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
+                   int iterations) {
+  Leapfrog run = prepare(input, compliances, positions);
+  const auto difference = [&](const Points& ahead, const Points& behind, double by) {
+    Points all(ahead.size());
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = (behind[i] - ahead[i]) / by;
+    return all;
+  };
+  const auto is_free = [&](std::size_t i) { return input.inverse_masses[i] > 0 ? 1.0 : 0.0; };
+  const double reach = 1e-7 * input.model.size;
+  const double stiffness = largest_eigenvalue(positions.size(), iterations, [&](const Points& p, double scale) {
+    const auto at = [&](double sign) {
+      for (std::size_t i = 0; i < p.size(); ++i) run.x[i] = positions[i] + is_free(i) * sign * reach * scale * p[i];
+      return accelerations(run);
+    };
+    const Points ahead = at(1);
+    return difference(ahead, at(-1), 2 * reach);
+  });
+  // What damps may be less than what is stiff: dashpots resist lengths alone.
+  double damping = 0;
+  if (most_damping(input.model, input.settings) > 0) {
+    run.x = positions;
+    damping = largest_eigenvalue(positions.size(), iterations, [&](const Points& p, double scale) {
+      const auto at = [&](double sign) {
+        for (std::size_t i = 0; i < p.size(); ++i) run.v[i] = is_free(i) * sign * scale * p[i];
+        return accelerations(run);
+      };
+      const Points ahead = at(1);
+      return difference(ahead, at(-1), 2);
+    });
+  }
+  // h^2 W^2 + 2 h D = 4, both with the reserve that a few power iterations need.
+  const double omega = std::sqrt(1.02 * stiffness), damped = 1.02 * damping / omega;
   return (std::sqrt(damped * damped + 4) - damped) / omega;
 }
 

@@ -38,8 +38,8 @@ inline double draw_unit(std::mt19937& random) {
   const double low = double(random()), high = double(random());
   return 2 * ((low + high * 0x1p32) / 0x1p64) - 1;
 }
-/// The longest step that is stable about these positions, s, by constraint_damping and the largest eigenvalue of
-/// M^-1 K, which power iteration finds from differences of forces. Bodies that deform far need shorter ones.
+/// The longest step that is stable about these positions, s, by the largest eigenvalues of M^-1 K and of the damping,
+/// which power iteration finds from differences of forces. Bodies that deform far need shorter ones.
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
                    int iterations = 100);
 

@@ -14,8 +14,8 @@ const uint INVERSE = 9u;       // of A's 3x3 block: xx, yy, zz; resistance to sl
 const uint INVERSE2 = 10u;     // xy, xz, yz; bits of the obstacles on which it slides
 const uint PRODUCT = 11u;      // A z
 const uint REST = 12u;         // position; bits: 1 + number among free bodies, or 0
-const uint FRICTION = 13u;     // force by obstacles, N; between steps 1 where it slips, within a step bits of what holds it
-const uint START = 14u;        // displacement at which Newton starts at most, where bodies start rigidly; 1: of a stiff body that something holds
+const uint FRICTION = 13u;     // by obstacles, N; between steps 1 where it slips, within a step bits of what holds it
+const uint START = 14u;        // Newton's furthest start, where bodies start rigidly; 1: of a stiff body that is held
 const uint SLOTS = 15u;
 const uint KNOWN = 0x80000000u;
 

@@ -1,5 +1,5 @@
-// The rigid motion that takes back the momentum that a few iterations leave a free body (method.md eq. 43). Contact holds
-// along its normals, and friction resists as it does in the residual, so that this works on the ground as in flight.
+// The rigid motion that takes back the momentum that a few iterations leave a free body (method.md eq. 43). Contact
+// holds along its normals, and friction resists as in the residual, so that this works on the ground as in flight.
 // Before Newton starts (AT_START) it is the motion by which obstacles stop a body, as rigid as its stiffness makes it.
 // PARTS work-groups per body, of which the last one to end adds up what all of them found, in order.
 #define SUMS_ARE coherent
@@ -10,34 +10,45 @@ shared bool last;
 // Of what holds a vertex along a normal, over its inertia: firm, and not so firm that floats lose inertia beside it.
 const float firm = 1e4;
 
-// Solves the 6x6 system K q = b of symmetric K by Cholesky's method. A direction without inertia stays 0.
-float factor[6][6];
-void factorise(float K[6][6]) {
-  for (int j = 0; j < 6; ++j) {
-    float pivot = K[j][j];
-    for (int k = 0; k < j; ++k) pivot -= factor[j][k] * factor[j][k];
-    bool any = pivot > 1e-6 * K[j][j];
-    factor[j][j] = any ? sqrt(pivot) : 0.0;
-    for (int i = j + 1; i < 6; ++i) {
-      float sum = K[i][j];
-      for (int k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
-      factor[i][j] = any ? sum / factor[j][j] : 0.0;
+// The columns of the inverse of a symmetric 6x6 matrix by Cholesky's method, one by each of six invocations. A direction
+// without inertia stays 0.
+shared float inverse_matrix[6][6];
+void invert(float K[6][6]) {
+  uint column = gl_LocalInvocationIndex;
+  if (column < 6u) {
+    float factor[6][6], y[6];
+    for (int j = 0; j < 6; ++j) {
+      float pivot = K[j][j];
+      for (int k = 0; k < j; ++k) pivot -= factor[j][k] * factor[j][k];
+      bool any = pivot > 1e-6 * K[j][j];
+      factor[j][j] = any ? inversesqrt(pivot) : 0.0;
+      for (int i = j + 1; i < 6; ++i) {
+        float sum = K[i][j];
+        for (int k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
+        factor[i][j] = sum * factor[j][j];
+      }
     }
+    for (int i = 0; i < 6; ++i) {
+      float sum = uint(i) == column ? 1.0 : 0.0;
+      for (int k = 0; k < i; ++k) sum -= factor[i][k] * y[k];
+      y[i] = sum * factor[i][i];
+    }
+    for (int i = 5; i >= 0; --i) {
+      float sum = y[i];
+      for (int k = i + 1; k < 6; ++k) sum -= factor[k][i] * y[k];
+      y[i] = sum * factor[i][i];
+    }
+    for (int i = 0; i < 6; ++i) inverse_matrix[i][column] = y[i];
   }
+  barrier();
 }
 float[6] solved(float b[6]) {
-  float y[6];
+  float q[6];
   for (int i = 0; i < 6; ++i) {
-    float sum = b[i];
-    for (int k = 0; k < i; ++k) sum -= factor[i][k] * y[k];
-    y[i] = factor[i][i] > 0.0 ? sum / factor[i][i] : 0.0;
+    q[i] = 0.0;
+    for (int j = 0; j < 6; ++j) q[i] += inverse_matrix[i][j] * b[j];
   }
-  for (int i = 5; i >= 0; --i) {
-    float sum = y[i];
-    for (int k = i + 1; k < 6; ++k) sum -= factor[k][i] * y[k];
-    y[i] = factor[i][i] > 0.0 ? sum / factor[i][i] : 0.0;
-  }
-  return y;
+  return q;
 }
 
 shared float totals[4u * MOMENTUM_COLUMNS];
@@ -50,7 +61,14 @@ void write_motion(uint body, DoubleSingle origin) {
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) K[i][j] = K[j][i] = total(at++) / (i < 3 ? 1.0 : reach) / (j < 3 ? 1.0 : reach);
   for (int i = 0; i < 6; ++i) b[i] = i < 3 ? total(uint(i)) : total(uint(i) + 1u) / reach;
-  factorise(K);
+  invert(K);
+#if AT_START
+  uint row = gl_LocalInvocationIndex;
+  if (row < 36u)
+    responses[body].inverse[row] =
+        inverse_matrix[row / 6u][row % 6u] / (row < 18u ? 1.0 : reach) / (row % 6u < 3u ? 1.0 : reach);
+#endif
+  if (gl_LocalInvocationIndex != 0u) return;
   float q[6] = solved(b), rest[6];
   for (int i = 0; i < 6; ++i) {  // again for what rounding left
     rest[i] = b[i];
@@ -66,19 +84,13 @@ void write_motion(uint body, DoubleSingle origin) {
   DoubleSingle middle = add_double(origin, centre);
   vec4 turn = vec4(good && angle > 0.0 ? w * (sin(0.5 * angle) / angle) : vec3(0.0), good ? cos(0.5 * angle) : 1.0);
 #if AT_START
-  for (int k = 0; k < 6; ++k) {
-    float unit[6] = float[6](0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    unit[k] = 1.0;
-    float column[6] = solved(unit);
-    for (int i = 0; i < 6; ++i)
-      responses[body].inverse[6 * i + k] = column[i] / (i < 3 ? 1.0 : reach) / (k < 3 ? 1.0 : reach);
-  }
   responses[body].arm = vec4(centre, 0.0);
 #endif
   vec3 push = total3(PUSH_AT), need = total3(NEED_AT) + mass * displacement;
   // At the start there is no residual to compare with.
   float load = good && dot(push, push) > 0.0 ? clamp(dot(need, push) / dot(push, push), 0.25, 4.0) : 1.0;
-  motions[body] = BodyMotion(turn, good ? displacement : vec3(0.0), load, middle.high, dot(push, push) > 0.0 ? 1.0 : 0.0, middle.low, 0.0);
+  float held = dot(push, push) > 0.0 ? 1.0 : 0.0;
+  motions[body] = BodyMotion(turn, good ? displacement : vec3(0.0), load, middle.high, held, middle.low, 0.0);
 }
 
 float sums[4 * MOMENTUM_COLUMNS];
@@ -107,8 +119,7 @@ void add_block(vec3 arm, mat3 B) {
     for (int j = i; j < 6; ++j) sums[at++] += dot(b, n[j]);
   }
 }
-// N/m, with which an obstacle resists a vertex of a body: of a stiff one as much as the whole body resists, of a soft one
-// by its own mass, where a tenth of the body's is about what touches of one that lies flat.
+// N/m, with which an obstacle resists a vertex: a tenth of a body's mass is about what touches of one that lies flat.
 float contact_stiffness(uint i, uint body) {
   float h = at(OFFSET, i).w, rate = bodies[body].w * h * h;
   return min(firm, 10.0 * rate) * at(AIM, i).w;
@@ -206,8 +217,6 @@ void main() {
       sums[k] = lane < PARTS ? momentum_sums[body * PARTS + lane].columns[k / 4u][k % 4u] : 0.0;
     add_up();
   }
-  if (lane == 0u) {
-    write_motion(body, origin);
-    parts_done[body] = 0u;
-  }
+  write_motion(body, origin);
+  if (lane == 0u) parts_done[body] = 0u;
 }

@@ -44,8 +44,8 @@ layout(std430) restrict readonly buffer Mesh {
 
 #define UNKNOWNS (6u * AGGREGATES)
 layout(std430) restrict readonly buffer Coarse {
-  vec4 centres[max(AGGREGATES, 1u)];              // of mass at rest; reach
-  vec4 bodies[max(FREE_BODIES, 1u)];              // of each free body: centre of mass at rest; 1/s^2, stiffness over mass
+  vec4 centres[max(AGGREGATES, 1u)];  // of mass at rest; reach
+  vec4 bodies[max(FREE_BODIES, 1u)];  // of each free body: centre of mass at rest; 1/s^2, stiffness over mass
   vec4 coarse_inverse[];              // of the coarse matrix: rows of COARSE_ROW, filled up with zeros
 };
 
@@ -87,7 +87,9 @@ vec3 kept_out(DoubleSingle x, vec3 u) {
   }
   return u;
 }
-vec3 aimed(uint i) { return start_fractions[chosen_start()] * at(RIGID_START == 1u && AT_START == 0 ? START : AIM, i).xyz; }
+vec3 aimed(uint i) {
+  return start_fractions[chosen_start()] * at(RIGID_START == 1u && AT_START == 0 ? START : AIM, i).xyz;
+}
 // Whether this step takes the vertex as one of a stiff body that something holds (is_held_stiff(), as the step began).
 bool began_stiff(uint i) { return RIGID_START == 1u && AT_START == 0 && at(START, i).w > 0.0; }
 vec3 start_displacement(uint i, DoubleSingle x) { return kept_out(x, aimed(i)); }

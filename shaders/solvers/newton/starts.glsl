@@ -1,4 +1,4 @@
-// Writes and returns where inertia takes vertex i: by BDF2 if `history`, else by implicit Euler, where gravity acts for a
+// Writes and returns where inertia takes vertex i: by BDF2 if `history`, else by implicit Euler. Gravity acts for a
 // part of the step: a half to begin a fall exactly, the whole where something holds the body.
 vec3 predict(uint i, bool history, float part) {
   Position own = positions[i];
@@ -8,8 +8,8 @@ vec3 predict(uint i, bool history, float part) {
   if (history) {
     // Of a substep as long as this one, where those before were longer or shorter.
     float as_long = (phases & PHASE_CHANGED) != 0u ? 1.0 / (2.0 * params.kick - 1.0) : 1.0;
-    offset = at(DISPLACEMENT, i).xyz * (as_long / 3.0);
-    speed += at(GAIN, i).xyz * (as_long / 3.0);
+    offset = at(DISPLACEMENT, i).xyz * as_long / 3.0;
+    speed += at(GAIN, i).xyz * as_long / 3.0;
   }
   float drag = 1.0 + params.drag * h;
   vec3 aim = offset + (h * speed + (part * h * h) * params.gravity) / drag;

@@ -46,7 +46,7 @@ void apply_contacts(uint i, inout Position own, inout Velocity speed) {
 // Books the work of obstacles that moved a vertex and so changed its velocity.
 void book_work(uint i, float inverse_mass) {
 #if MOVING_SOLIDS
-  if (pushed != 0.0) velocities[i].work += pushed * params.inverse_h / inverse_mass;
+  if (along_obstacles != 0.0) velocities[i].work += along_obstacles * params.inverse_h / inverse_mass;
 #endif
 }
 // Moves vertex i, which is not fixed, and returns the position that its neighbours see.

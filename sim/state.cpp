@@ -95,8 +95,11 @@ void pin(Sim& sim, const VertexList& vertices) {
     if (on_cpu(sim)) sim.host.velocities[v] = glm::dvec3(0);
   }
   write_inverse_masses(sim, vertices);
-  for (const std::size_t part : {offsetof(Velocity, high), offsetof(Velocity, low)})
-    write_vertices<Velocity>(sim, sim.velocities, part, vertices, std::vector<glm::vec3>(vertices.size()));
+  std::vector<std::size_t> parts;  // not of the work that stands between them
+  for (const std::uint32_t v : vertices)
+    for (const std::size_t part : {offsetof(Velocity, high), offsetof(Velocity, low)})
+      parts.push_back(v * sizeof(Velocity) + part);
+  if (!parts.empty()) sim.velocities.write_each(parts, sizeof(glm::vec3), std::vector<glm::vec3>(parts.size()).data());
 }
 
 void unpin(Sim& sim, const VertexList& vertices) {

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # What still goes wrong: runs scenes in every way of solving that takes them and writes a table of verdicts.
 # Usage: verdicts.sh PROGRAM TABLE.csv [SECONDS] [SCENES]     all shipped scenes, and a second of each, if none are named
+# A run of more than two minutes (LIMIT, in s) is called too slow.
 # A row has the energy that came from nothing, in % of the scene's scale, the tets inverted at the end and the verdict.
 set -uo pipefail
-[[ $# -ge 2 ]] || { sed -n '2,4s/^# //p' "$0" >&2; exit 2; }
+[[ $# -ge 2 ]] || { sed -n '2,5s/^# //p' "$0" >&2; exit 2; }
 program=$(realpath "$1") table=$2 seconds=${3:-1} here=$(dirname "$(realpath "$0")")
 shift $(($# < 3 ? $# : 3))
 scenes=("$@")
@@ -15,8 +16,11 @@ number() { sed -nE "s/^ *\"$1\": ([-0-9.e+]+|null),?\$/\1/p" "$out/stats.json" |
 row() {  # SCENE MODE
   local verdict
   rm -f "$out"/*
-  "$program" run --scene "$1" --mode "$2" --set "duration=$seconds" --csv-every 0 --out "$out" >"$out/said.txt" 2>"$out/error.txt"
-  [[ $? -ne 2 ]] || return 0  # a mode that does not take the scene
+  timeout "${LIMIT:-120}" "$program" run --scene "$1" --mode "$2" --set "duration=$seconds" --csv-every 0 --out "$out" >"$out/said.txt" 2>"$out/error.txt"
+  case $? in
+    2) return 0 ;;  # a mode that does not take the scene
+    124) echo "$(basename "$1" .json),$2,,,\"too slow\""; return 0 ;;
+  esac
   verdict=$(grep '^verdict: ' "$out/said.txt" "$out/error.txt" -h | tail -n 1 | sed 's/^verdict: //; s/"/'"'"'/g')
   awk -v scene="$(basename "$1" .json)" -v mode="$2" -v created="$(number created)" -v scale="$(number scale)" \
     -v inverted="$(number inverted_tets)" -v verdict="${verdict:-not finite}" 'BEGIN {

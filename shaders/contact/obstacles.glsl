@@ -133,7 +133,7 @@ bool will_touch(DoubleSingle x, DoubleSingle next, float substeps) {
   return any;
 }
 #if MOVING_SOLIDS
-float pushed = 0.0;  // m^2/s, of the corrections of this invocation's vertex along the velocities of obstacles
+float along_obstacles = 0.0;  // m^2/s, of the corrections of this invocation's vertex along the velocities of obstacles
 #endif
 // Moves vertex i at x out of all obstacles in turn; `moved`: its displacement in this substep so far.
 DoubleSingle resolve_contacts(uint i, DoubleSingle x, vec3 moved) {
@@ -153,7 +153,7 @@ DoubleSingle resolve_contacts(uint i, DoubleSingle x, vec3 moved) {
     if (contact.distance < 0.0) {
       vec3 correction = plane_correction(contact.normal, contact.distance, displacement, solid_friction(k, i));
 #if MOVING_SOLIDS
-      pushed += dot(correction, solid_velocity(k, x));
+      along_obstacles += dot(correction, solid_velocity(k, x));
 #endif
       x = add_double(x, correction);
       moved += correction;

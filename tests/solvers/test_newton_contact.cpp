@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "sim/contact/obstacle_kinds.h"
 #include "tests/gl_test.h"
+#include "tests/long_run.h"
 
 using namespace tetpbd;
 
@@ -14,7 +16,8 @@ namespace {
 struct Block {
   double modulus, density = 1000, size = 0.3, slope = 0;  // slope in degrees, about z
   glm::dvec3 velocity{0};
-  double height = 0;  // m, over the plane
+  double height = 0;                 // m, over the plane
+  std::optional<double> friction{};  // of the body
 };
 
 std::shared_ptr<Model> on_plane(const Block& block) {
@@ -28,6 +31,7 @@ std::shared_ptr<Model> on_plane(const Block& block) {
   plane.kind = find_obstacle_kind("half-space");
   plane.normal = rotation_of({0, 0, block.slope}) * glm::dvec3(0, 1, 0);
   add_body(*model, "block", mesh, block.density, mesh.positions, block.velocity, glm::dvec3(0), {});
+  model->bodies[0].friction = block.friction;
   return model;
 }
 
@@ -61,7 +65,8 @@ Outcome after(const Block& block, const Settings& settings, double seconds) {
 TEST_CASE_FIXTURE(GlTest, "newton: a block at rest stays at rest, whatever its stiffness, its density and the step") {
   for (const double modulus : {1e7, 1e9, 1e12})
     for (const double density : {1.0, 1e3})
-      for (const double dt : {0.002, 0.005, 0.02}) {
+      for (const double dt : {0.002, 0.02}) {
+        if (!is_long_run() && density < 1e3 && modulus != 1e9) continue;
         CAPTURE(modulus);
         CAPTURE(density);
         CAPTURE(dt);
@@ -111,6 +116,8 @@ TEST_CASE_FIXTURE(GlTest, "newton: what slides on level ground stops where Coulo
     CHECK(slid.moved.x == doctest::Approx(1 / (2 * 0.5 * 9.81)).epsilon(0.05));
     CHECK(slid.speed < 1e-4);
   }
+  const Outcome rough = after({.modulus = 1e7, .velocity = {1, 0, 0}, .friction = 0.9}, newton(1e7), 0.4);
+  CHECK(rough.moved.x == doctest::Approx(1 / (2 * 0.9 * 9.81)).epsilon(0.08));
 }
 
 TEST_CASE_FIXTURE(GlTest, "newton: a stiff block that lands comes to rest where it landed") {

@@ -3,7 +3,6 @@
 // Before Newton starts (AT_START) it is the motion by which obstacles stop a body, as rigid as its stiffness makes it.
 // PARTS work-groups per body, of which the last one to end adds up what all of them found, in order.
 #define SUMS_ARE coherent
-#define COLUMNS 5  // at a time
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"
 shared bool last;
@@ -94,12 +93,26 @@ void write_motion(uint body, DoubleSingle origin) {
 }
 
 float sums[4 * MOMENTUM_COLUMNS];
+// Adds the work-group's sums up into `totals`, half of them at a time, in a fixed order: a few invocations for each,
+// because a tree of all would wait at seven barriers. Rows are one longer than memory has banks.
+#define AT_A_TIME (2u * MOMENTUM_COLUMNS)
+#define TURNS max(GROUP_SIZE / AT_A_TIME, 1u)
+shared float cells[AT_A_TIME][GROUP_SIZE + 1u];
 void add_up() {
-  uint lane = gl_LocalInvocationIndex;
-  for (uint begin = 0u; begin < 4u * MOMENTUM_COLUMNS; begin += 4u * COLUMNS) {
-    for (uint k = 0u; k < 4u * COLUMNS; ++k) columns[k / 4u][lane][k % 4u] = sums[begin + k];
-    add_up_columns();
-    if (lane < 4u * COLUMNS) totals[begin + lane] = columns[lane / 4u][0][lane % 4u];
+  uint lane = gl_LocalInvocationIndex, row = lane / TURNS;
+  for (uint begin = 0u; begin < 4u * MOMENTUM_COLUMNS; begin += AT_A_TIME) {
+    for (uint k = 0u; k < AT_A_TIME; ++k) cells[k][lane] = sums[begin + k];
+    barrier();
+    float part = 0.0;
+    for (uint k = lane % TURNS; k < GROUP_SIZE && row < AT_A_TIME; k += TURNS) part += cells[row][k];
+    barrier();
+    if (row < AT_A_TIME) cells[row][lane % TURNS] = part;
+    barrier();
+    if (lane < AT_A_TIME) {
+      float sum = 0.0;
+      for (uint k = 0u; k < TURNS; ++k) sum += cells[lane][k];
+      totals[begin + lane] = sum;
+    }
     barrier();
   }
 }
@@ -204,18 +217,20 @@ void main() {
     add_vertex(i, body, origin);
   add_up();
   if (PARTS > 1u) {
-    if (lane == 0u) {
-      for (uint k = 0u; k < 4u * MOMENTUM_COLUMNS; ++k)
-        momentum_sums[group_index()].columns[k / 4u][k % 4u] = totals[k];
-      memoryBarrierBuffer();
-      last = atomicAdd(parts_done[body], 1u) + 1u == PARTS;
-    }
+    for (uint k = lane; k < 4u * MOMENTUM_COLUMNS; k += GROUP_SIZE)
+      momentum_sums[group_index()].columns[k / 4u][k % 4u] = totals[k];
+    memoryBarrierBuffer();
+    barrier();
+    if (lane == 0u) last = atomicAdd(parts_done[body], 1u) + 1u == PARTS;
     barrier();
     if (!last) return;
     memoryBarrierBuffer();
-    for (uint k = 0u; k < 4u * MOMENTUM_COLUMNS; ++k)
-      sums[k] = lane < PARTS ? momentum_sums[body * PARTS + lane].columns[k / 4u][k % 4u] : 0.0;
-    add_up();
+    for (uint k = lane; k < 4u * MOMENTUM_COLUMNS; k += GROUP_SIZE) {
+      float sum = 0.0;
+      for (uint p = 0u; p < PARTS; ++p) sum += momentum_sums[body * PARTS + p].columns[k / 4u][k % 4u];
+      totals[k] = sum;
+    }
+    barrier();
   }
   write_motion(body, origin);
   if (lane == 0u) parts_done[body] = 0u;

@@ -30,6 +30,10 @@ docs/make_tables.py stability NOTE FOLDER ...: the hard cases; a later folder's 
 
   for i in 1 2 3; do tetpbd compare --hard-cases --shard $i/3 --out S/$i & done; wait
   tetpbd compare --hard-cases --merge S/1 S/2 S/3 --out S/all
+
+docs/make_tables.py verdicts NOTE TABLE.csv ...: what still goes wrong in the shipped scenes
+
+  tests/verdicts.sh build/release/tetpbd TABLE.csv 1
 """
 import csv, json, pathlib, shutil, sys
 
@@ -180,7 +184,29 @@ def stability(note, *folders):
     write("stability.md", out)
 
 
-pages = {"fronts": fronts, "performance": performance, "stability": stability}
+def verdicts(note, *tables):
+    rows = sorted((row for name in tables for row in csv.DictReader(open(name))), key=lambda row: row["scene"])
+    modes = ["node", "explicit", "newton", "cpu-fast"]
+    of = {(row["scene"], row["mode"]): row for row in rows}
+
+    def cell(row):
+        if row is None:
+            return "–"
+        word = row["verdict"].split(":")[0]
+        if word == "right":
+            return word
+        parts = [f"{row['created_percent']} %"] if float(row["created_percent"] or 0) > 1 else []
+        parts += [f"{row['inverted_tets']} inv."] if (row["inverted_tets"] or "0") != "0" else []
+        return f"**{word}**" + (f" ({', '.join(parts)})" if parts else "")
+
+    scenes = sorted({row["scene"] for row in rows})
+    write("verdicts.md", ["# What still goes wrong: the table\n",
+          f"Written by `docs/make_tables.py verdicts`; its head has the command, [the guide](../guide.md#the-verdict) what verdicts mean. {note}\n",
+          "In brackets: energy that came from nothing, of what the scene has, and tets inverted at the end; \"–\": a mode that does not take the scene.\n",
+          table(["scene", *modes], [[f"`{s}`", *(cell(of.get((s, m))) for m in modes)] for s in scenes])])
+
+
+pages = {"fronts": fronts, "performance": performance, "stability": stability, "verdicts": verdicts}
 if len(sys.argv) < 3 or sys.argv[1] not in pages:
     sys.exit(__doc__)
 pages[sys.argv[1]](*sys.argv[2:])

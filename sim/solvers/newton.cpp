@@ -97,7 +97,9 @@ void end_refresh(Sim& sim, Newton& n) {
   const std::vector<glm::vec4>& level = n.coarse_levels[n.refreshed_for] = n.refresh.inverse.get();
   const Buffer& to = sim.solver.buffers[n.coarse_matrix];
   to.write(0, to.bytes(), level.data());
-  if (n.refresh.again) begin_refresh(sim, n);
+  if (!n.refresh.again) return;
+  n.coarse_levels.clear();  // of forces that have changed since
+  begin_refresh(sim, n);
 }
 
 // Refreshes at once, for the present plan.

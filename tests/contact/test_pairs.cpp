@@ -343,7 +343,7 @@ TEST_CASE("pairs: three blocks on each other come to rest") {
   for (const std::string mode : {"explicit", "newton"}) {
     CAPTURE(mode);
     settings.mode = mode;
-    settings.substeps = 60;  // forces alone would need fewer
+    settings.substeps = 40;  // forces alone would need fewer
     if (mode == "newton") settings.iterations = 8, settings.substeps = 2;
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < (is_long_run() ? 600 : 300); ++s) step(sim);

@@ -604,10 +604,12 @@ void advance(Session& s, double elapsed) {
 // Energy that nothing supplied is said once.
 static void follow_energy(Session& s, Lane& lane, const Measurement& now) {
   add_measurement(lane.ledger, now, *lane.sim.model, lane.sim.settings);
-  if (lane.ledger.not_judged) return;
+  if (lane.ledger.not_judged || now.by_hand) return;
   lane.created.add(100 * lane.ledger.relative(), now.time);
+  if (lane.gain_said) return;
   const auto gain = judge_energy(lane.ledger, lane.sim);
-  if (gain && !std::exchange(lane.gain_said, true)) say(s, verdict_line({{*gain}}));
+  lane.gain_said = gain.has_value();
+  if (gain) say(s, verdict_line({{*gain}}));
 }
 
 void measure_frame(Session& s, bool stepped) {
@@ -617,13 +619,10 @@ void measure_frame(Session& s, bool stepped) {
     if (!s.measuring) continue;
     if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
     while (const auto now = collect(*lane.metrics)) {
-      if (now->by_hand) {
-        add_measurement(lane.ledger, *now, *lane.sim.model, lane.sim.settings);
-        continue;
-      }
+      follow_energy(s, lane, *now);
+      if (now->by_hand) continue;
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
-      follow_energy(s, lane, *now);
       const Pairs& pairs = lane.sim.pairs;
       const double in_bodies = pairs ? pairs.depth / lane.sim.model->size : std::nan(""),
                    depth = std::fmax(now->penetration_max, in_bodies);  // of what there is

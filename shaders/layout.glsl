@@ -53,7 +53,7 @@ struct Step {
   float body_size;          // m, of the largest body at rest
   float restitution;        // of hard bodies
   float drag;               // 1/s, rate at which velocity decays (mode newton)
-  float kick;               // factor on accelerations in a substep after longer or shorter ones (modes explicit and newton)
+  float kick;               // factor on accelerations in a substep after longer or shorter ones, of any length
   float turn_limit;         // rad; turning further in a substep lowers the health (mode newton)
   float _0;
   vec4 stiffness[2];        // by constraint kind

@@ -11,7 +11,9 @@ layout(local_size_x = 256) in;
 #include "contact/impulses.glsl"
 shared Rigid before, body;  // the centre from the body's origin; momenta per mass
 shared uint worst, worst_place;
+#if MOVING_SOLIDS
 shared float worked;  // J, of obstacles that move, on the body in this substep
+#endif
 shared uint places[MOST_TOUCHES];  // of the contacts: vertex * MAX_OBSTACLES + obstacle
 
 DoubleSingle position_of(uint i) { return DoubleSingle(positions[i].high, positions[i].low); }
@@ -106,9 +108,11 @@ void write_contacts(uint b, uint o, int touching, bool full) {
   if (lane == 0u) {
     if (full) atomicAdd(dropped[DROP_CONTACTS], 1u);
     if (body.unsettled) atomicAdd(dropped[DROP_SWEEPS], 1u);
+#if MOVING_SOLIDS
     worked = 0.0;
     for (int k = 0; k < touching; ++k)
       worked += rigid_bodies[b].mass * dot(contacts[k].impulse, contacts[k].surface);
+#endif
     rigid_bodies[b].sides[o].touching = uint(touching);
     rigid_bodies[b].sides[o].velocity = body.velocity;
     rigid_bodies[b].sides[o].angular = length(body.spin) > 0.0 ? inverse(body.inverse_inertia) * body.spin : vec3(0.0);
@@ -155,7 +159,9 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
     barrier();
   }
   if (writes) write_contacts(b, 1u - s, touching, full);
+#if MOVING_SOLIDS
   barrier();
+#endif
   return true;
 }
 
@@ -185,7 +191,11 @@ void main() {
     if (moves && i >= first && i < first + rigid_bodies[b].vertices) {
       DoubleSingle x = position_of(i);
       vec3 v = velocity_at(body, arm_of(x, origin) - body.centre);
-      velocities[i] = Velocity(v, velocities[i].work + (i == first ? worked : 0.0), vec3(0.0), 0.0);
+      float work = velocities[i].work;
+#if MOVING_SOLIDS
+      if (i == first) work += worked;
+#endif
+      velocities[i] = Velocity(v, work, vec3(0.0), 0.0);
       begin_body(i);
       quantized_out[i] = quantize(predict_position(x, DoubleSingle(v, vec3(0.0))), weight_of(positions[i]));
     }

@@ -155,34 +155,26 @@ double largest_eigenvalue(std::size_t count, int iterations, Apply&& apply) {
 double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
                    int iterations) {
   Leapfrog run = prepare(input, compliances, positions);
-  const auto difference = [&](const Points& ahead, const Points& behind, double by) {
-    Points all(ahead.size());
-    for (std::size_t i = 0; i < all.size(); ++i) all[i] = (behind[i] - ahead[i]) / by;
-    return all;
-  };
-  const auto is_free = [&](std::size_t i) { return input.inverse_masses[i] > 0 ? 1.0 : 0.0; };
-  const double reach = 1e-7 * input.model.size;
-  const double stiffness = largest_eigenvalue(positions.size(), iterations, [&](const Points& p, double scale) {
-    const auto at = [&](double sign) {
-      for (std::size_t i = 0; i < p.size(); ++i) run.x[i] = positions[i] + is_free(i) * sign * reach * scale * p[i];
-      return accelerations(run);
-    };
-    const Points ahead = at(1);
-    return difference(ahead, at(-1), 2 * reach);
-  });
-  // What damps may be less than what is stiff: dashpots resist lengths alone.
-  double damping = 0;
-  if (most_damping(input.model, input.settings) > 0) {
-    run.x = positions;
-    damping = largest_eigenvalue(positions.size(), iterations, [&](const Points& p, double scale) {
+  // Of how accelerations fall where `moved`, positions or velocities, go `reach` to either side of what they are.
+  const auto eigenvalue = [&](Points& moved, double reach) {
+    const Points about = moved;
+    const double largest = largest_eigenvalue(about.size(), iterations, [&](const Points& p, double scale) {
       const auto at = [&](double sign) {
-        for (std::size_t i = 0; i < p.size(); ++i) run.v[i] = is_free(i) * sign * scale * p[i];
+        for (std::size_t i = 0; i < p.size(); ++i)
+          moved[i] = about[i] + (input.inverse_masses[i] > 0 ? sign * reach * scale : 0) * p[i];
         return accelerations(run);
       };
+      Points next = at(-1);
       const Points ahead = at(1);
-      return difference(ahead, at(-1), 2);
+      for (std::size_t i = 0; i < next.size(); ++i) next[i] = (next[i] - ahead[i]) / (2 * reach);
+      return next;
     });
-  }
+    moved = about;
+    return largest;
+  };
+  const double stiffness = eigenvalue(run.x, 1e-7 * input.model.size);
+  // What damps may be less than what is stiff: dashpots resist lengths alone.
+  const double damping = most_damping(input.model, input.settings) > 0 ? eigenvalue(run.v, 1) : 0;
   // h^2 W^2 + 2 h D = 4, both with the reserve that a few power iterations need.
   const double omega = std::sqrt(1.02 * stiffness), damped = 1.02 * damping / omega;
   return (std::sqrt(damped * damped + 4) - damped) / omega;

@@ -38,11 +38,12 @@ struct Newton {
 Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   const std::vector<std::string> defines = newton_defines(sizes, input);
   const ShaderWords words{{}, kind_words(input.system)};
+  std::vector<std::string> defines_at_start = defines;
+  defines_at_start.push_back("AT_START 1");
   const auto pass = [&](const char* name, std::size_t work_groups, std::size_t bytes, bool at_start = false) {
-    std::vector<std::string> all = defines;
-    all.push_back(fmt::format("AT_START {:d}", at_start));
-    return Pass{Program::compute(fmt::format("solvers/newton/{}.comp", name), words, all),
-                std::max<std::size_t>(work_groups, 1), bytes};
+    return Pass{
+        Program::compute(fmt::format("solvers/newton/{}.comp", name), words, at_start ? defines_at_start : defines),
+        std::max<std::size_t>(work_groups, 1), bytes};
   };
   const auto groups = [&](std::size_t items) { return (items + sizes.group - 1) / sizes.group; };
   const std::size_t count = sizes.aggregates, unknowns = sizes.unknowns(), turns = sizes.product_groups,
@@ -93,10 +94,13 @@ void begin_refresh(Sim& sim, Newton& n) {
   r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as the thread takes, at real time
 }
 
-void end_refresh(Sim& sim, Newton& n) {
-  const std::vector<glm::vec4>& level = n.coarse_levels[n.refreshed_for] = n.refresh.inverse.get();
+void write_coarse_level(Sim& sim, const Newton& n, const std::vector<glm::vec4>& level) {
   const Buffer& to = sim.solver.buffers[n.coarse_matrix];
   to.write(0, to.bytes(), level.data());
+}
+
+void end_refresh(Sim& sim, Newton& n) {
+  write_coarse_level(sim, n, n.coarse_levels[n.refreshed_for] = n.refresh.inverse.get());
   if (!n.refresh.again) return;
   n.coarse_levels.clear();  // of forces that have changed since
   begin_refresh(sim, n);
@@ -107,10 +111,8 @@ void refresh(Sim& sim, Newton& n) {
   while (n.refresh.inverse.valid()) end_refresh(sim, n);
   if (n.refreshed_for == sim.plan.h) return;
   if (const auto kept = n.coarse_levels.find(sim.plan.h); kept != n.coarse_levels.end()) {
-    const Buffer& to = sim.solver.buffers[n.coarse_matrix];
-    to.write(0, to.bytes(), kept->second.data());
     n.refreshed_for = sim.plan.h;
-    return;
+    return write_coarse_level(sim, n, kept->second);
   }
   begin_refresh(sim, n), end_refresh(sim, n);
 }

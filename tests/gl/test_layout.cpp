@@ -124,10 +124,8 @@ TEST_CASE("members of mode newton's blocks lie where GL reads them, and no array
       const NewtonBuffers layout = lay_out_newton_buffers(sizes, system);
       for (const char* name : {"begin", "predict", "start", "linearise", "residual", "update", "coarse", "prolong",
                                "product", "finish", "momentum", "place"}) {
-        std::vector<std::string> defines = newton_defines(sizes, input);
-        defines.push_back("AT_START 0");
-        const Program program =
-            Program::compute(std::string("solvers/newton/") + name + ".comp", {{}, kind_words(system)}, defines);
+        const Program program = Program::compute(std::string("solvers/newton/") + name + ".comp",
+                                                 {{}, kind_words(system)}, newton_defines(sizes, input));
         check_block(program, "Mesh", layout.mesh);
         check_block(program, "Coarse", layout.coarse);
         check_block(program, "Sums", layout.sums);

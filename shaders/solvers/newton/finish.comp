@@ -70,8 +70,9 @@ void main() {
     }
     uint slid_on = floatBitsToUint(at(INVERSE2, i).w);
     float slides = at(INVERSE, i).w;
-    slips = friction_limit(i, slid_on) > 0.0 && slides < 0.99 * grip * at(AIM, i).w;
-    if (friction_limit(i, slid_on) > 0.0 && touched != 0u) {
+    bool rubs = friction_limit(i, slid_on) > 0.0;
+    slips = rubs && slides < 0.99 * grip * at(AIM, i).w;
+    if (rubs && touched != 0u) {
       vec3 left = free_part(at(FRICTION, i).xyz, slid_on, i);
       friction = mix(left, friction_force(i, x, u, slid_on, slides), slips ? 1.0 : kept_grip);
       friction *= min(1.0, obstacle_friction(findLSB(touched), i) * push / max(length(friction), 1e-30));

@@ -9,8 +9,8 @@ shared bool last;
 // Of what holds a vertex along a normal, over its inertia: firm, and not so firm that floats lose inertia beside it.
 const float firm = 1e4;
 
-// The columns of the inverse of a symmetric 6x6 matrix by Cholesky's method, one by each of six invocations. A direction
-// without inertia stays 0.
+// The columns of the inverse of a symmetric 6x6 matrix by Cholesky's method, one by each of six invocations. A
+// direction without inertia stays 0.
 shared float inverse_matrix[6][6];
 void invert(float K[6][6]) {
   uint column = gl_LocalInvocationIndex;
@@ -51,15 +51,14 @@ float[6] solved(float b[6]) {
 }
 
 shared float totals[4u * MOMENTUM_COLUMNS];
-float total(uint at) { return totals[at]; }
-vec3 total3(uint at) { return vec3(total(at), total(at + 1u), total(at + 2u)); }
+vec3 total3(uint at) { return vec3(totals[at], totals[at + 1u], totals[at + 2u]); }
 void write_motion(uint body, DoubleSingle origin) {
-  float mass = total(3u), K[6][6], b[6], reach = sqrt((total(MATRIX_AT + 15u) + total(MATRIX_AT + 18u)) / mass);
+  float mass = totals[3u], K[6][6], b[6], reach = sqrt((totals[MATRIX_AT + 15u] + totals[MATRIX_AT + 18u]) / mass);
   // Turns are measured by how far they take vertices, which makes all six unknowns lengths.
   uint at = MATRIX_AT;
   for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) K[i][j] = K[j][i] = total(at++) / (i < 3 ? 1.0 : reach) / (j < 3 ? 1.0 : reach);
-  for (int i = 0; i < 6; ++i) b[i] = i < 3 ? total(uint(i)) : total(uint(i) + 1u) / reach;
+    for (int j = i; j < 6; ++j) K[i][j] = K[j][i] = totals[at++] / (i < 3 ? 1.0 : reach) / (j < 3 ? 1.0 : reach);
+  for (int i = 0; i < 6; ++i) b[i] = i < 3 ? totals[uint(i)] : totals[uint(i) + 1u] / reach;
   invert(K);
 #if AT_START
   uint row = gl_LocalInvocationIndex;
@@ -79,7 +78,7 @@ void write_motion(uint body, DoubleSingle origin) {
   vec3 centre = total3(8u) / mass, w = vec3(q[3], q[4], q[5]) / reach, displacement = vec3(q[0], q[1], q[2]);
   displacement += cross(w, centre);
   float angle = length(w), most = 0.5;
-  bool good = total(7u) == 0.0 && angle < most && reach > 0.0;
+  bool good = totals[7u] == 0.0 && angle < most && reach > 0.0;
   DoubleSingle middle = add_double(origin, centre);
   vec4 turn = vec4(good && angle > 0.0 ? w * (sin(0.5 * angle) / angle) : vec3(0.0), good ? cos(0.5 * angle) : 1.0);
 #if AT_START

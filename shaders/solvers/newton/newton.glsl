@@ -1,6 +1,9 @@
 // What the kernels of mode newton share (method.md, "Implicit steps"): a step of BDF2 is one Newton step for the
 // displacement u of each vertex over it, solved by conjugate gradients with a preconditioner of two levels: 3x3 blocks
 // of vertices, and rigid motions of aggregates.
+#ifndef AT_START  // momentum.comp before Newton starts
+#define AT_START 0
+#endif
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantize.glsl"

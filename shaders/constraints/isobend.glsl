@@ -2,7 +2,7 @@
 // L = sum k_j x_j, without unit. The k add up to 0 and do not change, so C^2 / 2 is quadratic in x where the rest shape
 // is flat. By the sign only one of two mirrored shapes is at rest, as in cubic shells (Garg and others 2007).
 
-// `rest` has the weights k of x1, x2 and x3, which cotangents at rest give (constraint_kinds.h), and +-|L| there.
+// `rest` is IsobendRest's values.
 Constraint4 isobend(vec3 x[4], const real rest[4], Ids ids) {
   Constraint4 c;
   vec3 d1 = x[1] - x[0], d2 = x[2] - x[0], d3 = x[3] - x[0];
@@ -26,4 +26,28 @@ Constraint4 isobend(vec3 x[4], const real rest[4], Ids ids) {
   c.gradient[2] = rest[1] * n;
   c.gradient[3] = rest[2] * n;
   return c;
+}
+
+// The weights k of x1, x2 and x3, by the cotangents at rest, and +-|L| there. A wing without area has no weights: the
+// constraint of such a hinge does nothing.
+struct IsobendRest {
+  real values[4];
+};
+real cotangent(vec3 u, vec3 v) { return dot(u, v) / length(cross(u, v)); }
+IsobendRest isobend_rest(vec3 x[4], Ids ids) {
+  vec3 e = x[3] - x[2];
+  real twice_areas = length(cross(x[2] - x[0], x[3] - x[0])) + length(cross(x[2] - x[1], x[3] - x[1]));
+  real scale = sqrt(real(6) / twice_areas);
+  real c21 = cotangent(x[1] - x[2], e), c31 = cotangent(x[1] - x[3], -e);
+  IsobendRest r;
+  r.values[0] = -scale * (c21 + c31);
+  r.values[1] = scale * (cotangent(x[0] - x[3], -e) + c31);
+  r.values[2] = scale * (cotangent(x[0] - x[2], e) + c21);
+  real sum = r.values[0] + r.values[1] + r.values[2];
+  bool sound = sum * real(0) == real(0);
+  for (int j = 0; j < 3; ++j) r.values[j] = sound ? r.values[j] : real(0);
+  r.values[3] = real(0);
+  real at_rest = isobend(x, r.values, ids).C;
+  r.values[3] = sound ? at_rest : real(0);
+  return r;
 }

@@ -2,8 +2,7 @@
 #define METRICS_GROUPS 64      // work-groups of a reduction at most; the number depends on the mesh alone
 #define METRICS_SIZE 256       // invocations of a work-group
 
-// Sums over one body, in this order in a row. The first group comes from constraints, the second from vertices, the
-// third from vertices once the centre and rotation are known.
+// Sums over one body, in this order in a row. Those from M_ANGULAR on need the centre and rotation of the others.
 #define M_VOLUME_CHANGE 0      // sum V - V0, m^3
 #define M_TET_SQUARES 1        // sum ((V - V0)/V0)^2
 #define M_TET_MAX 2

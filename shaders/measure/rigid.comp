@@ -1,7 +1,7 @@
 // One body's distance to its rigidly aligned rest shape (method.md eq. 20), and angular momentum about its centre.
+#define FIRST M_ANGULAR
+#define REDUCED 4
 #include "measure/reduce.glsl"
-layout(std430) readonly buffer Velocities { Velocity velocities[]; };
-layout(std430) readonly buffer Rest { vec4 rest[]; };
 
 void main() {
   vec3 centre = vec3(row[M_CENTRE], row[M_CENTRE + 1], row[M_CENTRE + 2]);
@@ -19,6 +19,10 @@ void main() {
     squares += at_rest.w * dot(apart, apart);
     angular += at_rest.w * cross(r, u);
   }
-  for (int a = 0; a < 3; ++a) store_partial(M_ANGULAR + a, angular[a]);
-  store_partial(M_RIGID_SQUARES, squares);
+  for (int a = 0; a < 3; ++a) values[a] = angular[a];
+  values[M_RIGID_SQUARES - FIRST] = squares;
+  store_partials();
+  if (!ends_last()) return;
+  int me = int(gl_LocalInvocationIndex);
+  if (me < REDUCED) row[FIRST + me] = total(FIRST + me);
 }

@@ -19,6 +19,8 @@ namespace {
 // The names of blocks of the kinds that are measured, in the order of the table.
 constexpr std::array record_blocks = {"Stretch", "Bend", "Volume"};
 constexpr std::size_t ring_size = 16, measured_kinds = std::tuple_size_v<decltype(Metrics::counts)>;
+// Those that have an energy where no material has it: the measured ones, and isobend, whose hinges are those of bend.
+constexpr std::array energy_kinds = {index_of<Stretch>, index_of<Bend>, index_of<Volume>, index_of<Isobend>};
 
 // The constraints of a body. Lists are sorted by vertex and bodies share none, so they are a range of each list.
 glm::uvec2 constraint_range(const ConstraintList& list, glm::uvec2 vertices) {
@@ -28,12 +30,14 @@ glm::uvec2 constraint_range(const ConstraintList& list, glm::uvec2 vertices) {
           std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
 }
 
-// J over C^2 of the kinds that are measured, of a body without a material model; 0 where a kind has no energy.
-glm::vec3 energy_per_square(const Material& material) {
-  glm::vec3 factors(0);
-  for (std::size_t k = 0; k < measured_kinds && !has_energy(material); ++k)
-    if (uses(material, constraint_kinds[k]) && material.compliance[k] > 0)
-      factors[glm::length_t(k)] = float(0.5 / material.compliance[k]);
+// J over C^2 of energy_kinds, of a body without a material model; 0 where a kind has no energy.
+glm::vec4 energy_per_square(const Material& material) {
+  glm::vec4 factors(0);
+  for (std::size_t k = 0; k < energy_kinds.size() && !has_energy(material); ++k) {
+    const double compliance = material.compliance[std::size_t(energy_kinds[k])];
+    if (uses(material, constraint_kinds[std::size_t(energy_kinds[k])]) && compliance > 0)
+      factors[glm::length_t(k)] = float(0.5 / compliance);
+  }
   return factors;
 }
 
@@ -130,10 +134,10 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     m.bodies.push_back(ranges);
   }
   m.rest = Buffer("metrics rest", rest);
-  m.partials = Buffer("metrics partials", M_ROW * METRICS_GROUPS * sizeof(float));
+  m.partials = Buffer("metrics partials", std::vector<std::uint32_t>(1 + M_ROW * METRICS_GROUPS, 0));
   for (std::size_t slot = 0; slot < ring_size; ++slot)
     m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr, GL_STREAM_READ);
-  for (const char* name : {"constraints", "vertices", "centre", "rigid", "close"})
+  for (const char* name : {"sums", "rigid"})
     m.passes.push_back({Program::compute(fmt::format("measure/{}.comp", name), {}, obstacle_defines(model))});
   m.vertices = double(model.positions.size());
   return m;
@@ -154,25 +158,20 @@ void measure(Metrics& m, const Sim& sim) {
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
     recorder.give("Row", m.rows[slot].id(), b * M_STRIDE * sizeof(float), M_STRIDE * sizeof(float));
-    // An invocation gets about four tets before there are more groups, and of a sheet, four edges.
     const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
-    const unsigned groups = unsigned(std::clamp<std::size_t>(work_groups(items, 4 * METRICS_SIZE), 1, METRICS_GROUPS));
+    const unsigned groups = unsigned(std::clamp<std::size_t>(work_groups(items, METRICS_SIZE), 1, METRICS_GROUPS));
+    const Program& sums = recorder.use(m.passes[0].program);
+    sums.set("edge_range", body.edges), sums.set("hinge_range", body.hinges), sums.set("tet_range", body.tets);
+    const Material& material = body_material(sim.model->bodies[b], sim.settings);
+    const auto& shares = sim.solver.stiffness_shares;
+    const float share = shares.empty() ? 1.0f : shares[b];  // what the solver holds it to have
+    sums.set("material", glm::vec4(share, share, 1, 1) * energy_material(material));
+    sums.set("energy_per_square", share * energy_per_square(material));
+    sums.set("midway", float(midway)), sums.set("touching", float(1e-5 * body.size));
     for (Pass& pass : m.passes) {
       const Program& kernel = recorder.use(pass.program);
-      kernel.set("vertex_range", body.vertices), kernel.set("edge_range", body.edges);
-      kernel.set("hinge_range", body.hinges), kernel.set("tet_range", body.tets);
-      kernel.set("mass", float(body.mass));
-      if (&pass == &m.passes[0]) {
-        const Material& material = body_material(sim.model->bodies[b], sim.settings);
-        const auto& shares = sim.solver.stiffness_shares;
-        const float share = shares.empty() ? 1.0f : shares[b];  // what the solver holds it to have
-        kernel.set("material", glm::vec4(share, share, 1, 1) * energy_material(material));
-        kernel.set("energy_per_square", share * energy_per_square(material));
-        kernel.set("midway", float(midway));
-      }
-      kernel.set("touching", float(1e-5 * body.size));
-      const bool one_group = &pass == &m.passes[2] || &pass == &m.passes[4];  // they add the groups' sums
-      pass.work_groups = one_group ? 1 : groups;
+      kernel.set("vertex_range", body.vertices), kernel.set("mass", float(body.mass));
+      pass.work_groups = groups;
       recorder.run(pass, {{"groups", groups}});
     }
   }

@@ -66,19 +66,7 @@ std::array<double, 8> NeoHookean::rest(glm::dvec3* x) {
 }
 
 std::array<double, 4> Isobend::rest(glm::dvec3* x) {
-  const auto cotangent = [&](int at, int a, int b) {
-    const glm::dvec3 u = x[a] - x[at], v = x[b] - x[at];
-    return glm::dot(u, v) / glm::length(glm::cross(u, v));
-  };
-  const auto twice_area = [&](int wing) { return glm::length(glm::cross(x[2] - x[wing], x[3] - x[wing])); };
-  const double scale = std::sqrt(6 / (twice_area(0) + twice_area(1)));
-  std::array<double, 4> values{-scale * (cotangent(2, 1, 3) + cotangent(3, 1, 2)),
-                               scale * (cotangent(3, 0, 2) + cotangent(3, 1, 2)),
-                               scale * (cotangent(2, 0, 3) + cotangent(2, 1, 3)), 0};
-  // A wing without area has no weights: the constraint of such a hinge does nothing.
-  if (!std::isfinite(values[0] + values[1] + values[2])) return {};
-  values[3] = evaluate<double>(x, values.data()).C;
-  return values;
+  return std::to_array(Formulas<double>{}.isobend_rest(x, any_ids).values);
 }
 
 std::size_t ConstraintSystem::count() const {

@@ -143,6 +143,23 @@ TEST_CASE("sheets: a strip around a cylinder has three times the energy of a pla
   }
 }
 
+TEST_CASE_FIXTURE(GlTest, "sheets: a bent sheet stores what isobend's compliance says, curved at rest or flat") {
+  for (const double at_rest : {0.0, 0.3, -0.5}) {
+    TetMesh sheet = make_sheet({1, 0.25}, {40, 10});
+    if (at_rest != 0) sheet.positions = cylinder(sheet, 1 / at_rest);
+    const auto bent = cylinder(make_sheet({1, 0.25}, {40, 10}), 0.5);
+    auto model = std::make_shared<Model>();
+    add_body(*model, "sheet", sheet, 300, sheet.positions, glm::dvec3(0), glm::dvec3(0), {});
+    Settings settings = cloth();
+    settings.compliance[index_of<Stretch>] = 0;  // hard: no energy
+    Sim sim = create_sim(model, settings);
+    Metrics metrics = create_metrics(*model);
+    CHECK(measure_now(metrics, sim).elastic < 1e-9);
+    write_state(sim, {bent, model->velocities});
+    CHECK(measure_now(metrics, sim).elastic == doctest::Approx(bending(sheet, bent) / 1e3).epsilon(1e-3));
+  }
+}
+
 TEST_CASE("sheets: a clamped strip sags as a beam does") {
   const int cells = 24;
   const double length = 1, step = length / (cells - 1), rigidity = 0.5, load = 0.1;  // J, N/m^2

@@ -41,7 +41,8 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
   std::vector<RigidBody> bodies = rigid_bodies(model);
   Settings touching = settings;
   touching.rigid_contact = true;
-  RigidContact contact(model, touching);
+  RigidContact contact(model, {});
+  contact.begin(model, touching);
   double time = 0;
   const Model nothing;  // to touch: contact is found here
   Settings flight = settings, carried = settings;
@@ -61,7 +62,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
           substep.begin(s);
           contact.prepare(substep, model.inverse_masses, Place{now.positions}, now.velocities, now.work, left_out);
           for (RigidBody& body : bodies) {
-            const bool touches = contact.carries(body.first);
+            const bool touches = contact.touches(body.first);
             if (touches) {
               body.velocity = body.angular = glm::dvec3(0);
               for (std::size_t i = body.first; i < body.first + body.rest.size(); ++i) {

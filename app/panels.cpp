@@ -81,9 +81,9 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   if (name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;
-    return rigid_in_contact(on);
+    return moves_rigidly(on);
   }
-  if (name == "restitution") return settings.restitution != 0 || rigid_in_contact(settings);
+  if (name == "restitution") return settings.restitution != 0 || moves_rigidly(settings);
   if (name == "ground_height") return settings.ground;
   if (name == "friction") return settings.ground || !s.loaded.scene.obstacles.empty();
   if (name == "young_modulus" || name == "poisson_ratio") return material;

@@ -86,7 +86,7 @@ struct ObstacleRecord {
   int _0;
 };
 
-// A hard body that touches obstacles (contact/rigid.glsl). Momenta and impulses are over the mass of the body.
+// A hard body that moves as a rigid one (contact/rigid.glsl). Momenta and impulses are over the mass of the body.
 struct RigidSide {
   int sums[RIGID_SUMS];  // over vertices, fixed-point: mass times arm, velocity, arm x velocity, arm's squares and
                          // products; then what is finer than a quantum of velocity and arm x velocity
@@ -94,21 +94,23 @@ struct RigidSide {
   uint fixed_vertices;
   uint carried;           // 1: in this substep the vertices move as a rigid body
   uint touching;          // number of contacts by which it moved
-  uint soon;              // 1: a vertex would touch an obstacle in a few substeps
-  uint _2, _3;
+  uint deformed;          // 1: a vertex was corrected by more than `slack`
+  uint _0, _1;
   vec3 origin;            // of arms
-  uint summed;            // 1: there are sums on this side
-  vec3 velocity;          // m/s, of a rigid body
-  float _0;
+  uint _2;
+  vec3 velocity;          // m/s, of a rigid body, with its low part
+  float _3;
+  vec3 velocity_low;
+  float _4;
   vec3 angular;
-  float _1;
+  float _5;
   vec4 impulses[MOST_TOUCHES];
   uint touches[MOST_TOUCHES];  // vertex * MAX_OBSTACLES + obstacle
 };
 struct RigidRecord {
   uint first;      // of its vertices
   uint vertices;
-  uint one_piece;  // 1: no hinges, so that it can be rigid
+  float slack;     // m, more than constraints correct a vertex by while it keeps its shape; 0: it is never rigid
   float mass;      // kg
   RigidSide sides[2];
 };

@@ -40,7 +40,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   const std::size_t count = sim.model->positions.size();
   SolverInput input{*sim.model, sim.system, sim.settings, sim.plan, sim.tuning, is_software_renderer()};
   input.compliant = any_material(*sim.model, settings, compliant);
-  input.rigid = touches_rigidly(*sim.model, settings);
+  input.rigid = any_moves_rigidly(*sim.model, settings);
   if (const std::vector<float> fineness = quantum_fineness(*sim.model, settings); !fineness.empty() && !on_cpu(sim)) {
     std::tie(sim.fineness, sim.fineness_texture) =
         make_texels("fineness of quanta", fineness, "make bodies of more similar size");
@@ -222,7 +222,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const KeepBindings kept;
   check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, any_material(*sim.model, s, compliant), touches_rigidly(*sim.model, s), s.contact,
+    return std::tuple(s.mode, any_material(*sim.model, s, compliant), any_moves_rigidly(*sim.model, s), s.contact,
                       has_obstacles(*sim.model, s));
   };
   if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))

@@ -44,7 +44,7 @@ struct Sim : StepValues {
   Obstacles obstacles;
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
-  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies in contact, and their vertices in contact (contact/rigid.glsl)
+  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies, and their vertices in contact (contact/rigid.glsl)
   Pass rigid_contact;   ///< before each substep, where there are hard bodies
   Pairs pairs;          ///< contact between bodies, where there is any
   Tuning tuning;

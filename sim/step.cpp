@@ -47,6 +47,13 @@ void give_buffers(Sim& sim) {
   glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
 }
 
+double mean_edge(const ConstraintList& edges, const Body& body) {
+  double sum = 0, count = 0;
+  for (std::size_t c = 0; c < edges.count(); ++c)
+    if (edges.ends(c)[0] - body.first_vertex < body.vertices) sum += edges.rest[c], ++count;
+  return count > 0 ? sum / count : 0;
+}
+
 // Resets the records of hard bodies, because vertices were moved from outside.
 void forget_contacts(Sim& sim) {
   if (!sim.rigid_bodies) return;
@@ -54,7 +61,8 @@ void forget_contacts(Sim& sim) {
   for (const Body& body : sim.model->bodies) {
     RigidRecord& record = records.emplace_back();
     record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
-    record.one_piece = body.one_piece && rigid_in_contact(sim.settings, body_material(body, sim.settings));
+    if (body.one_piece && moves_rigidly(sim.settings, body_material(body, sim.settings)))
+      record.slack = float(RigidContact::slack * mean_edge(sim.system.lists[std::size_t(index_of<Stretch>)], body));
     const auto mass = sim.model->masses.begin() + std::ptrdiff_t(body.first_vertex);
     record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
   }

@@ -63,6 +63,22 @@ vec3 impulse_at(Touch t, vec3 velocity) {
   }
   return impulse;
 }
+// How a rotation moves r, with s along its axis, as long as the tangent of half its angle.
+vec3 moved_by_turn(vec3 s, vec3 r) {
+  vec3 c = cross(s, r);
+  return (c + cross(s, c)) * (real(2) / (real(1) + dot(s, s)));
+}
+// The s of a rotation by the vector a, rad: library functions are not exact enough at small angles.
+vec3 half_tangent(vec3 a) {
+  real t = dot(a, a);
+  return a * (real(0.5) + t * (real(1) / real(24) + t / real(240)));
+}
+// The s of a free body's rotation in h, with the spin that its angular momentum gives it halfway.
+vec3 turn_in_flight(mat3 inverse_inertia, vec3 angular, real h) {
+  vec3 s = half_tangent(inverse_inertia * angular * (h * real(0.5)));
+  vec3 spin = inverse_inertia * (angular + moved_by_turn(-s, angular));
+  return half_tangent((spin + moved_by_turn(s, spin)) * h);
+}
 SHARED_TOUCHES
 // Sweeps over `contacts` until no impulse changes by more than `enough`; a body slower than `still` is then stopped.
 Rigid settled(TOUCHES Rigid b, int count, real enough, real still) {

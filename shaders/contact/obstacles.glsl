@@ -35,10 +35,10 @@ Solid solid_at(int k) {
   return Solid(solids[k].kind, solids[k].convex, solids[k].extent, solids[k].radius, solids[k].trust,
                solids[k].spacing, solids[k].origin, solids[k].cells, solids[k].first);
 }
-// Whether a vertex at the start or the end of a displacement of length `moved` may touch solid k within `times` of it.
-bool is_near_solid(int k, DoubleSingle x, float moved, float times) {
+// Whether a vertex at the start or the end of a displacement of length `moved` may touch solid k.
+bool is_near_solid(int k, DoubleSingle x, float moved) {
   vec3 arm = x.high - reaches[k].xyz;
-  float most = reaches[k].w + 2.0 * times * moved;
+  float most = reaches[k].w + 2.0 * moved;
   return dot(arm, arm) <= most * most;
 }
 float solid_friction(int k, uint i) {
@@ -55,7 +55,7 @@ Surface solid_contact(int k, DoubleSingle x, vec3 displacement) {
   return Surface(s.normal.x * solids[k].right + s.normal.y * solids[k].up + s.normal.z * solids[k].front, s.distance);
 }
 #else  // never called
-bool is_near_solid(int k, DoubleSingle x, float moved, float times) { return false; }
+bool is_near_solid(int k, DoubleSingle x, float moved) { return false; }
 vec3 solid_velocity(int k, DoubleSingle x) { return vec3(0.0); }
 float solid_friction(int k, uint i) { return 0.0; }
 float solid_restitution(int k) { return 0.0; }
@@ -66,7 +66,7 @@ Surface solid_contact(int k, DoubleSingle x, vec3 displacement) { return Surface
 // over solids that tests each.
 uint near_solids(DoubleSingle x, float moved) {
   uint bits = 0u;
-  for (int k = 0; k < SOLIDS; ++k) bits |= is_near_solid(k, x, moved, 1.0) ? 1u << k : 0u;
+  for (int k = 0; k < SOLIDS; ++k) bits |= is_near_solid(k, x, moved) ? 1u << k : 0u;
   return bits;
 }
 
@@ -92,7 +92,7 @@ Surface surface_ahead(int k, DoubleSingle x, vec3 aim, vec3 u) {
 #if SOLIDS  // even a branch that is never taken would change how compilers round what follows
   int s = k - params.plane_count;
   if (s >= 0) {
-    if (!is_near_solid(s, x, length(aim), 1.0)) return Surface(vec3(0.0), 1e9);
+    if (!is_near_solid(s, x, length(aim))) return Surface(vec3(0.0), 1e9);
     Surface contact = solid_contact(s, add_double(x, aim), aim - params.h * solid_velocity(s, x));
     return Surface(contact.normal, contact.distance + dot(contact.normal, u - aim));
   }
@@ -120,14 +120,13 @@ bool is_in_plane(DoubleSingle x) {
 // Whether a vertex may be stopped at x, from wherever or after a displacement of length `moved`.
 bool may_touch(DoubleSingle x) { return SOLIDS > 0 || is_in_plane(x); }
 bool may_touch(DoubleSingle x, float moved) { return near_solids(x, moved) != 0u || is_in_plane(x); }
-// Whether a vertex that moves from x to `next` in a substep is stopped within so many substeps at this velocity.
-bool will_touch(DoubleSingle x, DoubleSingle next, float substeps) {
+// Whether a vertex that moves from x to `next` in a substep is stopped.
+bool will_touch(DoubleSingle x, DoubleSingle next) {
   vec3 move = relative(next, x);
-  if (substeps != 1.0) next = add_double(next, (substeps - 1.0) * move);
   bool any = is_in_plane(next);
   for (int k = 0; k < SOLIDS && !any; ++k) {
-    if (!is_near_solid(k, x, length(move), substeps)) continue;
-    vec3 displacement = substeps * (move - params.h * solid_velocity(k, x));
+    if (!is_near_solid(k, x, length(move))) continue;
+    vec3 displacement = move - params.h * solid_velocity(k, x);
     any = solid_contact(k, add_double(x, displacement), displacement).distance < 0.0;
   }
   return any;

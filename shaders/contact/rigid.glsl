@@ -1,6 +1,6 @@
-// Contact of hard bodies (method.md, "Contact of a hard body"): what vertices add to the records of their bodies at the
-// end of a substep for rigid_contact.comp, and whether a body is moved as a rigid one in this substep. Records have two
-// sides, of which one is read and the other written, in turn.
+// Hard bodies that move as rigid ones (method.md, "Hard bodies are rigid"): what vertices add to the records of their
+// bodies at the end of a substep for rigid_contact.comp, and whether a body is moved as a rigid one in this substep.
+// Records have two sides, of which one is read and the other written, in turn.
 layout(std430) buffer RigidBodies {
   RigidRecord rigid_bodies[BODY_COUNT];
   uint near[];  // by side and body the vertices that will be in an obstacle after the next substep, in any order
@@ -24,14 +24,14 @@ vec3 arm_of(DoubleSingle x, vec3 origin) { return (x.high - origin) + x.low; }
 struct RigidState {
   uint body;
   bool carried;  // moved as a rigid body in this substep
-  bool summed;   // its sums are needed
+  float slack;
   vec3 origin;
   float mass;
 };
 RigidState state_of(uint b) {
   uint s = side_now();
-  return RigidState(b, rigid_bodies[b].sides[s].carried != 0u, rigid_bodies[b].sides[s].summed != 0u,
-                    rigid_bodies[b].sides[s].origin, rigid_bodies[b].mass);
+  return RigidState(b, rigid_bodies[b].sides[s].carried != 0u, rigid_bodies[b].slack, rigid_bodies[b].sides[s].origin,
+                    rigid_bodies[b].mass);
 }
 RigidState group_state;  // of the body of the work-group's first vertex
 RigidState state_at(uint i) {
@@ -61,13 +61,14 @@ void note_fixed(uint i) { atomicAdd(rigid_bodies[body_of(i)].sides[side_now()].f
 void note_range(vec3 value) {
   if (any(greaterThan(abs(value), vec3(1.0)))) atomicAdd(dropped[DROP_RANGE], 1u);
 }
-// Adds vertex i at x, with velocity v, that will be at `next`.
-void note_motion(RigidState state, uint i, DoubleSingle x, DoubleSingle v, DoubleSingle next, float inverse_mass) {
+// Adds vertex i at x, with velocity v, that will be at `next`, and that constraints have corrected.
+void note_motion(RigidState state, uint i, DoubleSingle x, DoubleSingle v, DoubleSingle next, vec3 correction,
+                 float inverse_mass) {
   uint b = state.body, s = side_now();
-  bool inside = will_touch(x, next, 1.0);
-  if (inside || will_touch(x, next, 4.0)) rigid_bodies[b].sides[s].soon = 1u;
-  if (inside) near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
-  if (!state.summed) return;
+  if (state.slack == 0.0) return;
+  if (will_touch(x, next))
+    near[s * params.vertex_count + rigid_bodies[b].first + atomicAdd(rigid_bodies[b].sides[s].near, 1u)] = i;
+  if (dot(correction, correction) > state.slack * state.slack) rigid_bodies[b].sides[s].deformed = 1u;
   float weight = 1.0 / (inverse_mass * state.mass);
   vec3 place = arm_of(x, state.origin) / (2.0 * params.body_size), arm = clamp(place, vec3(-1.0), vec3(1.0));
   note_range(place);

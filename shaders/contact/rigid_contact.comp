@@ -1,6 +1,6 @@
-// Contact of hard bodies (method.md, "Contact of a hard body"): before a substep in which a vertex would get into an
-// obstacle, its body gets the velocities of a rigid body in inelastic frictional contact. Each work-group with vertices
-// of the body computes its motion anew.
+// Hard bodies are rigid (method.md): before a substep a body gets the velocities of a rigid one, in inelastic frictional
+// contact if a vertex would get into an obstacle, else in flight if it is not deformed. Each work-group with vertices of
+// the body computes its motion anew.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
@@ -10,6 +10,8 @@ layout(local_size_x = 256) in;
 #define TOUCHES
 #include "contact/impulses.glsl"
 shared Rigid before, body;  // the centre from the body's origin; momenta per mass
+shared vec3 angular, velocity_low;  // of `before`, then of the motion in flight
+shared vec3 turn;                   // in flight (turn_in_flight)
 shared uint worst, worst_place;
 #if MOVING_SOLIDS
 shared float worked;  // J, of obstacles that move, on the body in this substep
@@ -31,9 +33,10 @@ Rigid rigid_motion(uint b, uint s) {
   motion.unsettled = false;
   motion.centre = reach * c;
   motion.inverse_inertia = inverse_inertia_of(moments * (reach * reach));
-  vec3 angular;
+  velocity_low = vec3(0.0);
   if (rigid_bodies[b].sides[s].carried != 0u) {  // more exact than sums
     motion.velocity = rigid_bodies[b].sides[s].velocity;
+    velocity_low = rigid_bodies[b].sides[s].velocity_low;
     angular = rigid_bodies[b].sides[s].angular;
   } else {
     vec3 speed = vec3(sums[3], sums[4], sums[5]);
@@ -115,8 +118,26 @@ void write_contacts(uint b, uint o, int touching, bool full) {
 #endif
     rigid_bodies[b].sides[o].touching = uint(touching);
     rigid_bodies[b].sides[o].velocity = body.velocity;
+    rigid_bodies[b].sides[o].velocity_low = vec3(0.0);
     rigid_bodies[b].sides[o].angular = length(body.spin) > 0.0 ? inverse(body.inverse_inertia) * body.spin : vec3(0.0);
   }
+}
+// Finds the motion of body b in flight, once `before` is known.
+void find_flight(uint b, uint o, bool writes) {
+  if (gl_LocalInvocationIndex != 0u) return;
+  DoubleSingle velocity = predict_velocity(DoubleSingle(before.velocity, velocity_low));
+  body.velocity = velocity.high, velocity_low = velocity.low;
+  body.centre = before.centre;
+  angular *= params.velocity_scale;
+  turn = turn_in_flight(before.inverse_inertia, angular, params.h);
+  if (!writes) return;
+  rigid_bodies[b].sides[o].touching = 0u;
+  rigid_bodies[b].sides[o].velocity = velocity.high;
+  rigid_bodies[b].sides[o].velocity_low = velocity.low;
+  rigid_bodies[b].sides[o].angular = angular;
+#if MOVING_SOLIDS
+  worked = 0.0;
+#endif
 }
 // Finds the motion of body b with `count` vertices near obstacles from side s; false if the body has no inertia.
 bool find_motion(uint b, uint s, uint count, bool writes) {
@@ -127,6 +148,11 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
   if (lane == 0u) before = rigid_motion(b, s);
   barrier();
   if (!has_inertia(before)) return false;
+  if (count == 0u) {
+    find_flight(b, 1u - s, writes);
+    barrier();
+    return true;
+  }
   if (lane < uint(touching))
     add_contact(int(lane), rigid_bodies[b].sides[s].touches[lane], origin, rigid_bodies[b].sides[s].impulses[lane].xyz);
   Rigid now = before;
@@ -174,14 +200,13 @@ void main() {
     uint first = rigid_bodies[b].first, count = rigid_bodies[b].sides[s].near;
     bool writes = first >= base && first < base + gl_WorkGroupSize.x;
     vec3 origin = rigid_bodies[b].sides[s].origin;
-    bool moves = count > 0u && rigid_bodies[b].sides[s].summed != 0u && rigid_bodies[b].one_piece != 0u &&
-                 rigid_bodies[b].sides[s].fixed_vertices == 0u;
+    bool moves = rigid_bodies[b].slack > 0.0 && rigid_bodies[b].sides[s].fixed_vertices == 0u &&
+                 (count > 0u || rigid_bodies[b].sides[s].deformed == 0u);
     if (moves) moves = find_motion(b, s, count, writes);
     if (writes) {
       if (lane < RIGID_SUMS) rigid_bodies[b].sides[o].sums[lane] = 0;
       if (lane == 0u) {
-        rigid_bodies[b].sides[o].near = rigid_bodies[b].sides[o].soon = 0u;
-        rigid_bodies[b].sides[o].summed = rigid_bodies[b].sides[s].soon;
+        rigid_bodies[b].sides[o].near = rigid_bodies[b].sides[o].deformed = 0u;
         rigid_bodies[b].sides[o].fixed_vertices = 0u;
         rigid_bodies[b].sides[o].carried = moves ? 1u : 0u;
         rigid_bodies[b].sides[o].origin = positions[first].high;
@@ -190,14 +215,17 @@ void main() {
     }
     if (moves && i >= first && i < first + rigid_bodies[b].vertices) {
       DoubleSingle x = position_of(i);
-      vec3 v = velocity_at(body, arm_of(x, origin) - body.centre);
+      vec3 arm = arm_of(x, origin) - body.centre;
+      DoubleSingle v = DoubleSingle(velocity_at(body, arm), vec3(0.0));
+      if (count == 0u)
+        v = add_double(DoubleSingle(body.velocity, velocity_low), moved_by_turn(turn, arm) * params.inverse_h);
       float work = velocities[i].work;
 #if MOVING_SOLIDS
       if (i == first) work += worked;
 #endif
-      velocities[i] = Velocity(v, work, vec3(0.0), 0.0);
+      velocities[i] = Velocity(v.high, work, v.low, 0.0);
       begin_body(i);
-      quantized_out[i] = quantize(predict_position(x, DoubleSingle(v, vec3(0.0))), weight_of(positions[i]));
+      quantized_out[i] = quantize(predict_position(x, v), weight_of(positions[i]));
     }
     barrier();
   }

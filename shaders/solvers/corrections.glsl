@@ -47,7 +47,7 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
     DoubleSingle here = x;
     x = seen_by_neighbours(x, v);
 #if RIGID_CONTACT
-    note_motion(body, i, here, v, x, own.inverse_mass);
+    note_motion(body, i, here, v, x, correction, own.inverse_mass);
 #endif
   }
   return x;

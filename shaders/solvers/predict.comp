@@ -17,14 +17,10 @@ void predict(uint i) {
 #endif
 #if RIGID_CONTACT
   RigidState body = state_at(i);
-  body.summed = true;
   body.origin = positions[rigid_bodies[body.body].first].high;
-  if (own.inverse_mass > 0.0) note_motion(body, i, here, v, x, own.inverse_mass);
+  if (own.inverse_mass > 0.0) note_motion(body, i, here, v, x, vec3(0.0), own.inverse_mass);
   else note_fixed(i);
-  if (i == rigid_bodies[body.body].first) {
-    rigid_bodies[body.body].sides[side_now()].origin = body.origin;
-    rigid_bodies[body.body].sides[side_now()].summed = 1u;
-  }
+  if (i == rigid_bodies[body.body].first) rigid_bodies[body.body].sides[side_now()].origin = body.origin;
 #endif
   quantized_out[i] = quantize(x, weight_of(own));
 }

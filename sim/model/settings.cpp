@@ -253,7 +253,7 @@ bool uses(const Material& material, const ConstraintKind& kind) {
   return std::ranges::find(names, kind.name) != names.end();
 }
 
-bool rigid_in_contact(const Settings& settings, const Material& material) {
+bool moves_rigidly(const Settings& settings, const Material& material) {
   return settings.rigid_contact && settings.contact == "none" && hard(material) && uses(material, Stretch::row) &&
          !solver_mode(settings).published;
 }
@@ -306,7 +306,7 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");
-  if (settings.restitution > 0 && !rigid_in_contact(settings))
+  if (settings.restitution > 0 && !moves_rigidly(settings))
     throw Error("restitution is of hard bodies", where,
                 "set it to 0, or rigid_contact to true and all k to 1, without compliance or material");
   if (compliant(settings) && settings.omega > 2)

@@ -135,10 +135,10 @@ bool compliant(const Material& material);
 std::optional<std::string> kind_without_force(const Material& material);
 /// Whether constraints resist their rate.
 bool damped(const Material& material);
-/// Whether touching bodies move as rigid ones (method.md, "Contact of a hard body"): the kinds in use keep a shape and
-/// all have k = 1.
-bool rigid_in_contact(const Settings& settings, const Material& material);
-inline bool rigid_in_contact(const Settings& settings) { return rigid_in_contact(settings, settings); }
+/// Whether bodies of this material move as rigid ones (method.md, "Hard bodies are rigid"): the kinds in use keep a shape
+/// and all have k = 1.
+bool moves_rigidly(const Settings& settings, const Material& material);
+inline bool moves_rigidly(const Settings& settings) { return moves_rigidly(settings, settings); }
 /// Whether all kinds in use have k = 1 and none has compliance. With stretch among them, the exact solution is then the
 /// motion of a rigid body.
 bool hard(const Material& material);

@@ -41,7 +41,10 @@ struct Colour {
 
 class FastPbd {
  public:
-  FastPbd(const SolverInput& input) : model_(&input.model), pairs_(input.model) {
+  FastPbd(const SolverInput& input)
+      : model_(&input.model),
+        pairs_(input.model),
+        rigid_(input.model, input.system.lists[std::size_t(index_of<Stretch>)]) {
     std::size_t all = 0;
     for_each_kind([&](auto is, int kind) {
       const auto& batches = std::get<batches::Batches<decltype(is)>>(work_.batches);
@@ -66,8 +69,8 @@ class FastPbd {
   /// Takes the step of CpuPbd::step, with constraints in another order.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, double time) {
     const Plan plan = plan_for(settings);
-    Shared step{
-        state, settings, plan, inverse_masses, {*model_, settings, plan, time}, {*model_, settings}, Barrier(threads_)};
+    Shared step{state, settings, plan, inverse_masses, {*model_, settings, plan, time}, Barrier(threads_)};
+    rigid_.begin(*model_, settings);
     auto& x = work_.x;
     x.resize(state.positions.size());
     work_.starts.resize(any_material(*model_, settings, damped) ? x.size() : 0);
@@ -99,7 +102,6 @@ class FastPbd {
     const Plan& plan;
     const std::vector<double>& inverse_masses;
     Substep substep;
-    RigidContact contact;
     Barrier barrier;
     GuardCounts guards{};
   };
@@ -114,7 +116,6 @@ class FastPbd {
   // A thread's part of a step.
   void run_substeps(Shared& step, std::size_t thread) {
     Substep& substep = step.substep;
-    RigidContact& contact = step.contact;
     Barrier& barrier = step.barrier;
     auto& x = work_.x;
     auto& v = step.state.velocities;
@@ -127,25 +128,24 @@ class FastPbd {
     GuardCounts counts{};
     for (int s = 0; s < step.plan.substeps; ++s) {
       if (!work_.starts.empty()) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
-      if (contact.wanted() || (substep.moving && s > 0)) {
+      if (rigid_.wanted() || (substep.moving && s > 0)) {
         barrier.wait(thread);
-        if (thread == 0) substep.begin(s), contact.prepare(substep, step.inverse_masses, work_, v, done, counts);
+        if (thread == 0) substep.begin(s), rigid_.prepare(substep, step.inverse_masses, work_, v, done, counts);
         barrier.wait(thread);
       }
       for_each_free_vertex([&](std::size_t i) {
-        predicted_[i] = contact.predict(substep, i, x[i].position(), v[i]);
+        predicted_[i] = rigid_.predict(substep, i, x[i].position(), v[i]);
         x[i].move_to(predicted_[i]);
       });
       for (int iteration = 0; iteration < step.plan.iterations; ++iteration) {
         solve(step, thread, iteration == 0, counts);
         for_each_free_vertex([&](std::size_t i) {
-          double* work = substep.moving && !contact.carries(i) ? &done[i] : nullptr;
+          double* work = substep.moving && !rigid_.carries(i) ? &done[i] : nullptr;
           x[i].move_to(substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i], work));
         });
       }
-      for_each_free_vertex([&](std::size_t i) {
-        if (!contact.carries(i)) v[i] += (x[i].position() - predicted_[i]) / substep.h;
-      });
+      for_each_free_vertex(
+          [&](std::size_t i) { v[i] = rigid_.velocity_after(substep, i, x[i].position(), predicted_[i], v[i]); });
       if (bodies_touch(*model_, step.settings)) {
         barrier.wait(thread);
         if (thread == 0) {
@@ -180,6 +180,7 @@ class FastPbd {
 
   const Model* model_;
   PairContact pairs_;
+  RigidContact rigid_;
   batches::Work work_;
   std::vector<Colour> colours_;
   std::vector<glm::dvec3> predicted_;

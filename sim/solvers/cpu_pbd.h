@@ -100,7 +100,10 @@ template <class real>
 class CpuPbd {
  public:
   CpuPbd(const Model& model, const ConstraintSystem& system)
-      : model_(&model), pairs_(model), at_vertex_(system.at_vertex) {
+      : model_(&model),
+        pairs_(model),
+        rigid_(model, system.lists[std::size_t(index_of<Stretch>)]),
+        at_vertex_(system.at_vertex) {
     for_each_kind([&](auto kind, int k) {
       constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
       const ConstraintList& list = system.lists[std::size_t(k)];
@@ -126,7 +129,7 @@ class CpuPbd {
     const double longest = jacobi ? longest_correction(*model_, settings) : model_->size;
     const Plan plan = plan_for(settings);
     Substep substep(*model_, settings, plan, time);
-    RigidContact contact(*model_, settings);
+    rigid_.begin(*model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
     if (substep.moving) state.work.resize(x.size());
@@ -139,9 +142,9 @@ class CpuPbd {
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
       substep.begin(s);
-      contact.prepare(substep, inverse_masses, vertices, v, state.work, guards);
+      rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards);
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) x[i] = contact.predict(substep, i, x[i], v[i]);
+        if (inverse_masses[i] > 0) x[i] = rigid_.predict(substep, i, x[i], v[i]);
       predicted = x;
       for (int iteration = 0; iteration < plan.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
@@ -161,12 +164,12 @@ class CpuPbd {
         for (std::size_t i = 0; i < x.size(); ++i) {
           if (!(inverse_masses[i] > 0)) continue;
           if (jacobi && at_vertex_[i] > 0) x[i] += sums[i] * (omega / at_vertex_[i]);
-          double* work = substep.moving && !contact.carries(i) ? &state.work[i] : nullptr;
+          double* work = substep.moving && !rigid_.carries(i) ? &state.work[i] : nullptr;
           x[i] = substep.out_of_obstacles(i, x[i], predicted[i], v[i], work);
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0 && !contact.carries(i)) v[i] += (x[i] - predicted[i]) / substep.h;
+        if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
       pairs_.resolve(settings, x, v, state.held, inverse_masses, substep.h);
     }
     return guards;
@@ -193,6 +196,7 @@ class CpuPbd {
 
   const Model* model_;
   PairContact pairs_;
+  RigidContact rigid_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;
   // What materials give constraints, else empty.

@@ -76,7 +76,7 @@ struct SolverInput {
   bool software = false;     ///< OpenGL runs on the CPU
   bool compliant = false;    ///< a material is (settings.h)
   bool fine_quanta = false;  ///< quantum_fineness() is not empty
-  bool rigid = false;        ///< hard bodies move as rigid ones in contact (rigid_in_contact(), settings.h)
+  bool rigid = false;        ///< hard bodies move as rigid ones (any_moves_rigidly())
 };
 
 /// A row of the table of modes: what the mode is called, what makes it, and what it can do.

@@ -179,7 +179,9 @@ TEST_CASE("a measured run ends with the numbers of the last good step and never 
   GlTest gl;
   const auto model = block();
   for (const char* mode : {"node", "cpu"}) {
-    Sim sim = create_sim(model, quick(mode));
+    Settings settings = quick(mode);
+    settings.rigid_contact = false;  // a rigid body has velocities of its own
+    Sim sim = create_sim(model, settings);
     Metrics metrics = create_metrics(*model);
     const auto spoil_after_6 = [&](long s) {
       if (s == 6 && std::string(mode) == "cpu") sim.host.velocities[9].x = infinity;

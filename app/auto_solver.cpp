@@ -81,7 +81,7 @@ Sim finer_than(const Settings& settings, const std::shared_ptr<const Model>& mod
   if (has_forces(settings)) {
     Settings leapfrog = settings;
     set_mode(leapfrog, "explicit", "auto");
-    leapfrog.stability = 0.1;
+    leapfrog.stability = 0.1, leapfrog.mass_scaling = 0;
     Sim sim = create_sim(model, leapfrog);
     if (sim.plan.substeps <= fine.substeps) return sim;
   }
@@ -137,7 +137,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       apply_settings(sim, trial.settings);
       reset(sim);
       trial.plan = sim.plan;
-      Metrics metrics = create_metrics(*model, sim.system);
+      Metrics metrics = create_metrics(sim);
       const double enough = first ? most_seconds() : 2e-3 * budget_ms * double(choice.steps) + 0.5;
       const MeasuredRun run =
           run_loop(sim, &metrics, choice.steps, {.most_seconds = enough, .right = right ? &*right : nullptr});

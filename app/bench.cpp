@@ -65,7 +65,7 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
                                   const Settings& settings, const BenchOptions& options) {
   Sim sim = create_sim(model, settings);
   const Explanation cost = explain(sim);
-  Metrics metrics = create_metrics(*model, sim.system);
+  Metrics metrics = create_metrics(sim);
   const auto right = right_motion(*model, settings);
   const MeasuredRun run = run_loop(sim, &metrics, options.frames,
                                    {.most_seconds = 12 * options.most_seconds, .right = right ? &*right : nullptr});

@@ -58,7 +58,7 @@ Settings settings_of(const Scene& scene, std::string mode) {
 ordered_json case_row(const Scene& scene, const Settings& settings, long steps) {
   const auto model = build_model(scene);
   Sim sim = create_sim(model, settings, {.count_guards = true});
-  Metrics metrics = create_metrics(*model, sim.system);
+  Metrics metrics = create_metrics(sim);
   const MeasuredRun run = run_loop(sim, &metrics, steps);
   const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps, hard(settings)) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);

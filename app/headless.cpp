@@ -133,7 +133,12 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"fps", double(sim.steps) / run.seconds}};
   const AdaptiveSubsteps& watch = adaptive_values(sim);
   if (solver_mode(sim.settings).leapfrog)
-    j["watch"] = {{"longest_substep_at_rest", sim.longest_substep}, {"most_substeps", watch.most_substeps}};
+    j["watch"] = {{"longest_substep_at_rest", sim.longest_substep},
+                  {"most_substeps", watch.most_substeps},
+                  {"mass_scaling",
+                   {{"added", sim.mass_scaling.added},
+                    {"vertices", sim.mass_scaling.vertices},
+                    {"longer", sim.mass_scaling.gain}}}};
   if (solver_mode(sim.settings).implicit)
     j["watch"] = {{"largest_residual", watch.largest_residual},
                   {"least_health", watch.least_health},
@@ -203,7 +208,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
   warm_up(sim);
-  Metrics metrics = create_metrics(*model, sim.system);
+  Metrics metrics = create_metrics(sim);
   const auto right = right_motion(*model, sim.settings, options.reference);
   std::optional<FrameWriter> frames;
   if (options.png_every > 0 || !options.video.empty()) frames.emplace(scene, sim, options, right ? &*right : nullptr);

@@ -76,7 +76,7 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   const bool material = settings.material != "none";
   if (name == "mass_splitting") return mode.jacobi && !compliant(settings);  // which brings it with it
   if (name == "omega") return mode.jacobi;
-  if (name == "stability") return mode.leapfrog;
+  if (name == "stability" || name == "mass_scaling") return mode.leapfrog;
   if (name == "iterations") return !mode.leapfrog;
   if (name == "rigid_contact") {
     Settings on = settings;
@@ -144,7 +144,7 @@ const std::vector<Group> groups = {
      true,
      {"material", "young_modulus", "poisson_ratio", "constraints", "k_*"},
      {"compliance_*", "constraint_damping", "damping"}},
-    {"Solver", true, {"mode", "substeps", "iterations", "stability", "dt"}, {"omega", "mass_splitting"}},
+    {"Solver", true, {"mode", "substeps", "iterations", "stability", "dt"}, {"omega", "mass_splitting", "mass_scaling"}},
     {"Contact", false, {"gravity", "ground", "friction", "restitution"}, {"ground_height", "rigid_contact"}}};
 
 bool names(const std::string& pattern, const std::string& name) {

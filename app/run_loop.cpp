@@ -110,7 +110,7 @@ MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings&
                       const Motion* right, bool timed, const std::function<void(const Sim&, long)>& stepped) {
   Sim sim = create_sim(model, settings);
   if (timed) warm_up(sim);
-  Metrics metrics = create_metrics(*model, sim.system);
+  Metrics metrics = create_metrics(sim);
   RunPlan plan{.right = right};
   if (stepped) plan.stepped = [&](long s) { stepped(sim, s); }, stepped(sim, 0);
   return run_loop(sim, &metrics, steps, plan);

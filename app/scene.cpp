@@ -436,7 +436,7 @@ std::string why_unused(const Settings& s, const std::string& name) {
   const auto is = [&](auto... names) { return ((name == names) || ...); };
   const SolverMode& mode = solver_mode(s);
   if (mode.leapfrog && is("iterations")) return "mode explicit has no iterations";
-  if (!mode.leapfrog && is("stability")) return "it is of mode explicit";
+  if (!mode.leapfrog && is("stability", "mass_scaling")) return "it is of mode explicit";
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
   if (s.material == "none" && is("young_modulus", "poisson_ratio")) return "there is no material";

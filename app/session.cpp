@@ -617,7 +617,7 @@ void measure_frame(Session& s, bool stepped) {
     while (const auto ms = lane.sim.timer.poll()) lane.step_ms.add(*ms, simulated_time(lane.sim));
     lane.sim.timed = s.measuring;
     if (!s.measuring) continue;
-    if (!lane.metrics) lane.metrics = create_metrics(*lane.sim.model, lane.sim.system);
+    if (!lane.metrics) lane.metrics = create_metrics(lane.sim);
     while (const auto now = collect(*lane.metrics)) {
       follow_energy(s, lane, *now);
       if (now->by_hand) continue;

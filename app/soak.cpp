@@ -42,7 +42,7 @@ int run_soak(Scene scene, const SoakOptions& options) {
   HeadlessContext context(options.gpu);
   choose_and_say(scene, model);
   Sim sim = create_sim(model, scene.settings);
-  Metrics metrics = create_metrics(*model, sim.system);
+  Metrics metrics = create_metrics(sim);
 
   // Steps are queued, never waited for one by one; the GPU is at most a ring of measurements behind.
   RunPlan plan{.measure_every = std::max(1L, options.steps / most_samples), .wait = false, .timed = false};

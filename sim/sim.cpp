@@ -35,7 +35,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.settings = settings;
   sim.plan = plan_for(settings);
   sim.tuning = within_limits(tuning);
-  sim.inverse_masses = sim.model->inverse_masses;
+  sim.masses = sim.model->masses, sim.inverse_masses = sim.model->inverse_masses;
   sim.system = std::move(system);
   const std::size_t count = sim.model->positions.size();
   SolverInput input{*sim.model, sim.system, sim.settings, sim.plan, sim.tuning, is_software_renderer()};
@@ -100,7 +100,8 @@ void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Mode
   Sim fresh = make_sim(
       model, settings, sim.tuning,
       same_constraints(*sim.model, settings, sim.settings) ? sim.system : build_constraints(*sim.model, settings));
-  fresh.inverse_masses = sim.inverse_masses;
+  for (std::size_t v = 0; v < sim.inverse_masses.size(); ++v)
+    if (is_pinned(sim, std::uint32_t(v))) fresh.inverse_masses[v] = 0;
   fresh.steps = sim.steps, fresh.guards = guard_counts(sim);
   fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, simulated_time(sim)};
   fresh.timed = sim.timed;
@@ -121,6 +122,7 @@ void adopt_settings(Sim& sim, const Settings& settings) {
   const Settings before = std::exchange(sim.settings, settings);
   const double fall = half_substep_fall(before, sim.plan);
   const Plan plan = std::exchange(sim.plan, plan_for(settings));
+  const std::vector<double> masses = sim.masses;
   try {
     sim.solver.retune(sim, &before);
   } catch (...) {
@@ -130,10 +132,11 @@ void adopt_settings(Sim& sim, const Settings& settings) {
   forget_readbacks(sim);
   write_step_block(sim);
   const double upwards = half_substep_fall(sim.settings, sim.plan) - fall;
-  if (upwards == 0) return;
+  const bool heavier = sim.masses != masses;
+  if (upwards == 0 && !heavier) return;
   State state = read_state(sim);
   add_upwards(sim, state, upwards);
-  write_velocities(sim, state);
+  heavier ? upload(sim, state) : write_velocities(sim, state);
   if (on_cpu(sim)) sim.host = std::move(state);
 }
 
@@ -181,7 +184,7 @@ void reset(Sim& sim) {
   if (sim.guard_counts) sim.guard_counts.clear();
   if (sim.check.words) clear_drops(sim);
   sim.guards = {};
-  sim.inverse_masses = sim.model->inverse_masses;
+  for (std::size_t v = 0; v < sim.masses.size(); ++v) sim.inverse_masses[v] = free_inverse_mass(sim, v);
   forget_all(sim);
   start_with(sim, {sim.model->positions, sim.model->velocities}, 0);
 }

@@ -23,6 +23,7 @@
 #include "sim/gl/gpu.h"
 #include "sim/gl/layout.h"
 #include "sim/model/model.h"
+#include "sim/solvers/mass_scaling.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -32,7 +33,9 @@ struct Sim : StepValues {
   Settings settings;  ///< as the user gave them
   Plan plan;          ///< what the next step takes
   ConstraintSystem system;
-  std::vector<double> inverse_masses;  ///< the model's, with pinned vertices 0
+  std::vector<double> masses;          ///< kg, the model's, in mode explicit with what mass scaling adds
+  std::vector<double> inverse_masses;  ///< 1/kg, of these masses; 0: fixed or pinned
+  MassScaling mass_scaling;
 
   Buffer positions;     ///< Position
   Buffer velocities;    ///< Velocity
@@ -145,6 +148,8 @@ void unpin(Sim& sim, const VertexList& vertices);
 inline void pin(Sim& sim, std::uint32_t vertex) { pin(sim, VertexList{vertex}); }
 inline void unpin(Sim& sim, std::uint32_t vertex) { unpin(sim, VertexList{vertex}); }
 bool is_pinned(const Sim& sim, std::uint32_t vertex);
+/// 1/kg, of a vertex while it is not pinned.
+double free_inverse_mass(const Sim& sim, std::size_t vertex);
 /// `positions` in metres, one for each vertex.
 void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions);
 inline void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {

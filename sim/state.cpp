@@ -104,8 +104,12 @@ void pin(Sim& sim, const VertexList& vertices) {
 
 void unpin(Sim& sim, const VertexList& vertices) {
   const KeepBindings kept;
-  for (const std::uint32_t v : vertices) sim.inverse_masses[v] = sim.model->inverse_masses[v];
+  for (const std::uint32_t v : vertices) sim.inverse_masses[v] = free_inverse_mass(sim, v);
   write_inverse_masses(sim, vertices);
+}
+
+double free_inverse_mass(const Sim& sim, std::size_t vertex) {
+  return sim.model->inverse_masses[vertex] > 0 ? 1 / sim.masses[vertex] : 0;
 }
 
 bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }

@@ -98,8 +98,9 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
 
 }  // namespace
 
-Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
+Metrics create_metrics(const Model& model, const ConstraintSystem& made, const std::vector<double>& own_masses) {
   const KeepBindings kept;
+  const std::vector<double>& masses = own_masses.empty() ? model.masses : own_masses;
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
   const bool all_made = made.present.size() >= measured_kinds &&
                         std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
@@ -121,12 +122,12 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made) {
     ranges.tets = {body.first_tet, body.first_tet + body.tets};
     glm::dvec3 centre{0};
     for (std::size_t i = first; i < end; ++i) {
-      ranges.mass += model.masses[i];
-      centre += model.masses[i] * model.rest.positions[i];
+      ranges.mass += masses[i];
+      centre += masses[i] * model.rest.positions[i];
     }
     centre /= ranges.mass;
     for (std::size_t i = first; i < end; ++i)
-      rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(model.masses[i]));
+      rest[i] = glm::vec4(glm::vec3(model.rest.positions[i] - centre), float(masses[i]));
     for (std::size_t t = ranges.tets.x; t < ranges.tets.y; ++t) m.volume += volumes[t];
     ranges.size = body_bounds(body, model.rest.positions).size();
     m.mass += ranges.mass;
@@ -226,7 +227,7 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   if (now.contacts > 0 || sim.settings.damping > 0 || std::ranges::any_of(sim.inverse_masses, is_fixed))
     errors.free = false;
   if (!errors.free) return;
-  const double mass = std::accumulate(sim.model->masses.begin(), sim.model->masses.end(), 0.0);
+  const double mass = std::accumulate(sim.masses.begin(), sim.masses.end(), 0.0);
   const glm::dvec3 gravity(0, -sim.settings.gravity, 0);
   const glm::dvec3 expected = errors.first->momentum + mass * gravity * (now.time - errors.first->time);
   if (now.speed > 0)

@@ -75,8 +75,10 @@ struct Metrics {
   std::size_t measured = 0;
 };
 
-/// Uses the constraints of `made`, of the same model, if it has all kinds that are measured.
-Metrics create_metrics(const Model& model, const ConstraintSystem& made = {});
+/// Uses the constraints of `made`, of the same model, if it has all kinds that are measured; without `masses`, the
+/// model's.
+Metrics create_metrics(const Model& model, const ConstraintSystem& made = {}, const std::vector<double>& masses = {});
+inline Metrics create_metrics(const Sim& sim) { return create_metrics(*sim.model, sim.system, sim.masses); }
 /// Queues a measurement of the current state. Waits only if the ring of results is full.
 void measure(Metrics& metrics, const Sim& sim);
 /// Changes a state from outside, as a hand does that moves vertices, between two measurements: the difference is work.

@@ -48,7 +48,8 @@ struct SolverSettings {
   int iterations = automatic;
   int substeps = automatic;
   double dt = 0.005;       ///< s
-  double stability = 0.4;  ///< in mode explicit, a substep over the longest that is stable at rest
+  double stability = 0.4;       ///< in mode explicit, a substep over the longest that is stable at rest
+  double mass_scaling = 0.001;  ///< in mode explicit, the part of a body's mass that may be added where it is stiffest
   double omega = 1.5;
   bool mass_splitting = true;
   double damping = 0;  ///< 1/s

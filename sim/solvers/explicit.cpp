@@ -24,8 +24,7 @@ double stiffening_for(double stiffer, double stability) {
 
 double explicit_substeps(const Model& model, const Settings& s) {
   const ConstraintSystem system = build_constraints(model, s);
-  const ReferenceInput input{model, system, s, model.inverse_masses};
-  const double longest = stable_step(input, s.compliance, model.rest.positions, 12);
+  const double longest = scale_masses({model, system, s, model.inverse_masses}, 12).longest_step;
   return std::max(1.0, std::ceil(s.dt / (s.stability * longest)));
 }
 
@@ -90,14 +89,19 @@ void start(Sim& sim, const State& state) {
 }
 
 void retune(Sim& sim, const Settings* before) {
-  const bool same = before && before->compliance == sim.settings.compliance &&
-                    before->constraint_damping == sim.settings.constraint_damping;
-  const double longest =
-      same ? sim.longest_substep
-           : stable_step(reference_input(sim), sim.settings.compliance, sim.model->rest.positions, 30);
-  sim.plan = make_plan(sim.settings, longest, sim.adaptive.stiffening);
-  if (!same) sim.adaptive.at_rest = stiffest(sim, sim.model->rest.positions);
-  sim.longest_substep = longest;
+  const Settings& now = sim.settings;
+  const bool same = before && before->compliance == now.compliance &&
+                    before->constraint_damping == now.constraint_damping && before->mass_scaling == now.mass_scaling;
+  if (same) {
+    sim.plan = make_plan(now, sim.longest_substep, sim.adaptive.stiffening);
+    return;
+  }
+  ScaledMasses scaled = scale_masses({*sim.model, sim.system, now, sim.model->inverse_masses}, 30);
+  sim.plan = make_plan(now, scaled.longest_step, sim.adaptive.stiffening);
+  sim.longest_substep = scaled.longest_step, sim.mass_scaling = scaled, sim.masses = std::move(scaled.masses);
+  for (std::size_t v = 0; v < sim.masses.size(); ++v)
+    if (!is_pinned(sim, std::uint32_t(v))) sim.inverse_masses[v] = 1 / sim.masses[v];
+  sim.adaptive.at_rest = stiffest(sim, sim.model->rest.positions);
 }
 
 }  // namespace

@@ -228,3 +228,93 @@ TEST_CASE("explicit: a body swings on where another mode left it, and another wh
     CHECK(std::abs(centre() - (start - 9.81 / 2 * time * time)) < 2e-5);
   }
 }
+
+namespace {
+
+// A block in whose middle one vertex stands so near another that their tets set the longest step.
+std::shared_ptr<Model> block_with_sliver(bool held) {
+  TetMesh mesh = make_block({1, 0.5, 0.5}, {16, 8, 8});
+  std::size_t middle = 0;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (glm::length(mesh.positions[v]) < glm::length(mesh.positions[middle])) middle = v;
+  mesh.positions[middle].x += 0.0575;  // of an edge of 0.0625
+  finish_tets(mesh, "block");
+  std::vector<std::uint32_t> fixed;
+  for (std::uint32_t v = 0; v < mesh.positions.size() && held; ++v)
+    if (mesh.positions[v].x < -0.49) fixed.push_back(v);
+  auto model = std::make_shared<Model>();
+  add_body(*model, "block", mesh, 1000, mesh.positions, glm::dvec3(0), held ? glm::dvec3(0) : glm::dvec3(1, 2, 3),
+           fixed);
+  return model;
+}
+
+Settings scaled_by(double share) {
+  Settings s;
+  s.mode = "explicit", s.material = "neo-hookean", s.young_modulus = 1e5, s.ground = false, s.mass_scaling = share;
+  return s;
+}
+
+double total(const std::vector<double>& masses) {
+  double sum = 0;
+  for (const double m : masses) sum += m;
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE_FIXTURE(GlTest, "mass scaling: substeps get longer for a hundredth of the mass, and the motion stays") {
+  const auto model = block_with_sliver(true);
+  Sim plain = create_sim(model, scaled_by(0)), heavier = create_sim(model, scaled_by(0.01));
+  CHECK(plain.masses == model->masses);
+  CHECK(plain.mass_scaling.gain == 1);
+  const MassScaling& told = heavier.mass_scaling;
+  CHECK(told.gain > 2);
+  CHECK(told.added <= 0.01 * total(model->masses));
+  CHECK(told.added == doctest::Approx(total(heavier.masses) - total(model->masses)));
+  CHECK(told.vertices > 0);
+  CHECK(told.vertices < model->masses.size() / 10);
+  CHECK(heavier.longest_substep > 1.99 * plain.longest_substep);
+  CHECK(heavier.plan.substeps < 0.6 * plain.plan.substeps);
+  for (std::size_t v = 0; v < model->masses.size(); ++v) CHECK(heavier.masses[v] >= model->masses[v]);
+  for (int s = 0; s < 60; ++s) step(plain), step(heavier);
+  const State right = read_state(plain), state = read_state(heavier);
+  CHECK(error_to(*model, right, state) < 1e-3);
+  CHECK(error_to(*model, right, {model->positions, {}}) > 0.05);
+}
+
+TEST_CASE_FIXTURE(GlTest, "mass scaling: gravity stays an acceleration, momenta are those of the masses that move") {
+  const auto model = block_with_sliver(false);
+  Sim sim = create_sim(model, scaled_by(0.01));
+  REQUIRE(sim.mass_scaling.gain > 2);
+  Metrics metrics = create_metrics(sim);
+  const Measurement start = measure_now(metrics, sim);
+  for (int s = 0; s < 60; ++s) step(sim);
+  const Measurement end = measure_now(metrics, sim);
+  const double t = 60 * sim.settings.dt, mass = total(sim.masses);
+  const double speed = start.momentum.y / mass - 9.81 * sim.plan.h / 2;  // the spin is not about the heavier centre
+  CHECK(end.centre.y - start.centre.y == doctest::Approx(speed * t - 0.5 * 9.81 * t * t).epsilon(1e-4));
+  CHECK((end.momentum.y - start.momentum.y) / mass == doctest::Approx(-9.81 * t).epsilon(1e-5));
+  CHECK(glm::length(end.angular_momentum - start.angular_momentum) < 1e-4 * glm::length(start.angular_momentum));
+  CHECK(end.total == doctest::Approx(start.total).epsilon(1e-3));
+}
+
+TEST_CASE_FIXTURE(GlTest, "mass scaling: it is left out where it gains little, and follows settings and pins") {
+  CHECK(create_sim(irregular_block(1, false), scaled_by(0.01)).mass_scaling.vertices == 0);
+  const auto model = block_with_sliver(false);
+  Sim sim = create_sim(model, scaled_by(0.01));
+  std::size_t heaviest = 0;
+  for (std::size_t v = 0; v < model->masses.size(); ++v)
+    if (sim.masses[v] / model->masses[v] > sim.masses[heaviest] / model->masses[heaviest]) heaviest = v;
+  pin(sim, std::uint32_t(heaviest));
+  apply_settings(sim, scaled_by(0));
+  CHECK(sim.masses == model->masses);
+  CHECK(is_pinned(sim, std::uint32_t(heaviest)));
+  unpin(sim, std::uint32_t(heaviest));
+  CHECK(sim.inverse_masses == model->inverse_masses);
+  apply_settings(sim, scaled_by(0.01));
+  CHECK(sim.inverse_masses[heaviest] == doctest::Approx(1 / sim.masses[heaviest]));
+  const auto positions = sim.positions.read_all<Position>();
+  CHECK(positions[heaviest].inverse_mass == float(sim.inverse_masses[heaviest]));
+  for (int s = 0; s < 40; ++s) step(sim);
+  CHECK(!check_finite(sim, true));
+}

@@ -1,6 +1,6 @@
-// Hard bodies are rigid (method.md): before a substep a body gets the velocities of a rigid one, in inelastic frictional
-// contact if a vertex would get into an obstacle, else in flight if it is not deformed. Each work-group with vertices of
-// the body computes its motion anew.
+// Hard bodies are rigid (method.md): before a substep a body gets the velocities of a rigid one, in inelastic
+// frictional contact if a vertex would get into an obstacle, else in flight if it is not deformed. Each work-group with
+// vertices of the body computes its motion anew.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"

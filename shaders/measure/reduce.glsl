@@ -6,7 +6,7 @@ layout(local_size_x = METRICS_SIZE) in;
 layout(std430) readonly buffer Positions { Position positions[]; };
 layout(std430) readonly buffer Velocities { Velocity velocities[]; };
 layout(std430) readonly buffer Rest { vec4 rest[]; };  // relative to the body's centre of mass, and the mass
-layout(std430) coherent buffer Partials {
+layout(std430) coherent buffer Partials {  // read by the last work-group to end
   uint groups_done;
   float partials[];  // [quantity][group]
 };
@@ -58,10 +58,15 @@ bool ends_last() {
   return last;
 }
 
-// Combines the groups' partials of one quantity, in order.
+// Combines the groups' partials of one quantity, in order; several are read side by side, because each takes long to
+// arrive.
 float total(int quantity) {
   int base = quantity * METRICS_GROUPS;
-  float result = partials[base];
-  for (int g = 1; g < int(groups); ++g) result = combine(quantity, result, partials[base + g]);
+  float result = partials[base], next[TREES];
+  for (int first = 1; first < int(groups); first += TREES) {
+    for (int k = 0; k < TREES; ++k) next[k] = partials[base + min(first + k, METRICS_GROUPS - 1)];
+    for (int k = 0; k < TREES; ++k)
+      if (first + k < int(groups)) result = combine(quantity, result, next[k]);
+  }
   return result;
 }

@@ -21,6 +21,7 @@ layout(std430) readonly buffer Stretch { Record2 edges[]; };
 layout(std430) readonly buffer Bend { Record4 hinges[]; };
 layout(std430) readonly buffer Volume { Record4 tets[]; };
 shared uint depths[DEPTHS];
+shared float totals[M_ANGULAR];
 
 // Positions relative to the first vertex, `age` seconds ago.
 void find_positions(Record4 r, float age, out vec3 x[4]) {
@@ -134,13 +135,14 @@ void add_vertex(uint i) {
 
 void write_row() {
   int me = int(gl_LocalInvocationIndex);
-  if (me < M_ANGULAR) row[me] = total(me);
-  if (me != 0) return;  // the rest reads the partial sums, not the row that other invocations write
+  if (me < M_ANGULAR) row[me] = totals[me] = total(me);
+  barrier();
+  if (me != 0) return;
   float covariance[9];
-  for (int k = 0; k < 9; ++k) covariance[k] = total(M_COVARIANCE + k);
+  for (int k = 0; k < 9; ++k) covariance[k] = totals[M_COVARIANCE + k];
   vec4 rotation = best_rotation(covariance);
   vec3 origin = positions[vertex_range.x].high + positions[vertex_range.x].low;
-  for (int a = 0; a < 3; ++a) row[M_CENTRE + a] = total(M_MOMENT + a) / mass, row[M_ORIGIN + a] = origin[a];
+  for (int a = 0; a < 3; ++a) row[M_CENTRE + a] = totals[M_MOMENT + a] / mass, row[M_ORIGIN + a] = origin[a];
   for (int a = 0; a < 4; ++a) row[M_ROTATION + a] = rotation[a];
 }
 

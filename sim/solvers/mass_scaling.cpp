@@ -30,8 +30,8 @@ std::vector<double> stiffness_at_rest(const ReferenceInput& input) {
   return stiffness;
 }
 
-// The least stiffness over mass, 1/s^2, to which a body's vertices can be brought by at most `share` of its mass, and at
-// a tenth of its vertices: what is as stiff as most of the body is not to be made heavier.
+// The least stiffness over mass, 1/s^2, to which a body's vertices can be brought by at most `share` of its mass, and
+// at a tenth of its vertices: what is as stiff as most of the body is not to be made heavier.
 double least_ratio(const Body& body, const std::vector<double>& masses, const std::vector<double>& stiffness,
                    double share) {
   double mass = 0;

@@ -59,7 +59,7 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
           .free_bodies = levels.free_bodies.size(),
           .group = group,
           .product_groups = (vertices + rows - 1) / rows,
-          .parts = std::clamp<std::size_t>(largest / 128, 1, 32),
+          .parts = std::clamp<std::size_t>((largest + 127) / 128, 1, 32),
           .rigid_start = !levels.free_bodies.empty() && has_obstacles(input.model, input.settings),
           .tets = tets};
 }

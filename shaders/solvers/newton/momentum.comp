@@ -2,7 +2,6 @@
 // holds along its normals, and friction resists as in the residual, so that this works on the ground as in flight.
 // Before Newton starts (AT_START) it is the motion by which obstacles stop a body, as rigid as its stiffness makes it.
 // PARTS work-groups per body, of which the last one to end adds up what all of them found, in order.
-#define SUMS_ARE coherent
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"
 shared bool last;
@@ -115,6 +114,27 @@ void add_up() {
     barrier();
   }
 }
+// Adds the work-groups' sums up into `totals`, which are read side by side, because each takes long to arrive.
+void add_up_parts(uint body) {
+  const uint count = 4u * MOMENTUM_COLUMNS, at_once = AT_A_TIME * GROUP_SIZE / count;
+  uint lane = gl_LocalInvocationIndex;
+  float sum = 0.0;
+  for (uint begin = 0u; begin < PARTS; begin += at_once) {
+    uint here = min(at_once, PARTS - begin);
+    for (uint k = lane; k < here * count; k += GROUP_SIZE) {
+      uint part = body * PARTS + begin + k / count;
+      cells[k / GROUP_SIZE][k % GROUP_SIZE] = momentum_sums[part].columns[k % count / 4u][k % 4u];
+    }
+    barrier();
+    for (uint p = 0u; p < here && lane < count; ++p) {
+      uint k = p * count + lane;
+      sum += cells[k / GROUP_SIZE][k % GROUP_SIZE];
+    }
+    barrier();
+  }
+  if (lane < count) totals[lane] = sum;
+  barrier();
+}
 void add3(uint at, vec3 value) {
   for (uint c = 0u; c < 3u; ++c) sums[at + c] += value[c];
 }
@@ -224,12 +244,7 @@ void main() {
     barrier();
     if (!last) return;
     memoryBarrierBuffer();
-    for (uint k = lane; k < 4u * MOMENTUM_COLUMNS; k += GROUP_SIZE) {
-      float sum = 0.0;
-      for (uint p = 0u; p < PARTS; ++p) sum += momentum_sums[body * PARTS + p].columns[k / 4u][k % 4u];
-      totals[k] = sum;
-    }
-    barrier();
+    add_up_parts(body);
   }
   write_motion(body, origin);
   if (lane == 0u) parts_done[body] = 0u;

@@ -52,22 +52,20 @@ layout(std430) restrict readonly buffer Coarse {
   vec4 coarse_inverse[];              // of the coarse matrix: rows of COARSE_ROW, filled up with zeros
 };
 
-#ifndef SUMS_ARE
-#define SUMS_ARE
-#endif
-layout(std430) restrict SUMS_ARE buffer Sums {
+// What is coherent is read by the last work-group to end, once it has counted the others.
+layout(std430) restrict buffer Sums {
   vec4 rotations[max(AGGREGATES, 1u)];  // quaternions
   BodyMotion motions[max(FREE_BODIES, 1u)];
   BodyResponse responses[max(FREE_BODIES, 1u)];
-  MomentumSums momentum_sums[max(FREE_BODIES * PARTS, 1u)];
-  vec2 group_dots[PRODUCT_GROUPS];  // r . z and z . A z, by work-group of product.comp
+  coherent MomentumSums momentum_sums[max(FREE_BODIES * PARTS, 1u)];
+  coherent vec2 group_dots[PRODUCT_GROUPS];  // r . z and z . A z, by work-group of product.comp
   vec2 dots;                        // their sums
   Iteration iterations[2];          // this one and the last, by turns
   float coarse_r[max(4u * COARSE_ROW, 1u)], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
   float is_free[max(AGGREGATES, 1u)];  // 1: no obstacle holds the aggregate, else 0
   float first_rz;                      // r . z of the first iteration that was healthy
   uint bad_starts[3];                  // how many tets each start turns over or blows up
-  uint products_done, parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
+  coherent uint products_done, parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
 };
 
 // The furthest start that at most a hundredth of all tets cannot bear: contact crushes a few tets at any start, and

@@ -1,6 +1,5 @@
 // A z, row by row, and its dot products with r and z. LANES invocations per vertex; the last work-group to end adds all
 // dot products up, in the order of the rows.
-#define SUMS_ARE coherent
 #define COLUMNS 1
 #include "solvers/newton/newton.glsl"
 shared vec3 parts[GROUP_SIZE];

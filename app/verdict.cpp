@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -88,6 +89,12 @@ Verdict judge(const RunErrors& errors, Sim& sim) {
          "take more --substeps");
   if (solver_mode(sim.settings).implicit && adaptive_values(sim).largest_residual > 1)
     find(Verdict::doubtful, "a residual did not fall", "take more --iterations");
+  const GuardCounts guards = guard_counts(sim);
+  const auto told = [&](unsigned guard, const char* what) {
+    const std::uint64_t count = guards[std::size_t(std::countr_zero(guard))];
+    if (count > 0) find(Verdict::doubtful, fmt::format("{} corrections were {}", count, what), solver_remedy(sim));
+  };
+  told(GUARD_LIMIT, "longer than a body and cut short"), told(GUARD_NOT_FINITE, "no numbers and dropped");
   for (const StartMotion& motion : sim.model->start_motions)
     find(Verdict::doubtful, fmt::format("body '{}' started inside {} and was moved", motion.body, motion.from),
          "place it outside");

@@ -54,8 +54,8 @@ void forget_readbacks(Sim& sim);
 void add_carried(Carried& all, AdaptiveSubsteps& adaptive, const Buffer& words);
 
 /// How many times shorter than at rest a substep has to be where the stiffest constraint is `stiffer` times as stiff.
-/// A substep at rest is `stability` times the longest stable one; the result keeps it within 0.7 of what is stable,
-/// in steps of a quarter of an octave, at most 32.
+/// A substep at rest is `stability` times the longest stable one; the result keeps it within 0.9 of what is stable (or
+/// `stability`, if that is larger), in steps of a quarter of an octave, at most 32.
 double stiffening_for(double stiffer, double stability);
 
 }  // namespace tetpbd

@@ -189,14 +189,15 @@ double stiffest_constraint(const ReferenceInput& input, const Compliances& compl
       const auto vertices = list.ends(c);
       std::array<glm::dvec3, arity> x;
       for (std::size_t j = 0; j < arity; ++j) x[j] = positions[vertices[j]] - positions[vertices[0]];
+      std::array<double, arity> weights;
+      for (std::size_t j = 0; j < arity; ++j)
+        weights[j] = input.inverse_masses[vertices[j]] * input.system.at_vertex[vertices[j]];
       const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
-      double sum = 0;
-      for (int k = 0; k < kind.row.components; ++k)
-        for (std::size_t j = 0; j < arity; ++j) {
-          const glm::dvec3 g = component(value, k).second[j];
-          sum += input.inverse_masses[vertices[j]] * input.system.at_vertex[vertices[j]] * glm::dot(g, g) / alpha(c)[k];
-        }
-      stiffest = std::max(stiffest, sum);
+      Formulas<double> formulas;
+      if constexpr (kind.row.components == 2)
+        stiffest = std::max(stiffest, formulas.stiffness_bound(value, weights.data(), alpha(c)));
+      else
+        stiffest = std::max(stiffest, formulas.weighted(value, weights.data()).sum / *alpha(c));
     }
   });
   return stiffest;

@@ -31,6 +31,9 @@ struct Record4 {
 #define MOST_TOUCHES 16      // contacts by which a hard body moves
 #define LEAST_HEALTH 0.1     // health below which mode newton takes shorter substeps (method.md, "Implicit steps")
 #define HEALTH_TURNING 0.05  // health at most where a part of a body turns further than TURN_LIMIT in a substep
+#define HEALTH_FAST 0.06     // health at most where a stiff body is about to hit something
+#define LOOK_AHEAD 5.0       // steps: notes are read up to four later
+#define FAST_STEP 0.03       // of a body's size, by which a fast vertex moves in a step
 #define TURN_LIMIT 0.15      // rad
 // The constants of a step (a uniform block, std140).
 struct Step {
@@ -55,7 +58,7 @@ struct Step {
   float drag;               // 1/s, rate at which velocity decays (mode newton)
   float kick;               // factor on accelerations in a substep after longer or shorter ones, of any length
   float turn_limit;         // rad; turning further in a substep lowers the health (mode newton)
-  float _0;
+  float look_ahead;         // s, in which a stiff body that will hit something lowers it (mode newton)
   vec4 stiffness[2];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
   vec4 compliance[2];       // over h^2, by constraint kind

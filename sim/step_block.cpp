@@ -53,6 +53,7 @@ void write_step_block(Sim& sim, int substeps_before) {
   block.vertex_count = unsigned(sim.model->positions.size());
   block.damping = float(most_damping(*sim.model, s) / h);
   block.turn_limit = float(TURN_LIMIT / sim.adaptive.substep_factor);
+  block.look_ahead = float(LOOK_AHEAD * s.dt);
   write_planes(*sim.model, s, block);
   for (std::size_t k = 0; k < kind_count; ++k) {
     block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.stiffness[k]);

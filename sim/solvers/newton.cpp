@@ -142,7 +142,7 @@ void adapt_substeps(Sim& sim, Newton& n) {
   w.calm_readbacks = w.health < LEAST_HEALTH || near ? 0 : w.calm_readbacks + 1;
   if (near)
     w.refined_readbacks = 0;
-  else if (w.substep_factor > 1 && w.health != float(HEALTH_TURNING))
+  else if (w.substep_factor > 1 && w.health != float(HEALTH_TURNING) && w.health != float(HEALTH_FAST))
     ++w.refined_readbacks;
   if (w.substep_factor == 1 && w.calm_readbacks == 0 && w.refined_readbacks < most)
     set_substep_factor(sim, n, refined_substeps);

@@ -25,6 +25,18 @@ float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 resi
   return rate;
 }
 #endif
+// A body that sound crosses within a step hits something at speed: short substeps alone can follow that, and are to
+// begin before it does.
+void note_fast(uint i, DoubleSingle x, vec3 v) {
+  uint body = floatBitsToUint(at(REST, i).w);
+  float step_length = params.look_ahead / LOOK_AHEAD;
+  bool stiff = body > 0u && bodies[body - 1u].w * step_length * step_length > 1.0;
+  float fast = FINE(FAST_STEP * params.body_size) / step_length + 4.0 * step_length * length(params.gravity);
+  if (!stiff || !(length(v) > fast)) return;
+  vec3 way = params.look_ahead * v;
+  for (int k = 0; k < obstacle_count(); ++k)
+    if (surface_ahead(k, x, way, way).distance < 0.0) atomicMin(least, floatBitsToUint(HEALTH_FAST));
+}
 void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);
   if (phases > 0u) l = lengths(phases);
@@ -81,18 +93,22 @@ void main() {
     work += params.h * work_rate(i, x, free, u, holds, last.residual);
 #endif
     vec3 carried = obstacle_velocity(findLSB(touched), x);  // by the first obstacle that it touches
-    vec3 stopped = carried + free_part(v - carried, touched, i);
+    uint stops = began_stiff(i) ? 0u : touched;
+    vec3 stopped = carried + free_part(v - carried, stops, i);
 #if MOVING_SOLIDS
     work += dot(stopped - v, carried) / own.inverse_mass;
 #endif
     v = stopped;
-    displacement = params.h * carried + free_part(u - params.h * carried, touched, i);
-    gain = free_part(v - before, touched, i);
+    displacement = params.h * carried + free_part(u - params.h * carried, stops, i);
+    gain = free_part(v - before, stops, i);
   }
   x = add_double(x, u);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v, work, vec3(0.0), 0.0);
   note_unless_finite(i, x.high, v);
+#if RIGID_START
+  note_fast(i, x, v);
+#endif
   put(DISPLACEMENT, i, displacement, uintBitsToFloat(touched | KNOWN));
   put(GAIN, i, gain, push);
   put(FRICTION, i, friction, uintBitsToFloat(slips ? 1u : 0u));

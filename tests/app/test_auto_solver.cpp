@@ -57,7 +57,7 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
     return fmt::format("{} {}x{} {}", scene.settings.mode, plan.substeps, plan.iterations, said.value_or("-"));
   };
   CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e4"}}).starts_with("explicit"));
-  CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e11"}}).starts_with("newton 2x32 newton, 2 sub"));
+  CHECK(chosen({{"material", "neo-hookean"}, {"young_modulus", "1e11"}}).starts_with("newton 4x16 newton, 4 sub"));
   CHECK(chosen({{"material", "springs"}, {"mode", "node"}, {"substeps", "9"}}) == "node 9x1 -");
   CHECK(chosen({{"material", "springs"}, {"substeps", "9"}}) == "node 9x1 -");
   CHECK(chosen({}).ends_with(" -"));  // nothing has a force

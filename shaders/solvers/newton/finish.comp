@@ -31,11 +31,13 @@ void note_fast(uint i, DoubleSingle x, vec3 v) {
   uint body = floatBitsToUint(at(REST, i).w);
   float step_length = params.look_ahead / LOOK_AHEAD;
   bool stiff = body > 0u && bodies[body - 1u].w * step_length * step_length > 1.0;
+  if (!stiff) return;
   float fast = FINE(FAST_STEP * params.body_size) / step_length + 4.0 * step_length * length(params.gravity);
-  if (!stiff || !(length(v) > fast)) return;
-  vec3 way = params.look_ahead * v;
-  for (int k = 0; k < obstacle_count(); ++k)
-    if (surface_ahead(k, x, way, way).distance < 0.0) atomicMin(least, floatBitsToUint(HEALTH_FAST));
+  for (int k = 0; k < obstacle_count(); ++k) {
+    vec3 nearing = v - obstacle_velocity(k, x), way = params.look_ahead * nearing;
+    Surface met = surface_ahead(k, x, way, way);
+    if (met.distance < 0.0 && -dot(met.normal, nearing) > fast) atomicMin(least, floatBitsToUint(HEALTH_FAST));
+  }
 }
 void main() {
   Lengths l = Lengths(0.0, 0.0, 0.0, false);

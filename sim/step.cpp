@@ -47,22 +47,30 @@ void give_buffers(Sim& sim) {
   glBindBufferBase(GL_ATOMIC_COUNTER_BUFFER, BIND_GUARDS, sim.guard_counts.id());
 }
 
-double mean_edge(const ConstraintList& edges, const Body& body) {
-  double sum = 0, count = 0;
-  for (std::size_t c = 0; c < edges.count(); ++c)
-    if (edges.ends(c)[0] - body.first_vertex < body.vertices) sum += edges.rest[c], ++count;
-  return count > 0 ? sum / count : 0;
+// m, the mean edge of each body, in one pass: edges are sorted by vertex, in the order of the bodies.
+std::vector<double> mean_edges(const Model& model, const ConstraintList& edges) {
+  std::vector<double> means;
+  std::size_t c = 0;
+  for (const Body& body : model.bodies) {
+    const std::size_t first = c, count = edges.count();
+    double sum = 0;
+    for (; c < count && edges.ends(c)[0] < body.first_vertex + body.vertices; ++c) sum += edges.rest[c];
+    means.push_back(c > first ? sum / double(c - first) : 0);
+  }
+  return means;
 }
 
 // Resets the records of hard bodies, because vertices were moved from outside.
 void forget_contacts(Sim& sim) {
   if (!sim.rigid_bodies) return;
+  const std::vector<double> edges = mean_edges(*sim.model, sim.system.lists[std::size_t(index_of<Stretch>)]);
   std::vector<RigidRecord> records;
   for (const Body& body : sim.model->bodies) {
+    const double edge = edges[records.size()];
     RigidRecord& record = records.emplace_back();
     record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
     if (body.one_piece && moves_rigidly(sim.settings, body_material(body, sim.settings)))
-      record.slack = float(RigidContact::slack * mean_edge(sim.system.lists[std::size_t(index_of<Stretch>)], body));
+      record.slack = float(RigidContact::slack * edge);
     const auto mass = sim.model->masses.begin() + std::ptrdiff_t(body.first_vertex);
     record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
   }

@@ -47,36 +47,36 @@ void spread(const Model& model, const Grouped& neighbours, const std::vector<std
   }
 }
 
-// Clusters by k-means: seeds begin evenly spread, as vertices are numbered along a curve, and move to the middle of
-// what is nearest to them a few times.
-Nearest cluster(const Model& model, const Grouped& neighbours, std::size_t wanted, std::vector<std::uint32_t>& seeds) {
-  const std::size_t vertices = model.positions.size();
+// Clusters a body by k-means: seeds begin evenly spread, as vertices are numbered along a curve, and move to the middle
+// of what is nearest to them a few times.
+void cluster(const Model& model, const Body& body, const Grouped& neighbours, std::size_t wanted,
+             std::vector<std::uint32_t>& seeds, Nearest& nearest) {
+  const std::size_t first = seeds.size();
   std::vector<std::uint32_t> moving;
-  for (std::uint32_t v = 0; v < vertices; ++v)
-    if (model.inverse_masses[v] > 0) moving.push_back(v);
+  for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
+    if (model.inverse_masses[v] > 0) moving.push_back(std::uint32_t(v));
   wanted = std::min(wanted, moving.size());
   for (std::size_t s = 0; s < wanted; ++s) seeds.push_back(moving[(2 * s + 1) * moving.size() / (2 * wanted)]);
-  Nearest nearest;
   for (int round = 0; round < 6; ++round) {
-    nearest.seed.assign(vertices, none);
-    nearest.distance.assign(vertices, std::numeric_limits<double>::max());
-    spread(model, neighbours, seeds, 0, nearest);
+    for (const std::uint32_t v : moving)
+      nearest.seed[v] = none, nearest.distance[v] = std::numeric_limits<double>::max();
+    spread(model, neighbours, seeds, first, nearest);
     for (const std::uint32_t v : moving)  // A part without a seed gets one.
-      if (nearest.seed[v] == none && seeds.size() < most_aggregates)
+      if (nearest.seed[v] == none && seeds.size() - first < most_aggregates)
         seeds.push_back(v), spread(model, neighbours, seeds, seeds.size() - 1, nearest);
     if (round == 5) break;
-    std::vector<glm::dvec4> centres(seeds.size(), glm::dvec4(0));
+    std::vector<glm::dvec4> centres(seeds.size() - first, glm::dvec4(0));
     for (const std::uint32_t v : moving)
-      if (nearest.seed[v] != none) centres[nearest.seed[v]] += model.masses[v] * glm::dvec4(model.rest.positions[v], 1);
-    std::vector<double> best(seeds.size(), std::numeric_limits<double>::max());
+      if (nearest.seed[v] != none)
+        centres[nearest.seed[v] - first] += model.masses[v] * glm::dvec4(model.rest.positions[v], 1);
+    std::vector<double> best(centres.size(), std::numeric_limits<double>::max());
     for (const std::uint32_t v : moving) {
-      const std::uint32_t s = nearest.seed[v];
-      if (s == none) continue;
+      if (nearest.seed[v] == none) continue;
+      const std::size_t s = nearest.seed[v] - first;
       const double distance = glm::distance(model.rest.positions[v], glm::dvec3(centres[s]) / centres[s].w);
-      if (distance < best[s]) best[s] = distance, seeds[s] = v;
+      if (distance < best[s]) best[s] = distance, seeds[first + s] = v;
     }
   }
-  return nearest;
 }
 
 using Weights = std::vector<std::pair<std::uint32_t, double>>;  // aggregate, weight
@@ -142,21 +142,23 @@ Modes modes(const Model& model, const Aggregates& aggregates, std::size_t v, con
 }
 
 // Has to change whenever the aggregates of the same mesh do.
-constexpr std::uint64_t cache_version = 1;
+constexpr std::uint64_t cache_version = 2;
 
-std::uint64_t cache_key(const Model& model, const Grouped& neighbours, std::size_t wanted) {
-  std::uint64_t key = hash_values(std::array{cache_version, std::uint64_t(wanted)});
+std::uint64_t cache_key(const Model& model, const Grouped& neighbours, const std::vector<std::size_t>& wanted) {
+  std::uint64_t key = hash_values(wanted, hash_values(std::array{cache_version}));
   key = hash_values(model.rest.positions, key);
   key = hash_values(model.masses, hash_values(model.inverse_masses, key));
   return hash_values(neighbours.values, hash_values(neighbours.first, key));
 }
 
-bool parse_aggregates(std::string_view bytes, std::uint64_t key, std::size_t vertices, Aggregates& result) {
+bool parse_aggregates(std::string_view bytes, std::uint64_t key, const Model& model, Aggregates& result) {
   const auto sound = [&](const std::array<Share, 4>& shares) {
     return std::ranges::all_of(shares,
                                [&](const Share& s) { return s.weight == 0 || s.aggregate < result.all.size(); });
   };
-  return take_sealed(bytes, key, result.all, result.of_vertex) && result.of_vertex.size() == vertices &&
+  return take_sealed(bytes, key, result.all, result.first, result.of_vertex) &&
+         result.of_vertex.size() == model.positions.size() && result.first.size() == model.bodies.size() + 1 &&
+         std::ranges::is_sorted(result.first) && result.first.back() == result.all.size() &&
          std::ranges::all_of(result.of_vertex, sound);
 }
 
@@ -170,19 +172,25 @@ void list_members(Aggregates& result) {
 
 }  // namespace
 
-Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::size_t wanted) {
+Aggregates make_aggregates(const Model& model, const Grouped& neighbours, const std::vector<std::size_t>& wanted) {
   // Aggregates of smaller meshes are made as quickly as they are read.
   const bool large = model.positions.size() >= 10000;
   const std::uint64_t key = large ? cache_key(model, neighbours, wanted) : 0;
   const std::string file = fmt::format("{:016x}.aggregates", key);
   Aggregates result;
-  if (large && parse_aggregates(read_cached(file), key, model.positions.size(), result)) {
+  if (large && parse_aggregates(read_cached(file), key, model, result)) {
     list_members(result);
     return result;
   }
   result = {};
+  result.first.push_back(0);
   std::vector<std::uint32_t> seeds;
-  const Nearest nearest = cluster(model, neighbours, wanted, seeds);
+  Nearest nearest;
+  nearest.seed.assign(model.positions.size(), none), nearest.distance.resize(model.positions.size());
+  for (std::size_t b = 0; b < model.bodies.size(); ++b) {
+    cluster(model, model.bodies[b], neighbours, wanted[b], seeds, nearest);
+    result.first.push_back(std::uint32_t(seeds.size()));
+  }
   const auto weights = smooth_weights(model, neighbours, nearest);
   result.of_vertex.resize(weights.size());
   parallel_for(weights.size(), [&](std::size_t v) { result.of_vertex[v] = make_shares(weights[v]); });
@@ -202,40 +210,41 @@ Aggregates make_aggregates(const Model& model, const Grouped& neighbours, std::s
     each([&](const glm::dvec3& x, double m) { squares += m * glm::dot(x - middle, x - middle); });
     result.all[a] = {middle, centre.w > 0 && squares > 0 ? std::sqrt(squares / centre.w) : model.size};
   }
-  if (large) keep_cached(file, key, result.all, result.of_vertex);
+  if (large) keep_cached(file, key, result.all, result.first, result.of_vertex);
   return result;
 }
 
 namespace {
 
-// The six rigid motions of a body in coarse unknowns.
-Eigen::MatrixXd rigid_motions(const Aggregates& aggregates, const RigidPart& part, Eigen::Index count) {
-  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(count, 6);
-  for (const std::uint32_t a : part.aggregates) {
-    const glm::dvec3 arm = aggregates.all[a].centre - part.centre;
+// The six rigid motions of a body about its centre of mass in coarse unknowns.
+Eigen::MatrixXd rigid_motions(std::span<const Aggregate> aggregates, const glm::dvec3& pivot) {
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(Eigen::Index(6 * aggregates.size()), 6);
+  for (std::size_t a = 0; a < aggregates.size(); ++a) {
+    const auto at = Eigen::Index(6 * a);
+    const glm::dvec3 arm = aggregates[a].centre - pivot;
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 unit(0);
       unit[axis] = 1;
       const glm::dvec3 shift = glm::cross(unit, arm);
-      for (int c = 0; c < 3; ++c) motions(6 * Eigen::Index(a) + c, 3 + axis) = shift[c];
-      motions(6 * Eigen::Index(a) + axis, axis) = 1;
-      motions(6 * Eigen::Index(a) + 3 + axis, 3 + axis) = aggregates.all[a].reach;
+      for (int c = 0; c < 3; ++c) motions(at + c, 3 + axis) = shift[c];
+      motions(at + axis, axis) = 1;
+      motions(at + 3 + axis, 3 + axis) = aggregates[a].reach;
     }
   }
   return motions;
 }
 
-}  // namespace
-
-std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregates, const BlockRows& rows,
-                                  const std::vector<RigidPart>& rigid) {
-  const auto count = Eigen::Index(6 * aggregates.all.size());
+// The coarse matrix of a body, of which each thread fills the columns of its aggregates; the matrix is symmetric.
+Eigen::MatrixXd coarse_matrix(const Model& model, std::size_t body, const Aggregates& aggregates,
+                              const BlockRows& rows) {
+  const std::size_t first = aggregates.first[body];
+  const auto count = Eigen::Index(6 * aggregates.of_body(body));
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(count, count);
-  // Each thread fills the columns of its aggregates; the matrix is symmetric.
-  parallel_for(aggregates.all.size(), 1, [&](std::size_t a) {
+  parallel_for(aggregates.of_body(body), 1, [&](std::size_t column) {
+    const std::size_t a = first + column;
     const auto add = [&](const Share& other, std::size_t v, const Eigen::Matrix<double, 6, 3>& from) {
       if (other.weight > 0)
-        A.block<6, 6>(6 * Eigen::Index(other.aggregate), 6 * Eigen::Index(a)) +=
+        A.block<6, 6>(6 * Eigen::Index(other.aggregate - first), 6 * Eigen::Index(column)) +=
             (from * modes(model, aggregates, v, other)).transpose();
     };
     for (std::uint32_t k = aggregates.members.first[a]; k < aggregates.members.first[a + 1]; ++k) {
@@ -253,14 +262,22 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
       for (const Share& share : aggregates.of_vertex[v]) add(share, v, from);
     }
   });
-  A = (0.5 * (A + A.transpose())).eval();
+  return 0.5 * (A + A.transpose());
+}
+
+}  // namespace
+
+std::vector<float> coarse_inverse(const Model& model, std::size_t body, const Aggregates& aggregates,
+                                  const BlockRows& rows, const glm::dvec3* pivot) {
+  Eigen::MatrixXd A = coarse_matrix(model, body, aggregates, rows);
+  const Eigen::Index count = A.rows();
   // An aggregate of one vertex has no rotation: whatever an unknown is that no member feels, the matrix stays regular.
   A.diagonal() *= 1 + 1e-6;
   if (count > 0) A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
-  std::vector<std::pair<Eigen::MatrixXd, Eigen::MatrixXd>> motions;  // with the matrix of each six
-  for (const RigidPart& part : rigid) {
-    const Eigen::MatrixXd N = rigid_motions(aggregates, part, count);
-    motions.emplace_back(N, N.transpose() * A * N);
+  Eigen::MatrixXd N, of_motions;  // rigid motions and their matrix
+  if (pivot) {
+    N = rigid_motions(std::span(aggregates.all).subspan(aggregates.first[body], aggregates.of_body(body)), *pivot);
+    of_motions = N.transpose() * A * N;
   }
   const Eigen::LLT<Eigen::MatrixXd> factors(A);
   Eigen::MatrixXd& inverse = A;
@@ -268,7 +285,7 @@ std::vector<float> coarse_inverse(const Model& model, const Aggregates& aggregat
   parallel_parts(std::size_t(count), 32, [&](std::size_t first, std::size_t end) {
     factors.solveInPlace(inverse.middleCols(Eigen::Index(first), Eigen::Index(end - first)));
   });
-  for (const auto& [N, of_motions] : motions) inverse -= N * of_motions.ldlt().solve(N.transpose());
+  if (pivot) inverse -= N * of_motions.ldlt().solve(N.transpose());
   const std::size_t width = (std::size_t(count) + 3) / 4 * 4;
   std::vector<float> values(width * std::size_t(count), 0.0f);
   parallel_for(std::size_t(count), 64, [&](std::size_t row) {

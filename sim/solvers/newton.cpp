@@ -46,7 +46,7 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
         std::max<std::size_t>(work_groups, 1), bytes};
   };
   const auto groups = [&](std::size_t items) { return (items + sizes.group - 1) / sizes.group; };
-  const std::size_t count = sizes.aggregates, unknowns = sizes.unknowns(), turns = sizes.product_groups,
+  const std::size_t count = sizes.aggregates, turns = sizes.product_groups,
                     vector = 16 * sizes.vertices, of_matrix = 2 * 56 * sizes.edges;
   Newton n;
   n.begin = pass("begin", groups(std::max(sizes.vertices, count)), 2 * vector);
@@ -55,7 +55,7 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   n.linearise = pass("linearise", groups(sizes.edges), sizeof(newton::EdgeBlock) * sizes.edges + 4 * sizes.uses * 30);
   n.residual = pass("residual", turns, of_matrix + 9 * vector);
   n.update = pass("update", count + groups(sizes.vertices), 15 * vector);
-  n.coarse = pass("coarse", groups(sizes.row_lanes * unknowns), 4 * unknowns * unknowns);
+  n.coarse = pass("coarse", groups(sizes.row_lanes * sizes.unknowns()), 16 * sizes.coarse);
   n.prolong = pass("prolong", groups(sizes.vertices), 7 * vector);
   n.product = pass("product", turns, of_matrix + 4 * vector);
   n.finish = pass("finish", groups(sizes.vertices), 14 * vector);
@@ -230,9 +230,9 @@ Solver create_newton_solver(const SolverInput& whole) {
     add_buffer(solver, input.tuning, block, std::move(buffer));
     return solver.buffers.size() - 1;
   };
-  n.vectors = add("Vectors", Buffer("vectors", fill_newton_vectors(input.model, *levels, n.layout), GL_DYNAMIC_COPY));
+  n.vectors = add("Vectors", Buffer("vectors", fill_newton_vectors(input.model, n.layout), GL_DYNAMIC_COPY));
   add("Blocks", Buffer("matrix", std::max<std::size_t>(sizes.edges, 1) * sizeof(newton::EdgeBlock)));
-  n.mesh = add("Mesh", Buffer("constraints and edges", fill_newton_mesh(input.system, *levels, n.layout)));
+  n.mesh = add("Mesh", Buffer("constraints and edges", fill_newton_mesh(input, *levels, sizes, n.layout)));
   n.coarse_matrix = add("Coarse", Buffer("coarse matrix", fill_newton_coarse(input, *levels, n.layout)));
   n.sums = add("Sums", Buffer("sums", std::vector<std::byte>(n.layout.sums.bytes), GL_DYNAMIC_COPY));
   solver.watches = solver.takes_constraints = true;

@@ -16,49 +16,63 @@ namespace tetpbd {
 
 namespace {
 
+std::size_t body_of(const Model& model, std::size_t vertex) {
+  return std::size_t(&body_at(model, vertex) - model.bodies.data());
+}
+
+// The work-groups that go through the rows of so many vertices.
+std::size_t groups_of_rows(std::size_t vertices, std::size_t group) {
+  const std::size_t rows = group / NewtonSizes::lanes;
+  return (vertices + rows - 1) / rows;
+}
+
 // Enough for what 3x3 blocks alone do not solve in a few iterations, and few enough for a dense inverse.
 std::size_t choose_aggregates(std::size_t vertices) {
-  return std::size_t(std::clamp(1.3 * std::sqrt(double(vertices)), 1.0, double(most_aggregates)));
+  const double count = double(vertices);
+  return std::size_t(std::clamp(std::min(1.3 * std::sqrt(count), count / 8), 1.0, double(most_aggregates)));
 }
+
+std::size_t coarse_row(std::size_t aggregates) { return (6 * aggregates + 3) / 4; }
 
 }  // namespace
 
 NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system) {
   const std::size_t vertices = model.positions.size();
-  NewtonLevels levels{build_newton_graph(system, vertices), {}, {}, {}};
-  levels.aggregates = make_aggregates(model, levels.graph.neighbours, choose_aggregates(vertices));
-  for (const Body& body : model.bodies) {
+  NewtonLevels levels{build_newton_graph(system, vertices), {}, {}};
+  std::vector<std::size_t> wanted;
+  for (const Body& body : model.bodies) wanted.push_back(choose_aggregates(body.vertices));
+  levels.aggregates = make_aggregates(model, levels.graph.neighbours, wanted);
+  for (std::size_t b = 0; b < model.bodies.size(); ++b) {
+    const Body& body = model.bodies[b];
     const auto begin = model.inverse_masses.begin() + std::ptrdiff_t(body.first_vertex);
-    if (!std::all_of(begin, begin + std::ptrdiff_t(body.vertices), [](double w) { return w != 0; })) continue;
-    const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
-    levels.free_bodies.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices),
-                                  float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0))});
-  }
-  for (std::size_t a = 0; a < levels.aggregates.all.size(); ++a) {
-    const std::uint32_t v = levels.aggregates.members.values[levels.aggregates.members.first[a]] / 4;
-    const auto found = std::ranges::find_if(
-        levels.free_bodies, [v](const newton::FreeBody& body) { return body.first <= v && v < body.end; });
-    levels.aggregate_bodies.push_back(
-        found == levels.free_bodies.end() ? 0u : std::uint32_t(found - levels.free_bodies.begin()) + 1);
+    if (std::all_of(begin, begin + std::ptrdiff_t(body.vertices), [](double w) { return w != 0; }))
+      levels.free_bodies.push_back(std::uint32_t(b));
   }
   return levels;
 }
 
 NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels) {
   const std::size_t group = std::max<std::size_t>(tuned({0, 128}, input.tuning).group, NewtonSizes::row_lanes);
-  const std::size_t rows = group / NewtonSizes::lanes, vertices = input.model.positions.size();
-  std::size_t largest = 0, tets = 0;
-  for (const auto& [first, end, mass] : levels.free_bodies) largest = std::max<std::size_t>(largest, end - first);
+  const std::vector<Body>& bodies = input.model.bodies;
+  std::size_t largest = 0, tets = 0, product_groups = 0, coarse = 0;
+  for (const std::uint32_t b : levels.free_bodies) largest = std::max(largest, bodies[b].vertices);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const std::size_t aggregates = levels.aggregates.of_body(b);
+    product_groups += groups_of_rows(bodies[b].vertices, group);
+    coarse += 6 * aggregates * coarse_row(aggregates);
+  }
   for (std::size_t k = 0; k < kind_count; ++k)
     if (constraint_kinds[k].tet) tets = std::max(tets, input.system.lists[k].count());
-  return {.vertices = vertices,
+  return {.vertices = input.model.positions.size(),
           .edges = levels.graph.edges(),
           .uses = levels.graph.uses.size(),
           .members = levels.aggregates.members.values.size(),
           .aggregates = levels.aggregates.all.size(),
+          .bodies = bodies.size(),
           .free_bodies = levels.free_bodies.size(),
+          .coarse = coarse,
           .group = group,
-          .product_groups = (vertices + rows - 1) / rows,
+          .product_groups = product_groups,
           .parts = std::clamp<std::size_t>((largest + 127) / 128, 1, 32),
           .rigid_start = !levels.free_bodies.empty() && has_obstacles(input.model, input.settings),
           .tets = tets};
@@ -77,10 +91,10 @@ std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverIn
                                     {"AGGREGATES", sizes.aggregates},
                                     {"MEMBERS", sizes.members},
                                     {"PRODUCT_GROUPS", sizes.product_groups},
+                                    {"BODIES", sizes.bodies},
                                     {"FREE_BODIES", sizes.free_bodies},
                                     {"PARTS", sizes.parts},
-                                    {"RIGID_START", sizes.rigid_start},
-                                    {"COARSE_ROW", sizes.coarse_row()}})
+                                    {"RIGID_START", sizes.rigid_start}})
     defines.push_back(fmt::format("{} {}u", name, value));
   for (std::size_t k = 0; k < kind_count; ++k)
     if (input.system.present[k])
@@ -110,10 +124,9 @@ std::vector<float> stiffness_shares(const Model& model, const Settings& settings
 ConstraintSystem soften(ConstraintSystem system, const Model& model, const std::vector<float>& shares) {
   for (ConstraintList& list : system.lists)
     for (std::size_t c = 0; c < list.count() && !list.compliance.empty() && !shares.empty(); ++c) {
-      const auto after = std::ranges::upper_bound(model.bodies, list.ends(c)[0], {}, &Body::first_vertex);
       const std::size_t each = list.compliance.size() / list.count();
       for (std::size_t k = 0; k < each; ++k)
-        list.compliance[each * c + k] /= double(shares[std::size_t(after - model.bodies.begin()) - 1]);
+        list.compliance[each * c + k] /= double(shares[body_of(model, list.ends(c)[0])]);
     }
   return system;
 }
@@ -129,8 +142,10 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
   to.shares = to.mesh.add<glm::uvec4>("shares", sizes.vertices);
   to.first_member = to.mesh.add<std::uint32_t>("first_member", sizes.aggregates + 1);
   to.members = to.mesh.add<glm::uvec2>("members", sizes.members);
-  to.free_bodies = to.mesh.add<newton::FreeBody>("free_bodies", sizes.free_bodies);
+  to.body_ranges = to.mesh.add<newton::BodyRange>("body_ranges", sizes.bodies);
+  to.free_bodies = to.mesh.add<std::uint32_t>("free_bodies", sizes.free_bodies);
   to.aggregate_bodies = to.mesh.add<std::uint32_t>("aggregate_bodies", sizes.aggregates);
+  to.group_bodies = to.mesh.add<std::uint32_t>("group_bodies", sizes.product_groups);
   const auto for_each_list = [&](const char* what, auto&& add) {
     for (std::size_t k = 0; k < kind_count; ++k)
       if (system.present[k])
@@ -147,43 +162,38 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
     });
 
   to.centres = to.coarse.add<glm::vec4>("centres", sizes.aggregates);
-  to.bodies = to.coarse.add<glm::vec4>("bodies", sizes.free_bodies);
-  to.coarse_inverse = to.coarse.add<glm::vec4>("coarse_inverse", sizes.unknowns() * sizes.coarse_row());
+  to.bodies = to.coarse.add<glm::vec4>("bodies", sizes.bodies);
+  to.coarse_inverse = to.coarse.add<glm::vec4>("coarse_inverse", sizes.coarse);
 
   to.rotations = to.sums.add<glm::vec4>("rotations", sizes.aggregates);
-  to.motions = to.sums.add<newton::BodyMotion>("motions", sizes.free_bodies);
-  to.sums.add<newton::BodyResponse>("responses", sizes.free_bodies);
+  to.motions = to.sums.add<newton::BodyMotion>("motions", sizes.bodies);
+  to.sums.add<newton::BodyResponse>("responses", sizes.bodies);
   to.sums.add<newton::MomentumSums>("momentum_sums", sizes.free_bodies * sizes.parts);
   to.sums.add<glm::vec2>("group_dots", sizes.product_groups);
-  to.sums.add<glm::vec2>("dots");
-  to.sums.add<newton::Iteration>("iterations", 2);
-  to.sums.add<float>("coarse_r", 4 * sizes.coarse_row());
+  to.sums.add<glm::vec2>("dots", sizes.bodies);
+  to.sums.add<newton::Iteration>("iterations", 2 * sizes.bodies);
+  to.sums.add<float>("coarse_r", sizes.unknowns() + 3);
   to.sums.add<float>("coarse_q", sizes.unknowns());
   to.sums.add<float>("coarse_y", sizes.unknowns());
   to.sums.add<float>("is_free", sizes.aggregates);
-  to.sums.add<float>("first_rz");
-  to.sums.add<std::uint32_t>("bad_starts", 3);
-  to.sums.add<std::uint32_t>("products_done");
+  to.sums.add<std::uint32_t>("bad_starts", 3 * sizes.bodies);
+  to.sums.add<std::uint32_t>("products_done", sizes.bodies);
   to.sums.add<std::uint32_t>("parts_done", sizes.free_bodies);
   return to;
 }
 
-std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels,
-                                           const NewtonBuffers& layout) {
+std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonBuffers& layout) {
   std::vector<glm::vec4> vectors(layout.vectors.bytes / sizeof(glm::vec4), glm::vec4(0)), rest;
   for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
-  std::uint32_t number = 0;
-  for (const auto& [first, end, mass] : levels.free_bodies) {
-    ++number;
-    for (std::uint32_t v = first; v < end; ++v) rest[v].w = std::bit_cast<float>(number);
-  }
+  for (std::size_t v = 0; v < rest.size(); ++v) rest[v].w = std::bit_cast<float>(std::uint32_t(body_of(model, v)));
   put(std::as_writable_bytes(std::span(vectors)), layout.slots[newton::REST], rest);
   return vectors;
 }
 
-std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
+std::vector<std::byte> fill_newton_mesh(const SolverInput& input, const NewtonLevels& levels, const NewtonSizes& sizes,
                                         const NewtonBuffers& layout) {
-  const auto& [graph, aggregates, free_bodies, aggregate_bodies] = levels;
+  const ConstraintSystem& system = input.system;
+  const auto& [graph, aggregates, free_bodies] = levels;
   std::vector<std::uint32_t> uses;
   std::vector<glm::uvec2> neighbours;
   std::vector<glm::uvec4> shares;
@@ -195,6 +205,19 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
   for (const auto& [a, b, c, d] : aggregates.of_vertex) shares.push_back({pack(a), pack(b), pack(c), pack(d)});
   for (const std::uint32_t m : aggregates.members.values)
     members.push_back({m / 4, aggregates.of_vertex[m / 4][m % 4].weight});
+  std::vector<newton::BodyRange> body_ranges;
+  std::vector<std::uint32_t> group_bodies, aggregate_bodies;
+  std::size_t coarse = 0;
+  for (std::uint32_t b = 0; b < input.model.bodies.size(); ++b) {
+    const Body& body = input.model.bodies[b];
+    const std::size_t row = coarse_row(aggregates.of_body(b));
+    body_ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices),
+                           std::uint32_t(group_bodies.size()), std::uint32_t(body.tets), aggregates.first[b],
+                           aggregates.first[b + 1], std::uint32_t(coarse), std::uint32_t(row)});
+    group_bodies.insert(group_bodies.end(), groups_of_rows(body.vertices, sizes.group), b);
+    aggregate_bodies.insert(aggregate_bodies.end(), aggregates.of_body(b), b);
+    coarse += 6 * aggregates.of_body(b) * row;
+  }
   std::vector<std::byte> contents(layout.mesh.bytes);
   put(contents, layout.first_use, graph.first_use);
   put(contents, layout.uses, uses);
@@ -203,8 +226,10 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
   put(contents, layout.shares, shares);
   put(contents, layout.first_member, aggregates.members.first);
   put(contents, layout.members, members);
+  put(contents, layout.body_ranges, body_ranges);
   put(contents, layout.free_bodies, free_bodies);
   put(contents, layout.aggregate_bodies, aggregate_bodies);
+  put(contents, layout.group_bodies, group_bodies);
   for (std::size_t k = 0; k < kind_count; ++k) {
     put(contents, layout.constraints[k].vertices, system.lists[k].vertices);
     for (const auto& [name, array, range] : constraint_arrays)
@@ -216,18 +241,19 @@ std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const Ne
 namespace {
 
 // Of each free body its centre of mass at rest, and 1/s^2, its stiffness against a force on opposite faces (of a cube E
-// times the edge) over its mass.
+// times the edge) over its mass; 0 of the others.
 std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& levels,
                                         const std::vector<glm::dmat3>& blocks) {
-  std::vector<glm::dvec4> bodies;
+  std::vector<glm::dvec4> bodies(model.bodies.size(), glm::dvec4(0));
   const Grouped& neighbours = levels.graph.neighbours;
-  for (const auto& [first, end, mass] : levels.free_bodies) {
-    double stiffness = 0;  // N m
+  for (const std::uint32_t b : levels.free_bodies) {
+    const std::size_t first = model.bodies[b].first_vertex, end = first + model.bodies[b].vertices;
+    double stiffness = 0, mass = 0;  // N m; kg
     glm::dvec3 centre{0};
     Bounds box{model.rest.positions[first], model.rest.positions[first]};
-    for (std::uint32_t v = first; v < end; ++v) {
+    for (std::size_t v = first; v < end; ++v) {
       const glm::dvec3& x = model.rest.positions[v];
-      centre += model.masses[v] * x;
+      centre += model.masses[v] * x, mass += model.masses[v];
       box = {glm::min(box.low, x), glm::max(box.high, x)};
       for (std::size_t n = neighbours.first[v]; n < neighbours.first[v + 1]; ++n) {
         const glm::dvec3 edge = model.rest.positions[neighbours.values[n]] - x;
@@ -235,7 +261,7 @@ std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& 
         stiffness += std::abs(block[0][0] + block[1][1] + block[2][2]) / 6 * glm::dot(edge, edge);  // each edge twice
       }
     }
-    bodies.emplace_back(centre / double(mass), stiffness / (box.size() * box.size() / 3) / double(mass));
+    bodies[b] = {centre / mass, stiffness / (box.size() * box.size() / 3) / mass};
   }
   return bodies;
 }
@@ -248,21 +274,26 @@ std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const Newton
   std::vector<double> inertia;
   for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
   const std::vector<glm::dmat3> blocks = compute_blocks_at_rest(input, levels.graph, h);
-  std::vector<glm::vec4> bodies;
-  std::vector<RigidPart> rigid;
-  for (const glm::dvec4& body : describe_bodies(input.model, levels, blocks)) {
-    bodies.emplace_back(body);
-    if (has_obstacles(input.model, input.settings)) rigid.push_back({{}, glm::dvec3(body)});
-  }
-  for (std::uint32_t a = 0; a < levels.aggregate_bodies.size() && !rigid.empty(); ++a)
-    if (levels.aggregate_bodies[a] > 0) rigid[levels.aggregate_bodies[a] - 1].aggregates.push_back(a);
-  const std::vector<float> inverse =
-      coarse_inverse(input.model, levels.aggregates, {levels.graph.neighbours, inertia, blocks}, rigid);
+  const std::vector<glm::dvec4> described = describe_bodies(input.model, levels, blocks);
+  const std::vector<glm::vec4> bodies(described.begin(), described.end());
+  const std::size_t count = bodies.size();
+  std::vector<std::vector<float>> inverses(count);
+  const BlockRows rows{levels.graph.neighbours, inertia, blocks};
+  parallel_for(count, count < 8 ? count : 1, [&](std::size_t b) {
+    const glm::dvec3 pivot(described[b]);
+    const bool rigid = std::ranges::binary_search(levels.free_bodies, std::uint32_t(b)) &&
+                       has_obstacles(input.model, input.settings);
+    inverses[b] = coarse_inverse(input.model, b, levels.aggregates, rows, rigid ? &pivot : nullptr);
+  });
   std::vector<glm::vec4> contents(layout.coarse.bytes / sizeof(glm::vec4), glm::vec4(0)), centres;
   for (const Aggregate& a : levels.aggregates.all) centres.emplace_back(glm::vec3(a.centre), float(a.reach));
   put(std::as_writable_bytes(std::span(contents)), layout.centres, centres);
   put(std::as_writable_bytes(std::span(contents)), layout.bodies, bodies);
-  put(std::as_writable_bytes(std::span(contents)), Range<float>{layout.coarse_inverse.at, inverse.size()}, inverse);
+  std::size_t at = layout.coarse_inverse.at;
+  for (const std::vector<float>& inverse : inverses) {
+    put(std::as_writable_bytes(std::span(contents)), Range<float>{at, inverse.size()}, inverse);
+    at += sizeof(float) * inverse.size();
+  }
   return contents;
 }
 

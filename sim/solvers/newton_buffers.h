@@ -20,21 +20,20 @@ inline constexpr std::size_t std430_alignment<newton::BodyResponse> = 16;
 struct NewtonLevels {
   NewtonGraph graph;
   Aggregates aggregates;
-  std::vector<newton::FreeBody> free_bodies;    ///< bodies without a fixed vertex
-  std::vector<std::uint32_t> aggregate_bodies;  ///< 1 + number among these, or 0
+  std::vector<std::uint32_t> free_bodies;  ///< bodies without a fixed vertex
 };
 NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& system);
 
 /// Sizes of work-groups and of the arrays that kernels work on.
 struct NewtonSizes {
-  std::size_t vertices, edges, uses, members, aggregates, free_bodies;
+  std::size_t vertices, edges, uses, members, aggregates, bodies, free_bodies;
+  std::size_t coarse;          ///< vec4s of the coarse inverses of all bodies
   std::size_t group;           ///< invocations of a work-group
   std::size_t product_groups;  ///< work-groups of a product with the matrix
   std::size_t parts;           ///< work-groups that add up a free body's momentum
   bool rigid_start;            ///< whether obstacles can stop a free body
   std::size_t tets;            ///< constraints of the largest kind of tets, for which Newton's start is checked
   std::size_t unknowns() const { return 6 * aggregates; }
-  std::size_t coarse_row() const { return (unknowns() + 3) / 4; }  ///< vec4s of a row of the coarse matrix
   static constexpr std::size_t lanes = 4;                          ///< invocations for a row of the matrix
   static constexpr std::size_t row_lanes = 32;                     ///< invocations for a row of the coarse matrix
 };
@@ -47,8 +46,8 @@ struct NewtonBuffers {
   Range<std::uint32_t> first_use, uses, first_neighbour, first_member;
   Range<glm::uvec2> neighbours, members;
   Range<glm::uvec4> shares;
-  Range<newton::FreeBody> free_bodies;
-  Range<std::uint32_t> aggregate_bodies;
+  Range<newton::BodyRange> body_ranges;
+  Range<std::uint32_t> free_bodies, aggregate_bodies, group_bodies;
   struct Constraints {
     Range<std::uint32_t> vertices;
     Range<float> values, compliances, dampings;
@@ -78,8 +77,8 @@ ConstraintSystem soften(ConstraintSystem system, const Model& model, const std::
 NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintSystem& system);
 
 /// The contents of `vectors` at rest, of `mesh`, and of `coarse`.
-std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonLevels& levels, const NewtonBuffers& layout);
-std::vector<std::byte> fill_newton_mesh(const ConstraintSystem& system, const NewtonLevels& levels,
+std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonBuffers& layout);
+std::vector<std::byte> fill_newton_mesh(const SolverInput& input, const NewtonLevels& levels, const NewtonSizes& sizes,
                                         const NewtonBuffers& layout);
 std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const NewtonLevels& levels,
                                           const NewtonBuffers& layout);

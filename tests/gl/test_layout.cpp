@@ -118,7 +118,8 @@ TEST_CASE("members of mode newton's blocks lie where GL reads them, and no array
     const SolverInput input{*model, system, settings, plan_for(settings), {}};
     NewtonSizes all = measure_newton(input, build_newton_levels(*model, system));
     NewtonSizes odd = all, none = all;  // what is behind a list of odd length may have to be aligned
-    odd.aggregates = 3, odd.members = 7, odd.uses = 5, odd.free_bodies = 1, odd.parts = 3, odd.product_groups = 1;
+    odd.aggregates = 3, odd.members = 7, odd.uses = 5, odd.bodies = 3, odd.free_bodies = 1, odd.parts = 3;
+    odd.product_groups = 1;
     none.aggregates = none.members = none.uses = none.free_bodies = none.edges = 0;
     for (const NewtonSizes& sizes : {all, odd, none}) {
       const NewtonBuffers layout = lay_out_newton_buffers(sizes, system);

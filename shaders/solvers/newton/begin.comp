@@ -1,4 +1,4 @@
-// Forgets the steps before a change from outside. One invocation per vertex, and per aggregate.
+// Forgets the steps before a change from outside. One invocation per vertex, per body and per aggregate.
 #include "solvers/newton/newton.glsl"
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
@@ -7,6 +7,6 @@ void main() {
     put(GAIN, i, vec3(0.0), 0.0);
     put(FRICTION, i, vec3(0.0), 0.0);
   }
-  if (i < FREE_BODIES) motions[i].held = 0.0;
+  if (i < BODIES) motions[i] = BodyMotion(vec4(0.0, 0.0, 0.0, 1.0), vec3(0.0), 1.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
   if (i < AGGREGATES) rotations[i] = vec4(0.0, 0.0, 0.0, 1.0);
 }

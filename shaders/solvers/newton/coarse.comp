@@ -1,5 +1,5 @@
-// The coarse unknowns y = A_c^-1 r. ROW_LANES invocations per row of the inverse. Where obstacles can stop a free body,
-// the inverse knows how it deforms, and the response to rigid motions is added here.
+// The coarse unknowns y = A_c^-1 r, body by body. ROW_LANES invocations per row of the inverse. Where obstacles can stop a free body,
+// the inverse knows how it deforms, and the response to rigid motions is added here (0 of a body that is held).
 #include "solvers/newton/newton.glsl"
 #if RIGID_START
 #define PARTS_OF_ROW 7
@@ -39,17 +39,20 @@ float rigid_part(uint row, uint body, float g[6]) {
 void main() {
   uint lane = gl_LocalInvocationIndex, row = group_index() * (GROUP_SIZE / ROW_LANES) + lane / ROW_LANES;
   float sum = 0.0;
-  if (row < UNKNOWNS)
-    for (uint k = lane % ROW_LANES; k < COARSE_ROW; k += ROW_LANES) {
-      vec4 m = coarse_inverse[row * COARSE_ROW + k];
-      for (uint c = 0u; c < 4u; ++c) sum += m[c] * coarse_r[4u * k + c];
+  uint body = BODIES == 1u || row >= UNKNOWNS ? 0u : aggregate_bodies[row / 6u];
+  BodyRange range = range_of(body);
+  if (row < UNKNOWNS) {
+    uint first = 6u * range.first_aggregate, end = 6u * range.end_aggregate;
+    for (uint k = lane % ROW_LANES; k < range.coarse_row; k += ROW_LANES) {
+      vec4 m = coarse_inverse[range.coarse_at + (row - first) * range.coarse_row + k];
+      for (uint c = 0u; c < 4u; ++c)
+        if (first + 4u * k + c < end) sum += m[c] * coarse_r[first + 4u * k + c];
     }
+  }
   parts[0][lane] = sum;
 #if RIGID_START
-  uint body = row < UNKNOWNS ? aggregate_bodies[row / 6u] : 0u;
   float g[6] = float[6](0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-  for (uint k = lane % ROW_LANES; k < AGGREGATES && body > 0u; k += ROW_LANES)
-    if (aggregate_bodies[k] == body) add_force(k, body - 1u, g);
+  for (uint k = range.first_aggregate + lane % ROW_LANES; k < range.end_aggregate; k += ROW_LANES) add_force(k, body, g);
   for (int c = 0; c < 6; ++c) parts[1 + c][lane] = g[c];
 #endif
   barrier();
@@ -62,7 +65,7 @@ void main() {
   float y = parts[0][lane];
 #if RIGID_START
   for (int c = 0; c < 6; ++c) g[c] = parts[1 + c][lane];
-  if (body > 0u) y += rigid_part(row, body - 1u, g);
+  y += rigid_part(row, body, g);
 #endif
   coarse_y[row] = is_free[row / 6u] * y;
 }

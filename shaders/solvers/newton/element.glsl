@@ -1,10 +1,12 @@
 // Adds what a constraint has of an edge, its vertices number i and j: a block of the matrix and the force on i. The
-// energy is C^2 / (2 a); damping resists the rate of C by tau / a. Two components have an energy each.
+// energy is C^2 / (2 a); damping resists the rate of C by tau / a. Two components have an energy each. `start` is that
+// of an only body.
 void add_$KIND(uint number, uint start, int i, int j, inout mat3 block, inout vec3 force) {
   vec3 x[$ARITY];
   uvec4 ids = uvec4(0u);
   for (uint k = 0u; k < $ARITY; ++k) ids[k] = vertices_$KIND[number][k];
   begin_body(ids[0]);
+  if (BODIES > 1u) start = chosen_start(body_of(ids[0]));
   ivec4 first = start_at(start, ids[0]);
   for (uint k = 0u; k < $ARITY; ++k) x[k] = between(start_at(start, ids[k]), first);
 #if $COMPONENTS == 2

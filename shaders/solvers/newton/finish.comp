@@ -28,9 +28,8 @@ float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 resi
 // A body that sound crosses within a step hits something at speed: short substeps alone can follow that, and are to
 // begin before it does.
 void note_fast(uint i, DoubleSingle x, vec3 v) {
-  uint body = floatBitsToUint(at(REST, i).w);
   float step_length = params.look_ahead / LOOK_AHEAD;
-  bool stiff = body > 0u && bodies[body - 1u].w * step_length * step_length > 1.0;
+  bool stiff = bodies[body_of(i)].w * step_length * step_length > 1.0;
   if (!stiff) return;
   float fast = FINE(FAST_STEP * params.body_size) / step_length + 4.0 * step_length * length(params.gravity);
   for (int k = 0; k < obstacle_count(); ++k) {
@@ -39,16 +38,20 @@ void note_fast(uint i, DoubleSingle x, vec3 v) {
     if (met.distance < 0.0 && -dot(met.normal, nearing) > fast) atomicMin(least, floatBitsToUint(HEALTH_FAST));
   }
 }
+void note_convergence(uint body) {
+  Lengths l = lengths(phases, body);
+  float first = phases > 1u ? iterations[2u * body + ((phases - 1u) & 1u)].first_rz : l.rz;
+  if (!(first > 0.0)) first = l.rz;
+  if (dots[body].x > 0.0) atomicMax(largest, floatBitsToUint(first > 0.0 ? sqrt(l.rz / first) : 1.0));
+  if (phases == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
+}
 void main() {
-  Lengths l = Lengths(0.0, 0.0, 0.0, false);
-  if (phases > 0u) l = lengths(phases);
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
-  if (i == 0u && phases > 0u) {
-    float first = phases > 1u && first_rz > 0.0 ? first_rz : l.rz;
-    if (dots.x > 0.0) atomicMax(largest, floatBitsToUint(first > 0.0 ? sqrt(l.rz / first) : 1.0));
-    if (phases == 1u && dots.x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
-  }
+  if (i < BODIES && phases > 0u) note_convergence(i);
   if (i >= VERTICES) return;
+  uint body = body_of(i);
+  Lengths l = Lengths(0.0, 0.0, 0.0, false);
+  if (phases > 0u) l = lengths(phases, body);
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
   vec4 offset = at(OFFSET, i);
@@ -65,10 +68,9 @@ void main() {
     float load = 1.0;
     bool falls = !is_step_known(i);  // an explicit start of BDF2, of what nothing holds
     if (phases > 0u && FREE_BODIES > 0u) {
-      uint body = floatBitsToUint(at(REST, i).w);
       u = free + free_part(rigid_displacement(i, x, free), holds, i);
       u = kept_out(x, u);
-      if (body > 0u) load = motions[body - 1u].load, falls = falls && motions[body - 1u].held == 0.0;
+      load = motions[body].load, falls = falls && motions[body].held == 0.0;
     }
     v = (u - offset.xyz) / offset.w;
     if (falls) v += (0.5 * params.h) * params.gravity;

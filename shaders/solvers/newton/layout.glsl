@@ -13,7 +13,7 @@ const uint STEP = 8u;          // s, of Newton
 const uint INVERSE = 9u;       // of A's 3x3 block: xx, yy, zz; resistance to sliding, N/m
 const uint INVERSE2 = 10u;     // xy, xz, yz; bits of the obstacles on which it slides
 const uint PRODUCT = 11u;      // A z
-const uint REST = 12u;         // position; bits: 1 + number among free bodies, or 0
+const uint REST = 12u;         // position; bits: the number of the body
 const uint FRICTION = 13u;     // by obstacles, N; between steps 1 where it slips, within a step bits of what holds it
 const uint START = 14u;        // Newton's furthest start, where bodies start rigidly; 1: of a stiff body that is held
 const uint SLOTS = 15u;
@@ -24,9 +24,13 @@ const uint KNOWN = 0x80000000u;
 struct EdgeBlock {
   vec4 columns[3];
 };
-struct FreeBody {
-  uint first, end;  // of its vertices
-  float mass;       // kg
+// Bodies are solved apart: each has its own step lengths, start and coarse level.
+struct BodyRange {
+  uint first, end;    // of its vertices
+  uint first_group;   // of product.comp
+  uint tets;          // for which Newton's start is checked
+  uint first_aggregate, end_aggregate;
+  uint coarse_at, coarse_row;  // where its coarse inverse begins, and the length of a row, in vec4s
 };
 // An edge's use of a constraint, whose vertices i and j it joins; kinds are counted among those present.
 #define PACKED_USE(constraint, kind, i, j) ((constraint) << 7 | (kind) << 4 | (i) << 2 | (j))
@@ -42,11 +46,12 @@ struct FreeBody {
 #define SHARE_WEIGHT(share) ((share) & 65535u)
 #define WEIGHT_UNIT (1.0 / 65535.0)
 
-// What an iteration of conjugate gradients leaves to the next.
+// What an iteration of conjugate gradients leaves to a body's next.
 struct Iteration {
   float rz;  // r . z
   float alpha;
   uint coarse;  // 1: the coarse level takes part
+  float first_rz;  // r . z of the first iteration that was healthy
 };
 // The rigid motion that takes back momentum that nothing gave a free body (method.md eq. 43).
 struct BodyMotion {

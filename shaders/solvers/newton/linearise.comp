@@ -13,7 +13,7 @@ uint id_of(Ids ids, int j) { return ids[j]; }
 void main() {
   uint edge = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
   if (edge >= EDGES) return;
-  uint start = chosen_start(), end = first_use[edge + 1u];
+  uint start = chosen_start(0u), end = first_use[edge + 1u];
   mat3 block = mat3(0.0);
   vec3 force = vec3(0.0);
   for (uint k = first_use[edge]; k < end; ++k) {

@@ -115,14 +115,14 @@ void add_up() {
   }
 }
 // Adds the work-groups' sums up into `totals`, which are read side by side, because each takes long to arrive.
-void add_up_parts(uint body) {
+void add_up_parts(uint number) {
   const uint count = 4u * MOMENTUM_COLUMNS, at_once = AT_A_TIME * GROUP_SIZE / count;
   uint lane = gl_LocalInvocationIndex;
   float sum = 0.0;
   for (uint begin = 0u; begin < PARTS; begin += at_once) {
     uint here = min(at_once, PARTS - begin);
     for (uint k = lane; k < here * count; k += GROUP_SIZE) {
-      uint part = body * PARTS + begin + k / count;
+      uint part = number * PARTS + begin + k / count;
       cells[k / GROUP_SIZE][k % GROUP_SIZE] = momentum_sums[part].columns[k % count / 4u][k % 4u];
     }
     barrier();
@@ -189,7 +189,7 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
 #else
 // Adds what vertex i is short of to be at rest in its step, and how it resists.
 void add_vertex(uint i, uint body, DoubleSingle origin) {
-  Lengths l = lengths(phases);
+  Lengths l = lengths(phases, body);
   DoubleSingle x = position(i);
   vec4 aim = at(AIM, i);
   Advanced now = advanced(i, l);
@@ -227,9 +227,10 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
 #endif
 
 void main() {
-  uint lane = gl_LocalInvocationIndex, body = group_index() / PARTS, part = group_index() % PARTS;
-  if (body >= FREE_BODIES) return;
-  uint first = free_bodies[body].first, end = free_bodies[body].end, slice = (end - first + PARTS - 1u) / PARTS;
+  uint lane = gl_LocalInvocationIndex, number = group_index() / PARTS, part = group_index() % PARTS;
+  if (number >= FREE_BODIES) return;
+  uint body = free_bodies[number];
+  uint first = range_of(body).first, end = range_of(body).end, slice = (end - first + PARTS - 1u) / PARTS;
   DoubleSingle origin = position(first);
   for (int k = 0; k < 4 * MOMENTUM_COLUMNS; ++k) sums[k] = 0.0;
   for (uint i = first + part * slice + lane; i < min(first + (part + 1u) * slice, end); i += GROUP_SIZE)
@@ -240,12 +241,12 @@ void main() {
       momentum_sums[group_index()].columns[k / 4u][k % 4u] = totals[k];
     memoryBarrierBuffer();
     barrier();
-    if (lane == 0u) last = atomicAdd(parts_done[body], 1u) + 1u == PARTS;
+    if (lane == 0u) last = atomicAdd(parts_done[number], 1u) + 1u == PARTS;
     barrier();
     if (!last) return;
     memoryBarrierBuffer();
-    add_up_parts(body);
+    add_up_parts(number);
   }
   write_motion(body, origin);
-  if (lane == 0u) parts_done[body] = 0u;
+  if (lane == 0u) parts_done[number] = 0u;
 }

@@ -36,8 +36,10 @@ layout(std430) restrict readonly buffer Mesh {
   uvec4 shares[VERTICES];                 // PACKED_SHARE
   uint first_member[AGGREGATES + 1u];
   uvec2 members[max(MEMBERS, 1u)];  // vertex; weight in WEIGHT_UNITs
-  FreeBody free_bodies[max(FREE_BODIES, 1u)];
-  uint aggregate_bodies[max(AGGREGATES, 1u)];  // 1 + number among free bodies, or 0
+  BodyRange body_ranges[BODIES];
+  uint free_bodies[max(FREE_BODIES, 1u)];      // those of which no vertex is fixed
+  uint aggregate_bodies[max(AGGREGATES, 1u)];  // the body of each aggregate
+  uint group_bodies[PRODUCT_GROUPS];           // and of each work-group of product.comp
   // Each kind of constraint has vertices, rest values, a material's compliances, and a body's own damping.
   #foreach uvec$ARITY vertices_$KIND[max(COUNT_$KIND, 1u)];
   #foreach float values_$KIND[max($VALUESu * COUNT_$KIND, 1u)];
@@ -48,31 +50,37 @@ layout(std430) restrict readonly buffer Mesh {
 #define UNKNOWNS (6u * AGGREGATES)
 layout(std430) restrict readonly buffer Coarse {
   vec4 centres[max(AGGREGATES, 1u)];  // of mass at rest; reach
-  vec4 bodies[max(FREE_BODIES, 1u)];  // of each free body: centre of mass at rest; 1/s^2, stiffness over mass
-  vec4 coarse_inverse[];              // of the coarse matrix: rows of COARSE_ROW, filled up with zeros
+  vec4 bodies[BODIES];  // of each that is free: centre of mass at rest; 1/s^2, stiffness over mass
+  vec4 coarse_inverse[];              // of each body's coarse matrix: rows, filled up with zeros
 };
 
 // What is coherent is read by the last work-group to end, once it has counted the others.
 layout(std430) restrict buffer Sums {
   vec4 rotations[max(AGGREGATES, 1u)];  // quaternions
-  BodyMotion motions[max(FREE_BODIES, 1u)];
-  BodyResponse responses[max(FREE_BODIES, 1u)];
+  BodyMotion motions[BODIES];
+  BodyResponse responses[BODIES];  // 0 of one that is not free
   coherent MomentumSums momentum_sums[max(FREE_BODIES * PARTS, 1u)];
   coherent vec2 group_dots[PRODUCT_GROUPS];  // r . z and z . A z, by work-group of product.comp
-  vec2 dots;                        // their sums
-  Iteration iterations[2];          // this one and the last, by turns
-  float coarse_r[max(4u * COARSE_ROW, 1u)], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
+  vec2 dots[BODIES];                // their sums
+  Iteration iterations[2u * BODIES];  // of each body this one and the last, by turns
+  float coarse_r[UNKNOWNS + 3u], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
   float is_free[max(AGGREGATES, 1u)];  // 1: no obstacle holds the aggregate, else 0
-  float first_rz;                      // r . z of the first iteration that was healthy
-  uint bad_starts[3];                  // how many tets each start turns over or blows up
-  coherent uint products_done, parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
+  uint bad_starts[3u * BODIES];        // how many of a body's tets each start turns over or blows up
+  coherent uint products_done[BODIES], parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
 };
 
-// The furthest start that at most a hundredth of all tets cannot bear: contact crushes a few tets at any start, and
-// they recover.
-uint chosen_start() {
+// A body, and its range, cost no reading where there is only one.
+uint body_of(uint i) { return BODIES == 1u ? 0u : floatBitsToUint(at(REST, i).w); }
+BodyRange range_of(uint body) {
+  const uint row = (UNKNOWNS + 3u) / 4u;
+  return BODIES == 1u ? BodyRange(0u, VERTICES, 0u, TETS, 0u, AGGREGATES, 0u, row) : body_ranges[body];
+}
+// The furthest start that at most a hundredth of a body's tets cannot bear: contact crushes a few tets at any start,
+// and they recover.
+uint chosen_start(uint body) {
+  uint tets = range_of(body).tets;
   for (uint start = 0u; start < 3u; ++start)
-    if (100u * bad_starts[start] <= TETS) return start;
+    if (100u * bad_starts[3u * body + start] <= tets) return start;
   return 3u;
 }
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
@@ -89,7 +97,7 @@ vec3 kept_out(DoubleSingle x, vec3 u) {
   return u;
 }
 vec3 aimed(uint i) {
-  return start_fractions[chosen_start()] * at(RIGID_START == 1u && AT_START == 0 ? START : AIM, i).xyz;
+  return start_fractions[chosen_start(body_of(i))] * at(RIGID_START == 1u && AT_START == 0 ? START : AIM, i).xyz;
 }
 // Whether this step takes the vertex as one of a stiff body that something holds (is_held_stiff(), as the step began).
 bool began_stiff(uint i) { return RIGID_START == 1u && AT_START == 0 && at(START, i).w > 0.0; }
@@ -141,9 +149,8 @@ float friction_limit(uint i, uint touched) {
 }
 // The displacement by which the rigid motion of its body moves a vertex that has moved by u.
 vec3 rigid_displacement(uint i, DoubleSingle x, vec3 u) {
-  uint body = floatBitsToUint(at(REST, i).w);
-  if (body == 0u) return vec3(0.0);
-  BodyMotion m = motions[body - 1u];
+  if (FREE_BODIES == 0u) return vec3(0.0);
+  BodyMotion m = motions[body_of(i)];  // none, of a body that is not free
   vec3 arm = relative(x, DoubleSingle(m.centre_high, m.centre_low)) + u;
   vec3 q = m.turn.xyz;
   // Not the turned arm less the arm, a difference that would drop digits.
@@ -152,8 +159,8 @@ vec3 rigid_displacement(uint i, DoubleSingle x, vec3 u) {
 // Whether vertex i is of a body that obstacles push and that sound crosses within a few substeps. That is not followed,
 // and BDF2 would turn its history into energy.
 bool is_held_stiff(uint i) {
-  uint body = floatBitsToUint(at(REST, i).w);
-  return body > 0u && motions[body - 1u].held > 0.0 && bodies[body - 1u].w * params.h * params.h > STIFF_BODY;
+  uint body = body_of(i);
+  return FREE_BODIES > 0u && motions[body].held > 0.0 && bodies[body].w * params.h * params.h > STIFF_BODY;
 }
 uint touched_before(uint i) { return floatBitsToUint(at(DISPLACEMENT, i).w) & ~KNOWN; }
 uint held_by(uint i) { return floatBitsToUint(at(FRICTION, i).w); }
@@ -172,7 +179,7 @@ void add_up_columns() {
 }
 #endif
 
-// The step lengths of an iteration from its dot products (Chronopoulos and Gear 1989): p = z + beta p, s += alpha p.
+// The step lengths of a body's iteration from its dot products (Chronopoulos and Gear 1989): p = z + beta p, s += alpha p.
 struct Lengths {
   float alpha, beta;
   float rz;
@@ -180,9 +187,9 @@ struct Lengths {
 };
 // The first iteration of a healthy step has alpha near 1. Below LEAST_HEALTH the coarse level knows nothing of this
 // body, and is left out of the rest of the step.
-Lengths lengths(uint iteration) {
-  Iteration before = iterations[(iteration - 1u) & 1u];
-  float rz = dots.x, curvature = dots.y;
+Lengths lengths(uint iteration, uint body) {
+  Iteration before = iterations[2u * body + ((iteration - 1u) & 1u)];
+  float rz = dots[body].x, curvature = dots[body].y;
   Lengths l = Lengths(0.0, 0.0, rz, before.coarse != 0u);
   if (before.rz > 0.0) {
     l.beta = rz / before.rz;

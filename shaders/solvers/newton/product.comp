@@ -1,26 +1,31 @@
-// A z, row by row, and its dot products with r and z. LANES invocations per vertex; the last work-group to end adds all
-// dot products up, in the order of the rows.
+// A z, row by row, and its dot products with r and z. LANES invocations per vertex; work-groups are of one body, of
+// which the last to end adds the body's dot products up, in the order of the rows.
 #define COLUMNS 1
 #include "solvers/newton/newton.glsl"
 shared vec3 parts[GROUP_SIZE];
 shared bool last;
-void add_up() {
+void add_up(uint body, uint begin, uint end) {
   uint lane = gl_LocalInvocationIndex;
   memoryBarrierBuffer();
   vec2 sum = vec2(0.0);
-  for (uint k = lane; k < PRODUCT_GROUPS; k += GROUP_SIZE) sum += group_dots[k];
+  for (uint k = begin + lane; k < end; k += GROUP_SIZE) sum += group_dots[k];
   columns[0][lane] = vec4(sum, 0.0, 0.0);
   add_up_columns();
   if (lane == 0u) {
-    dots = columns[0][0].xy;
-    products_done = 0u;
+    dots[body] = columns[0][0].xy;
+    products_done[body] = 0u;
   }
 }
 
 void main() {
-  uint lane = gl_LocalInvocationIndex, i = group_index() * (GROUP_SIZE / LANES) + lane / LANES;
+  const uint rows = GROUP_SIZE / LANES;
+  uint lane = gl_LocalInvocationIndex, group = group_index();
+  if (group >= PRODUCT_GROUPS) return;
+  uint body = BODIES == 1u ? 0u : group_bodies[group];
+  BodyRange range = range_of(body);
+  uint i = range.first + (group - range.first_group) * rows + lane / LANES;
   vec3 sum = vec3(0.0), own = vec3(0.0);
-  if (i < VERTICES) {
+  if (i < range.end) {
     own = at(SEARCH, i).xyz;
     uint end = first_neighbour[i + 1u];
     for (uint k = first_neighbour[i] + lane % LANES; k < end; k += LANES) {
@@ -33,7 +38,7 @@ void main() {
   parts[lane] = sum;
   barrier();
   vec2 own_dots = vec2(0.0);
-  if (lane % LANES == 0u && i < VERTICES) {
+  if (lane % LANES == 0u && i < range.end) {
     for (uint k = 1u; k < LANES; ++k) sum += parts[lane + k];
     float inertia = at(AIM, i).w, slides = at(INVERSE, i).w;
     sum += inertia * own;
@@ -44,11 +49,12 @@ void main() {
   }
   columns[0][lane] = vec4(own_dots, 0.0, 0.0);
   add_up_columns();
+  uint groups = (range.end - range.first + rows - 1u) / rows;
   if (lane == 0u) {
-    if (group_index() < PRODUCT_GROUPS) group_dots[group_index()] = columns[0][0].xy;
+    group_dots[group] = columns[0][0].xy;
     memoryBarrierBuffer();
-    last = atomicAdd(products_done, 1u) + 1u == gl_NumWorkGroups.x * gl_NumWorkGroups.y;
+    last = atomicAdd(products_done[body], 1u) + 1u == groups;
   }
   barrier();
-  if (last) add_up();
+  if (last) add_up(body, range.first_group, range.first_group + groups);
 }

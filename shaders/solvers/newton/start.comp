@@ -8,7 +8,6 @@ uint id_of(Ids ids, int j) { return 0u; }
 #foreach #include "constraints/$KIND.glsl"
 #foreach #include "solvers/newton/rest.glsl"
 #foreach #include "solvers/newton/start_tet.glsl"
-shared uint bad_here[3];
 
 void turn(uint aggregate) {
   uint lane = gl_LocalInvocationIndex, first = first_member[aggregate], end = first_member[aggregate + 1u];
@@ -56,12 +55,6 @@ void main() {
     turn(group);
     return;
   }
-  uint c = (group - AGGREGATES) * GROUP_SIZE + lane, bad = 0u;
-  if (lane < 3u) bad_here[lane] = 0u;
-  barrier();
-  #foreach check_start_$KIND(c, bad);
-  for (uint start = 0u; start < 3u; ++start)
-    if ((bad & (1u << start)) != 0u) atomicAdd(bad_here[start], 1u);
-  barrier();
-  if (lane < 3u && bad_here[lane] > 0u) atomicAdd(bad_starts[lane], bad_here[lane]);
+  uint c = (group - AGGREGATES) * GROUP_SIZE + lane;
+  #foreach check_start_$KIND(c);
 }

@@ -1,5 +1,6 @@
-// Sets a bit of `bad` for each of the first three starts that turns tet c over or blows it up, of a kind that has tets.
-void check_start_$KIND(uint c, inout uint bad) {
+// Counts tet c among its body's bad ones for each of the first three starts that turns it over or blows it up, of a
+// kind that has tets.
+void check_start_$KIND(uint c) {
 #if $TETS
   if (c >= COUNT_$KIND) return;
   uvec$ARITY ids = vertices_$KIND[c];
@@ -14,7 +15,9 @@ void check_start_$KIND(uint c, inout uint bad) {
     if (start == 3u) {
       before = now;
       if (!(now > 0.0)) atomicMin(least, 0u);
-    } else if (!(now >= 0.3 * min(1.0, max(before, 0.0)) && now <= 2.0 * max(1.0, before))) bad |= 1u << start;
+    } else if (!(now >= 0.3 * min(1.0, max(before, 0.0)) && now <= 2.0 * max(1.0, before))) {
+      atomicAdd(bad_starts[3u * body_of(ids[0]) + start], 1u);
+    }
   }
 #endif
 }

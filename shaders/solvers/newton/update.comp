@@ -38,22 +38,28 @@ void restrict_to(uint aggregate, uint slot, Lengths l) {
   }
 }
 
+Lengths lengths_in(uint body) {
+  return phases > 0u ? lengths(phases, body) : Lengths(0.0, 0.0, 0.0, AGGREGATES > 0);
+}
+// Leaves a body's iteration to its next.
+void note(uint body, Lengths l) {
+  float first_rz = phases == 0u ? 0.0 : iterations[2u * body + ((phases - 1u) & 1u)].first_rz;
+  if (!(first_rz > 0.0)) first_rz = l.rz;
+  iterations[2u * body + (phases & 1u)] = Iteration(l.rz, l.alpha, l.coarse ? 1u : 0u, first_rz);
+  if (phases == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
+}
+
 void main() {
   uint group = group_index();
-  Lengths l = Lengths(0.0, 0.0, 0.0, AGGREGATES > 0);
-  if (phases > 0u) l = lengths(phases);
-  if (group == 0u && gl_LocalInvocationIndex == 0u) {
-    iterations[phases & 1u] = Iteration(l.rz, l.alpha, l.coarse ? 1u : 0u);
-    if (phases == 0u) first_rz = 0.0;
-    else if (!(first_rz > 0.0)) first_rz = l.rz;
-    if (phases == 1u && dots.x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
-  }
   if (group < AGGREGATES) {
-    restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, l);
+    restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, lengths_in(aggregate_bodies[group]));
     return;
   }
   uint i = (group - AGGREGATES) * GROUP_SIZE + gl_LocalInvocationIndex;
-  if (i >= VERTICES || phases == 0u || !(l.alpha > 0.0)) return;
+  if (i < BODIES) note(i, lengths_in(i));
+  if (i >= VERTICES || phases == 0u) return;
+  Lengths l = lengths_in(body_of(i));
+  if (!(l.alpha > 0.0)) return;
   Advanced now = advanced(i, l);
   put(DIRECTION, i, now.direction, 0.0);
   put(IMAGE, i, now.image, 0.0);

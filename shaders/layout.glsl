@@ -31,7 +31,7 @@ struct Record4 {
 #define MOST_TOUCHES 16      // contacts by which a hard body moves
 #define LEAST_HEALTH 0.1     // health below which mode newton takes shorter substeps (method.md, "Implicit steps")
 #define HEALTH_TURNING 0.05  // health at most where a part of a body turns further than TURN_LIMIT in a substep
-#define HEALTH_FAST 0.06     // health at most where a stiff body is about to hit something
+#define HEALTH_FAST 0.04     // health at most where a body of some stiffness is about to hit something
 #define LOOK_AHEAD 5.0       // steps: notes are read up to four later
 #define FAST_STEP 0.004      // of a body's size, by which a fast vertex comes nearer in a step
 #define TURN_LIMIT 0.15      // rad

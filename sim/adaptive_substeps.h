@@ -23,11 +23,12 @@ struct AdaptiveValues {
 
   // Mode newton: the residual before the last iteration over that at Newton's start, and the length of the first step
   // of conjugate gradients: near 1 where the coarse level represents the body, small where it is missing. It counts
-  // as 0 where a tet is inverted, as 0.05 where a part of a body turns by over 0.15 rad in a substep of the settings.
+  // as 0 where a tet is inverted, as HEALTH_TURNING and HEALTH_FAST say (shaders/layout.glsl).
   double residual = 0, largest_residual = 0;  ///< at the last readback, and the largest since the start
   double health = 1, least_health = 1;        ///< the length of that first step, and the least since the start
   int substep_factor = 1;                     ///< substeps for each one of the settings
   int refined_readbacks = 0;                  ///< readbacks since there are more, to notice that they do not help
+  int hard_readbacks = 0;                     ///< readbacks that Newton still takes two rounds
 };
 
 constexpr int refined_substeps = 4;  ///< the larger `substep_factor`

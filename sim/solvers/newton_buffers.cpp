@@ -32,6 +32,11 @@ std::size_t choose_aggregates(std::size_t vertices) {
   return std::size_t(std::clamp(std::min(1.3 * std::sqrt(count), count / 8), 1.0, double(most_aggregates)));
 }
 
+float mass_of(const Model& model, const Body& body) {
+  const auto first = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
+  return float(std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0));
+}
+
 std::size_t coarse_row(std::size_t aggregates) { return (6 * aggregates + 3) / 4; }
 
 }  // namespace
@@ -176,7 +181,8 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
   to.sums.add<float>("coarse_q", sizes.unknowns());
   to.sums.add<float>("coarse_y", sizes.unknowns());
   to.sums.add<float>("is_free", sizes.aggregates);
-  to.sums.add<std::uint32_t>("bad_starts", 3 * sizes.bodies);
+  to.sums.add<float>("first_rz", sizes.bodies);
+  to.sums.add<std::uint32_t>("bad_starts", 6 * sizes.bodies);
   to.sums.add<std::uint32_t>("products_done", sizes.bodies);
   to.sums.add<std::uint32_t>("parts_done", sizes.free_bodies);
   return to;
@@ -213,7 +219,8 @@ std::vector<std::byte> fill_newton_mesh(const SolverInput& input, const NewtonLe
     const std::size_t row = coarse_row(aggregates.of_body(b));
     body_ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices),
                            std::uint32_t(group_bodies.size()), std::uint32_t(body.tets), aggregates.first[b],
-                           aggregates.first[b + 1], std::uint32_t(coarse), std::uint32_t(row)});
+                           aggregates.first[b + 1], std::uint32_t(coarse), std::uint32_t(row),
+                           mass_of(input.model, body)});
     group_bodies.insert(group_bodies.end(), groups_of_rows(body.vertices, sizes.group), b);
     aggregate_bodies.insert(aggregate_bodies.end(), aggregates.of_body(b), b);
     coarse += 6 * aggregates.of_body(b) * row;
@@ -281,8 +288,8 @@ std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const Newton
   const BlockRows rows{levels.graph.neighbours, inertia, blocks};
   parallel_for(count, count < 8 ? count : 1, [&](std::size_t b) {
     const glm::dvec3 pivot(described[b]);
-    const bool rigid = std::ranges::binary_search(levels.free_bodies, std::uint32_t(b)) &&
-                       has_obstacles(input.model, input.settings);
+    const bool rigid =
+        std::ranges::binary_search(levels.free_bodies, std::uint32_t(b)) && has_obstacles(input.model, input.settings);
     inverses[b] = coarse_inverse(input.model, b, levels.aggregates, rows, rigid ? &pivot : nullptr);
   });
   std::vector<glm::vec4> contents(layout.coarse.bytes / sizeof(glm::vec4), glm::vec4(0)), centres;

@@ -34,8 +34,8 @@ struct NewtonSizes {
   bool rigid_start;            ///< whether obstacles can stop a free body
   std::size_t tets;            ///< constraints of the largest kind of tets, for which Newton's start is checked
   std::size_t unknowns() const { return 6 * aggregates; }
-  static constexpr std::size_t lanes = 4;                          ///< invocations for a row of the matrix
-  static constexpr std::size_t row_lanes = 32;                     ///< invocations for a row of the coarse matrix
+  static constexpr std::size_t lanes = 4;       ///< invocations for a row of the matrix
+  static constexpr std::size_t row_lanes = 32;  ///< invocations for a row of the coarse matrix
 };
 NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels);
 std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverInput& input);

@@ -12,8 +12,8 @@ using glm::uint;
 using glm::vec3;
 using glm::vec4;
 #include "shaders/solvers/newton/layout.glsl"
-static_assert(sizeof(EdgeBlock) == 48 && sizeof(BodyRange) == 32);
-static_assert(sizeof(Iteration) == 16 && sizeof(BodyMotion) == 64 && sizeof(MomentumSums) == 16 * MOMENTUM_COLUMNS);
+static_assert(sizeof(EdgeBlock) == 48 && sizeof(BodyRange) == 36);
+static_assert(sizeof(Iteration) == 12 && sizeof(BodyMotion) == 64 && sizeof(MomentumSums) == 16 * MOMENTUM_COLUMNS);
 }  // namespace newton
 
 struct NewtonGraph {

@@ -5,7 +5,7 @@ void main() {
   if (i < VERTICES) {
     put(DISPLACEMENT, i, vec3(0.0), 0.0);
     put(GAIN, i, vec3(0.0), 0.0);
-    put(FRICTION, i, vec3(0.0), 0.0);
+    put(LEFT, i, vec3(0.0), 0.0);
   }
   if (i < BODIES) motions[i] = BodyMotion(vec4(0.0, 0.0, 0.0, 1.0), vec3(0.0), 1.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
   if (i < AGGREGATES) rotations[i] = vec4(0.0, 0.0, 0.0, 1.0);

@@ -1,5 +1,6 @@
-// The coarse unknowns y = A_c^-1 r, body by body. ROW_LANES invocations per row of the inverse. Where obstacles can stop a free body,
-// the inverse knows how it deforms, and the response to rigid motions is added here (0 of a body that is held).
+// The coarse unknowns y = A_c^-1 r, body by body. ROW_LANES invocations per row of the inverse. Where obstacles can
+// stop a free body, the inverse knows how it deforms, and the response to rigid motions is added here (0 of a body that
+// is held).
 #include "solvers/newton/newton.glsl"
 #if RIGID_START
 #define PARTS_OF_ROW 7
@@ -46,13 +47,14 @@ void main() {
     for (uint k = lane % ROW_LANES; k < range.coarse_row; k += ROW_LANES) {
       vec4 m = coarse_inverse[range.coarse_at + (row - first) * range.coarse_row + k];
       for (uint c = 0u; c < 4u; ++c)
-        if (first + 4u * k + c < end) sum += m[c] * coarse_r[first + 4u * k + c];
+        if (BODIES == 1u || first + 4u * k + c < end) sum += m[c] * coarse_r[first + 4u * k + c];
     }
   }
   parts[0][lane] = sum;
 #if RIGID_START
   float g[6] = float[6](0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-  for (uint k = range.first_aggregate + lane % ROW_LANES; k < range.end_aggregate; k += ROW_LANES) add_force(k, body, g);
+  for (uint k = range.first_aggregate + lane % ROW_LANES; k < range.end_aggregate; k += ROW_LANES)
+    add_force(k, body, g);
   for (int c = 0; c < 6; ++c) parts[1 + c][lane] = g[c];
 #endif
   barrier();

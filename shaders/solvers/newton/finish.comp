@@ -20,7 +20,7 @@ float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 resi
   }
   if (touched != 0u) {
     vec3 velocity = obstacle_velocity(findLSB(touched), x);
-    rate += dot(friction_force(i, x, u, touched, at(INVERSE, i).w), velocity);
+    rate += dot(friction_force(at(FRICTION, i).xyz, i, x, u, touched, at(INVERSE, i).w), velocity);
   }
   return rate;
 }
@@ -29,7 +29,7 @@ float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 resi
 // begin before it does.
 void note_fast(uint i, DoubleSingle x, vec3 v) {
   float step_length = params.look_ahead / LOOK_AHEAD;
-  bool stiff = bodies[body_of(i)].w * step_length * step_length > 1.0;
+  bool stiff = bodies[body_of(i)].w * step_length * step_length > STIFF_BODY;
   if (!stiff) return;
   float fast = FINE(FAST_STEP * params.body_size) / step_length + 4.0 * step_length * length(params.gravity);
   for (int k = 0; k < obstacle_count(); ++k) {
@@ -38,20 +38,22 @@ void note_fast(uint i, DoubleSingle x, vec3 v) {
     if (met.distance < 0.0 && -dot(met.normal, nearing) > fast) atomicMin(least, floatBitsToUint(HEALTH_FAST));
   }
 }
+// A body's health, and what the iterations leave of the residual. One that starts as a rigid body starts so near to
+// where it will be that rounding and contact may leave more than there was.
 void note_convergence(uint body) {
-  Lengths l = lengths(phases, body);
-  float first = phases > 1u ? iterations[2u * body + ((phases - 1u) & 1u)].first_rz : l.rz;
-  if (!(first > 0.0)) first = l.rz;
-  if (dots[body].x > 0.0) atomicMax(largest, floatBitsToUint(first > 0.0 ? sqrt(l.rz / first) : 1.0));
-  if (phases == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
+  Lengths l = lengths(iteration(), body);
+  float first = first_rz[body] > 0.0 ? first_rz[body] : l.rz;
+  float left = first > 0.0 ? sqrt(l.rz / first) : 1.0;
+  if (dots[body].x > 0.0 && !is_stiff(body)) atomicMax(largest, floatBitsToUint(left));
+  if (iteration() == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
 }
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
-  if (i < BODIES && phases > 0u) note_convergence(i);
+  if (i < BODIES && iteration() > 0u) note_convergence(i);
   if (i >= VERTICES) return;
   uint body = body_of(i);
   Lengths l = Lengths(0.0, 0.0, 0.0, false);
-  if (phases > 0u) l = lengths(phases, body);
+  if (iteration() > 0u) l = lengths(iteration(), body);
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
   vec4 offset = at(OFFSET, i);
@@ -67,7 +69,7 @@ void main() {
     u = kept_out(x, free);
     float load = 1.0;
     bool falls = !is_step_known(i);  // an explicit start of BDF2, of what nothing holds
-    if (phases > 0u && FREE_BODIES > 0u) {
+    if (iteration() > 0u && FREE_BODIES > 0u) {
       u = free + free_part(rigid_displacement(i, x, free), holds, i);
       u = kept_out(x, u);
       load = motions[body].load, falls = falls && motions[body].held == 0.0;
@@ -90,7 +92,7 @@ void main() {
     slips = rubs && slides < 0.99 * grip * at(AIM, i).w;
     if (rubs && touched != 0u) {
       vec3 left = free_part(at(FRICTION, i).xyz, slid_on, i);
-      friction = mix(left, friction_force(i, x, u, slid_on, slides), slips ? 1.0 : kept_grip);
+      friction = mix(left, friction_force(at(FRICTION, i).xyz, i, x, u, slid_on, slides), slips ? 1.0 : kept_grip);
       friction *= min(1.0, obstacle_friction(findLSB(touched), i) * push / max(length(friction), 1e-30));
     }
 #if MOVING_SOLIDS
@@ -115,5 +117,5 @@ void main() {
 #endif
   put(DISPLACEMENT, i, displacement, uintBitsToFloat(touched | KNOWN));
   put(GAIN, i, gain, push);
-  put(FRICTION, i, friction, uintBitsToFloat(slips ? 1u : 0u));
+  put(LEFT, i, friction, slips ? 1.0 : 0.0);
 }

@@ -7,16 +7,17 @@ const uint DISPLACEMENT = 2u;  // of the last step; bits: a step is known, obsta
 const uint GAIN = 3u;          // of velocity in the last step; the force of obstacles, N
 const uint RESIDUAL = 4u;      // r
 const uint SEARCH = 5u;        // z = M^-1 r
-const uint DIRECTION = 6u;     // p
+const uint DIRECTION = 6u;     // p; this and the next two: slip_direction
 const uint IMAGE = 7u;         // q = A p
 const uint STEP = 8u;          // s, of Newton
 const uint INVERSE = 9u;       // of A's 3x3 block: xx, yy, zz; resistance to sliding, N/m
 const uint INVERSE2 = 10u;     // xy, xz, yz; bits of the obstacles on which it slides
 const uint PRODUCT = 11u;      // A z
 const uint REST = 12u;         // position; bits: the number of the body
-const uint FRICTION = 13u;     // by obstacles, N; between steps 1 where it slips, within a step bits of what holds it
+const uint FRICTION = 13u;     // by obstacles, N; bits of what holds the vertex
 const uint START = 14u;        // Newton's furthest start, where bodies start rigidly; 1: of a stiff body that is held
-const uint SLOTS = 15u;
+const uint LEFT = 15u;         // of friction by the last step, N; 1: the vertex slipped
+const uint SLOTS = 16u;
 const uint KNOWN = 0x80000000u;
 
 // An edge of the matrix: the columns of the block in its first vertex's row and second one's column. Their w are the
@@ -31,6 +32,7 @@ struct BodyRange {
   uint tets;          // for which Newton's start is checked
   uint first_aggregate, end_aggregate;
   uint coarse_at, coarse_row;  // where its coarse inverse begins, and the length of a row, in vec4s
+  float mass;                  // kg
 };
 // An edge's use of a constraint, whose vertices i and j it joins; kinds are counted among those present.
 #define PACKED_USE(constraint, kind, i, j) ((constraint) << 7 | (kind) << 4 | (i) << 2 | (j))
@@ -39,7 +41,10 @@ struct BodyRange {
 #define USE_I(use) int((use) >> 2 & 3u)
 #define USE_J(use) int((use) & 3u)
 #define MOST_CONSTRAINTS (1u << 25)  // of a kind
-#define STIFF_BODY 0.1  // stiffness over mass, in 1/h^2, above which a body that touches takes steps of implicit Euler
+// Stiffness over mass, in 1/h^2, above which a body starts as a rigid one, and takes steps of implicit Euler while it
+// touches something: sound crosses it within a few substeps, which BDF2 does not follow.
+#define STIFF_BODY 0.05
+#define AGAIN 65536u  // with an iteration: it is of a second round, which linearises where the first has ended
 // A vertex's share of an aggregate.
 #define PACKED_SHARE(aggregate, weight) ((aggregate) << 16 | (weight))
 #define SHARE_AGGREGATE(share) ((share) >> 16)
@@ -51,7 +56,6 @@ struct Iteration {
   float rz;  // r . z
   float alpha;
   uint coarse;  // 1: the coarse level takes part
-  float first_rz;  // r . z of the first iteration that was healthy
 };
 // The rigid motion that takes back momentum that nothing gave a free body (method.md eq. 43).
 struct BodyMotion {
@@ -61,7 +65,7 @@ struct BodyMotion {
   vec3 centre_high;
   float held;  // 1: an obstacle pushes the body
   vec3 centre_low;
-  float _2;
+  float whole;  // 1: before Newton starts, the whole motion of a body that starts as a rigid one
 };
 // How a free body that obstacles hold and rub against answers a force as a rigid one: 6x6, by rows, about an origin.
 struct BodyResponse {

@@ -87,7 +87,9 @@ void write_motion(uint body, DoubleSingle origin) {
   // At the start there is no residual to compare with.
   float load = good && dot(push, push) > 0.0 ? clamp(dot(need, push) / dot(push, push), 0.25, 4.0) : 1.0;
   float held = dot(push, push) > 0.0 ? 1.0 : 0.0;
-  motions[body] = BodyMotion(turn, good ? displacement : vec3(0.0), load, middle.high, held, middle.low, 0.0);
+  float is_whole = good && AT_START == 1 && is_stiff(body) ? 1.0 : 0.0;
+  displacement = good ? displacement : vec3(0.0);
+  motions[body] = BodyMotion(turn, displacement, load, middle.high, held, middle.low, is_whole);
 }
 
 float sums[4 * MOMENTUM_COLUMNS];
@@ -154,7 +156,13 @@ void add_block(vec3 arm, mat3 B) {
 // N/m, with which an obstacle resists a vertex: a tenth of a body's mass is about what touches of one that lies flat.
 float contact_stiffness(uint i, uint body) {
   float h = at(OFFSET, i).w, rate = bodies[body].w * h * h;
+  if (AT_START == 1 && is_stiff(body)) return 100.0 * range_of(body).mass / (h * h);
   return min(firm, 10.0 * rate) * at(AIM, i).w;
+}
+// N/m, with which an obstacle holds a vertex: also where one vertex bears a whole body.
+float holding_stiffness(uint i, uint body) {
+  float h = at(OFFSET, i).w, least = is_stiff(body) ? 100.0 * range_of(body).mass / (h * h) : 0.0;
+  return max(firm * at(AIM, i).w, least);
 }
 #if AT_START
 void add_vertex(uint i, uint body, DoubleSingle origin) {
@@ -166,8 +174,8 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
   float limit = friction_limit(i, touched);
   if (limit > 0.0) {
     // What slipped in the last step goes on so, and what stuck resists.
-    float sticks = held_by(i) != 0u ? 0.0 : grip * aim.w;
-    f += friction_force(i, x, u, touched, sticks);
+    float sticks = at(LEFT, i).w > 0.0 ? 0.0 : grip * aim.w;
+    f += friction_force(at(LEFT, i).xyz, i, x, u, touched, sticks);
     for (int c = 0; c < 3 && sticks > 0.0; ++c) B[c] += free_part(mat3(sticks)[c], touched, i);
   }
   float stiff = contact_stiffness(i, body);
@@ -179,6 +187,10 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
     B += outerProduct(plane.normal * stiff, plane.normal);
   }
   sums[PUSH_AT] += touched != 0u ? 1.0 : 0.0;
+  if (is_stiff(body)) {  // the whole motion, from where the body is
+    f += B * u;
+    arm -= u;
+  }
   add3(0u, f);
   sums[3] += aim.w;
   add3(4u, cross(arm, f));
@@ -189,7 +201,7 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
 #else
 // Adds what vertex i is short of to be at rest in its step, and how it resists.
 void add_vertex(uint i, uint body, DoubleSingle origin) {
-  Lengths l = lengths(phases, body);
+  Lengths l = lengths(iteration(), body);
   DoubleSingle x = position(i);
   vec4 aim = at(AIM, i);
   Advanced now = advanced(i, l);
@@ -199,8 +211,8 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
   uint holds = held_by(i), touched = floatBitsToUint(at(INVERSE2, i).w);
   float slides = at(INVERSE, i).w;
   if (friction_limit(i, touched) > 0.0) {
-    f += friction_force(i, x, u, touched, slides);
-    for (int c = 0; c < 3; ++c) B[c] += free_part(mat3(slides)[c], touched, i);
+    f += friction_force(at(FRICTION, i).xyz, i, x, u, touched, slides);
+    for (int c = 0; c < 3; ++c) B[c] += without(free_part(mat3(slides)[c], touched, i), slip_direction(i));
   }
   for (int k = 0; k < obstacle_count() && aim.w > 0.0; ++k) {
     bool held = (holds & (1u << k)) != 0u;
@@ -208,7 +220,7 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
     if (held) {  // What the obstacle bears is what the residual leaves along its normal.
       vec3 n = normal_of(k, i);
       f -= n * dot(n, now.residual);
-      B += outerProduct(n * (firm * aim.w), n);
+      B += outerProduct(n * holding_stiffness(i, body), n);
       add3(PUSH_AT, n * max(0.0, -dot(n, now.residual)));
     } else if (plane.distance < 0.0 || surface_ahead(k, x, aim.xyz, aim.xyz).distance < 0.0) {
       // Also what the start has moved out: without it the body would go back in.

@@ -12,6 +12,8 @@
 layout(local_size_x = GROUP_SIZE) in;
 
 #include "solvers/newton/layout.glsl"
+uint iteration() { return phases % AGAIN; }
+uint round_of_newton() { return phases / AGAIN; }
 layout(std430) restrict buffer Vectors { vec4 vectors[]; };  // by slot, then vertex
 vec4 at(uint slot, uint i) { return vectors[slot * VERTICES + i]; }
 void put(uint slot, uint i, vec3 v, float w) { vectors[slot * VERTICES + i] = vec4(v, w); }
@@ -65,7 +67,8 @@ layout(std430) restrict buffer Sums {
   Iteration iterations[2u * BODIES];  // of each body this one and the last, by turns
   float coarse_r[UNKNOWNS + 3u], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
   float is_free[max(AGGREGATES, 1u)];  // 1: no obstacle holds the aggregate, else 0
-  uint bad_starts[3u * BODIES];        // how many of a body's tets each start turns over or blows up
+  float first_rz[BODIES];              // r . z of a step's first iteration that was healthy
+  uint bad_starts[6u * BODIES];        // by round, how many of a body's tets each start turns over or blows up
   coherent uint products_done[BODIES], parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
 };
 
@@ -73,14 +76,16 @@ layout(std430) restrict buffer Sums {
 uint body_of(uint i) { return BODIES == 1u ? 0u : floatBitsToUint(at(REST, i).w); }
 BodyRange range_of(uint body) {
   const uint row = (UNKNOWNS + 3u) / 4u;
-  return BODIES == 1u ? BodyRange(0u, VERTICES, 0u, TETS, 0u, AGGREGATES, 0u, row) : body_ranges[body];
+  BodyRange only = BodyRange(0u, VERTICES, 0u, TETS, 0u, AGGREGATES, 0u, row, body_ranges[0].mass);
+  return BODIES == 1u ? only : body_ranges[body];
 }
+uint start_number(uint body, uint start) { return 3u * (round_of_newton() * BODIES + body) + start; }
 // The furthest start that at most a hundredth of a body's tets cannot bear: contact crushes a few tets at any start,
 // and they recover.
 uint chosen_start(uint body) {
   uint tets = range_of(body).tets;
   for (uint start = 0u; start < 3u; ++start)
-    if (100u * bad_starts[3u * body + start] <= tets) return start;
+    if (100u * bad_starts[start_number(body, start)] <= tets) return start;
   return 3u;
 }
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
@@ -97,7 +102,8 @@ vec3 kept_out(DoubleSingle x, vec3 u) {
   return u;
 }
 vec3 aimed(uint i) {
-  return start_fractions[chosen_start(body_of(i))] * at(RIGID_START == 1u && AT_START == 0 ? START : AIM, i).xyz;
+  bool placed = AT_START == 0 && (RIGID_START == 1u || round_of_newton() > 0u);
+  return start_fractions[chosen_start(body_of(i))] * at(placed ? START : AIM, i).xyz;
 }
 // Whether this step takes the vertex as one of a stiff body that something holds (is_held_stiff(), as the step began).
 bool began_stiff(uint i) { return RIGID_START == 1u && AT_START == 0 && at(START, i).w > 0.0; }
@@ -135,10 +141,15 @@ vec3 slid_by(uint i, DoubleSingle x, vec3 u, uint touched) {
 // Coulomb allows. Where it sticks, a part of the force stays for the next step, so that nothing creeps: a spring whose
 // damping is near the critical one, whatever the body's size.
 const float grip = 10.0, kept_grip = 0.25;
-// N, on vertex i where it moves by u and resists sliding by so much, which is 0 where it slips.
-vec3 friction_force(uint i, DoubleSingle x, vec3 u, uint touched, float resistance) {
-  vec3 force = free_part(at(FRICTION, i).xyz, touched, i);
-  return resistance > 0.0 ? force - resistance * slid_by(i, x, u, touched) : force;
+// The direction of the friction on a vertex that slips and whose start is taken for where it will be: friction keeps to
+// its limit that way, and resists sliding only across it. 0 of any other vertex.
+vec3 slip_direction(uint i) { return vec3(at(DIRECTION, i).w, at(IMAGE, i).w, at(STEP, i).w); }
+vec3 without(vec3 v, vec3 direction) { return v - direction * dot(direction, v); }
+// N, on vertex i where it moves by u, friction has left so much, and it resists sliding by so much.
+vec3 friction_force(vec3 left, uint i, DoubleSingle x, vec3 u, uint touched, float resistance) {
+  vec3 force = free_part(left, touched, i);
+  vec3 slip = AT_START == 1 ? vec3(0.0) : slip_direction(i);
+  return resistance > 0.0 ? force - resistance * without(slid_by(i, x, u, touched), slip) : force;
 }
 // N, the most that friction does on vertex i, by the last step's push (lagged: Li et al. 2020) and the first obstacle
 // that it touches.
@@ -156,12 +167,9 @@ vec3 rigid_displacement(uint i, DoubleSingle x, vec3 u) {
   // Not the turned arm less the arm, a difference that would drop digits.
   return m.displacement + 2.0 * cross(q, cross(q, arm) + m.turn.w * arm);
 }
-// Whether vertex i is of a body that obstacles push and that sound crosses within a few substeps. That is not followed,
-// and BDF2 would turn its history into energy.
-bool is_held_stiff(uint i) {
-  uint body = body_of(i);
-  return FREE_BODIES > 0u && motions[body].held > 0.0 && bodies[body].w * params.h * params.h > STIFF_BODY;
-}
+bool is_stiff(uint body) { return RIGID_START == 1u && bodies[body].w * params.h * params.h > STIFF_BODY; }
+// Whether vertex i is of a stiff body that obstacles push.
+bool is_held_stiff(uint i) { return is_stiff(body_of(i)) && motions[body_of(i)].held > 0.0; }
 uint touched_before(uint i) { return floatBitsToUint(at(DISPLACEMENT, i).w) & ~KNOWN; }
 uint held_by(uint i) { return floatBitsToUint(at(FRICTION, i).w); }
 
@@ -179,7 +187,8 @@ void add_up_columns() {
 }
 #endif
 
-// The step lengths of a body's iteration from its dot products (Chronopoulos and Gear 1989): p = z + beta p, s += alpha p.
+// The step lengths of a body's iteration from its dot products (Chronopoulos and Gear 1989): p = z + beta p,
+// s += alpha p.
 struct Lengths {
   float alpha, beta;
   float rz;

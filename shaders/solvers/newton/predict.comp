@@ -4,7 +4,7 @@
 #include "solvers/newton/starts.glsl"
 void main() {
   uint i = group_index() * GROUP_SIZE + gl_LocalInvocationIndex;
-  for (uint k = 0u; k < 3u && i < BODIES; ++k) bad_starts[3u * i + k] = 0u;
+  for (uint k = 0u; k < 6u && i < BODIES; ++k) bad_starts[6u * i + k] = 0u;
   if (i >= VERTICES) return;
   bool held = RIGID_START == 1u && is_held_stiff(i), known = is_step_known(i) && !held;
   vec3 aim = predict(i, known, known || held ? 1.0 : 0.5);

@@ -10,7 +10,7 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
   vec3 r = vec3(0.0);
   uint holds = 0u, touched = touched_before(i);
   float slides = 0.0;
-  vec3 left = at(FRICTION, i).xyz, friction = vec3(0.0);
+  vec3 left = at(LEFT, i).xyz, friction = vec3(0.0), slip = vec3(0.0);
   vec3 inverse_diagonal = vec3(0.0), inverse_across = vec3(0.0);
   if (aim.w > 0.0) {
     vec3 u = start_displacement(i, x);
@@ -20,35 +20,37 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
     float limit = friction_limit(i, touched);
     if (limit > 0.0) {
       slides = grip * aim.w;
-      friction = friction_force(i, x, u, touched, slides);
+      friction = free_part(left, touched, i) - slides * slid_by(i, x, u, touched);
       float force = length(friction);
       if (force > limit) {
         friction *= limit / force;
-        // A stiff body starts where it will be, so that what slips meets the whole limit. Of a soft one the solution
-        // moves a vertex against its friction yet, which therefore has to fall with that.
-        bool stiff = began_stiff(i);
-        slides = stiff ? 0.0 : slides * limit / force;
-        left = stiff ? friction : left * (limit / force);
+        // A stiff body starts where it will be, so that what slips meets the whole limit. Otherwise the solution moves
+        // a vertex against its friction yet, which therefore has to fall with that.
+        bool stiff = began_stiff(i) && round_of_newton() == 0u;
+        slides *= limit / force;
+        if (stiff) slip = friction / limit;
+        left = stiff ? friction + slides * without(slid_by(i, x, u, touched), slip) : left * (limit / force);
       }
       r += friction;
-      for (int c = 0; c < 3; ++c) D[c] += free_part(mat3(slides)[c], touched, i);
+      for (int c = 0; c < 3; ++c) D[c] += without(free_part(mat3(slides)[c], touched, i), slip);
     }
+    mat3 B = inverse(D);
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, aimed(i), u);
       // A rigid start moves a vertex out, and a turn may take it a little too far.
       float moved_out = max(0.0, dot(plane.normal, u - aim.xyz));
       bool there = plane.distance <= 2.0 * FINE_AT(params.quantum, i) + 0.1 * moved_out;
-      if (there && (dot(plane.normal, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
+      bool touches = (touched & (1u << k)) != 0u;
+      if (there && (dot(plane.normal, r) <= 0.0 || touches)) holds |= 1u << k;
     }
-    mat3 B = inverse(D);
     inverse_diagonal = vec3(B[0][0], B[1][1], B[2][2]);
     inverse_across = vec3(B[0][1], B[0][2], B[1][2]);
   }
   put(RESIDUAL, i, r, 0.0);
   put(FRICTION, i, left, uintBitsToFloat(holds));
-  put(DIRECTION, i, vec3(0.0), 0.0);
-  put(IMAGE, i, vec3(0.0), 0.0);
-  put(STEP, i, vec3(0.0), 0.0);
+  put(DIRECTION, i, vec3(0.0), slip.x);
+  put(IMAGE, i, vec3(0.0), slip.y);
+  put(STEP, i, vec3(0.0), slip.z);
   put(INVERSE, i, inverse_diagonal, slides);
   put(INVERSE2, i, inverse_across, uintBitsToFloat(touched));
 }

@@ -16,7 +16,7 @@ void check_start_$KIND(uint c) {
       before = now;
       if (!(now > 0.0)) atomicMin(least, 0u);
     } else if (!(now >= 0.3 * min(1.0, max(before, 0.0)) && now <= 2.0 * max(1.0, before))) {
-      atomicAdd(bad_starts[3u * body_of(ids[0]) + start], 1u);
+      atomicAdd(bad_starts[start_number(body_of(ids[0]), start)], 1u);
     }
   }
 #endif

@@ -39,30 +39,31 @@ void restrict_to(uint aggregate, uint slot, Lengths l) {
 }
 
 Lengths lengths_in(uint body) {
-  return phases > 0u ? lengths(phases, body) : Lengths(0.0, 0.0, 0.0, AGGREGATES > 0);
+  return iteration() > 0u ? lengths(iteration(), body) : Lengths(0.0, 0.0, 0.0, AGGREGATES > 0);
 }
 // Leaves a body's iteration to its next.
 void note(uint body, Lengths l) {
-  float first_rz = phases == 0u ? 0.0 : iterations[2u * body + ((phases - 1u) & 1u)].first_rz;
-  if (!(first_rz > 0.0)) first_rz = l.rz;
-  iterations[2u * body + (phases & 1u)] = Iteration(l.rz, l.alpha, l.coarse ? 1u : 0u, first_rz);
-  if (phases == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
+  iterations[2u * body + (iteration() & 1u)] = Iteration(l.rz, l.alpha, l.coarse ? 1u : 0u);
+  if (phases == 0u) first_rz[body] = 0.0;
+  else if (!(first_rz[body] > 0.0)) first_rz[body] = l.rz;
+  if (iteration() == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
 }
 
 void main() {
   uint group = group_index();
   if (group < AGGREGATES) {
-    restrict_to(group, phases == 0u ? RESIDUAL : PRODUCT, lengths_in(aggregate_bodies[group]));
+    restrict_to(group, iteration() == 0u ? RESIDUAL : PRODUCT, lengths_in(aggregate_bodies[group]));
     return;
   }
   uint i = (group - AGGREGATES) * GROUP_SIZE + gl_LocalInvocationIndex;
   if (i < BODIES) note(i, lengths_in(i));
-  if (i >= VERTICES || phases == 0u) return;
+  if (i >= VERTICES || iteration() == 0u) return;
   Lengths l = lengths_in(body_of(i));
   if (!(l.alpha > 0.0)) return;
   Advanced now = advanced(i, l);
-  put(DIRECTION, i, now.direction, 0.0);
-  put(IMAGE, i, now.image, 0.0);
-  put(STEP, i, now.step, 0.0);
+  vec3 slip = slip_direction(i);
+  put(DIRECTION, i, now.direction, slip.x);
+  put(IMAGE, i, now.image, slip.y);
+  put(STEP, i, now.step, slip.z);
   put(RESIDUAL, i, now.residual, 0.0);
 }

@@ -25,8 +25,8 @@ float work_rate(uint i, DoubleSingle x, vec3 free, vec3 u, uint holds, vec3 resi
   return rate;
 }
 #endif
-// A body that sound crosses within a step hits something at speed: short substeps alone can follow that, and are to
-// begin before it does.
+// A body that sound crosses within a few steps hits something at speed: short substeps alone can follow that, and are
+// to begin before it does.
 void note_fast(uint i, DoubleSingle x, vec3 v) {
   float step_length = params.look_ahead / LOOK_AHEAD;
   bool stiff = bodies[body_of(i)].w * step_length * step_length > STIFF_BODY;

@@ -52,8 +52,8 @@ layout(std430) restrict readonly buffer Mesh {
 #define UNKNOWNS (6u * AGGREGATES)
 layout(std430) restrict readonly buffer Coarse {
   vec4 centres[max(AGGREGATES, 1u)];  // of mass at rest; reach
-  vec4 bodies[BODIES];  // of each that is free: centre of mass at rest; 1/s^2, stiffness over mass
-  vec4 coarse_inverse[];              // of each body's coarse matrix: rows, filled up with zeros
+  vec4 bodies[BODIES];      // of each that is free: centre of mass at rest; 1/s^2, stiffness over mass
+  vec4 coarse_inverse[];    // of each body's coarse matrix: rows, filled up with zeros
 };
 
 // What is coherent is read by the last work-group to end, once it has counted the others.
@@ -63,7 +63,7 @@ layout(std430) restrict buffer Sums {
   BodyResponse responses[BODIES];  // 0 of one that is not free
   coherent MomentumSums momentum_sums[max(FREE_BODIES * PARTS, 1u)];
   coherent vec2 group_dots[PRODUCT_GROUPS];  // r . z and z . A z, by work-group of product.comp
-  vec2 dots[BODIES];                // their sums
+  vec2 dots[BODIES];                  // their sums
   Iteration iterations[2u * BODIES];  // of each body this one and the last, by turns
   float coarse_r[UNKNOWNS + 3u], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
   float is_free[max(AGGREGATES, 1u)];  // 1: no obstacle holds the aggregate, else 0

@@ -34,15 +34,14 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
       r += friction;
       for (int c = 0; c < 3; ++c) D[c] += without(free_part(mat3(slides)[c], touched, i), slip);
     }
-    mat3 B = inverse(D);
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, aimed(i), u);
       // A rigid start moves a vertex out, and a turn may take it a little too far.
       float moved_out = max(0.0, dot(plane.normal, u - aim.xyz));
       bool there = plane.distance <= 2.0 * FINE_AT(params.quantum, i) + 0.1 * moved_out;
-      bool touches = (touched & (1u << k)) != 0u;
-      if (there && (dot(plane.normal, r) <= 0.0 || touches)) holds |= 1u << k;
+      if (there && (dot(plane.normal, r) <= 0.0 || (touched & (1u << k)) != 0u)) holds |= 1u << k;
     }
+    mat3 B = inverse(D);
     inverse_diagonal = vec3(B[0][0], B[1][1], B[2][2]);
     inverse_across = vec3(B[0][1], B[0][2], B[1][2]);
   }

@@ -24,7 +24,7 @@ void turn(uint aggregate) {
   }
   for (int c = 0; c < 3; ++c) columns[c][lane] = vec4(A[c], mass);
   add_up_columns();
-  if (lane != 0u) return;
+  if (lane != 0u || columns[0][0].w <= 0.0) return;  // Smoothing may leave an aggregate without a member.
   vec4 before = rotations[aggregate], q = before;
   // Where the vertices lie on a line, this keeps the rotation about it as it was.
   float small = 0.02 * columns[0][0].w * centre.w * centre.w;

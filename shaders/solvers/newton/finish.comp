@@ -64,7 +64,8 @@ void main() {
   float push = 0.0, work = velocities[i].work;
   if (own.inverse_mass > 0.0) {
     uint holds = held_by(i);
-    Advanced last = advanced(i, l);
+    Advanced last = Advanced(vec3(0.0), vec3(0.0), vec3(0.0), at(RESIDUAL, i).xyz);  // of no iteration
+    if (iteration() > 0u) last = advanced(i, l);
     vec3 free = start_displacement(i, x) + last.step;
     u = kept_out(x, free);
     float load = 1.0;

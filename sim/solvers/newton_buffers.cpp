@@ -32,12 +32,25 @@ std::size_t choose_aggregates(std::size_t vertices) {
   return std::size_t(std::clamp(std::min(1.3 * std::sqrt(count), count / 8), 1.0, double(most_aggregates)));
 }
 
-float mass_of(const Model& model, const Body& body) {
+double body_mass(const Model& model, const Body& body) {
   const auto first = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
-  return float(std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0));
+  return std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0);
 }
 
-std::size_t coarse_row(std::size_t aggregates) { return (6 * aggregates + 3) / 4; }
+// Where each body's vertices, work-groups, aggregates and coarse inverse are.
+std::vector<newton::BodyRange> make_body_ranges(const Model& model, const Aggregates& aggregates, std::size_t group) {
+  std::vector<newton::BodyRange> ranges;
+  std::size_t groups = 0, coarse = 0;
+  for (std::size_t b = 0; b < model.bodies.size(); ++b) {
+    const Body& body = model.bodies[b];
+    const std::size_t unknowns = 6 * aggregates.of_body(b), row = (unknowns + 3) / 4;
+    ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices),
+                      std::uint32_t(groups), std::uint32_t(body.tets), aggregates.first[b], aggregates.first[b + 1],
+                      std::uint32_t(coarse), std::uint32_t(row), float(body_mass(model, body))});
+    groups += groups_of_rows(body.vertices, group), coarse += unknowns * row;
+  }
+  return ranges;
+}
 
 }  // namespace
 
@@ -59,13 +72,10 @@ NewtonLevels build_newton_levels(const Model& model, const ConstraintSystem& sys
 NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels) {
   const std::size_t group = std::max<std::size_t>(tuned({0, 128}, input.tuning).group, NewtonSizes::row_lanes);
   const std::vector<Body>& bodies = input.model.bodies;
-  std::size_t largest = 0, tets = 0, product_groups = 0, coarse = 0;
+  const std::vector<newton::BodyRange> ranges = make_body_ranges(input.model, levels.aggregates, group);
+  const newton::BodyRange last = ranges.empty() ? newton::BodyRange{} : ranges.back();
+  std::size_t largest = 0, tets = 0;
   for (const std::uint32_t b : levels.free_bodies) largest = std::max(largest, bodies[b].vertices);
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const std::size_t aggregates = levels.aggregates.of_body(b);
-    product_groups += groups_of_rows(bodies[b].vertices, group);
-    coarse += 6 * aggregates * coarse_row(aggregates);
-  }
   for (std::size_t k = 0; k < kind_count; ++k)
     if (constraint_kinds[k].tet) tets = std::max(tets, input.system.lists[k].count());
   return {.vertices = input.model.positions.size(),
@@ -75,9 +85,9 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
           .aggregates = levels.aggregates.all.size(),
           .bodies = bodies.size(),
           .free_bodies = levels.free_bodies.size(),
-          .coarse = coarse,
+          .coarse = last.coarse_at + 6 * (last.end_aggregate - last.first_aggregate) * last.coarse_row,
           .group = group,
-          .product_groups = product_groups,
+          .product_groups = last.first_group + groups_of_rows(last.end - last.first, group),
           .parts = std::clamp<std::size_t>((largest + 127) / 128, 1, 32),
           .rigid_start = !levels.free_bodies.empty() && has_obstacles(input.model, input.settings),
           .tets = tets};
@@ -113,15 +123,13 @@ std::vector<float> stiffness_shares(const Model& model, const Settings& settings
   std::vector<float> shares;
   for (const Body& body : model.bodies) {
     const Material& material = body_material(body, settings);
-    const auto mass = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
-    const double all = std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0);
     const double size = body_bounds(body, model.rest.positions).size();
     double volume = 0;
     for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)
       volume += tet_volume(model.rest, model.rest.tets[t]);
     const Lame m = lame(material.young_modulus, material.poisson_ratio);
     const double stiffness = has_energy(material) ? 3 * (m.lambda + 2 * m.mu) * volume / (size * size) : 0;
-    shares.push_back(float(std::min(1.0, most * all / (stiffness * h * h))));
+    shares.push_back(float(std::min(1.0, most * body_mass(model, body) / (stiffness * h * h))));
   }
   return std::ranges::all_of(shares, [](float share) { return share == 1; }) ? std::vector<float>{} : shares;
 }
@@ -191,7 +199,9 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
 std::vector<glm::vec4> fill_newton_vectors(const Model& model, const NewtonBuffers& layout) {
   std::vector<glm::vec4> vectors(layout.vectors.bytes / sizeof(glm::vec4), glm::vec4(0)), rest;
   for (const glm::dvec3& x : model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
-  for (std::size_t v = 0; v < rest.size(); ++v) rest[v].w = std::bit_cast<float>(std::uint32_t(body_of(model, v)));
+  for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
+    for (std::size_t k = 0; k < model.bodies[b].vertices; ++k)
+      rest[model.bodies[b].first_vertex + k].w = std::bit_cast<float>(b);
   put(std::as_writable_bytes(std::span(vectors)), layout.slots[newton::REST], rest);
   return vectors;
 }
@@ -211,19 +221,10 @@ std::vector<std::byte> fill_newton_mesh(const SolverInput& input, const NewtonLe
   for (const auto& [a, b, c, d] : aggregates.of_vertex) shares.push_back({pack(a), pack(b), pack(c), pack(d)});
   for (const std::uint32_t m : aggregates.members.values)
     members.push_back({m / 4, aggregates.of_vertex[m / 4][m % 4].weight});
-  std::vector<newton::BodyRange> body_ranges;
   std::vector<std::uint32_t> group_bodies, aggregate_bodies;
-  std::size_t coarse = 0;
   for (std::uint32_t b = 0; b < input.model.bodies.size(); ++b) {
-    const Body& body = input.model.bodies[b];
-    const std::size_t row = coarse_row(aggregates.of_body(b));
-    body_ranges.push_back({std::uint32_t(body.first_vertex), std::uint32_t(body.first_vertex + body.vertices),
-                           std::uint32_t(group_bodies.size()), std::uint32_t(body.tets), aggregates.first[b],
-                           aggregates.first[b + 1], std::uint32_t(coarse), std::uint32_t(row),
-                           mass_of(input.model, body)});
-    group_bodies.insert(group_bodies.end(), groups_of_rows(body.vertices, sizes.group), b);
+    group_bodies.insert(group_bodies.end(), groups_of_rows(input.model.bodies[b].vertices, sizes.group), b);
     aggregate_bodies.insert(aggregate_bodies.end(), aggregates.of_body(b), b);
-    coarse += 6 * aggregates.of_body(b) * row;
   }
   std::vector<std::byte> contents(layout.mesh.bytes);
   put(contents, layout.first_use, graph.first_use);
@@ -233,7 +234,7 @@ std::vector<std::byte> fill_newton_mesh(const SolverInput& input, const NewtonLe
   put(contents, layout.shares, shares);
   put(contents, layout.first_member, aggregates.members.first);
   put(contents, layout.members, members);
-  put(contents, layout.body_ranges, body_ranges);
+  put(contents, layout.body_ranges, make_body_ranges(input.model, aggregates, sizes.group));
   put(contents, layout.free_bodies, free_bodies);
   put(contents, layout.aggregate_bodies, aggregate_bodies);
   put(contents, layout.group_bodies, group_bodies);
@@ -255,12 +256,13 @@ std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& 
   const Grouped& neighbours = levels.graph.neighbours;
   for (const std::uint32_t b : levels.free_bodies) {
     const std::size_t first = model.bodies[b].first_vertex, end = first + model.bodies[b].vertices;
-    double stiffness = 0, mass = 0;  // N m; kg
+    const double mass = body_mass(model, model.bodies[b]);
+    double stiffness = 0;  // N m
     glm::dvec3 centre{0};
     Bounds box{model.rest.positions[first], model.rest.positions[first]};
     for (std::size_t v = first; v < end; ++v) {
       const glm::dvec3& x = model.rest.positions[v];
-      centre += model.masses[v] * x, mass += model.masses[v];
+      centre += model.masses[v] * x;
       box = {glm::min(box.low, x), glm::max(box.high, x)};
       for (std::size_t n = neighbours.first[v]; n < neighbours.first[v + 1]; ++n) {
         const glm::dvec3 edge = model.rest.positions[neighbours.values[n]] - x;

@@ -153,16 +153,20 @@ void add_block(vec3 arm, mat3 B) {
     for (int j = i; j < 6; ++j) sums[at++] += dot(b, n[j]);
   }
 }
+// N/m, with which an obstacle holds a stiff body: also where one vertex bears all of it.
+float body_stiffness(uint i, uint body) {
+  float h = at(OFFSET, i).w;
+  return 100.0 * range_of(body).mass / (h * h);
+}
 // N/m, with which an obstacle resists a vertex: a tenth of a body's mass is about what touches of one that lies flat.
 float contact_stiffness(uint i, uint body) {
+  if (AT_START == 1 && is_stiff(body)) return body_stiffness(i, body);
   float h = at(OFFSET, i).w, rate = bodies[body].w * h * h;
-  if (AT_START == 1 && is_stiff(body)) return 100.0 * range_of(body).mass / (h * h);
   return min(firm, 10.0 * rate) * at(AIM, i).w;
 }
-// N/m, with which an obstacle holds a vertex: also where one vertex bears a whole body.
+// N/m, with which an obstacle holds a vertex.
 float holding_stiffness(uint i, uint body) {
-  float h = at(OFFSET, i).w, least = is_stiff(body) ? 100.0 * range_of(body).mass / (h * h) : 0.0;
-  return max(firm * at(AIM, i).w, least);
+  return max(firm * at(AIM, i).w, is_stiff(body) ? body_stiffness(i, body) : 0.0);
 }
 #if AT_START
 void add_vertex(uint i, uint body, DoubleSingle origin) {

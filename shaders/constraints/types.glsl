@@ -137,9 +137,15 @@ Multiplier2 multiplier(Constraint4x2 c, real w[4], real max_correction, real a[2
   m.guards = c.guards | (!number ? GUARD_NOT_FINITE : beyond ? GUARD_LIMIT : 0u);
   return m;
 }
-// b of method.md eq. 39b, times h^2. That of a tet that is turned over or nearly flat counts twice, for the curvature
-// of its volume.
-real stiffness_bound(Constraint4x2 c, real w[4], const real a[2]) {
+// b of method.md eq. 39b, times h^2. A stretched edge also resists being turned, in two directions, and edges of a
+// squeezed body come to lie side by side. A tet that is turned over or nearly flat counts twice, for the curvature of
+// its volume.
+real stiffness_bound(Constraint2 c, vec3 x[2], real w[2], real a) {
+  real l = length(x[0] - x[1]);
+  return weighted(c, w).sum / a * (real(1) + real(2) * abs(c.C) / max(max(l, l - c.C), real(1e-30)));
+}
+real stiffness_bound(Constraint4 c, vec3 x[4], real w[4], real a) { return weighted(c, w).sum / a; }
+real stiffness_bound(Constraint4x2 c, vec3 x[4], real w[4], const real a[2]) {
   real b = real(0);
   for (int j = 0; j < 4; ++j)
     b += w[j] * (dot(c.gradient[0][j], c.gradient[0][j]) / a[0] + dot(c.gradient[1][j], c.gradient[1][j]) / a[1]);

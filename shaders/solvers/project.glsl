@@ -30,6 +30,9 @@ void project_$KIND(uint number, uint owned) {
 #else
   float a = params.compliance[$KIND_ROW][$KIND_COLUMN];
 #endif
+#if !$RATE
+  NOTE_STIFFNESS(stiffness_bound(c, x, w, a));
+#endif
   float before = last_multiplier(number), share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
   if (gamma > 0.0) {
     vec3 start[$ARITY];
@@ -51,9 +54,6 @@ void project_$KIND(uint number, uint owned) {
   Multiplier m = multiplier(c, w, k, FINE(params.max_correction), a, share);
 #if COMPLIANT
   keep_multiplier(number, before + m.lambda);
-#endif
-#if !$RATE
-  NOTE_STIFFNESS(weighted(c, w).sum / a);
 #endif
   count_guards(record.x, owned, m.guards);
   for (int j = 0; j < $ARITY && m.lambda != 0.0; ++j)

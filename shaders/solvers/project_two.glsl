@@ -21,7 +21,7 @@ void project_$KIND(uint number, uint owned) {
   }
   Multiplier2 m = multiplier(c, w, FINE(params.max_correction), a, params.share);
   for (uint k = 0u; k < 2u; ++k) keep_multiplier(number + k, before[k] + m.lambda[k]);
-  NOTE_STIFFNESS(stiffness_bound(c, w, a));
+  NOTE_STIFFNESS(stiffness_bound(c, x, w, a));
   count_guards(ids, owned, m.guards);
   for (int j = 0; j < 4; ++j)
     add_correction(local_id(ids, j), owned, w[j] * (m.lambda[0] * c.gradient[0][j] + m.lambda[1] * c.gradient[1][j]));

@@ -195,9 +195,9 @@ double stiffest_constraint(const ReferenceInput& input, const Compliances& compl
       const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
       Formulas<double> formulas;
       if constexpr (kind.row.components == 2)
-        stiffest = std::max(stiffest, formulas.stiffness_bound(value, weights.data(), alpha(c)));
+        stiffest = std::max(stiffest, formulas.stiffness_bound(value, x.data(), weights.data(), alpha(c)));
       else
-        stiffest = std::max(stiffest, formulas.weighted(value, weights.data()).sum / *alpha(c));
+        stiffest = std::max(stiffest, formulas.stiffness_bound(value, x.data(), weights.data(), *alpha(c)));
     }
   });
   return stiffest;

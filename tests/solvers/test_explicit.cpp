@@ -126,14 +126,18 @@ TEST_CASE("explicit: substeps are stable where a body is stretched, squeezed, sh
   GlTest gl;
   const glm::dmat3 shear(1, 0, 0, 2, 1, 0, 0, 0, 1);
   const auto along = [](double x, double y, double z) { return glm::dmat3(x, 0, 0, 0, y, 0, 0, 0, z); };
-  for (const double nu : {0.3, 0.45, 0.49})
+  for (const auto& [material, nu] :
+       {std::pair("springs", 0.25), std::pair("springs", 0.45), std::pair("neo-hookean", 0.3),
+        std::pair("neo-hookean", 0.45), std::pair("neo-hookean", 0.49)})
     for (const glm::dmat3& by : {glm::dmat3(1), along(3, 1, 1), along(3, 0.58, 0.58), along(0.25, 1, 1),
                                  along(0.25, 2, 2), along(1, 0.25, 0.25), along(3, 3, 3), along(1, 3, 3),
                                  along(1.3, 1, 1), along(-1, 1, 1), along(-0.25, 1, 1), shear}) {
+      if (material == std::string("springs") && by[0].x < 0) continue;  // what volumes resist then is not counted
+      CAPTURE(material);
       CAPTURE(nu);
       CAPTURE(by[0].x);
       CAPTURE(by[1].y);
-      Settings settings = soft("neo-hookean", 0);
+      Settings settings = soft(material, 0);
       settings.stability = 0.9, settings.poisson_ratio = nu, settings.mass_scaling = 0;
       settings.dt = 0.02;  // so many substeps that rounding up leaves no reserve
       auto model = std::make_shared<Model>(*irregular_block(5, false));

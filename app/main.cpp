@@ -408,7 +408,7 @@ void add_commands(CLI::App& app, Arguments& a) {
         return a.mesh_repaired.empty() ? run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json)
                                        : run_repair(a.mesh_file, a.mesh_repaired);
       });
-  add(mesh, "file", a.mesh_file, ".ply .obj .stl .off (surface), .node .ele .msh (tetrahedra)")->required();
+  add(mesh, "file", a.mesh_file, mesh_formats)->required();
   add_tetgen(mesh, a.switches);
   add(mesh, "--out", a.mesh_out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
   add(mesh, "--repair", a.mesh_repaired, "mend the surface as far as that is safe, and write it: .ply .obj .off .stl");

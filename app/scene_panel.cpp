@@ -144,8 +144,9 @@ void draw_scene(Session& s) {
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
   bool load_it = ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
   end_row(s, "mesh",
-          "a scene (.json), or a mesh in place of this scene's first body: .ply .obj .stl .off surfaces, "
-          ".node/.ele .msh tetrahedra. A file can also be dropped onto the window");
+          fmt::format("a scene (.json), or a mesh in place of this scene's first body: {}. A file can also be "
+                      "dropped onto the window",
+                      mesh_formats));
   ImGui::SameLine();
   load_it |= button(s, "Load", "load", "opens the file of this path");
   if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);

@@ -27,6 +27,8 @@ using Polygon = std::vector<std::uint32_t>;
 struct Polygons {
   std::vector<glm::dvec3> positions;
   std::vector<Polygon> faces;
+  std::vector<std::size_t> lines{};  ///< of each face, for errors; none where there are no lines
+  std::uint32_t first = 0;           ///< the number of the first vertex and face
 };
 
 // A number that is no index becomes an index out of range.
@@ -43,6 +45,7 @@ Polygons read_off(const fs::path& file) {
   Polygons mesh;
   text.lines(vertices, "vertex", [&] { mesh.positions.push_back(text.position()); });
   text.lines(faces, "face", [&] {
+    mesh.lines.push_back(text.line_number());
     Polygon& face = mesh.faces.emplace_back(text.count("number of corners"));
     for (std::uint32_t& v : face) v = corner(double(text.integer("corner of the face")));
   });
@@ -52,10 +55,12 @@ Polygons read_off(const fs::path& file) {
 Polygons read_obj(const fs::path& file) {
   TextFile text(file, '#');
   Polygons mesh;
+  mesh.first = 1;
   while (text.next_line()) {
     const std::string_view keyword = text.word("keyword");
     if (keyword == "v") mesh.positions.push_back(text.position());
     if (keyword != "f") continue;
+    mesh.lines.push_back(text.line_number());
     Polygon& face = mesh.faces.emplace_back();
     while (text.more()) {
       const std::string_view word = text.word("corner of the face");  // "3", "3/1", "3//2", "-1"
@@ -106,25 +111,8 @@ Polygons read_stl(const fs::path& file) {
   return mesh;
 }
 
-template <class T>
-double read_value(const char* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return double(value);
-}
-struct PlyType {
-  std::string_view name, other_name;
-  std::size_t size;
-  double (*value)(const char*);
-};
-constexpr PlyType ply_types[] = {
-    {"char", "int8", 1, read_value<std::int8_t>},    {"uchar", "uint8", 1, read_value<std::uint8_t>},
-    {"short", "int16", 2, read_value<std::int16_t>}, {"ushort", "uint16", 2, read_value<std::uint16_t>},
-    {"int", "int32", 4, read_value<std::int32_t>},   {"uint", "uint32", 4, read_value<std::uint32_t>},
-    {"float", "float32", 4, read_value<float>},      {"double", "float64", 8, read_value<double>}};
-
 struct PlyProperty {
-  const PlyType *length, *type;  // `length`: of a list's length; null for a single value
+  const NumberType *length, *type;  // `length`: of a list's length; null for a single value
   std::string name;
 };
 struct PlyElement {
@@ -135,8 +123,7 @@ struct PlyElement {
 
 std::vector<PlyElement> read_ply_head(TextFile& text, std::string& format) {
   const auto type = [&](std::string_view name) {
-    for (const PlyType& type : ply_types)
-      if (name == type.name || name == type.other_name) return &type;
+    if (const NumberType* found = find_number_type(name)) return found;
     text.fail(fmt::format("'{}' is no type of PLY", name.substr(0, 40)));
   };
   std::vector<PlyElement> elements;
@@ -153,8 +140,8 @@ std::vector<PlyElement> read_ply_head(TextFile& text, std::string& format) {
       elements.push_back({name, text.count("number of elements"), {}});
     } else if (keyword == "property" && !elements.empty()) {
       const std::string_view word = text.word("type");
-      const PlyType* length = word == "list" ? type(text.word("type")) : nullptr;
-      const PlyType* each = type(length ? text.word("type") : word);
+      const NumberType* length = word == "list" ? type(text.word("type")) : nullptr;
+      const NumberType* each = type(length ? text.word("type") : word);
       elements.back().properties.push_back({length, each, std::string(text.word("name"))});
     } else if (keyword != "comment" && keyword != "obj_info") {
       text.fail("line is not understood");
@@ -166,19 +153,14 @@ Polygons read_ply(const fs::path& file) {
   TextFile text(file);
   std::string format;
   const std::vector<PlyElement> elements = read_ply_head(text, format);
-  if (format != "ascii" && format != "binary_little_endian" && format != "binary_big_endian")
+  const bool little = format == "binary_little_endian";
+  if (format != "ascii" && !little && format != "binary_big_endian")
     text.fail(fmt::format("'{}' is no format of PLY", format.substr(0, 40)));
-  std::string_view bytes = text.after_line();
+  text.set_order(format == "ascii" ? Order::text : little ? Order::little : Order::big);
   Polygons mesh;
   for (const PlyElement& element : elements) {
-    const auto value = [&, wanted = "value of the " + element.name](const PlyType& type) {
-      if (format == "ascii") return text.number(wanted);
-      if (bytes.size() < type.size) text.fail("file ends before its last " + element.name);
-      char raw[8];
-      std::memcpy(raw, bytes.data(), type.size);
-      bytes.remove_prefix(type.size);
-      if (format == "binary_big_endian") std::reverse(raw, raw + type.size);
-      return type.value(raw);
+    const auto value = [&, wanted = "value of the " + element.name](const NumberType& type) {
+      return format == "ascii" ? text.number(wanted) : text.number_of(type, element.name);
     };
     for (std::size_t i = 0; i < element.count; ++i) {
       if (format == "ascii") text.require_line("its last " + element.name);
@@ -189,6 +171,7 @@ Polygons read_ply(const fs::path& file) {
         const bool is_list = property.name.starts_with("vertex_ind");
         const bool is_face = is_list && element.name == "face", is_strip = is_list && element.name == "tristrips";
         if (is_face) mesh.faces.emplace_back();
+        if (is_face && format == "ascii") mesh.lines.push_back(text.line_number());
         Polygon strip;  // each corner completes a triangle, every other one turned; -1 ends the strip
         for (double k = 0; k < length; ++k) {
           const double number = value(*property.type);
@@ -286,13 +269,18 @@ SurfaceMesh load_as_is(const fs::path& file) {
   SurfaceMesh surface{std::move(mesh.positions), {}};
   if (surface.positions.size() >= 0xffffffffu)
     throw Error("mesh is too large for 32-bit indices", file.string(), "use a coarser one");
+  const auto place = [&](std::size_t face) {
+    return file.string() + (mesh.lines.size() == mesh.faces.size() ? fmt::format(" line {}", mesh.lines[face]) : "");
+  };
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     for (const std::uint32_t v : mesh.faces[f])
       if (v >= surface.positions.size())
-        throw Error(fmt::format("face {} names vertex {} of {}", f, v, surface.positions.size()), file.string(),
-                    "it is damaged: fetch or export it again");
+        throw Error(v == ~0u ? fmt::format("face {} names a vertex that is not there", f + mesh.first)
+                             : fmt::format("face {} names vertex {} of {}", f + mesh.first, v + mesh.first,
+                                           surface.positions.size()),
+                    place(f), "it is damaged: fetch or export it again");
     if (mesh.faces[f].size() > most_corners)
-      throw Error(fmt::format("face {} has {} corners", f, mesh.faces[f].size()), file.string(),
+      throw Error(fmt::format("face {} has {} corners", f + mesh.first, mesh.faces[f].size()), place(f),
                   "export the surface as triangles");
     add_triangles(surface, std::move(mesh.faces[f]));
   }

@@ -1,6 +1,6 @@
 // Surface and tetrahedral meshes in double precision (metres): read from files, checked, tetrahedralized by TetGen,
-// cached, reported, written. A new format is a reader in surface_files.cpp or tet_files.cpp. Nothing here knows of
-// solvers.
+// cached, reported, written. A new format is a reader in surface_files.cpp, tet_files.cpp or vtk_files.cpp. Nothing
+// here knows of solvers.
 #pragma once
 
 #include <array>
@@ -99,10 +99,16 @@ std::string checked_switches(const std::string& switches);
 TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, double time_limit = 600,
                        const std::string& source = "surface");
 
-/// TetGen .node/.ele (either name given) or Gmsh .msh (ASCII 2.2 and 4.1).
+/// What load_mesh() reads, for help and errors.
+inline constexpr const char* mesh_formats =
+    ".ply .obj .stl .off (surfaces), .node with .ele, .msh .vtk .vtu .mesh (tetrahedra)";
+/// TetGen .node/.ele (either name given), Gmsh .msh (2.2 and 4.1), VTK .vtk and .vtu, Medit .mesh.
 TetMesh load_tets(const std::filesystem::path& file);
 /// TetGen's two files, without finish_tets().
 TetMesh read_node_ele(const std::filesystem::path& file);
+/// VTK's unstructured grids, likewise.
+TetMesh read_vtk(const std::filesystem::path& file);
+TetMesh read_vtu(const std::filesystem::path& file);
 /// Any supported file: surfaces are checked and tetrahedralized with `switches`, tetrahedra stay as they are.
 TetMesh load_mesh(const std::filesystem::path& file, const std::string& switches);
 bool is_surface_file(const std::filesystem::path& file);

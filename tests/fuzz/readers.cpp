@@ -97,8 +97,9 @@ void read_node(std::string_view bytes) {
   expect_errors_only([&] { require_sound(load_tets(file)); });
 }
 
-void read_msh(std::string_view bytes) {
-  const fs::path file = write("mesh.msh", bytes);
+template <const auto& extension>
+void read_grid(std::string_view bytes) {
+  const fs::path file = write(extension, bytes);
   expect_errors_only([&] { require_sound(load_tets(file)); });
 }
 
@@ -122,7 +123,8 @@ void read_surface(std::string_view bytes) {
   expect_errors_only([&] { check(load_surface(file)); });
 }
 
-constexpr char ply[] = "mesh.ply", obj[] = "mesh.obj", stl[] = "mesh.stl", off[] = "mesh.off";
+constexpr char ply[] = "mesh.ply", obj[] = "mesh.obj", stl[] = "mesh.stl", off[] = "mesh.off", msh[] = "mesh.msh",
+               vtk[] = "mesh.vtk", vtu[] = "mesh.vtu", medit[] = "mesh.mesh";
 
 template <class T>
 T take(std::string_view& bytes) {
@@ -290,7 +292,10 @@ const std::vector<Reader>& readers() {
       {"tets", "tets", read_tets, false},
       {"fill", "fill", fill_surface, true},
       {"node", "node", read_node, false},
-      {"msh", "msh", read_msh, false},
+      {"msh", "msh", read_grid<msh>, false},
+      {"vtk", "vtk", read_grid<vtk>, false},
+      {"vtu", "vtu", read_grid<vtu>, false},
+      {"medit", "medit", read_grid<medit>, false},
       {"cache", "cache", read_cache_file, false},
       {"scene", "scene", read_scene, false},
       {"overrides", "overrides", read_overrides, false},

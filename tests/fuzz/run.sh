@@ -8,7 +8,7 @@ shift
 program=build/fuzz/tetpbd_fuzz
 cmake --preset fuzz >/dev/null
 cmake --build --preset fuzz
-[ $# -gt 0 ] || set -- triangles tets node msh cache ply obj stl off scene overrides words
+[ $# -gt 0 ] || set -- triangles tets node msh vtk vtu medit cache ply obj stl off scene overrides words
 export ASAN_OPTIONS=allocator_may_return_null=0 UBSAN_OPTIONS=print_stacktrace=1
 for reader in "$@"; do
   grown=build/fuzz/corpus/$reader

@@ -62,13 +62,17 @@ int run_selftest(int gpu);
 /// force when the same scene is reset. Of the options: size, samples, view.
 int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides, const RunOptions& options);
 
-/// `tetpbd mesh`: checks a mesh, fills surfaces with TetGen's `switches`, reports, writes it where `out`
-/// says.
-int run_mesh_command(const std::filesystem::path& file, const std::string& switches, const std::filesystem::path& out,
-                     bool json);
-
-/// `tetpbd mesh --repair OUT`: mends a surface as far as that takes no choice (repair() of tet_mesh.h).
-int run_repair(const std::filesystem::path& file, const std::filesystem::path& out);
+struct MeshOptions {
+  std::filesystem::path file{};
+  std::string switches = "pYq1.85o/140";  ///< TetGen's, for surfaces
+  std::string up = "y";                   ///< the file's axis that is turned upwards
+  std::filesystem::path repaired{};       ///< where a surface goes, mended as repair() of tet_mesh.h does
+  std::filesystem::path out{};            ///< where the mesh goes; both empty: nowhere
+  bool json = false;
+};
+/// `tetpbd mesh`: checks a mesh, mends and fills a surface, reports, writes. The status is 1 where what is mended is
+/// still no solid.
+int run_mesh_command(const MeshOptions& options);
 
 struct BenchOptions {
   std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};

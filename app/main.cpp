@@ -42,9 +42,8 @@ struct Arguments {
   MapOptions map;
   bool hard_cases = false;
   ReproduceOptions reproduce;
-  std::filesystem::path mesh_file, mesh_out, mesh_repaired;
-  std::string switches = "pYq1.85o/140";
-  bool json = false, selftest = false;
+  MeshOptions mesh;
+  bool selftest = false;
   std::vector<std::array<const CLI::Option*, 2>> apart;  ///< never together: one would be dropped
 };
 
@@ -133,10 +132,17 @@ void add_tetgen(CLI::App& command, std::string& switches) {
   add(command, "--tetgen", switches, "TetGen switches, pY for the paper's kind of mesh");
 }
 
+void add_up(CLI::App& command, std::string& up, const std::string& of) {
+  CLI::Option* option = command.add_option("--up", up, "the axis that points upwards in " + of);
+  option->check(one_of(std::array{"x", "y", "z"}))->type_name("AXIS");
+  if (!up.empty()) option->capture_default_str();
+}
+
 void add_overrides(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--mesh", overrides.mesh, "mesh in place of the scene's first body");
   add(command, "--height", overrides.height, 0.0, 1e6,
       "m, of the first body; 0: as its file has it (default: the scene's)");
+  add_up(command, overrides.up, "the first body's file (default: the scene's, of --mesh y)");
   add_tetgen(command, overrides.tetgen);
   command.add_option("--set", overrides.set, "PATH=VALUE for anything else, as in bodies.0.density=500")
       ->expected(1)
@@ -297,7 +303,8 @@ void add_commands(CLI::App& app, Arguments& a) {
   for (const char* dropped : {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
                               "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
                               "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
-                              "--turntable", "--camera-path", "--positions-every", "--export",    "--height"})
+                              "--turntable", "--camera-path", "--positions-every", "--export",    "--height",
+                              "--up"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   run.add_flag("--strict", a.run.strict, "exit status 1 also where the verdict is doubtful");
@@ -403,16 +410,16 @@ void add_commands(CLI::App& app, Arguments& a) {
   reproduce.add_flag("--quick", a.reproduce.quick, "bunny alone, few frames: checks the trends without a GPU");
   add_gpu(reproduce, a.reproduce.gpu);
 
-  CLI::App& mesh =
-      command("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it", [](const Arguments& a) {
-        return a.mesh_repaired.empty() ? run_mesh_command(a.mesh_file, a.switches, a.mesh_out, a.json)
-                                       : run_repair(a.mesh_file, a.mesh_repaired);
-      });
-  add(mesh, "file", a.mesh_file, mesh_formats)->required();
-  add_tetgen(mesh, a.switches);
-  add(mesh, "--out", a.mesh_out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
-  add(mesh, "--repair", a.mesh_repaired, "mend the surface as far as that is safe, and write it: .ply .obj .off .stl");
-  mesh.add_flag("--json", a.json, "print the report as JSON");
+  CLI::App& mesh = command("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it",
+                           [](const Arguments& a) { return run_mesh_command(a.mesh); });
+  add(mesh, "file", a.mesh.file, mesh_formats)->required();
+  add_tetgen(mesh, a.mesh.switches);
+  add_up(mesh, a.mesh.up, "the file; what is written is turned so that y does");
+  add(mesh, "--out", a.mesh.out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
+  add(mesh, "--repair", a.mesh.repaired,
+      "mend the surface as far as that is safe, and write it: .ply .obj .off .stl; status 1 if it is no solid then. "
+      "With --out it is filled as well");
+  mesh.add_flag("--json", a.mesh.json, "print the report as JSON");
 
   CLI::App& info = command("info", "GL version, devices, limits, extensions used, build, licences",
                            [](const Arguments& a) { return (a.selftest ? run_selftest : print_info)(a.run.gpu); });

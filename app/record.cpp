@@ -42,6 +42,7 @@ void note_scene(Session& s) {
   if (!o.mesh.empty()) scene["mesh"] = o.mesh.string();
   if (!o.tetgen.empty()) scene["tetgen"] = o.tetgen;
   if (!o.deform.empty()) scene["deform"] = o.deform;
+  if (!o.up.empty()) scene["up"] = o.up;
   if (o.height) scene["height"] = *o.height;
   if (!o.set.empty()) scene["set"] = o.set;
   scene["settings"] = settings_text(s.loaded.scene.settings);
@@ -118,6 +119,7 @@ void load_scene_of(Session& s, const ordered_json& scene, const std::string& whe
   SceneOverrides overrides{.mesh = scene.value("mesh", ""),
                            .tetgen = scene.value("tetgen", ""),
                            .deform = scene.value("deform", ""),
+                           .up = scene.value("up", ""),
                            .set = scene.value("set", std::vector<std::string>())};
   if (scene.contains("height")) overrides.height = scene["height"];
   const std::string name = scene.at("scene");

@@ -41,8 +41,9 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, ce
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Sheet, size, cells)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(WrapOptions, voxels, thickness)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, scale, height, rotation,
-                                                position, density, velocity, spin, fixed, heavy, deform, thickness)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, up, scale, height,
+                                                rotation, position, density, velocity, spin, fixed, heavy, deform,
+                                                thickness)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
 
 namespace {
@@ -55,7 +56,7 @@ json schema() {
   json result = json::parse(R"({
     "name": "text", "description": "text", "duration": [1e-6, 1e6],
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
-      "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "deform": "text",
+      "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "up": "text", "deform": "text",
       "wrap": {"or": false, "voxels": [8, 1000, "whole number"], "thickness": [1, 20]},
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
@@ -167,6 +168,10 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (kinds == 0 && !body.wrap) refuse(fmt::format("'{}' has a surface alone, so it needs its \"wrap\"", where), file);
   if (body.thickness > 0 && (body.block || body.tet || (!body.mesh.empty() && !is_surface_file(body.mesh))))
     refuse(fmt::format("'{}.thickness' is of a sheet, or of a surface mesh that is to be one", where), file);
+  if (!is_axis(body.up))
+    refuse(fmt::format("'{}.up' must be \"x\", \"y\" or \"z\", not \"{}\"", where, body.up.substr(0, 40)), file);
+  if (body.up != "y" && body.mesh.empty() && body.surface.empty())
+    refuse(fmt::format("'{}.up' is of a mesh's file, and this body has none", where), file);
   if (!body.surface.empty() && (body.sheet || body.thickness > 0))
     refuse(fmt::format("'{}' is a sheet, which carries no surface", where), file);
   const glm::dvec3 cells = body.block ? glm::dvec3(body.block->cells) : glm::dvec3(0);
@@ -412,10 +417,18 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     body.name = overrides.mesh.stem().string();
     body.mesh = overrides.mesh;
     body.surface.clear();
+    body.up = "y";
     body.block.reset(), body.tet.reset(), body.sheet.reset();
     scene.name = printable(fmt::format("{} with {}", scene.name, body.mesh.filename().string()));
     if (std::ranges::none_of(overrides.set, [](const auto& given) { return given.starts_with("camera"); }))
       scene.camera.reset();  // it was chosen for another body
+  }
+  if (!overrides.up.empty()) {
+    BodyDescription& body = scene.bodies[0];
+    if (!is_axis(overrides.up)) throw Error("no such axis", "--up " + overrides.up, "choose from x, y, z");
+    if (body.mesh.empty() && body.surface.empty())
+      throw Error("the first body is from no file", "--up " + overrides.up, "name one by --mesh");
+    body.up = overrides.up;
   }
   if (overrides.height) scene.bodies[0].height = *overrides.height;
   scene.by_device = overrides.by_device;
@@ -479,6 +492,7 @@ json body_json(const BodyDescription& body) {
     result.erase("tetgen");
   else
     result["wrap"] = body.wrap ? json(*body.wrap) : json(false);
+  if (body.up == "y") result.erase("up");
   if (body.height == 0) result.erase("height");
   if (body.thickness == 0) result.erase("thickness");
   for (json& box : result["fixed"]) box.erase("ratio"), box.erase("share");
@@ -524,7 +538,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     carries = carries || !carried.triangles.empty();
     if (!mesh.tets.empty())  // a sheet is drawn as itself
       add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried, model->rest.tets.size());
-    for (auto& p : mesh.positions) p *= body.scale;
+    for (auto& p : mesh.positions) p = upright(p, body.up) * body.scale;
     if (model->rest.tets.size() + mesh.tets.size() > most_tets)
       throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
                   fmt::format("keep to {} tets in all", most_tets));

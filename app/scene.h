@@ -9,6 +9,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/camera.h"
@@ -17,6 +18,12 @@
 #include "sim/model/settings.h"
 
 namespace tetpbd {
+
+inline bool is_axis(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
+/// A point of a file whose axis `up` ("x", "y" or "z") points upwards, in a frame where y does.
+inline glm::dvec3 upright(const glm::dvec3& p, std::string_view up) {
+  return up == "z" ? glm::dvec3(p.x, p.z, 0 - p.y) : up == "x" ? glm::dvec3(0 - p.y, p.x, p.z) : p;
+}
 
 struct BodyDescription {
   struct Block {
@@ -43,7 +50,8 @@ struct BodyDescription {
   std::filesystem::path surface;  ///< a fine one that rides on it, or, alone, on its wrap
   std::string tetgen = "pYq1.85o/140";
   std::optional<WrapOptions> wrap = WrapOptions{};  ///< of a surface that TetGen refuses; none: an error
-  glm::dvec3 scale{1};                              ///< along the mesh's own axes, before all else
+  std::string up = "y";                             ///< the axis that points upwards in both files
+  glm::dvec3 scale{1};                              ///< along the mesh's own axes then, before all else
   double height = 0;                                ///< m, scales the mesh; 0 keeps its size
   glm::dvec3 rotation{0};                           ///< degrees about x, then y, then z
   glm::dvec3 position{0};                           ///< m, where the middle of the bottom of its bounding box goes
@@ -73,6 +81,7 @@ struct SceneOverrides {
   std::string tetgen{}, deform{};
   std::string solver{};                                           ///< one of solver_presets(), or auto
   std::optional<double> budget_ms{};                              ///< for auto
+  std::string up{};                                               ///< of the first body's file
   std::optional<double> height{};                                 ///< of the first body; 0: its file's
   std::vector<std::pair<std::string, std::string>> parameters{};  ///< name, text
   std::vector<std::string> set{};                                 ///< PATH=VALUE

@@ -389,9 +389,10 @@ TEST_CASE("the scene that a run writes gives the same run wherever it lies") {
   CHECK(replayed("--scene beam --constraints stretch --steps 3")["bodies"][0]["block"].is_object());
 
   REQUIRE(program("mesh " TEST_MODELS "/bunny.ply --out a/my.obj", folder).status == 0);
-  const json own = replayed("--mesh a/my.obj --height 0.5 --steps 2 --set camera.fov=20");
+  const json own = replayed("--mesh a/my.obj --up z --height 0.5 --steps 2 --set camera.fov=20");
   CHECK(own["name"] == "bunny-drop with my.obj");
   CHECK(own["bodies"][0]["height"] == 0.5);
+  CHECK(own["bodies"][0]["up"] == "z");
   CHECK(own["camera"]["fov"] == 20);
   CHECK(replayed("--scene bunny-drop --steps 1")["bodies"][0]["mesh"] == "bunny.ply");
 

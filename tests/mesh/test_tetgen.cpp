@@ -204,9 +204,10 @@ TEST_CASE("cache: a folder that cannot be written is no error") {
 TEST_CASE("mesh command: reports, writes, passes errors on") {
   Folder folder;
   const fs::path bunny = fs::path(TEST_MODELS) / "bunny.ply";
-  CHECK(run_mesh_command(bunny, "pY", folder.path / "bunny.msh", false) == 0);
+  CHECK(run_mesh_command({.file = bunny, .switches = "pY", .out = folder.path / "bunny.msh"}) == 0);
   CHECK(load_tets(folder.path / "bunny.msh").tets.size() == 9736);
-  CHECK(run_mesh_command(folder.path / "bunny.msh", "", {}, true) == 0);
-  CHECK(contains(error_of([&] { run_mesh_command(folder.path / "none.ply", "pY", {}, false); }), "no such file"));
-  CHECK(contains(error_of([&] { run_mesh_command(bunny, "pY", folder.path / "a.b", true); }), "unknown mesh format"));
+  CHECK(run_mesh_command({.file = folder.path / "bunny.msh", .json = true}) == 0);
+  CHECK(contains(error_of([&] { run_mesh_command({.file = folder.path / "none.ply"}); }), "no such file"));
+  CHECK(contains(error_of([&] { run_mesh_command({.file = bunny, .out = folder.path / "a.b"}); }),
+                 "unknown mesh format"));
 }

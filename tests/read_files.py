@@ -28,6 +28,17 @@ quads = [(number(i, j), number(i, j + 1), number(i + 1, j + 1), number(i + 1, j)
 meshio.write(folder / "torus.obj", meshio.Mesh(points, [("quad", np.array(quads))]))
 run("mesh", "torus.obj", "--out", "torus.msh")
 torus = meshio.read(folder / "torus.msh")
+# The same mesh as others write it, read by us.
+tets = meshio.Mesh(torus.points, [("tetra", torus.cells[0].data)])
+for name, kind, how in [("22.msh", "gmsh22", {"binary": True}), ("41.msh", "gmsh", {"binary": True}),
+                        ("text.msh", "gmsh", {"binary": False}), ("text.vtk", "vtk", {"binary": False}),
+                        ("bytes.vtk", "vtk", {"binary": True}), ("text.vtu", "vtu", {"binary": False}),
+                        ("zlib.vtu", "vtu", {"binary": True}), ("a.mesh", "medit", {})]:
+    meshio.write(folder / name, tets, kind, **how)
+    run("mesh", name, "--out", "back.msh")
+    back = meshio.read(folder / "back.msh")
+    same(back.points, torus.points, 1e-10)
+    assert (back.cells[0].data == torus.cells[0].data).all(), name
 soft = {"model": "neo-hookean", "young_modulus": 2e5, "poisson_ratio": 0.4}
 (folder / "two.json").write_text(json.dumps({
     "bodies": [{"mesh": "torus.msh", "position": [0, 0.02, 0], "velocity": [0.1, 0, 0], "material": soft},

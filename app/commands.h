@@ -64,10 +64,10 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
 
 struct MeshOptions {
   std::filesystem::path file{};
-  std::string switches = "pYq1.85o/140";  ///< TetGen's, for surfaces
-  std::string up = "y";                   ///< the file's axis that is turned upwards
-  std::filesystem::path repaired{};       ///< where a surface goes, mended as repair() of tet_mesh.h does
-  std::filesystem::path out{};            ///< where the mesh goes; both empty: nowhere
+  SceneOverrides filled{.tetgen = FillOptions().switches};  ///< how surfaces are
+  std::string up = "y";                                     ///< the file's axis that is turned upwards
+  std::filesystem::path repaired{};  ///< where a surface goes, mended as repair() of tet_mesh.h does
+  std::filesystem::path out{};       ///< where the mesh goes; both empty: nowhere
   bool json = false;
 };
 /// `tetpbd mesh`: checks a mesh, mends and fills a surface, reports, writes. The status is 1 where what is mended is
@@ -177,7 +177,7 @@ std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 /// A question about units where a mesh is larger than 50 m or smaller than 1 mm; else empty.
 std::string question_units(const glm::dvec3& size);
 /// `mass` in kg.
-ordered_json mesh_json(const MeshReport& report, double mass);
+ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step);
 ordered_json error_json(const RunErrors& errors);
 /// The distance from the right motion; nulls where there is none.
 ordered_json motion_json(const MeasuredRun& run);

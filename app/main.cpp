@@ -128,8 +128,17 @@ void add_samples(CLI::App& command, int& samples) {
       ->capture_default_str();
 }
 
-void add_tetgen(CLI::App& command, std::string& switches) {
-  add(command, "--tetgen", switches, "TetGen switches, pY for the paper's kind of mesh");
+/// How surfaces become tets.
+void add_fill(CLI::App& command, SceneOverrides& overrides) {
+  add(command, "--tetgen", overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
+  command
+      .add_option("--fill", overrides.fill, "by what surfaces are filled: tetgen, lattice (default: what suits them)")
+      ->check([](const std::string& text) {
+        const bool known = text == "auto" || text == "tetgen" || text == "lattice";
+        return known ? std::string() : fmt::format("must be one of auto, tetgen, lattice, not '{}'", text);
+      });
+  add(command, "--tets", overrides.tets, 10.0, 1e8, "about so many, of a lattice (default: 15000)");
+  add(command, "--spacing", overrides.spacing, 1e-9, 1e6, "m, of a lattice, in place of --tets");
 }
 
 void add_up(CLI::App& command, std::string& up, const std::string& of) {
@@ -143,7 +152,7 @@ void add_overrides(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--height", overrides.height, 0.0, 1e6,
       "m, of the first body; 0: as its file has it (default: the scene's)");
   add_up(command, overrides.up, "the first body's file (default: the scene's, of --mesh y)");
-  add_tetgen(command, overrides.tetgen);
+  add_fill(command, overrides);
   command.add_option("--set", overrides.set, "PATH=VALUE for anything else, as in bodies.0.density=500")
       ->expected(1)
       ->take_all();
@@ -300,11 +309,11 @@ void add_commands(CLI::App& app, Arguments& a) {
   CLI::Option* replay = add(run, "--replay", a.run.replay,
                             "instead: what a record of tetpbd view --record says, lanes and all; with "
                             "--video, drawn at the speed it was played");
-  for (const char* dropped : {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
-                              "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
-                              "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
-                              "--turntable", "--camera-path", "--positions-every", "--export",    "--height",
-                              "--up"})
+  for (const char* dropped :
+       {"--scene",     "--mesh",      "--tetgen",        "--set",       "--deform",      "--solver",
+        "--budget-ms", "--explain",   "--steps",         "--png-every", "--positions",   "--video-every",
+        "--csv-every", "--reference", "--measure-every", "--turntable", "--camera-path", "--positions-every",
+        "--export",    "--height",    "--fill",          "--tets",      "--spacing",     "--up"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   run.add_flag("--strict", a.run.strict, "exit status 1 also where the verdict is doubtful");
@@ -348,7 +357,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_samples(bench, a.bench.samples);
   bench.add_flag_callback(
       "--no-render", [&] { a.bench.sizes.clear(); }, "simulation alone");
-  add_tetgen(bench, a.bench.overrides.tetgen);
+  add_fill(bench, a.bench.overrides);
   add_gpu(bench, a.bench.gpu);
   add(bench, "--out", a.bench.out, "folder for bench.csv and bench.json");
 
@@ -413,7 +422,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   CLI::App& mesh = command("mesh", "checks a surface or tetrahedral mesh, tetrahedralises, writes it",
                            [](const Arguments& a) { return run_mesh_command(a.mesh); });
   add(mesh, "file", a.mesh.file, mesh_formats)->required();
-  add_tetgen(mesh, a.mesh.switches);
+  add_fill(mesh, a.mesh.filled);
   add_up(mesh, a.mesh.up, "the file; what is written is turned so that y does");
   add(mesh, "--out", a.mesh.out, "write it: .node or .ele, .msh (tetrahedra); .ply .obj .off .stl (boundary)");
   add(mesh, "--repair", a.mesh.repaired,

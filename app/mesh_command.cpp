@@ -6,7 +6,9 @@
 #include "app/files.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
-#include "sim/mesh/wrap.h"
+#include "sim/mesh/fill.h"
+#include "sim/model/material.h"
+#include "sim/reference/reference.h"
 
 namespace tetpbd {
 
@@ -14,6 +16,17 @@ namespace {
 
 void turn(std::vector<glm::dvec3>& positions, const std::string& up) {
   for (glm::dvec3& p : positions) p = upright(p, up);
+}
+
+// s, of a rubber of 1 MPa; of sheets and of meshes so large that it would take seconds to find, 0.
+double longest_stable_step(const TetMesh& mesh) {
+  if (mesh.tets.empty() || mesh.tets.size() > 300'000) return 0;
+  Settings settings;
+  settings.material = "neo-hookean", settings.young_modulus = 1e6, settings.poisson_ratio = 0.45;
+  Model model;
+  add_body(model, "mesh", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), {});
+  const ConstraintSystem system = build_constraints(model, settings);
+  return stable_step({model, system, settings, model.inverse_masses}, settings.compliance, model.rest.positions, 30);
 }
 
 // Writes the surface, and says what was done to it.
@@ -58,35 +71,46 @@ int run_mesh_command(const MeshOptions& o) {
     if (mends && !surface.triangles.empty()) surface = load_surface(file);
     SurfaceMesh oriented = surface;
     const SurfaceCheck check = check_surface(oriented);
-    if (!check.defect.empty() && mends) {
+    FillOptions options = fill_options(o.filled.fill, o.filled.tetgen, o.filled.tets, o.filled.spacing, file.string());
+    const bool asked = !options.by.empty() || options.sized;
+    if (!check.defect.empty() && mends && !asked) {
       say_mended(fmt::format("{} ({})", check.defect, check.place));
       return print_document(), 1;
     }
-    if (!check.defect.empty())
+    if (!check.defect.empty() && !asked)
       throw Error(check.defect, check.place + " in " + file.string(),
-                  check.hint + (check.hopeless ? "" : "; --repair may mend it, a scene wraps it"));
+                  check.hint + (check.hopeless ? "" : "; --repair may mend it, --fill lattice takes it, as scenes do"));
+    if (!asked) options.by = "tetgen";
+    Filled result;
     try {
-      mesh = tetrahedralise(surface, o.switches, 600, file.string());
+      result = fill(surface, options, file.string());
     } catch (const NotSolid& left) {
       if (!mends) throw;
       say_mended(fmt::format("not sound ({})", left.what()));
       return print_document(), 1;
     }
-    if (mends) say_mended("");
-    if (mends && o.out.empty()) return print_document(), 0;
-    document["tetgen"] = o.switches;
-    put("surface", {{"vertices", surface.positions.size()},
-                    {"triangles", surface.triangles.size()},
-                    {"components", check.components},
+    if (mends) say_mended(check.defect.empty() ? "" : fmt::format("{} ({})", check.defect, check.place));
+    if (mends && o.out.empty()) return print_document(), check.defect.empty() ? 0 : 1;
+    if (options.by == "tetgen") document["tetgen"] = options.switches;
+    ordered_json found = {{"vertices", surface.positions.size()}, {"triangles", surface.triangles.size()}};
+    if (check.defect.empty())
+      found.update({{"components", check.components},
                     {"euler_characteristic", check.euler_characteristic},
                     {"volume", check.volume},
+                    {"cavities", check.cavities.size()},
                     {"triangles_turned", check.flipped_triangles}});
+    else
+      found["defect"] = fmt::format("{}: {}", check.defect, check.place);
+    put("surface", found);
+    if (!result.note.empty()) document["fill"] = result.note;
+    if (!result.note.empty() && !o.json) fmt::print("{}\n", result.note);
+    mesh = std::move(result.mesh);
   } else {
-    mesh = load_mesh(file, o.switches);
+    mesh = load_mesh(file, o.filled.tetgen);
   }
   if (!mends) turn(mesh.positions, o.up);
   const MeshReport counts = report(mesh);
-  put("mesh", mesh_json(counts, 1000 * counts.volume));
+  put("mesh", mesh_json(counts, 1000 * counts.filled, longest_stable_step(mesh)));
   if (const std::string units = question_units(counts.size); !o.json && !units.empty()) fmt::print("{}\n", units);
   if (interrupted()) throw Error("interrupted", file.string(), "start again; nothing was written", 1);
   if (!o.out.empty()) {

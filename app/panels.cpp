@@ -144,7 +144,10 @@ const std::vector<Group> groups = {
      true,
      {"material", "young_modulus", "poisson_ratio", "constraints", "k_*"},
      {"compliance_*", "constraint_damping", "damping"}},
-    {"Solver", true, {"mode", "substeps", "iterations", "stability", "dt"}, {"omega", "mass_splitting", "mass_scaling"}},
+    {"Solver",
+     true,
+     {"mode", "substeps", "iterations", "stability", "dt"},
+     {"omega", "mass_splitting", "mass_scaling"}},
     {"Contact", false, {"gravity", "ground", "friction", "restitution"}, {"ground_height", "rigid_contact"}}};
 
 bool names(const std::string& pattern, const std::string& name) {

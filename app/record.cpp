@@ -41,6 +41,9 @@ void note_scene(Session& s) {
   ordered_json scene = {{"scene", s.loaded.name}};
   if (!o.mesh.empty()) scene["mesh"] = o.mesh.string();
   if (!o.tetgen.empty()) scene["tetgen"] = o.tetgen;
+  if (!o.fill.empty()) scene["fill"] = o.fill;
+  if (o.tets) scene["tets"] = *o.tets;
+  if (o.spacing) scene["spacing"] = *o.spacing;
   if (!o.deform.empty()) scene["deform"] = o.deform;
   if (!o.up.empty()) scene["up"] = o.up;
   if (o.height) scene["height"] = *o.height;
@@ -118,10 +121,13 @@ void set_all(Settings& settings, const ordered_json& values, const std::string& 
 void load_scene_of(Session& s, const ordered_json& scene, const std::string& where) {
   SceneOverrides overrides{.mesh = scene.value("mesh", ""),
                            .tetgen = scene.value("tetgen", ""),
+                           .fill = scene.value("fill", ""),
                            .deform = scene.value("deform", ""),
                            .up = scene.value("up", ""),
                            .set = scene.value("set", std::vector<std::string>())};
-  if (scene.contains("height")) overrides.height = scene["height"];
+  for (const auto& [key, value] : {std::pair("height", &overrides.height), std::pair("tets", &overrides.tets),
+                                   std::pair("spacing", &overrides.spacing)})
+    if (scene.contains(key)) *value = scene[key];
   const std::string name = scene.at("scene");
   Scene opened = load_scene(name, overrides);
   if (scene.contains("settings")) set_all(opened.settings, scene["settings"], where);

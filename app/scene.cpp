@@ -40,8 +40,7 @@ fs::path models_folder() {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Block, size, cells, taper, mirror)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Sheet, size, cells)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription::Box, low, high, ratio, share)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(WrapOptions, voxels, thickness)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, up, scale, height,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(BodyDescription, name, mesh, surface, tetgen, fill, up, scale, height,
                                                 rotation, position, density, velocity, spin, fixed, heavy, deform,
                                                 thickness)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Camera, target, distance, azimuth, elevation, fov)
@@ -57,7 +56,7 @@ json schema() {
     "name": "text", "description": "text", "duration": [1e-6, 1e6],
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
       "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "up": "text", "deform": "text",
-      "wrap": {"or": false, "voxels": [8, 1000, "whole number"], "thickness": [1, 20]},
+      "fill": {"one of": ["auto", "tetgen", "lattice"]}, "tets": [10, 1e8], "spacing": [1e-9, 1e6],
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
         "taper": [0, 0.95], "mirror": "true or false"},
@@ -102,6 +101,9 @@ void check(const json& value, const json& allowed, const std::string& path, cons
     require(value.is_string(), "a text in quotes");
   } else if (allowed == "true or false") {
     require(value.is_boolean(), "true or false");
+  } else if (allowed.contains("one of")) {
+    require(std::ranges::find(allowed["one of"], value) != allowed["one of"].end(),
+            fmt::format("one of {}", fmt::join(allowed["one of"].get<std::vector<std::string>>(), ", ")));
   } else if (allowed.is_array()) {
     const double low = allowed[0], high = allowed[1], x = value.is_number() ? value.get<double>() : NAN;
     const bool whole = allowed.size() > 2;
@@ -160,12 +162,14 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (value.contains("block")) body.block = value["block"].get<BodyDescription::Block>();
   if (value.contains("sheet")) body.sheet = value["sheet"].get<BodyDescription::Sheet>();
   if (value.contains("tet")) body.tet = value["tet"].get<std::array<glm::dvec3, 4>>();
-  if (value.value("wrap", json()) == false) body.wrap.reset();
-  if (value.contains("wrap") && body.wrap) body.wrap = value["wrap"].get<WrapOptions>();
+  if (value.contains("tets")) body.tets = value["tets"].get<double>();
+  if (value.contains("spacing")) body.spacing = value["spacing"].get<double>();
   const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet) + bool(body.sheet);
   if (kinds > 1 || (kinds == 0 && body.surface.empty()))
     refuse(fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where), file);
-  if (kinds == 0 && !body.wrap) refuse(fmt::format("'{}' has a surface alone, so it needs its \"wrap\"", where), file);
+  if (kinds == 0 && body.fill == "tetgen")
+    refuse(fmt::format("'{}' has a surface alone, which rides on a lattice; name it as \"mesh\" for TetGen", where),
+           file);
   if (body.thickness > 0 && (body.block || body.tet || (!body.mesh.empty() && !is_surface_file(body.mesh))))
     refuse(fmt::format("'{}.thickness' is of a sheet, or of a surface mesh that is to be one", where), file);
   if (!is_axis(body.up))
@@ -299,8 +303,8 @@ bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   return false;
 }
 
-// `own`: becomes the surface that was wrapped, if one was.
-TetMesh mesh_of(const BodyDescription& body, const std::string& scene, SurfaceMesh& own) {
+// The body's own tets, without a surface that it carries.
+TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
   if (const auto& b = body.block)
     return b->taper > 0 ? make_spindle(b->size, b->cells, b->taper, b->mirror)
                         : make_block(b->size, b->cells, b->mirror);
@@ -311,26 +315,35 @@ TetMesh mesh_of(const BodyDescription& body, const std::string& scene, SurfaceMe
     return mesh;
   }
   if (body.thickness > 0) return sheet_of(load_surface(body.mesh), body.mesh.string());
-  const fs::path& file = body.mesh.empty() ? body.surface : body.mesh;
-  if (!is_surface_file(file) || !fs::is_regular_file(file)) return load_mesh(file, body.tetgen);
-  SurfaceMesh surface = load_surface(file);
-  Filled filled = fill_or_wrap(surface, body.tetgen, body.wrap, body.mesh.empty(), file.string());
-  if (!filled.note.empty()) {
-    own = std::move(surface);
-    print_error(fmt::format("tetpbd: {}: {}\n", printable(file.string()), printable(filled.note)));
-  }
-  return std::move(filled.mesh);
+  return load_mesh(body.mesh, body.tetgen);
 }
 
 /// A body's tets, and what rides on them where it is not their own boundary.
-std::pair<TetMesh, CarriedSurface> body_of(const BodyDescription& body, const std::string& scene) {
-  SurfaceMesh surface;
-  TetMesh mesh = mesh_of(body, scene, surface);
-  if (!body.surface.empty()) surface = load_surface(body.surface);
-  const fs::path& file = body.surface.empty() ? body.mesh : body.surface;
-  CarriedSurface carried;
-  if (!surface.triangles.empty()) carried = carry(surface, mesh, file.string());
-  return {std::move(mesh), std::move(carried)};
+Filled body_of(const BodyDescription& body, const std::string& scene) {
+  const fs::path& file = body.mesh.empty() ? body.surface : body.mesh;
+  const bool filled_here = !body.block && !body.sheet && !body.tet && body.thickness == 0 && is_surface_file(file) &&
+                           fs::is_regular_file(file);
+  Filled result;
+  if (filled_here) {
+    SurfaceMesh surface = load_surface(file);
+    for (glm::dvec3& p : surface.positions) p = upright(p, body.up);
+    const double height = bounds(surface.positions).high.y - bounds(surface.positions).low.y;
+    FillOptions options = fill_options(body.mesh.empty() ? "lattice" : body.fill, body.tetgen, body.tets, body.spacing,
+                                       fmt::format("body '{}' of scene '{}'", body.name, scene));
+    options.scale = body.scale * (body.height > 0 && height > 0 ? body.height / (height * body.scale.y) : 1.0);
+    result = fill(surface, options, file.string());
+    if (!result.note.empty())
+      print_error(fmt::format("tetpbd: {}: {}\n", printable(file.string()), printable(result.note)));
+  } else {
+    result.mesh = mesh_of(body, scene);
+    for (glm::dvec3& p : result.mesh.positions) p = upright(p, body.up);
+  }
+  if (!body.surface.empty() && !(filled_here && body.mesh.empty())) {
+    SurfaceMesh fine = load_surface(body.surface);
+    for (glm::dvec3& p : fine.positions) p = upright(p, body.up) * result.scale;
+    result.carried = carry(fine, result.mesh, body.surface.string());
+  }
+  return result;
 }
 
 void add_carried(CarriedSurface& all, const CarriedSurface& more, std::size_t first_tet) {
@@ -366,6 +379,19 @@ std::vector<std::string> scene_names(const std::string& folder) {
     if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
   std::sort(names.begin(), names.end());
   return names;
+}
+
+FillOptions fill_options(const std::string& by, const std::string& switches, const std::optional<double>& tets,
+                         const std::optional<double>& spacing, const std::string& where) {
+  if (by == "tetgen" && (tets || spacing))
+    throw Error(fmt::format("{} is of a lattice", tets ? "tets" : "spacing"), where,
+                "TetGen's switch a says how large tets are: leave out one of the two");
+  if (tets && spacing)
+    throw Error("tets and spacing both say how fine a lattice is", where, "leave out one of the two");
+  return {.by = by == "auto" ? "" : by,
+          .switches = switches,
+          .size = {tets.value_or(LatticeSize().tets), spacing.value_or(0)},
+          .sized = tets || spacing};
 }
 
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides) {
@@ -437,6 +463,9 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
                                         !overrides.budget_ms && hard(scene.settings));
   for (BodyDescription& body : scene.bodies) {
     if (!overrides.tetgen.empty()) body.tetgen = overrides.tetgen;
+    if (!overrides.fill.empty()) body.fill = overrides.fill;
+    if (overrides.tets) body.tets = overrides.tets, body.spacing.reset();
+    if (overrides.spacing) body.spacing = overrides.spacing, body.tets.reset();
     if (!overrides.deform.empty()) body.deform = overrides.deform;
   }
   return scene;
@@ -488,10 +517,9 @@ json body_json(const BodyDescription& body) {
       result[key] = file_name(file);
   };
   put_path("mesh", body.mesh), put_path("surface", body.surface);
-  if (body.block || body.tet || body.sheet || body.thickness > 0)
-    result.erase("tetgen");
-  else
-    result["wrap"] = body.wrap ? json(*body.wrap) : json(false);
+  if (body.block || body.tet || body.sheet || body.thickness > 0) result.erase("tetgen");
+  if (body.tets) result["tets"] = *body.tets;
+  if (body.spacing) result["spacing"] = *body.spacing;
   if (body.up == "y") result.erase("up");
   if (body.height == 0) result.erase("height");
   if (body.thickness == 0) result.erase("thickness");
@@ -534,11 +562,15 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   bool carries = false;
   for (const BodyDescription& body : scene.bodies) {
-    auto [mesh, carried] = body_of(body, scene.name);
+    Filled filled = body_of(body, scene.name);
+    TetMesh& mesh = filled.mesh;
+    const CarriedSurface& carried = filled.carried;
+    const bool sized = !mesh.fill.empty();  // before it was filled
     carries = carries || !carried.triangles.empty();
     if (!mesh.tets.empty())  // a sheet is drawn as itself
       add_carried(model->carried, carried.triangles.empty() ? carry_boundary(mesh) : carried, model->rest.tets.size());
-    for (auto& p : mesh.positions) p = upright(p, body.up) * body.scale;
+    if (!sized)
+      for (auto& p : mesh.positions) p *= body.scale;
     if (model->rest.tets.size() + mesh.tets.size() > most_tets)
       throw Error("the scene is too large", fmt::format("body '{}' of {}", body.name, scene.name),
                   fmt::format("keep to {} tets in all", most_tets));
@@ -574,7 +606,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     if (const std::string units = question_units(own.high - own.low);
         !body.mesh.empty() && body.height == 0 && !units.empty())
       print_error(fmt::format("tetpbd: {}: body '{}' is {}\n", scene.name, body.name, units));
-    const double scale = body.height > 0 ? body.height / (own.high.y - own.low.y) : 1.0;
+    const double scale = body.height > 0 && !sized ? body.height / (own.high.y - own.low.y) : 1.0;
     for (auto& p : mesh.positions) p = turn * ((p - own.centre()) * scale);
     const Bounds placed = bounds(mesh.positions);
     const glm::dvec3 bottom(placed.centre().x, placed.low.y, placed.centre().z);
@@ -582,6 +614,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     if (mesh.tets.empty()) mesh.thickness = body.thickness > 0 ? body.thickness : 1e-3 * placed.size();
     std::vector<glm::dvec3> start = mesh.positions;
     deform(start, mesh, body.deform, unsigned(scene.settings.seed) + 0x9e3779b9u * unsigned(model->bodies.size()));
+    if (!filled.note.empty()) model->fills.emplace_back(body.name, filled.note);
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   if (!carries) model->carried = {};

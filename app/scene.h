@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "render/camera.h"
-#include "sim/mesh/wrap.h"
+#include "sim/mesh/fill.h"
 #include "sim/model/model.h"
 #include "sim/model/settings.h"
 
@@ -47,18 +47,20 @@ struct BodyDescription {
   std::optional<std::array<glm::dvec3, 4>> tet;  ///< a single tet, m, or
   std::optional<Sheet> sheet;                    ///< a flat sheet
   double thickness = 0;           ///< m, of a sheet, 0: a thousandth of its size; of a surface mesh, makes it a sheet
-  std::filesystem::path surface;  ///< a fine one that rides on it, or, alone, on its wrap
-  std::string tetgen = "pYq1.85o/140";
-  std::optional<WrapOptions> wrap = WrapOptions{};  ///< of a surface that TetGen refuses; none: an error
-  std::string up = "y";                             ///< the axis that points upwards in both files
-  glm::dvec3 scale{1};                              ///< along the mesh's own axes then, before all else
-  double height = 0;                                ///< m, scales the mesh; 0 keeps its size
-  glm::dvec3 rotation{0};                           ///< degrees about x, then y, then z
-  glm::dvec3 position{0};                           ///< m, where the middle of the bottom of its bounding box goes
-  double density = 1000;                            ///< kg/m^3
-  glm::dvec3 velocity{0};                           ///< m/s
-  glm::dvec3 spin{0};                               ///< rad/s about the centre of mass
-  std::vector<Box> fixed;                           ///< vertices in any of these boxes are fixed
+  std::filesystem::path surface;  ///< a fine one that rides on it, or, alone, on a lattice that fills it
+  std::string tetgen = FillOptions().switches;
+  std::string fill = "auto";      ///< tetgen, lattice, or auto: what suits the surface
+  std::optional<double> tets;     ///< about so many, of a lattice
+  std::optional<double> spacing;  ///< m, of a lattice, in place of `tets`
+  std::string up = "y";           ///< the axis that points upwards in both files
+  glm::dvec3 scale{1};            ///< along the mesh's own axes then, before all else
+  double height = 0;              ///< m, scales the mesh; 0 keeps its size
+  glm::dvec3 rotation{0};         ///< degrees about x, then y, then z
+  glm::dvec3 position{0};         ///< m, where the middle of the bottom of its bounding box goes
+  double density = 1000;          ///< kg/m^3
+  glm::dvec3 velocity{0};         ///< m/s
+  glm::dvec3 spin{0};             ///< rad/s about the centre of mass
+  std::vector<Box> fixed;         ///< vertices in any of these boxes are fixed
   std::vector<Box> heavy;
   std::string deform = "none";
 };
@@ -78,7 +80,8 @@ struct Scene {
 /// What the command line puts in place of a scene's own.
 struct SceneOverrides {
   std::filesystem::path mesh{};
-  std::string tetgen{}, deform{};
+  std::string tetgen{}, fill{}, deform{};
+  std::optional<double> tets{}, spacing{};                        ///< of bodies that are lattices
   std::string solver{};                                           ///< one of solver_presets(), or auto
   std::optional<double> budget_ms{};                              ///< for auto
   std::string up{};                                               ///< of the first body's file
@@ -87,6 +90,10 @@ struct SceneOverrides {
   std::vector<std::string> set{};                                 ///< PATH=VALUE
   bool by_device = false;  ///< hard bodies that nobody says a mode for, or what Jacobi has, may take another than node
 };
+
+/// How a surface is filled; throws Error naming `where` where two of these exclude each other.
+FillOptions fill_options(const std::string& by, const std::string& switches, const std::optional<double>& tets,
+                         const std::optional<double>& spacing, const std::string& where);
 
 /// A name in models/scenes, or a file. Throws Error naming file, key and allowed range.
 Scene load_scene(const std::string& name_or_file, const SceneOverrides& overrides = {});

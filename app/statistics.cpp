@@ -54,8 +54,8 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MeshReport, vertices, surface_vertices, surface_triangles, edges, bends, tets, faces,
                                    euler_characteristic, genus, components, volume, smallest_tet_volume,
-                                   mean_tet_volume, min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg, slivers,
-                                   inverted)
+                                   mean_tet_volume, worst_altitude, worst_tet, cavities, min_dihedral_deg,
+                                   max_dihedral_deg, mean_min_dihedral_deg, slivers, inverted)
 std::string question_units(const glm::dvec3& size) {
   const double largest = std::max({size.x, size.y, size.z});
   if (largest >= 1e-3 && largest <= 50) return {};
@@ -63,10 +63,11 @@ std::string question_units(const glm::dvec3& size) {
                      largest > 1 ? "millimetres" : "metres");
 }
 
-ordered_json mesh_json(const MeshReport& counts, double mass) {
+ordered_json mesh_json(const MeshReport& counts, double mass, double longest_stable_step) {
   ordered_json all = nlohmann::json(counts);
   all["size"] = {counts.size.x, counts.size.y, counts.size.z};
   all["mass"] = mass;
+  if (longest_stable_step > 0) all["longest_stable_step"] = longest_stable_step;
   return all;
 }
 

@@ -19,19 +19,18 @@ uniform float midway;            // s, the age of the positions that velocities 
 uniform float touching;          // m, the distance to an obstacle that counts as contact
 layout(std430) readonly buffer Stretch { Record2 edges[]; };
 layout(std430) readonly buffer Bend { Record4 hinges[]; };
-layout(std430) readonly buffer Volume { Record4 tets[]; };
+layout(std430) readonly buffer Volume { TetRecord tets[]; };
 shared uint depths[DEPTHS];
 shared float totals[M_ANGULAR];
 
 // Positions relative to the first vertex, `age` seconds ago.
-void find_positions(Record4 r, float age, out vec3 x[4]) {
-  vec3 drift = velocities[r.vertices[0]].high;
+void find_positions(uint v[4], float age, out vec3 x[4]) {
+  vec3 drift = velocities[v[0]].high;
   for (int j = 0; j < 4; ++j)
-    x[j] = relative(positions[r.vertices[j]], positions[r.vertices[0]]) -
-           age * (velocities[r.vertices[j]].high - drift);
+    x[j] = relative(positions[v[j]], positions[v[0]]) - age * (velocities[v[j]].high - drift);
 }
-void find_rest(Record4 r, out vec3 x[4]) {
-  for (int j = 0; j < 4; ++j) x[j] = rest[r.vertices[j]].xyz - rest[r.vertices[0]].xyz;
+void find_rest(uint v[4], out vec3 x[4]) {
+  for (int j = 0; j < 4; ++j) x[j] = rest[v[j]].xyz - rest[v[0]].xyz;
 }
 
 float edge_error(Record2 r, float age) {
@@ -59,7 +58,7 @@ float hinge_elastic(Record4 r, vec3 x[4]) {
   float turn = hinge_error(r, x), elastic = energy_per_square.y * turn * turn;
   if (energy_per_square.w > 0.0) {
     vec3 at_rest[4];
-    find_rest(r, at_rest);
+    find_rest(r.vertices, at_rest);
     float C = isobend(x, isobend_rest(at_rest, 0u).values, 0u).C;
     elastic += energy_per_square.w * C * C;
   }
@@ -67,28 +66,28 @@ float hinge_elastic(Record4 r, vec3 x[4]) {
 }
 void add_hinge(Record4 r) {
   vec3 x[4], before[4];
-  find_positions(r, 0.0, x);
+  find_positions(r.vertices, 0.0, x);
   float turn = hinge_error(r, x);
   values[M_BEND_SQUARES] += turn * turn;
   if (!(energy_per_square.y + energy_per_square.w > 0.0)) return;
-  find_positions(r, midway, before);
+  find_positions(r.vertices, midway, before);
   values[M_ELASTIC] += hinge_elastic(r, x);
   values[M_ELASTIC_MIDWAY] += hinge_elastic(r, before);
 }
 
 float volume_of(vec3 x[4]) { return dot(cross(x[1], x[2]), x[3]) / 6.0; }
-float tet_elastic(Record4 r, vec3 x[4]) {
+float tet_elastic(TetRecord r, vec3 x[4]) {
   if (material.z > 0.0) {
     vec3 at_rest[4];
-    find_rest(r, at_rest);
-    return r.rest * tet_energy(x, at_rest, material);
+    find_rest(r.vertices, at_rest);
+    return r.filled * tet_energy(x, at_rest, material);
   }
   float error = volume_of(x) - r.rest;
   return energy_per_square.z * error * error;
 }
-void add_tet(Record4 r) {
+void add_tet(TetRecord r) {
   vec3 x[4], before[4];
-  find_positions(r, 0.0, x);
+  find_positions(r.vertices, 0.0, x);
   float volume = volume_of(x), error = volume - r.rest, change = error / r.rest;
   values[M_VOLUME_CHANGE] += error;
   values[M_TET_SQUARES] += change * change;
@@ -97,7 +96,7 @@ void add_tet(Record4 r) {
   if (!(material.z + energy_per_square.z > 0.0)) return;
   float elastic = tet_elastic(r, x), elastic_midway = elastic;
   if (midway > 0.0) {
-    find_positions(r, midway, before);
+    find_positions(r.vertices, midway, before);
     elastic_midway = tet_elastic(r, before);
   }
   values[M_ELASTIC] += elastic;

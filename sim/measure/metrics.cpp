@@ -11,6 +11,7 @@
 #include "sim/contact/moving_obstacle.h"
 #include "sim/gl/keep_bindings.h"
 #include "sim/model/material.h"
+#include "sim/parallel.h"
 
 namespace tetpbd {
 
@@ -28,6 +29,16 @@ glm::uvec2 constraint_range(const ConstraintList& list, glm::uvec2 vertices) {
   const auto first_vertex = [&](unsigned c) { return list.vertices[c * std::size_t(list.arity)]; };
   return {std::ranges::lower_bound(numbers, vertices.x, {}, first_vertex) - numbers.begin(),
           std::ranges::lower_bound(numbers, vertices.y, {}, first_vertex) - numbers.begin()};
+}
+
+Buffer tet_records(const ConstraintList& tets, const TetMesh& mesh) {
+  std::vector<layout::TetRecord> records(tets.count());
+  parallel_for(records.size(), [&](std::size_t t) {
+    layout::TetRecord& record = records[t];
+    std::ranges::copy(tets.ends(t), record.vertices);
+    record.rest = float(tets.rest[t]), record.filled = float(tets.rest[t] * fill_of(mesh, t));
+  });
+  return Buffer("records volume", records);
 }
 
 // J over C^2 of energy_kinds, of a body without a material model; 0 where a kind has no energy.
@@ -108,7 +119,8 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made, const s
   const std::vector<ConstraintList>& lists = (all_made ? made : own).lists;
   Metrics m;
   for (std::size_t k = 0; k < measured_kinds; ++k) {
-    m.records.push_back(record_buffer(lists[k], constraint_kinds[k].name));
+    m.records.push_back(k == std::size_t(index_of<Volume>) ? tet_records(lists[k], model.rest)
+                                                           : record_buffer(lists[k], constraint_kinds[k].name));
     m.counts[k] = lists[k].count();
   }
   std::vector<glm::vec4> rest(model.rest.positions.size());

@@ -65,7 +65,8 @@ double largest_magnitude(const Weights& weights) {
 }
 
 // Searches cells further and further around p, until no tet in those left can be nearer.
-CarriedVertex embed_vertex(const glm::dvec3& p, const TetMesh& mesh, const TetGrid& grid, double farthest) {
+CarriedVertex embed_vertex(const glm::dvec3& p, const TetMesh& mesh, const TetGrid& grid, double farthest,
+                           const auto& belongs) {
   const glm::ivec3 middle = grid.find_cell(p);
   std::pair<double, std::uint32_t> best{INFINITY, none};
   Weights weights{};
@@ -77,9 +78,10 @@ CarriedVertex embed_vertex(const glm::dvec3& p, const TetMesh& mesh, const TetGr
     for (std::size_t k = 0; k < 4; ++k) sum += inside[k] = std::max(now[k], 0.0);
     for (double& k : inside) k /= sum;
     // The distance to a point in the tet is an upper bound of that to the tet. Large weights make flat tets come last.
-    const double away = std::ranges::min(now) > -1e-9 ? 0
-                                                      : glm::distance(p, blend(mesh.positions, mesh.tets[t], inside)) *
-                                                            std::max(largest_magnitude(now), 1.0);
+    double away = std::ranges::min(now) > -1e-9 ? 0
+                                                : glm::distance(p, blend(mesh.positions, mesh.tets[t], inside)) *
+                                                      std::max(largest_magnitude(now), 1.0);
+    if (away < std::min(best.first, grid.cell) && !belongs(t)) away += grid.cell;
     if (std::pair(away, t) < best) best = {away, t}, weights = now;
   };
   for (int r = 0; best.first > r * grid.cell && (r - 1) * grid.cell < farthest; ++r)
@@ -102,12 +104,24 @@ CarriedVertex embed_vertex(const glm::dvec3& p, const TetMesh& mesh, const TetGr
 
 }  // namespace
 
-CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std::string& source) {
+CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std::string& source,
+                     const std::function<bool(std::size_t, std::uint32_t)>& belongs,
+                     const std::function<std::uint32_t(const glm::dvec3&)>& nearest) {
   const TetGrid grid = make_grid(mesh);
-  const double farthest = reach * bounds(mesh.positions).size();
+  // Where anything is carried, looking on in the grid would only take long.
+  const double farthest = nearest ? 2 * grid.cell : reach * bounds(mesh.positions).size();
   CarriedSurface result{std::vector<CarriedVertex>(surface.positions.size()), surface.triangles};
-  parallel_for(surface.positions.size(),
-               [&](std::size_t v) { result.vertices[v] = embed_vertex(surface.positions[v], mesh, grid, farthest); });
+  parallel_for(surface.positions.size(), [&](std::size_t v) {
+    result.vertices[v] = embed_vertex(surface.positions[v], mesh, grid, farthest,
+                                      [&](std::uint32_t tet) { return !belongs || belongs(v, tet); });
+  });
+  for (std::size_t v = 0; nearest && v < result.vertices.size(); ++v) {
+    CarriedVertex& vertex = result.vertices[v];
+    if (vertex.tet != none) continue;
+    vertex.tet = nearest(surface.positions[v]);
+    vertex.weights =
+        glm::vec3(grid.to_weights[vertex.tet] * (surface.positions[v] - mesh.positions[mesh.tets[vertex.tet][0]]));
+  }
   const auto lost = std::ranges::find(result.vertices, none, &CarriedVertex::tet);
   if (lost == result.vertices.end()) return result;
   const auto v = std::size_t(lost - result.vertices.begin());

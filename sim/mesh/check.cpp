@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "sim/mesh/disjoint_sets.h"
+#include "sim/mesh/solid.h"
 #include "sim/mesh/tet_mesh.h"
 #include "sim/parallel.h"
 
@@ -162,7 +163,71 @@ void check_edges(const SurfaceMesh& surface, const SurfaceTopology& topology, Su
       [&](std::size_t i) { return at_edge(topology.one_sided[i]); });
 }
 
-// Turns triangles so that every patch faces outward, and finds the patches without volume.
+std::vector<char> closed_patches(const SurfaceTopology& topology) {
+  std::vector<char> closed(topology.patches, 1);
+  for (std::size_t e = 0; e < topology.edge_count(); ++e)
+    if (topology.use_count(e) != 2)
+      for (std::uint32_t u = topology.edges[e]; u < topology.edges[e + 1]; ++u)
+        closed[topology.patch[topology.uses[u].triangle]] = 0;
+  return closed;
+}
+
+// How many closed patches each one is in. A patch that is only partly in another is not in it.
+std::vector<int> nesting_depths(const SurfaceMesh& surface, const SurfaceTopology& topology) {
+  struct Part {
+    std::vector<Triangle> triangles;
+    Bounds box{glm::dvec3(INFINITY), glm::dvec3(-INFINITY)};
+  };
+  constexpr std::size_t looked_at = 8;  // vertices
+  const std::vector<char> closed = closed_patches(topology);
+  std::vector<Part> parts(topology.patches);
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    Part& part = parts[topology.patch[i]];
+    const Triangle& t = surface.triangles[i];
+    part.triangles.push_back(topology.turned[i] ? Triangle{t[0], t[2], t[1]} : t);
+    for (const std::uint32_t v : t)
+      part.box.low = glm::min(part.box.low, surface.positions[v]),
+      part.box.high = glm::max(part.box.high, surface.positions[v]);
+  }
+  std::vector<int> depths(parts.size(), 0);
+  for (std::size_t b = 0; b < parts.size(); ++b) {
+    std::vector<std::size_t> candidates;
+    for (std::size_t a = 0; a < parts.size() && closed[b]; ++a)
+      if (a != b && closed[a] && glm::all(glm::greaterThan(parts[a].box.low, parts[b].box.low)) &&
+          glm::all(glm::lessThan(parts[a].box.high, parts[b].box.high)))
+        candidates.push_back(a);
+    if (candidates.empty()) continue;
+    const SurfaceMesh shell{surface.positions, parts[b].triangles};
+    const Solid solid(shell);
+    for (const std::size_t a : candidates) {
+      bool inside = true;
+      const std::vector<Triangle>& own = parts[a].triangles;
+      for (std::size_t k = 0; k < own.size() && inside; k += (own.size() + looked_at - 1) / looked_at)
+        inside = std::abs(solid.winding(surface.positions[own[k][0]])) > inside_winding;
+      depths[a] += inside;
+    }
+  }
+  return depths;
+}
+
+// A point in the cavity that begins at the patch's largest triangle: halfway to what is behind it.
+glm::dvec3 point_in_cavity(const SurfaceMesh& surface, const SurfaceTopology& topology, std::size_t patch,
+                           const Solid& solid, double size) {
+  std::size_t largest = surface.triangles.size();
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+    if (topology.patch[i] == patch &&
+        (largest == surface.triangles.size() || glm::length(area_vector(surface, surface.triangles[i])) >
+                                                    glm::length(area_vector(surface, surface.triangles[largest]))))
+      largest = i;
+  const Triangle& t = surface.triangles[largest];
+  const glm::dvec3 out = glm::normalize(area_vector(surface, t)), from = centroid(surface, t) + 1e-9 * size * out;
+  std::vector<Solid::Crossing> found;
+  solid.find_crossings(from, from + size * out, found);
+  return from + out * (found.empty() ? 1e-3 * size : found[0].at * size / 2);
+}
+
+// Turns triangles so that every patch faces away from what is solid, which is inward where it bounds a cavity, and
+// finds the patches without volume.
 void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, SurfaceCheck& check) {
   const glm::dvec3 centre = bounds(surface.positions).centre();  // smaller numbers round less
   std::vector<double> volume(topology.patches, 0), area(topology.patches, 0);
@@ -175,17 +240,23 @@ void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, 
     area[patch] += glm::length(normal);
     place[patch] = centroid(surface, t);
   }
-  for (const double v : volume) check.volume += std::abs(v);
+  const std::vector<int> depths =
+      topology.patches > 1 ? nesting_depths(surface, topology) : std::vector<int>(topology.patches, 0);
+  for (std::size_t p = 0; p < topology.patches; ++p) check.volume += std::abs(volume[p]) * (depths[p] % 2 ? -1 : 1);
   find_defect(
       check, "surface is flat", "part without volume", "parts without volume", "give it thickness or remove it",
       topology.patches, [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
       [&](std::size_t p) { return near(place[p]); });
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const bool inward = volume[topology.patch[i]] < 0;
-    if (bool(topology.turned[i]) == inward) continue;
+    const bool turn = (volume[topology.patch[i]] < 0) != (depths[topology.patch[i]] % 2 == 1);
+    if (bool(topology.turned[i]) == turn) continue;
     std::swap(surface.triangles[i][1], surface.triangles[i][2]);
     ++check.flipped_triangles;
   }
+  if (std::ranges::none_of(depths, [](int depth) { return depth % 2 == 1; })) return;
+  const Solid solid(surface);
+  for (std::size_t p = 0; p < topology.patches; ++p)
+    if (depths[p] % 2 == 1) check.cavities.push_back(point_in_cavity(surface, topology, p, solid, size));
 }
 
 // Dihedral angles between the faces opposite to corners a and b, degrees.
@@ -239,6 +310,38 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
   check_edges(surface, topology, check);
   if (check.defect.empty()) orient(surface, topology, size, check);
   return check;
+}
+
+Outward turn_outward(const SurfaceMesh& given) {
+  constexpr double round_enough = 1e-3;  // volume over area^1.5, below which an open patch stays as it is
+  Outward outward{given, {}};
+  SurfaceMesh& surface = outward.surface;
+  repair(surface);
+  const SurfaceTopology topology = surface_topology(surface.triangles, surface.positions.size());
+  const std::vector<char> closed = closed_patches(topology);
+  const std::vector<int> depths = nesting_depths(surface, topology);
+  std::vector<double> volume(topology.patches, 0), area(topology.patches, 0);
+  std::vector<glm::dvec3> origin(topology.patches, glm::dvec3(0));
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const double own = glm::length(area_vector(surface, surface.triangles[i]));
+    area[topology.patch[i]] += own, origin[topology.patch[i]] += own * centroid(surface, surface.triangles[i]);
+  }
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const Triangle& t = surface.triangles[i];
+    const std::uint32_t patch = topology.patch[i];
+    volume[patch] += glm::dot(surface.positions[t[0]] - origin[patch] / area[patch], area_vector(surface, t)) / 3 *
+                     (topology.turned[i] ? -1 : 1);
+  }
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const std::uint32_t patch = topology.patch[i];
+    const bool known = closed[patch] || std::abs(volume[patch]) > round_enough * std::pow(area[patch], 1.5);
+    const bool turn = known && (volume[patch] < 0) != (depths[patch] % 2 == 1);
+    if (bool(topology.turned[i]) != turn) std::swap(surface.triangles[i][1], surface.triangles[i][2]);
+  }
+  outward.patches = topology.patch;
+  outward.closed = std::ranges::all_of(closed, [](char is_closed) { return is_closed != 0; });
+  outward.cavities = int(std::ranges::count_if(depths, [](int depth) { return depth % 2 == 1; }));
+  return outward;
 }
 
 SurfaceCheck check_values(const SurfaceMesh& surface) {
@@ -314,6 +417,16 @@ std::string repair(SurfaceMesh& surface) {
   return fmt::format("{}", fmt::join(done, ", "));
 }
 
+double least_quality(const TetMesh& mesh) {
+  double least = INFINITY, edges = 0;
+  for (const Tet& tet : mesh.tets) {
+    least = std::min(least, least_altitude(mesh, tet));
+    for (std::size_t a = 0; a < 4; ++a)
+      for (std::size_t b = 0; b < a; ++b) edges += glm::distance(mesh.positions[tet[a]], mesh.positions[tet[b]]);
+  }
+  return least / (edges / (6 * double(mesh.tets.size())));
+}
+
 MeshReport report(const TetMesh& mesh) {
   MeshReport r{};
   r.vertices = mesh.positions.size();
@@ -321,6 +434,7 @@ MeshReport report(const TetMesh& mesh) {
   r.surface_triangles = mesh.surface.size();
   const Bounds box = bounds(mesh.positions);
   r.size = box.high - box.low;
+  r.filled = filled_volume(mesh);
   r.edges = tet_edges(mesh).size();
   DisjointSets parts(r.vertices);
   std::vector<char> solid(r.vertices, 0);
@@ -347,7 +461,20 @@ MeshReport report(const TetMesh& mesh) {
   }
   r.genus = int(surface.patches) - euler / 2;
 
+  // A part of the boundary that encloses less than nothing looks into a cavity.
+  std::vector<double> enclosed(surface.patches, 0);
+  for (std::size_t t = 0; t < boundary.size(); ++t) {
+    const auto& [a, b, c] = boundary[t];
+    const auto at = [&](std::uint32_t v) { return mesh.positions[v] - box.centre(); };
+    enclosed[surface.patch[t]] += glm::dot(at(a), glm::cross(at(b), at(c)));
+  }
+  r.cavities = int(std::ranges::count_if(enclosed, [](double volume) { return volume < 0; }));
+
   if (r.tets == 0) return r;
+  r.worst_altitude = INFINITY;
+  for (std::size_t t = 0; t < r.tets; ++t)
+    if (const double altitude = least_altitude(mesh, mesh.tets[t]); altitude < r.worst_altitude)
+      r.worst_altitude = altitude, r.worst_tet = t;
   r.smallest_tet_volume = INFINITY;
   r.min_dihedral_deg = 180;
   struct Shape {

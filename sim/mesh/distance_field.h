@@ -17,6 +17,8 @@ struct DistanceField {
   std::vector<float> values;  ///< m, negative inside; x fastest
 };
 
+/// Whether the program was built with OpenVDB.
+bool can_make_distance_fields();
 /// With `voxels` cells along the longest side of the surface's bounding box. A surface that encloses nothing (open,
 /// flat) counts as a sheet one cell thick. Cached. Throws Error naming `source`, also where the program was built
 /// without OpenVDB.

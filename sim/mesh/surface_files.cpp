@@ -12,7 +12,6 @@
 
 #include "sim/mesh/tet_mesh.h"
 #include "sim/mesh/text_file.h"
-#include "sim/mesh/wrap.h"
 
 namespace tetpbd {
 namespace {

@@ -97,17 +97,19 @@ void find_boundary(TetMesh& mesh, const std::string& source) {
     for (auto f = faces.begin(); f != faces.end();) {
       auto next = f + 1;
       while (next != faces.end() && next->others == f->others) ++next;
-      if (next - f > 2 || (next - f == 2 && f->even == f[1].even)) {
+      // Parts of a lattice that part at a face keep it, so it may have two tets on a side.
+      const bool both_sides = std::any_of(f, next, [&](const Face& other) { return other.even != f->even; });
+      if (mesh.fill.empty() && (next - f > 2 || (next - f == 2 && !both_sides))) {
         const auto [one, other] = std::minmax({f->id / 4, f[1].id / 4});
         throw Error(fmt::format("tets {} and {} overlap", one, other),
                     fmt::format("near {} in {}", point_text(mesh.positions[v]), source),
                     "remove duplicate or folded elements");
       }
-      if (next - f == 1)
-        boundary.push_back(f->id);
-      else
-        pieces.join(f->id / 4, f[1].id / 4);
-      f = next;
+      for (; f != next; ++f)
+        if (both_sides)
+          pieces.join(f->id / 4, (next - 1)->id / 4);
+        else
+          boundary.push_back(f->id);
     }
   }
   std::ranges::sort(boundary);  // the order of the tets
@@ -195,9 +197,24 @@ double tet_volume(const TetMesh& mesh, const Tet& tet) {
          6;
 }
 
+double least_altitude(const TetMesh& mesh, const Tet& tet) {
+  const auto& x = mesh.positions;
+  double largest = 0;
+  for (const auto& [a, b, c] : outward_faces)
+    largest = std::max(largest, glm::length(glm::cross(x[tet[b]] - x[tet[a]], x[tet[c]] - x[tet[a]])));
+  return 6 * tet_volume(mesh, tet) / largest;
+}
+
 double mesh_volume(const TetMesh& mesh) {
   const std::vector<double> volumes = tet_volumes(mesh);
   return std::accumulate(volumes.begin(), volumes.end(), 0.0);
+}
+
+double filled_volume(const TetMesh& mesh) {
+  const std::vector<double> volumes = tet_volumes(mesh);
+  double sum = 0;
+  for (std::size_t i = 0; i < volumes.size(); ++i) sum += fill_of(mesh, i) * volumes[i];
+  return sum;
 }
 
 std::vector<double> tet_volumes(const TetMesh& mesh) {
@@ -210,7 +227,7 @@ std::vector<double> lumped_masses(const TetMesh& mesh, double density) {
   std::vector<double> masses(mesh.positions.size(), 0);
   const std::vector<double> volumes = tet_volumes(mesh);
   for (std::size_t i = 0; i < volumes.size(); ++i) {
-    const double quarter = density * volumes[i] / 4;
+    const double quarter = density * volumes[i] * fill_of(mesh, i) / 4;
     for (const std::uint32_t v : mesh.tets[i]) masses[v] += quarter;
   }
   if (mesh.tets.empty())

@@ -34,6 +34,8 @@ struct TetMesh {
   bool one_piece = false;  ///< all tets are joined by faces, not only by vertices or edges
   /// m, of a sheet, which has no tets, only triangles; for all bodies of a model the largest, 0 without sheets.
   double thickness = 0;
+  /// By tet, the share of its volume that the body fills, which its mass and stiffness are of; empty: all of it.
+  std::vector<float> fill{};
 };
 
 /// Largest coordinate of a mesh file, so that volumes (its cube) and their products stay far inside a double's range.
@@ -42,6 +44,9 @@ constexpr double largest_coordinate = 1e30;
 /// PLY, OBJ, STL, OFF: polygons are cut into triangles, vertices welded, and those without a triangle dropped. Throws
 /// Error for files that cannot be read or have no triangle.
 SurfaceMesh load_surface(const std::filesystem::path& file);
+
+/// load_surface() without welding and dropping, for repair(), which says what it does.
+SurfaceMesh load_as_is(const std::filesystem::path& file);
 
 /// Merges vertices that are no further than `tolerance` (metres) from an earlier one that stays, drops triangles that
 /// collapse, then vertices without a triangle. Positions that are not finite stay for check_surface(). Indices must be
@@ -68,25 +73,35 @@ void drop_unused_vertices(std::vector<Vertex>& vertices, std::vector<std::array<
 struct SurfaceCheck {
   int components = 0;
   int euler_characteristic = 0;
-  double volume = 0;  ///< m^3, of all parts
+  double volume = 0;                 ///< m^3, of all parts, without cavities
+  std::vector<glm::dvec3> cavities;  ///< a point in each
   std::size_t flipped_triangles = 0;
   std::string defect;     ///< the first defect found
   std::size_t count = 0;  ///< how often it occurs
   std::string place;      ///< the same in words, and where it occurs first
   std::string hint;       ///< what to do about it
-  bool hopeless = false;  ///< a wrap does not repair it either (wrap.h)
+  bool hopeless = false;  ///< a lattice does not fill it either (lattice.h)
 };
-/// Orients triangles consistently and outward where possible, which is no defect, and stops at the first defect.
-/// Self-intersections are left to TetGen; tetrahedralise() reports them.
+/// Orients triangles consistently and away from what is solid where possible, which is no defect, and stops at the
+/// first defect. A closed part in another bounds a cavity of it, and one in a cavity is solid again. Self-intersections
+/// are left to TetGen; tetrahedralise() reports them.
 SurfaceCheck check_surface(SurfaceMesh& surface);
 /// Only the checks of indices and positions, where a defect is hopeless.
 SurfaceCheck check_values(const SurfaceMesh& surface);
+struct Outward {
+  SurfaceMesh surface;                   ///< repaired, its triangles turned
+  std::vector<std::uint32_t> patches{};  ///< of each triangle, its part of the surface
+  int cavities = 0;
+  bool closed = true;  ///< each of its parts
+};
+/// Orients what may have any defect but hopeless ones: parts that are open by the side on which they are hollow.
+Outward turn_outward(const SurfaceMesh& surface);
 /// Repairs what needs no choice: merges vertices in one place, drops triangles without area or repeated and vertices
 /// without a triangle, and turns triangles outward where the rest is sound. Says what it did; empty: nothing, and the
 /// surface is as it was.
 std::string repair(SurfaceMesh& surface);
 
-/// The surface encloses no solid that TetGen can fill; a wrap of it may (wrap.h).
+/// TetGen cannot fill the surface; a lattice may (fill.h).
 struct NotSolid : Error {
   using Error::Error;
 };
@@ -135,8 +150,11 @@ TetMesh sheet_of(SurfaceMesh surface, const std::string& source);
 TetMesh make_sheet(const std::array<double, 2>& size, const std::array<int, 2>& cells);
 
 double tet_volume(const TetMesh& mesh, const Tet& tet);
+double least_altitude(const TetMesh& mesh, const Tet& tet);  ///< m, from a corner to the face opposite to it
+inline double fill_of(const TetMesh& mesh, std::size_t tet) { return mesh.fill.empty() ? 1.0 : double(mesh.fill[tet]); }
 std::vector<double> tet_volumes(const TetMesh& mesh);
-double mesh_volume(const TetMesh& mesh);  ///< m^3, sum of signed tet volumes
+double mesh_volume(const TetMesh& mesh);    ///< m^3, sum of signed tet volumes
+double filled_volume(const TetMesh& mesh);  ///< m^3, of which the body fills its tets
 /// kg for each vertex: a quarter of each adjacent tet's mass, in a sheet a third of each triangle's; density in kg/m^3.
 std::vector<double> lumped_masses(const TetMesh& mesh, double density);
 /// Undirected edges of all tets and triangles, each once, sorted.
@@ -152,14 +170,20 @@ Bounds bounds(const std::vector<glm::dvec3>& positions);
 /// "(x, y, z)", for errors.
 std::string point_text(const glm::dvec3& p);
 
+/// The least altitude of a tet over the mean length of edges: of a regular tet 0.82, of a flat one 0.
+double least_quality(const TetMesh& mesh);
 /// What `tetpbd mesh` prints and stats.json quotes.
 struct MeshReport {
   std::size_t vertices, surface_vertices, surface_triangles, edges, bends, tets, faces;
   int euler_characteristic;  ///< V - E + F - T
   int genus;                 ///< of the tets' boundary, summed over its components
   int components;            ///< of tetrahedra and sheets (by shared vertices)
+  double filled;             ///< m^3, of which the body is
   double volume, smallest_tet_volume, mean_tet_volume;
   double min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg;
+  double worst_altitude;   ///< m, the least of a tet's corner over the opposite face
+  std::size_t worst_tet;   ///< which has it
+  int cavities;            ///< of all bodies
   std::size_t slivers;  ///< tets with a dihedral angle under 5 or over 175 degrees
   std::size_t inverted;
   glm::dvec3 size;  ///< m, of the bounding box

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "sim/error.h"
+#include "sim/files.h"
 #include "sim/mesh/cache.h"
 #include "sim/mesh/subprocess.h"
 #include "sim/mesh/tet_mesh.h"
@@ -65,19 +66,39 @@ void throw_intersections(const SurfaceMesh& surface, const fs::path& input, cons
                  "repair it (in MeshLab: select self-intersecting faces, delete them, close the holes)");
 }
 
-TetMesh run(const SurfaceMesh& surface, const std::string& switches, double seconds, const std::string& source) {
+// TetGen's own format, which names a point in each cavity.
+void write_with_cavities(const fs::path& file, const SurfaceMesh& surface, const std::vector<glm::dvec3>& cavities) {
+  std::string text = fmt::format("{} 3 0 0\n", surface.positions.size());
+  const auto put_points = [&](const std::vector<glm::dvec3>& points) {
+    for (std::size_t i = 0; i < points.size(); ++i)
+      text += fmt::format("{} {:.17g} {:.17g} {:.17g}\n", i, points[i].x, points[i].y, points[i].z);
+  };
+  put_points(surface.positions);
+  text += fmt::format("{} 0\n", surface.triangles.size());
+  for (const auto& [a, b, c] : surface.triangles) text += fmt::format("3 {} {} {}\n", a, b, c);
+  text += fmt::format("{}\n", cavities.size());
+  put_points(cavities);
+  write_file(file, text + "0\n");
+}
+
+TetMesh run(const SurfaceMesh& surface, const std::vector<glm::dvec3>& cavities, const std::string& switches,
+            double seconds, const std::string& source) {
   const TemporaryFolder folder;
-  const fs::path input = folder.path / "surface.off", output = folder.path / "surface.1.node";
-  write_surface(input, surface);
+  const fs::path input = folder.path / (cavities.empty() ? "surface.off" : "surface.smesh"),
+                 output = folder.path / "surface.1.node";
+  if (cavities.empty())
+    write_surface(input, surface);
+  else
+    write_with_cavities(input, surface, cavities);
   const SubprocessEnd end = run_tetgen(switches + "F", input, seconds);  // F writes no files of faces
   if (end.kind == SubprocessEnd::timed_out)
-    throw Error(fmt::format("tetrahedralising with {} took longer than {:g} s", switches, seconds), source,
-                "allow larger tets (a), ask for less quality (q), or use a coarser surface");
+    throw NotSolid(fmt::format("tetrahedralising with {} took longer than {:g} s", switches, seconds), source,
+                   "allow larger tets (a), ask for less quality (q), use a coarser surface, or --fill lattice");
   if (end.kind == SubprocessEnd::done && fs::exists(output)) return read_node_ele(output);
   throw_intersections(surface, input, source);
   throw NotSolid(fmt::format("TetGen failed with {} ({})", switches,
                              end.kind == SubprocessEnd::done ? "it made no tet" : end.reason),
-                 source, "try other switches, such as pYq1.85o/140, or remesh the surface");
+                 source, "try other switches, --fill lattice, or remesh the surface");
 }
 
 }  // namespace
@@ -106,14 +127,18 @@ TetMesh tetrahedralise(const SurfaceMesh& given, const std::string& wanted_switc
   const SurfaceCheck check = check_surface(surface);
   if (check.hopeless) throw Error(check.defect, check.place + " in " + source, check.hint);
   if (!check.defect.empty()) throw NotSolid(check.defect, check.place + " in " + source, check.hint);
-  TetMesh mesh = run(surface, switches, time_limit, source);
-  finish_tets(mesh, source);
-  // TetGen fills everything inside the outermost surface, and then the volumes of the parts do not add up to the tets'.
+  TetMesh mesh = run(surface, check.cavities, switches, time_limit, source);
+  try {
+    finish_tets(mesh, source);
+  } catch (const Error& flat) {
+    throw NotSolid("TetGen made no mesh of it", flat.what(), "try other switches or --fill lattice");
+  }
+  // Parts that meet were taken for one inside the other, or not; the volumes do not add up then.
   if (check.components > 1 && std::abs(mesh_volume(mesh) - check.volume) > 1e-6 * check.volume)
     throw NotSolid(
-        "parts of the surface lie inside one another",
+        "parts of the surface overlap",
         fmt::format("they enclose {:.6g} m^3, the tets fill {:.6g} m^3 in {}", check.volume, mesh_volume(mesh), source),
-        "remove the inner parts: cavities are not supported");
+        "unite the parts that overlap");
   keep_mesh(key, mesh);
   return mesh;
 }

@@ -20,18 +20,19 @@ namespace {
 
 // Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest are mu = 4/3 mu_Lame and
 // lambda = lambda_Lame + 5/6 mu_Lame.
-void make_neo_hookean(ConstraintList& tets, const Lame& m) {
+void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m) {
   const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu;
   for (std::size_t c = 0; c < tets.count(); ++c) {
     double* rest = tets.rest.data() + 8 * c;
     rest[7] = 1 + 0.75 * mu / lambda;
-    const double volume = 1 / (6 * rest[6]);
+    const double volume = fill_of(mesh, c) / (6 * rest[6]);
     tets.compliance.insert(tets.compliance.end(), {1 / (mu * volume), 1 / (lambda * volume)});
   }
 }
 
 // Springs of stiffness k and length L in all directions alike are isotropic with mu = lambda = (sum k L^2) / (15 V)
-// (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k L^2; volume(t) is that of tet t at rest.
+// (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k L^2; volume(t) is what the body fills of tet
+// t at rest.
 std::vector<double> spring_stiffness(const ConstraintList& edges, const ConstraintList& tets, double mu,
                                      const auto& volume) {
   std::vector<double> stiffness(edges.count());
@@ -49,15 +50,16 @@ std::vector<double> spring_stiffness(const ConstraintList& edges, const Constrai
 }
 
 // Springs contribute lambda = mu; constraints of volume add what is missing of lambda.
-void make_springs(ConstraintList& edges, ConstraintList& volumes, const Lame& m) {
-  const auto volume = [&](std::size_t t) { return volumes.rest[t]; };
+void make_springs(ConstraintList& edges, ConstraintList& volumes, const TetMesh& mesh, const Lame& m) {
+  const auto volume = [&](std::size_t t) { return volumes.rest[t] * fill_of(mesh, t); };
   for (const double k : spring_stiffness(edges, volumes, m.mu, volume)) edges.compliance.push_back(1 / k);
-  for (const double V : volumes.rest) volumes.compliance.push_back(V / (m.lambda - m.mu));
+  for (std::size_t t = 0; t < volumes.count(); ++t)
+    volumes.compliance.push_back(volumes.rest[t] / fill_of(mesh, t) / (m.lambda - m.mu));
 }
 
 // Dashpots lie along edges and damp by tau (s) times the stiffness that springs there would have.
-void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const Lame& m, double tau) {
-  const auto volume = [&](std::size_t t) { return 1 / (6 * tets.rest[8 * t + 6]); };
+void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const TetMesh& mesh, const Lame& m, double tau) {
+  const auto volume = [&](std::size_t t) { return fill_of(mesh, t) / (6 * tets.rest[8 * t + 6]); };
   for (const double k : spring_stiffness(edges, tets, m.mu, volume)) edges.compliance.push_back(1 / (k * tau));
 }
 
@@ -70,6 +72,7 @@ TetMesh body_mesh(const Model& model, const Body& body) {
                part(model.rest.tets, body.first_tet, body.tets),
                part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece,
                body.is_sheet() ? model.rest.thickness : 0};
+  if (!model.rest.fill.empty()) mesh.fill = part(model.rest.fill, body.first_tet, body.tets);
   const auto shift = [&](auto& elements) {
     for (auto& element : elements)
       for (std::uint32_t& v : element) v -= std::uint32_t(body.first_vertex);
@@ -104,10 +107,12 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
                 "give constraints stretch and isobend their compliance, and material none");
   ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
   const Lame m = lame(material.young_modulus, material.poisson_ratio);
-  if (material.material == "springs") make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], m);
-  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], m);
+  if (material.material == "springs")
+    make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], mesh, m);
+  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], mesh, m);
   if (system.present[index_of<Dashpot>])
-    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], m, material.constraint_damping);
+    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], mesh, m,
+                  material.constraint_damping);
   return system;
 }
 

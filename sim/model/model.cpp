@@ -39,6 +39,11 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
   model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
   model.rest.thickness = std::max(model.rest.thickness, mesh.tets.empty() ? mesh.thickness : 0);
   append_shifted(model.rest.tets, mesh.tets);
+  if (!model.rest.fill.empty() || !mesh.fill.empty()) {
+    model.rest.fill.resize(body.first_tet, 1);
+    model.rest.fill.insert(model.rest.fill.end(), mesh.fill.begin(), mesh.fill.end());
+    model.rest.fill.resize(model.rest.tets.size(), 1);
+  }
   append_shifted(model.rest.surface, mesh.surface);
   glm::dvec3 centre{0};
   double total = 0;

@@ -52,6 +52,8 @@ struct Model {
   double size = 1;                     ///< m, diagonal of the largest body at rest
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
+  /// By which surfaces became tets, where that was not asked for or says more: a body's name, and what was done.
+  std::vector<std::pair<std::string, std::string>> fills;
   std::vector<StartMotion> start_motions;  ///< already made in `positions`
   /// The surface of all bodies that is drawn and exported in place of `rest.surface`; empty unless a body has its own.
   CarriedSurface carried;

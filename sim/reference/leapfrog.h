@@ -38,11 +38,6 @@ inline double draw_unit(std::mt19937& random) {
   const double low = double(random()), high = double(random());
   return 2 * ((low + high * 0x1p32) / 0x1p64) - 1;
 }
-/// The longest step that is stable about these positions, s, by the largest eigenvalues of M^-1 K and of the damping,
-/// which power iteration finds from differences of forces. Bodies that deform far need shorter ones.
-double stable_step(const ReferenceInput& input, const Compliances& compliances, const Points& positions,
-                   int iterations = 100);
-
 /// The stiffness of the stiffest constraint, 1/s^2 (method.md eq. 39b), with a share of its vertices' masses. It bounds
 /// the largest eigenvalue of M^-1 K, but for the curvature of constraints.
 double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances, const Points& positions);

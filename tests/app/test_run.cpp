@@ -165,7 +165,7 @@ TEST_CASE("mistakes get one line, status 2 and no files") {
   fails("wobble", "wobble");
   std::ofstream(folder.path / "open.off") << "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
   fails("mesh open.off", "open.off");
-  fails("run --mesh open.off --set bodies.0.wrap=false", "open.off");
+  fails("run --mesh open.off --fill tetgen", "open.off");
 }
 
 TEST_CASE("help, version, info and explain answer") {

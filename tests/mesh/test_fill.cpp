@@ -1,4 +1,5 @@
-// Surfaces that no solver can fill, wrapped; distance fields; fine surfaces on coarse tets; repairs.
+// Surfaces that TetGen cannot fill, and the lattice that does; cavities; distance fields; fine surfaces on coarse tets.
+// repairs.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -7,8 +8,11 @@
 #include "app/commands.h"
 #include "app/scene.h"
 #include "sim/mesh/carry.h"
+#include "sim/mesh/disjoint_sets.h"
 #include "sim/mesh/distance_field.h"
-#include "sim/mesh/wrap.h"
+#include "sim/mesh/fill.h"
+#include "sim/mesh/solid.h"
+#include "sim/model/material.h"
 #include "tests/app/run_program.h"
 #include "tests/mesh/mesh_samples.h"
 #include "tests/render/render_stage.h"
@@ -18,8 +22,8 @@ using namespace samples;
 
 namespace {
 
-const doctest::skip needs_openvdb(!can_wrap());
-constexpr const char* coarse = "pYq1.85o/140";
+const doctest::skip needs_openvdb(!can_make_distance_fields());
+const FillOptions coarse{.size = {2000, 0}};
 
 SurfaceMesh rectangle(double x, double y, double z = 0) {
   return {{{0, 0, z}, {x, 0, z}, {x, y, z}, {0, y, z}}, {{0, 1, 2}, {0, 2, 3}}};
@@ -77,18 +81,16 @@ TEST_CASE("distance field: signed of what is closed, a sheet's of what is not" *
   CHECK(contains(error_of([&] { distance_field(lost, 20, "lost.obj"); }), "not finite numbers: 1 vertex"));
 }
 
-TEST_CASE("wrap: every defect ends as a body that carries the surface" * needs_openvdb) {
+TEST_CASE("lattice: every defect ends as a body that carries the surface") {
   const Folder folder;
   SurfaceMesh s = cube({3, 0, 0});
   const auto count = [&] { return std::uint32_t(s.positions.size()); };
   std::string why;
+  double volume = 1;
+  int parts = 1;
   SUBCASE("open") {
     s.triangles.pop_back();
     why = "surface is open: 3 edges with one triangle only";
-  }
-  SUBCASE("a sheet") {
-    s = rectangle(2, 1);
-    why = "too few triangles to enclose a volume: 2 of them";
   }
   SUBCASE("doubled") {
     s.triangles.push_back(s.triangles[0]);
@@ -108,70 +110,156 @@ TEST_CASE("wrap: every defect ends as a body that carries the surface" * needs_o
     SurfaceMesh other = cube({4, 1, 1});
     s = joined(s, other);
     weld(s, 1e-9);
+    volume = 2, parts = 2;
     why = "parts of the surface touch in single vertices: 1 vertex";
   }
   SUBCASE("it intersects itself") {
     s = joined(s, cube({3.5, 0.3, 0.2}));
+    volume = 2 - 0.5 * 0.7 * 0.8;
     why = "surface intersects itself: ";
   }
-  SUBCASE("one part in another") {
-    s = joined(s, cube({3.25, 0.25, 0.25}, 0.5));
-    why = "parts of the surface lie inside one another";
-  }
-  SUBCASE("one-sided") {
-    s = {{}, {}};
-    for (std::uint32_t i = 0; i < 12; ++i) {  // a Moebius strip
-      const double turn = 2 * std::acos(-1.0) * i / 12, half = turn / 2;
-      const glm::dvec3 out(std::cos(turn), std::sin(turn), 0);
-      for (const double side : {-0.3, 0.3})
-        s.positions.push_back(out * (1 + side * std::cos(half)) + glm::dvec3(0, 0, side * std::sin(half)));
-      const std::uint32_t a = 2 * i, c = i < 11 ? a + 2 : 1, d = i < 11 ? a + 3 : 0;
-      s.triangles.push_back({a, a + 1, d});
-      s.triangles.push_back({a, d, c});
-    }
-    why = "surface is open: 24 edges";
-  }
-  const Filled filled = fill_or_wrap(s, coarse, WrapOptions{24, 1}, false, "bad.obj");
+  const Filled filled = fill(s, coarse, "bad.obj");
   CHECK(contains(filled.note, why));
-  CHECK(contains(filled.note, ", so it was wrapped with 24 voxels across"));
+  CHECK(contains(filled.note, fmt::format(", so a lattice of {} tets fills it", filled.mesh.tets.size())));
+  CHECK(std::abs(double(filled.mesh.tets.size()) - 2000) < 350);
   const MeshReport counts = report(filled.mesh);
   CHECK(counts.inverted == 0);
-  CHECK(counts.components == 1);
-  CHECK(counts.volume > 0);
-  const CarriedSurface carried = carry(s, filled.mesh, "bad.obj");
-  const auto positions = carried_positions(carried, filled.mesh.tets, filled.mesh.positions);
+  CHECK(counts.components == parts);
+  CHECK(counts.min_dihedral_deg > 20);
+  CHECK(filled_volume(filled.mesh) == doctest::Approx(volume).epsilon(0.03));
   const double size = bounds(s.positions).size();
-  for (std::size_t v = 0; v < positions.size(); ++v) {
-    CHECK(glm::distance(positions[v], s.positions[v]) < 1e-6 * size);
-    const glm::vec3 w = carried.vertices[v].weights;
-    CHECK(std::min({w.x, w.y, w.z, 1 - w.x - w.y - w.z}) > -1e-5f);
-  }
-  const Filled again = fill_or_wrap(s, coarse, WrapOptions{24, 1}, false, "bad.obj");
+  const auto positions = carried_positions(filled.carried, filled.mesh.tets, filled.mesh.positions);
+  for (std::size_t v = 0; v < positions.size(); ++v) CHECK(glm::distance(positions[v], s.positions[v]) < 1e-6 * size);
+  const Filled again = fill(s, coarse, "bad.obj");
   CHECK(again.note == filled.note);
   CHECK(again.mesh.positions == filled.mesh.positions);
-  CHECK(contains(error_of([&] { fill_or_wrap(s, coarse, {}, false, "bad.obj"); }), why));
+  CHECK(again.mesh.fill == filled.mesh.fill);
+  CHECK(again.carried.triangles == filled.carried.triangles);
+  CHECK(contains(error_of([&] { fill(s, {.by = "tetgen"}, "bad.obj"); }), why));
 }
 
-TEST_CASE("wrap: a sound surface is left alone, a hopeless one refused" * needs_openvdb) {
+TEST_CASE("lattice: what encloses nothing is refused, a hole is closed") {
   const Folder folder;
-  const Filled sound = fill_or_wrap(cube(), coarse, WrapOptions{}, false, "cube.obj");
-  CHECK(sound.note == "");
-  CHECK(mesh_volume(sound.mesh) == doctest::Approx(1));
+  CHECK(fill(cube(), {}, "cube.obj").note == "");
   SurfaceMesh lost = cube();
   lost.positions[3].x = NAN;
-  CHECK(contains(error_of([&] { fill_or_wrap(lost, coarse, WrapOptions{}, false, "lost.obj"); }),
+  CHECK(contains(error_of([&] { fill(lost, coarse, "lost.obj"); }),
                  "2 positions are not finite numbers: 1 vertex, first vertex 3 in lost.obj: "));
-  CHECK(contains(error_of([&] { wrap({}, {}, "nothing.obj"); }), "nothing.obj"));
+  CHECK(contains(error_of([&] { fill(rectangle(2, 1), coarse, "flat.obj"); }), "encloses nothing"));
+  CHECK(contains(error_of([&] { fill({}, coarse, "nothing.obj"); }), "nothing.obj"));
+  SurfaceMesh plate = cube();
+  for (glm::dvec3& p : plate.positions) p.y *= 1e-3;
+  CHECK(contains(error_of([&] {
+                   fill(plate, {.by = "lattice", .size = {1000, 0}}, "plate.obj");
+                 }),
+                 "half of the body is thinner than an eighth of a cell: 0.001 m of"));
   SurfaceMesh scan = sphere(20);
   scan.triangles.resize(scan.triangles.size() - 30);  // a small hole does not make it hollow
-  CHECK(mesh_volume(fill_or_wrap(scan, coarse, WrapOptions{30, 1}, false, "scan.obj").mesh) > 4.2);
-  SurfaceMesh bowl = sphere(20);
-  std::erase_if(bowl.triangles, [&](const Triangle& t) { return bowl.positions[t[0]].z > 0.1; });
-  CHECK(mesh_volume(fill_or_wrap(bowl, coarse, WrapOptions{30, 1}, false, "bowl.obj").mesh) < 1.9);
-  const SurfaceMesh round = wrap(cube(), {40, 1}, "cube.obj");
-  const Bounds box = bounds(round.positions);
-  CHECK(box.low.x == doctest::Approx(-std::sqrt(3.0) / 40).epsilon(0.05));
-  CHECK(box.high.y == doctest::Approx(1 + std::sqrt(3.0) / 40).epsilon(0.05));
+  CHECK(filled_volume(fill(scan, coarse, "scan.obj").mesh) == doctest::Approx(4.18).epsilon(0.04));
+  FillOptions fine{.by = "lattice", .size = {.spacing = 1e-5}};
+  const std::string refused = error_of([&] { fill(cube(), fine, "cube.obj"); });
+  CHECK(contains(refused, "2 a lattice with a spacing of 1e-05 m is too fine: it has 1e+15 points, of at most 1e+09"));
+  CHECK(contains(refused, "give a spacing of 0.00"));
+}
+
+TEST_CASE("lattice: parts that are nearer than a cell stay apart, those that overlap become one") {
+  const Folder folder;
+  const auto of_two = [&](double apart) { return joined(cube(), cube({1 + apart, 0.13, 0.21})); };
+  const Filled near = fill(of_two(1e-3), {.by = "lattice", .size = {3000, 0}}, "near.obj");
+  CHECK(report(near.mesh).components == 2);
+  CHECK(contains(near.note, "in 2 parts"));
+  CHECK(filled_volume(near.mesh) == doctest::Approx(2).epsilon(1e-6));
+  // Each half of the surface rides on its own part.
+  DisjointSets parts(near.mesh.positions.size());
+  for (const Tet& t : near.mesh.tets)
+    for (const std::uint32_t v : t) parts.join(t[0], v);
+  const auto part = [&](std::size_t v) { return parts.root(near.mesh.tets[near.carried.vertices[v].tet][0]); };
+  for (std::size_t v = 0; v < 16; ++v) CHECK(part(v) == part(v < 8 ? 0 : 8));
+  CHECK(part(0) != part(8));
+  CHECK(report(fill(of_two(-0.1), {.by = "lattice", .size = {3000, 0}}, "joined.obj").mesh).components == 1);
+}
+
+TEST_CASE("lattice: mass and stiffness are of what the body fills") {
+  const Folder folder;
+  const SurfaceMesh ball = sphere(24);
+  const Filled filled = fill(ball, {.by = "lattice", .size = {6000, 0}}, "ball.obj");
+  SurfaceMesh copy = ball;
+  const double volume = check_surface(copy).volume;
+  CHECK(filled_volume(filled.mesh) == doctest::Approx(volume).epsilon(1e-6));
+  CHECK(mesh_volume(filled.mesh) < 1.06 * volume);
+  double mass = 0;
+  for (const double m : lumped_masses(filled.mesh, 500)) mass += m;
+  CHECK(mass == doctest::Approx(500 * volume).epsilon(1e-6));
+  // Stretched alike everywhere, the body stores the energy of its own volume.
+  Material material;
+  material.material = "neo-hookean", material.young_modulus = 1e5, material.poisson_ratio = 0.3;
+  const ConstraintSystem system = build_constraints(filled.mesh, material);
+  const ConstraintList& tets = system.lists[index_of<NeoHookean>];
+  for (std::size_t t = 0; t < 50; ++t) {
+    TetMesh full = filled.mesh;
+    full.fill.clear();
+    const auto whole = build_constraints(full, material).lists[index_of<NeoHookean>].compliance[2 * t];
+    CHECK(tets.compliance[2 * t] * fill_of(filled.mesh, t) == doctest::Approx(whole));
+    if (t == 0) CHECK(tets.count() == full.tets.size());
+    if (t > 3) break;
+  }
+  // The outer vertices lie on the surface, but where that would flatten tets.
+  const Outward outward = turn_outward(ball);
+  const Solid solid(outward.surface);
+  double sum = 0, count = 0;
+  for (const Triangle& t : filled.mesh.surface)
+    for (const std::uint32_t v : t) sum += std::pow(solid.nearest(filled.mesh.positions[v]).distance, 2), ++count;
+  CHECK(std::sqrt(sum / count) < 0.04);
+  CHECK(least_quality(filled.mesh) > 0.45);
+}
+
+TEST_CASE("solid: inside, nearest points and crossings") {
+  const SurfaceMesh box = cube();
+  const Solid solid(box);
+  CHECK(solid.winding({0.3, 0.4, 0.6}) == doctest::Approx(1));
+  CHECK(std::abs(solid.winding({1.3, 0.4, 0.6})) < 1e-3);
+  const auto near = solid.nearest({0.3, 0.4, 1.5});
+  CHECK(near.distance == doctest::Approx(0.5));
+  CHECK(near.point.z == doctest::Approx(1));
+  CHECK(solid.nearest({3, 0, 0}, 0.5).distance == 0.5);
+  std::vector<Solid::Crossing> found;
+  solid.find_crossings({-1, 0.4, 0.3}, {2, 0.41, 0.32}, found);
+  REQUIRE(found.size() == 2);
+  CHECK(found[0].at == doctest::Approx(1.0 / 3));
+  CHECK(found[0].jump == 1);
+  CHECK(found[1].jump == -1);
+  CHECK(solid.winding_at({0.5, 0.45, 0.35}, {-1, 0.4, 0.3}, 0) == 1);
+  CHECK(solid.sees({0.1, 0.2, 0.3}, 1, {0.9, 0.8, 0.7}));
+  CHECK_FALSE(solid.sees({0.1, 0.2, 0.3}, 1, {1.2, 0.8, 0.7}));
+  const SurfaceMesh two = joined(cube(), cube({0.5, 0.2, 0.2}));
+  const Solid both(two);
+  CHECK(both.winding({0.7, 0.5, 0.5}) == doctest::Approx(2));
+  CHECK(both.sees({0.1, 0.5, 0.5}, 1, {1.4, 0.52, 0.51}));  // through the walls inside
+}
+
+TEST_CASE("cavities: nested parts are hollow, whichever way they are turned, and solid again within") {
+  const Folder folder;
+  SurfaceMesh inner = cube(glm::dvec3(0.25), 0.5);
+  for (const bool turned : {false, true}) {
+    CAPTURE(turned);
+    if (turned)
+      for (Triangle& t : inner.triangles) std::swap(t[0], t[1]);
+    SurfaceMesh hollow = joined(cube(), inner);
+    const SurfaceCheck check = check_surface(hollow);
+    CHECK(check.defect == "");
+    CHECK(check.volume == doctest::Approx(0.875));
+    CHECK(check.cavities.size() == 1);
+    CHECK((check.flipped_triangles > 0) == !turned);
+    CHECK(mesh_volume(tetrahedralise(hollow, "pYq1.85o/140")) == doctest::Approx(0.875));
+    const Filled filled = fill(hollow, {.by = "lattice", .size = {4000, 0}}, "hollow.obj");
+    CHECK(filled.cavities == 1);
+    CHECK(filled_volume(filled.mesh) == doctest::Approx(0.875).epsilon(1e-6));
+    const SurfaceMesh with_core = joined(hollow, cube(glm::dvec3(0.4), 0.2));
+    CHECK(mesh_volume(tetrahedralise(with_core, "pYq1.85o/140")) == doctest::Approx(0.883));
+    const Filled core = fill(with_core, {.by = "lattice", .size = {12000, 0}}, "core.obj");
+    CHECK(filled_volume(core.mesh) == doctest::Approx(0.883).epsilon(1e-6));
+    CHECK(report(core.mesh).components == 2);
+  }
 }
 
 TEST_CASE("carry: a fine sphere on coarse tets follows every affine motion of them") {
@@ -379,29 +467,42 @@ TEST_CASE("scene: a body's fine surface, beside bodies without") {
   const std::string json = body_json(scene.bodies[0]).dump();
   CHECK(contains(json, "fine.obj"));
   CHECK(build_model(scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]})"))->carried.triangles.empty());
-  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": false)"); }), "needs its \"wrap\""));
-  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": {"voxels": 3})"); }),
-                 "'bodies.0.wrap.voxels' must be a whole number from 8 to 1000, not 3"));
-  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "wrap": true)"); }), "must be an object"));
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "fill": "tetgen")"); }), "rides on a lattice"));
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "tets": 3)"); }),
+                 "'bodies.0.tets' must be a number from 10 to 1e+08, not 3"));
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "fill": "foam")"); }),
+                 "must be one of auto, tetgen, lattice, not \"foam\""));
+  CHECK(contains(error_of([&] { build_model(scene_with(R"("surface": "fine.obj", "tets": 100, "spacing": 1)")); }),
+                 "tets and spacing both say how fine a lattice is"));
+  // A surface alone rides on a lattice, whose cells are as large as they are in the scene.
+  const auto alone = build_model(scene_with(R"("surface": "fine.obj", "spacing": 0.2, "scale": [1, 2, 1])"));
+  CHECK(alone->carried.triangles.size() == 1200 + 12);
+  const Bounds own = body_bounds(alone->bodies[0], alone->rest.positions);
+  CHECK(own.high.y - own.low.y == doctest::Approx(1).epsilon(0.1));
+  CHECK(own.high.x - own.low.x == doctest::Approx(0.5).epsilon(0.2));
+  CHECK(own.low.y == doctest::Approx(1));
+  double edges = 0;
+  for (const auto& [a, b] : tet_edges(alone->rest))
+    edges += glm::distance(alone->rest.positions[a], alone->rest.positions[b]);
+  CHECK(edges / double(tet_edges(alone->rest).size()) == doctest::Approx(0.19).epsilon(0.15));
 }
 
-TEST_CASE("run: a broken mesh becomes a body, and files have its surface" * needs_openvdb) {
+TEST_CASE("run: a broken mesh becomes a body, and files have its surface") {
   const run_program::Folder folder;
   SurfaceMesh open = sphere(10);
   open.triangles.resize(open.triangles.size() - 30);
   write_surface(folder.path / "open.obj", open);
-  std::ofstream(folder.path / "s.json") << R"({"bodies": [{"mesh": "open.obj", "wrap": {"voxels": 16}}]})";
+  std::ofstream(folder.path / "s.json") << R"({"bodies": [{"mesh": "open.obj", "tets": 500}]})";
   const auto done = run_program::program(
       "run --scene s.json --steps 2 --export ply,pc2,vtk --positions --png-every 2 --size 64x48 --out o", folder,
       "TETPBD_CACHE=cache");
   CHECK(done.status == 0);
-  CHECK(contains(done.err, "open.obj: surface is open: "));
-  CHECK(contains(done.err, "so it was wrapped with 16 voxels across"));
+  CHECK(contains(done.err, "open.obj: a lattice of "));
   const SurfaceMesh seen = load_surface(folder.path / "o/ply/frame_00000.ply");
   CHECK(seen.triangles == load_surface(folder.path / "open.obj").triangles);
   CHECK(fs::exists(folder.path / "o/surface.npy"));
   CHECK(fs::exists(folder.path / "o/surface_faces.npy"));
-  const auto refused = run_program::program("run --scene s.json --set bodies.0.wrap=false --out o", folder);
+  const auto refused = run_program::program("run --mesh open.obj --fill tetgen --out o", folder);
   CHECK(refused.status == 2);
   CHECK(contains(refused.err, "surface is open"));
 }

@@ -1,0 +1,62 @@
+#include "sim/mesh/fill.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "sim/mesh/cache.h"
+
+namespace tetpbd {
+namespace {
+
+Filled by_lattice(SurfaceMesh surface, const FillOptions& options, const std::string& why, const std::string& source) {
+  for (glm::dvec3& p : surface.positions) p *= options.scale;
+  const std::string how = fmt::format("lattice 1 {} {} {}", options.size.tets, options.size.spacing, why);
+  const std::uint64_t key = mesh_key(surface, how, "");
+  const std::string file = fmt::format("{:016x}.lattice", key);
+  Filled filled{.scale = options.scale};
+  std::vector<char> note;
+  std::vector<int> counts;
+  if (take_sealed(read_cached(file), key, filled.mesh.positions, filled.mesh.tets, filled.mesh.fill,
+                  filled.carried.vertices, filled.carried.triangles, note, counts) &&
+      filled.mesh.fill.size() == filled.mesh.tets.size() && counts.size() == 1) {
+    filled.note.assign(note.begin(), note.end()), filled.cavities = counts[0];
+    finish_tets(filled.mesh, file);
+    return filled;
+  }
+  Lattice lattice = fill_with_lattice(surface, options.size, source);
+  filled.mesh = std::move(lattice.mesh), filled.carried = std::move(lattice.carried);
+  filled.cavities = lattice.cavities;
+  filled.note = fmt::format("{}a lattice of {} tets fills it, its points {:.3g} m apart{}{}{}",
+                            why.empty() ? "" : why + ", so ", filled.mesh.tets.size(), lattice.spacing,
+                            lattice.parts > 1 ? fmt::format(", in {} parts", lattice.parts) : "",
+                            lattice.note.empty() ? "" : "; ", lattice.note);
+  keep_cached(file, key, filled.mesh.positions, filled.mesh.tets, filled.mesh.fill, filled.carried.vertices,
+              filled.carried.triangles, std::vector<char>(filled.note.begin(), filled.note.end()),
+              std::vector{filled.cavities});
+  return filled;
+}
+
+}  // namespace
+
+Filled fill(const SurfaceMesh& surface, const FillOptions& options, const std::string& source) {
+  constexpr double poor = 0.02;  // least altitude over the mean edge, a fifth of what TetGen makes of clean surfaces
+  if (options.by == "lattice" || (options.by.empty() && options.sized)) return by_lattice(surface, options, "", source);
+  std::string why;
+  try {
+    const double seconds = options.by.empty() ? 60 : 600;
+    Filled filled{.mesh = tetrahedralise(surface, options.switches, seconds, source)};
+    // Who gives switches wants those tets.
+    const bool judged = options.by.empty() && options.switches == FillOptions().switches;
+    const double quality = judged ? least_quality(filled.mesh) : 1;
+    if (quality >= poor) return filled;
+    why = fmt::format("its tets by TetGen are as flat as {:.2g} of an edge", quality);
+  } catch (const NotSolid& refusal) {
+    if (!options.by.empty()) throw;
+    why = refusal.what();
+    why = why.substr(0, why.find(" in " + source));
+  }
+  return by_lattice(surface, options, why, source);
+}
+
+}  // namespace tetpbd

@@ -34,6 +34,10 @@ docs/make_tables.py stability NOTE FOLDER ...: the hard cases; a later folder's 
 docs/make_tables.py verdicts NOTE TABLE.csv ...: what still goes wrong in the shipped scenes
 
   tests/verdicts.sh build/release/tetpbd TABLE.csv 1
+
+docs/make_tables.py scans NOTE TABLE.csv ...: what becomes of surfaces as people bring them
+
+  tests/scans.sh build/release/tetpbd TABLE.csv SURFACE...
 """
 import csv, json, pathlib, shutil, sys
 
@@ -206,7 +210,17 @@ def verdicts(note, *tables):
           table(["scene", *modes], [[f"`{s}`", *(cell(of.get((s, m))) for m in modes)] for s in scenes])])
 
 
-pages = {"fronts": fronts, "performance": performance, "stability": stability, "verdicts": verdicts}
+def scans(note, *tables):
+    rows = sorted((row for name in tables for row in csv.DictReader(open(name))), key=lambda row: row["surface"])
+    moduli = ["1e4", "1e5", "1e6"]
+    cell = lambda row, m: f"{number(row['created_' + m], 2)} %, {row['inverted_' + m]}" if row["inverted_" + m] else row["created_" + m]
+    write("scans.md", ["# Surfaces as people bring them: the table\n",
+          f"Written by `docs/make_tables.py scans`; its head has the command. {note}\n",
+          "By Young's modulus in Pa: energy that came from nothing, of what the scene has, and tets inverted at the end.\n",
+          table(["surface", "tets", *moduli], [[f"`{row['surface']}`", row["tets"], *(cell(row, m) for m in moduli)] for row in rows])])
+
+
+pages = {"fronts": fronts, "performance": performance, "stability": stability, "verdicts": verdicts, "scans": scans}
 if len(sys.argv) < 3 or sys.argv[1] not in pages:
     sys.exit(__doc__)
 pages[sys.argv[1]](*sys.argv[2:])

@@ -109,13 +109,14 @@ void LatticeCells::find() {
         const glm::dvec3 p = grid.place(at);
         const double away = 1.25 * grid.h;  // beyond the tets' reach from p, a length of h
         const bool far = solid.nearest(p, away).distance >= away;
-        if (far && !(solid.winding(p) > inside_winding)) continue;
+        const double around = far ? solid.winding(p) : 0;
+        if (far && !(around > inside_winding)) continue;
         for_each_cell(grid, at, [&](const Cell& cell) {
           const auto number = std::uint32_t(slab.cells.size());
           const std::array<glm::dvec3, 4> x = corners(cell);
           std::vector<Piece> found;
           if (far || solid.nearest(middle(x), reach(x)).distance >= reach(x)) {
-            const double winding = far ? 1 : solid.winding(middle(x));
+            const double winding = far ? around : solid.winding(middle(x));
             if (winding > inside_winding) found.push_back({number, true, false, 1, {{middle(x), winding}}, {}});
           } else {
             found = split(cell, number);

@@ -42,9 +42,10 @@ struct LatticeGrid {
     return place(glm::ivec3(int(number % nx), int(number / nx % ny), int(number / nx / ny)));
   }
 };
-/// Four points of the lattice by number.
+/// Four points of the lattice by number: a tet of it.
 using Cell = std::array<std::uint64_t, 4>;
-/// Tets of a mesh and pieces have the same numbers.
+/// In this order: find(), join(), keep_parts(), which makes the mesh; then, once it is fitted, fill(), peel() and
+/// keep_parts() again as often as wanted. Tets of the mesh and pieces have the same numbers.
 class LatticeCells {
  public:
   /// `box`: of the surface; h: m.

@@ -85,6 +85,8 @@ addEventListener('hashchange', named);
 named();
 )";
 
+}  // namespace
+
 std::string base64(const std::string& bytes) {
   static constexpr char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string result;
@@ -96,8 +98,6 @@ std::string base64(const std::string& bytes) {
   }
   return result;
 }
-
-}  // namespace
 
 std::string page(const std::string& title, const std::string& body) {
   return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + escaped(title) +

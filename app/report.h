@@ -13,6 +13,7 @@ namespace tetpbd {
 
 std::string page(const std::string& title, const std::string& body);
 std::string escaped(const std::string& text);
+std::string base64(const std::string& bytes);
 /// A picture as text; nothing where the file is not there.
 std::string data_uri(const std::filesystem::path& png);
 

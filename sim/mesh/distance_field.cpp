@@ -63,17 +63,15 @@ struct Polygons {
   }
 };
 
-vdb::FloatGrid::Ptr distances(const Polygons& mesh, float band, bool is_signed, vdb::Int32Grid* nearest = nullptr) {
-  vdb::initialize();
-  return vdb::tools::meshToVolume<vdb::FloatGrid>(mesh, *vdb::math::Transform::createLinearTransform(1.0), band, band,
-                                                  is_signed ? 0 : vdb::tools::UNSIGNED_DISTANCE_FIELD, nearest);
-}
-
 // Near the surface OpenVDB finds the nearest triangle. From there, sweeps along all diagonals pass triangles on to
 // neighbours where they are nearer. A band as wide as the grid would take OpenVDB 20 times as long.
 std::vector<float> grid_values(const Polygons& mesh, const glm::ivec3& size, bool is_signed) {
   vdb::Int32Grid nearest(-1);
-  const auto grid = distances(mesh, 3, is_signed, &nearest);
+  constexpr float band = 3;
+  vdb::initialize();
+  const auto grid =
+      vdb::tools::meshToVolume<vdb::FloatGrid>(mesh, *vdb::math::Transform::createLinearTransform(1.0), band, band,
+                                               is_signed ? 0 : vdb::tools::UNSIGNED_DISTANCE_FIELD, &nearest);
   const auto look = grid->getConstAccessor();
   const auto look_nearest = nearest.getConstAccessor();
   const glm::ivec3 stride(1, size.x, size.x * size.y);

@@ -43,9 +43,7 @@ void fit(TetMesh& mesh, const Solid& solid, double h) {
   const Grouped around = group_by_key(4 * mesh.tets.size(), mesh.positions.size(), [&](std::size_t i, auto&& emit) {
     emit(mesh.tets[i / 4][i % 4], std::uint32_t(i / 4));
   });
-  std::vector<char> outer(mesh.positions.size(), 0);
-  for (const Triangle& t : mesh.surface)
-    for (const std::uint32_t v : t) outer[v] = 1;
+  const std::vector<char> outer = outer_vertices(mesh);
   for (int pass = 0; pass < passes; ++pass)
     for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
       const std::uint32_t *first = &around.values[around.first[v]], *end = &around.values[around.first[v + 1]];
@@ -189,16 +187,14 @@ double share_outside(const SurfaceMesh& surface, const TetMesh& mesh, double h) 
 
 // How far outer vertices are from the surface: in the mean of squares, and at most.
 std::pair<double, double> gap(const TetMesh& mesh, const Solid& solid) {
-  std::vector<std::uint32_t> outer;
-  for (const Triangle& t : mesh.surface) outer.insert(outer.end(), t.begin(), t.end());
-  std::ranges::sort(outer);
-  outer.erase(std::unique(outer.begin(), outer.end()), outer.end());
-  std::vector<double> distances(outer.size());
-  parallel_for(outer.size(), 64,
-               [&](std::size_t k) { distances[k] = solid.nearest(mesh.positions[outer[k]]).distance; });
+  const std::vector<char> outer = outer_vertices(mesh);
+  std::vector<double> distances(outer.size(), 0);
+  parallel_for(outer.size(), 64, [&](std::size_t v) {
+    if (outer[v]) distances[v] = solid.nearest(mesh.positions[v]).distance;
+  });
   double squares = 0;
   for (const double d : distances) squares += d * d;
-  return {std::sqrt(squares / double(distances.size())), std::ranges::max(distances)};
+  return {std::sqrt(squares / double(std::ranges::count(outer, 1))), std::ranges::max(distances)};
 }
 
 std::string note_on(const Thickness& thickness, double left_out, double outside, std::pair<double, double> gap,

@@ -60,6 +60,13 @@ double reach(const std::array<glm::dvec3, 4>& x) {
 
 }  // namespace
 
+std::vector<char> outer_vertices(const TetMesh& mesh) {
+  std::vector<char> outer(mesh.positions.size(), 0);
+  for (const Triangle& t : mesh.surface)
+    for (const std::uint32_t v : t) outer[v] = 1;
+  return outer;
+}
+
 LatticeCells::LatticeCells(const Solid& inside, const Bounds& box, double h)
     : solid(inside), grid(make_grid(box, h)), weights(sample_weights()) {}
 
@@ -200,9 +207,7 @@ void LatticeCells::peel(TetMesh& mesh) {
       std::ranges::sort(faces.back().corners);
     }
   parallel_sort(std::span(faces));
-  std::vector<char> outer(mesh.positions.size(), 0);
-  for (const Triangle& t : mesh.surface)
-    for (const std::uint32_t v : t) outer[v] = 1;
+  const std::vector<char> outer = outer_vertices(mesh);
   const auto flat = [&](std::uint32_t t) {  // where the surface meets a plane, all its corners may
     return std::ranges::all_of(mesh.tets[t], [&](std::uint32_t v) { return outer[v] != 0; });
   };
@@ -315,8 +320,7 @@ void LatticeCells::fill(TetMesh& mesh) const {
     std::size_t inside = 0;
     for (std::size_t k = 0; k < samples; ++k) {
       const glm::dvec3 p = blend(x, weights[k]);
-      inside += pieces[i].shared ? solid.winding_at(p, site.at, site.winding) > inside_winding &&
-                                       solid.sees(site.at, site.winding, p)
+      inside += pieces[i].shared ? solid.sees(site.at, site.winding, p)
                                  : solid.winding_at(p, site.at, site.winding) > inside_winding;
     }
     mesh.fill[i] = std::max(least, float(inside) / float(samples));

@@ -44,6 +44,9 @@ struct LatticeGrid {
 };
 /// Four points of the lattice by number: a tet of it.
 using Cell = std::array<std::uint64_t, 4>;
+/// Of each vertex, whether it is on the boundary.
+std::vector<char> outer_vertices(const TetMesh& mesh);
+
 /// In this order: find(), join(), keep_parts(), which makes the mesh; then, once it is fitted, fill(), peel() and
 /// keep_parts() again as often as wanted. Tets of the mesh and pieces have the same numbers.
 class LatticeCells {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "app/report.h"
 #include "tests/mesh/mesh_samples.h"
 
 using namespace tetpbd;
@@ -113,18 +114,6 @@ std::string vtk(bool bytes, bool lists) {
   w.text += fmt::format("\nCELL_TYPES {}\n", cells);
   for (const std::uint8_t type : g.types) w.put(std::int32_t(type)), w.end_line();
   return w.text + fmt::format("\nPOINT_DATA {}\nSCALARS x float 1\nLOOKUP_TABLE default\n", sample.positions.size());
-}
-
-std::string base64(const std::string& bytes) {
-  const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    unsigned bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63];
-  }
-  return text;
 }
 
 enum class Vtu { ascii, inlined, appended, appended_base64 };

@@ -140,7 +140,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       Metrics metrics = create_metrics(sim);
       const double enough = first ? most_seconds() : 2e-3 * budget_ms * double(choice.steps) + 0.5;
       const MeasuredRun run =
-          run_loop(sim, &metrics, choice.steps, {.most_seconds = enough, .right = right ? &*right : nullptr});
+          run_loop(sim, &metrics, choice.steps, {.most_seconds = enough, .standard = right ? &*right : nullptr});
       if (interrupted()) throw Interrupted();
       if (first && run.errors.finite) choice.steps = run.steps;
       trial.ms = step_ms(run);

@@ -14,8 +14,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
-/// Steps that `advance` takes and `state` shows, held against the right motion.
-MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Motion* right,
+/// Steps that `advance` takes and `state` shows, held against the standard.
+MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Standard& standard,
                          const std::function<void()>& advance, const std::function<State()>& state) {
   MeasuredRun run;
   run.substeps = plan_for(settings).substeps;
@@ -30,14 +30,14 @@ MeasuredRun baseline_run(const Model& model, const Settings& settings, long step
     m.step = s, m.time = now.time;
     m.centre = now.centre, m.kinetic = now.kinetic, m.potential = now.potential;
     run.steps = s;
-    hold_against(run, right, model, s, now.time, state);
+    hold_against(run, standard, model, s, now.time, state);
   }
   return run;
 }
 
 /// A rigid body of six degrees of freedom, where k = 1: flight as in rigid.h, contact as the modes have it
 /// (rigid_contact.h), in double.
-MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, const Standard& standard) {
   std::vector<RigidBody> bodies = rigid_bodies(model);
   Settings touching = settings;
   touching.rigid_contact = true;
@@ -53,7 +53,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
     const glm::dvec3& at(std::uint32_t i) const { return points[i]; }
   };
   return baseline_run(
-      model, settings, steps, right,
+      model, settings, steps, standard,
       [&] {
         const Plan plan = plan_for(settings);
         GuardCounts left_out{};
@@ -80,14 +80,14 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
 }
 
 /// Newton steps with sparse Cholesky factors, `iterations` of them in each implicit step.
-MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Motion* right) {
+MeasuredRun direct_run(const Model& model, const Settings& settings, long steps, const Standard& standard) {
   const Plan plan = plan_for(settings);
   const ConstraintSystem system = build_constraints(model, settings);
   const ReferenceInput input{model, system, settings, model.inverse_masses};
   Implicit run = implicit(input, reference_compliances(input), {model.positions, model.velocities}, plan.h);
   run.most = plan.iterations;
   return baseline_run(
-      model, settings, steps, right, [&] { advance(run, plan.substeps); }, [&] { return run.now; });
+      model, settings, steps, standard, [&] { advance(run, plan.substeps); }, [&] { return run.now; });
 }
 
 }  // namespace

@@ -9,8 +9,8 @@ struct Baseline {
   const char* name;
   const char* scenes;  ///< it is for
   bool (*suits)(const Settings&);
-  /// Steps, each measured and held against the right motion, where there is one.
-  MeasuredRun (*run)(const Model&, const Settings&, long steps, const Motion* right);
+  /// Steps, each measured and held against the standard, where there is one.
+  MeasuredRun (*run)(const Model&, const Settings&, long steps, const Standard& standard);
 };
 const std::vector<Baseline>& baselines();
 

@@ -122,7 +122,9 @@ struct CompareOptions {
   std::filesystem::path out = "compare";
   Shards shards;
   std::optional<double> budget_ms, error_percent;
-  std::string judge;               ///< motion, volume, strain; empty: motion where the right one is known
+  std::string judge;               ///< motion, volume, strain, overlap, total; empty: motion where that is known
+  std::filesystem::path truth;     ///< a finer mesh of the first body, for total; empty: made (truth.h)
+  std::vector<std::string> fills;  ///< "tetgen", "tetgen:SWITCHES", "lattice:TETS"; empty: the scene's
   std::vector<std::string> cases;  ///< of hard cases; empty: all of models/scenes/hard
   std::vector<std::string> meshes = {"bunny", "block", "tet"};
 };
@@ -179,8 +181,8 @@ std::string question_units(const glm::dvec3& size);
 /// `mass` in kg.
 ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step);
 ordered_json error_json(const RunErrors& errors);
-/// The distance from the right motion; nulls where there is none.
-ordered_json motion_json(const MeasuredRun& run);
+/// The distance from a standard, "motion" or "total"; nulls where there is none, and of runs that are not finite.
+ordered_json distance_json(const std::string& standard, const std::optional<MotionError>& error, bool finite);
 /// {"step", "vertex"}, or null.
 ordered_json non_finite_json(const std::optional<NonFinite>& found);
 /// Puts into the row whether the run stayed finite, and says on standard error where not.

@@ -23,15 +23,15 @@ namespace {
 // speed against error
 
 const char* compare_columns =
-    "scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
+    "scene,mode,omega,iterations,substeps,fill,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
     "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
     "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
     "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy,penetration_max,penetration_999,"
-    "overlap_max,overlap_999,overlap_vertices,overlap_triangles";
+    "overlap_max,overlap_999,overlap_vertices,overlap_triangles,total_final,total_rms,total_peak,total_relative";
 const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
-    "wall_ms_per_step:wall-ms 11, motion_final:motion 11, motion_rms:rms 11, max_volume_loss_percent:loss-% "
-    "11, stretch_rms_peak:strain 11, rise 9, apex 9, energy 9, pareto 8";
+    "wall_ms_per_step:wall-ms 11, motion_final:motion 11, motion_rms:rms 11, total_rms:total 11, "
+    "max_volume_loss_percent:loss-% 11, stretch_rms_peak:strain 11, rise 9, apex 9, energy 9, pareto 8";
 
 /// What a step costs: GPU time, or wall time where the CPU does the work.
 double cost_ms(const ordered_json& row) {
@@ -49,6 +49,7 @@ constexpr Judge judges[] = {
     {"volume", "max_volume_loss_percent", "largest volume loss, %", 1},
     {"strain", "stretch_rms_peak", "largest RMS strain of edges, %", 100},
     {"overlap", "overlap_max", "how deep bodies are in each other, % of the size", 100},
+    {"total", "total_rms", "distance from the motion on finer meshes, RMS, % of the size", 100},
 };
 // Infinite where nothing is known.
 double error_by(const Judge& judge, const ordered_json& row) {
@@ -79,6 +80,32 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }
 
+/// What is compared: a scene, whose bodies are filled as `fill` says, and what its runs are held against.
+struct Subject {
+  std::string fill;  ///< empty: as the scene says
+  Scene scene;
+  std::shared_ptr<const Model> model{};
+  std::optional<Motion> right{};
+  std::optional<TotalError> total{};
+  Standard standard() const { return {right ? &*right : nullptr, total ? &*total : nullptr}; }
+};
+
+/// "tetgen:SWITCHES" or "lattice:TETS", what follows the colon left out or not, in place of the flags' own.
+SceneOverrides filled_by(SceneOverrides overrides, const std::string& fill) {
+  if (fill.empty()) return overrides;
+  const std::size_t colon = std::min(fill.find(':'), fill.size());
+  const std::string by = fill.substr(0, colon), how = fill.substr(std::min(colon + 1, fill.size()));
+  const std::string where = "--fills " + fill;
+  if (by != "auto" && by != "tetgen" && by != "lattice")
+    throw Error("no such filling", where, "choose from auto, tetgen, tetgen:SWITCHES, lattice, lattice:TETS");
+  overrides.fill = by, overrides.tets.reset(), overrides.spacing.reset();
+  if (by == "lattice" && !how.empty()) overrides.tets = to_number(how, where, "write lattice:TETS");
+  if (by == "tetgen" && !how.empty()) overrides.tetgen = how;
+  if (overrides.tets && !(*overrides.tets >= 10 && *overrides.tets <= 1e8))
+    throw Error("bad number of tets", where, "give 10 to 1e8");
+  return overrides;
+}
+
 /// What sets a row apart, over the whole run: worst shapes; steepest rise of the centre of mass, m/s, and its
 /// highest place after it had fallen, m; energy at the end, J.
 ordered_json course_of(const MeasuredRun& run) {
@@ -99,13 +126,15 @@ ordered_json course_of(const MeasuredRun& run) {
           {"energy", run.measurements.empty() ? std::nan("") : run.measurements.back().energy()}};
 }
 
-ordered_json compared(const Scene& scene, const Model& model, const Settings& settings, const MeasuredRun& run) {
-  ordered_json row = row_of(scene, model, settings, run);
+ordered_json compared(const Subject& subject, const Settings& settings, const MeasuredRun& run) {
+  ordered_json row = row_of(subject.scene, *subject.model, settings, run);
+  row["fill"] = subject.fill;
   row.update(course_of(run));
   row["mass_splitting"] = settings.mass_splitting ? 1 : 0;
   row["gpu_ms_per_step"] = median(run.gpu_ms);
   row["wall_ms_per_step"] = median(run.wall_ms);
-  row["motion_over_time"] = run.motion_over_time;
+  row.update(distance_json("total", run.total, run.errors.finite));
+  row["motion_over_time"] = run.motion_over_time, row["total_over_time"] = run.total_over_time;
   row["reference_distance"] = nullptr;
   row["pareto"] = false;
   return row;
@@ -126,12 +155,30 @@ void mark_front(ordered_json& rows, const Judge& judge) {
 }
 
 std::string label_of(const ordered_json& row) { return text_of(row["iterations"]) + " x " + text_of(row["substeps"]); }
+std::string series_of(const ordered_json& row) {
+  const std::string fill = text_of(row["fill"]), by = fill.substr(0, fill.find(':'));
+  return text_of(row["mode"]) + (fill.empty() ? "" : ", " + by + " " + text_of(row["tets"], 8));
+}
+std::string tets_of(const ordered_json& rows) {
+  const auto [least, most] = std::ranges::minmax(rows, {}, [](const auto& row) { return number(row, "tets"); });
+  return text_of(least["tets"]) + (least["tets"] == most["tets"] ? "" : " to " + text_of(most["tets"]));
+}
+
+/// What of the errors of these rows is their solver's: the rest is their mesh's.
+Series solver_series(const ordered_json& rows) {
+  Series series{"of which the solver's", "#cc3311", Series::dashes};
+  for (const auto& row : rows)
+    if (row["pareto"] == true && number(row, "motion_rms") > 0)
+      series.points.push_back({cost_ms(row), 100 * number(row, "motion_rms")});
+  std::ranges::sort(series.points, {}, &glm::dvec2::x);
+  return series;
+}
 
 Chart chart_of(const ordered_json& document, const Judge& judge) {
   const auto& rows = document["rows"];
   Chart chart{
       "Speed against error: " + text_of(rows[0]["scene"]),
-      fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps", text_of(rows[0]["tets"]),
+      fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps", tets_of(rows),
                   text_of(document["steps"]), text_of(document["dt"]), text_of(document["device"]["gl_renderer"])),
       "time of a step, ms (GPU time; cpu modes: wall time)",
       judge.label,
@@ -147,30 +194,34 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
       front.points.push_back(point);
       chart.notes.push_back({point, label_of(row)});
     }
-    const std::string mode = text_of(row["mode"]);
-    auto series = std::ranges::find(chart.series, mode, &Series::name);
-    if (series == chart.series.end()) series = chart.series.insert(series, {mode, mode_colour(mode)});
+    const std::string mode = text_of(row["mode"]), name = series_of(row);
+    auto series = std::ranges::find(chart.series, name, &Series::name);
+    if (series == chart.series.end())
+      series =
+          chart.series.insert(series, {name, name == mode ? mode_colour(mode) : palette_colour(chart.series.size())});
     series->points.push_back(point);
   }
   std::ranges::sort(front.points, {}, &glm::dvec2::x);
   chart.series.push_back(front);
+  if (judge.name == std::string("total"))
+    if (Series solvers = solver_series(rows); !solvers.points.empty()) chart.series.push_back(solvers);
   return chart;
 }
 
-/// The distance from the right motion over time: of all where they are few, else of what is on the front.
-Chart course_chart(const ordered_json& document) {
+/// The distance from the standard over time: of all where they are few, else of what is on the front.
+Chart course_chart(const ordered_json& document, const Judge& judge) {
   constexpr std::size_t most = 8;
-  const bool all = document["rows"].size() <= most;
+  const bool all = document["rows"].size() <= most, total = judge.name == std::string("total");
   Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
               all ? "mode, iterations x substeps" : "what is on the front; labels: mode, iterations x substeps",
               "time, s",
-              "distance from the right motion, % of the size",
+              fmt::format("distance from the {}, % of the size", total ? "motion on finer meshes" : "right motion"),
               false,
               true};
   for (const auto& row : document["rows"]) {
     if ((!all && row["pareto"] != true) || chart.series.size() == most) continue;
-    Series series{text_of(row["mode"]) + ", " + label_of(row), palette_colour(chart.series.size()), Series::line};
-    for (const auto& point : row["motion_over_time"])
+    Series series{series_of(row) + ", " + label_of(row), palette_colour(chart.series.size()), Series::line};
+    for (const auto& point : row[total ? "total_over_time" : "motion_over_time"])
       if (point[0] > 0) series.points.emplace_back(point[0].get<double>(), 100 * point[1].get<double>());
     if (!series.points.empty()) chart.series.push_back(series);
   }
@@ -189,63 +240,83 @@ void print_best(ordered_json rows, const char* what, std::optional<double> limit
   if (rows.empty()) return fmt::print(": nothing measured is\n");
   const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
   const auto& best = *std::ranges::min_element(rows, {}, order);
-  fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, {} {:.3g} %)\n", text_of(best["mode"]),
+  fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, {} {:.3g} %)\n",
+             text_of(best["mode"]) + (best["fill"] == "" ? "" : ", " + text_of(best["fill"])),
              text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best), judge.name,
              error_by(judge, best));
+}
+
+/// A run for each setting, and for each baseline among the modes.
+void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr<const Subject>& subject) {
+  const Settings& own = subject->scene.settings;
+  const long steps = options.steps;
+  Axes axes = options.axes;
+  if (axes.modes.empty() && has_forces(own))
+    axes.modes = {"node", "cpu-fast", "explicit", "newton"};
+  else if (axes.modes.empty())
+    axes.modes = {"node", "constraint", "cpu"};
+  note_unused(own, axes.modes, options.overrides);
+  for (const Baseline& baseline : baselines()) {
+    if (std::erase(axes.modes, baseline.name) == 0) continue;
+    if (!baseline.suits(own))
+      throw Error("no baseline for this scene", baseline.name, fmt::format("it is for scenes {}", baseline.scenes));
+    Axes plain = options.axes;
+    plain.modes = {}, plain.omegas = {};
+    for (Settings settings : combinations(own, plain)) {
+      settings.mode = baseline.name;
+      sweep.work.push_back([=] {
+        ordered_json row =
+            compared(*subject, settings, baseline.run(*subject->model, settings, steps, subject->standard()));
+        for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
+        return std::vector{row};
+      });
+    }
+  }
+  if (axes.modes.empty()) return;
+  for (const Settings& settings : combinations(own, axes))
+    sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
+      Film film(subject->scene, *subject->model, out, number, sweep.work.size());
+      const MeasuredRun run = run_model(subject->model, settings, steps, subject->standard(), true, film.of(steps));
+      ordered_json row = compared(*subject, settings, run);
+      row["film"] = film.write();
+      row["reference_distance"] = remaining_after_one_step(subject->model, settings);
+      return std::vector{row};
+    });
 }
 
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
-  Sweep sweep{"compare", "comparison", split(compare_columns, ','), 5, compare_table, {}};
+  Sweep sweep{"compare", "comparison", split(compare_columns, ','), 6, compare_table, {}};
+  if (!options.fills.empty())
+    sweep.table.insert(0,
+                       fmt::format("fill -{}, ", 2 + std::ranges::max(options.fills, {}, &std::string::size).size()));
   sweep.facts = {{"steps", options.steps}, {"dt", 0.005}};
   ordered_json document = run_or_merge(sweep, options.shards, options.out, options.gpu, [&] {
-    const Scene scene = load_scene(options.scene, options.overrides);
-    sweep.facts["dt"] = scene.settings.dt;
-    Axes axes = options.axes;
-    if (axes.modes.empty() && has_forces(scene.settings))
-      axes.modes = {"node", "cpu-fast", "explicit", "newton"};
-    else if (axes.modes.empty())
-      axes.modes = {"node", "constraint", "cpu"};
-    note_unused(scene.settings, axes.modes, options.overrides);
-    const auto model = build_model(scene);
-    const long steps = options.steps;
-    if (options.judge == "motion") require_motion(scene, *model, steps);
-    // The same for all rows: what is varied decides how the scene is solved, not how it moves.
-    const auto right = std::make_shared<const std::optional<Motion>>(right_motion(*model, scene.settings));
-    for (const Baseline& baseline : baselines()) {
-      if (std::erase(axes.modes, baseline.name) == 0) continue;
-      if (!baseline.suits(scene.settings))
-        throw Error("no baseline for this scene", baseline.name, fmt::format("it is for scenes {}", baseline.scenes));
-      Axes own = options.axes;
-      own.modes = {}, own.omegas = {};
-      for (Settings settings : combinations(scene.settings, own)) {
-        settings.mode = baseline.name;
-        sweep.work.push_back([=] {
-          const MeasuredRun run = baseline.run(*model, settings, steps, *right ? &**right : nullptr);
-          ordered_json row = compared(scene, *model, settings, run);
-          for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
-          return std::vector{row};
-        });
+    std::vector<std::string> fills = options.fills;
+    if (fills.empty()) fills = {""};
+    std::shared_ptr<const Truth> truth;  // the same for all fills
+    for (const std::string& fill : fills) {
+      auto subject =
+          std::make_shared<Subject>(Subject{fill, load_scene(options.scene, filled_by(options.overrides, fill))});
+      subject->model = build_model(subject->scene);
+      sweep.facts["dt"] = subject->scene.settings.dt;
+      if (options.judge == "motion") require_motion(subject->scene, *subject->model, options.steps);
+      // The same for all rows: what is varied decides how the scene is solved, not how it moves.
+      subject->right = right_motion(*subject->model, subject->scene.settings);
+      if (options.judge == "total") {
+        if (!truth) truth = require_truth(subject->scene, options.steps, options.truth);
+        subject->total = total_error(truth, *subject->model);
       }
+      add_runs(sweep, options, subject);
     }
-    if (axes.modes.empty()) return;
-    for (const Settings& settings : combinations(scene.settings, axes))
-      sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
-        Film film(scene, *model, out, number, sweep.work.size());
-        const MeasuredRun run = run_model(model, settings, steps, *right ? &**right : nullptr, true, film.of(steps));
-        ordered_json row = compared(scene, *model, settings, run);
-        row["film"] = film.write();
-        row["reference_distance"] = remaining_after_one_step(model, settings);
-        return std::vector{row};
-      });
   });
   ordered_json& rows = document["rows"];
   const Judge& judge = judge_of(options.judge, rows);
   mark_front(rows, judge);
   print_table(sweep, document);
   fmt::print("judged by {}: {}{}\n", judge.name, judge.label,
-             judge.name == std::string("motion") ? " in the chart, a part of it in the columns" : "");
+             judge.scale == 100 ? " in the chart, a part of it in the columns" : "");
   if (options.judge.empty() && std::string(judge.name) == "volume")
     fmt::print("the right motion is not known; --judge motion finds it\n");
   if (std::ranges::all_of(rows, [&](const auto& row) { return error_by(judge, row) == 0; }))
@@ -258,7 +329,7 @@ int run_compare(const CompareOptions& options) {
   std::string figures = to_svg(chart);
   chart.spots.clear();
   write_svg(options.out / "compare", to_svg(chart));
-  if (const Chart course = course_chart(document); !course.series.empty()) {
+  if (const Chart course = course_chart(document, judge); !course.series.empty()) {
     write_svg(options.out / "motion", to_svg(course));
     figures += to_svg(course);
   }

@@ -163,7 +163,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);
-  j["error"].update(motion_json(run));
+  j["error"].update(distance_json("motion", run.motion, run.errors.finite));
   j["momentum"] = {{"linear_drift", errors.linear_drift},
                    {"angular_drift", errors.angular_drift},
                    {"linear", vector(last.momentum)},
@@ -233,7 +233,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
-    RunPlan plan{.measure_every = options.measure_every, .right = right ? &*right : nullptr};
+    RunPlan plan{.measure_every = options.measure_every, .standard = right ? &*right : nullptr};
     plan.measured = [&](const Measurement& measurement, const RunErrors& errors) {
       if (csv && measurement.step % options.csv_every == 0) csv->add(csv_row(measurement, errors));
     };

@@ -325,8 +325,9 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_scene(reference, a);
   add(reference, "--steps", a.reference.steps, 1L, most_steps, "steps of the scene (default: its duration)");
   add(reference, "--method", a.reference.method,
-      "leapfrog or implicit, for soft bodies (default: leapfrog, unless its steps are too short)")
-      ->check(one_of(std::array{"leapfrog", "implicit"}));
+      "leapfrog or implicit, for soft bodies (default: leapfrog, unless its steps are too short); ten-node: the motion "
+      "on finer meshes, for compare --judge total")
+      ->check(one_of(std::array{"leapfrog", "implicit", "ten-node"}));
   add(reference, "--out", a.reference.out, "file to write (default: in the cache, where runs of the scene find it)");
   add_progress(reference, a.reference.progress);
 
@@ -392,8 +393,12 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(compare, "--steps", a.compare.steps, 1L, most_steps, "steps of each run");
   add(compare, "--judge", a.compare.judge,
       "by what: motion (the distance from the right one, found first if need be), volume (largest net loss), "
-      "strain, overlap (how deep bodies are in each other; default: motion where it is known)")
-      ->check(one_of(std::array{"motion", "volume", "strain", "overlap"}));
+      "strain, overlap (how deep bodies are in each other), total (the distance from the motion on finer meshes, found "
+      "first if need be; default: motion where it is known)")
+      ->check(one_of(std::array{"motion", "volume", "strain", "overlap", "total"}));
+  add(compare, "--truth", a.compare.truth, "a finer mesh of the first body, for --judge total (default: made)");
+  add(compare, "--fills", a.compare.fills,
+      "how surfaces are filled, varied as well: auto, tetgen, tetgen:SWITCHES, lattice, lattice:TETS");
   add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9, "print the best setting within so many ms per step");
   add(compare, "--error", a.compare.error_percent, 1e-9, 1e9, "print the cheapest setting with at most this error, %");
   compare.add_option_function<std::string>(
@@ -407,7 +412,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(compare, "--cases", a.compare.cases, "hard cases to run (default: all)")->needs(hard);
   add(compare, "--meshes", a.compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
   for (const char* dropped : {"--scene", "--iterations", "--substeps", "--rigid-contact", "--mass-splitting",
-                              "--omegas", "--judge", "--budget-ms", "--error"})
+                              "--omegas", "--judge", "--budget-ms", "--error", "--truth", "--fills"})
     a.apart.push_back({hard, compare.get_option(dropped)});
   compare.add_option("--merge", a.compare.shards.merge, "folders of finished shards, instead of running");
   add_gpu(compare, a.compare.gpu);

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "app/auto_solver.h"
@@ -21,14 +20,6 @@ namespace {
 
 const char* results =
     "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step";
-
-double to_number(const std::string& text, const std::string& where) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    throw Error(fmt::format("'{}' is no number", text), where, "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
-  return value;
-}
 
 ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
                      const std::string& x, const std::string& y, std::optional<Motion>& last, Film& film) {
@@ -64,17 +55,18 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
 MapAxis map_axis(const std::string& text, const std::string& flag) {
   const std::size_t equals = text.find('=');
   const std::string where = flag + " " + text, name = text.substr(0, equals);
+  const char* remedy = "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT";
   const Parameter* row = find_parameter(name);
   std::vector<std::string> names;
   for (const Parameter& one : parameters()) names.push_back(one.name);
   if (equals == std::string::npos || !row || std::holds_alternative<std::string Settings::*>(row->member) ||
       std::holds_alternative<bool Settings::*>(row->member) || row->effect == Effect::restart)
-    throw Error(fmt::format("'{}' is no setting with a number", name), where,
-                did_you_mean(name, names) + "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+    throw Error(fmt::format("'{}' is no setting with a number", name), where, did_you_mean(name, names) + remedy);
   MapAxis axis{row, split(text.substr(equals + 1), ',')};
   const auto range = split(text.substr(equals + 1), ':');
   if (range.size() == 3) {
-    const double from = to_number(range[0], where), to = to_number(range[1], where), count = to_number(range[2], where);
+    const auto number = [&](const std::string& word) { return to_number(word, where, remedy); };
+    const double from = number(range[0]), to = number(range[1]), count = number(range[2]);
     const bool factors = row->logarithmic && from > 0 && to > 0;
     if (!(count >= 2 && count <= 100)) throw Error("bad number of values", where, "give 2 to 100");
     axis.values.clear();
@@ -88,7 +80,7 @@ MapAxis map_axis(const std::string& text, const std::string& flag) {
   }
   Settings probe;
   for (const std::string& value : axis.values) set_parameter(probe, *row, value, where);
-  if (axis.values.empty()) throw Error("no values", where, "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
+  if (axis.values.empty()) throw Error("no values", where, remedy);
   return axis;
 }
 

@@ -8,6 +8,7 @@
 
 #include "app/files.h"
 #include "app/run_loop.h"
+#include "app/truth.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
@@ -102,12 +103,14 @@ Motion read_motion(const std::filesystem::path& file, const Model& model, std::u
 std::filesystem::path find_and_keep(const Scene& scene, const Model& model, const ReferenceOptions& options) {
   const ConstraintSystem system = build_constraints(model, scene.settings);
   const ReferenceInput input{model, system, scene.settings, model.inverse_masses};
-  const std::filesystem::path file = options.out.empty() ? cached_motion(scene_key(input)) : options.out;
+  const std::uint64_t key = motion_key(model, scene.settings, options.method);
+  const std::filesystem::path file = options.out.empty() ? cached_motion(key) : options.out;
   if (file.empty()) throw Error("nowhere to keep it", "there is no cache folder", "give --out FILE");
   std::error_code ignored;  // a folder that cannot be made is named when the file is written
   if (options.out.empty()) std::filesystem::create_directories(file.parent_path(), ignored);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
-  Progress progress("the right motion", steps, options.progress);
+  Progress progress(options.method == "ten-node" ? "the motion on finer meshes" : "the right motion", steps,
+                    options.progress);
   const Motion motion = find_motion(input, steps, options.method, file.string() + ".unfinished",
                                     [&](long done) { progress.update(done); });
   write_motion(file, model, motion);
@@ -115,14 +118,17 @@ std::filesystem::path find_and_keep(const Scene& scene, const Model& model, cons
   return file;
 }
 
-}  // namespace
-
-std::optional<Motion> right_motion(const Model& model, const Settings& settings, const std::filesystem::path& file) {
-  const std::uint64_t scene = scene_key(model, settings);
+std::optional<Motion> kept_motion(const Model& model, std::uint64_t scene, const std::filesystem::path& file) {
   const std::filesystem::path from = file.empty() ? cached_motion(scene) : file;
   std::error_code ignored;
   if (file.empty() && !std::filesystem::exists(from, ignored)) return std::nullopt;
   return read_motion(from, model, scene);
+}
+
+}  // namespace
+
+std::optional<Motion> right_motion(const Model& model, const Settings& settings, const std::filesystem::path& file) {
+  return kept_motion(model, scene_key(model, settings), file);
 }
 
 std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps) {
@@ -141,9 +147,20 @@ void require_motion(const Scene& scene, const Model& model, long steps) {
   if (!known || known->kept.back() < steps) find_and_keep(scene, model, {.steps = steps});
 }
 
+std::shared_ptr<const Truth> require_truth(const Scene& scene, long steps, const std::filesystem::path& mesh) {
+  const Scene finer = finer_scene(scene, mesh);
+  const std::shared_ptr<const Model> model = build_model(finer);
+  const ReferenceOptions options{.steps = steps, .method = "ten-node"};
+  const std::uint64_t key = motion_key(*model, finer.settings, options.method);
+  auto known = kept_motion(*model, key, {});
+  if (!known || known->kept.back() < steps) known = kept_motion(*model, key, find_and_keep(finer, *model, options));
+  return std::make_shared<const Truth>(Truth{model, std::move(*known)});
+}
+
 int run_reference(const Scene& scene, const ReferenceOptions& options) {
   catch_interrupts();
-  fmt::print("{}\n", find_and_keep(scene, *build_model(scene), options).string());
+  const Scene own = options.method == "ten-node" ? finer_scene(scene) : scene;
+  fmt::print("{}\n", find_and_keep(own, *build_model(own), options).string());
   return 0;
 }
 

@@ -6,13 +6,13 @@
 #include <optional>
 
 #include "app/scene.h"
-#include "sim/reference/motion.h"
+#include "sim/reference/total_error.h"
 
 namespace tetpbd {
 
 struct ReferenceOptions {
   long steps = 0;               ///< 0: the scene's duration
-  std::string method{};         ///< leapfrog or implicit; empty: what suits the scene
+  std::string method{};         ///< leapfrog, implicit, ten-node (total_error.h); empty: what suits the scene
   std::filesystem::path out{};  ///< empty: in the cache, where runs of the scene find it
   bool progress = false;        ///< show it even if standard error is no terminal
 };
@@ -27,5 +27,8 @@ std::optional<Motion> right_motion(const Model& model, const Settings& settings,
 std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps);
 /// Puts it there, over so many steps at least, if it is not. Throws Error for scenes without one.
 void require_motion(const Scene& scene, const Model& model, long steps);
+/// That of the scene's bodies on finer meshes (truth.h), found if it is not in the cache; of the first body on `mesh`,
+/// if named.
+std::shared_ptr<const Truth> require_truth(const Scene& scene, long steps, const std::filesystem::path& mesh);
 
 }  // namespace tetpbd

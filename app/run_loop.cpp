@@ -47,12 +47,16 @@ void Progress::update(long done) {
                           done > 0 ? fmt::format(", {:.0f} s left", left) : "", bar ? "" : "\n"));
 }
 
-void hold_against(MeasuredRun& run, const Motion* right, const Model& model, long step, double time,
+void hold_against(MeasuredRun& run, const Standard& standard, const Model& model, long step, double time,
                   const std::function<State()>& state) {
-  if (!right || !is_kept(*right, step)) return;
-  if (!run.motion) run.motion = MotionError{};
-  add_state(*run.motion, *right, model, step, state());
-  run.motion_over_time.push_back({time, run.motion->final});
+  const auto hold = [&](auto& error, auto& over_time, const Motion* motion, const auto* against) {
+    if (!motion || !is_kept(*motion, step)) return;
+    if (!error) error = MotionError{};
+    add_state(*error, *against, model, step, state());
+    over_time.push_back({time, error->final});
+  };
+  hold(run.motion, run.motion_over_time, standard.right, standard.right);
+  hold(run.total, run.total_over_time, standard.total ? &standard.total->truth->motion : nullptr, standard.total);
 }
 
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
@@ -69,7 +73,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     while (const auto ms = sim.timer.poll(wait)) run.gpu_ms.push_back(*ms);
   };
   const auto hold = [&](long s) {
-    hold_against(run, plan.right, *sim.model, s, double(s) * sim.settings.dt, [&] { return read_state(sim); });
+    hold_against(run, plan.standard, *sim.model, s, double(s) * sim.settings.dt, [&] { return read_state(sim); });
   };
   const bool touching = metrics && bodies_touch(*sim.model, sim.settings);
   if (metrics) measure(*metrics, sim);
@@ -107,11 +111,11 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
 }
 
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
-                      const Motion* right, bool timed, const std::function<void(const Sim&, long)>& stepped) {
+                      const Standard& standard, bool timed, const std::function<void(const Sim&, long)>& stepped) {
   Sim sim = create_sim(model, settings);
   if (timed) warm_up(sim);
   Metrics metrics = create_metrics(sim);
-  RunPlan plan{.right = right};
+  RunPlan plan{.standard = standard};
   if (stepped) plan.stepped = [&](long s) { stepped(sim, s); }, stepped(sim, 0);
   return run_loop(sim, &metrics, steps, plan);
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sim/measure/metrics.h"
-#include "sim/reference/motion.h"
+#include "sim/reference/total_error.h"
 
 namespace tetpbd {
 
@@ -45,31 +45,37 @@ struct Progress {
   void update(long done);
 };
 
+/// What runs are held against, at the instants it has.
+struct Standard {
+  const Motion* right = nullptr;
+  const TotalError* total = nullptr;
+  Standard(const Motion* motion = nullptr, const TotalError* error = nullptr) : right(motion), total(error) {}
+};
+
 struct RunPlan {
   long measure_every = 1;  ///< steps; the start and the last step are measured in any case
   double most_seconds = std::numeric_limits<double>::infinity();  ///< ends then, after one step at least
   bool wait = true;   ///< for each step, to time it; without: steps are queued, and timed all together
   bool timed = true;  ///< GPU time of each step; its queries are GL objects that come and go
   std::function<void(long)> stepped{};  ///< after each step
-  const Motion* right = nullptr;        ///< what the run is held against, at the instants it has
+  Standard standard{};
   /// Takes each measurement as it arrives; without, the run keeps them.
   std::function<void(const Measurement&, const RunErrors&)> measured{};
 };
 
 struct MeasuredRun {
   RunErrors errors;
-  std::optional<MotionError> motion;  ///< of the instants up to the last step, where there is a right one
-  std::vector<std::array<double, 2>> motion_over_time;  ///< s, distance over the size
-  std::vector<Measurement> measurements;                ///< the start first
-  std::vector<double> gpu_ms, wall_ms;                  ///< a step; GPU time is that of its passes alone
-  double seconds = 0;                                   ///< of all steps, without what came between those waited for
-  long steps = 0;                                       ///< taken, and finite
-  int substeps = 0;                                     ///< of a step
+  std::optional<MotionError> motion, total;  ///< of the instants up to the last step, where there is a standard
+  std::vector<std::array<double, 2>> motion_over_time, total_over_time;  ///< s, distance over the size
+  std::vector<Measurement> measurements;                                 ///< the start first
+  std::vector<double> gpu_ms, wall_ms;  ///< a step; GPU time is that of its passes alone
+  double seconds = 0;                   ///< of all steps, without what came between those waited for
+  long steps = 0;                       ///< taken, and finite
+  int substeps = 0;                     ///< of a step
 };
 
-/// Of a state that the run has reached: its distance from the right motion there, where `right` has that
-/// step.
-void hold_against(MeasuredRun& run, const Motion* right, const Model& model, long step, double time,
+/// Of a state that the run has reached: its distance from the standard there, where that has the step.
+void hold_against(MeasuredRun& run, const Standard& standard, const Model& model, long step, double time,
                   const std::function<State()>& state);
 
 /// Steps `steps` times. Ends early when the state is not finite (its errors then say so) or when
@@ -78,7 +84,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
 /// The same with a simulation of its own, every step measured; warmed up if it is for its times. `stepped` is
 /// shown the start and every step.
 MeasuredRun run_model(const std::shared_ptr<const Model>& model, const Settings& settings, long steps,
-                      const Motion* right = nullptr, bool timed = true,
+                      const Standard& standard = {}, bool timed = true,
                       const std::function<void(const Sim&, long)>& stepped = {});
 /// Steps until a GPU that has rested runs at its full clock (an H200 idles at 345 MHz of 1980 after four
 /// seconds, and takes a quarter of a second to rise), then goes back to the start. Nothing where a CPU steps.

@@ -88,12 +88,12 @@ ordered_json error_json(const RunErrors& errors) {
   return result;
 }
 
-ordered_json motion_json(const MeasuredRun& run) {
+ordered_json distance_json(const std::string& standard, const std::optional<MotionError>& error, bool finite) {
   ordered_json result;
   for (const auto& [key, member] :
-       {std::pair("motion_final", &MotionError::final), std::pair("motion_rms", &MotionError::rms),
-        std::pair("motion_peak", &MotionError::peak), std::pair("motion_relative", &MotionError::relative)})
-    result[key] = run.motion && run.errors.finite ? *run.motion.*member : std::nan("");  // written as null
+       {std::pair("_final", &MotionError::final), std::pair("_rms", &MotionError::rms),
+        std::pair("_peak", &MotionError::peak), std::pair("_relative", &MotionError::relative)})
+    result[standard + key] = error && finite ? *error.*member : std::nan("");  // written as null
   return result;
 }
 
@@ -128,7 +128,7 @@ ordered_json row_of(const Scene& scene, const Model& model, const Settings& sett
                       {"linear_drift", run.errors.linear_drift},
                       {"angular_drift", run.errors.angular_drift}};
   row.update(error_json(run.errors));
-  row.update(motion_json(run));
+  row.update(distance_json("motion", run.motion, run.errors.finite));
   put_finite(row, run);
   return row;
 }

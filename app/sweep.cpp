@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <optional>
@@ -115,6 +116,14 @@ ordered_json measured(const Sweep& sweep, const Shards& part, const std::filesys
 }
 
 }  // namespace
+
+double to_number(const std::string& text, const std::string& where, const char* remedy) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw Error(fmt::format("'{}' is no number", text), where, remedy);
+  return value;
+}
 
 std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
   std::vector<Settings> all{base};

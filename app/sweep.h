@@ -62,6 +62,8 @@ int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const o
 const ordered_json& cell(const ordered_json& row, const std::string& key);
 /// Nothing for null and what is not finite.
 std::string text_of(const ordered_json& value, int digits = 4);
+/// Of a word on the command line; throws Error.
+double to_number(const std::string& text, const std::string& where, const char* remedy);
 /// NaN where it is no number.
 double number(const ordered_json& row, const char* key);
 std::vector<std::string> keys(const ordered_json& object);

@@ -17,6 +17,7 @@ template <class F>
 void for_each_spring(const Leapfrog& run, F&& visit) {
   std::size_t offset = 0;
   for_each_elastic<true>(run.input.system, run.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
+    if (run.input.ten_node && std::is_same_v<decltype(kind), NeoHookean>) return;
     visit(kind, list, alpha, offset);
     offset += list.vertices.size();
   });
@@ -46,6 +47,10 @@ Points accelerations(Leapfrog& run) {
       }
     });
   });
+  const std::size_t first = run.parts.size() - 10 * run.tets.size();
+  parallel_for(run.tets.size(), 256, [&](std::size_t t) {
+    std::ranges::copy(forces(run.tets[t], run.x), run.parts.begin() + std::ptrdiff_t(first + 10 * t));
+  });
   const glm::dvec3 gravity(0, -run.input.settings.gravity, 0);
   Points a(run.x.size(), glm::dvec3(0));
   parallel_for(a.size(), 1024, [&](std::size_t i) {
@@ -72,11 +77,13 @@ void resolve_contact(const glm::dvec3& n, double depth, double friction, const g
 
 Leapfrog prepare(const ReferenceInput& input, const Compliances& compliances, const Points& positions) {
   require_compliances(input.system, compliances);
-  Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}, {0}};
+  Leapfrog run{input, compliances, 0, positions, Points(positions.size(), glm::dvec3(0)), {}, {}, {}, {0}};
   std::vector<std::uint32_t> vertices;
   for_each_spring(run, [&](auto, const ConstraintList& list, auto&&, std::size_t) {
     vertices.insert(vertices.end(), list.vertices.begin(), list.vertices.end());
   });
+  if (input.ten_node) run.tets = ten_node_tets(input.system.lists[index_of<NeoHookean>], input.model.rest.positions);
+  for (const TenNodeTet& tet : run.tets) vertices.insert(vertices.end(), tet.nodes.begin(), tet.nodes.end());
   run.parts.resize(vertices.size());
   run.at_vertex = group_by_key(vertices.size(), positions.size(),
                                [&](std::size_t part, auto&& emit) { emit(vertices[part], std::uint32_t(part)); });

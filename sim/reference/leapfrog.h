@@ -10,6 +10,7 @@
 #include "sim/parallel.h"
 #include "sim/reference/objective.h"
 #include "sim/reference/reference.h"
+#include "sim/reference/ten_node.h"
 
 namespace tetpbd {
 
@@ -21,6 +22,7 @@ struct Leapfrog {
   Points x;                         ///< m, at the time reached
   Points v;                         ///< m/s, half a step before
   Points parts;                     ///< N, forces by constraint and vertex of it, one kind after the other
+  std::vector<TenNodeTet> tets;     ///< of ten nodes, whose parts come last
   Grouped at_vertex;                ///< the parts that act on each vertex
   std::vector<double> time = {0};   ///< s, one number
   std::vector<State::Held> held{};  ///< as in State

@@ -13,6 +13,7 @@
 #include "sim/hash.h"
 #include "sim/interrupt.h"
 #include "sim/mesh/cache.h"
+#include "sim/model/material.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/rigid.h"
@@ -24,6 +25,7 @@ namespace {
 // Steps are far shorter than what changes a motion to four digits.
 constexpr double rigid_step_length = 4e-5;  // s
 constexpr double part_of_stable = 0.5;      // of the longest stable step, in leapfrog steps
+constexpr double ten_node_part = 0.7;       // likewise; what is told apart by them are meshes, whose errors are larger
 constexpr long implicit_steps = 8;          // in a step of the scene
 constexpr double most_stable = 3000;        // stable steps in a step of the scene; more of them cost more than Newton's
 constexpr double most_bytes = 9e6;          // of stored positions, where these are `least_instants` or more
@@ -102,7 +104,8 @@ TwoRuns rigid_runs(const ReferenceInput& input) {
 TwoRuns leapfrog_runs(const ReferenceInput& input, double stable) {
   const State start{input.model.positions, input.model.velocities};
   return make_runs(
-      input.settings.dt, long(std::ceil(input.settings.dt / (part_of_stable * stable))),
+      input.settings.dt,
+      long(std::ceil(input.settings.dt / ((input.ten_node ? ten_node_part : part_of_stable) * stable))),
       [&](double h) { return leapfrog(input, reference_compliances(input), start, h); },
       [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.held), each(run.time); });
 }
@@ -204,8 +207,40 @@ std::uint64_t scene_key(const Model& model, const Settings& settings) {
   return scene_key({model, {}, settings, model.inverse_masses});
 }
 
+std::uint64_t motion_key(const Model& model, const Settings& settings, const std::string& method) {
+  const std::uint64_t key = scene_key(model, settings);
+  return method == "ten-node" ? hash_values(method, key) : key;
+}
+
+namespace {
+
+Motion find_ten_node_motion(const ReferenceInput& input, long steps, const std::filesystem::path& unfinished,
+                            const std::function<void(long)>& progress) {
+  const auto is_elastic = [](const Material& m) { return m.material != "none"; };
+  const bool all_elastic = std::ranges::all_of(input.model.bodies, [&](const Body& body) {
+    return !body.is_sheet() && is_elastic(body_material(body, input.settings));
+  });
+  if (!all_elastic)
+    throw Error("the bodies have no motion on finer meshes", "constraints alone, or a sheet",
+                "give them a material, which does not depend on the mesh");
+  const Halved halved = halve_edges(input.model);
+  const ConstraintSystem system = build_constraints(halved.model, input.settings);
+  Motion motion = find_motion({halved.model, system, input.settings, halved.model.inverse_masses, true}, steps,
+                              "leapfrog", unfinished, progress);
+  motion.method = "ten-node", motion.scene = motion_key(input.model, input.settings, motion.method);
+  for (Points& positions : motion.positions) {
+    Points corners(halved.corner.size());
+    for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = positions[halved.corner[i]];
+    positions = std::move(corners);
+  }
+  return motion;
+}
+
+}  // namespace
+
 Motion find_motion(const ReferenceInput& input, long steps, const std::string& method,
                    const std::filesystem::path& unfinished, const std::function<void(long)>& progress) {
+  if (method == "ten-node") return find_ten_node_motion(input, steps, unfinished, progress);
   require_reference(input);
   Motion motion;
   motion.method = method;

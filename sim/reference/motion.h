@@ -13,7 +13,7 @@
 namespace tetpbd {
 
 struct Motion {
-  std::string method;       ///< "rigid body", "leapfrog" or "implicit"
+  std::string method;       ///< "rigid body", "leapfrog", "implicit" or "ten-node"
   std::uint64_t scene = 0;  ///< scene_key() of its scene
   double dt = 0;            ///< s, a step of the scene
   double step = 0;          ///< s, a step of the finer run
@@ -39,10 +39,13 @@ std::uint64_t scene_key(const ReferenceInput& input);
 /// The same with the model's own inverse masses.
 std::uint64_t scene_key(const Model& model, const Settings& settings);
 
-/// The motion over `steps` steps of the scene, by the named method or the one that suits it; `progress` is called after
-/// each. The file `unfinished`, if named, saves it from time to time, and an interrupted one continues. Throws Error
-/// for scenes without a reference (0 < k < 1, bodies free to turn about fixed vertices, some compliances 0), or
-/// Interrupted.
+/// That of the motion that `method` finds: of ten-node tets it is another one.
+std::uint64_t motion_key(const Model& model, const Settings& settings, const std::string& method);
+
+/// The motion over `steps` steps of the scene, by the named method or the one that suits it, or of ten-node tets in the
+/// place of the scene's (ten_node.h), of which it has the corners; `progress` is called after each step. The file
+/// `unfinished`, if named, saves it from time to time, and an interrupted one continues. Throws Error for scenes
+/// without a reference (0 < k < 1, bodies free to turn about fixed vertices, some compliances 0), or Interrupted.
 Motion find_motion(const ReferenceInput& input, long steps, const std::string& method = {},
                    const std::filesystem::path& unfinished = {}, const std::function<void(long)>& progress = {});
 

@@ -19,6 +19,7 @@ struct ReferenceInput {
   const ConstraintSystem& system;
   const Settings& settings;
   const std::vector<double>& inverse_masses;  ///< 1/kg, 0: fixed
+  bool ten_node = false;                      ///< of halve_edges(): each eight neo-Hookean tets are one of ten nodes
 };
 
 /// Throws Error unless the compliances of all kinds that have constraints are above 0 (infinity is allowed).
@@ -26,8 +27,8 @@ void require_compliances(const ConstraintSystem& system, const Compliances& comp
 
 /// The longest step that is stable about these positions, s, by the largest eigenvalues of M^-1 K and of the damping,
 /// which power iteration finds from differences of forces. Bodies that deform far need shorter ones.
-double stable_step(const ReferenceInput& input, const Compliances& compliances, const std::vector<glm::dvec3>& positions,
-                   int iterations = 100);
+double stable_step(const ReferenceInput& input, const Compliances& compliances,
+                   const std::vector<glm::dvec3>& positions, int iterations = 100);
 
 /// The RMS distance (by mass) of two states over the size of the body, of several the mean by mass. States are not
 /// aligned first: a displaced state has an error.

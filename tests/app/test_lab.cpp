@@ -151,6 +151,46 @@ TEST_CASE("compare judges by the motion, beside a rigid body and a direct solver
   CHECK(wrong.err.find("no baseline for this scene: rigid-body") != std::string::npos);
 }
 
+TEST_CASE("compare judges meshes and solvers together, by the motion on finer meshes") {
+  const Folder folder;
+  std::ofstream(folder.path / "cube.obj") << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+                                             "f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\n"
+                                             "f 1 5 8\nf 1 8 4\nf 2 3 7\nf 2 7 6\n";
+  const std::string cache = "TETPBD_CACHE=" + (folder.path / "cache").string(),
+                    hangs =
+                        "compare --scene beam --mesh cube.obj --material neo-hookean --young-modulus 1e4 --steps 10 "
+                        "--set 'bodies.0.fixed=[{\"low\":[0,0.85,0],\"high\":[1,1,1]}]' --iterations 1 --substeps 4 ";
+  const Outcome all = program(hangs +
+                                  "--judge total --modes node,newton --fills tetgen,lattice:150,lattice:1000 "
+                                  "--budget-ms 1e6 --out a",
+                              folder, cache);
+  REQUIRE(all.status == 0);
+  const json rows = json::parse(read(folder.path / "a/compare.json"))["rows"];
+  REQUIRE(rows.size() == 6);
+  const auto error = [&](const char* fill, const char* mode) {
+    for (const json& row : rows)
+      if (row["fill"] == fill && row["mode"] == mode) return row["total_rms"].get<double>();
+    return std::nan("");
+  };
+  // A finer mesh is nearer with the better solver, and by far with neither.
+  CHECK(error("lattice:1000", "newton") < 0.85 * error("lattice:150", "newton"));
+  CHECK(error("lattice:1000", "newton") > 1e-4);
+  CHECK(error("lattice:150", "newton") < 0.05);
+  CHECK(error("tetgen", "newton") > 0);
+  CHECK(all.out.find("judged by total: distance from the motion on finer meshes") != std::string::npos);
+  CHECK(all.out.substr(all.out.find("best within")).find("lattice:1000") != std::string::npos);
+  CHECK(read(folder.path / "a/motion.svg").find("motion on finer meshes") != std::string::npos);
+  // The second time that motion is in the cache, which another mesh of the first body has not.
+  CHECK(program(hangs + "--judge total --modes node --out b", folder, cache).err.find("finer") == std::string::npos);
+  CHECK(program(hangs + "--judge total --modes node --truth cube.obj --out c", folder, cache).status == 0);
+  CHECK(program(hangs + "--fills hexes --out d", folder, cache).err.find("no such filling: --fills hexes") !=
+        std::string::npos);
+  CHECK(program(hangs + "--fills lattice:many --out d", folder, cache).err.find("'many' is no number") !=
+        std::string::npos);
+  CHECK(program("compare --scene beam --judge total --out d", folder, cache).err.find("give them a material") !=
+        std::string::npos);
+}
+
 TEST_CASE("compare finds the front, and shards merge to the same rows") {
   const Folder folder;
   const std::string command = "compare --scene beam --modes node,cpu --iterations 1,4 --substeps 1,2 --steps 12 ";
@@ -187,7 +227,7 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
   CHECK(read(folder.path / "whole/compare.svg").starts_with("<svg"));
   CHECK(read(folder.path / "whole/compare.png").substr(1, 3) == "PNG");
   CHECK(read(folder.path / "whole/compare.csv")
-            .starts_with("scene,mode,omega,iterations,substeps,vertices,tets,gpu_ms_per_step"));
+            .starts_with("scene,mode,omega,iterations,substeps,fill,vertices,tets,gpu_ms_per_step"));
   CHECK(program("compare --shard 4/3", folder).status == 2);
   CHECK(program("compare --merge nowhere --out x", folder).status == 2);
   CHECK(program("compare --merge part1 part1 --out x", folder).status == 2);

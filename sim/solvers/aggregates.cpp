@@ -142,7 +142,7 @@ Modes modes(const Model& model, const Aggregates& aggregates, std::size_t v, con
 }
 
 // Has to change whenever the aggregates of the same mesh do.
-constexpr std::uint64_t cache_version = 2;
+constexpr std::uint64_t cache_version = 3;
 
 std::uint64_t cache_key(const Model& model, const Grouped& neighbours, const std::vector<std::size_t>& wanted) {
   std::uint64_t key = hash_values(wanted, hash_values(std::array{cache_version}));
@@ -208,7 +208,9 @@ Aggregates make_aggregates(const Model& model, const Grouped& neighbours, const 
     each([&](const glm::dvec3& x, double m) { centre += m * glm::dvec4(x, 1); });
     const glm::dvec3 middle = centre.w > 0 ? glm::dvec3(centre) / centre.w : model.rest.positions[seeds[a]];
     each([&](const glm::dvec3& x, double m) { squares += m * glm::dot(x - middle, x - middle); });
-    result.all[a] = {middle, centre.w > 0 && squares > 0 ? std::sqrt(squares / centre.w) : model.size};
+    // One vertex alone reaches nowhere, but for rounding, by which nothing may be divided.
+    const double reach = centre.w > 0 ? std::sqrt(squares / centre.w) : 0;
+    result.all[a] = {middle, reach > 1e-9 * model.size ? reach : model.size};
   }
   if (large) keep_cached(file, key, result.all, result.first, result.of_vertex);
   return result;

@@ -232,6 +232,22 @@ TEST_CASE(
   before ? setenv("TETPBD_CACHE", kept.c_str(), 1) : unsetenv("TETPBD_CACHE");
 }
 
+TEST_CASE("newton: an aggregate of one vertex, whose neighbours are all fixed, has no rotation by rounding") {
+  for (std::uint32_t lone = 0; lone < 120; ++lone) {
+    Model model = *irregular_block(1, false);
+    const Grouped neighbours = neighbours_of(model.rest);
+    for (std::uint32_t k = neighbours.first[lone]; k < neighbours.first[lone + 1]; ++k)
+      model.inverse_masses[neighbours.values[k]] = 0;
+    const Aggregates aggregates = make_aggregates(model, neighbours, {4});
+    std::size_t alone = 0;
+    for (std::size_t a = 0; a < aggregates.all.size(); ++a) {
+      CHECK(aggregates.all[a].reach > 1e-3 * model.size);
+      alone += aggregates.members.first[a + 1] - aggregates.members.first[a] == 1;
+    }
+    CHECK(alone >= 1);
+  }
+}
+
 TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inverted") {
   const auto model = irregular_block(1, true, {}, {});
   const Grouped neighbours = neighbours_of(model->rest);

@@ -444,6 +444,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
     body.mesh = overrides.mesh;
     body.surface.clear();
     body.up = "y";
+    body.fill = "auto", body.tets.reset(), body.spacing.reset();
     body.block.reset(), body.tet.reset(), body.sheet.reset();
     scene.name = printable(fmt::format("{} with {}", scene.name, body.mesh.filename().string()));
     if (std::ranges::none_of(overrides.set, [](const auto& given) { return given.starts_with("camera"); }))
@@ -463,7 +464,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
                                         !overrides.budget_ms && hard(scene.settings));
   for (BodyDescription& body : scene.bodies) {
     if (!overrides.tetgen.empty()) body.tetgen = overrides.tetgen;
-    if (!overrides.fill.empty()) body.fill = overrides.fill;
+    if (!overrides.fill.empty()) {
+      body.fill = overrides.fill;
+      if (body.fill != "lattice") body.tets.reset(), body.spacing.reset();  // of the scene's lattice
+    }
     if (overrides.tets) body.tets = overrides.tets, body.spacing.reset();
     if (overrides.spacing) body.spacing = overrides.spacing, body.tets.reset();
     if (!overrides.deform.empty()) body.deform = overrides.deform;

@@ -115,6 +115,20 @@ TEST_CASE("the command line overrides, and its errors name the flag") {
   CHECK_THROWS_AS(load_scene("no-such-scene"), Error);
 }
 
+TEST_CASE("a scene of a lattice takes TetGen from the command line, and the size of the lattice goes") {
+  const BodyDescription shipped = load_scene("clamped-bunny").bodies[0];
+  CHECK(shipped.fill == "lattice");
+  CHECK(shipped.tets == 24000);
+  for (const char* other : {"tetgen", "auto"}) {
+    const BodyDescription body = load_scene("clamped-bunny", {.fill = other}).bodies[0];
+    CHECK(body.fill == other);
+    CHECK_FALSE((body.tets || body.spacing));
+  }
+  CHECK(load_scene("clamped-bunny", {.fill = "lattice"}).bodies[0].tets == 24000);
+  CHECK(load_scene("clamped-bunny", {.mesh = "another.ply"}).bodies[0].fill == "auto");
+  CHECK(load_scene("clamped-bunny", {.fill = "lattice", .spacing = 0.1}).bodies[0].spacing == 0.1);
+}
+
 TEST_CASE("every deformation does what it says and leaves the rest shape") {
   const TetMesh mesh = make_block({1, 2, 1}, {3, 3, 3});
   const auto volume_of = [&](const std::vector<glm::dvec3>& x, int& inverted) {

@@ -15,6 +15,7 @@
 #include "app/scene.h"
 #include "app/sweep.h"
 #include "render/frame.h"
+#include "sim/reference/reference.h"
 
 namespace tetpbd {
 
@@ -178,6 +179,8 @@ std::string csv_row(const Measurement& measurement, const RunErrors& so_far);
 
 /// A question about units where a mesh is larger than 50 m or smaller than 1 mm; else empty.
 std::string question_units(const glm::dvec3& size);
+/// s, with forces; 0 of what has none, and of meshes so large that it would take seconds to find.
+double longest_stable_step(const ReferenceInput& input);
 /// `mass` in kg.
 ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step);
 ordered_json error_json(const RunErrors& errors);

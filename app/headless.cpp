@@ -116,15 +116,6 @@ ordered_json settings_json(Scene scene, const Settings& settings) {
   return result;
 }
 
-// s, with forces; 0 of what has none, and of meshes so large that it would take seconds to find.
-double longest_stable_step(const Sim& sim) {
-  constexpr std::size_t most_tets = 300'000;
-  if (solver_mode(sim.settings).leapfrog) return sim.longest_substep;
-  if (sim.settings.material == "none" || sim.model->rest.tets.size() > most_tets) return 0;
-  return stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}, sim.settings.compliance,
-                     sim.model->rest.positions, 30);
-}
-
 ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
                              const ordered_json& hash, const std::optional<SolverChoice>& choice,
                              const Verdict& verdict) {
@@ -134,8 +125,11 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   j["settings"]["iterations"] = sim.plan.iterations, j["settings"]["substeps"] = sim.plan.substeps;
   if (choice) j["solver_choice"] = solver_choice_json(*choice);
   j["mesh"] = mesh_json(report(sim.model->rest), std::reduce(sim.model->masses.begin(), sim.model->masses.end()),
-                        longest_stable_step(sim));
-  for (const auto& [body, what] : sim.model->fills) j["fills"].push_back({{"body", body}, {"what", what}});
+                        solver_mode(sim.settings).leapfrog
+                            ? sim.longest_substep
+                            : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}));
+  for (const BodyFill& fill : sim.model->fills)
+    if (!fill.what.empty()) j["fills"].push_back({{"body", sim.model->bodies[fill.body].name}, {"what", fill.what}});
   for (const StartMotion& m : sim.model->start_motions)
     j["start_motions"].push_back({{"body", m.body}, {"from", m.from}, {"motion", vector(m.motion)}, {"work", m.work}});
   j["device"] = device_json(device);

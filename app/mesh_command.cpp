@@ -8,7 +8,6 @@
 #include "sim/interrupt.h"
 #include "sim/mesh/fill.h"
 #include "sim/model/material.h"
-#include "sim/reference/reference.h"
 
 namespace tetpbd {
 
@@ -18,15 +17,14 @@ void turn(std::vector<glm::dvec3>& positions, const std::string& up) {
   for (glm::dvec3& p : positions) p = upright(p, up);
 }
 
-// s, of a rubber of 1 MPa; of sheets and of meshes so large that it would take seconds to find, 0.
-double longest_stable_step(const TetMesh& mesh) {
-  if (mesh.tets.empty() || mesh.tets.size() > 300'000) return 0;
+// s, of a rubber of 1 MPa.
+double longest_step_of_rubber(const TetMesh& mesh) {
   Settings settings;
   settings.material = "neo-hookean", settings.young_modulus = 1e6, settings.poisson_ratio = 0.45;
   Model model;
   add_body(model, "mesh", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), {});
   const ConstraintSystem system = build_constraints(model, settings);
-  return stable_step({model, system, settings, model.inverse_masses}, settings.compliance, model.rest.positions, 30);
+  return longest_stable_step({model, system, settings, model.inverse_masses});
 }
 
 // Writes the surface, and says what was done to it.
@@ -67,8 +65,7 @@ int run_mesh_command(const MeshOptions& o) {
   const std::filesystem::path& file = mends ? o.repaired : o.file;
   TetMesh mesh;
   if (is_surface_file(file)) {
-    SurfaceMesh surface = mends ? load_as_is(file) : load_surface(file);
-    if (mends && !surface.triangles.empty()) surface = load_surface(file);
+    const SurfaceMesh surface = load_surface(file, mends);
     SurfaceMesh oriented = surface;
     const SurfaceCheck check = check_surface(oriented);
     FillOptions options = fill_options(o.filled.fill, o.filled.tetgen, o.filled.tets, o.filled.spacing, file.string());
@@ -110,7 +107,7 @@ int run_mesh_command(const MeshOptions& o) {
   }
   if (!mends) turn(mesh.positions, o.up);
   const MeshReport counts = report(mesh);
-  put("mesh", mesh_json(counts, 1000 * counts.filled, longest_stable_step(mesh)));
+  put("mesh", mesh_json(counts, 1000 * counts.filled, longest_step_of_rubber(mesh)));
   if (const std::string units = question_units(counts.size); !o.json && !units.empty()) fmt::print("{}\n", units);
   if (interrupted()) throw Error("interrupted", file.string(), "start again; nothing was written", 1);
   if (!o.out.empty()) {

@@ -618,7 +618,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     if (mesh.tets.empty()) mesh.thickness = body.thickness > 0 ? body.thickness : 1e-3 * placed.size();
     std::vector<glm::dvec3> start = mesh.positions;
     deform(start, mesh, body.deform, unsigned(scene.settings.seed) + 0x9e3779b9u * unsigned(model->bodies.size()));
-    if (!filled.note.empty()) model->fills.emplace_back(body.name, filled.note);
+    if (!filled.note.empty()) model->fills.push_back({model->bodies.size(), filled.note, {}});
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   if (!carries) model->carried = {};

@@ -63,6 +63,13 @@ std::string question_units(const glm::dvec3& size) {
                      largest > 1 ? "millimetres" : "metres");
 }
 
+double longest_stable_step(const ReferenceInput& input) {
+  constexpr std::size_t most_tets = 300'000;
+  const std::size_t tets = input.model.rest.tets.size();
+  if (input.settings.material == "none" || tets == 0 || tets > most_tets) return 0;
+  return stable_step(input, input.settings.compliance, input.model.rest.positions, 30);
+}
+
 ordered_json mesh_json(const MeshReport& counts, double mass, double longest_stable_step) {
   ordered_json all = nlohmann::json(counts);
   all["size"] = {counts.size.x, counts.size.y, counts.size.z};

@@ -1,6 +1,5 @@
 // A step (method.md, "A step"): each substep predicts, solves as often as there are iterations, and finishes.
 #include <algorithm>
-#include <numeric>
 
 #include "sim/contact/moving_obstacle.h"
 #include "sim/contact/rigid_contact.h"
@@ -71,8 +70,7 @@ void forget_contacts(Sim& sim) {
     record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
     if (body.one_piece && moves_rigidly(sim.settings, body_material(body, sim.settings)))
       record.slack = float(RigidContact::slack * edge);
-    const auto mass = sim.model->masses.begin() + std::ptrdiff_t(body.first_vertex);
-    record.mass = float(std::accumulate(mass, mass + std::ptrdiff_t(body.vertices), 0.0));
+    record.mass = float(body_mass(*sim.model, body));
   }
   sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
 }

@@ -173,13 +173,14 @@ std::vector<char> closed_patches(const SurfaceTopology& topology) {
 }
 
 // How many closed patches each one is in. A patch that is only partly in another is not in it.
-std::vector<int> nesting_depths(const SurfaceMesh& surface, const SurfaceTopology& topology) {
+std::vector<int> nesting_depths(const SurfaceMesh& surface, const SurfaceTopology& topology,
+                                const std::vector<char>& closed) {
+  if (topology.patches < 2) return std::vector<int>(topology.patches, 0);
   struct Part {
     std::vector<Triangle> triangles;
     Bounds box{glm::dvec3(INFINITY), glm::dvec3(-INFINITY)};
   };
   constexpr std::size_t looked_at = 8;  // vertices
-  const std::vector<char> closed = closed_patches(topology);
   std::vector<Part> parts(topology.patches);
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
     Part& part = parts[topology.patch[i]];
@@ -226,37 +227,75 @@ glm::dvec3 point_in_cavity(const SurfaceMesh& surface, const SurfaceTopology& to
   return from + out * (found.empty() ? 1e-3 * size : found[0].at * size / 2);
 }
 
-// Turns triangles so that every patch faces away from what is solid, which is inward where it bounds a cavity, and
-// finds the patches without volume.
-void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, SurfaceCheck& check) {
-  const glm::dvec3 centre = bounds(surface.positions).centre();  // smaller numbers round less
-  std::vector<double> volume(topology.patches, 0), area(topology.patches, 0);
-  std::vector<glm::dvec3> place(topology.patches);
+// m^3, between a triangle and a point: their sum is what a closed surface encloses, wherever the point is.
+double volume_from(const glm::dvec3& apex, const std::vector<glm::dvec3>& x, const Triangle& t) {
+  return glm::dot(x[t[0]] - apex, glm::cross(x[t[1]] - apex, x[t[2]] - apex)) / 6;
+}
+
+struct Patch {
+  double volume = 0, area = 0;     // m^3 and m^2; as its first triangle is turned
+  glm::dvec3 place{0}, centre{0};  // a point of it; of its area, from which a hole counts least and numbers are small
+  int depth = 0;                   // how many closed patches it is in; if odd, it bounds a cavity
+  bool closed = true;
+};
+
+std::vector<Patch> measure_patches(const SurfaceMesh& surface, const SurfaceTopology& topology) {
+  std::vector<Patch> patches(topology.patches);
+  const std::vector<char> closed = closed_patches(topology);
+  const std::vector<int> depths = nesting_depths(surface, topology, closed);
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const Triangle& t = surface.triangles[i];
-    const std::uint32_t patch = topology.patch[i];
-    const glm::dvec3 normal = area_vector(surface, t);
-    volume[patch] += glm::dot(surface.positions[t[0]] - centre, normal) / 3 * (topology.turned[i] ? -1 : 1);
-    area[patch] += glm::length(normal);
-    place[patch] = centroid(surface, t);
+    Patch& patch = patches[topology.patch[i]];
+    const double own = glm::length(area_vector(surface, surface.triangles[i]));
+    patch.place = centroid(surface, surface.triangles[i]);
+    patch.area += own, patch.centre += own * patch.place;
   }
-  const std::vector<int> depths =
-      topology.patches > 1 ? nesting_depths(surface, topology) : std::vector<int>(topology.patches, 0);
-  for (std::size_t p = 0; p < topology.patches; ++p) check.volume += std::abs(volume[p]) * (depths[p] % 2 ? -1 : 1);
-  find_defect(
-      check, "surface is flat", "part without volume", "parts without volume", "give it thickness or remove it",
-      topology.patches, [&](std::size_t p) { return std::abs(volume[p]) <= flat_thickness * area[p] * size; },
-      [&](std::size_t p) { return near(place[p]); });
+  for (std::size_t p = 0; p < patches.size(); ++p)
+    patches[p].centre /= patches[p].area, patches[p].depth = depths[p], patches[p].closed = closed[p] != 0;
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const bool turn = (volume[topology.patch[i]] < 0) != (depths[topology.patch[i]] % 2 == 1);
+    Patch& patch = patches[topology.patch[i]];
+    patch.volume += volume_from(patch.centre, surface.positions, surface.triangles[i]) * (topology.turned[i] ? -1 : 1);
+  }
+  return patches;
+}
+
+bool is_cavity(const Patch& patch) { return patch.depth % 2 == 1; }
+
+double volume_of(const std::vector<Patch>& patches) {
+  double volume = 0;
+  for (const Patch& patch : patches) volume += std::abs(patch.volume) * (is_cavity(patch) ? -1 : 1);
+  return volume;
+}
+
+// Turns triangles so that every patch faces away from what is solid, which is inward where it bounds a cavity. One that
+// is open and hardly hollow keeps its side. Returns how many were turned.
+std::size_t turn_patches(SurfaceMesh& surface, const SurfaceTopology& topology, const std::vector<Patch>& patches) {
+  constexpr double round_enough = 1e-3;  // volume over area^1.5
+  std::size_t turned = 0;
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const Patch& patch = patches[topology.patch[i]];
+    const bool known = patch.closed || std::abs(patch.volume) > round_enough * std::pow(patch.area, 1.5);
+    const bool turn = known && (patch.volume < 0) != is_cavity(patch);
     if (bool(topology.turned[i]) == turn) continue;
     std::swap(surface.triangles[i][1], surface.triangles[i][2]);
-    ++check.flipped_triangles;
+    ++turned;
   }
-  if (std::ranges::none_of(depths, [](int depth) { return depth % 2 == 1; })) return;
+  return turned;
+}
+
+// Turns triangles outward and finds the patches without volume, and the cavities.
+void orient(SurfaceMesh& surface, const SurfaceTopology& topology, double size, SurfaceCheck& check) {
+  const std::vector<Patch> patches = measure_patches(surface, topology);
+  check.volume = volume_of(patches);
+  find_defect(
+      check, "surface is flat", "part without volume", "parts without volume", "give it thickness or remove it",
+      patches.size(),
+      [&](std::size_t p) { return std::abs(patches[p].volume) <= flat_thickness * patches[p].area * size; },
+      [&](std::size_t p) { return near(patches[p].place); });
+  check.flipped_triangles = turn_patches(surface, topology, patches);
+  if (std::ranges::none_of(patches, is_cavity)) return;
   const Solid solid(surface);
-  for (std::size_t p = 0; p < topology.patches; ++p)
-    if (depths[p] % 2 == 1) check.cavities.push_back(point_in_cavity(surface, topology, p, solid, size));
+  for (std::size_t p = 0; p < patches.size(); ++p)
+    if (is_cavity(patches[p])) check.cavities.push_back(point_in_cavity(surface, topology, p, solid, size));
 }
 
 // Dihedral angles between the faces opposite to corners a and b, degrees.
@@ -313,34 +352,16 @@ SurfaceCheck check_surface(SurfaceMesh& surface) {
 }
 
 Outward turn_outward(const SurfaceMesh& given) {
-  constexpr double round_enough = 1e-3;  // volume over area^1.5, below which an open patch stays as it is
   Outward outward{given, {}};
   SurfaceMesh& surface = outward.surface;
   repair(surface);
   const SurfaceTopology topology = surface_topology(surface.triangles, surface.positions.size());
-  const std::vector<char> closed = closed_patches(topology);
-  const std::vector<int> depths = nesting_depths(surface, topology);
-  std::vector<double> volume(topology.patches, 0), area(topology.patches, 0);
-  std::vector<glm::dvec3> origin(topology.patches, glm::dvec3(0));
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const double own = glm::length(area_vector(surface, surface.triangles[i]));
-    area[topology.patch[i]] += own, origin[topology.patch[i]] += own * centroid(surface, surface.triangles[i]);
-  }
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const Triangle& t = surface.triangles[i];
-    const std::uint32_t patch = topology.patch[i];
-    volume[patch] += glm::dot(surface.positions[t[0]] - origin[patch] / area[patch], area_vector(surface, t)) / 3 *
-                     (topology.turned[i] ? -1 : 1);
-  }
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const std::uint32_t patch = topology.patch[i];
-    const bool known = closed[patch] || std::abs(volume[patch]) > round_enough * std::pow(area[patch], 1.5);
-    const bool turn = known && (volume[patch] < 0) != (depths[patch] % 2 == 1);
-    if (bool(topology.turned[i]) != turn) std::swap(surface.triangles[i][1], surface.triangles[i][2]);
-  }
+  const std::vector<Patch> patches = measure_patches(surface, topology);
+  turn_patches(surface, topology, patches);
   outward.patches = topology.patch;
-  outward.closed = std::ranges::all_of(closed, [](char is_closed) { return is_closed != 0; });
-  outward.cavities = int(std::ranges::count_if(depths, [](int depth) { return depth % 2 == 1; }));
+  outward.closed = std::ranges::all_of(patches, &Patch::closed);
+  outward.cavities = int(std::ranges::count_if(patches, is_cavity));
+  outward.volume = volume_of(patches);
   return outward;
 }
 
@@ -417,14 +438,21 @@ std::string repair(SurfaceMesh& surface) {
   return fmt::format("{}", fmt::join(done, ", "));
 }
 
-double least_quality(const TetMesh& mesh) {
-  double least = INFINITY, edges = 0;
-  for (const Tet& tet : mesh.tets) {
-    least = std::min(least, least_altitude(mesh, tet));
+double mean_edge(const TetMesh& mesh) {
+  double edges = 0;
+  for (const Tet& tet : mesh.tets)
     for (std::size_t a = 0; a < 4; ++a)
       for (std::size_t b = 0; b < a; ++b) edges += glm::distance(mesh.positions[tet[a]], mesh.positions[tet[b]]);
-  }
-  return least / (edges / (6 * double(mesh.tets.size())));
+  return edges / (6 * double(mesh.tets.size()));
+}
+
+FlattestTet flattest_tet(const TetMesh& mesh) {
+  FlattestTet flattest{0, INFINITY};
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    if (const double altitude = least_altitude(mesh, mesh.tets[t]); altitude < flattest.altitude)
+      flattest = {t, altitude};
+  flattest.quality = flattest.altitude / mean_edge(mesh);
+  return flattest;
 }
 
 MeshReport report(const TetMesh& mesh) {
@@ -463,18 +491,13 @@ MeshReport report(const TetMesh& mesh) {
 
   // A part of the boundary that encloses less than nothing looks into a cavity.
   std::vector<double> enclosed(surface.patches, 0);
-  for (std::size_t t = 0; t < boundary.size(); ++t) {
-    const auto& [a, b, c] = boundary[t];
-    const auto at = [&](std::uint32_t v) { return mesh.positions[v] - box.centre(); };
-    enclosed[surface.patch[t]] += glm::dot(at(a), glm::cross(at(b), at(c)));
-  }
+  for (std::size_t t = 0; t < boundary.size(); ++t)
+    enclosed[surface.patch[t]] += volume_from(box.centre(), mesh.positions, boundary[t]);
   r.cavities = int(std::ranges::count_if(enclosed, [](double volume) { return volume < 0; }));
 
   if (r.tets == 0) return r;
-  r.worst_altitude = INFINITY;
-  for (std::size_t t = 0; t < r.tets; ++t)
-    if (const double altitude = least_altitude(mesh, mesh.tets[t]); altitude < r.worst_altitude)
-      r.worst_altitude = altitude, r.worst_tet = t;
+  const FlattestTet flattest = flattest_tet(mesh);
+  r.worst_altitude = flattest.altitude, r.worst_tet = flattest.tet;
   r.smallest_tet_volume = INFINITY;
   r.min_dihedral_deg = 180;
   struct Shape {

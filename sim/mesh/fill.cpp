@@ -48,7 +48,7 @@ Filled fill(const SurfaceMesh& surface, const FillOptions& options, const std::s
     Filled filled{.mesh = tetrahedralise(surface, options.switches, seconds, source)};
     // Who gives switches wants those tets.
     const bool judged = options.by.empty() && options.switches == FillOptions().switches;
-    const double quality = judged ? least_quality(filled.mesh) : 1;
+    const double quality = judged ? flattest_tet(filled.mesh).quality : 1;
     if (quality >= poor) return filled;
     why = fmt::format("its tets by TetGen are as flat as {:.2g} of an edge", quality);
   } catch (const NotSolid& refusal) {

@@ -9,6 +9,7 @@
 
 #include "sim/interrupt.h"
 #include "sim/mesh/lattice_cells.h"
+#include "sim/mesh/thickness.h"
 #include "sim/parallel.h"
 
 namespace tetpbd {
@@ -16,16 +17,11 @@ namespace {
 
 // Raises small shares, because what is lighter and softer would be crushed by what is behind it, and then scales those
 // below 1 so that the volume is right: that of a closed surface, which samples miss by some thousandths.
-void settle_shares(TetMesh& mesh, const SurfaceMesh& surface, bool closed) {
+void settle_shares(TetMesh& mesh, const Outward& outward) {
   constexpr float least = 0.7f;
   constexpr double most = 0.05;  // beyond it the surface overlaps itself, or the lattice left something out
-  double right = filled_volume(mesh), whole = 0, part = 0, enclosed = 0;
-  const glm::dvec3 centre = bounds(surface.positions).centre();
-  for (const auto& [a, b, c] : surface.triangles) {
-    const auto& x = surface.positions;
-    enclosed += glm::dot(x[a] - centre, glm::cross(x[b] - centre, x[c] - centre)) / 6;
-  }
-  if (closed && std::abs(right - enclosed) < most * enclosed) right = enclosed;
+  double right = filled_volume(mesh), whole = 0, part = 0;
+  if (outward.closed && std::abs(right - outward.volume) < most * outward.volume) right = outward.volume;
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
     mesh.fill[t] = std::max(mesh.fill[t], least);
     (mesh.fill[t] < 1 ? part : whole) += double(mesh.fill[t]) * tet_volume(mesh, mesh.tets[t]);
@@ -72,15 +68,6 @@ void fit(TetMesh& mesh, const Solid& solid, double h) {
     }
 }
 
-double area_of(const SurfaceMesh& surface) {
-  double area = 0;
-  for (const auto& [a, b, c] : surface.triangles) {
-    const auto& x = surface.positions;
-    area += glm::length(glm::cross(x[b] - x[a], x[c] - x[a])) / 2;
-  }
-  return area;
-}
-
 // m^3, of what is inside, by points of a grid.
 double sampled_volume(const Solid& solid, const Bounds& box) {
   constexpr int across = 40;
@@ -95,48 +82,11 @@ double sampled_volume(const Solid& solid, const Bounds& box) {
   return std::pow(cell, 3) * double(std::accumulate(counts.begin(), counts.end(), std::size_t(0)));
 }
 
-/// How thin the body is, by rays inward from points of its surface.
-struct Thickness {
-  double thinnest = INFINITY;  ///< m, that of a fiftieth of the surface
-  double share = 0;            ///< of the surface, where it is below a cell
-  double median = INFINITY;    ///< m
-  double volume = 0;           ///< m^3, of a thin body: rays meet each part of it from two sides
-};
-Thickness measure_thickness(const SurfaceMesh& surface, const Solid& solid, double h) {
-  constexpr std::size_t rays = 2000;
-  const double size = bounds(surface.positions).size(), step = area_of(surface) / rays;
-  std::vector<std::uint32_t> from;  // triangles, as often as their area says
-  double sum = step / 2;
-  for (std::uint32_t i = 0; i < surface.triangles.size(); ++i) {
-    const auto& [a, b, c] = surface.triangles[i];
-    const auto& x = surface.positions;
-    for (sum += glm::length(glm::cross(x[b] - x[a], x[c] - x[a])) / 2; sum >= step && from.size() < rays; sum -= step)
-      from.push_back(i);
-  }
-  std::vector<double> depths(from.size(), INFINITY);
-  parallel_for(depths.size(), 64, [&](std::size_t k) {
-    const auto& [a, b, c] = surface.triangles[from[k]];
-    const auto& x = surface.positions;
-    const glm::dvec3 normal = glm::cross(x[b] - x[a], x[c] - x[a]), middle = (x[a] + x[b] + x[c]) / 3.0;
-    const glm::dvec3 n = normal / glm::length(normal), start = middle - 1e-6 * size * n;
-    double winding = solid.winding(start);
-    if (!(winding > inside_winding)) return;
-    std::vector<Solid::Crossing> found;
-    solid.find_crossings(start, start - size * n, found);
-    for (const auto& [at, jump] : found)
-      if (winding += jump; !(winding > inside_winding)) {
-        depths[k] = (at + 1e-6) * size;
-        return;
-      }
-  });
-  Thickness thickness;
-  for (const double depth : depths) thickness.volume += std::isfinite(depth) ? depth * step / 2 : 0;
-  std::ranges::sort(depths);
-  if (depths.empty()) return thickness;
-  const auto thin = std::ranges::lower_bound(depths, h) - depths.begin();
-  thickness.median = depths[depths.size() / 2], thickness.thinnest = depths[depths.size() / 50],
-  thickness.share = double(thin) / double(depths.size());
-  return thickness;
+// m^3, of a thin body: rays meet each part of it from two sides.
+double thin_volume(const std::vector<Depth>& depths, double area) {
+  double volume = 0;
+  for (const Depth& d : depths) volume += std::isfinite(d.depth) ? d.depth * area / double(depths.size()) / 2 : 0;
+  return volume;
 }
 
 // Cells of volume h^3 / 12 fill the body and stick out of its surface by a part of h.
@@ -174,9 +124,7 @@ void require_memory(double tets, const Bounds& box, double h, const std::string&
 }
 
 // Of the vertices that the surface names, how many are further than a cell from all tets.
-double share_outside(const SurfaceMesh& surface, const TetMesh& mesh, double h) {
-  const SurfaceMesh outside{mesh.positions, mesh.surface};
-  const Solid boundary(outside);
+double share_outside(const SurfaceMesh& surface, const Solid& boundary, double h) {
   std::vector<char> far(surface.positions.size(), 0);
   parallel_for(far.size(), 256, [&](std::size_t v) {
     const glm::dvec3& p = surface.positions[v];
@@ -197,7 +145,7 @@ std::pair<double, double> gap(const TetMesh& mesh, const Solid& solid) {
   return {std::sqrt(squares / double(std::ranges::count(outer, 1))), std::ranges::max(distances)};
 }
 
-std::string note_on(const Thickness& thickness, double left_out, double outside, std::pair<double, double> gap,
+std::string note_on(const std::vector<Depth>& depths, double left_out, double outside, std::pair<double, double> gap,
                     double h) {
   constexpr double worth_saying = 0.2;  // of a cell
   std::vector<std::string> notes;
@@ -206,9 +154,10 @@ std::string note_on(const Thickness& thickness, double left_out, double outside,
                                 gap.first, gap.second));
   if (outside > 1e-3)
     notes.push_back(fmt::format("{:.2g} % of its vertices enclose nothing and ride on what is nearest", 100 * outside));
-  if (thickness.share > 0.02)
-    notes.push_back(fmt::format("{:.0f} % of it is thinner than a cell: {:.3g} m; spacing {:.2g} would do",
-                                100 * thickness.share, thickness.thinnest, thickness.thinnest));
+  const auto thin = std::ranges::lower_bound(depths, h, {}, &Depth::depth) - depths.begin();
+  if (const double share = double(thin) / double(depths.size()), part = thinnest(depths).depth; share > 0.02)
+    notes.push_back(fmt::format("{:.0f} % of it is thinner than a cell: {:.3g} m; spacing {:.2g} would do", 100 * share,
+                                part, part));
   if (left_out > 1e-3)
     notes.push_back(fmt::format("{:.2g} % of its volume hangs on by less than a cell and is left out", 100 * left_out));
   return fmt::format("{}", fmt::join(notes, "; "));
@@ -225,7 +174,8 @@ Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, con
   const Bounds box = bounds(surface.positions);
   const double area = area_of(surface);
   double volume = surface.triangles.empty() ? 0 : sampled_volume(solid, box);
-  if (!(volume > 0)) volume = measure_thickness(surface, solid, 0).volume;  // it is between the grid's points
+  const std::vector<Depth> depths = measure_depths(surface, solid);
+  if (!(volume > 0)) volume = thin_volume(depths, area);  // it is between the grid's points
   if (!(volume > 0))
     throw Error("the surface encloses nothing that a lattice could fill", source,
                 "close it, or give \"thickness\", which makes it a sheet");
@@ -235,12 +185,10 @@ Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, con
   for (int turn = 0;; ++turn) {
     require_memory(expected_tets(volume, area, h), box, h, source);
     if (interrupted()) throw Error("interrupted", source, "start again; nothing was written", 1);
-    const Thickness thickness = measure_thickness(surface, solid, h);
-    if (8 * thickness.median < h)
-      throw Error(
-          "half of the body is thinner than an eighth of a cell",
-          fmt::format("{:.3g} m of {:.3g} m, in {}", thickness.median, h, source),
-          fmt::format("give a spacing of {:.2g}, or \"thickness\", which makes it a sheet", 2 * thickness.median));
+    if (const double median = depths.empty() ? INFINITY : depths[depths.size() / 2].depth; 8 * median < h)
+      throw Error("half of the body is thinner than an eighth of a cell",
+                  fmt::format("{:.3g} m of {:.3g} m, in {}", median, h, source),
+                  fmt::format("give a spacing of {:.2g}, or \"thickness\", which makes it a sheet", 2 * median));
     LatticeCells cells(solid, box, h);
     cells.find();
     if (cells.all().empty())
@@ -264,9 +212,14 @@ Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, con
       lattice.parts = int(cells.keep_parts(outward.patches, lattice.mesh, off));
       left_out += off;
     }
-    settle_shares(lattice.mesh, surface, outward.closed);
-    lattice.carried = cells.carry_surface(given, lattice.mesh, source);
-    lattice.note = note_on(thickness, left_out, share_outside(surface, lattice.mesh, h), gap(lattice.mesh, solid), h);
+    settle_shares(lattice.mesh, outward);
+    const SurfaceMesh outside{lattice.mesh.positions, lattice.mesh.surface};
+    const Solid boundary(outside);
+    lattice.carried = cells.carry_surface(given, lattice.mesh, boundary, source);
+    const auto off = gap(lattice.mesh, solid);
+    lattice.note = note_on(depths, left_out, share_outside(surface, boundary, h), off, h);
+    const Depth thin = thinnest(depths);
+    lattice.fit = {thin.depth, thin.at, off.second, mean_edge(lattice.mesh)};
     break;
   }
   lattice.spacing = h;

@@ -7,6 +7,7 @@
 
 #include "sim/mesh/carry.h"
 #include "sim/mesh/tet_mesh.h"
+#include "sim/mesh/thickness.h"
 
 namespace tetpbd {
 
@@ -19,6 +20,7 @@ struct Lattice {
   CarriedSurface carried;  ///< the given surface
   double spacing = 0;      ///< m
   int parts = 0, cavities = 0;
+  Fit fit;           ///< of the surface, as it was given
   std::string note;  ///< what is thinner than a cell or was left out; empty: nothing
 };
 /// Fills what the surface encloses, however broken it is: open, in many parts, crossing itself. Throws Error where it

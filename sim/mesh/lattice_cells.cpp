@@ -12,7 +12,6 @@
 namespace tetpbd {
 namespace {
 
-constexpr std::array<Triangle, 4> tet_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};  // opposite to each corner
 constexpr std::size_t samples = 32, most_samples = 256;  // of a cell near the surface; of one that may be split
 
 // The faces of a box around the body are between points of the lattice, so that flat sides do not meet whole layers.
@@ -327,7 +326,7 @@ void LatticeCells::fill(TetMesh& mesh) const {
   });
 }
 
-CarriedSurface LatticeCells::carry_surface(const SurfaceMesh& given, const TetMesh& mesh,
+CarriedSurface LatticeCells::carry_surface(const SurfaceMesh& given, const TetMesh& mesh, const Solid& boundary,
                                            const std::string& source) const {
   constexpr std::size_t looked_from = 4;
   const auto belongs = [&](std::size_t v, std::uint32_t tet) {
@@ -336,8 +335,6 @@ CarriedSurface LatticeCells::carry_surface(const SurfaceMesh& given, const TetMe
              return solid.sees(site.at, site.winding, site.at + (1 - 1e-6) * (given.positions[v] - site.at));
            });
   };
-  const SurfaceMesh outside{mesh.positions, mesh.surface};
-  const Solid boundary(outside);
   std::vector<std::uint32_t> owner(mesh.positions.size(), 0);  // a tet at each vertex
   for (std::uint32_t t = 0; t < mesh.tets.size(); ++t)
     for (const std::uint32_t v : mesh.tets[t]) owner[v] = t;

@@ -63,7 +63,9 @@ class LatticeCells {
   std::size_t keep_parts(const std::vector<std::uint32_t>& patches, TetMesh& mesh, double& left_out);
   /// Finds the shares anew where tets have moved.
   void fill(TetMesh& mesh) const;
-  CarriedSurface carry_surface(const SurfaceMesh& given, const TetMesh& mesh, const std::string& source) const;
+  /// `boundary`: of the mesh.
+  CarriedSurface carry_surface(const SurfaceMesh& given, const TetMesh& mesh, const Solid& boundary,
+                               const std::string& source) const;
   const std::vector<Piece>& all() const { return pieces; }
 
  private:

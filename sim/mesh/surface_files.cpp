@@ -286,10 +286,10 @@ SurfaceMesh load_as_is(const fs::path& file) {
   return surface;
 }
 
-SurfaceMesh load_surface(const fs::path& file) {
+SurfaceMesh load_surface(const fs::path& file, bool may_be_empty) {
   SurfaceMesh surface = load_as_is(file);
   weld(surface, weld_tolerance * bounds(surface.positions).size());
-  if (surface.triangles.empty())
+  if (surface.triangles.empty() && !may_be_empty)
     throw Error("file holds no triangle", file.string(), "export the surface as triangles or polygons");
   return surface;
 }

@@ -16,9 +16,6 @@ namespace {
 // A tet with |6 V| under this times its longest edge cubed has no volume, because rounding decides its sign.
 constexpr double no_volume = 1e-10;
 
-// Faces opposite corners 0 to 3, counter-clockwise seen from outside a tet of positive volume.
-constexpr std::array<Triangle, 4> outward_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
-
 double longest_edge(const TetMesh& mesh, const Tet& tet) {
   double longest = 0;
   for (const std::uint32_t a : tet)
@@ -70,7 +67,7 @@ void orient_tets(TetMesh& mesh, const std::string& source) {
 void find_boundary(TetMesh& mesh, const std::string& source) {
   const auto outward = [&](std::size_t face) -> Triangle {  // tet * 4 + side
     const Tet& t = mesh.tets[face / 4];
-    const auto& [a, b, c] = outward_faces[face % 4];
+    const auto& [a, b, c] = tet_faces[face % 4];
     return {t[a], t[b], t[c]};
   };
   const auto each = [&](std::size_t face, const auto& emit) {
@@ -200,7 +197,7 @@ double tet_volume(const TetMesh& mesh, const Tet& tet) {
 double least_altitude(const TetMesh& mesh, const Tet& tet) {
   const auto& x = mesh.positions;
   double largest = 0;
-  for (const auto& [a, b, c] : outward_faces)
+  for (const auto& [a, b, c] : tet_faces)
     largest = std::max(largest, glm::length(glm::cross(x[tet[b]] - x[tet[a]], x[tet[c]] - x[tet[a]])));
   return 6 * tet_volume(mesh, tet) / largest;
 }

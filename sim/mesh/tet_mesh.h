@@ -17,6 +17,9 @@ namespace tetpbd {
 using Triangle = std::array<std::uint32_t, 3>;
 using Tet = std::array<std::uint32_t, 4>;
 
+/// The faces of a tet of positive volume, opposite to its corners 0 to 3, counter-clockwise seen from outside.
+constexpr std::array<Triangle, 4> tet_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+
 inline bool names_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
 /// Triangles are counter-clockwise seen from outside.
@@ -36,14 +39,15 @@ struct TetMesh {
   double thickness = 0;
   /// By tet, the share of its volume that the body fills, which its mass and stiffness are of; empty: all of it.
   std::vector<float> fill{};
+  std::size_t other_cells = 0;  ///< solid cells of its file that are no tets, and so were left out
 };
 
 /// Largest coordinate of a mesh file, so that volumes (its cube) and their products stay far inside a double's range.
 constexpr double largest_coordinate = 1e30;
 
 /// PLY, OBJ, STL, OFF: polygons are cut into triangles, vertices welded, and those without a triangle dropped. Throws
-/// Error for files that cannot be read or have no triangle.
-SurfaceMesh load_surface(const std::filesystem::path& file);
+/// Error for files that cannot be read or, unless they may be, are without a triangle.
+SurfaceMesh load_surface(const std::filesystem::path& file, bool may_be_empty = false);
 
 /// load_surface() without welding and dropping, for repair(), which says what it does.
 SurfaceMesh load_as_is(const std::filesystem::path& file);
@@ -93,6 +97,7 @@ struct Outward {
   std::vector<std::uint32_t> patches{};  ///< of each triangle, its part of the surface
   int cavities = 0;
   bool closed = true;  ///< each of its parts
+  double volume = 0;   ///< m^3, of all parts, without cavities; of a closed surface it is exact
 };
 /// Orients what may have any defect but hopeless ones: parts that are open by the side on which they are hollow.
 Outward turn_outward(const SurfaceMesh& surface);
@@ -117,7 +122,8 @@ TetMesh tetrahedralise(const SurfaceMesh& surface, const std::string& switches, 
 /// What load_mesh() reads, for help and errors.
 inline constexpr const char* mesh_formats =
     ".ply .obj .stl .off (surfaces), .node with .ele, .msh .vtk .vtu .mesh (tetrahedra)";
-/// TetGen .node/.ele (either name given), Gmsh .msh (2.2 and 4.1), VTK .vtk and .vtu, Medit .mesh.
+/// TetGen .node/.ele (either name given), Gmsh .msh (2.2 and 4.1), VTK .vtk and .vtu, Medit .mesh. Throws Error, also
+/// where all solid cells are hexahedra, prisms and the like.
 TetMesh load_tets(const std::filesystem::path& file);
 /// TetGen's two files, without finish_tets().
 TetMesh read_node_ele(const std::filesystem::path& file);
@@ -170,8 +176,14 @@ Bounds bounds(const std::vector<glm::dvec3>& positions);
 /// "(x, y, z)", for errors.
 std::string point_text(const glm::dvec3& p);
 
-/// The least altitude of a tet over the mean length of edges: of a regular tet 0.82, of a flat one 0.
-double least_quality(const TetMesh& mesh);
+/// The tet that limits the steps of solvers with forces.
+struct FlattestTet {
+  std::size_t tet = 0;
+  double altitude = 0;  ///< m, its least
+  double quality = 0;   ///< that over the mean length of edges: where all tets are regular 0.82, of a flat one 0
+};
+FlattestTet flattest_tet(const TetMesh& mesh);
+double mean_edge(const TetMesh& mesh);  ///< m, of the edges of each tet
 /// What `tetpbd mesh` prints and stats.json quotes.
 struct MeshReport {
   std::size_t vertices, surface_vertices, surface_triangles, edges, bends, tets, faces;
@@ -181,10 +193,10 @@ struct MeshReport {
   double filled;             ///< m^3, of which the body is
   double volume, smallest_tet_volume, mean_tet_volume;
   double min_dihedral_deg, max_dihedral_deg, mean_min_dihedral_deg;
-  double worst_altitude;   ///< m, the least of a tet's corner over the opposite face
-  std::size_t worst_tet;   ///< which has it
-  int cavities;            ///< of all bodies
-  std::size_t slivers;  ///< tets with a dihedral angle under 5 or over 175 degrees
+  double worst_altitude;  ///< m, the least of a tet's corner over the opposite face
+  std::size_t worst_tet;  ///< which has it
+  int cavities;           ///< of all bodies
+  std::size_t slivers;    ///< tets with a dihedral angle under 5 or over 175 degrees
   std::size_t inverted;
   glm::dvec3 size;  ///< m, of the bounding box
 };

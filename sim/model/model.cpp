@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <numeric>
 #include <random>
 #include <span>
 
@@ -85,6 +86,11 @@ std::vector<float> quantum_fineness(const Model& model, const Settings& settings
     any = any || small;
   }
   return any ? fineness : std::vector<float>{};
+}
+
+double body_mass(const Model& model, const Body& body) {
+  const auto first = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
+  return std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0);
 }
 
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions) {

@@ -8,6 +8,7 @@
 #include "sim/contact/obstacle.h"
 #include "sim/mesh/carry.h"
 #include "sim/mesh/tet_mesh.h"
+#include "sim/mesh/thickness.h"
 #include "sim/model/settings.h"
 
 namespace tetpbd {
@@ -41,6 +42,13 @@ struct StartMotion {
   double work = 0;         ///< J, against gravity
 };
 
+/// How a body was made of its file.
+struct BodyFill {
+  std::size_t body;  ///< of the model's
+  std::string what;  ///< was done that nobody asked for; empty: nothing
+  Fit fit;           ///< at rest, in the frame of the scene
+};
+
 struct Model {
   TetMesh rest;  ///< m; bodies one after the other
   std::vector<Body> bodies;
@@ -52,8 +60,7 @@ struct Model {
   double size = 1;                     ///< m, diagonal of the largest body at rest
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
-  /// By which surfaces became tets, where that was not asked for or says more: a body's name, and what was done.
-  std::vector<std::pair<std::string, std::string>> fills;
+  std::vector<BodyFill> fills;             ///< of bodies from files; others have none
   std::vector<StartMotion> start_motions;  ///< already made in `positions`
   /// The surface of all bodies that is drawn and exported in place of `rest.surface`; empty unless a body has its own.
   CarriedSurface carried;
@@ -64,6 +71,7 @@ const Body& body_at(const Model& model, std::size_t vertex);
 /// By vertex: how much finer its body's quanta are than those of the largest body, a power of two up to 1. Empty where
 /// no body is smaller than an eighth of that, and where bodies touch: corrections of contact are sums of common quanta.
 std::vector<float> quantum_fineness(const Model& model, const Settings& settings);
+double body_mass(const Model& model, const Body& body);  ///< kg
 /// Bounds of the body's vertices, given the positions of all.
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions);
 /// The body's material; `all` is that of the settings, for bodies without their own.

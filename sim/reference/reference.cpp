@@ -22,11 +22,8 @@ double error_to(const Model& model, const State& reference, const State& state) 
     mass += model.masses[i];
     squares += model.masses[i] * glm::dot(apart, apart);
   }
-  for (const Body& body : model.bodies) {
-    double body_mass = 0;
-    for (std::size_t i = 0; i < body.vertices; ++i) body_mass += model.masses[body.first_vertex + i];
-    size += body_mass / mass * body_bounds(body, model.rest.positions).size();
-  }
+  for (const Body& body : model.bodies)
+    size += body_mass(model, body) / mass * body_bounds(body, model.rest.positions).size();
   return std::sqrt(squares / mass) / size;
 }
 

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 
 #include "sim/contact/moving_obstacle.h"
 #include "sim/contact/obstacles.h"
@@ -30,11 +29,6 @@ std::size_t groups_of_rows(std::size_t vertices, std::size_t group) {
 std::size_t choose_aggregates(std::size_t vertices) {
   const double count = double(vertices);
   return std::size_t(std::clamp(std::min(1.3 * std::sqrt(count), count / 8), 1.0, double(most_aggregates)));
-}
-
-double body_mass(const Model& model, const Body& body) {
-  const auto first = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
-  return std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0);
 }
 
 // Where each body's vertices, work-groups, aggregates and coarse inverse are.

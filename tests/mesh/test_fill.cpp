@@ -210,7 +210,7 @@ TEST_CASE("lattice: mass and stiffness are of what the body fills") {
   for (const Triangle& t : filled.mesh.surface)
     for (const std::uint32_t v : t) sum += std::pow(solid.nearest(filled.mesh.positions[v]).distance, 2), ++count;
   CHECK(std::sqrt(sum / count) < 0.04);
-  CHECK(least_quality(filled.mesh) > 0.45);
+  CHECK(flattest_tet(filled.mesh).quality > 0.45);
 }
 
 TEST_CASE("solid: inside, nearest points and crossings") {

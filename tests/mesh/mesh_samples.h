@@ -80,6 +80,31 @@ inline tetpbd::SurfaceMesh cube(const glm::dvec3& at = glm::dvec3(0), double sid
   return s;
 }
 
+inline tetpbd::SurfaceMesh rectangle(double x, double y, double z = 0) {
+  return {{{0, 0, z}, {x, 0, z}, {x, y, z}, {0, y, z}}, {{0, 1, 2}, {0, 2, 3}}};
+}
+/// n x n on each of the cube's sides, pushed out to a sphere of radius 1.
+inline tetpbd::SurfaceMesh sphere(int n) {
+  tetpbd::SurfaceMesh s;
+  const tetpbd::SurfaceMesh box = cube(glm::dvec3(-1), 2);
+  for (std::size_t side = 0; side < 12; side += 2) {
+    const tetpbd::Triangle &t = box.triangles[side], &u = box.triangles[side + 1];
+    const glm::dvec3 a = box.positions[t[0]], b = box.positions[t[1]], d = box.positions[u[2]];
+    const auto base = std::uint32_t(s.positions.size());
+    for (int j = 0; j <= n; ++j)
+      for (int i = 0; i <= n; ++i)
+        s.positions.push_back(glm::normalize(a + (b - a) * (double(i) / n) + (d - a) * (double(j) / n)));
+    const auto at = [&](int i, int j) { return base + std::uint32_t(j * (n + 1) + i); };
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        s.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+        s.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+      }
+  }
+  tetpbd::weld(s, 1e-9);
+  return s;
+}
+
 inline tetpbd::SurfaceMesh joined(tetpbd::SurfaceMesh a, const tetpbd::SurfaceMesh& b) {
   const auto base = static_cast<std::uint32_t>(a.positions.size());
   a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());

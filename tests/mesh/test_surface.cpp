@@ -348,3 +348,19 @@ TEST_CASE("subprocess: output, failures, time and memory limits") {
   int status = 0;
   CHECK(::waitpid(-1, &status, WNOHANG) == -1);  // no child is left
 }
+
+TEST_CASE("surface files: triangle strips of PLY") {
+  const Folder folder;
+  const char* head =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+  for (const char* strips : {"6 0 2 1 3 0 2\n", "9 0 2 1 3 -1 1 3 0 2\n"}) {
+    SurfaceMesh s = load_surface(folder.write("strips.ply", std::string(head) + strips));
+    CHECK(s.triangles == std::vector<Triangle>{{0, 2, 1}, {1, 2, 3}, {1, 3, 0}, {0, 3, 2}});
+    const SurfaceCheck check = check_surface(s);
+    CHECK(check.defect == "");
+    CHECK(check.flipped_triangles == 0);
+  }
+  CHECK(contains(error_of([&] { load_surface(folder.write("bad.ply", std::string(head) + "3 0 1 7\n")); }),
+                 "names vertex 7 of 4"));
+}

@@ -182,7 +182,7 @@ std::string question_units(const glm::dvec3& size);
 /// s, with forces; 0 of what has none, and of meshes so large that it would take seconds to find.
 double longest_stable_step(const ReferenceInput& input);
 /// `mass` in kg.
-ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step);
+ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step, const Fit& fit);
 ordered_json error_json(const RunErrors& errors);
 /// The distance from a standard, "motion" or "total"; nulls where there is none, and of runs that are not finite.
 ordered_json distance_json(const std::string& standard, const std::optional<MotionError>& error, bool finite);

@@ -116,6 +116,26 @@ ordered_json settings_json(Scene scene, const Settings& settings) {
   return result;
 }
 
+// Of all bodies from files: the thinnest part, which of those without a lattice is found here, and the largest gap.
+Fit fit_of(const Model& model) {
+  Fit all;
+  const auto take_thinnest = [&](double depth, const glm::dvec3& at) {
+    if (depth <= std::fmin(depth, all.thinnest)) all.thinnest = depth, all.thinnest_at = at;
+  };
+  SurfaceMesh boundary{model.rest.positions, {}};
+  for (const auto& [number, what, fit] : model.fills) {
+    take_thinnest(fit.thinnest, fit.thinnest_at);
+    if (fit.gap >= std::fmax(fit.gap, all.gap)) all.gap = fit.gap, all.edge = fit.edge;
+    const Body& body = model.bodies[number];
+    const auto first = model.rest.surface.begin() + std::ptrdiff_t(body.first_triangle);
+    if (std::isnan(fit.thinnest))
+      boundary.triangles.insert(boundary.triangles.end(), first, first + std::ptrdiff_t(body.triangles));
+  }
+  const Depth found = thinnest_part(boundary);
+  take_thinnest(found.depth, found.at);
+  return all;
+}
+
 ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
                              const ordered_json& hash, const std::optional<SolverChoice>& choice,
                              const Verdict& verdict) {
@@ -127,7 +147,8 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
   j["mesh"] = mesh_json(report(sim.model->rest), std::reduce(sim.model->masses.begin(), sim.model->masses.end()),
                         solver_mode(sim.settings).leapfrog
                             ? sim.longest_substep
-                            : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}));
+                            : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}),
+                        fit_of(*sim.model));
   for (const BodyFill& fill : sim.model->fills)
     if (!fill.what.empty()) j["fills"].push_back({{"body", sim.model->bodies[fill.body].name}, {"what", fill.what}});
   for (const StartMotion& m : sim.model->start_motions)

@@ -132,10 +132,12 @@ void add_samples(CLI::App& command, int& samples) {
 void add_fill(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--tetgen", overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
   command
-      .add_option("--fill", overrides.fill, "by what surfaces are filled: tetgen, lattice (default: what suits them)")
+      .add_option("--fill", overrides.fill,
+                  "by what surfaces and boundaries of tets are filled: tetgen, lattice; file: tets stay as they are "
+                  "(default: what suits them)")
       ->check([](const std::string& text) {
-        const bool known = text == "auto" || text == "tetgen" || text == "lattice";
-        return known ? std::string() : fmt::format("must be one of auto, tetgen, lattice, not '{}'", text);
+        const bool known = std::ranges::find(fill_kinds, text) != std::end(fill_kinds);
+        return known ? std::string() : fmt::format("must be one of {}, not '{}'", fmt::join(fill_kinds, ", "), text);
       });
   add(command, "--tets", overrides.tets, 10.0, 1e8, "about so many, of a lattice (default: 15000)");
   add(command, "--spacing", overrides.spacing, 1e-9, 1e6, "m, of a lattice, in place of --tets");

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "app/commands.h"
 #include "app/files.h"
@@ -38,57 +39,63 @@ std::string mend(const MeshOptions& o) {
   return done.empty() ? "nothing to mend" : done;
 }
 
-}  // namespace
-
-int run_mesh_command(const MeshOptions& o) {
-  if (!o.out.empty()) require_mesh_format(o.out);
+struct Command {
+  const MeshOptions& o;
+  const bool mends = !o.repaired.empty();
+  /// What was mended is read again: its format may have rounded it.
+  const std::filesystem::path& file = mends ? o.repaired : o.file;
   ordered_json document{{"file", o.file.string()}};
-  const auto put = [&](const char* title, const ordered_json& table) {
+
+  void put(const char* title, const ordered_json& table) {
     document[title] = table;
     if (o.json) return;
     fmt::print("{}\n", title);
-    for (const auto& [name, value] : table.items()) fmt::print("  {:<28}{:>14}\n", name, text_of(value, 6));
-  };
-  const auto print_document = [&] {
-    if (o.json) fmt::print("{}\n", json_text(document, 2));
-  };
-  const bool mends = !o.repaired.empty();
-  const std::string done = mends ? mend(o) : "";
-  const auto say_mended = [&](const std::string& left) {
+    for (const auto& [name, value] : table.items()) {
+      std::string text = value.is_array() ? "" : text_of(value, 6);
+      for (std::size_t i = 0; value.is_array() && i < value.size(); ++i) text += (i ? ", " : "") + text_of(value[i], 4);
+      fmt::print("  {:<28}{:>14}\n", name, text);
+    }
+  }
+  void say(const std::string& line) const {
+    if (!o.json && !line.empty()) fmt::print("{}\n", line);
+  }
+  void say_mended(const std::string& done, const std::string& left) {
     document["repaired"] = {{"done", done}, {"left", left}, {"written", o.repaired.string()}};
-    if (o.json) return;
     const std::string not_filled = left.empty() || o.out.empty() ? "" : fmt::format(", not {}", o.out.string());
-    fmt::print("{}: {}; {}, written {}{}\n", o.file.string(), done, left.empty() ? "sound" : left, o.repaired.string(),
-               not_filled);
-  };
-  // What was mended is read again: its format may have rounded it.
-  const std::filesystem::path& file = mends ? o.repaired : o.file;
-  TetMesh mesh;
-  if (is_surface_file(file)) {
+    say(fmt::format("{}: {}; {}, written {}{}", o.file.string(), done, left.empty() ? "sound" : left,
+                    o.repaired.string(), not_filled));
+  }
+  int end(int status) const {
+    if (o.json) fmt::print("{}\n", json_text(document, 2));
+    return status;
+  }
+
+  FillOptions options() const {
+    return fill_options(o.filled.fill, o.filled.tetgen, o.filled.tets, o.filled.spacing, file.string());
+  }
+  /// Nothing where that ends the command, with status 1 unless the surface is sound.
+  std::optional<Filled> fill_surface(const std::string& done, int& status) {
     const SurfaceMesh surface = load_surface(file, mends);
     SurfaceMesh oriented = surface;
     const SurfaceCheck check = check_surface(oriented);
-    FillOptions options = fill_options(o.filled.fill, o.filled.tetgen, o.filled.tets, o.filled.spacing, file.string());
-    const bool asked = !options.by.empty() || options.sized;
-    if (!check.defect.empty() && mends && !asked) {
-      say_mended(fmt::format("{} ({})", check.defect, check.place));
-      return print_document(), 1;
-    }
+    const std::string defect = check.defect.empty() ? "" : fmt::format("{} ({})", check.defect, check.place);
+    FillOptions how = options();
+    const bool asked = !how.by.empty() || how.sized;
+    if (!check.defect.empty() && mends && !asked) return say_mended(done, defect), status = 1, std::nullopt;
     if (!check.defect.empty() && !asked)
       throw Error(check.defect, check.place + " in " + file.string(),
                   check.hint + (check.hopeless ? "" : "; --repair may mend it, --fill lattice takes it, as scenes do"));
-    if (!asked) options.by = "tetgen";
+    if (!asked) how.by = "tetgen";
     Filled result;
     try {
-      result = fill(surface, options, file.string());
+      result = fill(surface, how, file.string());
     } catch (const NotSolid& left) {
       if (!mends) throw;
-      say_mended(fmt::format("not sound ({})", left.what()));
-      return print_document(), 1;
+      return say_mended(done, fmt::format("not sound ({})", left.what())), status = 1, std::nullopt;
     }
-    if (mends) say_mended(check.defect.empty() ? "" : fmt::format("{} ({})", check.defect, check.place));
-    if (mends && o.out.empty()) return print_document(), check.defect.empty() ? 0 : 1;
-    if (options.by == "tetgen") document["tetgen"] = options.switches;
+    if (mends) say_mended(done, defect);
+    if (mends && o.out.empty()) return status = check.defect.empty() ? 0 : 1, std::nullopt;
+    if (how.by == "tetgen") document["tetgen"] = how.switches;
     ordered_json found = {{"vertices", surface.positions.size()}, {"triangles", surface.triangles.size()}};
     if (check.defect.empty())
       found.update({{"components", check.components},
@@ -99,24 +106,49 @@ int run_mesh_command(const MeshOptions& o) {
     else
       found["defect"] = fmt::format("{}: {}", check.defect, check.place);
     put("surface", found);
-    if (!result.note.empty()) document["fill"] = result.note;
-    if (!result.note.empty() && !o.json) fmt::print("{}\n", result.note);
-    mesh = std::move(result.mesh);
-  } else {
-    mesh = load_mesh(file, o.filled.tetgen);
+    return result;
   }
-  if (!mends) turn(mesh.positions, o.up);
-  const MeshReport counts = report(mesh);
-  put("mesh", mesh_json(counts, 1000 * counts.filled, longest_step_of_rubber(mesh)));
-  if (const std::string units = question_units(counts.size); !o.json && !units.empty()) fmt::print("{}\n", units);
-  if (interrupted()) throw Error("interrupted", file.string(), "start again; nothing was written", 1);
-  if (!o.out.empty()) {
-    write_mesh(o.out, mesh);
-    document["written"] = o.out.string();
-    if (!o.json) fmt::print("written {}\n", o.out.string());
+  Filled fill_tets() const {
+    FillOptions how = options();
+    if (how.by.empty() && !how.sized) how.by = "file";
+    return refill(load_mesh(file, {}), how, file.string());
   }
-  print_document();
-  return counts.inverted == 0 ? 0 : 1;
+
+  /// Reports on it and writes it.
+  int finish(Filled filled) {
+    if (!filled.note.empty()) document["fill"] = filled.note;
+    say(filled.note);
+    TetMesh& mesh = filled.mesh;
+    if (!mends) turn(mesh.positions, o.up), filled.fit.thinnest_at = upright(filled.fit.thinnest_at, o.up);
+    if (std::isnan(filled.fit.thinnest)) {
+      const Depth found = thinnest_part({mesh.positions, mesh.surface});
+      filled.fit.thinnest = found.depth, filled.fit.thinnest_at = found.at;
+    }
+    const MeshReport counts = report(mesh);
+    put("mesh", mesh_json(counts, 1000 * counts.filled, longest_step_of_rubber(mesh), filled.fit));
+    if (const std::string flat = too_flat(mesh); !flat.empty())
+      say(flat + ": scenes fill a soft body with a lattice instead, unless told otherwise by --fill");
+    say(question_units(counts.size));
+    if (interrupted()) throw Error("interrupted", file.string(), "start again; nothing was written", 1);
+    if (!o.out.empty()) {
+      write_mesh(o.out, mesh);
+      document["written"] = o.out.string();
+      say(fmt::format("written {}", o.out.string()));
+    }
+    return end(counts.inverted == 0 ? 0 : 1);
+  }
+};
+
+}  // namespace
+
+int run_mesh_command(const MeshOptions& o) {
+  if (!o.out.empty()) require_mesh_format(o.out);
+  const std::string done = o.repaired.empty() ? "" : mend(o);
+  Command command{o};
+  if (!is_surface_file(command.file)) return command.finish(command.fill_tets());
+  int status = 0;
+  std::optional<Filled> filled = command.fill_surface(done, status);
+  return filled ? command.finish(std::move(*filled)) : command.end(status);
 }
 
 }  // namespace tetpbd

@@ -56,7 +56,7 @@ json schema() {
     "name": "text", "description": "text", "duration": [1e-6, 1e6],
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
       "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "up": "text", "deform": "text",
-      "fill": {"one of": ["auto", "tetgen", "lattice"]}, "tets": [10, 1e8], "spacing": [1e-9, 1e6],
+      "tets": [10, 1e8], "spacing": [1e-9, 1e6],
       "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
         "taper": [0, 0.95], "mirror": "true or false"},
@@ -75,6 +75,7 @@ json schema() {
       "azimuth": [-360, 360], "elevation": [-89, 89], "fov": [5, 120]}
   })");
   json& body = result["bodies"]["each"];
+  body["fill"]["one of"] = fill_kinds;
   body["heavy"] = body["fixed"];
   body["heavy"]["each"].update({{"ratio", {1e-9, 1e9}}, {"share", {0, 1}}});
   constexpr int most = MAX_OBSTACLES - 1;  // beside the ground
@@ -156,6 +157,8 @@ void read_material(const json& bodies, Settings& settings, const std::string& fi
   read_settings(rows, settings, file);
 }
 
+bool has_tets(const BodyDescription& body) { return !body.mesh.empty() && !is_surface_file(body.mesh); }
+
 BodyDescription read_body(const json& value, const std::string& where, const std::string& file,
                           const fs::path& folder) {
   auto body = value.get<BodyDescription>();
@@ -170,6 +173,8 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (kinds == 0 && body.fill == "tetgen")
     refuse(fmt::format("'{}' has a surface alone, which rides on a lattice; name it as \"mesh\" for TetGen", where),
            file);
+  if (body.fill == "file" && !has_tets(body))
+    refuse(fmt::format("'{}.fill' is of a file of tets, and this body has none", where), file);
   if (body.thickness > 0 && (body.block || body.tet || (!body.mesh.empty() && !is_surface_file(body.mesh))))
     refuse(fmt::format("'{}.thickness' is of a sheet, or of a surface mesh that is to be one", where), file);
   if (!is_axis(body.up))
@@ -318,30 +323,40 @@ TetMesh mesh_of(const BodyDescription& body, const std::string& scene) {
   return load_mesh(body.mesh, body.tetgen);
 }
 
-/// A body's tets, and what rides on them where it is not their own boundary.
-Filled body_of(const BodyDescription& body, const std::string& scene) {
+/// A body's tets, and what rides on them where it is not their own boundary. Tets of a file stay as flat as they are
+/// unless the body is soft: a hard one takes no shorter steps for them.
+Filled body_of(const BodyDescription& body, const std::string& scene, bool soft) {
   const fs::path& file = body.mesh.empty() ? body.surface : body.mesh;
-  const bool filled_here = !body.block && !body.sheet && !body.tet && body.thickness == 0 && is_surface_file(file) &&
-                           fs::is_regular_file(file);
+  const bool made = body.block || body.sheet || body.tet || body.thickness > 0;
+  const bool filled_here = !made && is_surface_file(file) && fs::is_regular_file(file);
+  const auto options_for = [&](const std::vector<glm::dvec3>& positions) {
+    FillOptions options = fill_options(body.mesh.empty() ? "lattice" : body.fill, body.tetgen, body.tets, body.spacing,
+                                       fmt::format("body '{}' of scene '{}'", body.name, scene));
+    const double height = bounds(positions).high.y - bounds(positions).low.y;
+    options.scale = body.scale * (body.height > 0 && height > 0 ? body.height / (height * body.scale.y) : 1.0);
+    return options;
+  };
   Filled result;
   if (filled_here) {
     SurfaceMesh surface = load_surface(file);
     for (glm::dvec3& p : surface.positions) p = upright(p, body.up);
-    const double height = bounds(surface.positions).high.y - bounds(surface.positions).low.y;
-    FillOptions options = fill_options(body.mesh.empty() ? "lattice" : body.fill, body.tetgen, body.tets, body.spacing,
-                                       fmt::format("body '{}' of scene '{}'", body.name, scene));
-    options.scale = body.scale * (body.height > 0 && height > 0 ? body.height / (height * body.scale.y) : 1.0);
-    result = fill(surface, options, file.string());
-    if (!result.note.empty())
-      print_error(fmt::format("tetpbd: {}: {}\n", printable(file.string()), printable(result.note)));
+    result = fill(surface, options_for(surface.positions), file.string());
   } else {
     result.mesh = mesh_of(body, scene);
     for (glm::dvec3& p : result.mesh.positions) p = upright(p, body.up);
   }
+  if (!made && !filled_here) {
+    FillOptions options = options_for(result.mesh.positions);
+    if (!soft && options.by.empty() && !options.sized) options.by = "file";
+    result = refill(std::move(result.mesh), options, file.string());
+  }
+  if (!result.note.empty())
+    print_error(fmt::format("tetpbd: {}: {}\n", printable(file.string()), printable(result.note)));
   if (!body.surface.empty() && !(filled_here && body.mesh.empty())) {
     SurfaceMesh fine = load_surface(body.surface);
     for (glm::dvec3& p : fine.positions) p = upright(p, body.up) * result.scale;
     result.carried = carry(fine, result.mesh, body.surface.string());
+    result.fit.gap = NAN;  // how far it is from the tets has not been measured
   }
   return result;
 }
@@ -383,9 +398,10 @@ std::vector<std::string> scene_names(const std::string& folder) {
 
 FillOptions fill_options(const std::string& by, const std::string& switches, const std::optional<double>& tets,
                          const std::optional<double>& spacing, const std::string& where) {
-  if (by == "tetgen" && (tets || spacing))
+  if ((by == "tetgen" || by == "file") && (tets || spacing))
     throw Error(fmt::format("{} is of a lattice", tets ? "tets" : "spacing"), where,
-                "TetGen's switch a says how large tets are: leave out one of the two");
+                by == "file" ? "a file's tets stay as they are: leave out one of the two"
+                             : "TetGen's switch a says how large tets are: leave out one of the two");
   if (tets && spacing)
     throw Error("tets and spacing both say how fine a lattice is", where, "leave out one of the two");
   return {.by = by == "auto" ? "" : by,
@@ -462,9 +478,11 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   const bool jacobi = flag("mode") || said("mode") || flag("omega") || flag("mass_splitting");
   scene.mode_open = scene.mode_open || (scene.by_device && !jacobi && overrides.solver.empty() &&
                                         !overrides.budget_ms && hard(scene.settings));
+  if (overrides.fill == "file" && std::ranges::none_of(scene.bodies, has_tets))
+    throw Error("no body is from a file of tets", "--fill file", "leave it out, or name one by --mesh");
   for (BodyDescription& body : scene.bodies) {
     if (!overrides.tetgen.empty()) body.tetgen = overrides.tetgen;
-    if (!overrides.fill.empty()) {
+    if (!overrides.fill.empty() && (overrides.fill != "file" || has_tets(body))) {
       body.fill = overrides.fill;
       if (body.fill != "lattice") body.tets.reset(), body.spacing.reset();  // of the scene's lattice
     }
@@ -566,7 +584,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   bool carries = false;
   for (const BodyDescription& body : scene.bodies) {
-    Filled filled = body_of(body, scene.name);
+    Filled filled = body_of(body, scene.name, compliant(scene.settings));
     TetMesh& mesh = filled.mesh;
     const CarriedSurface& carried = filled.carried;
     const bool sized = !mesh.fill.empty();  // before it was filled
@@ -618,7 +636,10 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     if (mesh.tets.empty()) mesh.thickness = body.thickness > 0 ? body.thickness : 1e-3 * placed.size();
     std::vector<glm::dvec3> start = mesh.positions;
     deform(start, mesh, body.deform, unsigned(scene.settings.seed) + 0x9e3779b9u * unsigned(model->bodies.size()));
-    if (!filled.note.empty()) model->fills.push_back({model->bodies.size(), filled.note, {}});
+    Fit& fit = filled.fit;  // a lattice is as large as it will be
+    fit.thinnest_at = turn * (fit.thinnest_at - own.centre()) + body.position - bottom;
+    if ((!body.mesh.empty() || !body.surface.empty()) && !mesh.tets.empty())
+      model->fills.push_back({model->bodies.size(), filled.note, fit});
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   if (!carries) model->carried = {};

@@ -25,6 +25,9 @@ inline glm::dvec3 upright(const glm::dvec3& p, std::string_view up) {
   return up == "z" ? glm::dvec3(p.x, p.z, 0 - p.y) : up == "x" ? glm::dvec3(0 - p.y, p.x, p.z) : p;
 }
 
+/// By what a body's file is filled; auto: what suits it, file: tets that it has stay as they are.
+constexpr const char* fill_kinds[] = {"auto", "tetgen", "lattice", "file"};
+
 struct BodyDescription {
   struct Block {
     glm::dvec3 size{1};  ///< m
@@ -49,7 +52,7 @@ struct BodyDescription {
   double thickness = 0;           ///< m, of a sheet, 0: a thousandth of its size; of a surface mesh, makes it a sheet
   std::filesystem::path surface;  ///< a fine one that rides on it, or, alone, on a lattice that fills it
   std::string tetgen = FillOptions().switches;
-  std::string fill = "auto";      ///< tetgen, lattice, or auto: what suits the surface
+  std::string fill = "auto";      ///< one of fill_kinds
   std::optional<double> tets;     ///< about so many, of a lattice
   std::optional<double> spacing;  ///< m, of a lattice, in place of `tets`
   std::string up = "y";           ///< the axis that points upwards in both files

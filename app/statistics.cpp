@@ -70,11 +70,15 @@ double longest_stable_step(const ReferenceInput& input) {
   return stable_step(input, input.settings.compliance, input.model.rest.positions, 30);
 }
 
-ordered_json mesh_json(const MeshReport& counts, double mass, double longest_stable_step) {
+ordered_json mesh_json(const MeshReport& counts, double mass, double longest_stable_step, const Fit& fit) {
   ordered_json all = nlohmann::json(counts);
   all["size"] = {counts.size.x, counts.size.y, counts.size.z};
   all["mass"] = mass;
   if (longest_stable_step > 0) all["longest_stable_step"] = longest_stable_step;
+  const glm::dvec3& at = fit.thinnest_at;
+  all["thinnest_part"] = fit.thinnest;
+  all["thinnest_at"] = std::isnan(fit.thinnest) ? ordered_json() : ordered_json{at.x, at.y, at.z};
+  all["surface_gap"] = fit.gap, all["surface_gap_of_edge"] = fit.gap / fit.edge;
   return all;
 }
 

@@ -52,4 +52,8 @@ Depth thinnest(const std::vector<Depth>& depths) {
   return depths.empty() || !std::isfinite(depths[depths.size() / 50].depth) ? none : depths[depths.size() / 50];
 }
 
+Depth thinnest_part(const SurfaceMesh& surface) {
+  return surface.triangles.size() > 300'000 ? thinnest({}) : thinnest(measure_depths(surface, Solid(surface)));
+}
+
 }  // namespace tetpbd

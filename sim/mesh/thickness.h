@@ -9,7 +9,7 @@
 
 namespace tetpbd {
 
-/// What a body has of its surface, as numbers; NaN: not known.
+/// How well a body's tets can stand for its surface; NaN: not known.
 struct Fit {
   double thinnest = NAN;        ///< m, its thinnest part, but for a fiftieth of its surface
   glm::dvec3 thinnest_at{NAN};  ///< m, a point there
@@ -25,6 +25,8 @@ struct Depth {
 std::vector<Depth> measure_depths(const SurfaceMesh& surface, const Solid& solid);
 /// The one of them that is the thinnest part; none of those: NaN.
 Depth thinnest(const std::vector<Depth>& depths);
+/// Of a closed surface that looks outward; of more than 300 000 triangles, which would take seconds: NaN.
+Depth thinnest_part(const SurfaceMesh& surface);
 double area_of(const SurfaceMesh& surface);  ///< m^2
 
 }  // namespace tetpbd

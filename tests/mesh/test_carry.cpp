@@ -69,7 +69,7 @@ TEST_CASE("scene: a body's fine surface, beside bodies without") {
   CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "tets": 3)"); }),
                  "'bodies.0.tets' must be a number from 10 to 1e+08, not 3"));
   CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "fill": "foam")"); }),
-                 "must be one of auto, tetgen, lattice, not \"foam\""));
+                 "must be one of auto, tetgen, lattice, file, not \"foam\""));
   CHECK(contains(error_of([&] { build_model(scene_with(R"("surface": "fine.obj", "tets": 100, "spacing": 1)")); }),
                  "tets and spacing both say how fine a lattice is"));
   // A surface alone rides on a lattice, whose cells are as large as they are in the scene.

@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <tuple>
 
+#include "app/commands.h"
+#include "app/scene.h"
 #include "sim/mesh/carry.h"
 #include "sim/mesh/disjoint_sets.h"
 #include "sim/mesh/fill.h"
@@ -178,6 +182,103 @@ TEST_CASE("cavities: nested parts are hollow, whichever way they are turned, and
   }
 }
 
+TEST_CASE("files of tets: a soft body's boundary is filled anew where a tet is far too flat, or if asked") {
+  const Folder folder;
+  const TetMesh sound = make_block(glm::dvec3(1), glm::ivec3(3));
+  TetMesh mesh = sound;  // a vertex in its tet 5, close to the face opposite to the last corner, makes four of it
+  const Tet t = mesh.tets[5];
+  const auto at = [&](std::size_t k) { return mesh.positions[t[k]]; };
+  mesh.positions.push_back((at(0) + at(1) + at(2)) / 3.0 + 1e-3 * (at(3) - at(0)));
+  const auto middle = std::uint32_t(mesh.positions.size() - 1);
+  for (std::size_t k = 0; k < 3; ++k) mesh.tets.push_back(t), mesh.tets.back()[k] = middle;
+  mesh.tets[5][3] = middle;
+  finish_tets(mesh, "block");
+  CHECK(too_flat(sound).empty());
+  CHECK(contains(too_flat(mesh), "tet 5 near ("));
+  write_mesh(folder.path / "flat.msh", mesh);
+  write_mesh(folder.path / "sound.msh", sound);
+  write_mesh(folder.path / "flat.ply", mesh);
+  const auto made = [&](const std::string& keys, const SceneOverrides& overrides = {},
+                        const std::string& name = "flat.msh") {
+    const std::string text = fmt::format(R"({{"bodies": [{{"mesh": "{}", "density": 500 {}}}]}})", name, keys);
+    return build_model(load_scene(folder.write("s.json", text).string(), overrides));
+  };
+  const std::string soft = R"(, "material": "rubber")";
+  const auto mass = [](const Model& model) { return body_mass(model, model.bodies[0]); };
+  const auto filled = made(soft);
+  const std::string& what = filled->fills.at(0).what;
+  CHECK(what.starts_with("tet 5 near (-"));
+  CHECK(contains(what, "as flat as 0.000"));
+  CHECK(contains(what, fmt::format(" of an edge, so a lattice of {} tets fills it", filled->rest.tets.size())));
+  CHECK(what.ends_with("; --fill file keeps its tets"));
+  CHECK(flattest_tet(filled->rest).quality > 0.3);
+  CHECK(mass(*filled) == doctest::Approx(500).epsilon(0.01));
+  CHECK(filled->carried.triangles.size() == mesh.surface.size());
+  // What keeps the file's tets: a hard body, a sound file, and who says so.
+  for (const auto& model : {made(""), made(soft + R"(, "fill": "file")"), made(soft, {.fill = "file"}),
+                            made(soft + R"(, "fill": "lattice")", {.fill = "file"})}) {
+    CHECK(original_tets(*model) == mesh.tets);
+    CHECK(model->fills.at(0).what.empty());
+  }
+  CHECK(original_tets(*made(soft, {}, "sound.msh")) == sound.tets);
+  // What fills any file anew.
+  const std::tuple<std::shared_ptr<Model>, double, double> anew[] = {
+      {made("", {.fill = "lattice", .tets = 300}, "sound.msh"), 1, 300},
+      {made(R"(, "tets": 300)"), 1, 300},
+      {made(R"(, "spacing": 0.5, "height": 2)"), 8, 1000}};
+  for (const auto& [model, volume, tets] : anew) {
+    CHECK(std::abs(double(model->rest.tets.size()) - tets) < 0.5 * tets);
+    CHECK(model->fills.at(0).what.starts_with("a lattice of "));
+    CHECK(mass(*model) == doctest::Approx(500 * volume).epsilon(0.01));
+  }
+  const auto by_tetgen = made(soft, {.fill = "tetgen"});
+  CHECK(flattest_tet(by_tetgen->rest).quality > 0.05);
+  CHECK(by_tetgen->rest.surface.size() == mesh.surface.size());
+  CHECK(mass(*by_tetgen) == doctest::Approx(500));
+  CHECK(contains(error_of([&] { made("", {.fill = "file"}, "flat.ply"); }),
+                 "2 no body is from a file of tets: --fill file"));
+  CHECK(
+      contains(error_of([&] { made(R"(, "fill": "file")", {}, "flat.ply"); }), "'bodies.0.fill' is of a file of tets"));
+  CHECK(contains(error_of([&] { made(R"(, "fill": "file", "tets": 50)"); }), "tets is of a lattice"));
+  const MeshOptions lattice{
+      .file = folder.path / "flat.msh", .filled = {.fill = "lattice"}, .out = folder.path / "l.msh"};
+  CHECK(run_mesh_command(lattice) == 0);
+  CHECK(too_flat(load_tets(folder.path / "l.msh")).empty());
+  CHECK(run_mesh_command({.file = folder.path / "flat.msh", .out = folder.path / "same.msh"}) == 0);
+  CHECK(load_tets(folder.path / "same.msh").tets == mesh.tets);
+}
+
+TEST_CASE("fit: the thinnest part and the gap to the surface, in the frame of the scene, also from the cache") {
+  const Folder folder;
+  // A slab with a thin fin on its top, which is at x = 0.
+  SurfaceMesh slab = cube(), fin = cube({0, 0.9, 0});
+  for (glm::dvec3& p : slab.positions) p.y *= 0.5;
+  for (glm::dvec3& p : fin.positions) p.x *= 0.08, p.y = p.y > 1 ? 1.2 : 0.4;
+  const SurfaceMesh surface = joined(slab, fin);
+  for (const char* again : {"first", "from the cache"}) {
+    CAPTURE(again);
+    const Fit fit = fill(surface, {.by = "lattice", .size = {3000, 0}}, "fin.obj").fit;
+    CHECK(fit.thinnest == doctest::Approx(0.08).epsilon(0.01));
+    CHECK(fit.thinnest_at.y > 0.5);
+    CHECK(fit.gap > 0);
+    CHECK(fit.gap < 0.6 * fit.edge);
+  }
+  const Fit whole = fill(cube(), {}, "cube.obj").fit;
+  CHECK(whole.gap == 0);
+  CHECK(std::isnan(whole.thinnest));  // which its boundary tells
+  CHECK(thinnest_part(cube()).depth == doctest::Approx(1).epsilon(1e-5));
+  CHECK(std::isnan(thinnest_part({}).depth));
+  write_surface(folder.path / "fin.obj", surface);
+  const Scene scene = load_scene(folder
+                                     .write("s.json", R"({"bodies": [{"mesh": "fin.obj", "height": 2.4, "tets": 3000,
+    "rotation": [0, 0, 180], "position": [5, 0, 0]}]})")
+                                     .string());
+  const Fit placed = build_model(scene)->fills.at(0).fit;
+  CHECK(placed.thinnest == doctest::Approx(0.16).epsilon(0.01));
+  CHECK(placed.thinnest_at.y < 1.4);
+  CHECK(placed.thinnest_at.x > 5);
+}
+
 TEST_CASE("run: a broken mesh becomes a body, and files have its surface") {
   const run_program::Folder folder;
   SurfaceMesh open = sphere(10);
@@ -193,6 +294,15 @@ TEST_CASE("run: a broken mesh becomes a body, and files have its surface") {
   CHECK(seen.triangles == load_surface(folder.path / "open.obj").triangles);
   CHECK(fs::exists(folder.path / "o/surface.npy"));
   CHECK(fs::exists(folder.path / "o/surface_faces.npy"));
+  const auto numbers = nlohmann::json::parse(run_program::read(folder.path / "o/stats.json"))["mesh"];
+  CHECK(numbers["thinnest_part"] > 1.5);
+  CHECK(numbers["thinnest_at"].size() == 3);
+  CHECK(numbers["surface_gap"].get<double>() / numbers["surface_gap_of_edge"].get<double>() < 0.6);
+  write_surface(folder.path / "cube.obj", cube());
+  const auto whole = run_program::program("mesh cube.obj --json", folder, "TETPBD_CACHE=cache");
+  const auto counts = nlohmann::json::parse(whole.out)["mesh"];
+  CHECK(counts["thinnest_part"].get<double>() == doctest::Approx(1).epsilon(1e-4));
+  CHECK(counts["surface_gap"] == 0);
   const auto refused = run_program::program("run --mesh open.obj --fill tetgen --out o", folder);
   CHECK(refused.status == 2);
   CHECK(contains(refused.err, "surface is open"));

@@ -67,6 +67,9 @@ Filled refill(TetMesh mesh, const FillOptions& options, const std::string& sourc
     filled = asked ? fill(boundary, options, source) : by_lattice(std::move(boundary), options, why, source);
     if (!asked) filled.note += "; --fill file keeps its tets";
   }
+  if (mesh.other_cells > 0)
+    filled.note = fmt::format("hexahedra, prisms and the like are left out: {}{}{}", mesh.other_cells,
+                              filled.note.empty() ? "" : "; ", filled.note);
   return filled;
 }
 

@@ -90,14 +90,16 @@ TetMesh read_msh(const fs::path& file) {
     const auto [block_count, total] = read_counts("number of elements");
     std::size_t found = 0, tags = 0;
     long long type = 0;
-    // Type 4 is a tet, 11 one of second order, whose corners come first.
+    // Tets of any order have their corners first. Other solids are hexahedra, prisms and pyramids, of any order.
+    const auto is_one_of = [&](auto... types) { return ((type == types) || ...); };
     const auto read_element = [&] {
       whole("element number");
       if (!blocks && !bytes) type = whole("element type"), tags = count("number of tags");
       if (bytes && (type < 1 || type >= std::ssize(msh_nodes)))
         text.fail(fmt::format("there is no element type {}", type));
       for (std::size_t i = 0; i < tags; ++i) whole("tag");
-      const std::size_t corners = type == 4 || type == 11 ? 4 : 0;
+      const std::size_t corners = is_one_of(4, 11, 29, 30, 31) ? 4 : 0;
+      mesh.other_cells += is_one_of(5, 6, 7, 12, 13, 14, 17, 18, 19, 92, 93);
       if (corners > 0)
         for (std::uint32_t& v : mesh.tets.emplace_back()) {
           const long long number = whole("node of the tet");
@@ -134,6 +136,8 @@ TetMesh read_medit(const fs::path& file) {
   TextFile text(file, '#');
   if (!text.next_line() || !text.line().starts_with("MeshVersionFormatted"))
     text.fail("file does not begin with MeshVersionFormatted, so it is not Medit's .mesh in ASCII");
+  constexpr std::string_view other_solids[] = {"Hexahedra", "HexahedraQ2", "Prisms",    "PrismsP2",
+                                               "Pyramids",  "PyramidsP2",  "Pentahedra"};
   TetMesh mesh;
   const auto next_word = [&] { return text.more() || text.next_line(); };
   const auto whole = [&](const char* name) {
@@ -150,6 +154,8 @@ TetMesh read_medit(const fs::path& file) {
         mesh.positions.push_back(text.any_position("vertex"));
         whole("vertex");  // its reference
       }
+    if (std::ranges::find(other_solids, keyword) != std::end(other_solids))
+      mesh.other_cells += text.counted(whole("number of cells"), "number of cells");
     if (keyword != "Tetrahedra" && keyword != "TetrahedraP2") continue;
     for (std::size_t left = text.counted(whole("number of tets"), "number of tets"); left > 0; --left) {
       for (std::uint32_t& v : mesh.tets.emplace_back()) {
@@ -212,9 +218,14 @@ TetMesh load_tets(const fs::path& file) {
   const std::string extension = lower_extension(file);
   const auto reader =
       std::ranges::find(readers, extension, [](const auto& row) { return std::string_view(row.first); });
+  if (extension == ".meshb")
+    throw Error("Medit's binary format is not read", file.string(), "save it as .mesh, which is text, or as .msh");
   if (reader == std::end(readers))
     throw Error(fmt::format("unknown mesh format '{}'", extension), file.string(), fmt::format("use {}", mesh_formats));
   TetMesh mesh = reader->second(file);
+  if (mesh.tets.empty() && mesh.other_cells > 0)
+    throw Error(fmt::format("all {} solid cells are hexahedra, prisms or the like", mesh.other_cells), file.string(),
+                "mesh it with tetrahedra, or give its boundary alone (.stl, .ply), which is filled");
   finish_tets(mesh, file.string());
   return mesh;
 }

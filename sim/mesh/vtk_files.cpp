@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sim/error.h"
@@ -25,6 +27,13 @@ struct Cells {
 }
 
 bool is_whole(double number) { return number == std::floor(number); }
+
+// Other solids by their types: hexahedra, prisms, pyramids, polyhedra, of any order.
+bool is_other_solid(double type) {
+  constexpr std::array<int, 2> ranges[] = {{11, 16}, {25, 27}, {29, 29}, {31, 33}, {37, 37},
+                                           {41, 42}, {65, 67}, {72, 74}, {79, 81}};
+  return std::ranges::any_of(ranges, [&](const auto& range) { return type >= range[0] && type <= range[1]; });
+}
 
 // Types 10, 24 and 71 are tets, of first, second and any order, and their corners come first.
 void add_tets(TetMesh& mesh, const Cells& cells, const fs::path& file) {
@@ -50,6 +59,7 @@ void add_tets(TetMesh& mesh, const Cells& cells, const fs::path& file) {
         tet[k] = std::uint32_t(base + std::size_t(point));
       }
     }
+    mesh.other_cells += is_other_solid(type);
     first = last;
   }
   if (first != double(cells.corners.size()))

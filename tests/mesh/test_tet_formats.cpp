@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "app/report.h"
+#include "sim/mesh/fill.h"
 #include "tests/mesh/mesh_samples.h"
 
 using namespace tetpbd;
@@ -265,6 +266,49 @@ TEST_CASE("tet formats: wrong counts are refused before anything is made of them
   CHECK(contains(error("a.mesh", medit(false), "Dimension\n3", "Dimension\n2"), "not three-dimensional"));
 }
 
+TEST_CASE("tet formats: solid cells that are no tets are counted, and refused where there are no tets") {
+  const Folder folder;
+  // A cube of one cell, and perhaps a tet on it.
+  const std::vector<std::string> at{"0 0 0", "1 0 0", "1 1 0", "0 1 0", "0 0 1", "1 0 1", "1 1 1", "0 1 1", "0 0 2"};
+  std::string points, nodes, vertices;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    points += at[i] + "\n", nodes += fmt::format("{} {}\n", i + 1, at[i]), vertices += at[i] + " 0\n";
+  }
+  for (const bool tet : {true, false}) {
+    const auto with = [&](const char* text) { return tet ? text : ""; };
+    const std::pair<const char*, std::string> written[] = {
+        {"a.vtk", fmt::format("# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 9 float\n{}"
+                              "CELLS {}\n8 0 1 2 3 4 5 6 7\n{}CELL_TYPES {}\n12\n{}",
+                              points, tet ? "2 14" : "1 9", with("4 4 5 7 8\n"), tet ? 2 : 1, with("10\n"))},
+        {"a.vtu", fmt::format("<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>"
+                              "<Piece NumberOfPoints=\"9\" NumberOfCells=\"{}\"><Points><DataArray type=\"Float32\" "
+                              "NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points><Cells><DataArray "
+                              "type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 3 4 5 6 7 {}</DataArray>"
+                              "<DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">8 {}</DataArray><DataArray "
+                              "type=\"UInt8\" Name=\"types\" format=\"ascii\">12 {}</DataArray></Cells></Piece>"
+                              "</UnstructuredGrid></VTKFile>",
+                              tet ? 2 : 1, points, with("4 5 7 8"), with("12"), with("10"))},
+        {"a.msh", fmt::format("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9\n{}$EndNodes\n$Elements\n{}\n"
+                              "1 5 2 0 1 1 2 3 4 5 6 7 8\n{}$EndElements\n",
+                              nodes, tet ? 2 : 1, with("2 4 2 0 1 5 6 8 9\n"))},
+        {"a.mesh",
+         fmt::format("MeshVersionFormatted 2\nDimension 3\nVertices\n9\n{}Hexahedra\n1\n1 2 3 4 5 6 7 8 0\n{}End",
+                     vertices, with("Tetrahedra\n1\n5 6 8 9 0\n"))}};
+    for (const auto& [name, text] : written) {
+      CAPTURE(name);
+      const fs::path file = folder.write(name, text);
+      if (!tet) {
+        CHECK(contains(error_of([&] { load_tets(file); }), "2 all 1 solid cells are hexahedra, prisms or the like: "));
+        continue;
+      }
+      const TetMesh mesh = load_tets(file);
+      CHECK(mesh.tets.size() == 1);
+      CHECK(mesh.other_cells == 1);
+      CHECK(refill(mesh, {}, name).note == "hexahedra, prisms and the like are left out: 1");
+    }
+  }
+}
+
 TEST_CASE("tet formats: without tets, in a format that nobody reads, and with counts alone") {
   const Folder folder;
   CHECK(contains(error_of([&] {
@@ -275,7 +319,9 @@ TEST_CASE("tet formats: without tets, in a format that nobody reads, and with co
                              "");
                  }),
                  "2 mesh has no tetrahedron: "));
-  CHECK(contains(error_of([&] { load_mesh(folder.write("a.meshb", "1"), ""); }), ".msh .vtk .vtu .mesh (tetrahedra)"));
+  CHECK(contains(error_of([&] { load_mesh(folder.write("a.meshb", "1"), ""); }),
+                 "2 Medit's binary format is not read: "));
+  CHECK(contains(error_of([&] { load_mesh(folder.write("a.stp", "1"), ""); }), ".msh .vtk .vtu .mesh (tetrahedra)"));
   folder.write("a.node", "5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n");
   const TetMesh mesh = load_tets(folder.write("a.ele", "2\n1 1 2 3 4\n2 2 3 4 5\n"));
   CHECK(mesh.tets.size() == 2);

@@ -71,7 +71,9 @@ struct Command {
   }
 
   FillOptions options() const {
-    return fill_options(o.filled.fill, o.filled.tetgen, o.filled.tets, o.filled.spacing, file.string());
+    FillOptions options = fill_options(o.filled.fill, o.filled.tetgen, o.filled.tets, o.filled.spacing, file.string());
+    options.progress = fill_progress(file.string());
+    return options;
   }
   /// Nothing where that ends the command, with status 1 unless the surface is sound.
   std::optional<Filled> fill_surface(const std::string& done, int& status) {
@@ -93,6 +95,7 @@ struct Command {
       if (!mends) throw;
       return say_mended(done, fmt::format("not sound ({})", left.what())), status = 1, std::nullopt;
     }
+    how.progress = {};  // its line goes before what follows
     if (mends) say_mended(done, defect);
     if (mends && o.out.empty()) return status = check.defect.empty() ? 0 : 1, std::nullopt;
     if (how.by == "tetgen") document["tetgen"] = how.switches;

@@ -31,7 +31,7 @@ void print_error(const std::string& line);
 void print_gl_error(const char* text);
 
 /// A line on standard error that is written over, on a terminal or if forced; elsewhere a new one every so
-/// many seconds.
+/// many seconds. `quiet`: s before the first.
 struct Progress {
   std::string label;
   long total;
@@ -40,7 +40,7 @@ struct Progress {
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now(), last;
 
   Progress(const std::string& of, long steps, bool force = false,
-           double lines_every = std::numeric_limits<double>::infinity());
+           double lines_every = std::numeric_limits<double>::infinity(), double quiet = 0);
   ~Progress();
   void update(long done);
 };
@@ -51,6 +51,9 @@ struct Standard {
   const TotalError* total = nullptr;
   Standard(const Motion* motion = nullptr, const TotalError* error = nullptr) : right(motion), total(error) {}
 };
+
+/// FillOptions::progress for this file: says how far its lattice is, if it takes longer than two seconds.
+std::function<void(double)> fill_progress(const std::string& file);
 
 struct RunPlan {
   long measure_every = 1;  ///< steps; the start and the last step are measured in any case

@@ -334,6 +334,7 @@ Filled body_of(const BodyDescription& body, const std::string& scene, bool soft)
                                        fmt::format("body '{}' of scene '{}'", body.name, scene));
     const double height = bounds(positions).high.y - bounds(positions).low.y;
     options.scale = body.scale * (body.height > 0 && height > 0 ? body.height / (height * body.scale.y) : 1.0);
+    options.progress = fill_progress(printable(file.string()));
     return options;
   };
   Filled result;

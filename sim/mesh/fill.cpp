@@ -27,7 +27,7 @@ Filled by_lattice(SurfaceMesh surface, const FillOptions& options, const std::st
     finish_tets(filled.mesh, file);
     return filled;
   }
-  Lattice lattice = fill_with_lattice(surface, options.size, source);
+  Lattice lattice = fill_with_lattice(surface, options.size, source, options.progress);
   filled.mesh = std::move(lattice.mesh), filled.carried = std::move(lattice.carried);
   filled.cavities = lattice.cavities, filled.fit = lattice.fit;
   filled.note = fmt::format("{}a lattice of {} tets fills it, its points {:.3g} m apart{}{}{}",

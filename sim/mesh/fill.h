@@ -2,6 +2,7 @@
 // any surface takes.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "sim/mesh/carry.h"
@@ -16,6 +17,7 @@ struct FillOptions {
   LatticeSize size{};
   bool sized = false;                      ///< somebody asks for `size`, which the lattice alone can meet
   glm::dvec3 scale{1};                     ///< of the surface before a lattice fills it, whose cells are regular then
+  std::function<void(double)> progress{};  ///< told now and then which part of a lattice is done
 };
 struct Filled {
   TetMesh mesh{};

@@ -33,14 +33,15 @@ void settle_shares(TetMesh& mesh, const Outward& outward) {
 
 // Vertices of the boundary go to the surface and others between their neighbours, as far as no altitude gets shorter
 // than 0.45 of the spacing (0.71 in the lattice), or none gets shorter at all.
-void fit(TetMesh& mesh, const Solid& solid, double h) {
+void fit(TetMesh& mesh, const Solid& solid, double h, const auto& watch) {
   constexpr int passes = 12;
   constexpr double floor = 0.45;
   const Grouped around = group_by_key(4 * mesh.tets.size(), mesh.positions.size(), [&](std::size_t i, auto&& emit) {
     emit(mesh.tets[i / 4][i % 4], std::uint32_t(i / 4));
   });
   const std::vector<char> outer = outer_vertices(mesh);
-  for (int pass = 0; pass < passes; ++pass)
+  for (int pass = 0; pass < passes; ++pass) {
+    watch(double(pass) / passes);
     for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
       const std::uint32_t *first = &around.values[around.first[v]], *end = &around.values[around.first[v + 1]];
       const auto least = [&] {
@@ -66,6 +67,7 @@ void fit(TetMesh& mesh, const Solid& solid, double h) {
         if (now >= floor * h || now >= before) break;
       }
     }
+  }
 }
 
 // m^3, of what is inside, by points of a grid.
@@ -165,7 +167,14 @@ std::string note_on(const std::vector<Depth>& depths, double left_out, double ou
 
 }  // namespace
 
-Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, const std::string& source) {
+Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, const std::string& source,
+                          const std::function<void(double)>& progress) {
+  const auto watch = [&](double from, double to) {
+    return [&progress, &source, from, to](double part) {
+      if (interrupted()) throw Error("interrupted", source, "start again; nothing was written", 1);
+      if (progress) progress(from + part * (to - from));
+    };
+  };
   const SurfaceCheck values = check_values(given);
   if (values.hopeless) throw Error(values.defect, values.place + " in " + source, values.hint);
   const Outward outward = turn_outward(given);
@@ -184,13 +193,12 @@ Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, con
   double h = size.spacing > 0 ? size.spacing : spacing_for(size.tets, volume, area);
   for (int turn = 0;; ++turn) {
     require_memory(expected_tets(volume, area, h), box, h, source);
-    if (interrupted()) throw Error("interrupted", source, "start again; nothing was written", 1);
     if (const double median = depths.empty() ? INFINITY : depths[depths.size() / 2].depth; 8 * median < h)
       throw Error("half of the body is thinner than an eighth of a cell",
                   fmt::format("{:.3g} m of {:.3g} m, in {}", median, h, source),
                   fmt::format("give a spacing of {:.2g}, or \"thickness\", which makes it a sheet", 2 * median));
     LatticeCells cells(solid, box, h);
-    cells.find();
+    cells.find(watch(0.1 * turn, 0.1 * turn + 0.1));
     if (cells.all().empty())
       throw Error(fmt::format("a lattice with a spacing of {:.3g} m finds nothing inside", h), source,
                   "give a smaller spacing, or more tets");
@@ -204,7 +212,7 @@ Lattice fill_with_lattice(const SurfaceMesh& given, const LatticeSize& size, con
     lattice.parts = int(cells.keep_parts(outward.patches, lattice.mesh, left_out));
     for (int round = 0;; ++round) {
       finish_tets(lattice.mesh, source);
-      fit(lattice.mesh, solid, h);
+      fit(lattice.mesh, solid, h, watch(0.3 + 0.22 * round, 0.38 + 0.22 * round));
       cells.fill(lattice.mesh);
       if (round == 2) break;
       cells.peel(lattice.mesh);

@@ -2,6 +2,7 @@
 // size and well shaped, so that solvers take long steps (docs/method.md, "Meshes").
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,8 @@ struct Lattice {
   std::string note;  ///< what is thinner than a cell or was left out; empty: nothing
 };
 /// Fills what the surface encloses, however broken it is: open, in many parts, crossing itself. Throws Error where it
-/// encloses nothing or memory does not suffice.
-Lattice fill_with_lattice(const SurfaceMesh& surface, const LatticeSize& size, const std::string& source);
+/// encloses nothing or memory does not suffice, and when interrupted. `progress`: told now and then which part is done.
+Lattice fill_with_lattice(const SurfaceMesh& surface, const LatticeSize& size, const std::string& source,
+                          const std::function<void(double)>& progress = {});
 
 }  // namespace tetpbd

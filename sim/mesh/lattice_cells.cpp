@@ -101,13 +101,13 @@ std::vector<Piece> LatticeCells::split(const Cell& cell, std::uint32_t number) c
   return result;
 }
 
-void LatticeCells::find() {
+void LatticeCells::find(const std::function<void(double)>& watch) {
   struct Slab {
     std::vector<Cell> cells;
     std::vector<Piece> pieces;
   };
   std::vector<Slab> slabs(std::size_t(grid.size.z / 2));
-  parallel_for(slabs.size(), 1, [&](std::size_t s) {
+  const auto find_in = [&](std::size_t s) {
     Slab& slab = slabs[s];
     glm::ivec3 at(0, 0, 2 * int(s) + 1);
     for (at.y = 1; at.y < grid.size.y; at.y += 2)
@@ -132,7 +132,12 @@ void LatticeCells::find() {
           std::ranges::move(found, std::back_inserter(slab.pieces));
         });
       }
-  });
+  };
+  constexpr std::size_t batch = 16;
+  for (std::size_t first = 0; first < slabs.size(); first += batch) {
+    watch(double(first) / double(slabs.size()));
+    parallel_for(std::min(batch, slabs.size() - first), 1, [&](std::size_t s) { find_in(first + s); });
+  }
   for (Slab& slab : slabs) {
     for (Piece& piece : slab.pieces) {
       piece.corners = corners(slab.cells[piece.cell]);

@@ -1,6 +1,7 @@
 // The cells of a lattice that a body is in, and what of each belongs to which part of it (lattice.h).
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -53,8 +54,8 @@ class LatticeCells {
  public:
   /// `box`: of the surface; h: m.
   LatticeCells(const Solid& inside, const Bounds& box, double h);
-  /// Finds the pieces, and which corners they share.
-  void find();
+  /// Finds the pieces, and which corners they share. `watch` is told which part of them is found.
+  void find(const std::function<void(double)>& watch);
   void join();
   /// Takes off tets that the body hardly fills, before keep_parts().
   void peel(TetMesh& mesh);

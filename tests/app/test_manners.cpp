@@ -1,6 +1,10 @@
 // What the command line says of words it does not know, and of flags that change nothing.
 #include <doctest/doctest.h>
+#include <fcntl.h>
 
+#include <thread>
+
+#include "app/run_loop.h"
 #include "sim/model/did_you_mean.h"
 #include "tests/app/run_program.h"
 
@@ -71,4 +75,20 @@ TEST_CASE("manners: flags that change nothing say so, others do not, both spelli
   CHECK(named.out.find("solver:") == std::string::npos);
   const std::string help = program("run --help", folder).out;
   CHECK(help.find("cpu-fast: Gauss-Seidel by colours") != std::string::npos);
+}
+
+TEST_CASE("progress: where there is no terminal, a line at most every so often, the first after a while") {
+  const Folder folder;
+  const fs::path file = folder.path / "said";
+  const int before = dup(2), said = open(file.c_str(), O_CREAT | O_WRONLY, 0600);
+  dup2(said, 2);
+  {
+    Progress progress("filling a.obj, per cent:", 100, false, 10, 0.3);
+    progress.update(10);
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    for (const long done : {50, 60}) progress.update(done);
+  }
+  dup2(before, 2);
+  close(before), close(said);
+  CHECK(read(file) == "filling a.obj, per cent: 50 of 100, 0 s left\n");
 }

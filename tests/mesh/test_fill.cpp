@@ -8,6 +8,7 @@
 
 #include "app/commands.h"
 #include "app/scene.h"
+#include "sim/interrupt.h"
 #include "sim/mesh/carry.h"
 #include "sim/mesh/disjoint_sets.h"
 #include "sim/mesh/fill.h"
@@ -277,6 +278,23 @@ TEST_CASE("fit: the thinnest part and the gap to the surface, in the frame of th
   CHECK(placed.thinnest == doctest::Approx(0.16).epsilon(0.01));
   CHECK(placed.thinnest_at.y < 1.4);
   CHECK(placed.thinnest_at.x > 5);
+}
+
+TEST_CASE("lattice: says how far it is, and ends where it is interrupted") {
+  const Folder folder;
+  std::vector<double> parts;
+  fill(cube(), {.by = "lattice", .size = {3000, 0}, .progress = [&](double part) { parts.push_back(part); }}, "a.obj");
+  REQUIRE(parts.size() > 10);
+  CHECK(std::ranges::is_sorted(parts));
+  CHECK(parts.front() == 0);
+  CHECK(parts.back() < 1);
+  std::size_t calls = 0;
+  const auto interrupt = [&](double) { signals::caught = ++calls == 5; };
+  CHECK(error_of([&] {
+          fill(cube(), {.by = "lattice", .size = {2500, 0}, .progress = interrupt}, "b.obj");
+        }) == "1 interrupted: b.obj: start again; nothing was written");
+  signals::caught = 0;
+  CHECK(calls == 5);
 }
 
 TEST_CASE("run: a broken mesh becomes a body, and files have its surface") {

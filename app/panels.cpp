@@ -319,6 +319,22 @@ void draw_colour_range(Session& s) {
                             .c_str());
 }
 
+// Of the bodies at rest; also while the cursor is on it.
+void draw_flattest(Session& s) {
+  const Model& model = *s.loaded.model;
+  const FlattestTet& flattest = s.loaded.flattest;
+  if (model.rest.tets.empty()) return;
+  const Body& body = *(std::ranges::upper_bound(model.bodies, flattest.tet, {}, &Body::first_tet) - 1);
+  check_box(s, "flattest tet", s.view.flattest,
+            fmt::format("shows its edges through the bodies: tet {} of {}, {:.2g} of an edge high, which limits the "
+                        "steps of mode explicit",
+                        flattest.tet - body.first_tet, body.name, flattest.quality),
+            s.first_view.flattest);
+  s.ui.at_flattest = ImGui::IsItemHovered();
+  ImGui::SameLine(label_width());
+  ImGui::TextDisabled("%s", fmt::format("{:.3g} m high, {}", flattest.altitude, body.name).c_str());
+}
+
 void draw_view(Session& s) {
   ViewOptions& view = s.view;
   const ViewOptions& first = s.first_view;
@@ -333,6 +349,7 @@ void draw_view(Session& s) {
                               colour_names[std::size_t(first.colour)]))
     choose_colour(s, Colour(std::ranges::find(colour_names, *name) - colour_names.begin()));
   draw_colour_range(s);
+  draw_flattest(s);
   if (view.look == Look::tets) {
     slider(s, "shrink", view.shrink, first.shrink, 0, 1, "%.2f of its size",
            "each tetrahedron, towards its centre: gaps show the inside");

@@ -173,6 +173,7 @@ Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scen
   loaded.lanes.push_back({create_sim(model, scene.settings)});
   loaded.renderer = make_renderer(*model);
   loaded.picker = make_picker(model->rest);
+  if (!model->rest.tets.empty()) loaded.flattest = flattest_tet(model->rest);
   return loaded;
 }
 

@@ -46,6 +46,7 @@ struct Loaded {
   Buffer answers{};                      ///< where the right motion has the vertices
   long held = -1;                        ///< step at which vertices were last held against it
   Probe probe{};
+  FlattestTet flattest{};  ///< at rest
   std::optional<LiveMap> map{};
   Lane& lane() { return lanes[chosen]; }
   Sim& sim() { return lane().sim; }
@@ -123,6 +124,7 @@ struct Ui {
   bool rebudget = false;                   ///< once the slider is let go
   std::map<std::string, SceneCard> cards;  ///< by file, once shown
   MapWords map;
+  bool at_flattest = false;            ///< the cursor is on what the panel says of the flattest tet
   std::string mesh;                    ///< path being typed
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
   std::array<PlotView, 3> plot_views;

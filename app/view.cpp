@@ -45,6 +45,7 @@ void draw_lanes(Session& s, const Target& target) {
   const bool farthest = s.fit_range && s.view.colour == Colour::motion;
   const std::size_t valued =
       farthest ? std::size_t(std::ranges::max_element(lanes, {}, off) - lanes.begin()) : s.loaded.chosen;
+  const bool flattest = s.view.flattest || std::exchange(s.ui.at_flattest, false);
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     Frame frame = make_frame(lanes[i].sim, s.camera, s.view, target);
     frame.viewport = tile_in(s, i, target.width, target.height);
@@ -60,6 +61,7 @@ void draw_lanes(Session& s, const Target& target) {
     frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
     if (s.view.worst && i == s.loaded.chosen)
       for (const auto& [vertex, value] : s.worst) frame.worst.push_back(vertex);
+    if (flattest) frame.tet = std::uint32_t(s.loaded.flattest.tet);
     if (s.view.colour == Colour::motion && s.loaded.comparable) frame.values = lanes[i].apart.id();
     if (s.view.colour == Colour::patch) frame.values = patch_numbers(lanes[i]);
     if ((s.view.colour == Colour::motion || s.view.colour == Colour::patch) && !frame.values)
@@ -77,7 +79,7 @@ void draw_lanes(Session& s, const Target& target) {
     if (!several || s.overlaid || !s.ghost || i == right) continue;
     frame.positions = lanes[right].sim.positions.id(), frame.velocities = lanes[right].sim.velocities.id();
     frame.over = true, frame.opacity = 0.3f, frame.caption.clear();
-    frame.pinned.clear(), frame.grabbed.clear(), frame.worst.clear();
+    frame.pinned.clear(), frame.grabbed.clear(), frame.worst.clear(), frame.tet.reset();
     frame.options.arrows = frame.options.contacts = false;
     frame.options.colour = Colour::plain, frame.options.body_colour = glm::vec3(0.25f);
     frame.options.worst = frame.options.shadow = frame.options.follow = frame.options.legend = false;

@@ -69,6 +69,7 @@ struct ViewOptions {
   bool arrows = false;         ///< the displacements of some vertices by their velocities ...
   double arrow_seconds = 0.1;  ///< ... in this time
   bool worst = false;          ///< reads the values of all vertices back (poll_values)
+  bool flattest = false;       ///< shows the flattest tet
   bool hold_range = false;     ///< else ranges follow the present values (fitted_range)
 
   ColourRange& range() { return ranges[std::size_t(colour)]; }
@@ -108,6 +109,7 @@ struct Frame {
   std::vector<std::uint32_t> pinned, grabbed;  ///< vertices shown as dots
   std::vector<std::uint32_t> touching;         ///< vertices on obstacles, shown as dots through the body
   std::vector<std::uint32_t> worst;            ///< vertices shown as rings through the body
+  std::optional<std::uint32_t> tet;            ///< whose edges are shown through the body
   std::string caption;                         ///< at the upper left
   bool over = false;                           ///< draws only the bodies, into a picture that is there already
   float opacity = 1;                           ///< of the bodies

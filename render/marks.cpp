@@ -1,7 +1,9 @@
 #include "render/marks.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <utility>
 
 #include "render/layout.h"
 #include "sim/gl/layout.h"
@@ -10,7 +12,7 @@ namespace tetpbd {
 
 namespace {
 
-constexpr glm::vec3 contact_colour(0.95f, 0.35f, 0.0f);
+constexpr glm::vec3 contact_colour(0.95f, 0.35f, 0.0f), worst_colour(0.70f, 0.0f, 0.30f);
 
 // The size in pixels of a mark that has `size` in a picture of 720 lines.
 float scaled(const Frame& frame, float size) { return size * std::max(1.0f, float(frame.viewport.height) / 720.0f); }
@@ -99,20 +101,46 @@ void draw_dots(Renderer& renderer, const Frame& frame) {
   batch(frame.pinned, glm::vec3(0.020f, 0.035f, 0.060f), 7.0f);
   glDisable(GL_DEPTH_TEST);
   if (frame.options.contacts) batch(frame.touching, contact_colour, 7.0f);
-  batch(frame.worst, glm::vec3(0.70f, 0.0f, 0.30f), 18.0f, 0.68f);
+  batch(frame.worst, worst_colour, 18.0f, 0.68f);
+  if (frame.tet) {
+    const Tet& tet = renderer.mesh.tets[*frame.tet];
+    batch({tet.begin(), tet.end()}, worst_colour, 8.0f);
+  }
+}
+
+// With a pale rim, which shows them on any colour; corners have dots, because a sliver may be smaller than a pixel.
+void draw_tet(Renderer& renderer, const Frame& frame) {
+  const Tet& tet = renderer.mesh.tets.at(*frame.tet);
+  if (std::exchange(renderer.edged_tet, frame.tet) != frame.tet) {
+    std::vector<std::array<std::uint32_t, 2>> edges;
+    for (std::size_t a = 0; a < 4; ++a)
+      for (std::size_t b = 0; b < a; ++b) edges.push_back({tet[a], tet[b]});
+    renderer.tet_edges = Buffer("edges of a tet", edges);
+  }
+  const Program& program = use(renderer, "edges of a tet");
+  program.set("viewport", glm::vec3(frame.viewport.width, frame.viewport.height, 0));
+  glDisable(GL_DEPTH_TEST);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, renderer.tet_edges.id());
+  for (const auto& [shade, width] : {std::pair(glm::vec3(1), 4.5f), {worst_colour, 2.2f}}) {
+    program.set("shade", shade);
+    program.set("width", scaled(frame, width));
+    glDrawElements(GL_LINES, 12, GL_UNSIGNED_INT, nullptr);
+  }
+  glEnable(GL_DEPTH_TEST);
 }
 
 }  // namespace
 
 void draw_marks(Renderer& renderer, const Frame& frame) {
   if (!frame.options.contacts && !frame.options.arrows && frame.pinned.empty() && frame.grabbed.empty() &&
-      frame.worst.empty())
+      frame.worst.empty() && !frame.tet)
     return;
   bind_vertices(renderer, frame);
   glEnable(GL_PROGRAM_POINT_SIZE);
   if (frame.options.contacts) draw_contacts(renderer, frame);
   if (frame.options.contacts && frame.pairs) draw_body_contacts(renderer, frame);
   if (frame.options.arrows) draw_arrows(renderer, frame);
+  if (frame.tet) draw_tet(renderer, frame);
   draw_dots(renderer, frame);
   glDisable(GL_PROGRAM_POINT_SIZE);
 }

@@ -1,4 +1,5 @@
-// Draws marks over bodies: dots on pinned, grabbed and touching vertices, rings on the worst, arrows of velocity.
+// Draws marks over bodies: dots on pinned, grabbed and touching vertices, rings on the worst, a tet's
+// edges, arrows of velocity.
 #pragma once
 
 #include "render/renderer.h"

@@ -36,6 +36,7 @@ const std::map<std::string, Recipe> recipes = {
     {"obstacles", {{"render/obstacle.vert", "render/body.frag"}, {"SHAPE"}}},
     {"obstacles shadow", {{"render/obstacle.vert", "render/depth.frag"}, {"SHADOW"}}},
     {"graph", {{"render/body.vert", "render/graph.geom", "render/graph.frag"}, {}}},
+    {"edges of a tet", {{"render/body.vert", "render/edge.geom", "render/arrows.frag"}, {}}},
     {"contacts", {{"render/dots.vert", "render/dots.frag"}, {"CONTACTS"}}},
     {"contact arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {"CONTACTS"}}},
     {"arrows", {{"render/arrows.vert", "render/arrows.geom", "render/arrows.frag"}, {}}},

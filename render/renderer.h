@@ -50,6 +50,8 @@ struct Renderer {
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
   Buffer graph;            ///< edges' vertices
+  Buffer tet_edges;        ///< of the tet that was shown last, likewise
+  std::optional<std::uint32_t> edged_tet;
   Buffer arrow_vertices, contact_arrows;
   std::vector<std::string> contact_sizes;  ///< Pairs::sizes for which `contact_arrows` was made
   Buffer rest;                             ///< vec4: rest position and body

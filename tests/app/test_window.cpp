@@ -205,6 +205,16 @@ TEST_CASE("window: the probe says what a vertex and its tet measure, colours how
   }
   REQUIRE(!s.worst.empty());
   CHECK(s.worst[0].second == std::ranges::max(apart));
+  const auto with = [&](bool checked, bool pointed_at) {
+    s.view.flattest = checked, s.ui.at_flattest = pointed_at;
+    draw_lanes(s, target);
+    return read_rgba(target).rgba;
+  };
+  const auto plain = with(false, false), edged = with(true, false);
+  CHECK(edged != plain);
+  CHECK(with(false, true) == edged);
+  CHECK(with(false, false) == plain);
+  CHECK(s.loaded.flattest.altitude == report(model.rest).worst_altitude);
 
   const glm::dvec3 aim = 0.5 * (bounds(state.positions).low + bounds(state.positions).high);
   ask(s.loaded.probe, s.loaded.lanes, 0, s.loaded.renderer, shown_frame(s, 0),

@@ -82,7 +82,12 @@ for colour in volume stretch velocity motion; do key c; await "^colour $colour";
 shot plain.png; key w; await '^worst true'
 forget; xdotool mousemove $cx $cy; await '^probe [0-9]+ [0-9]+ '
 await_other plain.png probe.png 5000 "the tooltip"
-key w; await '^worst false'; key c; await '^colour patch'; key c; await '^colour residual'; key c; await '^colour plain'
+key w; await '^worst false'
+xdotool mousemove $((vx + 15)) $((vy + 15)); sleep 0.5; shot before.png
+click "flattest tet" 0.1; await '^flattest tet true'; xdotool mousemove $((vx + 15)) $((vy + 15)); sleep 0.5
+await_other before.png flattest.png 2000 "the flattest tet"
+click "flattest tet" 0.1; await '^flattest tet false'; xdotool mousemove $cx $cy
+key c; await '^colour patch'; key c; await '^colour residual'; key c; await '^colour plain'
 for axis in x y z "the view"; do key x; await "^cut 0.5000 along $axis"; done
 await_other plain.png cut.png 5000 "a cut"
 forget; xdotool keydown alt; xdotool click 5; xdotool keyup alt; await '^cut 0.4800'

@@ -316,6 +316,20 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
   const glm::vec3 at = project(stage.frame.camera, glm::vec3(stage.mesh.positions[0]), width, height);
   CHECK(ring.count > 40);
   CHECK(std::abs(float(ring.low.x + ring.high.x) * 0.5f - at.x) < 2);
+  stage.frame.worst.clear();
+  stage.frame.tet = 0;  // inside, too
+  const Difference edges = difference(stage.image(), turned);
+  CHECK(edges.count > 100);
+  glm::vec2 low(INFINITY), high(-INFINITY);
+  for (const std::uint32_t v : stage.mesh.tets[0]) {
+    const glm::vec2 corner(project(stage.frame.camera, glm::vec3(stage.mesh.positions[v]), width, height));
+    low = glm::min(low, corner), high = glm::max(high, corner);
+  }
+  CHECK(glm::all(glm::lessThan(glm::abs(glm::vec2(edges.low) - low), glm::vec2(6))));
+  CHECK(glm::all(glm::lessThan(glm::abs(glm::vec2(edges.high) - high), glm::vec2(6))));
+  stage.frame.tet = std::uint32_t(stage.mesh.tets.size() - 1);
+  CHECK(difference(stage.image(), turned).low != edges.low);
+  stage.frame.tet.reset();
   CHECK(difference(without, unknown).count > 500);
   CHECK(gl_error_count() == 0);
 }

@@ -50,7 +50,7 @@ constexpr Judge judges[] = {
     {"volume", "max_volume_loss_percent", "largest volume loss, %", 1},
     {"strain", "stretch_rms_peak", "largest RMS strain of edges, %", 100},
     {"overlap", "overlap_max", "how deep bodies are in each other, % of the size", 100},
-    {"total", "total_error", "distance from the motion on finer meshes, and the solver's own, RMS, % of the size", 100},
+    {"total", "total_error", "total error, the solver's own added, RMS, % of the size", 100},
 };
 // Infinite where nothing is known.
 double error_by(const Judge& judge, const ordered_json& row) {
@@ -158,6 +158,7 @@ void mark_front(ordered_json& rows, const Judge& judge) {
   }
 }
 
+// Of a row among those of one mesh.
 std::string label_of(const ordered_json& row) { return text_of(row["iterations"]) + " x " + text_of(row["substeps"]); }
 std::string series_of(const ordered_json& row) {
   const std::string fill = text_of(row["fill"]), by = fill.substr(0, fill.find(':'));
@@ -180,14 +181,14 @@ Series solver_series(const ordered_json& rows) {
 
 Chart chart_of(const ordered_json& document, const Judge& judge) {
   const auto& rows = document["rows"];
-  Chart chart{
-      "Speed against error: " + text_of(rows[0]["scene"]),
-      fmt::format("{} tets, {} steps of {} s, {}; labels: iterations x substeps", tets_of(rows),
-                  text_of(document["steps"]), text_of(document["dt"]), text_of(document["device"]["gl_renderer"])),
-      "time of a step, ms (GPU time; cpu modes: wall time)",
-      judge.label,
-      true,
-      true};
+  Chart chart{"Speed against error: " + text_of(rows[0]["scene"]),
+              fmt::format("{} tets, {} steps of {} s, {}; labels: {}", tets_of(rows), text_of(document["steps"]),
+                          text_of(document["dt"]), text_of(document["device"]["gl_renderer"]),
+                          rows[0]["fill"] == "" ? "iterations x substeps" : "tets"),
+              "time of a step, ms (GPU time; cpu modes: wall time)",
+              judge.label,
+              true,
+              true};
   Series front{"Pareto front", "#999999", Series::dashes};
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& row = rows[i];
@@ -196,7 +197,7 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
     chart.spots.push_back({point, i});
     if (row["pareto"] == true) {
       front.points.push_back(point);
-      chart.notes.push_back({point, label_of(row)});
+      chart.notes.push_back({point, row["fill"] == "" ? label_of(row) : text_of(row["tets"], 8)});
     }
     const std::string mode = text_of(row["mode"]), name = series_of(row);
     auto series = std::ranges::find(chart.series, name, &Series::name);

@@ -30,9 +30,10 @@ void refine(BodyDescription& body, const std::string& scene) {
     body.block->cells *= std::max(1, int(std::ceil(std::cbrt(fewest_cells / (cells.x * cells.y * cells.z)))));
     return;
   }
+  if (body.tet) return;
   const std::filesystem::path file = body.mesh.empty() ? body.surface : body.mesh;
-  if (body.tet || !is_surface_file(file)) return;
-  body.mesh = file, body.surface.clear(), body.tets.reset(), body.spacing.reset();
+  body.mesh = file, body.surface.clear(), body.fill = "auto", body.tets.reset(), body.spacing.reset();
+  if (!is_surface_file(file)) return;
   SurfaceMesh surface = load_surface(file);
   for (glm::dvec3& p : surface.positions) p = upright(p, body.up);
   const bool clean = fill(surface, {}, file.string()).carried.vertices.empty();

@@ -181,7 +181,7 @@ TEST_CASE("compare judges meshes and solvers together, by the motion on finer me
   CHECK(error("lattice:1000", "newton") > 1e-4);
   CHECK(error("lattice:150", "newton") < 0.05);
   CHECK(error("tetgen", "newton") > 0);
-  CHECK(all.out.find("judged by total: distance from the motion on finer meshes") != std::string::npos);
+  CHECK(all.out.find("judged by total: total error") != std::string::npos);
   CHECK(all.out.substr(all.out.find("best within")).find("lattice:1000") != std::string::npos);
   CHECK(read(folder.path / "a/motion.svg").find("motion on finer meshes") != std::string::npos);
   // The second time that motion is in the cache, which another mesh of the first body has not.

@@ -1,4 +1,4 @@
-// The energy ledger of a run: where energy came from that nothing supplied (method.md, "Energy").
+// The energy ledger of a run: where energy came from that nothing supplied (method.md, "How error is measured").
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // A body-centred cubic lattice of tets, fitted to a surface: it fills what TetGen refuses, and its tets are all of one
-// size and well shaped, so that solvers take long steps (docs/method.md, "Meshes").
+// size and well shaped, so that solvers take long steps (docs/method.md, "Lattices").
 #pragma once
 
 #include <functional>

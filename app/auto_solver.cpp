@@ -167,6 +167,34 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   return choice;
 }
 
+namespace {
+
+constexpr double hard_impact = 0.5;  // of Young's modulus; a body of 10 kPa that falls 1 m hits with 2
+
+// The stagnation pressure rho v^2 of the hardest fall to the ground, over the body's Young's modulus.
+double impact_strain(const Model& model, const Settings& settings) {
+  double most = 0;
+  for (const Body& body : model.bodies) {
+    const Material& material = body_material(body, settings);
+    if (!settings.ground || body.is_sheet() || material.material == "none") continue;
+    double lowest = INFINITY, fastest = 0, volume = 0;
+    for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) {
+      lowest = std::min(lowest, model.positions[v].y);
+      fastest = std::max(fastest, glm::dot(model.velocities[v], model.velocities[v]));
+      if (model.inverse_masses[v] == 0) lowest = -INFINITY;  // what is held does not fall
+    }
+    if (lowest == -INFINITY) continue;
+    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)
+      volume += fill_of(model.rest, t) * tet_volume(model.rest, model.rest.tets[t]);
+    const double drop = std::max(0.0, lowest - settings.ground_height);
+    const double square = fastest + 2 * std::max(0.0, settings.gravity) * drop;
+    most = std::max(most, body_mass(model, body) / volume * square / material.young_modulus);
+  }
+  return most;
+}
+
+}  // namespace
+
 std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   if (!std::exchange(scene.mode_open, false)) return std::nullopt;
   Settings& s = scene.settings;
@@ -180,17 +208,21 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   // Four times as many where newton would take four times its own (sim/adaptive_substeps.h).
   const double wanted = explicit_substeps(model, s),
                most = (is_software_renderer() ? 20 : 40) * (0.5 * s.dt * spin > TURN_LIMIT ? refined_substeps : 1);
-  // Of bodies that touch newton is the less right, and takes four times its substeps as well.
-  if (wanted <= most * (bodies_touch(model, s) ? refined_substeps : 1)) {
+  // Of bodies that touch newton is the less right, and takes four times its substeps as well. What an impact presses
+  // flat keeps inverted tets in explicit, where nothing turns them back.
+  const bool touching = bodies_touch(model, s), flat = !touching && impact_strain(model, s) > hard_impact;
+  if (!flat && wanted <= most * (touching ? refined_substeps : 1)) {
     set_mode(s, "explicit", scene.name);
     return fmt::format("explicit, about {:g} substep{}", wanted, wanted == 1 ? "" : "s");
   }
   set_mode(s, "newton", scene.name);
   // What truncated iterations leave turns a body that spins: so many keep that to a few percent.
   // Very stiff bodies land without a crush only in short substeps, of which there are four times as many then.
-  s.substeps = wanted <= 400 ? 2 : 4, s.iterations = wanted <= 40 ? 4 : wanted <= 128 ? 8 : 16;
-  return fmt::format("newton, {} substeps of {} iterations: explicit would take {:g}, over {:g}", s.substeps,
-                     s.iterations, wanted, most);
+  s.substeps = wanted <= 400 && !flat ? 2 : 4;
+  s.iterations = wanted <= 40 && !flat ? 4 : wanted <= 128 ? 8 : 16;
+  const std::string why = flat && wanted <= most ? "the impact would press the body flat"
+                                                 : fmt::format("explicit would take {:g}, over {:g}", wanted, most);
+  return fmt::format("newton, {} substeps of {} iterations: {}", s.substeps, s.iterations, why);
 }
 
 std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model) {

@@ -46,8 +46,9 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
                            long steps);
 /// The mode of bodies that have forces, where nobody says one: `explicit` up to 40 substeps, 20 on a software
 /// renderer, else `newton` in two substeps of 4 iterations, 8 from 40 such substeps on, 16 from 128, 32 from
-/// 400. By what was measured (docs/results.md), without a race. Of hard ones `cpu-fast` on a software
-/// renderer, where the scene lets the device choose. What it took; nothing otherwise.
+/// 400; `newton` as well where a body falls so far that the impact presses it flat. By what was measured
+/// (docs/results.md), without a race. Of hard ones `cpu-fast` on a software renderer, where the scene lets the device
+/// choose. What it took; nothing otherwise.
 std::optional<std::string> choose_by_rule(Scene& scene, const Model& model);
 /// For a scene that asks for it: over its first 400 steps at most. The scene then has the settings chosen.
 std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model);

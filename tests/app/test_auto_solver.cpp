@@ -61,6 +61,17 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
   CHECK(chosen({{"material", "springs"}, {"mode", "node"}, {"substeps", "9"}}) == "node 9x1 -");
   CHECK(chosen({{"material", "springs"}, {"substeps", "9"}}) == "node 9x1 -");
   CHECK(chosen({}).ends_with(" -"));  // nothing has a force
+  // Soft enough to be pressed flat by what it falls, unless it is held or there is no ground.
+  const auto dropped = [](const char* modulus, bool held, bool ground) {
+    Scene scene = falling({.parameters = {{"material", "neo-hookean"}, {"young_modulus", modulus}}});
+    scene.bodies[0].position.y = 1, scene.settings.ground = ground;
+    if (held) scene.bodies[0].fixed.push_back({{0, 0.9, 0}, {1, 1, 1}});
+    return *choose_by_rule(scene, *build_model(scene));
+  };
+  CHECK(dropped("1e4", false, true) == "newton, 4 substeps of 8 iterations: the impact would press the body flat");
+  CHECK(dropped("1e4", true, true).starts_with("explicit"));
+  CHECK(dropped("1e4", false, false).starts_with("explicit"));
+  CHECK(dropped("1e5", false, true).starts_with("explicit"));
   CHECK(load_scene("soft-beam").mode_open);
   CHECK_FALSE(load_scene("soft-beam", {.solver = "newton"}).mode_open);
   CHECK_FALSE(load_scene("bunny-drop").mode_open);

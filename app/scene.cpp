@@ -600,10 +600,12 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     const glm::dmat3 turn = rotation_of(body.rotation);
     // Fixed and heavy vertices are chosen in the mesh's own frame, before it is turned.
     const Bounds own = bounds(mesh.positions);
+    const glm::dvec3 extent = glm::max(own.high - own.low, glm::dvec3(1e-300));
+    // A flat side of a surface is nearly flat on its lattice: a box as thin as a plane takes what is near it.
+    const glm::dvec3 least = mesh.fill.empty() ? glm::dvec3(0) : 0.3 * mean_edge(mesh) / extent;
     const auto is_in = [&](std::size_t vertex, const BodyDescription::Box& box) {
-      const glm::dvec3 part = (mesh.positions[vertex] - own.low) / glm::max(own.high - own.low, glm::dvec3(1e-300));
-      return glm::all(glm::greaterThanEqual(part, box.low - 1e-9)) &&
-             glm::all(glm::lessThanEqual(part, box.high + 1e-9));
+      const glm::dvec3 away = (mesh.positions[vertex] - own.low) / extent - 0.5 * (box.low + box.high);
+      return glm::all(glm::lessThanEqual(glm::abs(away), glm::max(0.5 * (box.high - box.low) + 1e-9, least)));
     };
     std::vector<std::uint32_t> fixed;
     std::vector<double> mass_factors(mesh.positions.size(), 1);

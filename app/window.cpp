@@ -349,7 +349,8 @@ void measure_window(Desktop& d, Session& s) {
       pixels_x > 0 && pixels_y > 0 && d.width > 0 && d.height > 0 && !glfwGetWindowAttrib(d.window, GLFW_ICONIFIED);
   if (!d.visible) return;
   const std::tuple before(s.ui.scale, d.density, d.dark);
-  d.density = float(pixels_x) / float(d.width);
+  // A window that is resized between the two questions has no such density, and no font of that size.
+  d.density = std::clamp(float(pixels_x) / float(d.width), 0.5f, 4.0f);
   float content = 1;
   glfwGetWindowContentScale(d.window, &content, nullptr);
   s.ui.scale = std::clamp(content / d.density, 0.5f, 4.0f) * float(s.ui.kept.text);

@@ -18,9 +18,11 @@ using namespace tetpbd;
 namespace {
 
 struct SceneFile {
-  std::filesystem::path path =
-      std::filesystem::temp_directory_path() / ("tetpbd_scene_" + std::to_string(getpid()) + ".json");
-  explicit SceneFile(const std::string& text) { std::ofstream(path) << text; }
+  std::filesystem::path path;
+  explicit SceneFile(const std::string& text, const std::string& ending = ".json")
+      : path(std::filesystem::temp_directory_path() / ("tetpbd_scene_" + std::to_string(getpid()) + ending)) {
+    std::ofstream(path) << text;
+  }
   ~SceneFile() { std::filesystem::remove(path); }
 };
 
@@ -127,6 +129,27 @@ TEST_CASE("a scene of a lattice takes TetGen from the command line, and the size
   CHECK(load_scene("clamped-bunny", {.fill = "lattice"}).bodies[0].tets == 24000);
   CHECK(load_scene("clamped-bunny", {.mesh = "another.ply"}).bodies[0].fill == "auto");
   CHECK(load_scene("clamped-bunny", {.fill = "lattice", .spacing = 0.1}).bodies[0].spacing == 0.1);
+}
+
+TEST_CASE("a fixed side of a box that a lattice fills is all of that side") {
+  const SceneFile cube(
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+      "f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\n"
+      "f 1 5 8\nf 1 8 4\nf 2 3 7\nf 2 7 6\n",
+      ".obj");
+  Scene scene = load_scene("clamped-bunny");
+  scene.bodies[0].mesh = cube.path, scene.bodies[0].tets = 1000;
+  scene.bodies[0].fixed = {{{0, 0, 0}, {1, 0, 1}}};
+  const auto model = build_model(scene);
+  glm::dvec3 low(1e9), high(-1e9);
+  for (std::size_t i = 0; i < model->positions.size(); ++i) {
+    if (model->inverse_masses[i] > 0) continue;
+    CHECK(model->rest.positions[i].y < 0.1);
+    low = glm::min(low, model->rest.positions[i]), high = glm::max(high, model->rest.positions[i]);
+  }
+  CHECK(high.x - low.x > 0.8);
+  CHECK(high.z - low.z > 0.8);
+  CHECK(std::ranges::count(model->inverse_masses, 0.0) > 16);
 }
 
 TEST_CASE("every deformation does what it says and leaves the rest shape") {

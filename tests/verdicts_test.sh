@@ -10,6 +10,7 @@ known=(
   'soft-beam,node corrections: contact of what gives way'
   'jelly-beam,node corrections: few iterations'
   'jelly-bunny,node corrections: contact of soft bodies by positions'
+  'jelly-bunny,explicit explicit: tets that bear the landing'
   'muscle,node corrections: few iterations'
   'ring,node corrections: contact of soft bodies by positions'
   'rollers,node corrections: contact of soft bodies by positions'

@@ -177,16 +177,15 @@ double impact_strain(const Model& model, const Settings& settings) {
   for (const Body& body : model.bodies) {
     const Material& material = body_material(body, settings);
     if (!settings.ground || body.is_sheet() || material.material == "none") continue;
-    double lowest = INFINITY, fastest = 0, volume = 0;
+    double fastest = 0;
+    bool held = false;
     for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) {
-      lowest = std::min(lowest, model.positions[v].y);
       fastest = std::max(fastest, glm::dot(model.velocities[v], model.velocities[v]));
-      if (model.inverse_masses[v] == 0) lowest = -INFINITY;  // what is held does not fall
+      held = held || model.inverse_masses[v] == 0;
     }
-    if (lowest == -INFINITY) continue;
-    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)
-      volume += fill_of(model.rest, t) * tet_volume(model.rest, model.rest.tets[t]);
-    const double drop = std::max(0.0, lowest - settings.ground_height);
+    if (held) continue;
+    const double volume = filled_volume(body_mesh(model, body));
+    const double drop = std::max(0.0, body_bounds(body, model.positions).low.y - settings.ground_height);
     const double square = fastest + 2 * std::max(0.0, settings.gravity) * drop;
     most = std::max(most, body_mass(model, body) / volume * square / material.young_modulus);
   }

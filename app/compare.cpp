@@ -260,7 +260,7 @@ void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr
     axes.modes = {"node", "cpu-fast", "explicit", "newton"};
   else if (axes.modes.empty())
     axes.modes = {"node", "constraint", "cpu"};
-  note_unused(own, axes.modes, options.overrides);
+  if (sweep.work.empty()) note_unused(own, axes.modes, options.overrides);  // the same for all fills
   for (const Baseline& baseline : baselines()) {
     if (std::erase(axes.modes, baseline.name) == 0) continue;
     if (!baseline.suits(own))

@@ -17,13 +17,10 @@ double reserve(const Model& model, const Settings& settings) {
   double fall = 0, strain = 0;
   const std::vector<double> volumes = tet_volumes(model.rest);
   for (const Body& body : model.bodies) {
-    double mass = 0, lowest = INFINITY;
-    for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) {
-      mass += model.masses[v];
-      lowest = std::min(lowest, model.positions[v].y);
-    }
+    const double lowest = body_bounds(body, model.positions).low.y;
     const double drop = settings.ground ? std::max(0.0, lowest - settings.ground_height) : 0;
-    fall += mass * std::abs(settings.gravity) * std::max(drop, body_bounds(body, model.rest.positions).size());
+    fall += body_mass(model, body) * std::abs(settings.gravity) *
+            std::max(drop, body_bounds(body, model.rest.positions).size());
     const Material& material = body_material(body, settings);
     const double modulus = has_energy(material) ? material.young_modulus : 0;
     for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t) strain += 1e-6 * modulus * volumes[t];

@@ -63,24 +63,6 @@ void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const TetM
   for (const double k : spring_stiffness(edges, tets, m.mu, volume)) edges.compliance.push_back(1 / (k * tau));
 }
 
-TetMesh body_mesh(const Model& model, const Body& body) {
-  const auto part = [](const auto& all, std::size_t first, std::size_t count) {
-    const auto begin = all.begin() + std::ptrdiff_t(first);
-    return std::vector(begin, begin + std::ptrdiff_t(count));
-  };
-  TetMesh mesh{part(model.rest.positions, body.first_vertex, body.vertices),
-               part(model.rest.tets, body.first_tet, body.tets),
-               part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece,
-               body.is_sheet() ? model.rest.thickness : 0};
-  if (!model.rest.fill.empty()) mesh.fill = part(model.rest.fill, body.first_tet, body.tets);
-  const auto shift = [&](auto& elements) {
-    for (auto& element : elements)
-      for (std::uint32_t& v : element) v -= std::uint32_t(body.first_vertex);
-  };
-  shift(mesh.tets), shift(mesh.surface);
-  return mesh;
-}
-
 // Adds a body's constraints. Other bodies may be of other materials, so each constraint gets its own coefficients.
 void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body& body, const Material& m) {
   for (std::size_t k = 0; k < kind_count; ++k) {

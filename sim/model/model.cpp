@@ -98,6 +98,24 @@ Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions) {
   return bounds({first, first + std::ptrdiff_t(body.vertices)});
 }
 
+TetMesh body_mesh(const Model& model, const Body& body) {
+  const auto part = [](const auto& all, std::size_t first, std::size_t count) {
+    const auto begin = all.begin() + std::ptrdiff_t(first);
+    return std::vector(begin, begin + std::ptrdiff_t(count));
+  };
+  TetMesh mesh{part(model.rest.positions, body.first_vertex, body.vertices),
+               part(model.rest.tets, body.first_tet, body.tets),
+               part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece,
+               body.is_sheet() ? model.rest.thickness : 0};
+  if (!model.rest.fill.empty()) mesh.fill = part(model.rest.fill, body.first_tet, body.tets);
+  const auto shift = [&](auto& elements) {
+    for (auto& element : elements)
+      for (std::uint32_t& v : element) v -= std::uint32_t(body.first_vertex);
+  };
+  shift(mesh.tets), shift(mesh.surface);
+  return mesh;
+}
+
 bool has_own_materials(const Model& model) {
   return std::ranges::any_of(model.bodies, [](const Body& body) { return body.material.has_value(); });
 }

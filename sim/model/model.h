@@ -72,6 +72,8 @@ const Body& body_at(const Model& model, std::size_t vertex);
 /// no body is smaller than an eighth of that, and where bodies touch: corrections of contact are sums of common quanta.
 std::vector<float> quantum_fineness(const Model& model, const Settings& settings);
 double body_mass(const Model& model, const Body& body);  ///< kg
+/// The body's part of the rest mesh, by itself: its vertices are numbered from 0.
+TetMesh body_mesh(const Model& model, const Body& body);
 /// Bounds of the body's vertices, given the positions of all.
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions);
 /// The body's material; `all` is that of the settings, for bodies without their own.

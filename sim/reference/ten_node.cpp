@@ -17,13 +17,7 @@ constexpr std::array<std::array<std::size_t, 4>, 8> eighths{
 
 void halve_body(const Model& model, const Body& body, Halved& result) {
   const auto first = std::uint32_t(body.first_vertex);
-  TetMesh coarse;
-  const auto at = [&](const auto& values, std::size_t from) { return values.begin() + std::ptrdiff_t(from); };
-  const auto& rest = model.rest;
-  coarse.tets.assign(at(rest.tets, body.first_tet), at(rest.tets, body.first_tet + body.tets));
-  for (Tet& tet : coarse.tets)
-    for (std::uint32_t& v : tet) v -= first;
-  coarse.positions.resize(body.vertices);
+  const TetMesh coarse = body_mesh(model, body);
   const auto sides = tet_edges(coarse);
   const auto middle = [&](std::uint32_t a, std::uint32_t b) {
     const std::array<std::uint32_t, 2> side{std::min(a, b), std::max(a, b)};
@@ -31,18 +25,19 @@ void halve_body(const Model& model, const Body& body, Halved& result) {
   };
   // The values at the corners, then those halfway between.
   const auto with_middles = [&](const Points& all) {
-    Points values(at(all, first), at(all, first + body.vertices));
+    const auto begin = all.begin() + std::ptrdiff_t(first);
+    Points values(begin, begin + std::ptrdiff_t(body.vertices));
     for (const auto& [a, b] : sides) values.push_back((values[a] + values[b]) * 0.5);
     return values;
   };
-  TetMesh fine{with_middles(rest.positions), {}, {}};
+  TetMesh fine{with_middles(model.rest.positions), {}, {}};
   for (std::size_t t = 0; t < coarse.tets.size(); ++t) {
     const Tet& tet = coarse.tets[t];
     std::array<std::uint32_t, 10> nodes{tet[0], tet[1], tet[2], tet[3]};
     for (std::size_t e = 0; e < 6; ++e) nodes[4 + e] = middle(tet[edges[e][0]], tet[edges[e][1]]);
     for (const auto& eighth : eighths) {
       fine.tets.push_back({nodes[eighth[0]], nodes[eighth[1]], nodes[eighth[2]], nodes[eighth[3]]});
-      if (!rest.fill.empty()) fine.fill.push_back(rest.fill[body.first_tet + t]);
+      if (!coarse.fill.empty()) fine.fill.push_back(coarse.fill[t]);
     }
   }
   finish_tets(fine, "the tets of body " + body.name + ", halved");
@@ -52,10 +47,8 @@ void halve_body(const Model& model, const Body& body, Halved& result) {
     if (is_fixed(v)) fixed.push_back(v);
   for (const auto& [a, b] : sides)
     if (is_fixed(a) && is_fixed(b)) fixed.push_back(middle(a, b));
-  double mass = 0;
-  for (std::size_t v = 0; v < body.vertices; ++v) mass += model.masses[first + v];
-  add_body(result.model, body.name, fine, mass / filled_volume(fine), with_middles(model.positions), glm::dvec3(0),
-           glm::dvec3(0), fixed);
+  add_body(result.model, body.name, fine, body_mass(model, body) / filled_volume(fine), with_middles(model.positions),
+           glm::dvec3(0), glm::dvec3(0), fixed);
   Body& added = result.model.bodies.back();
   added.material = body.material, added.friction = body.friction;
   std::ranges::copy(with_middles(model.velocities),

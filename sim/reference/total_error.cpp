@@ -19,15 +19,15 @@ TotalError total_error(std::shared_ptr<const Truth> truth, const Model& model) {
     return tet >= own.first_tet && tet < own.first_tet + own.tets;
   };
   CarriedSurface points = carry({finer.rest.positions, {}}, model.rest, "the mesh of " + model.bodies[0].name, belongs);
-  return {std::move(truth), std::move(points)};
+  Points offset = carried_positions(points, model.rest.tets, model.rest.positions);
+  for (std::size_t i = 0; i < offset.size(); ++i) offset[i] = finer.rest.positions[i] - offset[i];
+  return {std::move(truth), std::move(points), std::move(offset)};
 }
 
 void add_state(MotionError& error, const TotalError& total, const Model& model, long step, const State& state) {
-  const Model& finer = *total.truth->model;
   State there{carried_positions(total.points, model.rest.tets, state.positions), {}};
-  const Points rest = carried_positions(total.points, model.rest.tets, model.rest.positions);
-  for (std::size_t i = 0; i < rest.size(); ++i) there.positions[i] += finer.rest.positions[i] - rest[i];
-  add_state(error, total.truth->motion, finer, step, there);
+  for (std::size_t i = 0; i < there.positions.size(); ++i) there.positions[i] += total.offset[i];
+  add_state(error, total.truth->motion, *total.truth->model, step, there);
 }
 
 }  // namespace tetpbd

@@ -17,6 +17,7 @@ struct Truth {
 struct TotalError {
   std::shared_ptr<const Truth> truth;
   CarriedSurface points;
+  Points offset;  ///< m, from where those tets carry them at rest to where they are
 };
 /// Throws Error where the bodies are not the same.
 TotalError total_error(std::shared_ptr<const Truth> truth, const Model& model);

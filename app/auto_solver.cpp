@@ -110,10 +110,16 @@ double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
                            long steps) {
+  if (smoothed(settings) && !solver_mode(settings).smoothed) {  // what is right is of smoothed tets, as asked for
+    Settings own = settings;
+    set_mode(own, "newton", "auto");
+    return choose_solver(model, own, budget_ms, steps);
+  }
   SolverChoice choice{budget_ms, steps, ""};
   std::optional<Motion> right = right_motion(*model, settings);
   if (right) choice.judged = "motion";
   for (const Settings& candidate : candidates(settings)) {
+    if (smoothed(settings) && !solver_mode(candidate).smoothed) continue;
     const bool first = choice.trials.empty(), as_it_is = candidate == settings || solver_mode(candidate).leapfrog;
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
     Sim sim = create_sim(model, candidate);

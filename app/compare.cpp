@@ -23,7 +23,7 @@ namespace {
 // speed against error
 
 const char* compare_columns =
-    "scene,mode,omega,iterations,substeps,fill,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
+    "scene,mode,omega,iterations,substeps,fill,element,vertices,tets,gpu_ms_per_step,wall_ms_per_step,"
     "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
     "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
     "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy,penetration_max,penetration_999,"
@@ -81,14 +81,19 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }
 
+bool has_smoothed_tets(const Settings& settings) { return smoothed(in_mode(settings, settings)); }
+
 /// What is compared: a scene, whose bodies are filled as `fill` says, and what its runs are held against.
 struct Subject {
   std::string fill;  ///< empty: as the scene says
   Scene scene;
   std::shared_ptr<const Model> model{};
-  std::optional<Motion> right{};
+  std::array<std::optional<Motion>, 2> right{};  ///< of linear and of smoothed tets
   std::optional<TotalError> total{};
-  Standard standard() const { return {right ? &*right : nullptr, total ? &*total : nullptr}; }
+  Standard standard(const Settings& settings) const {
+    const auto& own = right[has_smoothed_tets(settings)];
+    return {own ? &*own : nullptr, total ? &*total : nullptr};
+  }
 };
 
 /// "tetgen:SWITCHES" or "lattice:TETS", what follows the colon left out or not, in place of the flags' own.
@@ -130,6 +135,7 @@ ordered_json course_of(const MeasuredRun& run) {
 ordered_json compared(const Subject& subject, const Settings& settings, const MeasuredRun& run) {
   ordered_json row = row_of(subject.scene, *subject.model, settings, run);
   row["fill"] = subject.fill;
+  row["element"] = has_smoothed_tets(settings) ? "smoothed" : "linear";
   row.update(course_of(run));
   row["mass_splitting"] = settings.mass_splitting ? 1 : 0;
   row["gpu_ms_per_step"] = median(run.gpu_ms);
@@ -162,7 +168,8 @@ void mark_front(ordered_json& rows, const Judge& judge) {
 std::string label_of(const ordered_json& row) { return text_of(row["iterations"]) + " x " + text_of(row["substeps"]); }
 std::string series_of(const ordered_json& row) {
   const std::string fill = text_of(row["fill"]), by = fill.substr(0, fill.find(':'));
-  return text_of(row["mode"]) + (fill.empty() ? "" : ", " + by + " " + text_of(row["tets"], 8));
+  return text_of(row["mode"]) + (fill.empty() ? "" : ", " + by + " " + text_of(row["tets"], 8)) +
+         (row["element"] == "smoothed" ? ", smoothed" : "");
 }
 std::string tets_of(const ordered_json& rows) {
   const auto [least, most] = std::ranges::minmax(rows, {}, [](const auto& row) { return number(row, "tets"); });
@@ -246,20 +253,47 @@ void print_best(ordered_json rows, const char* what, std::optional<double> limit
   const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
   const auto& best = *std::ranges::min_element(rows, {}, order);
   fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, {} {:.3g} %)\n",
-             text_of(best["mode"]) + (best["fill"] == "" ? "" : ", " + text_of(best["fill"])),
+             text_of(best["mode"]) + (best["fill"] == "" ? "" : ", " + text_of(best["fill"])) +
+                 (best["element"] == "smoothed" ? ", smoothed" : ""),
              text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best), judge.name,
              error_by(judge, best));
+}
+
+Axes axes_for(const CompareOptions& options, const Settings& own) {
+  Axes axes = options.axes;
+  if (axes.modes.empty() && has_forces(own))
+    axes.modes = {"node", "cpu-fast", "explicit", "newton"};
+  else if (axes.modes.empty())
+    axes.modes = {"node", "constraint", "cpu"};
+  return axes;
+}
+
+/// The right motions of the tets that rows have: what else is varied decides how a scene is solved, not how it moves.
+void find_right_motions(Subject& subject, const CompareOptions& options) {
+  const Axes axes = axes_for(options, subject.scene.settings);
+  Axes others = axes;
+  others.modes.clear();
+  std::vector<Settings> all;
+  for (const std::string& mode : axes.modes)  // baselines among them, which solve linear tets
+    for (Settings settings : combinations(subject.scene.settings, others)) {
+      settings.mode = mode;
+      all.push_back(settings);
+    }
+  for (const Settings& settings : all) {
+    std::optional<Motion>& right = subject.right[has_smoothed_tets(settings)];
+    if (right) continue;
+    Scene scene = subject.scene;
+    scene.settings.mode = settings.mode, scene.settings.element = settings.element;
+    if (options.judge == "motion" || options.judge == "total") require_motion(scene, *subject.model, options.steps);
+    right = right_motion(*subject.model, scene.settings);
+  }
 }
 
 /// A run for each setting, and for each baseline among the modes.
 void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr<const Subject>& subject) {
   const Settings& own = subject->scene.settings;
   const long steps = options.steps;
-  Axes axes = options.axes;
-  if (axes.modes.empty() && has_forces(own))
-    axes.modes = {"node", "cpu-fast", "explicit", "newton"};
-  else if (axes.modes.empty())
-    axes.modes = {"node", "constraint", "cpu"};
+  Axes axes = axes_for(options, own);
   if (sweep.work.empty()) note_unused(own, axes.modes, options.overrides);  // the same for all fills
   for (const Baseline& baseline : baselines()) {
     if (std::erase(axes.modes, baseline.name) == 0) continue;
@@ -271,7 +305,7 @@ void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr
       settings.mode = baseline.name;
       sweep.work.push_back([=] {
         ordered_json row =
-            compared(*subject, settings, baseline.run(*subject->model, settings, steps, subject->standard()));
+            compared(*subject, settings, baseline.run(*subject->model, settings, steps, subject->standard(settings)));
         for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
         return std::vector{row};
       });
@@ -281,7 +315,8 @@ void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr
   for (const Settings& settings : combinations(own, axes))
     sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
       Film film(subject->scene, *subject->model, out, number, sweep.work.size());
-      const MeasuredRun run = run_model(subject->model, settings, steps, subject->standard(), true, film.of(steps));
+      const MeasuredRun run =
+          run_model(subject->model, settings, steps, subject->standard(settings), true, film.of(steps));
       ordered_json row = compared(*subject, settings, run);
       row["film"] = film.write();
       row["reference_distance"] = remaining_after_one_step(subject->model, settings);
@@ -292,7 +327,8 @@ void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
-  Sweep sweep{"compare", "comparison", split(compare_columns, ','), 6, compare_table, {}};
+  Sweep sweep{"compare", "comparison", split(compare_columns, ','), 7, compare_table, {}};
+  if (options.axes.elements.size() > 1) sweep.table.insert(0, "element -10, ");
   if (!options.fills.empty())
     sweep.table.insert(0,
                        fmt::format("fill -{}, ", 2 + std::ranges::max(options.fills, {}, &std::string::size).size()));
@@ -306,10 +342,7 @@ int run_compare(const CompareOptions& options) {
           std::make_shared<Subject>(Subject{fill, load_scene(options.scene, filled_by(options.overrides, fill))});
       subject->model = build_model(subject->scene);
       sweep.facts["dt"] = subject->scene.settings.dt;
-      if (options.judge == "motion" || options.judge == "total")
-        require_motion(subject->scene, *subject->model, options.steps);
-      // The same for all rows: what is varied decides how the scene is solved, not how it moves.
-      subject->right = right_motion(*subject->model, subject->scene.settings);
+      find_right_motions(*subject, options);
       if (options.judge == "total") {
         if (!truth) truth = require_truth(subject->scene, options.steps, options.truth);
         subject->total = total_error(truth, *subject->model);

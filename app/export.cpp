@@ -68,11 +68,17 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
   std::ranges::transform(positions, moved, moved.begin(), std::minus{});
   std::array<std::vector<float>, 3> values;
   std::vector<std::uint32_t> ends;
+  const auto& x = state.positions;
+  std::vector<float> stored(has_averages(sim.system) ? x.size() : 0);  // of smoothed tets, by vertex
+  for (std::size_t v = 0; v < stored.size(); ++v)
+    stored[v] =
+        average_energy(sim.system.averages, v, x, energy_material(solved_material(body_at(model, v), sim.settings)));
   for (std::size_t t = 0; t < tets; ++t) {
     const auto [a, b, c, d] = model.rest.tets[t];
-    const auto& x = state.positions;
-    const glm::vec4 material = energy_material(body_material(body_at(model, a), sim.settings));
-    const TetValues now = tet_values(model, t, {x[a], x[b], x[c], x[d]}, material);
+    const glm::vec4 material = energy_material(solved_material(body_at(model, a), sim.settings));
+    TetValues now = tet_values(model, t, {x[a], x[b], x[c], x[d]}, material);
+    for (const std::uint32_t corner : {a, b, c, d})
+      if (material.z == 3) now.energy += 0.25f * stored[corner];
     values[0].push_back(now.volume), values[1].push_back(now.strain), values[2].push_back(now.energy);
     ends.push_back(std::uint32_t(4 * (t + 1)));
   }

@@ -43,6 +43,7 @@ std::string describe(const Lane& lane, bool material) {
   add(lane.sim.plan.substeps, "substep");
   add(lane.sim.plan.iterations, "iteration");
   if (material && s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
+  if (smoothed(in_mode(s, s))) text += ", smoothed";
   if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
   return text;
 }
@@ -110,6 +111,9 @@ const std::vector<Comparison>& comparisons() {
       {"soft and hard",
        "neo-Hookean by forces, and k = 1",
        {"material=neo-hookean,mode=explicit", "material=none,hard"}},
+      {"linear, smoothed",
+       "tets of a neo-Hookean material, by forces: each by itself, and averaged around vertices",
+       {"material=neo-hookean,mode=explicit,element=linear", "material=neo-hookean,mode=explicit,element=smoothed"}},
       {"forces, implicit, XPBD",
        "of soft bodies: leapfrog at half of what is stable, one implicit step, 20 substeps, 5",
        {"mode=explicit", "newton", "mode=node,iterations=1,substeps=20", "mode=node,iterations=1,substeps=5"}},

@@ -399,6 +399,7 @@ void add_commands(CLI::App& app, Arguments& a) {
       "first if need be; default: motion where it is known)")
       ->check(one_of(std::array{"motion", "volume", "strain", "overlap", "total"}));
   add(compare, "--truth", a.compare.truth, "a finer mesh of the first body, for --judge total (default: made)");
+  add(compare, "--elements", a.compare.axes.elements, "kinds of tets to vary as well: linear, smoothed");
   add(compare, "--fills", a.compare.fills,
       "how surfaces are filled, varied as well: auto, tetgen, tetgen:SWITCHES, lattice, lattice:TETS");
   add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9, "print the best setting within so many ms per step");
@@ -414,7 +415,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(compare, "--cases", a.compare.cases, "hard cases to run (default: all)")->needs(hard);
   add(compare, "--meshes", a.compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
   for (const char* dropped : {"--scene", "--iterations", "--substeps", "--rigid-contact", "--mass-splitting",
-                              "--omegas", "--judge", "--budget-ms", "--error", "--truth", "--fills"})
+                              "--omegas", "--judge", "--budget-ms", "--error", "--truth", "--fills", "--elements"})
     a.apart.push_back({hard, compare.get_option(dropped)});
   compare.add_option("--merge", a.compare.shards.merge, "folders of finished shards, instead of running");
   add_gpu(compare, a.compare.gpu);

@@ -87,23 +87,28 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   if (name == "ground_height") return settings.ground;
   if (name == "friction") return settings.ground || !s.loaded.scene.obstacles.empty();
   if (name == "young_modulus" || name == "poisson_ratio") return material;
+  if (name == "element") return settings.material == "neo-hookean" && mode.smoothed;
+  if (name == "smoothing") return smoothed(in_mode(settings, settings));
   if (name == "constraints") return !material;
   const auto* of = std::get_if<KindMember>(&row.member);
   return !of || (!material && uses(settings, constraint_kinds[of->kind]));
 }
 
-// Beside the number stands whether the mode decides it; then the number shows what it decided.
-void count_widget(Session& s, const Parameter& row, const std::string& id, int& value) {
+// Beside the number stands whether the mode or the material decides it; then the number shows what it decided.
+template <class T>
+void automatic_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
   const Plan& plan = s.loaded.sim().plan;
-  const int decided = row.name == "iterations" ? plan.iterations : plan.substeps;
+  const T decided = row.name == "iterations" ? T(plan.iterations)
+                    : row.name == "substeps" ? T(plan.substeps)
+                                             : T(smoothing_of(s.loaded.sim().settings));
   const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize("auto").x +
                     ImGui::GetStyle().ItemSpacing.x;
-  int shown = value == automatic ? decided : value;
+  T shown = value == automatic ? decided : value;
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - box);
   if (number_widget(row, id, shown)) value = shown;
   ImGui::SameLine();
-  bool by_mode = value == automatic;
-  if (ImGui::Checkbox(("auto" + id).c_str(), &by_mode)) value = by_mode ? automatic : decided;
+  bool by_itself = value == automatic;
+  if (ImGui::Checkbox(("auto" + id).c_str(), &by_itself)) value = by_itself ? T(automatic) : decided;
   mark(s, row.name + " auto");
 }
 
@@ -119,8 +124,8 @@ bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
   }
   const std::string id = begin_row(s, label_of(row.name.c_str()), !back.empty());
   with_value(settings, row, [&]<class T>(T& value) {
-    if constexpr (std::is_same_v<T, int>)
-      if (row.automatic) return count_widget(s, row, id, value);
+    if constexpr (std::is_same_v<T, int> || std::is_same_v<T, double>)
+      if (row.automatic) return automatic_widget(s, row, id, value);
     if constexpr (std::is_same_v<T, bool>)
       ImGui::Checkbox(id.c_str(), &value);
     else if constexpr (!std::is_same_v<T, std::string>)
@@ -142,8 +147,8 @@ struct Group {
 const std::vector<Group> groups = {
     {"Material",
      true,
-     {"material", "young_modulus", "poisson_ratio", "constraints", "k_*"},
-     {"compliance_*", "constraint_damping", "damping"}},
+     {"material", "young_modulus", "poisson_ratio", "element", "constraints", "k_*"},
+     {"smoothing", "compliance_*", "constraint_damping", "damping"}},
     {"Solver",
      true,
      {"mode", "substeps", "iterations", "stability", "dt"},

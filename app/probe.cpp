@@ -12,15 +12,13 @@ namespace tetpbd {
 namespace {
 
 namespace measures {
-using glm::cross, glm::distance, glm::dot, glm::inverse, glm::mat3, glm::vec3, glm::vec4, glm::abs, glm::max, std::log;
+using glm::cross, glm::distance, glm::dot, glm::determinant, glm::inverse, glm::mat3, glm::transpose, glm::vec3,
+    glm::vec4, glm::abs, glm::max, glm::clamp, std::log;
 // clang-format off: in this order
 #include "shaders/energy.glsl"
 #include "shaders/render/values.glsl"
 // clang-format on
 }  // namespace measures
-
-// Floats of the copy: the tet's positions, the vertex's velocity, its distance.
-constexpr std::size_t of_velocity = 4 * sizeof(Position) / 4, of_distance = of_velocity + sizeof(Velocity) / 4;
 
 std::uint32_t tet_behind(const TetMesh& mesh, const Triangle& face) {
   const auto has = [&](const Tet& tet) {
@@ -29,35 +27,52 @@ std::uint32_t tet_behind(const TetMesh& mesh, const Triangle& face) {
   return std::uint32_t(std::ranges::find_if(mesh.tets, has) - mesh.tets.begin());
 }
 
+// Floats of the copy: the positions, the vertex's velocity, its distance.
+std::size_t velocity_at(const Probe& probe) { return probe.read.size() * sizeof(Position) / 4; }
+std::size_t distance_at(const Probe& probe) { return velocity_at(probe) + sizeof(Velocity) / 4; }
+
 void copy_values(Probe& probe, const Lane& lane) {
-  if (!probe.copy) probe.copy = Buffer("probe", (of_distance + 1) * 4, nullptr, GL_STREAM_READ);
   const auto& tet = lane.sim.model->rest.tets[probe.next.tet];
-  for (std::size_t i = 0; i < 4; ++i)
-    lane.sim.positions.copy_to(probe.copy, i * sizeof(Position), tet[i] * sizeof(Position), sizeof(Position));
   const std::size_t vertex = probe.next.vertex;
-  lane.sim.velocities.copy_to(probe.copy, of_velocity * 4, vertex * sizeof(Velocity), sizeof(Velocity));
-  if (lane.apart) lane.apart.copy_to(probe.copy, of_distance * 4, vertex * 4, 4);
+  const Averages& averages = lane.sim.system.averages;
+  probe.read.assign(tet.begin(), tet.end());
+  if (has_averages(lane.sim.system))
+    for (std::uint32_t k = averages.first_neighbour[vertex]; k < averages.first_neighbour[vertex + 1]; ++k)
+      probe.read.push_back(averages.neighbours[k].vertex);
+  const std::size_t bytes = (distance_at(probe) + 1) * 4;
+  if (!probe.copy || probe.copy.bytes() < bytes) probe.copy = Buffer("probe", bytes, nullptr, GL_STREAM_READ);
+  for (std::size_t i = 0; i < probe.read.size(); ++i)
+    lane.sim.positions.copy_to(probe.copy, i * sizeof(Position), probe.read[i] * sizeof(Position), sizeof(Position));
+  lane.sim.velocities.copy_to(probe.copy, velocity_at(probe) * 4, vertex * sizeof(Velocity), sizeof(Velocity));
+  if (lane.apart) lane.apart.copy_to(probe.copy, distance_at(probe) * 4, vertex * 4, 4);
   probe.copied = Fence::here();
 }
 
-Reading reading_of(Reading reading, const Lane& lane, const std::vector<float>& values) {
+std::array<glm::dvec3, 4> corners_of(const Tet& tet, const std::vector<glm::dvec3>& positions) {
+  return {positions[tet[0]], positions[tet[1]], positions[tet[2]], positions[tet[3]]};
+}
+
+Reading reading_of(const Probe& probe, const Lane& lane, const std::vector<float>& values) {
+  Reading reading = probe.next;
   const Model& model = *lane.sim.model;
-  const Tet& tet = model.rest.tets[reading.tet];
+  const Averages& averages = lane.sim.system.averages;
   const auto pair = [&](std::size_t at) {
     return glm::dvec3(values[at], values[at + 1], values[at + 2]) +
            glm::dvec3(values[at + 4], values[at + 5], values[at + 6]);
   };
-  std::array<glm::dvec3, 4> now;
-  for (std::size_t i = 0; i < 4; ++i) {
-    now[i] = pair(8 * i);
-    if (tet[i] == reading.vertex) reading.position = now[i];
-  }
-  reading.speed = glm::length(pair(of_velocity));
-  const glm::vec4 material = energy_material(body_material(body_at(model, reading.vertex), lane.sim.settings));
-  const TetValues measured = tet_values(model, reading.tet, now, material);
+  std::vector<glm::dvec3> now(model.positions.size());  // where they were read
+  for (std::size_t i = 0; i < probe.read.size(); ++i) now[probe.read[i]] = pair(8 * i);
+  reading.position = now[reading.vertex];
+  reading.speed = glm::length(pair(velocity_at(probe)));
+  const glm::vec4 material = energy_material(solved_material(body_at(model, reading.vertex), lane.sim.settings));
+  const TetValues measured = tet_values(model, reading.tet, corners_of(model.rest.tets[reading.tet], now), material);
   reading.volume = double(measured.volume), reading.strain = double(measured.strain);
   if (material.z > 0) reading.energy = double(measured.energy);
-  if (lane.apart) reading.distance = double(values[of_distance]);
+  if (material.z == 3 && probe.read.size() > 4) {
+    reading.volume = average_at(averages, reading.vertex, now).J - 1;
+    *reading.energy += double(average_energy(averages, reading.vertex, now, material));
+  }
+  if (lane.apart) reading.distance = double(values[distance_at(probe)]);
   return reading;
 }
 
@@ -74,6 +89,12 @@ TetValues tet_values(const Model& model, std::size_t tet, const std::array<glm::
   return {measures::tet_value(COLOUR_VOLUME, now, rest, material),
           measures::tet_value(COLOUR_STRETCH, now, rest, material),
           measures::tet_value(COLOUR_ENERGY, now, rest, material)};
+}
+
+float average_energy(const Averages& averages, std::size_t vertex, const std::vector<glm::dvec3>& positions,
+                     const glm::vec4& material) {
+  const Average at = average_at(averages, vertex, positions);
+  return measures::averaged_energy(glm::mat3(at.F), float(at.J), material);
 }
 
 void ask(Probe& probe, const std::vector<Lane>& lanes, std::size_t lane, Renderer& renderer, const Frame& frame,
@@ -97,7 +118,7 @@ bool take_reading(Probe& probe, const std::vector<Lane>& lanes, bool wait) {
     copy_values(probe, lane);
   }
   const auto values = poll_readback<float>(probe.copied, probe.copy, "reading what is under the cursor", wait);
-  if (values) probe.reading = reading_of(probe.next, lane, *values);
+  if (values) probe.reading = reading_of(probe, lane, *values);
   return values.has_value();
 }
 

@@ -96,7 +96,7 @@ Motion read_motion(const std::filesystem::path& file, const Model& model, std::u
   }
   if (motion.positions.empty())
     throw Error("the motion of another scene", file.string(),
-                "its mesh, start, material, world or dt differ: tetpbd reference makes this one's");
+                "its mesh, start, material, element, world or dt differ: tetpbd reference makes this one's");
   return motion;
 }
 
@@ -159,7 +159,9 @@ std::shared_ptr<const Truth> require_truth(const Scene& scene, long steps, const
 
 int run_reference(const Scene& scene, const ReferenceOptions& options) {
   catch_interrupts();
-  const Scene own = options.method == "ten-node" ? finer_scene(scene) : scene;
+  Scene own = options.method == "ten-node" ? finer_scene(scene) : scene;
+  // A run chooses a mode that has them.
+  if (smoothed(own.settings) && own.mode_open) set_mode(own.settings, "newton", own.name);
   fmt::print("{}\n", find_and_keep(own, *build_model(own), options).string());
   return 0;
 }

@@ -57,7 +57,8 @@ json schema() {
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
       "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "up": "text", "deform": "text",
       "tets": [10, 1e8], "spacing": [1e-9, 1e6],
-      "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null},
+      "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null,
+        "element": null, "smoothing": null},
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
         "taper": [0, 0.95], "mirror": "true or false"},
       "sheet": {"size": {"least": 2, "most": 2, "of": "two numbers", "each": [1e-6, 1e6]},
@@ -504,7 +505,9 @@ std::string why_unused(const Settings& s, const std::string& name) {
   if (!mode.leapfrog && is("stability", "mass_scaling")) return "it is of mode explicit";
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
-  if (s.material == "none" && is("young_modulus", "poisson_ratio")) return "there is no material";
+  if (s.material == "none" && is("young_modulus", "poisson_ratio", "element")) return "there is no material";
+  if (is("element") && s.material == "springs") return "springs have no tets";
+  if (is("smoothing") && !smoothed(in_mode(s, s))) return "no tets are smoothed";
   if (s.material != "none" && (is("constraints") || name.starts_with("k_") || name.starts_with("compliance_")))
     return "the material stands in its place";
   for (const ConstraintKind& kind : constraint_kinds)
@@ -518,6 +521,9 @@ std::string why_unused(const Settings& s, const std::string& name) {
 }  // namespace
 
 void note_unused(const Settings& settings, const std::vector<std::string>& modes, const SceneOverrides& overrides) {
+  for (const std::string& mode : modes.empty() ? std::vector{settings.mode} : modes)
+    if (const SolverMode* row = find_solver_mode(mode); row && smoothed(settings) && !row->smoothed)
+      print_error(fmt::format("tetpbd: mode {} has no smoothed tets, and solves linear ones\n", mode));
   for (const auto& [name, text] : overrides.parameters) {
     const std::string key = find_parameter(name)->name;
     std::string why = why_unused(settings, key);

@@ -142,6 +142,9 @@ std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
     set_parameter(s, *find_parameter("constraints"), set, "--constraint-sets");
   });
   vary(axes.modes, [](Settings& s, const std::string& mode) { set_mode(s, mode, "--modes"); });
+  vary(axes.elements, [](Settings& s, const std::string& element) {
+    set_parameter(s, *find_parameter("element"), element, "--elements");
+  });
   vary(axes.rigid_contact, [](Settings& s, int on) { s.rigid_contact = on != 0; });
   vary(axes.mass_splitting, [](Settings& s, int on) { s.mass_splitting = on != 0; });
   vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });

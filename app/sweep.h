@@ -17,7 +17,7 @@ using nlohmann::ordered_json;
 
 /// Settings to combine; an empty list: the scene's own.
 struct Axes {
-  std::vector<std::string> modes{}, constraint_sets{};  ///< sets of kinds joined by +
+  std::vector<std::string> modes{}, constraint_sets{}, elements{};  ///< sets of kinds joined by +
   std::vector<double> omegas{};
   std::vector<int> iterations{}, substeps{};
   std::vector<int> rigid_contact{}, mass_splitting{};  ///< 0 or 1, one at most: they tell no rows apart

@@ -13,8 +13,8 @@ namespace {
 
 constexpr const char* finer_switches = "pYq1.2/15o/130";
 constexpr std::size_t fewest_tets = 5000;  // a surface of few triangles keeps TetGen from making as many
-constexpr double finer_lattice = 45000;  // tets
-constexpr double fewest_cells = 300;     // of a block
+constexpr double finer_lattice = 45000;    // tets
+constexpr double fewest_cells = 300;       // of a block
 
 void refine(BodyDescription& body, const std::string& scene) {
   const auto refuse = [&](const char* what, const char* remedy) {

@@ -42,8 +42,9 @@ Frame make_frame(const Sim& sim, const Camera& camera, const ViewOptions& option
   frame.viewport = {0, 0, target.width, target.height};
   frame.options = options;
   if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
-  frame.material = energy_material(sim.settings);
-  frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
+  frame.material = energy_material(in_mode(sim.settings, sim.settings));
+  if (frame.material.z != 3)
+    frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
   frame.model = sim.model;
   update(frame, sim);
   const auto is_pinned = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };

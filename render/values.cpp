@@ -84,7 +84,8 @@ GLuint find_values(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   const bool of_vertices =
       options.colour == Colour::velocity || options.colour == Colour::motion || options.colour == Colour::patch;
-  if (options.look == Look::tets && !of_vertices && !options.worst) return 0;
+  const bool averaged = frame.material.z == 3;
+  if (options.look == Look::tets && !of_vertices && !averaged && !options.worst) return 0;
   const GLuint value = vertex_values(renderer, frame);
   if (value) glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   if (options.worst && value && !renderer.values_copied) {

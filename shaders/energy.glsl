@@ -19,8 +19,23 @@ float neo_hookean_energy(mat3 F, float J, float shear, float first) {
   return 0.5f * (mu * rest + 0.75f * mu * shape + lambda * j * j);
 }
 
-// The elastic energy, J/m^3 at rest, of a tet with corners p, at rest r. `material` has Lame's mu and lambda in Pa,
-// then 1 for stable neo-Hookean (method.md, "Materials"), 2 for springs, or 0 for no energy.
+// `material` has Lame's mu and lambda in Pa, then 1 for stable neo-Hookean (method.md, "Materials"), 2 for springs, 3
+// for neo-Hookean of smoothed tets, and s of these; or 0 for no energy.
+
+// The energy of shear alone, of such a modulus.
+float shear_energy(mat3 F, float J, float shear) { return neo_hookean_energy(F, J, shear, -5.0f / 6.0f * shear); }
+// J/m^3 at rest, of a smoothed tet itself: a part of shear, and of volume what it resists by itself (smoothed.glsl).
+float smoothed_energy(mat3 F, float J, vec4 material) {
+  float beyond = J - clamp(J, 0.7f, 1.3f), lambda = material.y + 5.0f / 6.0f * material.x;
+  return shear_energy(F, J, material.w * material.x) + 0.5f * lambda * beyond * beyond;
+}
+// J/m^3 at rest, of what smoothed tets leave to the averages around a vertex.
+float averaged_energy(mat3 F, float J, vec4 material) {
+  float lambda = material.y + 5.0f / 6.0f * material.x;
+  return shear_energy(F, determinant(F), (1.0f - material.w) * material.x) + 0.5f * lambda * (J - 1.0f) * (J - 1.0f);
+}
+
+// The elastic energy, J/m^3 at rest, of a tet with corners p, at rest r; of a smoothed one its own.
 float tet_energy(vec3 p[4], vec3 r[4], vec4 material) {
   float J = six_volumes(p) / six_volumes(r);
   if (material.z == 2.0f) {
@@ -32,8 +47,8 @@ float tet_energy(vec3 p[4], vec3 r[4], vec4 material) {
       }
     return 1.25f * material.x * sum + 0.5f * (material.y - material.x) * (J - 1.0f) * (J - 1.0f);
   }
-  if (material.z != 1.0f) return 0.0f;
-  return neo_hookean_energy(mat3(p[1] - p[0], p[2] - p[0], p[3] - p[0]) *
-                                inverse(mat3(r[1] - r[0], r[2] - r[0], r[3] - r[0])),
-                            J, material.x, material.y);
+  if (material.z == 0.0f) return 0.0f;
+  mat3 F =
+      mat3(p[1] - p[0], p[2] - p[0], p[3] - p[0]) * inverse(mat3(r[1] - r[0], r[2] - r[0], r[3] - r[0]));
+  return material.z == 3.0f ? smoothed_energy(F, J, material) : neo_hookean_energy(F, J, material.x, material.y);
 }

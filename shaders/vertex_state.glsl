@@ -1,6 +1,8 @@
 // The state of vertices, for kernels that move them.
 layout(std430) buffer Positions { Position positions[]; };
+#ifndef WITHOUT_VELOCITIES
 layout(std430) buffer Velocities { Velocity velocities[]; };
+#endif
 // Values for sim/adaptive_substeps.h are bits of floats.
 layout(std430) buffer Check {
   uint bad_step, bad_vertex;  // first step whose state is not finite, and its lowest such vertex; ~0: none

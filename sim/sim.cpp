@@ -164,8 +164,8 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
 bool same_constraints(const Model& model, const Settings& a, const Settings& b) {
   const auto decides = [](const Settings& s) {
     const bool dashpots = s.material == "neo-hookean";
-    return std::tuple(kinds_in_use(s), s.material, s.young_modulus, s.poisson_ratio,
-                      dashpots ? s.constraint_damping : 0);
+    return std::tuple(kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
+                      dashpots ? s.constraint_damping : 0, solver_mode(s).smoothed);
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };

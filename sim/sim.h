@@ -67,7 +67,7 @@ struct Sim : StepValues {
 Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings,
                const Tuning& tuning = tuning_from_environment());
 /// How many substeps mode explicit takes for a step at rest, within some percent. The settings must have forces.
-double explicit_substeps(const Model& model, const Settings& settings);
+double explicit_substeps(const Model& model, Settings settings);
 /// Takes over new settings; positions stay, and velocities become those of the new half substep. Makes the solver again
 /// if the mode, the constraint kinds or whether there is compliance changed; where that fails, throws and leaves the
 /// simulation as it was.

@@ -1,3 +1,5 @@
+#ifndef NEO_HOOKEAN
+#define NEO_HOOKEAN
 // Stable neo-Hookean elasticity of a tet (Smith, de Goes and Kim 2018, eq. 14) as two constraints (method.md eqs.
 // 29-31), C_0 = sqrt(I - log(I + 1)) and C_1 = J - alpha, alpha = 1 + 3 mu / (4 lambda), where I is the sum of squared
 // singular values of the deformation gradient and J its determinant.
@@ -34,10 +36,16 @@ Constraint4x2 neo_hookean(vec3 x[4], const real rest[8], Ids ids) {
 real neo_hookean_jacobian(vec3 x[4], const real rest[8]) {
   return dot(cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]) * rest[6];
 }
+// From a third of the trace of the squares' matrix, and of its deviator the length and the determinant.
+real largest_singular_value(real third, real p, real det) {
+  real angle = acos(clamp(p > real(0) ? (det / p) / (real(2) * p * p) : real(1), real(-1), real(1))) / real(3);
+  return sqrt(max(third + real(2) * p * cos(angle), real(1e-12)));
+}
 // A block of the Hessian of the energy, with compliances a[0] and a[1], and a quarter of the difference of the
-// gradients. The part that can be negative, (J - alpha) Hess J, is limited to the positive part, of I, over the largest
-// singular value. At rest it is just that large, because a body turns freely.
-EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i, int j) {
+// gradients, where `beyond` is J - alpha and `own` 1 if that is the tet's own. The part that can be negative, (J -
+// alpha) Hess J, is limited to the positive part, of I, over the largest singular value. At rest it is just that large,
+// because a body turns freely.
+EdgePart neo_hookean_edge(vec3 x[4], const real rest[8], const real a[2], real beyond, real own, int i, int j) {
   vec3 s1 = x[1] - x[0], s2 = x[2] - x[0], s3 = x[3] - x[0];
   vec3 t1 = rest[0] * s1 + rest[1] * s2 + rest[2] * s3;
   vec3 t2 = rest[1] * s1 + rest[3] * s2 + rest[4] * s3;
@@ -50,10 +58,9 @@ EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i,
   real p =
       sqrt(max((d11 * d11 + d22 * d22 + d33 * d33) / real(6) + (d12 * d21 + d13 * d31 + d23 * d32) / real(3), real(0)));
   real det = d11 * (d22 * d33 - d23 * d32) - d12 * (d21 * d33 - d23 * d31) + d13 * (d21 * d32 - d22 * d31);
-  real angle = acos(clamp(p > real(0) ? (det / p) / (real(2) * p * p) : real(1), real(-1), real(1))) / real(3);
-  real longest = sqrt(max(third + real(2) * p * cos(angle), real(1e-12)));
+  real longest = largest_singular_value(third, p, det);
   real share = I / (I + real(1)), limit = share / (a[0] * longest);
-  real bent = (dot(g3, s3) - rest[7]) / a[1], held = clamp(bent, -limit, limit);
+  real bent = beyond / a[1], held = clamp(bent, -limit, limit);
   int low = min(i, j), high = max(i, j);
   real m12 = rest[1], m13 = rest[2], m23 = rest[4];
   real metric = low > 0 ? (low == 2 ? m23 : high == 2 ? m12 : m13)
@@ -64,7 +71,11 @@ EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i,
        gj = chosen(j, g0, g1, g2, g3);
   EdgePart part;
   part.block = mat3(share * metric / a[0]) + outerProduct(ti * (real(2) / (a[0] * (I + real(1)) * (I + real(1)))), tj) +
-               outerProduct(gi / a[1], gj) + cross_matrix(others * ((i < j ? held : -held) * rest[6]));
+               outerProduct(gi * (own / a[1]), gj) + cross_matrix(others * ((i < j ? held : -held) * rest[6]));
   part.force = (ti - tj) * (real(0.25) * share / a[0]) + (gi - gj) * (real(0.25) * bent);
   return part;
 }
+EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i, int j) {
+  return neo_hookean_edge(x, rest, a, neo_hookean_jacobian(x, rest) - rest[7], real(1), i, j);
+}
+#endif

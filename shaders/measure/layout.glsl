@@ -26,8 +26,10 @@
 #define DEPTHS 32
 #define M_ANGULAR 63           // 3: sum m r x u about the centre of mass
 #define M_RIGID_SQUARES 66     // sum m |x - c - R X|^2
-#define M_CENTRE 67            // 3: c - x0
-#define M_ROTATION 70          // 4: quaternion w, x, y, z
-#define M_ORIGIN 74            // 3: x0
-#define M_ROW 77
+#define M_AVERAGED 67          // J, what averages of smoothed tets store; M_ELASTIC has the tets' own
+#define M_AVERAGED_MIDWAY 68
+#define M_CENTRE 69            // 3: c - x0
+#define M_ROTATION 72          // 4: quaternion w, x, y, z
+#define M_ORIGIN 76            // 3: x0
+#define M_ROW 79
 #define M_STRIDE 128           // floats from one body's row to the next: a multiple of any driver's binding alignment

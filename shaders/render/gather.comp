@@ -19,6 +19,27 @@ float error(uint v, uint k) {
   }
   return tet_value(kind, p, r, material);
 }
+// Of smoothed tets by averages around the vertex (method.md, "Smoothed tets"): J - 1, or the energy, with their own.
+// Tets count by their whole volume, also where the body does not fill them.
+float averaged(uint v) {
+  mat3 F = mat3(0.0);
+  float volume = 0.0, J = 0.0, own = 0.0;
+  for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
+    mat3 sides, at_rest;
+    for (int c = 0; c < 3; ++c) {
+      uint j = items[3u * k + uint(c)];
+      sides[c] = position(j) - position(v);
+      at_rest[c] = rest[j].xyz - rest[v].xyz;
+    }
+    float part = determinant(at_rest), change = determinant(sides) / part;
+    mat3 gradient = sides * inverse(at_rest);
+    volume += part, F += part * gradient, J += part * change;
+    own += part * smoothed_energy(gradient, change, material);
+  }
+  if (!(volume > 0.0) || !finite(vec3(own * 1e-25))) return 0.0;
+  J /= volume;
+  return kind == COLOUR_VOLUME ? J - 1.0 : own / volume + averaged_energy(F / volume, J, material);
+}
 #else
 float error(uint v, uint k) {
   return distance(position(items[k]), position(v)) / distance(rest[items[k]].xyz, rest[v].xyz) - 1.0;
@@ -26,6 +47,9 @@ float error(uint v, uint k) {
 #endif
 
 float gathered(uint v) {
+#ifdef TETS
+  if (material.z == 3.0 && (kind == COLOUR_VOLUME || kind == COLOUR_ENERGY)) return averaged(v);
+#endif
   float sum = 0.0;
   uint n = 0u;
   for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {

@@ -18,7 +18,9 @@ bool place_tet(out vec3 p[4], out float value[4]) {
     if (!finite(p[i])) return false;
   }
   int kind = int(view.colour.x);
-  if (kind == COLOUR_VOLUME || kind == COLOUR_STRETCH || kind == COLOUR_ENERGY || kind == COLOUR_RESIDUAL) {
+  bool averaged = view.material.z == 3.0 && (kind == COLOUR_VOLUME || kind == COLOUR_ENERGY);  // of smoothed tets
+  bool by_tet = kind == COLOUR_VOLUME || kind == COLOUR_STRETCH || kind == COLOUR_ENERGY || kind == COLOUR_RESIDUAL;
+  if (by_tet && !averaged) {
     // The exact value of the tet replaces means by vertex, which the surface shows.
     float own = tet_value(kind, p, r, view.material);
     for (int i = 0; i < 4; ++i) value[i] = own;

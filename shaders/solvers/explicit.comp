@@ -1,6 +1,6 @@
 // Mode explicit (method.md eq. 39): every vertex gathers the forces of its constraints and moves, in one dispatch.
 // A work-group owns a patch of neighbouring vertices; a constraint on the border of patches is evaluated in each.
-// Vertices are read from one buffer and written to another.
+// Vertices are read from one buffer and written to another. Where tets are smoothed, smooth.comp comes before.
 #include "types.glsl"
 #include "double_single.glsl"
 #include "quantized.glsl"
@@ -13,7 +13,6 @@ void keep_multiplier(uint record, float lambda) {}
 shared uint stiffest_here;
 #define NOTE_STIFFNESS(value) if ((phases & PHASE_WATCH) != 0u) atomicMax(stiffest_here, floatBitsToUint(value))
 #include "solvers/patch.glsl"
-
 void main() {
   uint lane = gl_LocalInvocationIndex;
   bool exists = group_index() < PATCH_COUNT;

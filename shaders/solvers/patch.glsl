@@ -10,7 +10,8 @@ shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's star
 shared ivec4 local_positions[MAX_VERTICES];  // quantized
 shared uint global_ids[MAX_VERTICES];
 // A quantum of a sum is params.correction_quantum times the vertex's number of constraints. No correction exceeds
-// params.max_correction, which is 2^30 quanta over that number, so no sum overflows.
+// params.max_correction, which is 2^30 quanta over that number. Sums may wrap on the way, where forces of averages
+// cancel, but end in range.
 shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];
 // The first word of a record has a byte for each vertex: its number in the chunk.
@@ -19,6 +20,15 @@ uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
 float record_value(uint number, uint word) {
   return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2u][word % 2u]);
 }
+#if AVERAGED
+layout(std430) restrict readonly buffer Averages { vec4 averages[]; };  // as smooth.comp leaves them
+shared float averages_of_J[MAX_VERTICES];
+float mean_J(uint record) {
+  float sum = 0.0;
+  for (int j = 0; j < 4; ++j) sum += averages_of_J[local_id(record, j)];
+  return 0.25 * sum;
+}
+#endif
 #define Ids uint
 uint id_of(Ids record, int j) { return global_ids[local_id(record, j)]; }
 #include "constraints/types.glsl"
@@ -27,13 +37,15 @@ uint id_of(Ids record, int j) { return global_ids[local_id(record, j)]; }
 #if COUNT_GUARDS
 layout(binding = BIND_GUARDS) uniform atomic_uint guard_counts[GUARDS];
 #endif
-// Several patches may have the same constraint: the one that owns its first vertex counts the guards that triggered.
-void count_guards(uint record, uint owned, uint guards) {
+void count_guards(uint guards) {
 #if COUNT_GUARDS
-  if (local_id(record, 0) >= owned) return;
   for (int g = 0; g < GUARDS; ++g)
     if ((guards & (1u << g)) != 0u) atomicCounterIncrement(guard_counts[g]);
 #endif
+}
+// Several patches may have the same constraint: the one that owns its first vertex counts the guards that triggered.
+void count_guards(uint record, uint owned, uint guards) {
+  if (local_id(record, 0) < owned) count_guards(guards);
 }
 void add_correction(uint local, uint owned, vec3 correction) {
   if (local >= owned) return;
@@ -41,6 +53,31 @@ void add_correction(uint local, uint owned, vec3 correction) {
   for (uint axis = 0u; axis < 3u; ++axis) atomicAdd(sums[3u * local + axis], quanta[axis]);
 }
 #foreach #include "solvers/$PROJECT.glsl"
+#if AVERAGED
+#include "rings.glsl"
+mat3 stress_of(uint i) { return mat3(averages[3u * i].xyz, averages[3u * i + 1u].xyz, averages[3u * i + 2u].xyz); }
+// Adds the forces of averages on the owned vertices, RING_LANES invocations for each.
+void add_ring_forces(uint first, uint owned) {
+  for (uint t = gl_LocalInvocationIndex; t < RING_LANES * owned; t += GROUP_SIZE) {
+    uint local = t / RING_LANES, i = first + local;
+    Ring ring = ring_of(i);
+    uint k = ring.first_neighbour + 2u * (t % RING_LANES);
+    if (k >= ring.end_neighbour) continue;
+    begin_body(i);
+    mat3 own = stress_of(i);
+    vec3 force = vec3(0.0);
+    for (; k < ring.end_neighbour; k += 2u * RING_LANES) {
+      RingNeighbour n = ring_neighbour(k);
+      force += own * n.own - stress_of(n.vertex) * n.other;
+    }
+    vec3 correction = force * (inverse_mass_of(local_positions[local]) * params.h * params.h);
+    float most = FINE(params.max_correction), l = length(correction);
+    bool number = l * 0.0 == 0.0;
+    count_guards(!number ? GUARD_NOT_FINITE : l > most ? GUARD_LIMIT : 0u);
+    if (number) add_correction(local, owned, l > most ? correction * (most / l) : correction);
+  }
+}
+#endif
 
 // A patch is one chunk, or more where its vertices are too many for one; those it owns come first in each.
 struct Chunk {
@@ -60,6 +97,9 @@ void load_chunk(uint number) {
     uvec2 vertex = patch_words[VERTICES_AT + MAX_VERTICES * number + k];
     global_ids[k] = vertex.x;
     local_positions[k] = quantized[vertex.x];
+#if AVERAGED
+    averages_of_J[k] = averages[3u * vertex.x].w;
+#endif
 #if COMPLIANT
     if (params.damping > 0.0) start_positions[k] = quantized[params.vertex_count + vertex.x];
 #endif
@@ -83,6 +123,9 @@ void sum_corrections(Chunk chunk, bool exists) {
   load_chunk(chunk.number);
   barrier();
   project_chunk(chunk, exists);
+#if AVERAGED
+  if (exists) add_ring_forces(chunk.first, chunk.owned);
+#endif
   barrier();
 #if CHUNKED
   for (uint next = chunk.next; next != 0u; next = chunk_at(next).next) {

@@ -98,8 +98,8 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.angular_momentum -= glm::cross(result.centre, result.momentum);
   result.kinetic = sums[M_KINETIC];
   result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
-  result.elastic = sums[M_ELASTIC];
-  result.stored = sums[M_ELASTIC_MIDWAY];
+  result.elastic = sums[M_ELASTIC] + sums[M_AVERAGED];
+  result.stored = sums[M_ELASTIC_MIDWAY] + sums[M_AVERAGED_MIDWAY];
   result.total = result.kinetic + result.stored + pending.gravity * (heights - m.mass * pending.ground);
   result.work = sums[M_WORK];
   result.contacts = sums[M_CONTACTS];
@@ -167,6 +167,9 @@ void measure(Metrics& m, const Sim& sim) {
   recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
   recorder.give("Rest", m.rest), recorder.give("Partials", m.partials);
   const double midway = solver_mode(sim.settings).implicit ? 0 : 0.5 * sim.plan.h;
+  const auto& bindings = sim.solver.bindings;
+  const auto rings = std::ranges::find(bindings, "Rings", &std::pair<std::string, GLuint>::first);
+  recorder.give("Rings", rings != bindings.end() ? rings->second : m.rest.id());
   for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
@@ -175,15 +178,20 @@ void measure(Metrics& m, const Sim& sim) {
     const unsigned groups = unsigned(std::clamp<std::size_t>(work_groups(items, METRICS_SIZE), 1, METRICS_GROUPS));
     const Program& sums = recorder.use(m.passes[0].program);
     sums.set("edge_range", body.edges), sums.set("hinge_range", body.hinges), sums.set("tet_range", body.tets);
-    const Material& material = body_material(sim.model->bodies[b], sim.settings);
+    const Material material = solved_material(sim.model->bodies[b], sim.settings);
     const auto& shares = sim.solver.stiffness_shares;
     const float share = shares.empty() ? 1.0f : shares[b];  // what the solver holds it to have
-    sums.set("material", glm::vec4(share, share, 1, 1) * energy_material(material));
+    const glm::vec4 energies = glm::vec4(share, share, 1, 1) * energy_material(material);
+    sums.set("material", energies);
     sums.set("energy_per_square", share * energy_per_square(material));
     sums.set("midway", float(midway)), sums.set("touching", float(1e-5 * body.size));
     for (Pass& pass : m.passes) {
       const Program& kernel = recorder.use(pass.program);
       kernel.set("vertex_range", body.vertices), kernel.set("mass", float(body.mass));
+      if (&pass != &m.passes[0]) {
+        kernel.set("material", energies), kernel.set("midway", float(midway));
+        kernel.set("averaged", smoothed(material) && rings != bindings.end() ? 1u : 0u);
+      }
       pass.work_groups = groups;
       recorder.run(pass, {{"groups", groups}});
     }

@@ -31,6 +31,7 @@ struct ConstraintKind {
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
   bool curved = false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
   bool tet = false;             ///< has NAME_jacobian(), the volume over that at rest
+  bool averaged = false;        ///< its last C is by averages around its vertices (averages.h)
   bool rate = false;            ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
   constexpr bool of_material() const { return most_compliance == 0; }
 };
@@ -92,6 +93,22 @@ struct NeoHookean {
   static std::array<double, 8> rest(glm::dvec3* x);  // the last is alpha, which material.cpp sets
 };
 ADD_KIND(NeoHookean)
+struct Smoothed {
+  static constexpr ConstraintKind row{.name = "smoothed",
+                                      .arity = 4,
+                                      .noun = "smoothed tets",
+                                      .compliance_unit = "1/J",
+                                      .most_compliance = 0,
+                                      .values = 8,
+                                      .components = 2,
+                                      .curved = true,
+                                      .tet = true,
+                                      .averaged = true};
+  FORMULA(smoothed)
+  static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
+  static std::array<double, 8> rest(glm::dvec3* x) { return NeoHookean::rest(x); }
+};
+ADD_KIND(Smoothed)
 struct Dashpot {
   static constexpr ConstraintKind row{
       .name = "dashpot", .arity = 2, .noun = "edges", .compliance_unit = "m/(N s)", .most_compliance = 0, .rate = true};

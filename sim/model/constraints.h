@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sim/mesh/tet_mesh.h"
+#include "sim/model/averages.h"
 #include "sim/model/constraint_kinds.h"
 
 namespace tetpbd {
@@ -42,8 +43,11 @@ struct ConstraintSystem {
   std::vector<ConstraintList> lists;     ///< one per kind, empty for a kind left out
   std::vector<bool> present;             ///< by kind, whether its list has any
   std::vector<std::uint32_t> at_vertex;  ///< n_i, constraints of all kinds on vertex i
+  Averages averages{};                   ///< of smoothed tets
   std::size_t count() const;
 };
+/// Whether tets are smoothed, so that there are averages.
+inline bool has_averages(const ConstraintSystem& system) { return !system.averages.vertices.empty(); }
 /// The constraints of a mesh of the kinds that `names` ("stretch,volume") lists.
 ConstraintSystem build_constraints(const TetMesh& mesh, const std::string& names);
 

@@ -13,15 +13,23 @@ Lame lame(double young_modulus, double poisson_ratio) {
 glm::vec4 energy_material(const Material& material) {
   if (material.material == "none") return glm::vec4(0);
   const Lame own = lame(material.young_modulus, material.poisson_ratio);
-  return glm::vec4(own.mu, own.lambda, material.material == "springs" ? 2 : 1, 0);
+  return glm::vec4(own.mu, own.lambda,
+                   material.material == "springs" ? 2
+                   : smoothed(material)           ? 3
+                                                  : 1,
+                   smoothing_of(material));
 }
 
 namespace {
 
 // Smith's parameters (2018, eq. 16) that have the linear elasticity of `m` at rest are mu = 4/3 mu_Lame and
 // lambda = lambda_Lame + 5/6 mu_Lame.
-void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m) {
-  const double mu = 4.0 / 3 * m.mu, lambda = m.lambda + 5.0 / 6 * m.mu;
+Lame smith_moduli(const Lame& m) { return {4.0 / 3 * m.mu, m.lambda + 5.0 / 6 * m.mu}; }
+
+// `share` is the part of mu that the tets have themselves.
+void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m, double share = 1) {
+  const auto [whole, lambda] = smith_moduli(m);
+  const double mu = share * whole;
   for (std::size_t c = 0; c < tets.count(); ++c) {
     double* rest = tets.rest.data() + 8 * c;
     rest[7] = 1 + 0.75 * mu / lambda;
@@ -79,6 +87,8 @@ void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body&
     to.present[k] = to.present[k] || own.count() > 0;
   }
   for (std::size_t i = 0; i < body.vertices; ++i) to.at_vertex[body.first_vertex + i] = from.at_vertex[i];
+  if (has_averages(from) || has_averages(to))
+    append(to.averages, from.averages, body.vertices, std::uint32_t(body.first_vertex));
 }
 
 }  // namespace
@@ -91,18 +101,25 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
   const Lame m = lame(material.young_modulus, material.poisson_ratio);
   if (material.material == "springs")
     make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], mesh, m);
-  if (material.material == "neo-hookean") make_neo_hookean(system.lists[index_of<NeoHookean>], mesh, m);
+  if (material.material == "neo-hookean" && !smoothed(material))
+    make_neo_hookean(system.lists[index_of<NeoHookean>], mesh, m);
+  const ConstraintList& tets = system.lists[smoothed(material) ? index_of<Smoothed> : index_of<NeoHookean>];
+  if (smoothed(material)) {
+    const double s = smoothing_of(material);
+    const auto [mu, lambda] = smith_moduli(m);
+    make_neo_hookean(system.lists[index_of<Smoothed>], mesh, m, s);
+    system.averages = average_tets(mesh, mu, lambda, s);
+  }
   if (system.present[index_of<Dashpot>])
-    make_dashpots(system.lists[index_of<Dashpot>], system.lists[index_of<NeoHookean>], mesh, m,
-                  material.constraint_damping);
+    make_dashpots(system.lists[index_of<Dashpot>], tets, mesh, m, material.constraint_damping);
   return system;
 }
 
-ConstraintSystem build_constraints(const Model& model, const Material& all) {
-  if (!has_own_materials(model)) return build_constraints(model.rest, all);
+ConstraintSystem build_constraints(const Model& model, const Settings& settings) {
+  if (!has_own_materials(model)) return build_constraints(model.rest, in_mode(settings, settings));
   ConstraintSystem system = build_constraints(TetMesh{model.rest.positions, {}, {}}, "");
   for (const Body& body : model.bodies) {
-    const Material& own = body_material(body, all);
+    const Material own = solved_material(body, settings);
     append_body(system, build_constraints(body_mesh(model, body), own), body, own);
   }
   return system;

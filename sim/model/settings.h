@@ -12,7 +12,7 @@
 
 namespace tetpbd {
 
-/// The value of a count that is left to the mode.
+/// The value of a number that is left to the mode, or to the material.
 inline constexpr int automatic = -1;
 
 /// The surroundings of all bodies, without the obstacles of the model.
@@ -31,7 +31,9 @@ struct Material {
   std::string material = "none";  ///< the model (material.h), in place of kinds, stiffness and compliance
   double young_modulus = 1e6;     ///< Pa
   double poisson_ratio = 0.3;
-  double constraint_damping = 0;  ///< s
+  std::string element = "linear";  ///< of neo-Hookean tets: linear or smoothed
+  double smoothing = automatic;    ///< s, the part of a smoothed tet's resistance to shear that is its own
+  double constraint_damping = 0;   ///< s
   std::string constraints = "stretch,bend,volume";
   std::array<double, kind_count> stiffness = [] {  ///< k_NAME by kind, 0 to 1
     std::array<double, kind_count> hard;
@@ -47,7 +49,7 @@ struct SolverSettings {
   std::string mode = "node";
   int iterations = automatic;
   int substeps = automatic;
-  double dt = 0.005;       ///< s
+  double dt = 0.005;            ///< s
   double stability = 0.4;       ///< in mode explicit, a substep over the longest that is stable at rest
   double mass_scaling = 0.001;  ///< in mode explicit, the part of a body's mass that may be added where it is stiffest
   double omega = 1.5;
@@ -91,7 +93,7 @@ struct Parameter {
   const char* unit = "";
   bool logarithmic = false;  ///< slider scale
   Effect effect = Effect::live;
-  bool automatic = false;  ///< also accepts the word auto, which leaves it to the mode
+  bool automatic = false;  ///< also accepts the word auto, which leaves it to the mode or the material
 };
 /// Calls f with a reference to the parameter's value in `settings`, a double, int, bool or std::string.
 template <class S, class F>
@@ -136,8 +138,8 @@ bool compliant(const Material& material);
 std::optional<std::string> kind_without_force(const Material& material);
 /// Whether constraints resist their rate.
 bool damped(const Material& material);
-/// Whether bodies of this material move as rigid ones (method.md, "Hard bodies are rigid"): the kinds in use keep a shape
-/// and all have k = 1.
+/// Whether bodies of this material move as rigid ones (method.md, "Hard bodies are rigid"): the kinds in use keep a
+/// shape and all have k = 1.
 bool moves_rigidly(const Settings& settings, const Material& material);
 inline bool moves_rigidly(const Settings& settings) { return moves_rigidly(settings, settings); }
 /// Whether all kinds in use have k = 1 and none has compliance. With stretch among them, the exact solution is then the
@@ -145,6 +147,14 @@ inline bool moves_rigidly(const Settings& settings) { return moves_rigidly(setti
 bool hard(const Material& material);
 /// The kinds in use, separated by commas: those of the material model, else `constraints`.
 std::string kinds_in_use(const Material& material);
+/// Whether its tets are smoothed, in modes that have them.
+inline bool smoothed(const Material& material) {
+  return material.material == "neo-hookean" && material.element == "smoothed";
+}
+/// s of smoothed tets: as it was given, or by Poisson's ratio (method.md, "Smoothed tets").
+double smoothing_of(const Material& material);
+/// The material as the settings' mode solves it: of linear tets where the mode has no smoothed ones.
+Material in_mode(Material material, const Settings& settings);
 bool uses(const Material& material, const ConstraintKind& kind);  ///< whether the kind is in use
 
 /// Throws Error for values out of range and for settings that exclude each other; `where` names the file or flag.

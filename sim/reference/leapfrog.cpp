@@ -7,6 +7,7 @@
 
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
+#include "sim/reference/smoothed.h"
 
 namespace tetpbd {
 
@@ -27,6 +28,8 @@ void for_each_spring(const Leapfrog& run, F&& visit) {
 // and -(grad C . v) grad C / alpha where only the rate counts.
 Points accelerations(Leapfrog& run) {
   const double all = run.input.settings.constraint_damping;
+  const Averages& rings = run.input.system.averages;
+  run.averages = find_averages(rings, run.x);
   const bool has_dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of damping of C
   for_each_spring(run, [&](auto kind, const ConstraintList& list, auto&& alpha, std::size_t offset) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
@@ -41,6 +44,8 @@ Points accelerations(Leapfrog& run) {
       for (int k = 0; k < kind.row.components; ++k) {
         const auto [C, gradient] = component(value, k);
         double size = kind.row.rate ? 0 : C;
+        if constexpr (kind.row.averaged)
+          if (k == 1) size -= own_volume(x, vertices, list, c, run.averages).excess;
         const double damping = kind.row.rate ? 1 : list.damping_at(c, has_dashpots ? 0 : all);
         for (std::size_t j = 0; j < arity; ++j) size += damping * glm::dot(gradient[j], run.v[vertices[j]]);
         for (std::size_t j = 0; j < arity; ++j) run.parts[offset + c * arity + j] -= size / alpha(c)[k] * gradient[j];
@@ -52,10 +57,11 @@ Points accelerations(Leapfrog& run) {
     std::ranges::copy(forces(run.tets[t], run.x), run.parts.begin() + std::ptrdiff_t(first + 10 * t));
   });
   const glm::dvec3 gravity(0, -run.input.settings.gravity, 0);
+  const Points pull = average_forces(rings, run.averages);
   Points a(run.x.size(), glm::dvec3(0));
   parallel_for(a.size(), 1024, [&](std::size_t i) {
     if (run.input.inverse_masses[i] == 0) return;
-    glm::dvec3 force(0);
+    glm::dvec3 force = pull.empty() ? glm::dvec3(0) : pull[i];
     for (std::uint32_t k = run.at_vertex.first[i]; k < run.at_vertex.first[i + 1]; ++k)
       force += run.parts[run.at_vertex.values[k]];
     a[i] = gravity + force * run.input.inverse_masses[i];
@@ -201,7 +207,10 @@ double stiffest_constraint(const ReferenceInput& input, const Compliances& compl
         weights[j] = input.inverse_masses[vertices[j]] * input.system.at_vertex[vertices[j]];
       const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
       Formulas<double> formulas;
-      if constexpr (kind.row.components == 2)
+      if constexpr (kind.row.averaged)
+        stiffest =
+            std::max(stiffest, formulas.smoothed_bound(value, x.data(), weights.data(), &list.rest[8 * c], alpha(c)));
+      else if constexpr (kind.row.components == 2)
         stiffest = std::max(stiffest, formulas.stiffness_bound(value, x.data(), weights.data(), alpha(c)));
       else
         stiffest = std::max(stiffest, formulas.stiffness_bound(value, x.data(), weights.data(), *alpha(c)));

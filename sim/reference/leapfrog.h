@@ -26,6 +26,7 @@ struct Leapfrog {
   Grouped at_vertex;                ///< the parts that act on each vertex
   std::vector<double> time = {0};   ///< s, one number
   std::vector<State::Held> held{};  ///< as in State
+  std::vector<Average> averages{};  ///< of smoothed tets, by vertex
   PairContact pairs{input.model};
 };
 /// A run from `start`, whose positions and velocities are of one instant. Throws Error for compliances not above 0.

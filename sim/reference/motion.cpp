@@ -186,10 +186,13 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   }
   const Settings& s = input.settings;
   const auto add_material = [&](const Material& m) {
+    for (std::size_t k = 0; m.material == "none" && k < kind_count; ++k)
+      if (!constraint_kinds[k].of_material()) add(std::array{m.stiffness[k], m.compliance[k]});
     if (m.material == "none")
-      add(m.constraints), add(m.stiffness), add(m.compliance);
+      add(m.constraints);
     else
       add(m.material), add(std::array{m.young_modulus, m.poisson_ratio});
+    if (smoothed(in_mode(m, s))) add(m.element), add(std::array{smoothing_of(m)});
   };
   add_material(s);
   for (const Body& body : model.bodies) {
@@ -207,9 +210,19 @@ std::uint64_t scene_key(const Model& model, const Settings& settings) {
   return scene_key({model, {}, settings, model.inverse_masses});
 }
 
+namespace {
+
+// Those of no mode, so that tets are not smoothed.
+Settings of_linear_tets(Settings settings) {
+  settings.mode.clear();
+  return settings;
+}
+
+}  // namespace
+
 std::uint64_t motion_key(const Model& model, const Settings& settings, const std::string& method) {
-  const std::uint64_t key = scene_key(model, settings);
-  return method == "ten-node" ? hash_values(method, key) : key;
+  if (method == "ten-node") return hash_values(method, scene_key(model, of_linear_tets(settings)));
+  return scene_key(model, settings);
 }
 
 namespace {
@@ -224,7 +237,7 @@ Motion find_ten_node_motion(const ReferenceInput& input, long steps, const std::
     throw Error("the bodies have no motion on finer meshes", "constraints alone, or a sheet",
                 "give them a material, which does not depend on the mesh");
   const Halved halved = halve_edges(input.model);
-  const ConstraintSystem system = build_constraints(halved.model, input.settings);
+  const ConstraintSystem system = build_constraints(halved.model, of_linear_tets(input.settings));
   Motion motion = find_motion({halved.model, system, input.settings, halved.model.inverse_masses, true}, steps,
                               "leapfrog", unfinished, progress);
   motion.method = "ten-node", motion.scene = motion_key(input.model, input.settings, motion.method);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/reference/smoothed.h"
+
 namespace tetpbd {
 
 namespace {
@@ -15,16 +17,24 @@ glm::dvec3 drag_displacement(const Objective::Drag& drag, const Points& position
   return moved - drag.normal * glm::dot(drag.normal, moved);
 }
 
-// The energy of a component of C: stiffness / 2 (C - offset)^2.
+// The energy of a component of C: stiffness / 2 (C - offset)^2. By averages, of which vertices store what they resist,
+// it has stiffness / 2 own^2 instead (smoothed.glsl).
 struct Spring {
   double stiffness = 0, offset = 0;
+  bool averaged = false;
+  double own = 0;
 };
+
+Spring by_averages(double stiffness, const OwnVolume& own) {
+  return {stiffness, own.excess, true, Formulas<double>{}.own_resistance(own.J)};
+}
 
 // Calls visit(Kind{}, vertex numbers, positions relative to the first, rest values, a Spring per component) for every
 // constraint with an energy or damping.
 template <class F>
 void for_each_constraint(const Objective& o, const Points& positions, F&& visit) {
   std::size_t number = 0;  // of the component
+  const std::vector<Average> averages = find_averages(o.system.averages, positions);
   for_each_elastic<true>(o.system, o.compliances, [&](auto kind, const ConstraintList& list, auto&& alpha) {
     constexpr ConstraintKind row = decltype(kind)::row;
     constexpr std::size_t arity = std::size_t(row.arity);
@@ -39,6 +49,8 @@ void for_each_constraint(const Objective& o, const Points& positions, F&& visit)
         springs[k] = {(elastic + damped) / alpha(c)[k], 0};
         if (damped > 0) springs[k].offset = damped / (elastic + damped) * o.before[number];
       }
+      if constexpr (row.averaged)
+        springs[1] = by_averages(springs[1].stiffness, own_volume(x, vertices, list, c, averages));
       visit(kind, vertices, x, &list.rest[c * std::size_t(row.values)], springs);
     }
   });
@@ -60,11 +72,13 @@ Energy evaluate_energy(const Objective& o, const Points& positions) {
   for_each_constraint(o, positions, [&](auto kind, const auto*, auto& x, const double* rest, auto& springs) {
     const auto c = unclamped<decltype(kind)>(x, rest);
     for (int k = 0; k < kind.row.components; ++k) {
-      const auto [stiffness, offset] = springs[std::size_t(k)];
-      const double C = component(c, k).first - offset;
-      add(stiffness / 2 * C * C);
+      const Spring& s = springs[std::size_t(k)];
+      const double C = s.averaged ? s.own : component(c, k).first - s.offset;
+      add(s.stiffness / 2 * C * C);
     }
   });
+  for_each_average(o.system.averages, positions,
+                   [&](std::size_t, const Averages::Vertex& v, const Average& at) { add(average_energy(v, at)); });
   for (const Objective::Drag& drag : o.drags) {
     const double slip = glm::length(drag_displacement(drag, positions));
     add(drag.force * (slip < drag.reach ? slip * slip / (2 * drag.reach) : slip - drag.reach / 2));
@@ -94,10 +108,12 @@ Points gradient(const Objective& o, const Points& positions) {
     const auto c = unclamped<decltype(kind)>(x, rest);
     for (int k = 0; k < kind.row.components; ++k) {
       const auto [C, by_vertex] = component(c, k);
-      const auto [stiffness, offset] = springs[std::size_t(k)];
-      for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += stiffness * (C - offset) * by_vertex[j];
+      const Spring& s = springs[std::size_t(k)];
+      for (std::size_t j = 0; j < x.size(); ++j) g[v[j]] += s.stiffness * (C - s.offset) * by_vertex[j];
     }
   });
+  const Points pull = average_forces(o.system.averages, find_averages(o.system.averages, positions));
+  for (std::size_t i = 0; i < pull.size(); ++i) g[i] -= pull[i];
   for (const Objective::Drag& drag : o.drags) {
     const glm::dvec3 slip = drag_displacement(drag, positions);
     g[drag.vertex] += drag.force / std::max(glm::length(slip), drag.reach) * slip;
@@ -150,7 +166,8 @@ auto constraint_hessian(std::array<glm::dvec3, arity>& x, const double* rest, co
   hessian = (0.5 * (hessian + hessian.transpose())).eval();
   for (int k = 0; k < Kind::row.components; ++k) {
     const Eigen::Map<const Vector> g(&component(here, k).second->x);
-    hessian += springs[std::size_t(k)].stiffness * g * g.transpose();
+    if (!springs[std::size_t(k)].averaged || springs[std::size_t(k)].own != 0)
+      hessian += springs[std::size_t(k)].stiffness * g * g.transpose();
   }
   if (project) {
     const Eigen::SelfAdjointEigenSolver<Matrix> modes(hessian);
@@ -176,6 +193,18 @@ Sparse assemble(const Objective& o, const Points& positions, bool project) {
         if (row >= column && o.masses[to] > 0 && o.masses[from] > 0) entries.emplace_back(row, column, local(r, c));
       }
   });
+  for (std::size_t v = 0; v < o.system.averages.vertices.size(); ++v) {
+    const AverageHessian average = average_hessian(o.system.averages, v, positions, project);
+    for (std::size_t i = 0; i < average.slopes.size(); ++i)
+      for (std::size_t j = 0; j < average.slopes.size(); ++j) {
+        const std::uint32_t to = average.ids[i], from = average.ids[j];
+        if (to < from || !(o.masses[to] > 0 && o.masses[from] > 0)) continue;
+        const glm::dmat3 block = average.block(i, j);
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c)
+            if (to > from || r >= c) entries.emplace_back(3 * int(to) + r, 3 * int(from) + c, block[c][r]);
+      }
+  }
   for (const Objective::Drag& drag : o.drags) {
     const glm::dvec3 slip = drag_displacement(drag, positions);
     const double length = glm::length(slip);

@@ -5,6 +5,7 @@
 
 #include "sim/contact/pairs.h"
 #include "sim/sim.h"
+#include "sim/solvers/rings.h"
 
 namespace tetpbd {
 
@@ -80,12 +81,12 @@ Pass make_patch_pass(Solver& solver, const SolverInput& input, const Patches& pa
   const std::size_t owned = std::max<std::size_t>(patches.most_owned, 1),
                     vertices = std::max<std::size_t>(patches.largest, 1);
   std::vector<std::string> defines = vertex_defines(input);
-  defines.insert(defines.end(),
-                 {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
-                  define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
-                  define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8), define("MAX_VERTICES", vertices),
-                  define("MAX_OWNED", owned), define("CHUNKED", patches.chunked),
-                  define("COUNT_GUARDS", input.tuning.count_guards)});
+  defines.insert(defines.end(), {define("GROUP_SIZE", group), define("PATCH_COUNT", patches.count),
+                                 define("CHUNK_PAIRS", patches.chunk_words / 2), define("VERTICES_AT", chunk_bytes / 8),
+                                 define("RECORDS_AT", (chunk_bytes + vertex_bytes) / 8),
+                                 define("MAX_VERTICES", vertices), define("MAX_OWNED", owned),
+                                 define("CHUNKED", patches.chunked), define("AVERAGED", has_averages(input.system)),
+                                 define("RING_LANES", 16), define("COUNT_GUARDS", input.tuning.count_guards)});
   const std::size_t most_blocks = contacts_lag(input.model, input.settings) ? 10 : 8;
   return {Program::compute(shader, {{}, kind_words(input.system)}, defines, most_blocks), patches.count, bytes};
 }

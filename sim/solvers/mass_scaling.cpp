@@ -13,6 +13,21 @@ namespace {
 std::vector<double> stiffness_at_rest(const ReferenceInput& input) {
   std::vector<double> stiffness(input.model.masses.size(), 0);
   const auto& rest = input.model.rest.positions;
+  // Each average resists through all vertices around it; shear counts as by C[0] of a tet at rest.
+  const Averages& averages = input.system.averages;
+  constexpr double by_shear = 9 / (16 * (3 - 1.3862943611198906));
+  const auto resistance = [&](std::size_t v, const glm::dvec3& gradient) {
+    const Averages::Vertex& at = averages.vertices[v];
+    return (by_shear * at.shear + at.bulk) * glm::dot(gradient, gradient) / at.volume;
+  };
+  for (std::size_t v = 0; v < averages.vertices.size(); ++v) {
+    glm::dvec3 own(0);
+    for (std::uint32_t k = averages.first_neighbour[v]; k < averages.first_neighbour[v + 1]; ++k) {
+      const Averages::Neighbour& n = averages.neighbours[k];
+      own -= n.own, stiffness[v] += resistance(n.vertex, n.other);
+    }
+    if (averages.vertices[v].volume > 0) stiffness[v] += resistance(v, own);
+  }
   for_each_elastic(input.system, input.settings.compliance, [&](auto kind, const ConstraintList& list, auto&& alpha) {
     constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
     for (std::size_t c = 0; c < list.count(); ++c) {
@@ -20,7 +35,7 @@ std::vector<double> stiffness_at_rest(const ReferenceInput& input) {
       std::array<glm::dvec3, arity> x;
       for (std::size_t j = 0; j < arity; ++j) x[j] = rest[vertices[j]] - rest[vertices[0]];
       const auto value = unclamped<decltype(kind)>(x, &list.rest[c * std::size_t(kind.row.values)]);
-      for (int k = 0; k < kind.row.components; ++k)
+      for (int k = 0; k < kind.row.components - int(kind.row.averaged); ++k)
         for (std::size_t j = 0; j < arity; ++j) {
           const glm::dvec3 gradient = component(value, k).second[j];
           stiffness[vertices[j]] += glm::dot(gradient, gradient) / alpha(c)[k];

@@ -9,6 +9,7 @@
 
 #include "sim/sim.h"
 #include "sim/solvers/newton_buffers.h"
+#include "sim/solvers/rings.h"
 
 namespace tetpbd {
 
@@ -24,12 +25,13 @@ struct Refresh {
 
 struct Newton {
   Pass begin, predict, start, linearise, residual, update, coarse, prolong, product, finish;
+  Pass averages, stresses;   ///< only where tets are smoothed
   Pass again;                ///< before a second round
   Pass momentum;             ///< only where a body is free
   Pass start_motion, place;  ///< only where obstacles can stop one
   std::shared_ptr<const NewtonLevels> levels;
   NewtonBuffers layout;
-  std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0;  ///< indices of Solver::buffers
+  std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0, rings = 0;  ///< indices of Solver::buffers
   Refresh refresh;
   double refreshed_for = 0;  ///< s, the substep of the last refresh
   /// The coarse level by the substep it is for, with the present forces: substeps change back and forth.
@@ -59,6 +61,11 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   n.coarse = pass("coarse", groups(sizes.row_lanes * sizes.unknowns()), 16 * sizes.coarse);
   n.prolong = pass("prolong", groups(sizes.vertices), 7 * vector);
   n.product = pass("product", turns, of_matrix + 4 * vector);
+  if (has_averages(input.system)) {
+    const std::size_t rings = 32 * sizes.edges * 2;
+    n.averages = pass("averages", turns, rings + 24 * 16 * sizes.vertices);
+    n.stresses = pass("stresses", turns, rings + 32 * sizes.edges + 7 * vector);
+  }
   n.finish = pass("finish", groups(sizes.vertices), 14 * vector);
   n.again = pass("again", groups(sizes.vertices), 14 * vector);
   if (sizes.free_bodies > 0) n.momentum = pass("momentum", sizes.parts * sizes.free_bodies, 7 * vector);
@@ -70,9 +77,12 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
 }
 
 void run_round(Sim& sim, Newton& n, unsigned again) {
-  run_kernel(sim, n.start, again), run_kernel(sim, n.linearise, again), run_kernel(sim, n.residual, again);
+  run_kernel(sim, n.start, again);
+  if (n.averages) run_kernel(sim, n.averages, again);
+  run_kernel(sim, n.linearise, again), run_kernel(sim, n.residual, again);
   for (unsigned k = 0; k < unsigned(sim.plan.iterations); ++k) {
     run_kernel(sim, n.update, k | again), run_kernel(sim, n.coarse, k | again), run_kernel(sim, n.prolong, k | again);
+    if (n.stresses) run_kernel(sim, n.stresses, k | again);
     run_kernel(sim, n.product, (k + 1) | again);
   }
 }
@@ -214,6 +224,10 @@ void retune(Sim& sim, Newton& n, const Settings* before) {
   for (std::size_t k = 0; others && k < kind_count; ++k)
     for (const auto& [name, array, range] : constraint_arrays)
       write(mesh, n.layout.constraints[k].*range, to_floats(system.lists[k].*array));
+  if (others && has_averages(system)) {
+    const std::vector<glm::uvec4> words = ring_words(system.averages);
+    sim.solver.buffers[n.rings].write(0, words.size() * sizeof words[0], words.data());
+  }
   if (!others && forces(*before) == forces(sim.settings)) return;
   n.coarse_levels.clear();
   begin_refresh(sim, n);
@@ -242,7 +256,9 @@ Solver create_newton_solver(const SolverInput& whole) {
     return solver.buffers.size() - 1;
   };
   n.vectors = add("Vectors", Buffer("vectors", fill_newton_vectors(input.model, n.layout), GL_DYNAMIC_COPY));
-  add("Blocks", Buffer("matrix", std::max<std::size_t>(sizes.edges, 1) * sizeof(newton::EdgeBlock)));
+  const std::size_t of_averages = has_averages(input.system) ? 6 * sizes.vertices + 2 * sizes.edges : 0;
+  add("Blocks", Buffer("matrix", std::max<std::size_t>(sizes.edges, 1) * sizeof(newton::EdgeBlock) + 16 * of_averages));
+  if (has_averages(input.system)) n.rings = add("Rings", Buffer("rings", ring_words(input.system.averages)));
   n.mesh = add("Mesh", Buffer("constraints and edges", fill_newton_mesh(input, *levels, sizes, n.layout)));
   n.coarse_matrix = add("Coarse", Buffer("coarse matrix", fill_newton_coarse(input, *levels, n.layout)));
   n.sums = add("Sums", Buffer("sums", std::vector<std::byte>(n.layout.sums.bytes), GL_DYNAMIC_COPY));

@@ -105,6 +105,7 @@ std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverIn
                                     {"PARTS", sizes.parts},
                                     {"RIGID_START", sizes.rigid_start}})
     defines.push_back(fmt::format("{} {}u", name, value));
+  defines.push_back(define("AVERAGED", has_averages(input.system)));
   for (std::size_t k = 0; k < kind_count; ++k)
     if (input.system.present[k])
       defines.push_back(fmt::format("COUNT_{} {}u", constraint_kinds[k].name, input.system.lists[k].count()));
@@ -135,6 +136,10 @@ ConstraintSystem soften(ConstraintSystem system, const Model& model, const std::
       for (std::size_t k = 0; k < each; ++k)
         list.compliance[each * c + k] /= double(shares[body_of(model, list.ends(c)[0])]);
     }
+  for (std::size_t v = 0; v < system.averages.vertices.size() && !shares.empty(); ++v) {
+    const double share = double(shares[body_of(model, v)]);
+    system.averages.vertices[v].shear *= share, system.averages.vertices[v].bulk *= share;
+  }
   return system;
 }
 
@@ -244,10 +249,10 @@ namespace {
 
 // Of each free body its centre of mass at rest, and 1/s^2, its stiffness against a force on opposite faces (of a cube E
 // times the edge) over its mass; 0 of the others.
-std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& levels,
-                                        const std::vector<glm::dmat3>& blocks) {
+std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& levels, const BlocksAtRest& matrix,
+                                        bool averaged) {
   std::vector<glm::dvec4> bodies(model.bodies.size(), glm::dvec4(0));
-  const Grouped& neighbours = levels.graph.neighbours;
+  const auto& [neighbours, blocks] = matrix;
   for (const std::uint32_t b : levels.free_bodies) {
     const std::size_t first = model.bodies[b].first_vertex, end = first + model.bodies[b].vertices;
     const double mass = body_mass(model, model.bodies[b]);
@@ -261,7 +266,9 @@ std::vector<glm::dvec4> describe_bodies(const Model& model, const NewtonLevels& 
       for (std::size_t n = neighbours.first[v]; n < neighbours.first[v + 1]; ++n) {
         const glm::dvec3 edge = model.rest.positions[neighbours.values[n]] - x;
         const glm::dmat3& block = blocks[n];
-        stiffness += std::abs(block[0][0] + block[1][1] + block[2][2]) / 6 * glm::dot(edge, edge);  // each edge twice
+        const double trace = block[0][0] + block[1][1] + block[2][2];
+        // Averages couple neighbours of neighbours with either sign, which cancels.
+        stiffness += (averaged ? -trace : std::abs(trace)) / 6 * glm::dot(edge, edge);  // each edge twice
       }
     }
     bodies[b] = {centre / mass, stiffness / (box.size() * box.size() / 3) / mass};
@@ -276,12 +283,12 @@ std::vector<glm::vec4> fill_newton_coarse(const SolverInput& input, const Newton
   const double h = input.plan.h * 2 / 3;  // s, by which BDF2 multiplies a velocity
   std::vector<double> inertia;
   for (const double w : input.model.inverse_masses) inertia.push_back(w > 0 ? 1 / (w * h * h) : 0);
-  const std::vector<glm::dmat3> blocks = compute_blocks_at_rest(input, levels.graph, h);
-  const std::vector<glm::dvec4> described = describe_bodies(input.model, levels, blocks);
+  const BlocksAtRest matrix = compute_blocks_at_rest(input, levels.graph, h);
+  const std::vector<glm::dvec4> described = describe_bodies(input.model, levels, matrix, has_averages(input.system));
   const std::vector<glm::vec4> bodies(described.begin(), described.end());
   const std::size_t count = bodies.size();
   std::vector<std::vector<float>> inverses(count);
-  const BlockRows rows{levels.graph.neighbours, inertia, blocks};
+  const BlockRows rows{matrix.neighbours, inertia, matrix.blocks};
   parallel_for(count, count < 8 ? count : 1, [&](std::size_t b) {
     const glm::dvec3 pivot(described[b]);
     const bool rigid =

@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+
 #include "sim/error.h"
+#include "sim/reference/smoothed.h"
 
 namespace tetpbd {
 
@@ -59,7 +63,9 @@ glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList&
   std::array<glm::dvec3, arity> x;
   for (std::size_t k = 0; k < arity; ++k) x[k] = input.model.rest.positions[list.ends(c)[k]];
   const double* rest = &list.rest[c * std::size_t(Kind::row.values)];
-  if constexpr (Kind::row.components == 2) {
+  if constexpr (Kind::row.averaged) {
+    return Formulas<double>{}.smoothed_part(x.data(), rest, &list.compliance[2 * c], 1, i, j).block;
+  } else if constexpr (Kind::row.components == 2) {
     return Formulas<double>{}.neo_hookean_part(x.data(), rest, &list.compliance[2 * c], i, j).block;
   } else {
     const double a = list.compliance.empty() ? settings.compliance[index_of<Kind>] : list.compliance[c];
@@ -70,9 +76,35 @@ glm::dmat3 compute_block_at_rest(const SolverInput& input, const ConstraintList&
   }
 }
 
+// Adds what averages of smoothed tets make of each row.
+BlocksAtRest add_averages(const BlocksAtRest& tets, const Averages& averages, const Points& rest) {
+  const std::size_t count = rest.size();
+  std::vector<AverageHessian> hessians(count);
+  parallel_for(count, 256, [&](std::size_t v) { hessians[v] = average_hessian(averages, v, rest, true); });
+  std::vector<std::map<std::uint32_t, glm::dmat3>> rows(count);
+  parallel_for(count, 64, [&](std::size_t v) {
+    for (std::uint32_t n = tets.neighbours.first[v]; n < tets.neighbours.first[v + 1]; ++n)
+      rows[v].emplace(tets.neighbours.values[n], tets.blocks[n]);
+    for (const std::uint32_t around : hessians[v].ids) {
+      const AverageHessian& average = hessians[around];
+      const auto own = std::size_t(std::ranges::find(average.ids, v) - average.ids.begin());
+      for (std::size_t j = 0; j < average.slopes.size(); ++j)
+        if (average.ids[j] != v) rows[v].try_emplace(average.ids[j], 0.0).first->second += average.block(own, j);
+    }
+  });
+  BlocksAtRest result;
+  result.neighbours.first = {0};
+  for (const auto& row : rows) {
+    for (const auto& [neighbour, block] : row)
+      result.neighbours.values.push_back(neighbour), result.blocks.push_back(block);
+    result.neighbours.first.push_back(std::uint32_t(result.blocks.size()));
+  }
+  return result;
+}
+
 }  // namespace
 
-std::vector<glm::dmat3> compute_blocks_at_rest(const SolverInput& input, const NewtonGraph& graph, double h) {
+BlocksAtRest compute_blocks_at_rest(const SolverInput& input, const NewtonGraph& graph, double h) {
   std::vector<glm::dmat3> of_edge(graph.edges(), glm::dmat3(0)), blocks(graph.edge_of.size());
   parallel_for(
       of_edge.size(),
@@ -92,7 +124,9 @@ std::vector<glm::dmat3> compute_blocks_at_rest(const SolverInput& input, const N
     const glm::dmat3& block = of_edge[graph.edge_of[n] / 2];
     blocks[n] = graph.edge_of[n] % 2 ? glm::transpose(block) : block;
   });
-  return blocks;
+  BlocksAtRest result{graph.neighbours, std::move(blocks)};
+  const Averages& averages = input.system.averages;
+  return !has_averages(input.system) ? result : add_averages(result, averages, input.model.rest.positions);
 }
 
 }  // namespace tetpbd

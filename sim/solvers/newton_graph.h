@@ -34,7 +34,12 @@ struct NewtonGraph {
 /// Throws Error where a kind has more constraints than a use can name.
 NewtonGraph build_newton_graph(const ConstraintSystem& system, std::size_t vertices);
 
-/// Blocks by neighbour, J/m^2, for steps of BDF2 of `h` seconds.
-std::vector<glm::dmat3> compute_blocks_at_rest(const SolverInput& input, const NewtonGraph& graph, double h);
+/// Blocks by neighbour, J/m^2. With smoothed tets neighbours of neighbours are among them.
+struct BlocksAtRest {
+  Grouped neighbours;
+  std::vector<glm::dmat3> blocks;
+};
+/// Of the matrix at rest, for steps of BDF2 of `h` seconds.
+BlocksAtRest compute_blocks_at_rest(const SolverInput& input, const NewtonGraph& graph, double h);
 
 }  // namespace tetpbd

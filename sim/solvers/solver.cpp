@@ -57,6 +57,7 @@ static const std::vector<SolverMode> rows = {
      .create = MADE_BY(create_explicit_solver),
      .leapfrog = true,
      .pairs = true,
+     .smoothed = true,
      .substeps = 1},
     {.name = "newton",
      .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
@@ -64,6 +65,7 @@ static const std::vector<SolverMode> rows = {
      .create = MADE_BY(create_newton_solver),
      .implicit = true,
      .pairs = true,
+     .smoothed = true,
      .iterations = 4,
      .substeps = 1},
     {.name = "paper",
@@ -137,6 +139,7 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
                      {"OWN", list.stiffness.empty() ? "0" : "1"},
                      {"PROJECT", kind.components == 1 ? "project" : "project_two"},
                      {"RATE", kind.rate ? "1" : "0"},
+                     {"AVERAGED", kind.averaged ? "1" : "0"},
                      {"VALUES", std::to_string(kind.values)},
                      {"COMPONENTS", std::to_string(kind.components)},
                      {"CURVED", kind.curved ? "1" : "0"},

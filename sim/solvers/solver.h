@@ -88,6 +88,7 @@ struct SolverMode {
   bool implicit = false;              ///< forces in implicit steps, in place of corrections
   bool leapfrog = false;              ///< forces in place of corrections, in as many substeps as stay stable
   bool pairs = false;                 ///< contact between bodies
+  bool smoothed = false;              ///< has smoothed tets, in place of which others solve linear ones
   bool jacobi = false;                ///< corrections are averaged, or masses split
   bool cpu = false;                   ///< steps on the CPU, where `Sim::host` is the state
   bool all_cores = false;             ///< of the CPU

@@ -231,7 +231,7 @@ TEST_CASE("compare finds the front, and shards merge to the same rows") {
   CHECK(read(folder.path / "whole/compare.svg").starts_with("<svg"));
   CHECK(read(folder.path / "whole/compare.png").substr(1, 3) == "PNG");
   CHECK(read(folder.path / "whole/compare.csv")
-            .starts_with("scene,mode,omega,iterations,substeps,fill,vertices,tets,gpu_ms_per_step"));
+            .starts_with("scene,mode,omega,iterations,substeps,fill,element,vertices,tets,gpu_ms_per_step"));
   CHECK(program("compare --shard 4/3", folder).status == 2);
   CHECK(program("compare --merge nowhere --out x", folder).status == 2);
   CHECK(program("compare --merge part1 part1 --out x", folder).status == 2);

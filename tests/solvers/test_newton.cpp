@@ -64,6 +64,7 @@ Settings soft(const std::string& material, double tau = 0) {
   Settings settings;
   settings.mode = "newton", settings.material = material, settings.constraint_damping = tau;
   settings.young_modulus = 1e5, settings.iterations = 30, settings.substeps = 1;
+  if (material == "smoothed") settings.material = "neo-hookean", settings.element = "smoothed";
   if (material == "none") {
     settings.compliance[index_of<Stretch>] = 1e-4, settings.compliance[index_of<Volume>] = 5e-9;
     settings.compliance[index_of<Bend>] = 1;
@@ -292,7 +293,8 @@ TEST_CASE("newton: the coarse matrix is the fine one between rigid motions, inve
 
 TEST_CASE("newton: its motion nears that of leapfrog with the square of the step, damped or not") {
   GlTest gl;
-  for (const auto& [material, tau] : {std::pair{"none", 2e-3}, {"springs", 0.0}, {"neo-hookean", 2e-3}}) {
+  for (const auto& [material, tau] :
+       {std::pair{"none", 2e-3}, {"springs", 0.0}, {"neo-hookean", 2e-3}, {"smoothed", 0.0}, {"smoothed", 2e-3}}) {
     CAPTURE(material);
     const auto model = irregular_block(1, true, {0.3, 0, 0}, {0, 0, 1});
     Settings settings = soft(material, tau);
@@ -316,14 +318,17 @@ TEST_CASE("newton: its motion nears that of leapfrog with the square of the step
 TEST_CASE("newton: what falls freely falls as it should, spinning, in few iterations") {
   GlTest gl;
   const auto model = irregular_block(30, false, {1, 0, 2}, {3, -2, 4});
-  Settings settings = soft("neo-hookean");
-  settings.iterations = 4;
-  Sim sim = create_sim(model, settings);
-  const auto [centre, spin] = centre_and_spin(*model, {model->positions, model->velocities});
-  for (int s = 0; s < 80; ++s) step(sim);
-  const auto [now, left] = centre_and_spin(*model, read_state(sim));
-  CHECK(glm::length(now - (centre + glm::dvec3(0.4, -0.5 * 9.81 * 0.16, 0.8))) < 1e-3);
-  CHECK(glm::length(left - spin) < 0.03 * glm::length(spin));
+  for (const char* material : {"neo-hookean", "smoothed"}) {
+    CAPTURE(material);
+    Settings settings = soft(material);
+    settings.iterations = 4;
+    Sim sim = create_sim(model, settings);
+    const auto [centre, spin] = centre_and_spin(*model, {model->positions, model->velocities});
+    for (int s = 0; s < 80; ++s) step(sim);
+    const auto [now, left] = centre_and_spin(*model, read_state(sim));
+    CHECK(glm::length(now - (centre + glm::dvec3(0.4, -0.5 * 9.81 * 0.16, 0.8))) < 1e-3);
+    CHECK(glm::length(left - spin) < 0.03 * glm::length(spin));
+  }
 }
 
 TEST_CASE("newton: a stiff block that spins fast keeps its spin in more substeps, and gains no energy") {
@@ -406,15 +411,17 @@ int inverted_tets(const Sim& sim) {
 
 TEST_CASE("newton: hostile starts end whole") {
   GlTest gl;
-  for (const char* how : {"squash:0.1", "mirror", "random", "invert-one", "stretch:4", "flatten"}) {
-    CAPTURE(how);
-    Settings settings = soft("neo-hookean", 2e-3);
-    settings.young_modulus = 1e6, settings.poisson_ratio = 0.45, settings.iterations = 8;
-    Sim sim = create_sim(deformed(how), settings);
-    for (int s = 0; s < 200; ++s) step(sim);
-    CHECK_FALSE(check_finite(sim, true));
-    CHECK(inverted_tets(sim) == 0);
-  }
+  for (const char* material : {"neo-hookean", "smoothed"})
+    for (const char* how : {"squash:0.1", "mirror", "random", "invert-one", "stretch:4", "flatten"}) {
+      CAPTURE(material);
+      CAPTURE(how);
+      Settings settings = soft(material, 2e-3);
+      settings.young_modulus = 1e6, settings.poisson_ratio = 0.45, settings.iterations = 8;
+      Sim sim = create_sim(deformed(how), settings);
+      for (int s = 0; s < 200; ++s) step(sim);
+      CHECK_FALSE(check_finite(sim, true));
+      CHECK(inverted_tets(sim) == 0);
+    }
 }
 
 TEST_CASE("newton: three iterations keep the momentum and the energy of stiff free bodies") {

@@ -12,7 +12,15 @@ void add_$KIND(uint number, uint start, int i, int j, inout mat3 block, inout ve
 #if $COMPONENTS == 2
   float a[2];
   for (uint k = 0u; k < 2u; ++k) a[k] = compliances_$KIND[2u * number + k];
+#if $AVERAGED
+  float mean = 0.0;
+  for (int k = 0; k < 4; ++k) mean += 0.25 * averages[3u * ids[k]].w;
+  EdgePart part = $KIND_part(x, rest_$KIND(number), a, mean, i, j);
+  slope_of_first += smoothed_slope(x, rest_$KIND(number), j) * (0.25 / a[1]);
+  slope_of_second += smoothed_slope(x, rest_$KIND(number), i) * (0.25 / a[1]);
+#else
   EdgePart part = $KIND_part(x, rest_$KIND(number), a, i, j);
+#endif
   block += part.block;
   force += part.force;
 #else

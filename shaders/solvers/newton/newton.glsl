@@ -25,7 +25,16 @@ ivec4 start_at(uint start, uint i) { return floatBitsToInt(at(RESIDUAL + start, 
 #ifndef BLOCKS_ARE
 #define BLOCKS_ARE readonly
 #endif
-layout(std430) restrict BLOCKS_ARE buffer Blocks { EdgeBlock blocks[]; };
+layout(std430) restrict BLOCKS_ARE buffer Blocks {
+#if AVERAGED
+  // What smoothed tets add (method.md, "Smoothed tets"): each average of F and J resists all vertices around it, so
+  // that a product takes two passes, stresses.comp and product.comp.
+  vec4 averages[3u * VERTICES];  // columns of F at Newton's start; J, shear_hold(), 0
+  vec4 stresses[3u * VERTICES];  // of a product: the change of stress; of pressure
+  vec4 slopes[2u * EDGES];       // V lambda dJ/dx of an edge's first vertex by its second's position, and reversed
+#endif
+  EdgeBlock blocks[];
+};
 
 // In a block of several arrays all but the last need a size, which may not be 0. Long ones hold numbers or vectors,
 // because Mesa's linker goes through a sized array of structs or arrays element by element. An array that begins with

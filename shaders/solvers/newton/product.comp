@@ -1,7 +1,13 @@
-// A z, row by row, and its dot products with r and z. LANES invocations per vertex; work-groups are of one body, of
-// which the last to end adds the body's dot products up, in the order of the rows.
+// A z, row by row, of smoothed tets after stresses.comp, and its dot products with r and z. LANES invocations per
+// vertex; work-groups are of one body, of which the last to end adds the body's dot products up, in the order of the
+// rows.
 #define COLUMNS 1
+#define WITHOUT_VELOCITIES
 #include "solvers/newton/newton.glsl"
+#if AVERAGED
+#include "rings.glsl"
+mat3 stress_at(uint i) { return mat3(stresses[3u * i].xyz, stresses[3u * i + 1u].xyz, stresses[3u * i + 2u].xyz); }
+#endif
 shared vec3 parts[GROUP_SIZE];
 shared bool last;
 void add_up(uint body, uint begin, uint end) {
@@ -27,12 +33,23 @@ void main() {
   vec3 sum = vec3(0.0), own = vec3(0.0);
   if (i < range.end) {
     own = at(SEARCH, i).xyz;
-    uint end = first_neighbour[i + 1u];
-    for (uint k = first_neighbour[i] + lane % LANES; k < end; k += LANES) {
+    uint first = first_neighbour[i], end = first_neighbour[i + 1u];
+#if AVERAGED
+    Ring ring = ring_of(i);
+    mat3 stress = stress_at(i);
+    float pressure = stresses[3u * i].w;
+#endif
+    for (uint k = first + lane % LANES; k < end; k += LANES) {
       uint edge = neighbours[k].x, e = edge >> 1;
       vec3 c0 = blocks[e].columns[0].xyz, c1 = blocks[e].columns[1].xyz, c2 = blocks[e].columns[2].xyz;
       vec3 d = at(SEARCH, neighbours[k].y).xyz - own;
       sum += (edge & 1u) == 0u ? c0 * d.x + c1 * d.y + c2 * d.z : vec3(dot(c0, d), dot(c1, d), dot(c2, d));
+#if AVERAGED
+      if (!(ring.inverse_volume > 0.0)) continue;
+      RingNeighbour n = ring_neighbour(ring.first_neighbour + 2u * (k - first));
+      sum += stress_at(n.vertex) * n.other - stress * n.own + slopes[edge ^ 1u].xyz * stresses[3u * n.vertex].w -
+             slopes[edge].xyz * pressure;
+#endif
     }
   }
   parts[lane] = sum;

@@ -1,7 +1,23 @@
 // The residual at Newton's start, the inverse diagonal blocks, and which obstacles hold a vertex. LANES invocations per
 // vertex.
+#define WITHOUT_VELOCITIES
 #include "solvers/newton/newton.glsl"
+#if AVERAGED
+#include "solvers/newton/smoothing.glsl"
+// Adds the diagonal block by which an average resists a vertex with such gradients of V F and V lambda J.
+void add_resistance(Ring ring, mat3 F, vec3 gradient, vec3 slope, inout vec3 diagonal, inout vec3 across) {
+  float I = squares(F) + 1.0, shear = ring.shear * ring.inverse_volume, bulk = ring.inverse_volume / ring.bulk;
+  vec3 along = F * gradient;
+  float turn = 2.0 * shear / (I * I);
+  diagonal += vec3(shear * (1.0 - 1.0 / I) * dot(gradient, gradient)) + turn * along * along + bulk * slope * slope;
+  across += turn * vec3(along.x * along.y, along.x * along.z, along.y * along.z) +
+            bulk * vec3(slope.x * slope.y, slope.x * slope.z, slope.y * slope.z);
+}
+#endif
 shared vec3 parts[3][GROUP_SIZE];
+#if AVERAGED
+shared vec3 own_parts[2][GROUP_SIZE];
+#endif
 
 void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
   Position own = positions[i];
@@ -57,26 +73,52 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
 void main() {
   uint lane = gl_LocalInvocationIndex, row = lane / LANES, i = group_index() * (GROUP_SIZE / LANES) + row;
   vec3 force = vec3(0.0), diagonal = vec3(0.0), across = vec3(0.0);
+#if AVERAGED
+  vec3 own_gradient = vec3(0.0), own_slope = vec3(0.0);
+  Ring ring = ring_of(min(i, VERTICES - 1u));
+  mat3 F = average_F(min(i, VERTICES - 1u)), stress = shear_stress(F) * ring.shear;
+#endif
   if (i < VERTICES) {
-    uint end = first_neighbour[i + 1u];
-    for (uint k = first_neighbour[i] + lane % LANES; k < end; k += LANES) {
+    uint first = first_neighbour[i], end = first_neighbour[i + 1u];
+    for (uint k = first + lane % LANES; k < end; k += LANES) {
       uint edge = neighbours[k].x, e = edge >> 1;
       vec4 c0 = blocks[e].columns[0], c1 = blocks[e].columns[1], c2 = blocks[e].columns[2];
       vec3 f = vec3(c0.w, c1.w, c2.w);
       force += (edge & 1u) == 0u ? f : -f;
       diagonal -= vec3(c0.x, c1.y, c2.z);
       across -= 0.5 * vec3(c0.y + c1.x, c0.z + c2.x, c1.z + c2.y);
+#if AVERAGED
+      if (!(ring.inverse_volume > 0.0)) continue;
+      RingNeighbour n = ring_neighbour(ring.first_neighbour + 2u * (k - first));
+      Ring other = ring_of(n.vertex);
+      mat3 of_other = average_F(n.vertex);
+      force += shear_stress(of_other) * n.other * other.shear - stress * n.own;
+      add_resistance(other, of_other, n.other, slopes[edge ^ 1u].xyz, diagonal, across);
+      own_gradient -= n.own;
+      own_slope -= slopes[edge].xyz;
+#endif
     }
   }
   parts[0][lane] = force;
   parts[1][lane] = diagonal;
   parts[2][lane] = across;
+#if AVERAGED
+  own_parts[0][lane] = own_gradient;
+  own_parts[1][lane] = own_slope;
+#endif
   barrier();
   if (lane % LANES != 0u || i >= VERTICES) return;
   for (uint k = 1u; k < LANES; ++k) {
     force += parts[0][lane + k];
     diagonal += parts[1][lane + k];
     across += parts[2][lane + k];
+#if AVERAGED
+    own_gradient += own_parts[0][lane + k];
+    own_slope += own_parts[1][lane + k];
+#endif
   }
+#if AVERAGED
+  if (ring.inverse_volume > 0.0) add_resistance(ring, F, own_gradient, own_slope, diagonal, across);
+#endif
   finish(i, force, diagonal, across);
 }

@@ -118,17 +118,17 @@ TEST_CASE("the command line overrides, and its errors name the flag") {
 }
 
 TEST_CASE("a scene of a lattice takes TetGen from the command line, and the size of the lattice goes") {
-  const BodyDescription shipped = load_scene("clamped-bunny").bodies[0];
+  const BodyDescription shipped = load_scene("jelly-bunny").bodies[0];
   CHECK(shipped.fill == "lattice");
   CHECK(shipped.tets == 24000);
   for (const char* other : {"tetgen", "auto"}) {
-    const BodyDescription body = load_scene("clamped-bunny", {.fill = other}).bodies[0];
+    const BodyDescription body = load_scene("jelly-bunny", {.fill = other}).bodies[0];
     CHECK(body.fill == other);
     CHECK_FALSE((body.tets || body.spacing));
   }
-  CHECK(load_scene("clamped-bunny", {.fill = "lattice"}).bodies[0].tets == 24000);
-  CHECK(load_scene("clamped-bunny", {.mesh = "another.ply"}).bodies[0].fill == "auto");
-  CHECK(load_scene("clamped-bunny", {.fill = "lattice", .spacing = 0.1}).bodies[0].spacing == 0.1);
+  CHECK(load_scene("jelly-bunny", {.fill = "lattice"}).bodies[0].tets == 24000);
+  CHECK(load_scene("jelly-bunny", {.mesh = "another.ply"}).bodies[0].fill == "auto");
+  CHECK(load_scene("jelly-bunny", {.fill = "lattice", .spacing = 0.1}).bodies[0].spacing == 0.1);
 }
 
 TEST_CASE("a fixed side of a box that a lattice fills is all of that side") {
@@ -137,7 +137,7 @@ TEST_CASE("a fixed side of a box that a lattice fills is all of that side") {
       "f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\n"
       "f 1 5 8\nf 1 8 4\nf 2 3 7\nf 2 7 6\n",
       ".obj");
-  Scene scene = load_scene("clamped-bunny");
+  Scene scene = load_scene("jelly-bunny");
   scene.bodies[0].mesh = cube.path, scene.bodies[0].tets = 1000;
   scene.bodies[0].fixed = {{{0, 0, 0}, {1, 0, 1}}};
   const auto model = build_model(scene);

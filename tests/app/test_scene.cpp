@@ -137,7 +137,7 @@ TEST_CASE("a fixed side of a box that a lattice fills is all of that side") {
       "f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\n"
       "f 1 5 8\nf 1 8 4\nf 2 3 7\nf 2 7 6\n",
       ".obj");
-  Scene scene = load_scene("jelly-bunny");
+  Scene scene = load_scene("clamped-bunny", {.fill = "lattice"});
   scene.bodies[0].mesh = cube.path, scene.bodies[0].tets = 1000;
   scene.bodies[0].fixed = {{{0, 0, 0}, {1, 0, 1}}};
   const auto model = build_model(scene);

@@ -24,10 +24,14 @@ float neo_hookean_energy(mat3 F, float J, float shear, float first) {
 
 // The energy of shear alone, of such a modulus.
 float shear_energy(mat3 F, float J, float shear) { return neo_hookean_energy(F, J, shear, -5.0f / 6.0f * shear); }
-// J/m^3 at rest, of a smoothed tet itself: a part of shear, and of volume what it resists by itself (smoothed.glsl).
-float smoothed_energy(mat3 F, float J, vec4 material) {
-  float beyond = J - clamp(J, 0.7f, 1.3f), lambda = material.y + 5.0f / 6.0f * material.x;
-  return shear_energy(F, J, material.w * material.x) + 0.5f * lambda * beyond * beyond;
+// J/m^3 at rest, of a smoothed tet itself: a part of shear, and of volume what it resists by itself (smoothed.glsl). Of
+// a linear one all.
+float own_energy(mat3 F, float J, vec4 material) {
+  bool smoothed = material.z == 3.0f;
+  float shear = smoothed ? material.w * material.x : material.x;
+  float beyond = smoothed ? J - clamp(J, 0.7f, 1.3f) : 0.0f, lambda = material.y + 5.0f / 6.0f * material.x;
+  float first = smoothed ? -5.0f / 6.0f * shear : material.y;
+  return neo_hookean_energy(F, J, shear, first) + 0.5f * lambda * beyond * beyond;
 }
 // J/m^3 at rest, of what smoothed tets leave to the averages around a vertex.
 float averaged_energy(mat3 F, float J, vec4 material) {
@@ -48,7 +52,6 @@ float tet_energy(vec3 p[4], vec3 r[4], vec4 material) {
     return 1.25f * material.x * sum + 0.5f * (material.y - material.x) * (J - 1.0f) * (J - 1.0f);
   }
   if (material.z == 0.0f) return 0.0f;
-  mat3 F =
-      mat3(p[1] - p[0], p[2] - p[0], p[3] - p[0]) * inverse(mat3(r[1] - r[0], r[2] - r[0], r[3] - r[0]));
-  return material.z == 3.0f ? smoothed_energy(F, J, material) : neo_hookean_energy(F, J, material.x, material.y);
+  mat3 F = mat3(p[1] - p[0], p[2] - p[0], p[3] - p[0]) * inverse(mat3(r[1] - r[0], r[2] - r[0], r[3] - r[0]));
+  return own_energy(F, J, material);
 }

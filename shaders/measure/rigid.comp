@@ -3,11 +3,11 @@
 #define FIRST M_ANGULAR
 #define REDUCED 6
 #include "measure/reduce.glsl"
+#ifdef AVERAGED
 #include "energy.glsl"
 #include "averages.glsl"
 uniform vec4 material;  // energy.glsl
 uniform float midway;   // s, the age of the positions that velocities belong to
-uniform uint averaged;  // 1: the body has smoothed tets, and there is a block Rings
 uint around;
 float age;
 vec3 ring_side(uint j) {
@@ -22,6 +22,7 @@ float averages_store(uint i, float before) {
   add_averages(ring, 0u, 1u, F, J);
   return averaged_energy(F * ring.inverse_volume, J * ring.inverse_volume, material) / ring.inverse_volume;
 }
+#endif
 
 void main() {
   vec3 centre = vec3(row[M_CENTRE], row[M_CENTRE + 1], row[M_CENTRE + 2]);
@@ -39,9 +40,10 @@ void main() {
     vec3 apart = r - (X + 2.0 * cross(q, cross(q, X) + w * X));
     squares += at_rest.w * dot(apart, apart);
     angular += at_rest.w * cross(r, u);
-    if (averaged == 0u) continue;
+#ifdef AVERAGED
     float now = averages_store(i, 0.0);
     stored += vec2(now, midway > 0.0 ? averages_store(i, midway) : now);
+#endif
   }
   for (int a = 0; a < 3; ++a) values[a] = angular[a];
   values[M_RIGID_SQUARES - FIRST] = squares;

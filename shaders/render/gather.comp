@@ -34,7 +34,7 @@ float averaged(uint v) {
     float part = determinant(at_rest), change = determinant(sides) / part;
     mat3 gradient = sides * inverse(at_rest);
     volume += part, F += part * gradient, J += part * change;
-    own += part * smoothed_energy(gradient, change, material);
+    own += part * own_energy(gradient, change, material);
   }
   if (!(volume > 0.0) || !finite(vec3(own * 1e-25))) return 0.0;
   J /= volume;

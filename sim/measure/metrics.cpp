@@ -169,7 +169,13 @@ void measure(Metrics& m, const Sim& sim) {
   const double midway = solver_mode(sim.settings).implicit ? 0 : 0.5 * sim.plan.h;
   const auto& bindings = sim.solver.bindings;
   const auto rings = std::ranges::find(bindings, "Rings", &std::pair<std::string, GLuint>::first);
-  recorder.give("Rings", rings != bindings.end() ? rings->second : m.rest.id());
+  if (rings != bindings.end()) {
+    recorder.give("Rings", rings->second);
+    // Beside the plain kernel, since a software renderer runs all that a kernel has.
+    std::vector<std::string> defines = obstacle_defines(*sim.model);
+    defines.push_back("AVERAGED 1");
+    if (m.passes.size() == 2) m.passes.push_back({Program::compute("measure/rigid.comp", {}, defines)});
+  }
   for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
@@ -185,13 +191,12 @@ void measure(Metrics& m, const Sim& sim) {
     sums.set("material", energies);
     sums.set("energy_per_square", share * energy_per_square(material));
     sums.set("midway", float(midway)), sums.set("touching", float(1e-5 * body.size));
-    for (Pass& pass : m.passes) {
+    const bool averaged = smoothed(material) && rings != bindings.end();
+    for (const std::size_t number : {std::size_t(0), std::size_t(averaged ? 2 : 1)}) {
+      Pass& pass = m.passes[number];
       const Program& kernel = recorder.use(pass.program);
       kernel.set("vertex_range", body.vertices), kernel.set("mass", float(body.mass));
-      if (&pass != &m.passes[0]) {
-        kernel.set("material", energies), kernel.set("midway", float(midway));
-        kernel.set("averaged", smoothed(material) && rings != bindings.end() ? 1u : 0u);
-      }
+      if (number == 2) kernel.set("material", energies), kernel.set("midway", float(midway));
       pass.work_groups = groups;
       recorder.run(pass, {{"groups", groups}});
     }

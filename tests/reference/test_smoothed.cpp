@@ -141,7 +141,7 @@ TEST_CASE("smoothed tets: Hessian blocks are the changes of forces") {
   CHECK(worst < 1e-6 * largest);
 }
 
-TEST_CASE("smoothed tets: under one strain everywhere they are linear tets; turned, they are at rest") {
+TEST_CASE("smoothed tets: under one strain everywhere they are linear tets, and turned they are at rest") {
   const Scene linear = beam_of("neo-hookean", {3, 2, 2}, 1e5, 0.4), scene = smooth(linear);
   const auto strained = [](const glm::dvec3& p) {
     return glm::dvec3(1.3 * p.x + 0.2 * p.y, 0.8 * p.y + 0.1 * p.z, 0.1 * p.x + 1.1 * p.z);  // J is 1.15

@@ -270,23 +270,16 @@ Axes axes_for(const CompareOptions& options, const Settings& own) {
 
 /// The right motions of the tets that rows have: what else is varied decides how a scene is solved, not how it moves.
 void find_right_motions(Subject& subject, const CompareOptions& options) {
-  const Axes axes = axes_for(options, subject.scene.settings);
-  Axes others = axes;
-  others.modes.clear();
-  std::vector<Settings> all;
-  for (const std::string& mode : axes.modes)  // baselines among them, which solve linear tets
-    for (Settings settings : combinations(subject.scene.settings, others)) {
-      settings.mode = mode;
-      all.push_back(settings);
+  const Axes elements{.elements = options.axes.elements};
+  for (const std::string& mode : axes_for(options, subject.scene.settings).modes)  // baselines solve linear tets
+    for (const Settings& settings : combinations(subject.scene.settings, elements)) {
+      Scene scene = subject.scene;
+      scene.settings = settings, scene.settings.mode = mode;
+      std::optional<Motion>& right = subject.right[has_smoothed_tets(scene.settings)];
+      if (right) continue;
+      if (options.judge == "motion" || options.judge == "total") require_motion(scene, *subject.model, options.steps);
+      right = right_motion(*subject.model, scene.settings);
     }
-  for (const Settings& settings : all) {
-    std::optional<Motion>& right = subject.right[has_smoothed_tets(settings)];
-    if (right) continue;
-    Scene scene = subject.scene;
-    scene.settings.mode = settings.mode, scene.settings.element = settings.element;
-    if (options.judge == "motion" || options.judge == "total") require_motion(scene, *subject.model, options.steps);
-    right = right_motion(*subject.model, scene.settings);
-  }
 }
 
 /// A run for each setting, and for each baseline among the modes.

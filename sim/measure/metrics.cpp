@@ -172,9 +172,7 @@ void measure(Metrics& m, const Sim& sim) {
   if (rings != bindings.end()) {
     recorder.give("Rings", rings->second);
     // Beside the plain kernel, since a software renderer runs all that a kernel has.
-    std::vector<std::string> defines = obstacle_defines(*sim.model);
-    defines.push_back("AVERAGED 1");
-    if (m.passes.size() == 2) m.passes.push_back({Program::compute("measure/rigid.comp", {}, defines)});
+    if (m.passes.size() == 2) m.passes.push_back({Program::compute("measure/rigid.comp", {}, {"AVERAGED 1"})});
   }
   for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {

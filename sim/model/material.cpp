@@ -27,7 +27,7 @@ namespace {
 Lame smith_moduli(const Lame& m) { return {4.0 / 3 * m.mu, m.lambda + 5.0 / 6 * m.mu}; }
 
 // `share` is the part of mu that the tets have themselves.
-void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m, double share = 1) {
+void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m, double share) {
   const auto [whole, lambda] = smith_moduli(m);
   const double mu = share * whole;
   for (std::size_t c = 0; c < tets.count(); ++c) {
@@ -101,14 +101,12 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
   const Lame m = lame(material.young_modulus, material.poisson_ratio);
   if (material.material == "springs")
     make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], mesh, m);
-  if (material.material == "neo-hookean" && !smoothed(material))
-    make_neo_hookean(system.lists[index_of<NeoHookean>], mesh, m);
-  const ConstraintList& tets = system.lists[smoothed(material) ? index_of<Smoothed> : index_of<NeoHookean>];
+  const double own = smoothed(material) ? smoothing_of(material) : 1;
+  ConstraintList& tets = system.lists[smoothed(material) ? index_of<Smoothed> : index_of<NeoHookean>];
+  if (material.material == "neo-hookean") make_neo_hookean(tets, mesh, m, own);
   if (smoothed(material)) {
-    const double s = smoothing_of(material);
     const auto [mu, lambda] = smith_moduli(m);
-    make_neo_hookean(system.lists[index_of<Smoothed>], mesh, m, s);
-    system.averages = average_tets(mesh, mu, lambda, s);
+    system.averages = average_tets(mesh, mu, lambda, own);
   }
   if (system.present[index_of<Dashpot>])
     make_dashpots(system.lists[index_of<Dashpot>], tets, mesh, m, material.constraint_damping);

@@ -78,8 +78,6 @@ glm::dmat3 deformation(const TenNodeTet& tet, const Points& x, std::size_t p) {
   return F;
 }
 
-double squares(const glm::dmat3& F) { return glm::dot(F[0], F[0]) + glm::dot(F[1], F[1]) + glm::dot(F[2], F[2]); }
-
 }  // namespace
 
 Halved halve_edges(const Model& model) {
@@ -109,7 +107,7 @@ double energy(const TenNodeTet& tet, const Points& x) {
   double sum = 0;
   for (std::size_t p = 0; p < 4; ++p) {
     const glm::dmat3 F = deformation(tet, x, p);
-    const double I = squares(F), beyond = glm::determinant(F) - tet.alpha;
+    const double I = Formulas<double>{}.squares(F), beyond = glm::determinant(F) - tet.alpha;
     sum += tet.mu / 8 * (I - std::log(I + 1)) + tet.lambda / 8 * beyond * beyond;
   }
   return sum;
@@ -119,9 +117,11 @@ std::array<glm::dvec3, 10> forces(const TenNodeTet& tet, const Points& x) {
   std::array<glm::dvec3, 10> result{};
   for (std::size_t p = 0; p < 4; ++p) {
     const glm::dmat3 F = deformation(tet, x, p);
-    const glm::dmat3 cofactors(glm::cross(F[1], F[2]), glm::cross(F[2], F[0]), glm::cross(F[0], F[1]));
+    Formulas<double> formulas;
+    const glm::dmat3 cofactors = formulas.cofactors(F);
     const double beyond = glm::dot(F[0], cofactors[0]) - tet.alpha;
-    const glm::dmat3 stress = tet.mu / 4 * (1 - 1 / (squares(F) + 1)) * F + tet.lambda / 4 * beyond * cofactors;
+    const glm::dmat3 stress =
+        tet.mu / 4 * (1 - 1 / (formulas.squares(F) + 1)) * F + tet.lambda / 4 * beyond * cofactors;
     for (std::size_t k = 0; k < 4; ++k) {
       const glm::dvec3 pull = stress * tet.gradients[k];
       result[k] -= (4 * (k == p ? near : away) - 1) * pull;

@@ -100,12 +100,12 @@ inline double off(double value, double right) { return std::abs(value / right - 
 
 // A clamped block of `material`, with what a run of it needs.
 inline Scene beam_of(const std::string& material, const glm::ivec3& cells, double young_modulus, double poisson_ratio,
-                     const glm::dvec3& size = {1, 0.25, 0.25}) {
+                     const glm::dvec3& size = {1, 0.25, 0.25}, bool mirrored = false) {
   Scene scene;
   scene.settings.material = material;
   scene.settings.young_modulus = young_modulus, scene.settings.poisson_ratio = poisson_ratio;
   scene.settings.ground = false;
-  const TetMesh mesh = make_block(size, cells);
+  const TetMesh mesh = make_block(size, cells, mirrored);
   std::vector<std::uint32_t> fixed;
   const double end = bounds(mesh.positions).low.x;
   for (std::uint32_t i = 0; i < mesh.positions.size(); ++i)
@@ -113,6 +113,16 @@ inline Scene beam_of(const std::string& material, const glm::ivec3& cells, doubl
   add_body(scene.model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), fixed);
   scene.system = build_constraints(scene.model.rest, scene.settings);
   return scene;
+}
+
+// m, by which its free end has sunk, the mean of its vertices.
+inline double sag_of(const Scene& scene, const Points& x) {
+  double sum = 0;
+  int count = 0;
+  const Bounds box = bounds(scene.model.positions);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (scene.model.positions[i].x > box.high.x - 1e-9) sum += scene.model.positions[i].y - x[i].y, ++count;
+  return sum / count;
 }
 
 inline double dot(const std::vector<glm::dvec3>& a, const std::vector<glm::dvec3>& b) {

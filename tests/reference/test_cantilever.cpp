@@ -10,15 +10,6 @@ using namespace reference_scenes;
 
 namespace {
 
-double sag_of(const Scene& scene, const Points& x) {
-  double sum = 0;
-  int count = 0;
-  const Bounds box = bounds(scene.model.positions);
-  for (std::size_t i = 0; i < x.size(); ++i)
-    if (scene.model.positions[i].x > box.high.x - 1e-9) sum += scene.model.positions[i].y - x[i].y, ++count;
-  return sum / count;
-}
-
 Points hanging(const Scene& scene) {
   return static_equilibrium(scene.input(), scene.model.positions, none).state.positions;
 }

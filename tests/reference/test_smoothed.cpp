@@ -28,15 +28,7 @@ Points moved(const Scene& scene, const std::function<glm::dvec3(const glm::dvec3
 double largest_of(const Points& forces) { return largest_distance(forces, Points(forces.size(), glm::dvec3(0))); }
 
 Scene mirrored_beam(const glm::ivec3& cells, double E, double nu) {
-  Scene scene = beam_of("neo-hookean", {1, 1, 1}, E, nu);
-  const TetMesh mesh = make_block({1, 0.25, 0.25}, cells, true);
-  std::vector<std::uint32_t> fixed;
-  for (std::uint32_t i = 0; i < mesh.positions.size(); ++i)
-    if (mesh.positions[i].x < bounds(mesh.positions).low.x + 1e-9) fixed.push_back(i);
-  scene.model = {};
-  add_body(scene.model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), fixed);
-  scene.system = build_constraints(scene.model, scene.settings);
-  return scene;
+  return beam_of("neo-hookean", cells, E, nu, {1, 0.25, 0.25}, true);
 }
 Minimum hanging(const Scene& scene) {
   Objective o = elastic(scene);
@@ -46,15 +38,6 @@ Minimum hanging(const Scene& scene) {
   o.unit = 1e-3;
   return minimise(o, scene.model.rest.positions);
 }
-double sag_of(const Scene& scene, const Points& x) {
-  double sum = 0;
-  int count = 0;
-  const double end = bounds(scene.model.rest.positions).high.x;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    if (scene.model.rest.positions[i].x > end - 1e-9) sum += scene.model.rest.positions[i].y - x[i].y, ++count;
-  return sum / count;
-}
-
 }  // namespace
 
 TEST_CASE("smoothed tets: the gradient is that of the energy, wherever the body is") {

@@ -13,7 +13,7 @@ namespace {
 // The items of a vertex are the other corners of each of its elements, in the order of `others`.
 template <std::size_t N>
 VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint32_t, N>>& elements,
-                    const std::array<std::array<std::size_t, N - 1>, N>& others, const std::string& label,
+                    const std::array<std::array<std::uint32_t, N - 1>, N>& others, const std::string& label,
                     std::size_t bytes) {
   const auto corners = [&](std::size_t e, const auto& emit) {
     for (std::size_t k = 0; k < N; ++k) emit(elements[e][k], std::uint32_t(e * N + k));
@@ -21,7 +21,7 @@ VertexGather gather(const TetMesh& mesh, const std::vector<std::array<std::uint3
   const Grouped grouped = group_by_key(elements.size(), mesh.positions.size(), corners);
   std::vector<std::uint32_t> items;
   for (const std::uint32_t corner : grouped.values)
-    for (const std::size_t other : others[corner % N]) items.push_back(elements[corner / N][other]);
+    for (const std::uint32_t other : others[corner % N]) items.push_back(elements[corner / N][other]);
   return {Buffer(label + " offsets", grouped.first), Buffer(label + " items", items), Buffer(label, bytes)};
 }
 
@@ -32,9 +32,6 @@ void fill(Renderer& renderer, Pass& pass, GLuint positions, const Buffer& values
   renderer.recorder.give("Values", values);
   run_over(renderer, pass, renderer.mesh.positions.size());
 }
-
-// The other corners of a tet, by corner, in even permutations, which keep the sign of the volume.
-constexpr std::array<std::array<std::size_t, 3>, 4> even{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 // Fills a buffer of gathered values, made when first needed, and returns its name.
 GLuint gathered(Renderer& renderer, const Frame& frame, VertexGather& values, Pass& pass, const auto& make) {
@@ -67,7 +64,7 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
   pass.program.set("kind", int(colour));
   pass.program.set("material", frame.material);
   return gathered(renderer, frame, values, pass,
-                  [&](const TetMesh& mesh) { return gather<4>(mesh, mesh.tets, even, label, bytes); });
+                  [&](const TetMesh& mesh) { return gather<4>(mesh, mesh.tets, tet_faces, label, bytes); });
 }
 
 }  // namespace
@@ -76,7 +73,7 @@ void fill_cofactors(Renderer& renderer, const Frame& frame) {
   if (!renderer.carried_array) make_carried(renderer);
   rest_buffer(renderer), tet_buffer(renderer);
   gathered(renderer, frame, renderer.cofactors, kernel(renderer, "cofactors"), [](const TetMesh& mesh) {
-    return gather<4>(mesh, mesh.tets, even, "cofactors", mesh.positions.size() * 3 * sizeof(glm::vec4));
+    return gather<4>(mesh, mesh.tets, tet_faces, "cofactors", mesh.positions.size() * 3 * sizeof(glm::vec4));
   });
 }
 

@@ -2,6 +2,7 @@
 #define RINGS
 // The neighbours of vertices among smoothed tets, and the tets around each (sim/model/averages.h), in words of four.
 // Each vertex has two: V^-1, shear and bulk; where its neighbours, of two words each, and its parts begin and end.
+#define MATRIX_OF(columns, i) mat3(columns[3u * (i)].xyz, columns[3u * (i) + 1u].xyz, columns[3u * (i) + 2u].xyz)
 layout(std430) restrict readonly buffer Rings { uvec4 rings[]; };
 struct Ring {
   float inverse_volume, shear, bulk;  // 0 of a vertex without smoothed tets

@@ -55,7 +55,6 @@ void add_correction(uint local, uint owned, vec3 correction) {
 #foreach #include "solvers/$PROJECT.glsl"
 #if AVERAGED
 #include "rings.glsl"
-mat3 stress_of(uint i) { return mat3(averages[3u * i].xyz, averages[3u * i + 1u].xyz, averages[3u * i + 2u].xyz); }
 // Adds the forces of averages on the owned vertices, RING_LANES invocations for each.
 void add_ring_forces(uint first, uint owned) {
   for (uint t = gl_LocalInvocationIndex; t < RING_LANES * owned; t += GROUP_SIZE) {
@@ -64,11 +63,11 @@ void add_ring_forces(uint first, uint owned) {
     uint k = ring.first_neighbour + 2u * (t % RING_LANES);
     if (k >= ring.end_neighbour) continue;
     begin_body(i);
-    mat3 own = stress_of(i);
+    mat3 own = MATRIX_OF(averages, i);
     vec3 force = vec3(0.0);
     for (; k < ring.end_neighbour; k += 2u * RING_LANES) {
       RingNeighbour n = ring_neighbour(k);
-      force += own * n.own - stress_of(n.vertex) * n.other;
+      force += own * n.own - MATRIX_OF(averages, n.vertex) * n.other;
     }
     vec3 correction = force * (inverse_mass_of(local_positions[local]) * params.h * params.h);
     float most = FINE(params.max_correction), l = length(correction);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/matrix_access.hpp>
 #include <numeric>
 
 #include "sim/error.h"
@@ -11,6 +12,12 @@
 #include "sim/parallel.h"
 
 namespace tetpbd {
+
+std::array<glm::dvec3, 4> barycentric_gradients(const std::array<glm::dvec3, 4>& x) {
+  const glm::dmat3 inverse = glm::inverse(glm::dmat3(x[1] - x[0], x[2] - x[0], x[3] - x[0]));
+  const glm::dvec3 rows[3] = {glm::row(inverse, 0), glm::row(inverse, 1), glm::row(inverse, 2)};
+  return {-(rows[0] + rows[1] + rows[2]), rows[0], rows[1], rows[2]};
+}
 namespace {
 
 // A tet with |6 V| under this times its longest edge cubed has no volume, because rounding decides its sign.

@@ -19,6 +19,8 @@ using Tet = std::array<std::uint32_t, 4>;
 
 /// The faces of a tet of positive volume, opposite to its corners 0 to 3, counter-clockwise seen from outside.
 constexpr std::array<Triangle, 4> tet_faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+/// 1/m, by corner: how the corner's barycentric coordinate changes with the place in a tet of these corners.
+std::array<glm::dvec3, 4> barycentric_gradients(const std::array<glm::dvec3, 4>& corners);
 
 inline bool names_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 

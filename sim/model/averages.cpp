@@ -1,14 +1,10 @@
 #include "sim/model/averages.h"
 
 #include <algorithm>
-#include <glm/gtc/matrix_access.hpp>
 
 namespace tetpbd {
 
 namespace {
-
-// The other corners of a tet, by corner, in even permutations, which keep the sign of the volume.
-constexpr std::size_t others[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
 // The share of a tet's corners in the averages around each of them: corner i with what corner j adds.
 struct Share {
@@ -27,15 +23,15 @@ Averages average_tets(const TetMesh& mesh, double mu, double lambda, double s) {
   shares.reserve(12 * mesh.tets.size());
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
     const Tet& tet = mesh.tets[t];
-    const auto& x = mesh.positions;
-    const glm::dmat3 sides(x[tet[1]] - x[tet[0]], x[tet[2]] - x[tet[0]], x[tet[3]] - x[tet[0]]);
-    const double six_volumes = glm::determinant(sides), quarter = six_volumes / 24 * fill_of(mesh, t);
-    const glm::dmat3 inverse = glm::inverse(sides);
-    glm::dvec3 gradients[4] = {glm::dvec3(0), glm::row(inverse, 0), glm::row(inverse, 1), glm::row(inverse, 2)};
-    gradients[0] = -(gradients[1] + gradients[2] + gradients[3]);
+    std::array<glm::dvec3, 4> x;
+    for (std::size_t i = 0; i < 4; ++i) x[i] = mesh.positions[tet[i]];
+    const double six_volumes = glm::determinant(glm::dmat3(x[1] - x[0], x[2] - x[0], x[3] - x[0]));
+    const double quarter = six_volumes / 24 * fill_of(mesh, t);
+    const std::array<glm::dvec3, 4> gradients = barycentric_gradients(x);
     for (std::size_t i = 0; i < 4; ++i) {
       result.vertices[tet[i]].volume += quarter;
-      parts[tet[i]].push_back({{tet[others[i][0]], tet[others[i][1]], tet[others[i][2]]}, quarter / six_volumes});
+      const auto& [a, b, c] = tet_faces[i];
+      parts[tet[i]].push_back({{tet[a], tet[b], tet[c]}, quarter / six_volumes});
       for (std::size_t j = 0; j < 4; ++j)
         if (j != i) shares.push_back({tet[i], tet[j], quarter * gradients[j], quarter * gradients[i]});
     }

@@ -94,16 +94,11 @@ struct NeoHookean {
 };
 ADD_KIND(NeoHookean)
 struct Smoothed {
-  static constexpr ConstraintKind row{.name = "smoothed",
-                                      .arity = 4,
-                                      .noun = "smoothed tets",
-                                      .compliance_unit = "1/J",
-                                      .most_compliance = 0,
-                                      .values = 8,
-                                      .components = 2,
-                                      .curved = true,
-                                      .tet = true,
-                                      .averaged = true};
+  static constexpr ConstraintKind row = [] {
+    ConstraintKind row = NeoHookean::row;
+    row.name = "smoothed", row.noun = "smoothed tets", row.averaged = true;
+    return row;
+  }();
   FORMULA(smoothed)
   static const auto& vertices(const TetMesh& mesh) { return mesh.tets; }
   static std::array<double, 8> rest(glm::dvec3* x) { return NeoHookean::rest(x); }

@@ -26,6 +26,7 @@ namespace {
 constexpr double rigid_step_length = 4e-5;  // s
 constexpr double part_of_stable = 0.5;      // of the longest stable step, in leapfrog steps
 constexpr double ten_node_part = 0.7;       // likewise; what is told apart by them are meshes, whose errors are larger
+constexpr double smoothed_part = 0.33;      // likewise; squeezed tets resist by themselves as well
 constexpr long implicit_steps = 8;          // in a step of the scene
 constexpr double most_stable = 3000;        // stable steps in a step of the scene; more of them cost more than Newton's
 constexpr double most_bytes = 9e6;          // of stored positions, where these are `least_instants` or more
@@ -103,9 +104,11 @@ TwoRuns rigid_runs(const ReferenceInput& input) {
 
 TwoRuns leapfrog_runs(const ReferenceInput& input, double stable) {
   const State start{input.model.positions, input.model.velocities};
+  const double part = input.ten_node                           ? ten_node_part
+                      : input.system.averages.vertices.empty() ? part_of_stable
+                                                               : smoothed_part;
   return make_runs(
-      input.settings.dt,
-      long(std::ceil(input.settings.dt / ((input.ten_node ? ten_node_part : part_of_stable) * stable))),
+      input.settings.dt, long(std::ceil(input.settings.dt / (part * stable))),
       [&](double h) { return leapfrog(input, reference_compliances(input), start, h); },
       [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.held), each(run.time); });
 }

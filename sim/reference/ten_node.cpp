@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/gtc/matrix_access.hpp>
 
 namespace tetpbd {
 namespace {
@@ -94,9 +93,7 @@ std::vector<TenNodeTet> ten_node_tets(const ConstraintList& halved, const Points
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t j = 0; j < 4; ++j) tet.nodes[node[i][j]] = halved.ends(8 * t + i)[j];
     const auto& [a, b, c, d] = std::array{tet.nodes[0], tet.nodes[1], tet.nodes[2], tet.nodes[3]};
-    const glm::dmat3 inverse = glm::inverse(glm::dmat3(rest[b] - rest[a], rest[c] - rest[a], rest[d] - rest[a]));
-    for (int k = 0; k < 3; ++k) tet.gradients[std::size_t(k + 1)] = glm::row(inverse, k);
-    tet.gradients[0] = -(tet.gradients[1] + tet.gradients[2] + tet.gradients[3]);
+    tet.gradients = barycentric_gradients({rest[a], rest[b], rest[c], rest[d]});
     tet.mu = 8 / halved.compliance[16 * t], tet.lambda = 8 / halved.compliance[16 * t + 1];
     tet.alpha = halved.rest[64 * t + 7];
   }

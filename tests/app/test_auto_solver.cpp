@@ -107,7 +107,7 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     double chosen = 0, least = 1;
     for (const SolverTrial& trial : choice->trials) {
       CHECK(trial.ms > 0);
-      CHECK(trial.fits == (trial.ms <= 1.05 * 4));
+      CHECK((!trial.fits || trial.ms <= 1.05 * 4));  // one that was ended as too slow may have a lower median
       if (!trial.fits) continue;
       const MeasuredRun run = run_model(model, trial.settings, choice->steps, &right);
       least = std::min(least, run.motion->rms);

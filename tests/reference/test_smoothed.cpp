@@ -2,6 +2,7 @@
 // a cantilever, which linear tets miss.
 #include "sim/reference/leapfrog.h"
 #include "sim/reference/smoothed.h"
+#include "sim/solvers/newton_buffers.h"
 #include "tests/reference/reference_scenes.h"
 
 using namespace reference_scenes;
@@ -140,6 +141,42 @@ TEST_CASE("smoothed tets: under one strain everywhere they are linear tets, and 
   const Points turned = moved(scene, [&](const glm::dvec3& p) { return turn * p + glm::dvec3(7, 8, 9); });
   CHECK(largest_of(gradient(elastic(scene), turned)) < 1e-9 * largest_of(b));
   CHECK(std::abs(stored(scene, turned)) < 1e-9 * stored(scene, x));
+}
+
+TEST_CASE("smoothed tets: where a body fills a part of a tet, averages resist as much less, and softened as well") {
+  const Scene linear = beam_of("neo-hookean", {3, 2, 2}, 1e5, 0.4), whole = smooth(linear);
+  generator.seed(3);
+  TetMesh mesh = whole.model.rest;
+  const auto filled = [&](const auto& share) {
+    Model model;
+    mesh.fill.clear();
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) mesh.fill.push_back(float(share(t)));
+    add_body(model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), {});
+    return model;
+  };
+  const auto stored = [](const Model& model, const Settings& settings, const Points& x) {
+    Scene s{model, build_constraints(model, settings), settings};
+    return energy(elastic(s), x) - energy(elastic(s), model.rest.positions);
+  };
+  // Under one strain everywhere what is stored is in proportion to the volume that is filled.
+  const Model half = filled([](std::size_t) { return 0.5; });
+  const Model uneven = filled([](std::size_t t) { return t % 3 == 0 ? 0.25 : 1.0; });
+  const Points x = moved(whole, [](const glm::dvec3& p) {
+    return glm::dvec3(1.2 * p.x + 0.2 * p.y, 0.9 * p.y + 0.1 * p.z, 0.1 * p.x + 1.1 * p.z);
+  });
+  const double all = stored(whole.model, whole.settings, x);
+  CHECK(stored(half, whole.settings, x) == doctest::Approx(all / 2).epsilon(1e-6));
+  CHECK(stored(uneven, whole.settings, x) ==
+        doctest::Approx(all * filled_volume(uneven.rest) / filled_volume(whole.model.rest)).epsilon(1e-6));
+  CHECK(stored(uneven, whole.settings, x) == doctest::Approx(stored(uneven, linear.settings, x)).epsilon(1e-6));
+  // A body of half the stiffness stores half as much, wherever it is.
+  const Points scattered = moved(whole, [](const glm::dvec3& p) { return p + noise(0.05); });
+  Scene soft = whole;
+  soft.system = soften(whole.system, whole.model, {0.5f});
+  const auto of = [&](const Scene& s) {
+    return energy(elastic(s), scattered) - energy(elastic(s), s.model.rest.positions);
+  };
+  CHECK(of(soft) == doctest::Approx(of(whole) / 2).epsilon(1e-6));
 }
 
 TEST_CASE("smoothed tets: newton's minimiser ends fast at large strains") {

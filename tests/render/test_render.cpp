@@ -7,9 +7,11 @@
 #include <glm/gtc/packing.hpp>
 #include <limits>
 
+#include "app/probe.h"
 #include "render/layout.h"
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
+#include "sim/reference/smoothed.h"
 #include "tests/render/render_stage.h"
 
 namespace colour_maps {
@@ -331,6 +333,55 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
   CHECK(difference(stage.image(), turned).low != edges.low);
   stage.frame.tet.reset();
   CHECK(difference(without, unknown).count > 500);
+  CHECK(gl_error_count() == 0);
+}
+
+TEST_CASE("render: smoothed tets are coloured by the averages around vertices") {
+  Stage stage;
+  constexpr double mu = 3e4, lambda = 5e4, s = 0.4, m = 4.0 / 3 * mu, l = lambda + 5.0 / 6 * mu;
+  const Averages averages = average_tets(stage.mesh, m, l, s);
+  const std::size_t count = stage.mesh.positions.size();
+  std::vector<glm::dvec3> x = stage.mesh.positions;
+  // Bent, swollen at one end, so that some tets are beyond what averages alone resist.
+  for (glm::dvec3& p : x) p = p * (1 + 0.25 * (p.x + 0.5)) + glm::dvec3(0, 0.2 * p.x * p.x, 0.1 * p.y);
+  const auto shear = [](const glm::dmat3& F, double J) {
+    const double I = glm::dot(F[0], F[0]) + glm::dot(F[1], F[1]) + glm::dot(F[2], F[2]);
+    return (I - 3) / 2 - 0.75 * (J - 1) - 0.5 * std::log((I + 1) / 4);
+  };
+  std::vector<double> volume(count), own(count);
+  for (const Tet& tet : stage.mesh.tets) {
+    const auto sides = [&](const auto& at) {
+      return glm::dmat3(at[tet[1]] - at[tet[0]], at[tet[2]] - at[tet[0]], at[tet[3]] - at[tet[0]]);
+    };
+    const glm::dmat3 rest = sides(stage.mesh.positions), F = sides(x) * glm::inverse(rest);
+    const double J = glm::determinant(F), beyond = J - std::clamp(J, 0.7, 1.3);
+    for (const std::uint32_t v : tet) {
+      volume[v] += glm::determinant(rest);
+      own[v] += glm::determinant(rest) * (s * m * shear(F, J) + l / 2 * beyond * beyond);
+    }
+  }
+  std::vector<Position> moved(count);
+  for (std::size_t v = 0; v < count; ++v) moved[v].high = glm::vec3(x[v]);
+  stage.positions.write(0, moved.size() * sizeof(Position), moved.data());
+  stage.frame.material = glm::vec4(mu, lambda, 3, s);
+  stage.frame.options.worst = true;
+  for (const Colour colour : {Colour::volume, Colour::energy}) {
+    stage.frame.options.colour = colour;
+    stage.image();
+    const auto values = poll_values(stage.renderer, true);
+    REQUIRE(values);
+    double least = INFINITY, most = 0;
+    for (std::size_t v = 0; v < count; ++v) {
+      const Average at = average_at(averages, v, x);
+      const double stored = (1 - s) * m * shear(at.F, glm::determinant(at.F)) + l / 2 * (at.J - 1) * (at.J - 1);
+      const double right = colour == Colour::volume ? at.J - 1 : own[v] / volume[v] + stored;
+      CHECK(double((*values)[v]) == doctest::Approx(right).epsilon(1e-4).scale(colour == Colour::volume ? 0.1 : 100));
+      CHECK(double(average_energy(averages, v, x, stage.frame.material)) ==
+            doctest::Approx(stored).epsilon(1e-4).scale(100));
+      least = std::min(least, right), most = std::max(most, right);
+    }
+    CHECK(most > 2 * least);
+  }
   CHECK(gl_error_count() == 0);
 }
 

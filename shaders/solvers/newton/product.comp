@@ -6,7 +6,6 @@
 #include "solvers/newton/newton.glsl"
 #if AVERAGED
 #include "rings.glsl"
-mat3 stress_at(uint i) { return mat3(stresses[3u * i].xyz, stresses[3u * i + 1u].xyz, stresses[3u * i + 2u].xyz); }
 #endif
 shared vec3 parts[GROUP_SIZE];
 shared bool last;
@@ -36,7 +35,7 @@ void main() {
     uint first = first_neighbour[i], end = first_neighbour[i + 1u];
 #if AVERAGED
     Ring ring = ring_of(i);
-    mat3 stress = stress_at(i);
+    mat3 stress = MATRIX_OF(stresses, i);
     float pressure = stresses[3u * i].w;
 #endif
     for (uint k = first + lane % LANES; k < end; k += LANES) {
@@ -47,7 +46,8 @@ void main() {
 #if AVERAGED
       if (!(ring.inverse_volume > 0.0)) continue;
       RingNeighbour n = ring_neighbour(ring.first_neighbour + 2u * (k - first));
-      sum += stress_at(n.vertex) * n.other - stress * n.own + slopes[edge ^ 1u].xyz * stresses[3u * n.vertex].w -
+      mat3 others = MATRIX_OF(stresses, n.vertex);
+      sum += others * n.other - stress * n.own + slopes[edge ^ 1u].xyz * stresses[3u * n.vertex].w -
              slopes[edge].xyz * pressure;
 #endif
     }

@@ -76,7 +76,7 @@ void main() {
 #if AVERAGED
   vec3 own_gradient = vec3(0.0), own_slope = vec3(0.0);
   Ring ring = ring_of(min(i, VERTICES - 1u));
-  mat3 F = average_F(min(i, VERTICES - 1u)), stress = shear_stress(F) * ring.shear;
+  mat3 F = MATRIX_OF(averages, min(i, VERTICES - 1u)), stress = shear_stress(F) * ring.shear;
 #endif
   if (i < VERTICES) {
     uint first = first_neighbour[i], end = first_neighbour[i + 1u];
@@ -91,7 +91,7 @@ void main() {
       if (!(ring.inverse_volume > 0.0)) continue;
       RingNeighbour n = ring_neighbour(ring.first_neighbour + 2u * (k - first));
       Ring other = ring_of(n.vertex);
-      mat3 of_other = average_F(n.vertex);
+      mat3 of_other = MATRIX_OF(averages, n.vertex);
       force += shear_stress(of_other) * n.other * other.shear - stress * n.own;
       add_resistance(other, of_other, n.other, slopes[edge ^ 1u].xyz, diagonal, across);
       own_gradient -= n.own;

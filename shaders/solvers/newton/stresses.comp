@@ -29,7 +29,8 @@ void main() {
     for (int c = 0; c < 3; ++c) change[c] += parts[c][lane + k].xyz;
     pressure += parts[0][lane + k].w;
   }
-  mat3 stress = shear_change(average_F(i), change * ring.inverse_volume, averages[3u * i + 1u].w) * ring.shear;
+  mat3 F = MATRIX_OF(averages, i);
+  mat3 stress = shear_change(F, change * ring.inverse_volume, averages[3u * i + 1u].w) * ring.shear;
   pressure *= ring.inverse_volume / ring.bulk;
   for (int c = 0; c < 3; ++c) stresses[3u * i + uint(c)] = vec4(stress[c], pressure);
 }

@@ -47,6 +47,7 @@ struct RunOptions {
   long history_mb = 256;              ///< of the window: for states to go back to; 0: none
   std::filesystem::path record;       ///< of the window: what is done there (record.h); empty: nowhere
   std::filesystem::path replay;       ///< what `run` does in place of a scene's steps
+  bool check_crossings = false;       ///< exact, after every step; the first ends the run with status 1
   bool strict = false;                ///< a doubtful verdict is status 1
   bool progress = false;              ///< show it even if standard error is no terminal
 };

@@ -27,7 +27,9 @@ const char* compare_columns =
     "max_volume_loss_percent,tet_volume_rms,stretch_rms,rigid_distance,reference_distance,linear_drift,"
     "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
     "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy,penetration_max,penetration_999,"
-    "overlap_max,overlap_999,overlap_vertices,overlap_triangles,total_final,total_rms,total_peak,total_relative,total_"
+    "overlap_max,overlap_999,overlap_vertices,overlap_triangles,crossing_depth,total_final,total_rms,total_peak,total_"
+    "relative,"
+    "total_"
     "error";
 const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "

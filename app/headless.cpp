@@ -248,7 +248,9 @@ int run_headless(Scene scene, const RunOptions& options) {
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
-    RunPlan plan{.measure_every = options.measure_every, .standard = right ? &*right : nullptr};
+    RunPlan plan{.measure_every = options.measure_every,
+                 .check_crossings = options.check_crossings,
+                 .standard = right ? &*right : nullptr};
     plan.measured = [&](const Measurement& measurement, const RunErrors& errors) {
       if (csv && measurement.step % options.csv_every == 0) csv->add(csv_row(measurement, errors));
     };

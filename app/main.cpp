@@ -308,14 +308,17 @@ void add_commands(CLI::App& app, Arguments& a) {
       ->check(one_of(export_formats));
   add(run, "--dump-shaders", a.run.dump_shaders,
       "folder for the text of each shader of the run as it is compiled, a file each");
+  run.add_flag("--check-crossings", a.run.check_crossings,
+               "after every step, test exactly whether surfaces cut each other: the first that do end the run with "
+               "status 1");
   CLI::Option* replay = add(run, "--replay", a.run.replay,
                             "instead: what a record of tetpbd view --record says, lanes and all; with "
                             "--video, drawn at the speed it was played");
-  for (const char* dropped :
-       {"--scene",     "--mesh",      "--tetgen",        "--set",       "--deform",      "--solver",
-        "--budget-ms", "--explain",   "--steps",         "--png-every", "--positions",   "--video-every",
-        "--csv-every", "--reference", "--measure-every", "--turntable", "--camera-path", "--positions-every",
-        "--export",    "--height",    "--fill",          "--tets",      "--spacing",     "--up"})
+  for (const char* dropped : {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
+                              "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
+                              "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
+                              "--turntable", "--camera-path", "--positions-every", "--export",    "--height",
+                              "--fill",      "--tets",        "--spacing",         "--up",        "--check-crossings"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   run.add_flag("--strict", a.run.strict, "exit status 1 also where the verdict is doubtful");

@@ -68,6 +68,20 @@ void hold_against(MeasuredRun& run, const Standard& standard, const Model& model
   hold(run.total, run.total_over_time, standard.total ? &standard.total->truth->motion : nullptr, standard.total);
 }
 
+Crossings current_crossings(const Sim& sim) {
+  return find_crossings(*sim.model, read_state(sim).positions, sim.settings.contact == "self");
+}
+
+// Whether more pairs of triangles cut each other than at the start, which goes into the errors.
+bool crossed(const Sim& sim, std::size_t at_start, RunErrors& errors) {
+  const Crossings now = current_crossings(sim);
+  if (now.pairs <= at_start) return false;
+  Overlap overlap = errors.overlap.value_or(Overlap{});
+  overlap.crossings = largest(overlap.crossings, now);
+  errors.overlap = overlap;
+  return true;
+}
+
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
   MeasuredRun run;
   sim.timed = plan.timed;
@@ -87,6 +101,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
   const bool touching = metrics && bodies_touch(*sim.model, sim.settings);
   if (metrics) measure(*metrics, sim);
   hold(0);
+  const std::size_t at_start = plan.check_crossings ? current_crossings(sim).pairs : 0;
   const auto begin = steady_clock::now();
   while (run.steps < steps && !interrupted() && !check_finite(sim)) {
     const auto step_begin = steady_clock::now();
@@ -105,8 +120,9 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
       run.errors.overlap =
           largest(run.errors.overlap.value_or(Overlap{}),
                   measure_overlap(*sim.model, read_state(sim).positions, sim.settings.contact == "self"));
+    if (plan.check_crossings && crossed(sim, at_start, run.errors)) run.errors.crossed = s;
     if (plan.stepped) plan.stepped(s);
-    if (!run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
+    if (run.errors.crossed || !run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;
   }
   if (!plan.wait) {
     glFinish();

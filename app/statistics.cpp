@@ -17,6 +17,9 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
   const auto overlap = [&](auto member) -> ordered_json {
     return so_far.overlap ? ordered_json((*so_far.overlap).*member) : nullptr;
   };
+  const auto crossing = [&](auto member) -> ordered_json {
+    return so_far.overlap ? ordered_json(so_far.overlap->crossings.*member) : nullptr;
+  };
   return {{"step", now.step},
           {"time", now.time},
           {"volume_error_percent", m.volume_error_percent},
@@ -46,7 +49,8 @@ ordered_json quantities(const Measurement& now, const RunErrors& so_far) {
           {"overlap_max", overlap(&Overlap::largest)},
           {"overlap_999", overlap(&Overlap::part_999)},
           {"overlap_vertices", overlap(&Overlap::inside)},
-          {"overlap_triangles", overlap(&Overlap::triangles)},
+          {"overlap_triangles", crossing(&Crossings::pairs)},
+          {"crossing_depth", crossing(&Crossings::depth)},
           {"finite", int(now.finite())}};
 }
 
@@ -94,7 +98,7 @@ ordered_json error_json(const RunErrors& errors) {
   const Measurement last = errors.last.value_or(nothing_measured());
   result["penetration_max"] = over_all(last.penetration_max, errors.penetration_max);
   result["penetration_999"] = over_all(last.penetration_999, errors.penetration_999);
-  for (const char* key : {"overlap_max", "overlap_999", "overlap_vertices", "overlap_triangles"})
+  for (const char* key : {"overlap_max", "overlap_999", "overlap_vertices", "overlap_triangles", "crossing_depth"})
     result[key] = all[key];
   return result;
 }

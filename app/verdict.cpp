@@ -87,6 +87,16 @@ Verdict judge(const RunErrors& errors, Sim& sim) {
   if (errors.overlap && errors.overlap->largest > 0.05)
     find(Verdict::doubtful, fmt::format("bodies were {:.3g} % of a size in each other", 100 * errors.overlap->largest),
          "take more --substeps");
+  if (errors.crossed) {
+    const Crossings& crossings = errors.overlap->crossings;
+    const auto body = [&](std::uint32_t t) { return body_at(*sim.model, sim.model->rest.surface[t][0]).name; };
+    find(Verdict::wrong,
+         fmt::format("after step {} surfaces cut each other, {} pairs of triangles, {} of body '{}' and {} of '{}' "
+                     "first",
+                     *errors.crossed, crossings.pairs, crossings.first[0], body(crossings.first[0]), crossings.first[1],
+                     body(crossings.first[1])),
+         sim.settings.contact == "none" ? "let them touch: --contact bodies" : "take more --substeps");
+  }
   if (solver_mode(sim.settings).implicit && adaptive_values(sim).largest_residual > 1)
     find(Verdict::doubtful, "a residual did not fall", "take more --iterations");
   const GuardCounts guards = guard_counts(sim);

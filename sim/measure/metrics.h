@@ -100,6 +100,7 @@ struct RunErrors {
   double penetration_max = 0, penetration_999 = 0;  ///< the largest of all measurements
   EnergyLedger ledger;
   std::optional<Overlap> overlap;          ///< the largest of each, where bodies touch
+  std::optional<long> crossed;             ///< the step at whose end surfaces cut each other, where that ends a run
   bool free = true;                        ///< no contact, damping or fixed vertex so far
   std::optional<Measurement> first, last;  ///< the first and last finite state
   bool finite = true;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <set>
 
 #include "sim/contact/cell_grid.h"
 #include "sim/contact/pairs.h"
@@ -23,55 +21,8 @@ bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x
   return at.x > 0 && at.y > 0 && at.z > 0 && at.x + at.y + at.z < 1;
 }
 
-// Whether an edge of one triangle passes through the other.
-bool cuts(const PairMesh& mesh, std::uint32_t a, std::uint32_t b, const std::vector<glm::dvec3>& x) {
-  const auto corner = [&](std::uint32_t t, std::size_t c) { return x[mesh.triangles[t][c % 3]]; };
-  for (const auto& [t, o] : {std::pair(a, b), std::pair(b, a)}) {
-    const glm::dvec3 n = glm::cross(corner(o, 1) - corner(o, 0), corner(o, 2) - corner(o, 0));
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double from = glm::dot(n, corner(t, c) - corner(o, 0)), to = glm::dot(n, corner(t, c + 1) - corner(o, 0));
-      if (!(from * to < 0)) continue;
-      const glm::dvec3 p = corner(t, c) + (corner(t, c + 1) - corner(t, c)) * (from / (from - to));
-      bool within = true;
-      for (std::size_t k = 0; k < 3; ++k)
-        within = within && glm::dot(glm::cross(corner(o, k + 1) - corner(o, k), p - corner(o, k)), n) > 0;
-      if (within) return true;
-    }
-  }
-  return false;
-}
-
 bool are_apart(const Bounds& a, const Bounds& b) {
   return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
-}
-
-// Counts the pairs of triangles that cut each other, of different bodies or with `self` also of one.
-template <class F>
-std::size_t count_cutting(const PairMesh& mesh, const std::vector<glm::dvec3>& x, double cell, bool self,
-                          F&& may_overlap) {
-  std::vector<Bounds> boxes;
-  CellGrid grid(cell);
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [i, j, k, body] = mesh.triangles[t];
-    boxes.push_back({glm::min(x[i], glm::min(x[j], x[k])), glm::max(x[i], glm::max(x[j], x[k]))});
-    if (may_overlap(body, boxes[t])) grid.add(boxes[t], t);
-  }
-  std::vector<std::size_t> counts(boxes.size(), 0);
-  parallel_for(counts.size(), 64, [&](std::size_t t) {
-    std::set<std::uint32_t> near;
-    grid.for_each(boxes[t], [&](std::uint32_t o) {
-      if (o > t && !are_apart(boxes[t], boxes[o])) near.insert(o);
-    });
-    const auto& own = mesh.triangles[t];
-    for (const std::uint32_t o : near) {
-      const auto& other = mesh.triangles[o];
-      if (other[3] == own[3] && !self) continue;
-      const auto is_common = [&](std::uint32_t v) { return v == other[0] || v == other[1] || v == other[2]; };
-      const bool joined = std::any_of(own.begin(), own.begin() + 3, is_common);
-      counts[t] += !joined && cuts(mesh, std::uint32_t(t), o, x);
-    }
-  });
-  return std::reduce(counts.begin(), counts.end());
 }
 
 }  // namespace
@@ -120,7 +71,7 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
     });
   });
   Overlap result;
-  result.triangles = count_cutting(mesh, x, cell, self, may_overlap);
+  result.crossings = find_crossings(model, x, self);
   if (depths.empty()) return result;
   result.deepest = std::ranges::max(depths);
   for (std::size_t s = 0; s < depths.size(); ++s) depths[s] /= sizes[mesh.vertices[s].body];
@@ -132,7 +83,7 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
 }
 
 Overlap largest(const Overlap& a, const Overlap& b) {
-  return {std::max(a.inside, b.inside), std::max(a.triangles, b.triangles), std::max(a.largest, b.largest),
+  return {std::max(a.inside, b.inside), largest(a.crossings, b.crossings), std::max(a.largest, b.largest),
           std::max(a.deepest, b.deepest), std::max(a.part_999, b.part_999)};
 }
 

@@ -525,6 +525,28 @@ TEST_CASE("run: its last line is a verdict, and what starts inside something is 
   CHECK(turned.err.find("'bodies.0.fixed.0' has a \"low\" above its \"high\"") != std::string::npos);
 }
 
+TEST_CASE("run: where surfaces cut each other it ends, if asked to look") {
+  const Folder folder;
+  // Neither falls; the first flies into the second, which lets it through without contact.
+  std::ofstream(folder.path / "scene.json") << R"({"world": {"gravity": 0, "ground": false}, "bodies": [
+    {"name": "left", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "velocity": [4, 0, 0]},
+    {"name": "right", "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}, "position": [1.101, 0.2, 0.1]}]})";
+  const std::string run = "run --scene scene.json --steps 20 --csv-every 0 ";
+  const Outcome through = program(run + "--contact none --check-crossings", folder);
+  CHECK(through.status == 1);
+  CHECK(through.out.find("\nverdict: wrong: after step 6 surfaces cut each other, ") != std::string::npos);
+  CHECK(through.out.find("of body 'left' and ") != std::string::npos);
+  CHECK(through.out.find("--contact bodies") != std::string::npos);
+  const auto stats = nlohmann::json::parse(read(folder.path / "out/stats.json"));
+  CHECK(stats["error"]["overlap_triangles"].get<int>() > 4);
+  CHECK(stats["error"]["crossing_depth"].get<double>() == doctest::Approx(0.04).epsilon(0.3));
+  CHECK(stats["timing"]["steps"] == 6);
+  CHECK(program(run + "--contact none", folder).status == 0);
+  const Outcome apart = program(run + "--contact none --check-crossings --set bodies.0.velocity=[0,0,0]", folder);
+  CHECK(apart.status == 0);
+  CHECK(apart.out.find("surfaces cut") == std::string::npos);
+}
+
 TEST_CASE("run: a column of mirrored cells sags without a lean, and one of equal cells leans") {
   const Folder folder;
   const auto lean = [&](const std::string& mirror) {

@@ -278,7 +278,7 @@ TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") 
   const Overlap apart =
       measure_overlap(*blocks({{}, {{0.51, 0.03, 0.02}}}), blocks({{}, {{0.51, 0.03, 0.02}}})->positions, false);
   CHECK(apart.inside == 0);
-  CHECK(apart.triangles == 0);
+  CHECK(apart.crossings.pairs == 0);
   CHECK(apart.largest == 0);
   const Overlap overlap = measure_overlap(*model, model->positions, false);
   CHECK(overlap.inside == 32);  // 4 x 4 vertices of each face
@@ -294,7 +294,7 @@ TEST_CASE("pairs: how deep bodies are in each other is measured by their tets") 
   const auto crossed = blocks({ridge, keel});
   const Overlap cut = measure_overlap(*crossed, crossed->positions, false);
   CHECK(cut.inside == 0);
-  CHECK(cut.triangles == 4);  // two beside each edge
+  CHECK(cut.crossings.pairs == 4);  // two beside each edge
 }
 
 TEST_CASE("pairs: a block slides on another as friction says") {

@@ -352,7 +352,7 @@ TEST_CASE("sheets: a ball and another sheet fall on one that is held, and stay o
     REQUIRE_FALSE(check_finite(sim, true));
     const State state = read_state(sim);
     CHECK(crossings(model->rest, state.positions) == 0);
-    CHECK(measure_overlap(*model, state.positions, true).triangles == 0);
+    CHECK(measure_overlap(*model, state.positions, true).crossings.pairs == 0);
     const auto lowest = [&](std::size_t body) {
       double low = 1;
       for (std::size_t i = 0; i < model->bodies[body].vertices; ++i)
@@ -392,8 +392,8 @@ TEST_CASE("sheets: one that folds onto itself does not go through itself where t
       if (s % 10 == 9) most = std::max(most, crossings(sheet, read_state(sim).positions));
     }
     const auto end = read_state(sim).positions;
-    CHECK((measure_overlap(*model, end, true).triangles == 0) == (crossings(sheet, end) == 0));
-    CHECK(measure_overlap(*model, end, false).triangles == 0);
+    CHECK((measure_overlap(*model, end, true).crossings.pairs == 0) == (crossings(sheet, end) == 0));
+    CHECK(measure_overlap(*model, end, false).crossings.pairs == 0);
     REQUIRE_FALSE(check_finite(sim, true));
     if (contact == "none")
       through = most;

@@ -1,6 +1,6 @@
 // Contact of bodies with each other and with themselves (method.md, "Bodies in contact"). The broad phase, once in up
 // to four steps, finds candidates near each vertex of a surface; the narrow phase, in each substep, finds and resolves
-// contacts with them. It runs on the GPU; in CPU modes pair_contact.h does the same in double.
+// contacts with them. It runs on the GPU; CPU modes and the reference have offset_contact.h.
 #pragma once
 
 #include "sim/contact/pair_layout.h"

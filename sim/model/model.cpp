@@ -30,6 +30,7 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
             model.rest.surface.size(),
             mesh.surface.size(),
             mesh.one_piece};
+  if (mesh.tets.empty()) body.thickness = mesh.thickness;
   const auto append_shifted = [&](auto& to, const auto& from) {
     const std::size_t start = to.size();
     to.resize(start + from.size());
@@ -38,7 +39,7 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
     });
   };
   model.rest.positions.insert(model.rest.positions.end(), mesh.positions.begin(), mesh.positions.end());
-  model.rest.thickness = std::max(model.rest.thickness, mesh.tets.empty() ? mesh.thickness : 0);
+  model.rest.thickness = std::max(model.rest.thickness, body.thickness);
   append_shifted(model.rest.tets, mesh.tets);
   if (!model.rest.fill.empty() || !mesh.fill.empty()) {
     model.rest.fill.resize(body.first_tet, 1);
@@ -105,8 +106,7 @@ TetMesh body_mesh(const Model& model, const Body& body) {
   };
   TetMesh mesh{part(model.rest.positions, body.first_vertex, body.vertices),
                part(model.rest.tets, body.first_tet, body.tets),
-               part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece,
-               body.is_sheet() ? model.rest.thickness : 0};
+               part(model.rest.surface, body.first_triangle, body.triangles), body.one_piece, body.thickness};
   if (!model.rest.fill.empty()) mesh.fill = part(model.rest.fill, body.first_tet, body.tets);
   const auto shift = [&](auto& elements) {
     for (auto& element : elements)

@@ -17,12 +17,13 @@ namespace tetpbd {
 struct State {
   std::vector<glm::dvec3> positions;   ///< m
   std::vector<glm::dvec3> velocities;  ///< m/s
-  /// The triangle that a vertex was in last, if any, and the side of a sheet on which it belongs.
-  struct Held {
-    std::uint32_t target = ~0u, under = 0;
+  /// A vertex and a triangle, or two edges, that touched, and how they share their vertices' masses with others.
+  struct Touching {
+    std::uint32_t edges, first, second;  ///< whether two edges; their numbers (contact/surfaces.h)
+    std::array<std::uint8_t, 4> shares;
   };
-  std::vector<Held> held{};    ///< by vertex of a surface, in CPU modes where bodies touch
-  std::vector<double> work{};  ///< J that obstacles that move have done on each vertex; empty: none
+  std::vector<Touching> touching{};  ///< in the last substep, in CPU modes where bodies touch
+  std::vector<double> work{};        ///< J that obstacles that move have done on each vertex; empty: none
 };
 
 /// A contiguous part of the rest mesh, and its material.
@@ -32,6 +33,7 @@ struct Body {
   bool one_piece = false;              ///< has no hinges, and so is a rigid body if it is hard
   std::optional<Material> material{};  ///< its own; none: that of the settings
   std::optional<double> friction{};    ///< on obstacles without their own; none: the world's
+  double thickness = 0;                ///< m, of a sheet
   bool is_sheet() const { return tets == 0; }
 };
 

@@ -111,10 +111,12 @@ void advance(Leapfrog& run, long steps) {
   const Settings& settings = run.input.settings;
   const double remaining = std::exp(-settings.damping * run.h);
   std::vector<MovingObstacle> obstacles;
+  run.pairs.begin_step();
   for (long s = 0; s < steps; ++s, run.time[0] += run.h) {
     if (s == 0 || std::ranges::any_of(run.input.model.obstacles, moves))
       obstacles = obstacles_at(run.input.model, settings, run.time[0], run.h);
     const Points a = accelerations(run);
+    run.pairs.begin(settings, run.x);
     parallel_for(a.size(), 4096, [&](std::size_t i) {
       if (run.input.inverse_masses[i] == 0) return;
       const glm::dvec3 before = run.x[i];
@@ -127,7 +129,7 @@ void advance(Leapfrog& run, long steps) {
         resolve_contact(surface.normal, -surface.distance, friction, moved, run.h, x, run.v[i]);
       }
     });
-    run.pairs.resolve(settings, run.x, run.v, run.held, run.input.inverse_masses, run.h);
+    run.pairs.resolve(settings, run.x, run.v, run.touching, run.input.inverse_masses, run.h);
   }
   for (std::size_t i = 0; i < run.x.size(); ++i)
     if (!std::isfinite(glm::dot(run.x[i], run.x[i]) + glm::dot(run.v[i], run.v[i])))

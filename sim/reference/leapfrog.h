@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "sim/contact/pair_contact.h"
+#include "sim/contact/offset_contact.h"
 #include "sim/parallel.h"
 #include "sim/reference/objective.h"
 #include "sim/reference/reference.h"
@@ -25,9 +25,9 @@ struct Leapfrog {
   std::vector<TenNodeTet> tets;     ///< of ten nodes, whose parts come last
   Grouped at_vertex;                ///< the parts that act on each vertex
   std::vector<double> time = {0};   ///< s, one number
-  std::vector<State::Held> held{};  ///< as in State
+  std::vector<State::Touching> touching{};  ///< as in State
   std::vector<Average> averages{};  ///< of smoothed tets, by vertex
-  PairContact pairs{input.model};
+  OffsetContact pairs{input.model};
 };
 /// A run from `start`, whose positions and velocities are of one instant. Throws Error for compliances not above 0.
 Leapfrog leapfrog(const ReferenceInput& input, const Compliances& compliances, const State& start, double h);

@@ -110,7 +110,7 @@ TwoRuns leapfrog_runs(const ReferenceInput& input, double stable) {
   return make_runs(
       input.settings.dt, long(std::ceil(input.settings.dt / (part * stable))),
       [&](double h) { return leapfrog(input, reference_compliances(input), start, h); },
-      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.held), each(run.time); });
+      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.touching), each(run.time); });
 }
 
 TwoRuns implicit_runs(const ReferenceInput& input) {
@@ -205,7 +205,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
   add(numbers);
-  if (bodies_touch(model, s)) add(s.contact + ", sharp edges, held, folds, deep starts");
+  if (bodies_touch(model, s)) add(s.contact + ", offsets");
   return key;
 }
 

@@ -133,6 +133,10 @@ class FastPbd {
         if (thread == 0) substep.begin(s), rigid_.prepare(substep, step.inverse_masses, work_, v, done, counts);
         barrier.wait(thread);
       }
+      if (thread == 0) {
+        if (s == 0) pairs_.begin_step();
+        pairs_.begin(step.settings, step.state.positions);  // of the step's start, then of the last resolve()
+      }
       for_each_free_vertex([&](std::size_t i) {
         predicted_[i] = rigid_.predict(substep, i, x[i].position(), v[i]);
         x[i].move_to(predicted_[i]);
@@ -150,7 +154,8 @@ class FastPbd {
         barrier.wait(thread);
         if (thread == 0) {
           write_positions(step.state);
-          pairs_.resolve(step.settings, step.state.positions, v, step.state.held, step.inverse_masses, substep.h);
+          pairs_.resolve(step.settings, step.state.positions, v, step.state.touching, step.inverse_masses, substep.h,
+                         substep.h / OffsetContact::recovery);
           read_positions(step.state);
         }
         barrier.wait(thread);
@@ -179,7 +184,7 @@ class FastPbd {
   }
 
   const Model* model_;
-  PairContact pairs_;
+  OffsetContact pairs_;
   RigidContact rigid_;
   batches::Work work_;
   std::vector<Colour> colours_;

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "sim/contact/pair_contact.h"
+#include "sim/contact/offset_contact.h"
 #include "sim/contact/rigid_contact.h"
 #include "sim/model/constraints.h"
 #include "sim/model/model.h"
@@ -139,9 +139,11 @@ class CpuPbd {
       for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
     GuardCounts guards{};
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
+    pairs_.begin_step();
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
       substep.begin(s);
+      pairs_.begin(settings, x);
       rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = rigid_.predict(substep, i, x[i], v[i]);
@@ -170,7 +172,7 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
-      pairs_.resolve(settings, x, v, state.held, inverse_masses, substep.h);
+      pairs_.resolve(settings, x, v, state.touching, inverse_masses, substep.h, substep.h / OffsetContact::recovery);
     }
     return guards;
   }
@@ -195,7 +197,7 @@ class CpuPbd {
   };
 
   const Model* model_;
-  PairContact pairs_;
+  OffsetContact pairs_;
   RigidContact rigid_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;

@@ -142,10 +142,10 @@ TEST_CASE("pairs: sharp edges are those of a block, and none of a ball") {
   CHECK(pair_mesh(*blocks({ball})).edges.size() == 0);
 }
 
-TEST_CASE("pairs: edges that cross stop each other, on the GPU as in double") {
+TEST_CASE("pairs: edges that cross stop each other, in every mode") {
   GlTest gl;
   const double r = std::sqrt(0.5);
-  Placed ridge{{0, 0, 0}}, keel{{0.07, 0.705, 0.09}, {0, -1, 0}};
+  Placed ridge{{0, 0, 0}}, keel{{0.07, 0.72, 0.09}, {0, -1, 0}};
   ridge.turn = glm::dmat3(1, 0, 0, 0, r, r, 0, -r, r), keel.turn = glm::dmat3(r, r, 0, -r, r, 0, 0, 0, 1);
   ridge.cells = keel.cells = glm::ivec3(2);
   const auto model = blocks({ridge, keel});
@@ -173,15 +173,6 @@ TEST_CASE("pairs: edges that cross stop each other, on the GPU as in double") {
     CHECK(glm::length(motion_of(sim).momentum - before.momentum) < 1e-5 * glm::length(before.momentum));
     CHECK(motion_of(sim).energy < 1.001 * before.energy);
   }
-  Settings loose = touching("node", 1);
-  loose.friction = 0.4, loose.substeps = 1, loose.dt = 5e-4;
-  Sim kernels = create_sim(model, loose);
-  loose.mode = "cpu-double";
-  Sim truth = create_sim(model, loose);
-  for (int s = 0; s < 20; ++s) step(kernels), step(truth);
-  CHECK(touched(kernels).touches > 4);
-  const State a = read_state(kernels), b = read_state(truth);
-  for (std::size_t i = 0; i < a.positions.size(); ++i) CHECK(glm::length(a.velocities[i] - b.velocities[i]) < 2e-3);
 }
 
 TEST_CASE("pairs: two bodies that collide keep their momentum, part again and gain no energy") {
@@ -210,27 +201,6 @@ TEST_CASE("pairs: two bodies that collide keep their momentum, part again and ga
     CHECK(touched(sim).deepest < 0.02 * model->size);
   }
   for (const double speed : speeds) CHECK(speed == doctest::Approx(speeds[0]).epsilon(0.05));
-}
-
-TEST_CASE("pairs: kernels do what the CPU does in double") {
-  GlTest gl;
-  const auto model = blocks({{{0, 0, 0}, {3, 0, 0}}, {{0.505, 0.13, 0.08}, {-1, 0.5, 0}}});
-  Settings settings = touching("node");
-  settings.friction = 0.4, settings.substeps = 1, settings.dt = 5e-4,
-  settings.young_modulus = 1;  // all but loose
-  Sim kernels = create_sim(model, settings);
-  settings.mode = "cpu-double";
-  Sim truth = create_sim(model, settings);
-  for (int s = 0; s < 12; ++s) step(kernels), step(truth);
-  CHECK(touched(kernels).touches > 20);
-  const State a = read_state(kernels), b = read_state(truth);
-  double off = 0, moved = 0;
-  for (std::size_t i = 0; i < a.positions.size(); ++i) {
-    off = std::max(off, glm::length(a.velocities[i] - b.velocities[i]));
-    moved = std::max(moved, glm::length(b.velocities[i] - model->velocities[i]));
-  }
-  CHECK(moved > 0.5);
-  CHECK(off < 2e-3 * moved);
 }
 
 TEST_CASE("pairs: the same bits twice, nothing but boxes while bodies are far apart") {
@@ -360,7 +330,7 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
   GlTest gl;
   std::mt19937 random(seed_of_run(7));
   std::uniform_real_distribution<double> unit(-1, 1);
-  constexpr std::array modes = {"explicit", "node", "cpu-double", "cpu-fast"};
+  constexpr std::array modes = {"explicit", "node"};
   double worst = 0;
   for (int round = 0; round < (is_long_run() ? 40 : 8); ++round) {
     CAPTURE(round);
@@ -374,9 +344,9 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
       all.push_back(one);
     }
     const auto model = blocks(all);
-    Settings settings = touching(modes[round % 4], 1e5);
+    Settings settings = touching(modes[round % 2], 1e5);
     settings.constraint_damping = 3e-3;
-    if (round % 8 >= 4) settings.contact = "self";
+    if (round % 4 >= 2) settings.contact = "self";
     Sim sim = create_sim(model, settings);
     for (int s = 0; s < (is_long_run() ? 200 : 100); ++s) step(sim);
     REQUIRE_FALSE(check_finite(sim, true));
@@ -385,22 +355,6 @@ TEST_CASE("pairs: bodies that start in each other part, and stay finite") {
     worst = std::max(worst, overlap);
   }
   record_worst("bodies that start in each other: overlap over size", worst, 0.01);
-}
-
-TEST_CASE("pairs: a body that another is deep in does not meet its own far sides") {
-  GlTest gl;
-  const auto model = blocks({{{0, 0, 0}}, {{0.24, 0.02, 0.03}, {0, 0, 0}, {0.3, 0.2, 0.9}}});
-  REQUIRE(measure_overlap(*model, model->positions, true).deepest > 0.15);
-  std::vector<State> ends;
-  for (const char* contact : {"bodies", "self"}) {
-    Settings settings = touching("cpu-double");
-    settings.contact = contact;
-    Sim sim = create_sim(model, settings);
-    for (int s = 0; s < 5; ++s) step(sim);
-    ends.push_back(read_state(sim));
-  }
-  for (std::size_t i = 0; i < model->positions.size(); ++i)
-    REQUIRE(glm::distance(ends[0].positions[i], ends[1].positions[i]) < 1e-9);
 }
 
 TEST_CASE("pairs: after a state that is not finite, the last good one goes on as it did, in every mode") {
@@ -449,7 +403,7 @@ TEST_CASE("pairs: a vertex leaves a body that is folded over itself") {
   add_body(both, "small", small, 1000, start, {}, {}, {});
   const auto model = std::make_shared<const Model>(both);
   REQUIRE(measure_overlap(*model, model->positions, false).deepest > 0.02);
-  for (const std::string mode : {"explicit", "cpu-double"}) {
+  for (const std::string mode : {"explicit"}) {
     CAPTURE(mode);
     Sim sim = create_sim(model, touching(mode));
     for (int s = 0; s < 8; ++s) step(sim);
@@ -473,7 +427,7 @@ TEST_CASE("pairs: a vertex behind the crease of a sharp valley is pushed out thr
   add_body(*model, "valley", valley, 1000, valley.positions, {}, {}, all);
   add_body(*model, "spike", spike, 1000, above, {}, {}, {});
   REQUIRE(measure_overlap(*model, model->positions, false).inside == 1);
-  for (const std::string mode : {"explicit", "newton", "cpu-double"}) {
+  for (const std::string mode : {"explicit", "newton"}) {
     CAPTURE(mode);
     Settings settings = touching(mode, 1e6);
     if (mode == "newton") settings.iterations = 8, settings.substeps = 5;
@@ -560,7 +514,8 @@ TEST_CASE("pairs: explicit, newton and PBD are held against a reference in which
   CHECK(right.scene != through.scene);
   CHECK(error_to(*model, {right.positions.back(), {}}, {through.positions.back(), {}}) > 0.1);
   settings.contact = "bodies";
-  for (const auto& [mode, most] : {std::pair("explicit", 0.001), {"newton", 0.003}, {"node", 0.01}}) {
+  // On the GPU surfaces meet; those of the reference keep a distance of a sixth of a cell's edges.
+  for (const auto& [mode, most] : {std::pair("explicit", 0.025), {"newton", 0.025}, {"node", 0.03}, {"cpu", 0.01}}) {
     CAPTURE(mode);
     settings.mode = mode;
     Sim sim = create_sim(model, settings);
@@ -575,8 +530,10 @@ TEST_CASE("pairs: a run says how deep bodies came to be in each other, where the
   for (const std::string mode : {"explicit", "cpu-fast"}) {
     Settings settings = touching(mode, 1e5);
     const Overlap met = run_model(model, settings, 40).errors.overlap.value();
-    CHECK(met.inside > 10);
-    CHECK(met.largest > 1e-5);
+    const bool keeps_offsets = mode == "cpu-fast";
+    CHECK(keeps_offsets == (met.inside == 0));
+    CHECK(keeps_offsets == (met.crossings.pairs == 0));
+    CHECK(keeps_offsets == (met.largest < 1e-5));
     CHECK(met.largest < 0.01);
     CHECK(met.part_999 <= met.largest);
     settings.contact = "none";

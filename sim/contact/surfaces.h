@@ -1,0 +1,28 @@
+// The surfaces of all bodies as contact needs them: vertices, edges and triangles, and the distance that each keeps.
+#pragma once
+
+#include <array>
+
+#include "sim/model/model.h"
+
+namespace tetpbd {
+
+struct Surfaces {
+  static constexpr std::uint32_t none = ~0u;
+  struct Edge {
+    std::array<std::uint32_t, 2> ends, beside;  ///< beside: the third corners of its triangles; none where there is one
+    std::uint32_t body;
+  };
+  std::vector<std::uint32_t> vertices;  ///< each once, body by body
+  std::vector<Edge> edges;              ///< each once, body by body
+  /// By triangle of Model::rest.surface: its edges, from each corner to the next, and its body.
+  std::vector<std::array<std::uint32_t, 3>> triangle_edges;
+  std::vector<std::uint32_t> triangle_bodies;
+  /// By vertex of the model: its neighbours along edges, and a triangle that has it.
+  std::vector<std::uint32_t> first_neighbour, neighbours;
+  std::vector<std::uint32_t> own_triangle;
+  std::vector<double> offsets;  ///< m, by vertex of the model: the distance that its surface keeps from others
+};
+Surfaces lay_out_surfaces(const Model& model);
+
+}  // namespace tetpbd

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <tuple>
 
 #include "sim/contact/cell_grid.h"
@@ -78,45 +77,54 @@ void OffsetContact::set_margins(const Points& x, const std::vector<double>& weig
           {2 * surfaces_.offsets[i], 2 * ahead * longest, std::min(reserve * longest, 8 * surfaces_.offsets[i])});
 }
 
-// All pairs nearer to each other than their offset and half of both margins, where the substep begins.
-void OffsetContact::find_pairs(bool self) {
-  const auto& triangles = model_->rest.surface;
-  listed_ = start_;
-  std::vector<Bounds> bodies;
-  std::vector<double> widest;  // by body, the largest margin
+OffsetContact::Extents OffsetContact::find_extents() const {
+  Extents result;
   for (const Body& body : model_->bodies) {
-    bodies.push_back(body_bounds(body, start_));
+    result.boxes.push_back(body_bounds(body, start_));
     const auto first = margins_.begin() + std::ptrdiff_t(body.first_vertex);
-    widest.push_back(*std::max_element(first, first + std::ptrdiff_t(body.vertices)));
+    result.margins.push_back(*std::max_element(first, first + std::ptrdiff_t(body.vertices)));
   }
   double edge = 0;
   for (const Surfaces::Edge& e : surfaces_.edges) edge += glm::distance(start_[e.ends[0]], start_[e.ends[1]]);
   edge /= double(std::max<std::size_t>(surfaces_.edges.size(), 1));
-  const auto box_of = [&](std::span<const std::uint32_t> corners, bool with_offset) {
-    Bounds box{start_[corners[0]], start_[corners[0]]};
-    double margin = 0, offset = 0;
-    for (const std::uint32_t i : corners) {
-      box.low = glm::min(box.low, start_[i]), box.high = glm::max(box.high, start_[i]);
-      margin = std::max(margin, margins_[i]), offset = std::max(offset, surfaces_.offsets[i]);
-    }
-    const double grown = margin / 2 + (with_offset ? offset : 0);
-    return Bounds{box.low - grown, box.high + grown};
+  result.cell = 2 * edge + std::ranges::max(result.margins);
+  return result;
+}
+
+// Around vertices, grown by half of their margins and, where `kept`, by their offsets.
+Bounds OffsetContact::box_around(std::span<const std::uint32_t> vertices, bool kept) const {
+  Bounds box{start_[vertices[0]], start_[vertices[0]]};
+  double margin = 0, offset = 0;
+  for (const std::uint32_t i : vertices) {
+    box.low = glm::min(box.low, start_[i]), box.high = glm::max(box.high, start_[i]);
+    margin = std::max(margin, margins_[i]), offset = std::max(offset, surfaces_.offsets[i]);
+  }
+  const double grown = margin / 2 + (kept ? offset : 0);
+  return {box.low - grown, box.high + grown};
+}
+
+bool OffsetContact::Extents::may_meet(std::uint32_t own, const Bounds& box) const {
+  for (std::uint32_t b = 0; b < boxes.size(); ++b)
+    if (b != own && glm::all(glm::lessThanEqual(box.low - margins[b] / 2, boxes[b].high)) &&
+        glm::all(glm::greaterThanEqual(box.high + margins[b] / 2, boxes[b].low)))
+      return true;
+  return false;
+}
+
+// All pairs nearer to each other than their offset and half of both margins, where the substep begins.
+void OffsetContact::find_pairs(bool self) {
+  listed_ = start_;
+  const Extents bodies = find_extents();
+  const auto may_meet = [&](std::uint32_t body, std::span<const std::uint32_t> vertices) {
+    return self || bodies.may_meet(body, box_around(vertices, true));
   };
-  const auto is_near_body = [&](std::uint32_t own, const Bounds& box) {
-    for (std::uint32_t b = 0; b < bodies.size() && !self; ++b)
-      if (b != own && glm::all(glm::lessThanEqual(box.low - widest[b] / 2, bodies[b].high)) &&
-          glm::all(glm::greaterThanEqual(box.high + widest[b] / 2, bodies[b].low)))
-        return true;
-    return self;
-  };
-  const double cell = 2 * edge + std::ranges::max(widest);
-  CellGrid triangle_grid(cell), edge_grid(cell);
+  CellGrid triangle_grid(bodies.cell), edge_grid(bodies.cell);
+  const auto& triangles = model_->rest.surface;
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
-    if (is_near_body(surfaces_.triangle_bodies[t], box_of(triangles[t], true)))
-      triangle_grid.add(box_of(triangles[t], false), t);
+    if (may_meet(surfaces_.triangle_bodies[t], triangles[t])) triangle_grid.add(box_around(triangles[t], false), t);
   for (std::uint32_t e = 0; e < surfaces_.edges.size(); ++e)
-    if (is_near_body(surfaces_.edges[e].body, box_of(surfaces_.edges[e].ends, true)))
-      edge_grid.add(box_of(surfaces_.edges[e].ends, false), e);
+    if (const Surfaces::Edge& edge = surfaces_.edges[e]; may_meet(edge.body, edge.ends))
+      edge_grid.add(box_around(edge.ends, false), e);
   const std::size_t vertices = surfaces_.vertices.size();
   std::vector<std::vector<Pair>> found(vertices + surfaces_.edges.size());
   parallel_for(found.size(), 64, [&](std::size_t item) {
@@ -124,12 +132,10 @@ void OffsetContact::find_pairs(bool self) {
     const std::uint32_t own = edges ? std::uint32_t(item - vertices) : surfaces_.vertices[item];
     const std::span<const std::uint32_t> corners =
         edges ? std::span<const std::uint32_t>(surfaces_.edges[own].ends) : std::span(&own, 1);
-    const Bounds box = box_of(corners, true);
-    const std::uint32_t body =
-        edges ? surfaces_.edges[own].body : surfaces_.triangle_bodies[surfaces_.own_triangle[own]];
-    if (!is_near_body(body, box)) return;
+    if (!may_meet(edges ? surfaces_.edges[own].body : surfaces_.triangle_bodies[surfaces_.own_triangle[own]], corners))
+      return;
     std::vector<std::uint32_t> near;
-    (edges ? edge_grid : triangle_grid).for_each(box, [&](std::uint32_t other) {
+    (edges ? edge_grid : triangle_grid).for_each(box_around(corners, true), [&](std::uint32_t other) {
       if (!edges || other > own) near.push_back(other);
     });
     std::ranges::sort(near);

@@ -2,6 +2,8 @@
 // keep a distance from each other; impulses stop what comes nearer, and no motion takes a surface through another.
 #pragma once
 
+#include <span>
+
 #include "sim/contact/surfaces.h"
 #include "sim/model/formulas.h"
 #include "sim/model/settings.h"
@@ -60,6 +62,14 @@ class OffsetContact {
 
   bool list_holds(const Points& x) const;
   void set_margins(const Points& x, const std::vector<double>& weights);
+  struct Extents {  // of bodies, where the substep begins
+    std::vector<Bounds> boxes;
+    std::vector<double> margins;  // m, the largest of each
+    double cell = 1;              // m, of a grid for all
+    bool may_meet(std::uint32_t own, const Bounds& box) const;
+  };
+  Extents find_extents() const;
+  Bounds box_around(std::span<const std::uint32_t> vertices, bool kept) const;
   void find_pairs(bool self);
   void add_pair(bool self, bool edges, std::uint32_t first, std::uint32_t second, std::vector<Pair>& found) const;
   void evaluate_pairs();

@@ -128,7 +128,8 @@ CarriedSurface carry(const SurfaceMesh& surface, const TetMesh& mesh, const std:
   throw Error("surface does not fit its tets",
               fmt::format("vertex {} at {} is more than {:.3g} m away from them, in {}", v,
                           point_text(surface.positions[v]), farthest, source),
-              "export both from one place and scale, or leave \"mesh\" out");
+              "export both from one place and scale, or leave \"mesh\" out; where tets are too large for a thin "
+              "part, take more");
 }
 
 CarriedSurface carry_boundary(const TetMesh& mesh) {

@@ -373,3 +373,45 @@ TEST_CASE("offset contact: bodies bounce as barriers have it") {
     CHECK(find_crossings(s.model, barrier.x, false).pairs == 0);
   }
 }
+
+TEST_CASE("offset contact: three cloths bear a block, and nothing goes through") {
+  Stage s;
+  Material cloth = s.settings;
+  cloth.material = "none", cloth.constraints = "stretch,isobend", cloth.constraint_damping = 1e-3;
+  cloth.compliance[index_of<Stretch>] = 1e-2, cloth.compliance[index_of<Isobend>] = 1e3;
+  s.floor(0.2);
+  TetMesh sheet = make_sheet({0.36, 0.36}, {8, 8});
+  sheet.thickness = 0.002;
+  for (int k = 0; k < 3; ++k) s.add(sheet, {0.003 * k, 0.0022 + 0.0022 * k, -0.002 * k}, {}, {}, 300).material = cloth;
+  s.add(make_block(glm::dvec3(0.2), glm::ivec3(3)), {0, 0.1092, 0}, {}, {}, 2000);
+  s.scale = 16 * 9.81 * 0.1;
+  s.begin();
+  s.advance_to(is_long_run() ? 0.5 : 0.06);
+  const Body& block = s.model.bodies[4];
+  double lowest = 1;
+  for (std::size_t i = block.first_vertex; i < s.model.positions.size(); ++i) lowest = std::min(lowest, s.run->x[i].y);
+  MESSAGE("block ", lowest, " created ", s.created(), " truncated ", s.truncated(), " nearest ",
+          s.run->pairs.counts().nearest, " h ", s.h);
+  CHECK(lowest > 0.003);  // a fall that nothing stopped would have taken 17 mm
+  CHECK(lowest < 0.0095);
+  s.check(1e-3, 1e-2);
+}
+
+TEST_CASE("offset contact: two blocks slide on each other as Coulomb has it") {
+  Stage s;
+  s.settings.friction = 0.3;
+  s.floor(1);
+  s.add(make_block({0.6, 0.1, 0.3}, {12, 2, 6}), {0, 0.058, 0});
+  s.add(make_block({0.2, 0.1, 0.2}, {4, 2, 4}), {-0.15, 0.167, 0}, {1.5, 0, 0});
+  for (std::size_t i = s.model.bodies[1].first_vertex; i < s.model.bodies[2].first_vertex; ++i)
+    if (s.model.rest.positions[i].y < -0.049) s.model.inverse_masses[i] = 0;
+  s.scale = 4 * 9.81 * 0.1 + 4.5;
+  s.begin();
+  const glm::dvec3 from = s.centre(2);
+  s.advance_to(is_long_run() ? 0.9 : 0.3);
+  const double seconds = is_long_run() ? 1.5 / (0.3 * 9.81) : 0.3, moved = s.centre(2).x - from.x;
+  const double right = 1.5 * seconds - 0.5 * 0.3 * 9.81 * seconds * seconds;
+  MESSAGE("moved ", moved, ", right ", right, ", created ", s.created(), " truncated ", s.truncated());
+  CHECK(std::abs(moved - right) < 0.02 * right);
+  s.check();
+}

@@ -68,6 +68,8 @@ void hold_against(MeasuredRun& run, const Standard& standard, const Model& model
   hold(run.total, run.total_over_time, standard.total ? &standard.total->truth->motion : nullptr, standard.total);
 }
 
+namespace {
+
 Crossings current_crossings(const Sim& sim) {
   return find_crossings(*sim.model, read_state(sim).positions, sim.settings.contact == "self");
 }
@@ -76,11 +78,12 @@ Crossings current_crossings(const Sim& sim) {
 bool crossed(const Sim& sim, std::size_t at_start, RunErrors& errors) {
   const Crossings now = current_crossings(sim);
   if (now.pairs <= at_start) return false;
-  Overlap overlap = errors.overlap.value_or(Overlap{});
-  overlap.crossings = largest(overlap.crossings, now);
-  errors.overlap = overlap;
+  if (!errors.overlap) errors.overlap.emplace();
+  errors.overlap->crossings = largest(errors.overlap->crossings, now);
   return true;
 }
+
+}  // namespace
 
 MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan) {
   MeasuredRun run;

@@ -8,6 +8,10 @@
 
 namespace tetpbd {
 
+inline bool are_apart(const Bounds& a, const Bounds& b) {
+  return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
+}
+
 class CellGrid {
  public:
   explicit CellGrid(double cell) : cell_(cell) {}  ///< edge of a cell, m

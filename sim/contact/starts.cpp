@@ -52,9 +52,6 @@ Cell moved(Cell cell, const glm::dvec3& by) {
   cell.box = moved(cell.box, by);
   return cell;
 }
-bool apart(const Bounds& a, const Bounds& b) {
-  return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
-}
 
 void fill_grid(Shape& shape) {
   double longest = 0;
@@ -151,19 +148,19 @@ Depth depth_in(const MovingObstacle& obstacle, const Shape& shape, const glm::dv
 // Calls f with each pair of cells of the two that overlap by more than touching, but for those whose boxes say enough.
 template <class Skip, class F>
 void for_each_overlap(const Shape& a, const glm::dvec3& by, const Shape& b, Skip&& skip, F&& f) {
-  if (apart(moved(a.box, by), b.box)) return;
+  if (are_apart(moved(a.box, by), b.box)) return;
   const double enough = touching * std::min(a.size, b.size);
   std::vector<std::uint32_t> near;
   for (const Cell& own : a.cells) {
     const Cell cell = moved(own, by);
-    if (apart(cell.box, b.box)) continue;
+    if (are_apart(cell.box, b.box)) continue;
     near.clear();
     b.grid.for_each(cell.box, [&](std::uint32_t c) { near.push_back(c); });
     std::ranges::sort(near);
     const auto same = std::ranges::unique(near);
     near.erase(same.begin(), same.end());
     for (const std::uint32_t c : near)
-      if (!apart(cell.box, b.cells[c].box) && !skip(cell.box, b.cells[c].box) &&
+      if (!are_apart(cell.box, b.cells[c].box) && !skip(cell.box, b.cells[c].box) &&
           overlap_depth(cell, b.cells[c]) > enough)
         if (!f(cell, b.cells[c])) return;
   }
@@ -249,7 +246,7 @@ std::vector<glm::dvec3> ways_out(const Wanted& wanted) {
       add(shape.size * place.obstacle.pose.axes[a]), add(-shape.size * place.obstacle.pose.axes[a]);
   }
   for (std::size_t o = 0; o < wanted.world.shapes.size() && wanted.bodies; ++o)
-    if (o != wanted.body && !apart(shape.box, wanted.world.shapes[o].box))
+    if (o != wanted.body && !are_apart(shape.box, wanted.world.shapes[o].box))
       add(shape.box.centre() - wanted.world.shapes[o].box.centre());
   return ways;
 }

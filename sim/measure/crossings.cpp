@@ -69,10 +69,6 @@ double edge_length(const Triangles& all, std::uint32_t a, std::uint32_t b) {
   return sum / 6;
 }
 
-bool are_apart(const Bounds& a, const Bounds& b) {
-  return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
-}
-
 Triangles lay_out(const Model& model, const std::vector<glm::dvec3>& x) {
   Triangles all{model, x, {}, {}};
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b) all.body.insert(all.body.end(), model.bodies[b].triangles, b);

@@ -21,10 +21,6 @@ bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x
   return at.x > 0 && at.y > 0 && at.z > 0 && at.x + at.y + at.z < 1;
 }
 
-bool are_apart(const Bounds& a, const Bounds& b) {
-  return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
-}
-
 }  // namespace
 
 Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bool self) {

@@ -298,18 +298,13 @@ void OffsetContact::push_apart(double push_limit, Substep& substep) {
     if (!pair.acts || missing <= 0) continue;
     const Meeting meeting = meet(pair, substep);
     if (!(meeting.weight > 0)) continue;
-    glm::dvec3 velocity(0);  // m/s, of one relative to the other
-    for (std::size_t k = 0; k < 4; ++k) {
-      const std::uint32_t i = pair.vertices[k];
-      velocity += pair.near.weights[k] / h * (x[i] - start_[i]);
-    }
     const double push = std::min(push_part * missing, push_limit * pair.offset) / meeting.weight;
     for (std::size_t k = 0; k < 4; ++k) {
       const std::uint32_t i = pair.vertices[k];
       places[i] += (weights[i] * pair.near.weights[k] * push) * pair.near.normal;
       if (meeting.turns)
-        changes_[i] +=
-            (weights[i] * push / pair.near.distance * glm::dot(pair.near.turns[k], velocity)) * pair.near.normal;
+        changes_[i] += (weights[i] * push / pair.near.distance * glm::dot(pair.near.turns[k], meeting.velocity)) *
+                       pair.near.normal;
     }
   }
   change_velocities(substep);
@@ -329,9 +324,10 @@ OffsetContact::Meeting OffsetContact::meet(const Pair& pair, const Substep& subs
     const std::uint32_t i = pair.vertices[k];
     const glm::dvec3 velocity = (substep.x[i] - start_[i]) / substep.h;
     m.along += b[k] * glm::dot(n, velocity), m.weight += b[k] * b[k] * weight[k];
-    m.slip += b[k] * velocity;
+    m.velocity += b[k] * velocity;
     if (m.turns) m.slip += glm::dot(n, velocity) * e[k];
   }
+  m.slip += m.velocity;
   m.slip -= glm::dot(m.slip, n) * n;
   const double size = glm::length(m.slip);
   for (std::size_t k = 0; k < 4; ++k) {

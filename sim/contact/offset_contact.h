@@ -81,7 +81,8 @@ class OffsetContact {
   std::vector<State::Touching> next_touching(const Substep& substep) const;
   struct Meeting {                       // of a pair, by the velocities of the substep so far
     double along = 0;                    // m/s, along the normal; below 0 they come nearer
-    glm::dvec3 slip{0};                  // m/s, across it
+    glm::dvec3 velocity{0};              // m/s, of one relative to the other
+    glm::dvec3 slip{0};                  // m/s, across the normal, with what turns add
     double weight = 0, slip_weight = 0;  // 1/kg
     bool turns = true;                   // all vertices can move, so that friction must not turn them
   };

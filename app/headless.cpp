@@ -172,7 +172,8 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                   {"most_substeps", watch.most_substeps}};
   if (sim.pairs) {
     const PairNumbers pairs = touched(sim);
-    j["contact"] = {{"touches", pairs.touches}, {"detections", pairs.detections}};
+    j["contact"] = {{"touches", pairs.touches},     {"detections", pairs.detections},    {"pairs", pairs.listed_pairs},
+                    {"truncated", pairs.truncated}, {"truncated_velocity", pairs.taken}, {"nearest", pairs.nearest}};
   }
   if (!sim.solver.stiffness_shares.empty()) j["stiffness_share"] = sim.solver.stiffness_shares;
   const RunErrors& errors = run.errors;

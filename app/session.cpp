@@ -624,9 +624,7 @@ void measure_frame(Session& s, bool stepped) {
       if (now->by_hand) continue;
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
-      const Pairs& pairs = lane.sim.pairs;
-      const double in_bodies = pairs ? pairs.depth / lane.sim.model->size : std::nan(""),
-                   depth = std::fmax(now->penetration_max, in_bodies);  // of what there is
+      const double depth = now->penetration_max;  // NaN without obstacles
       if (!std::isnan(depth)) lane.depth.add(100 * depth, now->time);
     }
     // Half the ring of results: with more under way, asking again would wait for the oldest.

@@ -29,20 +29,23 @@ void draw_contacts(Renderer& renderer, const Frame& frame) {
   glEnable(GL_DEPTH_TEST);
 }
 
-// Arrows at vertices and edges that are in another body, along the normal by which they leave it, and the redder the
-// deeper they are, up to a thousandth of the size.
+// Arrows at vertices and edges that touch another surface, along the normal away from it, and the redder the nearer
+// they are; of the first pairs, where there are very many.
 void draw_body_contacts(Renderer& renderer, const Frame& frame) {
   const Pairs& pairs = *frame.pairs;
   const float size = glm::length(renderer.rest_high - renderer.rest_low);
-  const std::size_t count = pairs.items, bytes = count * sizeof(ContactArrow);
+  constexpr std::size_t most = 65536;
+  const std::size_t count = std::min(pairs.pairs.bytes() / sizeof(pair_layout::SurfacePair), most),
+                    bytes = count * sizeof(ContactArrow);
   if (renderer.contact_arrows.bytes() != bytes) renderer.contact_arrows = Buffer("arrows of contacts", bytes);
-  if (renderer.contact_sizes != pairs.sizes) {
-    renderer.passes["touches"] = {Program::compute("render/touches.comp", {}, pairs.sizes)};
-    renderer.contact_sizes = pairs.sizes;
+  if (renderer.contact_sizes != pairs.defines) {
+    renderer.passes["touches"] = {Program::compute("render/touches.comp", {}, pairs.defines)};
+    renderer.contact_sizes = pairs.defines;
   }
   Recorder& recorder = renderer.recorder;
   recorder.give("Positions", frame.positions), recorder.give("Arrows", renderer.contact_arrows);
   recorder.give("PairMesh", pairs.mesh), recorder.give("PairLists", pairs.lists);
+  recorder.give("Pairs", pairs.pairs);
   run_over(renderer, kernel(renderer, "touches"), count);
   recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
   const GLuint arrows = renderer.contact_arrows.id();
@@ -52,7 +55,7 @@ void draw_body_contacts(Renderer& renderer, const Frame& frame) {
   for (const GLuint none : {ATTRIBUTE_LOW, ATTRIBUTE_REST}) attribute(none, 0, 1, 0, 0);
   const Program& program = use(renderer, "contact arrows");
   program.set("seconds", 0.04f * size);
-  program.set("deepest", 0.001f * size);
+  program.set("deepest", 0.05f);
   program.set("viewport", glm::vec3(frame.viewport.width, frame.viewport.height, 0));
   program.set("width", scaled(frame, 1.8f));
   glDisable(GL_DEPTH_TEST);

@@ -136,7 +136,8 @@ struct RigidRecord {
 #define DROP_CONTACTS 0  // a hard body in a substep had more contacts than MOST_TOUCHES
 #define DROP_SWEEPS 1    // its impulses had not settled
 #define DROP_RANGE 2     // a vertex of it was beyond what sums hold
-#define DROPS 3
+#define DROP_SPEED 3    // a vertex was too fast for the pairs of surfaces that were listed, and was held up
+#define DROPS 4
 
 // The phases of a substep that a dispatch does (a dispatch parameter), as bits.
 #define PHASE_PREDICT 1u  // before the corrections: v += h g, p = x + h v
@@ -145,15 +146,14 @@ struct RigidRecord {
 #define PHASE_FINISH 4u   // after: v += (p - predicted) / h
 #define PHASE_WATCH 16u   // mode explicit: records the stiffness of constraints
 #define PHASE_CHANGED 32u // modes explicit and newton: the substeps before were longer or shorter
-#define PHASE_TOUCHED 64u       // first applies the corrections that contact of bodies found after the last substep
-#define PHASE_SHARED_SIDE 128u  // the side of the contact counts that is this substep's (contact/bodies/sums.glsl)
-#define PHASE_SHARED_LAST 256u  // resets this side of the counts too, as the next ones are exact
+#define PHASE_NEAR 64u     // bodies may touch
 
 // Binding points of uniform blocks; storage blocks get theirs by name (sim/gl/pass.h).
 #define BIND_STEP 0
 #define BIND_OBSTACLES 1
 // Texture units of the simulation.
 #define UNIT_FIELDS 15    // the signed distance fields of all obstacles, one after the other
+#define UNIT_LISTED 12    // where vertices were when pairs of surfaces were listed
 #define UNIT_QUANTA 13    // how much finer the quanta of each vertex are, where some bodies are far smaller
 #define UNIT_FRICTION 14  // the friction of each vertex, where bodies have their own
 // Binding points of atomic counters.

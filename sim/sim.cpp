@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <bit>
 #include <tuple>
 
 #include "sim/contact/moving_obstacle.h"
@@ -17,9 +16,6 @@ namespace {
 // Fills in the driver's limits where nothing lower is asked for.
 Tuning within_limits(Tuning tuning) {
   const unsigned row = unsigned(most_work_groups_in_row());
-  if (tuning.lanes == 0) tuning.lanes = is_software_renderer() ? 1 : 8;  // lanes run one after the other in software
-  if (tuning.lanes > 8 || !std::has_single_bit(tuning.lanes))
-    throw Error("no such tuning", fmt::format("lanes={}", tuning.lanes), "a power of two up to 8");
   if (tuning.row == 0 || tuning.row > row) tuning.row = row;
   const std::size_t storage = std::size_t(capabilities().storage_bytes);
   if (tuning.storage == 0 || tuning.storage > storage) tuning.storage = storage;
@@ -262,13 +258,12 @@ GuardCounts guard_counts(Sim& sim) {
 
 std::vector<std::pair<std::string, std::uint64_t>> dropped(Sim& sim) {
   const GuardCounts counts = guard_counts(sim);
-  const PairNumbers pairs = touched(sim);
   std::vector<std::pair<std::string, std::uint64_t>> all;
   const auto add = [&](const char* name, std::uint64_t count) {
     if (count > 0) all.emplace_back(name, count);
   };
   for (std::size_t d = 0; d < DROPS; ++d) add(drop_names[d], counts[GUARDS + d]);
-  add("contact_candidates", pairs.crowded), add("contact_speed", pairs.outrun);
+  add("contact_pairs", touched(sim).left_out);
   return all;
 }
 

@@ -47,8 +47,7 @@ std::size_t snapshot_bytes(Sim& sim) {
 }
 
 std::size_t snapshot_memory(const Sim& sim) {
-  const std::size_t host_bytes =
-      sim.model->positions.size() * 2 * sizeof(glm::dvec3) + sim.host.touching.size() * sizeof(State::Touching);
+  const std::size_t host_bytes = sim.model->positions.size() * 2 * sizeof(glm::dvec3);
   return sizeof(Snapshot) + (on_cpu(sim) ? host_bytes : 0);
 }
 

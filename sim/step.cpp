@@ -36,7 +36,7 @@ void give_buffers(Sim& sim) {
   recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
   recorder.give("Predicted", sim.predicted), recorder.give("Check", sim.check.words);
   if (sim.fineness) bind_texels(UNIT_QUANTA, sim.fineness_texture);
-  recorder.give("RigidBodies", sim.rigid_bodies), recorder.give("PairSums", sim.pairs.sums);
+  recorder.give("RigidBodies", sim.rigid_bodies);
   for (const auto& [block, buffer] : sim.solver.bindings) recorder.give(block, buffer);
   give_quantized(sim);
   if (!sim.guard_counts) return;
@@ -110,8 +110,9 @@ void step(Sim& sim) {
     for (int k = 0; k < sim.plan.substeps; ++k) {
       if (moving) bind_next_obstacles(sim);
       move_rigid_bodies(sim);
+      list_pairs(sim, k);
       sim.solver.substep(sim, k);
-      resolve_body_contacts(sim, sim.plan.substeps - 1 - k);
+      resolve_body_contacts(sim);
     }
     // Vertex fetches and copies read the state next.
     sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);

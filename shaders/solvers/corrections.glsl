@@ -3,11 +3,6 @@
 #include "vertex.glsl"
 layout(std430) buffer Predicted { Velocity predicted[]; };  // a DoubleSingle, padded
 
-// Neighbours see where the next prediction will put the vertex, because the first iteration starts there.
-DoubleSingle seen_by_neighbours(DoubleSingle x, DoubleSingle v) { return predict_position(x, predict_velocity(v)); }
-// Damping compares with the start of the substep.
-DoubleSingle place_before(DoubleSingle x, DoubleSingle v) { return x; }
-
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
   bool predicts = (phases & PHASE_PREDICT) != 0u, finishes = (phases & PHASE_FINISH) != 0u;
   DoubleSingle x = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low), start = x;
@@ -30,14 +25,15 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
     }
     x = corrected;
   }
-  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   if (finishes) {
     if (!predicts) start = DoubleSingle(predicted[i].high, predicted[i].low);
     if (!carried) v = add_double(v, relative(x, start) * params.inverse_h);
+    stay_listed(i, x, v);
     note_unless_finite(i, x.high + x.low, v.high + v.low);
   } else if (predicts) {
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
   }
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   if (predicts || finishes) velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
   if (!carried) book_work(i, own.inverse_mass);
 #if COMPLIANT

@@ -1,10 +1,6 @@
 // How leapfrog moves a vertex in a substep of mode explicit (method.md eq. 39).
 #include "vertex.glsl"
 
-DoubleSingle seen_by_neighbours(DoubleSingle x, DoubleSingle v) { return x; }
-// Damping compares with the vertex one substep earlier.
-DoubleSingle place_before(DoubleSingle x, DoubleSingle v) { return predict_position(x, DoubleSingle(-v.high, -v.low)); }
-
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
   DoubleSingle start = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low);
   // The time from the middle of the last substep to the middle of this one.
@@ -17,6 +13,7 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
     x = resolve_contacts(i, x, params.h * v.high);
     v = add_double(v, relative(x, free) * params.inverse_h);
   }
+  stay_listed(i, x, v);
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
   book_work(i, own.inverse_mass);

@@ -49,23 +49,24 @@ Interval project(const ConvexCell& cell, const glm::dvec3& axis) {
 
 }  // namespace
 
-double overlap_depth(const ConvexCell& a, const ConvexCell& b) {
+double overlap_depth(const ConvexCell& a, const ConvexCell& b, double gap) {
   double depth = std::numeric_limits<double>::infinity();
   for_each_axis(a, b, [&](const glm::dvec3& axis) {
     const Interval on_a = project(a, axis), on_b = project(b, axis);
-    depth = std::min({depth, on_a.high - on_b.low, on_b.high - on_a.low});
+    depth = std::min({depth, on_a.high - on_b.low + gap, on_b.high - on_a.low + gap});
     return depth > 0;
   });
   return std::isfinite(depth) ? std::max(depth, 0.0) : 0;
 }
 
-double exit_distance(const ConvexCell& a, const ConvexCell& b, const glm::dvec3& direction, double enough) {
+double exit_distance(const ConvexCell& a, const ConvexCell& b, const glm::dvec3& direction, double enough, double gap) {
   double distance = std::numeric_limits<double>::infinity();
   for_each_axis(a, b, [&](const glm::dvec3& axis) {
     const double along = glm::dot(direction, axis);
     if (std::abs(along) < 1e-9) return true;
     const Interval on_a = project(a, axis), on_b = project(b, axis);
-    distance = std::min(distance, along > 0 ? (on_b.high - on_a.low) / along : (on_a.high - on_b.low) / -along);
+    distance =
+        std::min(distance, (along > 0 ? on_b.high - on_a.low + gap : on_a.high - on_b.low + gap) / std::abs(along));
     return distance > enough;
   });
   return distance;

@@ -13,12 +13,13 @@ struct ConvexCell {
   int count = 0;                        ///< 3 or 4
 };
 
-/// m, the shortest way to move one that parts them; 0 where they are apart or touch. A triangle has no inside: its
-/// depth is measured through its plane and along its edges.
-double overlap_depth(const ConvexCell& a, const ConvexCell& b);
+/// m, the shortest way to move one that leaves `gap` between them, or a little more; 0 where there is as much. A
+/// triangle has no inside: its depth is measured through its plane and along its edges.
+double overlap_depth(const ConvexCell& a, const ConvexCell& b, double gap = 0);
 
-/// m, how far `a` has to go along `direction` (of unit length) until it is apart from b, which it overlaps; infinite
-/// where it never is. Where it is no more than `enough`, it may be found too large.
-double exit_distance(const ConvexCell& a, const ConvexCell& b, const glm::dvec3& direction, double enough = 0);
+/// m, how far `a` has to go along `direction` (of unit length) until that is so; infinite where it never is. Where it
+/// is no more than `enough`, it may be found too large.
+double exit_distance(const ConvexCell& a, const ConvexCell& b, const glm::dvec3& direction, double enough = 0,
+                     double gap = 0);
 
 }  // namespace tetpbd

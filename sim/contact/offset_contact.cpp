@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "sim/contact/cell_grid.h"
 #include "sim/contact/pairs.h"
@@ -12,47 +11,74 @@ namespace tetpbd {
 
 namespace {
 
-using glsl::ProximityFormulas;
-using Proximity = ProximityFormulas::Proximity;
+using real = double;  // of the formulas' constants
+using glm::uint;
+using Proximity = Formulas<double>::Proximity;
 
-constexpr double ahead = 3;           // substeps before which a pair that will touch gets its share
-constexpr double push_to = 0.95;      // of the offset, that places keep; the rest is room to rest in
-constexpr double push_part = 0.5;     // of what is missing to that, made up in a substep
-constexpr double least_gap = 0.02;    // of the offset, below which nothing moves on
-constexpr double gap_part = 0.9;      // of the gap, which both sides together may cross in a substep
-constexpr double least_part = 0.1;    // of the offset, which bodies that touch from the start keep
-constexpr double rest_part = 0.5;     // of a distance at rest, which the offset within a body may be at most
-constexpr double reserve = 16;        // times the longest motion in a substep: a list holds for some
-constexpr double motion_part = 0.49;  // of the margin, which keeps what is not listed apart
+constexpr double limit_part = 0.49;  // of the margin, which a vertex may go: what is not listed is a margin apart
+constexpr double reserve = 16;       // times the longest motion in a substep: a list holds for some
 
 int side_of(bool edges, std::size_t k) { return (edges ? k < 2 : k == 0) ? 0 : 1; }
-auto key_of(const auto& pair) { return std::tuple(bool(pair.edges), pair.first, pair.second); }
 
 }  // namespace
 
-void OffsetContact::begin(const Settings& settings, const Points& x) {
+namespace glsl {
+
+// The surface, for the shaders' formulas.
+struct SurfaceFormulas : Formulas<double> {
+  using uvec4 = glm::uvec4;
+  static constexpr uint NONE = Surfaces::none;
+  const Model& model;
+  const Surfaces& surfaces;
+  const std::vector<glm::dvec3>& places;
+
+  vec3 between(uint from, uint to) const { return places[to] - places[from]; }
+  uvec4 edge_vertices(uint e) const {
+    const Surfaces::Edge& edge = surfaces.edges[e];
+    return {edge.ends[0], edge.ends[1], edge.beside[0], edge.beside[1]};
+  }
+  uvec4 triangle_corners(uint t) const {
+    const auto& [i, j, k] = model.rest.surface[t];
+    return {i, j, k, 0};
+  }
+  uint edge_of_triangle(uint t, int side) const { return surfaces.triangle_edges[t][std::size_t(side)]; }
+  uint own_triangle_of(uint vertex) const { return surfaces.own_triangle[vertex]; }
+  uint first_neighbour_of(uint vertex) const { return surfaces.first_neighbour[vertex]; }
+  uint neighbour_at(uint k) const { return surfaces.neighbours[k]; }
+#include "shaders/contact/bodies/belongs.glsl"
+};
+
+}  // namespace glsl
+
+void OffsetContact::begin(const Settings& settings, const Points& x, const Points& v) {
   if (bodies_touch(*model_, settings))
-    start_ = x;
+    start_ = x, start_velocities_ = v;
   else
     start_.clear(), listed_.clear();
 }
 
-void OffsetContact::resolve(const Settings& settings, Points& x, Points& v, std::vector<State::Touching>& touching,
-                            const std::vector<double>& inverse_masses, double h, double push_limit) {
-  if (start_.empty()) return touching.clear();
+void OffsetContact::resolve(const Settings& settings, Points& x, Points& v, const std::vector<double>& inverse_masses,
+                            double h, double push_limit) {
+  if (start_.empty()) return;
   if (surfaces_.vertices.empty()) surfaces_ = lay_out_surfaces(*model_);
   Substep substep{x, v, inverse_masses, h};
-  if (!list_holds(x)) {
+  const bool anew = !list_holds(x);
+  if (anew) {
     set_margins(x, inverse_masses);
     find_pairs(settings.contact == "self");
   }
   evaluate_pairs();
-  take_shares(touching);
-  touching = next_touching(substep);
+  if (anew)
+    for (Pair& pair : pairs_) {
+      Ways ways;
+      for (std::size_t k = 0; k < 4; ++k) ways[k] = h * start_velocities_[pair.vertices[k]];
+      share_masses(pair, ways);
+    }
   const double before = kinetic_energy(substep);
-  apply_impulses(settings, substep);
-  push_apart(push_limit, substep);
+  const Points moved = x;
+  apply_impulses(settings, push_limit, substep);
   counts_.gained += std::max(0.0, kinetic_energy(substep) - before);
+  for (Pair& pair : pairs_) share_masses(pair, ways_of(pair, moved));
   truncate(substep);
 }
 
@@ -61,7 +87,7 @@ bool OffsetContact::list_holds(const Points& x) const {
   if (listed_.empty()) return false;
   return std::ranges::all_of(surfaces_.vertices, [&](std::uint32_t i) {
     const double away = glm::distance(start_[i], listed_[i]), way = glm::distance(x[i], start_[i]);
-    return away == 0 || away + ahead * way <= 0.5 * margins_[i];
+    return away == 0 || away + AHEAD * way <= 0.5 * margins_[i];
   });
 }
 
@@ -74,7 +100,7 @@ void OffsetContact::set_margins(const Points& x, const std::vector<double>& weig
   for (const std::uint32_t i : surfaces_.vertices)
     if (weights[i] > 0 || x[i] != start_[i])
       margins_[i] = std::max(
-          {2 * surfaces_.offsets[i], 2 * ahead * longest, std::min(reserve * longest, 8 * surfaces_.offsets[i])});
+          {2 * surfaces_.offsets[i], 2 * AHEAD * longest, std::min(reserve * longest, 8 * surfaces_.offsets[i])});
 }
 
 OffsetContact::Extents OffsetContact::find_extents() const {
@@ -150,7 +176,7 @@ void OffsetContact::find_pairs(bool self) {
 
 void OffsetContact::add_pair(bool self, bool edges, std::uint32_t first, std::uint32_t second,
                              std::vector<Pair>& found) const {
-  Pair pair{edges, first, second, {}, 0, {}};
+  Pair pair{.edges = edges, .first = first, .second = second, .vertices = {}, .offset = 0};
   std::uint32_t body, other;
   if (edges) {
     const Surfaces::Edge &a = surfaces_.edges[first], &b = surfaces_.edges[second];
@@ -176,8 +202,8 @@ void OffsetContact::add_pair(bool self, bool edges, std::uint32_t first, std::ui
   const double distance = proximity(pair, start_).distance, margin = (margins[0] + margins[1]) / 2;
   if (distance > pair.offset + margin) return;
   // What is near from the start must not be pressed apart by its offset: that would be energy from nothing.
-  const double given = body == other ? rest_part * proximity(pair, model_->rest.positions).distance
-                                     : std::max(proximity(pair, model_->positions).distance, least_part * pair.offset);
+  const double given = body == other ? REST_PART * proximity(pair, model_->rest.positions).distance
+                                     : std::max(proximity(pair, model_->positions).distance, LEAST_PART * pair.offset);
   pair.offset = std::min(pair.offset, given);
   if (distance > pair.offset + margin) return;
   found.push_back(pair);
@@ -186,159 +212,86 @@ void OffsetContact::add_pair(bool self, bool edges, std::uint32_t first, std::ui
 void OffsetContact::evaluate_pairs() {
   parallel_for(pairs_.size(), 256, [&](std::size_t p) {
     Pair& pair = pairs_[p];
-    pair.near = proximity(pair, start_), pair.belongs = belongs(pair), pair.acts = false;
+    pair.near = proximity(pair, start_);
+    pair.belongs =
+        glsl::SurfaceFormulas{{}, *model_, surfaces_, start_}.belongs(pair.near, pair.edges, pair.first, pair.second);
   });
 }
 
 Proximity OffsetContact::proximity(const Pair& pair, const Points& x) const {
   const auto at = [&](std::size_t k) { return x[pair.vertices[k]] - x[pair.vertices[0]]; };
-  return pair.edges ? ProximityFormulas{}.edge_edge_proximity(at(1), at(2), at(3))
-                    : ProximityFormulas{}.vertex_triangle_proximity(at(1), at(2), at(3));
+  return pair.edges ? Formulas<double>{}.edge_edge_proximity(at(1), at(2), at(3))
+                    : Formulas<double>{}.vertex_triangle_proximity(at(1), at(2), at(3));
 }
 
-bool OffsetContact::belongs(const Pair& pair) const {
-  const int part = pair.near.part;
-  const glm::dvec3& n = pair.near.normal;
-  if (pair.edges) return part == 0 && leads_off_edge(pair.first, -n) && leads_off_edge(pair.second, n);
-  if (part == 0) return true;
-  if (part < 4) {
-    const std::uint32_t edge = surfaces_.triangle_edges[pair.second][std::size_t(part - 1)];
-    const std::uint32_t third = model_->rest.surface[pair.second][std::size_t(part + 1) % 3];
-    return surfaces_.edges[edge].beside[0] == third && leads_off_edge(edge, n);
-  }
-  const std::uint32_t corner = pair.vertices[std::size_t(part - 3)];
-  return surfaces_.own_triangle[corner] == pair.second && pair.first < corner && leads_off_vertex(corner, n) &&
-         leads_off_vertex(pair.first, -n);
+OffsetContact::Ways OffsetContact::ways_of(const Pair& pair, const Points& x) const {
+  Ways ways;
+  for (std::size_t k = 0; k < 4; ++k) ways[k] = x[pair.vertices[k]] - start_[pair.vertices[k]];
+  return ways;
 }
 
-bool OffsetContact::leads_off_edge(std::uint32_t edge, const glm::dvec3& to) const {
-  const Surfaces::Edge& e = surfaces_.edges[edge];
-  const glm::dvec3 &a = start_[e.ends[0]], along = start_[e.ends[1]] - a;
-  return std::ranges::all_of(e.beside, [&](std::uint32_t beside) {
-    if (beside == Surfaces::none) return true;
-    const glm::dvec3 across = start_[beside] - a;
-    return ProximityFormulas{}.leads_away(to, across - along * (glm::dot(across, along) / glm::dot(along, along)));
-  });
+// For the next substep: frozen, so that they sum to one at each vertex.
+void OffsetContact::share_masses(Pair& pair, Ways ways) const {
+  pair.shares = {};
+  if (!pair.belongs || !Formulas<double>{}.touches_soon(pair.near, ways.data(), pair.offset)) return;
+  for (std::size_t k = 0; k < 4; ++k) pair.shares[k] = std::uint8_t(Formulas<double>{}.mass_share(pair.near, int(k)));
 }
 
-bool OffsetContact::leads_off_vertex(std::uint32_t vertex, const glm::dvec3& to) const {
-  const auto begin = surfaces_.neighbours.begin();
-  const std::uint32_t first = surfaces_.first_neighbour[vertex], end = surfaces_.first_neighbour[vertex + 1];
-  return std::all_of(begin + first, begin + end, [&](std::uint32_t next) {
-    return ProximityFormulas{}.leads_away(to, start_[next] - start_[vertex]);
-  });
-}
-
-// Those of the substep before: frozen, so that they sum to one at each vertex.
-void OffsetContact::take_shares(const std::vector<State::Touching>& touching) {
-  shared_.assign(start_.size(), 0);
-  auto before = touching.begin();
-  for (Pair& pair : pairs_) {
-    while (before != touching.end() && key_of(*before) < key_of(pair)) ++before;
-    if (before == touching.end() || key_of(*before) != key_of(pair) || !pair.belongs) continue;
-    pair.acts = true, pair.shares = before->shares;
-    for (std::size_t k = 0; k < 4; ++k) shared_[pair.vertices[k]] += pair.shares[k];
-  }
-}
-
-std::vector<State::Touching> OffsetContact::next_touching(const Substep& substep) const {
-  std::vector<State::Touching> touching;
-  for (const Pair& pair : pairs_) {
-    if (!pair.belongs) continue;
-    double approach = 0;  // m, in this substep
-    for (std::size_t k = 0; k < 4; ++k)
-      approach +=
-          pair.near.weights[k] * glm::dot(pair.near.normal, substep.x[pair.vertices[k]] - start_[pair.vertices[k]]);
-    if (pair.near.distance + ahead * std::min(0.0, approach) >= pair.offset) continue;
-    State::Touching& next = touching.emplace_back(State::Touching{pair.edges, pair.first, pair.second, {}});
-    for (std::size_t k = 0; k < 4; ++k)
-      next.shares[k] = std::uint8_t(std::clamp(
-          std::round(255 * std::max(std::abs(pair.near.weights[k]), glm::length(pair.near.turns[k]))), 1.0, 255.0));
-  }
-  return touching;
-}
-
-// Inelastic, on the part of each vertex's mass that is the pair's, so that kinetic energy cannot rise.
-void OffsetContact::apply_impulses(const Settings& settings, Substep& substep) {
-  const auto& [x, v, weights, h] = substep;
-  changes_.assign(x.size(), glm::dvec3(0));
+void OffsetContact::apply_impulses(const Settings& settings, double push_limit, Substep& substep) {
+  auto& [x, v, weights, h] = substep;
+  Formulas<double> f;
+  std::vector<int> shared(x.size(), 0);
+  for (const Pair& pair : pairs_)
+    for (std::size_t k = 0; k < 4; ++k) shared[pair.vertices[k]] += pair.shares[k];
+  Points stopped(x.size(), glm::dvec3(0)), pushed = stopped;
   counts_.touching = 0;
-  for (const Pair& pair : pairs_) {
-    if (!pair.acts) continue;
+  for (Pair& pair : pairs_) {
+    pair.push = 0;
+    if (!pair.acts()) continue;
     ++counts_.touching;
     counts_.nearest = std::min(counts_.nearest, pair.near.distance / pair.offset);
-    const Meeting meeting = meet(pair, substep);
-    if (!(meeting.weight > 0)) continue;
-    const auto& [b, e, n, distance, part] = pair.near;
+    std::array<double, 4> split;
+    for (std::size_t k = 0; k < 4; ++k)
+      split[k] = weights[pair.vertices[k]] * shared[pair.vertices[k]] / double(pair.shares[k]);
+    Ways ways = ways_of(pair, x);
+    const bool turns = all_move(pair, weights);
+    const auto m = f.meet(pair.near, ways.data(), split.data(), turns);
+    if (!(m.weight > 0)) continue;
     const auto friction = [&](std::uint32_t vertex) {
       return body_at(*model_, vertex).friction.value_or(settings.friction);
     };
-    const double both = Formulas<double>{}.mean_friction(friction(pair.vertices[0]), friction(pair.vertices[3]));
-    const double stop = std::max(0.0, -meeting.along - std::max(0.0, distance - pair.offset) / h) / meeting.weight;
-    const double size = glm::length(meeting.slip);
-    const double grip = size > 0 ? std::min(1 / meeting.slip_weight, both * stop / size) : 0;
+    const double both = f.mean_friction(friction(pair.vertices[0]), friction(pair.vertices[3]));
+    const double stop = f.stopping_impulse(pair.near, m, pair.offset), slip = f.slip_impulse(m, stop, both);
+    pair.push = f.push_apart(pair.near, m, pair.offset, push_limit);
     for (std::size_t k = 0; k < 4; ++k) {
       const std::uint32_t i = pair.vertices[k];
-      glm::dvec3 impulse = b[k] * (stop * n - grip * meeting.slip);
-      if (meeting.turns) impulse -= grip * glm::dot(e[k], meeting.slip) * n;
-      changes_[i] += weights[i] * impulse;
+      stopped[i] += weights[i] * f.impulse_on(int(k), pair.near, m, stop, slip, turns);
+      pushed[i] += (weights[i] * pair.near.weights[k] * pair.push) * pair.near.normal;
     }
   }
-  change_velocities(substep);
+  for (const std::uint32_t i : surfaces_.vertices) v[i] += stopped[i] / h, x[i] += stopped[i];
+  turn_pushed(substep);
+  for (const std::uint32_t i : surfaces_.vertices) x[i] += pushed[i];
 }
 
-// Moves what is nearer than its offset apart, in place alone. As that turns what slips, a little of the velocities
-// goes along.
-void OffsetContact::push_apart(double push_limit, Substep& substep) {
+bool OffsetContact::all_move(const Pair& pair, const std::vector<double>& weights) {
+  return std::ranges::all_of(pair.vertices, [&](std::uint32_t i) { return weights[i] > 0; });
+}
+
+// Pushes that are yet to come turn what slips: a little of the velocities goes along.
+void OffsetContact::turn_pushed(Substep& substep) {
   auto& [x, v, weights, h] = substep;
-  changes_.assign(x.size(), glm::dvec3(0));
-  Points places(x.size(), glm::dvec3(0));
+  Points turned(x.size(), glm::dvec3(0));
   for (const Pair& pair : pairs_) {
-    const double missing = push_to * pair.offset - pair.near.distance;
-    if (!pair.acts || missing <= 0) continue;
-    const Meeting meeting = meet(pair, substep);
-    if (!(meeting.weight > 0)) continue;
-    const double push = std::min(push_part * missing, push_limit * pair.offset) / meeting.weight;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const std::uint32_t i = pair.vertices[k];
-      places[i] += (weights[i] * pair.near.weights[k] * push) * pair.near.normal;
-      if (meeting.turns)
-        changes_[i] += (weights[i] * push / pair.near.distance * glm::dot(pair.near.turns[k], meeting.velocity)) *
-                       pair.near.normal;
-    }
+    if (!(pair.push > 0) || !all_move(pair, weights)) continue;
+    Ways ways = ways_of(pair, x);
+    glm::dvec3 way(0);
+    for (std::size_t k = 0; k < 4; ++k) way += pair.near.weights[k] * ways[k];
+    for (std::size_t k = 0; k < 4; ++k)
+      turned[pair.vertices[k]] +=
+          weights[pair.vertices[k]] * Formulas<double>{}.push_turn(int(k), pair.near, way, pair.push);
   }
-  change_velocities(substep);
-  for (const std::uint32_t i : surfaces_.vertices) x[i] += places[i];
-}
-
-OffsetContact::Meeting OffsetContact::meet(const Pair& pair, const Substep& substep) const {
-  const auto& [b, e, n, distance, part] = pair.near;
-  Meeting m;
-  std::array<double, 4> weight;  // 1/kg, of the pair's part of the mass
-  for (std::size_t k = 0; k < 4; ++k) {
-    const std::uint32_t i = pair.vertices[k];
-    weight[k] = substep.weights[i] * shared_[i] / double(pair.shares[k]);
-    m.turns = m.turns && substep.weights[i] > 0;
-  }
-  for (std::size_t k = 0; k < 4; ++k) {
-    const std::uint32_t i = pair.vertices[k];
-    const glm::dvec3 velocity = (substep.x[i] - start_[i]) / substep.h;
-    m.along += b[k] * glm::dot(n, velocity), m.weight += b[k] * b[k] * weight[k];
-    m.velocity += b[k] * velocity;
-    if (m.turns) m.slip += glm::dot(n, velocity) * e[k];
-  }
-  m.slip += m.velocity;
-  m.slip -= glm::dot(m.slip, n) * n;
-  const double size = glm::length(m.slip);
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double turn = m.turns && size > 0 ? glm::dot(e[k], m.slip) / size : 0;
-    m.slip_weight += (b[k] * b[k] + turn * turn) * weight[k];
-  }
-  return m;
-}
-
-void OffsetContact::change_velocities(Substep& substep) {
-  for (const std::uint32_t i : surfaces_.vertices) substep.x[i] += substep.h * changes_[i], substep.v[i] += changes_[i];
+  for (const std::uint32_t i : surfaces_.vertices) v[i] += turned[i] / h;
 }
 
 double OffsetContact::kinetic_energy(const Substep& substep) const {
@@ -354,28 +307,25 @@ void OffsetContact::truncate(Substep& substep) {
   auto& [x, v, weights, h] = substep;
   std::vector<double> part(x.size(), 1);
   for (const Pair& pair : pairs_) {
-    std::array<double, 2> approach{0, 0};
-    const auto way = [&](std::size_t k) {
+    glm::dvec2 sides(0);
+    const auto own = [&](std::size_t k) {
       const std::uint32_t i = pair.vertices[k];
       return (side_of(pair.edges, k) == 0 ? -1 : 1) * glm::dot(pair.near.normal, x[i] - start_[i]);
     };
     for (std::size_t k = 0; k < 4; ++k) {
-      double& of_side = approach[std::size_t(side_of(pair.edges, k))];
-      of_side = std::max(of_side, way(k));
+      double& of_side = sides[side_of(pair.edges, k)];
+      of_side = std::max(of_side, own(k));
     }
-    const double both = approach[0] + approach[1];
-    const double most = gap_part * std::max(0.0, pair.near.distance - least_gap * pair.offset);
-    if (both <= most) continue;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const double limit = most * approach[std::size_t(side_of(pair.edges, k))] / both, own = way(k);
-      if (own > limit) part[pair.vertices[k]] = std::min(part[pair.vertices[k]], limit / own);
-    }
+    for (std::size_t k = 0; k < 4; ++k)
+      part[pair.vertices[k]] =
+          std::min(part[pair.vertices[k]],
+                   Formulas<double>{}.allowed_part(pair.near, pair.offset, sides, side_of(pair.edges, k), own(k)));
   }
   for (const std::uint32_t i : surfaces_.vertices) {
     if (!(weights[i] > 0)) continue;
     const glm::dvec3 way = x[i] - start_[i];
     // What is not listed is at least half of both margins apart.
-    const double away = glm::distance(start_[i] + part[i] * way, listed_[i]), most = motion_part * margins_[i];
+    const double away = glm::distance(start_[i] + part[i] * way, listed_[i]), most = limit_part * margins_[i];
     if (away > most)
       part[i] *= std::clamp((most - glm::distance(start_[i], listed_[i])) / (part[i] * glm::length(way)), 0.0, 1.0);
     if (part[i] == 1) continue;

@@ -8,14 +8,6 @@
 #include "sim/model/formulas.h"
 #include "sim/model/settings.h"
 
-namespace tetpbd::glsl {
-
-struct ProximityFormulas : Formulas<double> {
-#include "shaders/contact/bodies/proximity.glsl"
-};
-
-}  // namespace tetpbd::glsl
-
 namespace tetpbd {
 
 class OffsetContact {
@@ -34,12 +26,12 @@ class OffsetContact {
   void change_model(const Model& model) { model_ = &model; }
   /// Before a step: pairs are found anew, so that it goes the same way wherever a run begins.
   void begin_step() { listed_.clear(); }
-  /// Before a substep moves positions `x`.
-  void begin(const Settings& settings, const Points& x);
+  /// Before a substep moves positions `x` of velocities `v`.
+  void begin(const Settings& settings, const Points& x, const Points& v);
   /// After it has moved them, in `h` s: changes them and velocities `v`. What is too near moves apart by so many
   /// offsets at most.
-  void resolve(const Settings& settings, Points& x, Points& v, std::vector<State::Touching>& touching,
-               const std::vector<double>& inverse_masses, double h, double push_limit = INFINITY);
+  void resolve(const Settings& settings, Points& x, Points& v, const std::vector<double>& inverse_masses, double h,
+               double push_limit = INFINITY);
   /// s, in which an offset is recovered at the fastest where constraints turn every way into a velocity.
   static constexpr double recovery = 0.05;
   const Counts& counts() const { return counts_; }
@@ -50,10 +42,13 @@ class OffsetContact {
     std::uint32_t first, second;  // numbers of these
     std::array<std::uint32_t, 4> vertices;
     double offset;  // m
-    glsl::ProximityFormulas::Proximity near;
-    bool belongs = false, acts = false;
-    std::array<std::uint8_t, 4> shares{};
+    Formulas<double>::Proximity near{};
+    bool belongs = false;
+    std::array<std::uint8_t, 4> shares{};  // of its vertices' masses, in 255ths; 0: it does not touch
+    double push = 0;                       // push_apart()
+    bool acts() const { return belongs && shares[0] > 0; }
   };
+  using Ways = std::array<glm::dvec3, 4>;
   struct Substep {
     Points &x, &v;
     const std::vector<double>& weights;
@@ -73,34 +68,22 @@ class OffsetContact {
   void find_pairs(bool self);
   void add_pair(bool self, bool edges, std::uint32_t first, std::uint32_t second, std::vector<Pair>& found) const;
   void evaluate_pairs();
-  glsl::ProximityFormulas::Proximity proximity(const Pair& pair, const Points& x) const;
-  bool belongs(const Pair& pair) const;
-  bool leads_off_edge(std::uint32_t edge, const glm::dvec3& to) const;
-  bool leads_off_vertex(std::uint32_t vertex, const glm::dvec3& to) const;
-  void take_shares(const std::vector<State::Touching>& touching);
-  std::vector<State::Touching> next_touching(const Substep& substep) const;
-  struct Meeting {                       // of a pair, by the velocities of the substep so far
-    double along = 0;                    // m/s, along the normal; below 0 they come nearer
-    glm::dvec3 velocity{0};              // m/s, of one relative to the other
-    glm::dvec3 slip{0};                  // m/s, across the normal, with what turns add
-    double weight = 0, slip_weight = 0;  // 1/kg
-    bool turns = true;                   // all vertices can move, so that friction must not turn them
-  };
-  Meeting meet(const Pair& pair, const Substep& substep) const;
-  void apply_impulses(const Settings& settings, Substep& substep);
-  void push_apart(double push_limit, Substep& substep);
-  void change_velocities(Substep& substep);
+  Formulas<double>::Proximity proximity(const Pair& pair, const Points& x) const;
+  void share_masses(Pair& pair, Ways ways) const;
+  Ways ways_of(const Pair& pair, const Points& x) const;  // since the substep began
+  void apply_impulses(const Settings& settings, double push_limit, Substep& substep);
+  void turn_pushed(Substep& substep);
+  static bool all_move(const Pair& pair, const std::vector<double>& weights);
   double kinetic_energy(const Substep& substep) const;  // J, of surfaces
   void truncate(Substep& substep);
 
   const Model* model_;
-  Surfaces surfaces_;            // made with the first contacts
-  Points start_;                 // where the substep began; empty where bodies do not touch
+  Surfaces surfaces_;  // made with the first contacts
+  Points start_;       // where the substep began; empty where bodies do not touch
+  Points start_velocities_;
   Points listed_;                // where pairs_ were found; empty: not yet
   std::vector<double> margins_;  // m, by vertex: half of it may be moved until pairs are found anew
   std::vector<Pair> pairs_;
-  Points changes_;           // m/s, by vertex, of velocities
-  std::vector<int> shared_;  // by vertex, the sum of shares
   Counts counts_;
 };
 

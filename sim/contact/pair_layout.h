@@ -1,53 +1,53 @@
-// shaders/contact/bodies/layout.glsl as C++, and the layout of the buffers of contact between bodies (surfaces.glsl and
-// sums.glsl in the same folder).
+// shaders/contact/bodies/layout.glsl as C++, and the layout of the buffers of contact between bodies (surfaces.glsl in
+// the same folder).
 #pragma once
 
+#include "sim/contact/surfaces.h"
 #include "sim/gl/buffer_layout.h"
 
 namespace tetpbd {
 
 namespace pair_layout {
 using glm::uint;
+using glm::uvec4;
+using glm::vec4;
 #include "shaders/contact/bodies/layout.glsl"
-static_assert(sizeof(SurfaceLeaf) == 28 && sizeof(SurfaceBody) == 8 && sizeof(SurfaceSlice) == 12);
-static_assert(sizeof(ContactTotals) == 12 && sizeof(CandidateCounts) == 64 && sizeof(BodyBox) == 56);
-static_assert(sizeof(LeafBox) == 28 && sizeof(NearLeaves) == 256 && sizeof(ContactRecord) == 44);
-static_assert(sizeof(ContactSums) == 28);
+static_assert(sizeof(SurfaceLeaf) == 32 && sizeof(ContactTotals) == 24 && sizeof(PairCounts) == 32);
+static_assert(sizeof(SurfacePair) == 64 && sizeof(PairSums) == 56);
 }  // namespace pair_layout
 
-struct PairMesh;
+/// Parts of surfaces in leaves: about 64 triangles that are together at rest, with the vertices and edges of no earlier
+/// leaf.
+struct SurfaceLeaves {
+  std::vector<pair_layout::SurfaceLeaf> leaves;  ///< body by body
+  std::vector<std::uint32_t> triangles, vertices, edges;
+};
+SurfaceLeaves cut_leaves(const Model& model, const Surfaces& surfaces);
+
 struct PairSizes {
-  std::size_t triangles, edges, vertices, leaves, slices, tets, bodies;
-  std::size_t all_vertices;                 ///< inner ones among them
-  std::size_t lanes;                        ///< invocations that find the candidates of an item
-  static constexpr std::size_t group = 64;  ///< invocations of a work-group
-  std::size_t items() const { return vertices + edges; }
-  std::size_t targets() const { return triangles + edges; }
+  std::size_t triangles, edges, surface_vertices;
+  std::size_t vertices, places;  ///< inner ones among them; once more where bodies touch themselves
+  std::size_t leaves;
 };
 std::vector<std::string> pair_defines(const PairSizes& sizes);
 
 struct PairRanges {
-  BufferLayout mesh, lists, sums;
-  Range<glm::uvec4> triangles, edge_vertices, tet_vertices, tet_beyond;
-  Range<std::uint32_t> edge_bodies, first_around, behind;
-  Range<glm::uvec2> surface_vertices, around;
+  BufferLayout mesh, lists;
+  Range<glm::uvec4> triangles, edges;
+  Range<glm::vec4> places;
+  Range<std::uint32_t> triangle_edges, own_triangle, first_neighbour, neighbours, leaf_triangles, leaf_vertices,
+      leaf_edges;
+  Range<float> offsets;
   Range<pair_layout::SurfaceLeaf> leaves;
-  Range<pair_layout::SurfaceBody> bodies;
-  Range<pair_layout::SurfaceSlice> slices;
-  Range<pair_layout::ContactTotals> totals;  ///< this and the following of `lists`
-  Range<pair_layout::CandidateCounts> counts;
-  Range<pair_layout::BodyBox> boxes;
-  Range<float> depths;
-  Range<pair_layout::ContactRecord> records;
-  Range<std::int32_t> sharing;  ///< of `sums`
+  Range<glm::vec4> leaf_lows, leaf_highs;  ///< these and the following of `lists`
+  Range<pair_layout::ContactTotals> totals;
+  Range<pair_layout::PairCounts> counts;
 };
 PairRanges lay_out_pairs(const PairSizes& sizes);
-
-/// The surface's vertices in parts of at most 1024, each of one body.
-std::vector<pair_layout::SurfaceSlice> cut_slices(const PairMesh& mesh);
 /// The contents of `mesh` of PairRanges.
-std::vector<std::byte> fill_pair_mesh(const PairMesh& mesh, std::size_t all_vertices, const PairRanges& ranges);
-/// The contents of `lists` up to the end of boxes, without contacts and with empty boxes.
+std::vector<std::byte> fill_pair_mesh(const Model& model, const Surfaces& surfaces, const SurfaceLeaves& leaves,
+                                      const PairRanges& ranges);
+/// The contents of `lists` before anything is found.
 std::vector<std::byte> make_empty_lists(const PairRanges& ranges);
 
 }  // namespace tetpbd

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <utility>
+#include <numeric>
 
+#include "sim/contact/cell_grid.h"
+#include "sim/contact/offset_contact.h"
 #include "sim/gl/keep_bindings.h"
-#include "sim/measure/overlap.h"
 #include "sim/sim.h"
 
 namespace tetpbd {
@@ -19,262 +20,246 @@ bool bodies_touch(const Model& model, const Settings& settings) {
   return settings.contact == "self" || (settings.contact == "bodies" && model.bodies.size() > 1);
 }
 
-bool contacts_lag(const Model& model, const Settings& settings) {
-  return bodies_touch(model, settings) && !solver_mode(settings).implicit;
-}
-
 namespace {
 
-float unsorted(std::uint32_t bits) { return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits); }
+constexpr double most_limit = 1.5;                                    // edges, that a vertex may go between detections
+constexpr unsigned tasks = 6;                                         // work-groups of a pair of leaves
+constexpr std::size_t group = 64, pair_group = 64, find_group = 128;  // invocations
 
 void give_pairs(Sim& sim) {
   const Pairs& p = sim.pairs;
   Recorder& recorder = sim.recorder;
-  recorder.give("PairMesh", p.mesh), recorder.give("PairSpheres", p.spheres);
-  recorder.give("PairLists", p.lists), recorder.give("PairRest", p.rest);
+  recorder.give("PairMesh", p.mesh), recorder.give("PairLists", p.lists);
+  recorder.give("LeafPairs", p.leaf_pairs), recorder.give("Pairs", p.pairs);
+  recorder.give("PairSumsByVertex", p.sums), recorder.give("Listed", p.listed);
   recorder.counts = p.lists.id();
 }
 
-// Finds the boxes of bodies; for a broad phase also those of leaves, and resets its counts.
-void find_boxes(Sim& sim, bool broad_phase) {
+void find_boxes(Sim& sim, bool detects) {
   Pairs& p = sim.pairs;
-  const std::size_t first = broad_phase ? p.ranges.counts.at : p.ranges.boxes.at;
-  p.empty.copy_to(p.lists, first, first, p.empty.bytes() - first);
-  p.boxes.work_groups = p.slices + (broad_phase ? p.leaves : 0);
-  sim.recorder.run(p.boxes);
+  p.empty.copy_to(p.lists, p.ranges.counts.at, p.ranges.counts.at, p.ranges.counts.bytes());
+  sim.recorder.run(p.boxes, {{"detects", unsigned(detects)}});
+  p.boxed = true;
 }
 
-void find_candidates(Sim& sim, double margin) {
-  Pairs& p = sim.pairs;
-  Recorder& recorder = sim.recorder;
-  const float reach = float(margin + p.thickness);
-  recorder.use(p.boxes.program).set("margin", reach);
-  find_boxes(sim, true);
-  recorder.run(p.cull);
-  recorder.barrier(GL_COMMAND_BARRIER_BIT);  // cull counts the work-groups of the next kernels
-  for (Pass* query : {&p.query, &p.query_edges}) {
-    if (!*query) continue;
-    recorder.use(query->program).set("margin", reach);
-    recorder.run(*query);
-  }
-  recorder.barrier(GL_COMMAND_BARRIER_BIT);  // the queries count the work-groups of meet and push
-  ++p.detections, p.age = 0;
+// m/s, that no more than a tenth of the leaves exceed.
+double high_speed(std::vector<double> speeds) {
+  if (speeds.empty()) return 0;
+  const auto at = speeds.begin() + std::ptrdiff_t(0.9 * double(speeds.size()));
+  std::ranges::nth_element(speeds, at);
+  return *at;
 }
 
-// Where the surface of a body is and how fast it moves.
+// Where the surface of a body is and how fast its vertices are.
 struct Extent {
-  Bounds positions, velocities;  // of velocities, the means of slices
-  double spread = 0;             // m/s, how far all but a few vertices are from these
-
-  double fastest() const { return glm::length(glm::max(glm::abs(velocities.low), glm::abs(velocities.high))) + spread; }
+  Bounds box;
+  double fastest = 0;  // m/s
 };
-double approach_speed(const Extent& a, const Extent& b) {
-  const auto most =
-      glm::max(glm::abs(a.velocities.high - b.velocities.low), glm::abs(b.velocities.high - a.velocities.low));
-  return glm::length(most) + a.spread + b.spread;
-}
-bool are_apart(const Bounds& a, const Bounds& b, double distance) {
-  return glm::any(glm::greaterThan(a.low, b.high + distance)) || glm::any(glm::greaterThan(b.low, a.high + distance));
-}
 
-// Decides whether bodies may touch before the readback after the next, and how fast they approach each other.
+// Decides whether bodies may touch before the readback after the next.
 void plan_detection(Sim& sim, const std::vector<Extent>& bodies) {
   Pairs& p = sim.pairs;
   const Settings& s = sim.settings;
-  p.fastest = p.approach_speed = 0;
-  for (const Extent& body : bodies) p.fastest = std::max(p.fastest, body.fastest());
+  p.fastest = 0;
+  for (const Extent& body : bodies) p.fastest = std::max(p.fastest, body.fastest);
   const double seconds = 2 * double(Pairs::readback_interval + 1) * s.dt,
-               apart = 2 * (p.fastest + std::abs(s.gravity) * seconds) * seconds + 2 * p.margin + p.thickness;
-  const bool self = s.contact == "self";
-  p.near = self;
-  for (std::size_t a = 0; a < bodies.size(); ++a)
-    for (std::size_t b = self ? a : a + 1; b < bodies.size(); ++b) {
-      if (a != b && are_apart(bodies[a].positions, bodies[b].positions, apart)) continue;
-      p.near = true;
-      p.approach_speed = std::max(p.approach_speed, approach_speed(bodies[a], bodies[b]));
+               apart = 2 * (p.fastest + std::abs(s.gravity) * seconds) * seconds + p.edge;
+  p.near = s.contact == "self";
+  for (std::size_t a = 0; a < bodies.size() && !p.near; ++a)
+    for (std::size_t b = a + 1; b < bodies.size() && !p.near; ++b) {
+      const Bounds &one = bodies[a].box, &other = bodies[b].box;
+      p.near = !are_apart({one.low - apart, one.high + apart}, other);
     }
-  if (!p.near) p.age = -1;
+}
+
+Buffer checked(const Tuning& tuning, Buffer buffer) {
+  check_storage(tuning, buffer.label(), buffer.bytes());
+  return buffer;
+}
+
+// As much as a block may have at most: what then has no room is counted.
+void make_room(Pairs& p, const Tuning& tuning, std::size_t pairs, std::size_t leaf_pairs) {
+  if (p.pairs) pairs = std::min(pairs, tuning.storage / sizeof(SurfacePair));
+  p.pairs = checked(tuning, Buffer("pairs of surfaces", sizeof(SurfacePair) * pairs));
+  p.leaf_pairs = checked(tuning, Buffer("pairs of leaves", sizeof(glm::uvec2) * leaf_pairs));
 }
 
 void read_contacts(Sim& sim) {
-  constexpr double spreads = 2;  // root mean squares from the mean, within which all vertices but a few are
   Pairs& p = sim.pairs;
   const auto contents = poll_readback<std::byte>(p.requested, p.readback, "contacts", true);
   if (!contents) return;
   const ContactTotals totals = get(*contents, p.ranges.totals)[0];
-  p.touches += totals.touching, p.crowded += totals.crowded;
-  p.depth = double(std::bit_cast<float>(totals.deepest));
-  p.deepest = std::max(p.deepest, p.depth);
-  std::vector<Extent> bodies;
-  for (const BodyBox& box : get(*contents, p.ranges.boxes)) {
-    const auto vector = [](const std::uint32_t(&bits)[3]) {
-      return glm::dvec3(unsorted(bits[0]), unsorted(bits[1]), unsorted(bits[2]));
-    };
-    bodies.push_back({{vector(box.low), vector(box.high)},
-                      {vector(box.slowest), vector(box.fastest)},
-                      spreads * double(std::bit_cast<float>(box.spread))});
-    // The few faster vertices matter only if they cross the margin before the next readback.
-    const double faster = double(std::bit_cast<float>(box.top_speed)) - bodies.back().fastest();
-    p.outrun += faster * double(Pairs::readback_interval) * sim.settings.dt > p.margin;
+  p.touches += totals.touching, p.truncated += totals.truncated;
+  p.taken += double(totals.taken) * TAKEN_UNIT;
+  p.nearest_lately = std::min(1.0, double(std::bit_cast<float>(totals.nearest)));
+  p.nearest = std::min(p.nearest, p.nearest_lately);
+  p.listed_pairs = std::max<std::uint64_t>(p.listed_pairs, totals.most_pairs);
+  const std::size_t pairs = p.pairs.bytes() / sizeof(SurfacePair),
+                    leaf_pairs = p.leaf_pairs.bytes() / sizeof(glm::uvec2);
+  p.left_out += std::max<std::size_t>(totals.most_pairs, pairs) - pairs;
+  p.left_out += std::max<std::size_t>(totals.most_leaf_pairs, leaf_pairs) - leaf_pairs;
+  if (totals.most_pairs > pairs / 2 || totals.most_leaf_pairs > leaf_pairs / 2)
+    make_room(p, sim.tuning, std::max<std::size_t>(pairs, 4 * std::size_t(totals.most_pairs)),
+              std::max<std::size_t>(leaf_pairs, 4 * std::size_t(totals.most_leaf_pairs)));
+  std::vector<Extent> bodies(sim.model->bodies.size(), {{glm::dvec3(INFINITY), glm::dvec3(-INFINITY)}, 0});
+  const std::vector<glm::vec4> lows = get(*contents, p.ranges.leaf_lows), highs = get(*contents, p.ranges.leaf_highs);
+  std::vector<double> speeds;
+  for (std::size_t l = 0; l < lows.size(); ++l) {
+    Extent& body = bodies[p.leaf_bodies[l]];
+    body.box = {glm::min(body.box.low, glm::dvec3(lows[l])), glm::max(body.box.high, glm::dvec3(highs[l]))};
+    body.fastest = std::max(body.fastest, double(lows[l].w));
+    speeds.push_back(double(lows[l].w));
   }
   plan_detection(sim, bodies);
+  p.usual = high_speed(speeds);
 }
 
 void request_readback(Pairs& p) {
   p.lists.copy_to(p.readback, 0, 0, p.readback.bytes());
-  const auto& totals = p.ranges.totals;
-  p.empty.copy_to(p.lists, totals.at, totals.at, totals.bytes());
+  p.empty.copy_to(p.lists, p.ranges.totals.at, p.ranges.totals.at, p.ranges.totals.bytes());
   p.requested = Fence::here();
 }
 
-void make_buffers(Pairs& p, const SolverInput& input, const PairMesh& surfaces, const PairSizes& sizes) {
-  const auto checked = [&](Buffer buffer) {
-    check_storage(input.tuning, buffer.label(), buffer.bytes());
-    return buffer;
-  };
-  p.mesh = checked(Buffer("surfaces", fill_pair_mesh(surfaces, sizes.all_vertices, p.ranges)));
-  if (input.settings.contact == "self") {
-    std::vector<glm::vec4> rest;
-    for (const glm::dvec3& x : input.model.rest.positions) rest.emplace_back(glm::vec3(x), 0);
-    p.rest = checked(Buffer("surfaces at rest", rest));
-  }
-  p.lists = checked(Buffer("contacts", p.ranges.lists.bytes));
-  p.spheres = checked(Buffer("spheres around triangles", sizeof(glm::vec4) * sizes.targets()));
-  p.sums = checked(Buffer("corrections by contacts", std::vector<std::byte>(p.ranges.sums.bytes), GL_DYNAMIC_COPY));
-  p.empty = Buffer("no contacts", make_empty_lists(p.ranges));
+void make_buffers(Pairs& p, const SolverInput& input, const Surfaces& surfaces, const SurfaceLeaves& leaves) {
+  const Model& model = input.model;
+  const std::size_t count = model.positions.size(), triangles = model.rest.surface.size();
+  p.mesh = checked(input.tuning, Buffer("surfaces", fill_pair_mesh(model, surfaces, leaves, p.ranges)));
+  p.empty = Buffer("no pairs", make_empty_lists(p.ranges));
+  p.lists = checked(input.tuning, Buffer("leaves of surfaces", make_empty_lists(p.ranges), GL_DYNAMIC_COPY));
+  p.sums = checked(input.tuning, Buffer("sums of pairs", std::vector<std::byte>(sizeof(PairSums) * count)));
+  p.listed = checked(input.tuning, Buffer("places of listing", std::vector<glm::vec4>(count), GL_DYNAMIC_COPY));
+  p.listed_texels = make_texel_view(p.listed);
   p.readback = Buffer("contacts read-back", p.empty.bytes(), nullptr, GL_STREAM_READ);
+  make_room(p, input.tuning, 65536 + 8 * triangles, 4096 + 24 * p.leaf_bodies.size());
 }
 
-void make_passes(Pairs& p, const SolverInput& input, const PairMesh& surfaces) {
+void make_passes(Pairs& p, const SolverInput& input) {
   const Settings& settings = input.settings;
+  const bool implicit = solver_mode(settings).implicit;
   std::vector<std::string> defines = vertex_defines(input);
-  defines.insert(defines.end(), p.sizes.begin(), p.sizes.end());
-  defines.push_back(fmt::format("ROW {}u", input.tuning.row));
-  defines.push_back(fmt::format("IMPLICIT {:d}", solver_mode(settings).implicit));
-  defines.push_back(fmt::format("SHEETS {:d}", surfaces.thickness > 0));
-  defines.push_back(fmt::format("EDGE {:.9g}", surfaces.edge));
-  defines.push_back(fmt::format("SELF_MARGIN {:.9g}", pair_margin(surfaces)));
-  defines.push_back(fmt::format("CONTACT_SELF {:d}", settings.contact == "self"));
-  const auto kernel = [&](const char* name, const char* variant = nullptr) {
-    constexpr std::size_t most_blocks = 10;
+  defines.insert(defines.end(), p.defines.begin(), p.defines.end());
+  const double mass = std::accumulate(input.model.masses.begin(), input.model.masses.end(), 0.0);
+  defines.insert(defines.end(), {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
+                                 fmt::format("PAIR_GROUP {}u", pair_group), fmt::format("TASKS {}u", tasks),
+                                 fmt::format("TOTAL_MASS {:.9g}", mass),
+                                 fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
+  const auto kernel = [&](const char* name, std::size_t size = group, bool before_substep = true) {
     std::vector<std::string> all = defines;
-    if (variant) all.push_back(variant);
-    return Program::compute(fmt::format("contact/bodies/{}.comp", name), scheme_words(input), all, most_blocks);
+    all.push_back(fmt::format("GROUP_SIZE {}u", size));
+    all.push_back(fmt::format("BEFORE_SUBSTEP {:d}", before_substep));
+    return Program::compute(fmt::format("contact/bodies/{}.comp", name), scheme_words(input), all);
   };
-  const auto counted = [&](Program program, std::size_t number, const char* what = "") {
+  const auto counted = [&](Program program, std::size_t at) {
     Pass pass{std::move(program)};
-    pass.name = pass.program.label() + what;
-    pass.counts_at = p.ranges.counts.at + offsetof(CandidateCounts, groups) + sizeof(WorkGroups) * number;
+    pass.counts_at = p.ranges.counts.at + at;
     return pass;
   };
-  p.boxes = {kernel("boxes"), p.slices + p.leaves};
-  p.cull = {kernel("cull"), p.leaves};
-  p.query = counted(kernel("query", "QUERY_EDGES 0"), QUERY_GROUPS);
-  if (!surfaces.edges.empty()) p.query_edges = counted(kernel("query", "QUERY_EDGES 1"), EDGE_GROUPS, " of edges");
-  p.meet = counted(kernel("meet", "LAGGED 0"), LANE_GROUPS);
-  p.push = counted(kernel("push"), RECORD_GROUPS);
-  if (p.lag) p.meet_and_push = counted(kernel("meet", "LAGGED 1"), LANE_GROUPS, ", and push");
+  p.boxes = {kernel("boxes"), p.leaf_bodies.size()};
+  p.near_leaves = {kernel("near"), p.leaf_bodies.size()};
+  p.cull = {kernel("cull"), p.leaf_bodies.size()};
+  p.find = counted(kernel("find", find_group), offsetof(PairCounts, leaf_pair_groups));
+  p.impulses = counted(kernel("impulses", pair_group, false), offsetof(PairCounts, pair_groups));
+  p.truncate = counted(kernel("truncate", pair_group, false), offsetof(PairCounts, pair_groups));
+}
+
+// Substeps between detections, so that meanwhile surfaces come nearer by a part of an edge: with much less detections
+// take the time, with much more there are many pairs that never touch.
+int detection_interval(const Sim& sim) {
+  const Pairs& p = sim.pairs;
+  const bool self = sim.settings.contact == "self";  // neighbours would be listed
+  const double gained = std::abs(sim.settings.gravity) * double(2 * Pairs::readback_interval) * sim.settings.dt;
+  const double usual = (self ? 0.1 : 0.2) * p.edge / (p.usual + gained),
+               most = 0.4 * most_limit * p.edge / (p.fastest + gained);
+  return int(std::clamp(std::min(usual, most) / sim.plan.h, 1.0, double(sim.plan.substeps)));
 }
 
 }  // namespace
 
 Pairs make_pairs(const SolverInput& input) {
   const Model& model = input.model;
-  PairMesh surfaces = pair_mesh(model);
-  order_in_leaves(model.rest, surfaces);
-  add_tets(model.rest, surfaces);
-  const PairSizes sizes{.triangles = surfaces.triangles.size(),
+  const Surfaces surfaces = lay_out_surfaces(model);
+  const SurfaceLeaves leaves = cut_leaves(model, surfaces);
+  const PairSizes sizes{.triangles = model.rest.surface.size(),
                         .edges = surfaces.edges.size(),
-                        .vertices = surfaces.vertices.size(),
-                        .leaves = surfaces.leaves.size(),
-                        .slices = cut_slices(surfaces).size(),
-                        .tets = surfaces.tets.size(),
-                        .bodies = model.bodies.size(),
-                        .all_vertices = model.positions.size(),
-                        .lanes = input.tuning.lanes};
+                        .surface_vertices = surfaces.vertices.size(),
+                        .vertices = model.positions.size(),
+                        .places = model.positions.size() * (input.settings.contact == "self" ? 2 : 1),
+                        .leaves = leaves.leaves.size()};
   Pairs p;
-  p.lag = contacts_lag(model, input.settings);
-  p.margin = (input.settings.contact == "self" ? 1 : 2) * pair_margin(surfaces), p.thickness = surfaces.thickness;
-  p.slices = sizes.slices, p.leaves = sizes.leaves, p.items = sizes.items();
-  p.ranges = lay_out_pairs(sizes), p.sizes = pair_defines(sizes);
-  make_buffers(p, input, surfaces, sizes);
-  make_passes(p, input, surfaces);
+  for (const SurfaceLeaf& leaf : leaves.leaves) p.leaf_bodies.push_back(leaf.body);
+  for (const std::uint32_t v : surfaces.vertices) p.offset += surfaces.offsets[v] / double(surfaces.vertices.size());
+  p.edge = p.offset / Surfaces::offset_part;
+  p.ranges = lay_out_pairs(sizes), p.defines = pair_defines(sizes);
+  make_buffers(p, input, surfaces, leaves);
+  make_passes(p, input);
   return p;
 }
 
 void plan_body_contacts(Sim& sim) {
   Pairs& p = sim.pairs;
-  if (!p || sim.steps % Pairs::readback_interval != 0) return;
+  if (!p) return;
+  bind_texels(UNIT_LISTED, p.listed_texels);
+  if (sim.steps % Pairs::readback_interval != 0) return;
   read_contacts(sim);
   give_pairs(sim);
-  if (!p.near || p.age < 0) find_boxes(sim, false);
+  if (!p.near || !p.boxed) find_boxes(sim, false);
   request_readback(p);
 }
 
-void resolve_body_contacts(Sim& sim, int left) {
+void list_pairs(Sim& sim, int substep) {
   Pairs& p = sim.pairs;
-  if (!p || !p.near) return;
-  const Settings& s = sim.settings;
-  const double h = sim.plan.h, gained = std::abs(s.gravity) * 2 * double(Pairs::readback_interval) * s.dt,
-               approach = p.approach_speed + gained;
-  // A body that crosses the margin in a substep gets a wider one, and so do bodies that overlap at the start.
-  const double margin =
-      std::min(std::max(p.margin, 1.1 * approach * h), sim.model->size) + 2 * std::exchange(p.start_depth, 0);
-  // Candidates last, in substeps, while bodies cannot cross the margin, or twice the margin if something else stops one
-  // of two; only one step where a body folds or leaves another, because other candidates are soon needed there.
-  const double lifetime =
-      std::max(1.0, std::floor(margin / (h * std::max(approach, 0.5 * (p.fastest + gained)) + 1e-30)));
-  const bool changes = s.contact == "self" || p.depth > 0.1 * p.margin;
-  const double most_lifetime = double((changes ? 1 : Pairs::most_lifetime) * sim.plan.substeps);
-  // Contacts are counted ahead for a next substep that applies corrections itself.
-  const bool ahead = p.lag && sim.plan.substeps > 1, lagged = ahead && left > 0 && p.counted && p.age >= 0;
-  if (p.age < 0 || (!lagged && p.counted && (p.phases & PHASE_SHARED_LAST) == 0)) p.sums.clear();
+  p.phases = p && p.near ? PHASE_NEAR : 0u;
+  if (!p.phases) return;
   give_pairs(sim);
-  sim.recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
-  if (p.age < 0 || double(p.age) >= std::min(lifetime, most_lifetime)) find_candidates(sim, margin);
-  ++p.age;
-  Pass& meet = lagged ? p.meet_and_push : p.meet;
-  const bool implicit = solver_mode(s).implicit;
-  // Implicit substeps are long: with one pass a stack sinks in by 0.7 %, with eight by 0.02 %. Each pass brings bodies
-  // nearer to others, so that what may come near before the next pass has no bound.
-  const float closed_most = implicit ? 1e30f : float(std::max({approach, p.fastest + gained, margin / (2 * s.dt)}) * h);
-  sim.recorder.use(meet.program).set("closed_most", closed_most);
-  for (int pass = 0; pass < (implicit ? 8 : 1); ++pass) {
-    sim.recorder.run(meet, {{"side", p.side}, {"ahead", unsigned(ahead)}, {"substep", unsigned(p.age)}});
-    if (!lagged) sim.recorder.run(p.push, {{"side", p.side}});
+  const int interval = detection_interval(sim);
+  if (substep % interval != 0) return;
+  Recorder& recorder = sim.recorder;
+  find_boxes(sim, true);
+  for (Pass* pass : {&p.near_leaves, &p.cull, &p.find}) {
+    const Program& program = recorder.use(pass->program);
+    program.set("lifetime", float(interval * sim.plan.h));
+    program.set("least_limit", float(0.5 * p.offset)), program.set("most_limit", float(most_limit * p.edge));
   }
-  p.counted = ahead;
-  if (ahead) p.side = 1 - p.side;
-  p.phases = lagged ? PHASE_TOUCHED | (p.side ? PHASE_SHARED_SIDE : 0u) | (left == 1 ? PHASE_SHARED_LAST : 0u) : 0u;
+  recorder.run(p.near_leaves);
+  recorder.run(p.cull);
+  recorder.barrier(GL_COMMAND_BARRIER_BIT);  // cull counts the work-groups of find, and find those of the others
+  recorder.run(p.find);
+  recorder.barrier(GL_COMMAND_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+  ++p.detections, p.side = 0;
+}
+
+void resolve_body_contacts(Sim& sim) {
+  Pairs& p = sim.pairs;
+  if (!p.phases) return;
+  Recorder& recorder = sim.recorder;
+  recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
+  // What has no velocity of its own but that of its motion must not be pushed apart at once.
+  const bool by_force = solver_mode(sim.settings).leapfrog;
+  recorder.use(p.impulses.program).set("push_limit", by_force ? 1e30f : float(sim.plan.h / OffsetContact::recovery));
+  recorder.run(p.impulses, {{"side", p.side}});
+  recorder.run(p.truncate, {{"side", p.side}});
+  p.side = 1 - p.side;
   give_quantized(sim);
 }
 
 void start_pairs(Sim& sim, const State& state) {
   Pairs& p = sim.pairs;
   if (!p) return;
-  p.requested = {}, p.age = -1;
+  p.requested = {}, p.boxed = false;
   std::vector<Extent> bodies;
   for (const Body& body : sim.model->bodies) {
-    const auto body_bounds = [&](const std::vector<glm::dvec3>& all) {
-      const auto first = all.begin() + std::ptrdiff_t(body.first_vertex);
-      return bounds({first, first + std::ptrdiff_t(body.vertices)});
-    };
-    bodies.push_back({body_bounds(state.positions), body_bounds(state.velocities)});
+    Extent& extent = bodies.emplace_back(Extent{body_bounds(body, state.positions), 0});
+    for (std::size_t i = body.first_vertex; i < body.first_vertex + body.vertices; ++i)
+      extent.fastest = std::max(extent.fastest, glm::length(state.velocities[i]));
   }
   plan_detection(sim, bodies);
-  p.start_depth = p.near ? measure_overlap(*sim.model, state.positions, sim.settings.contact == "self").deepest : 0;
-  std::vector<std::byte> contents(p.lists.bytes(), std::byte{0xff});  // NONE in all that `empty` does not hold
-  std::ranges::copy(make_empty_lists(p.ranges), contents.begin());
-  p.lists.write(0, contents.size(), contents.data());
+  p.usual = p.fastest;
+  p.lists.write(0, p.empty.bytes(), make_empty_lists(p.ranges).data());
 }
 
 void add_carried(Carried& all, Pairs& p) {
   if (!p) return;
-  const PairRanges& r = p.ranges;
-  all.ranges.push_back({&p.lists, 0, r.depths.at + r.depths.bytes()});  // from totals to depths
-  all.ranges.push_back({&p.lists, r.records.at, r.records.bytes()});
-  all.add(p.readback);
-  if (p.lag) all.ranges.push_back({&p.sums, r.sharing.at, r.sharing.bytes()});
+  all.add(p.lists), all.add(p.readback);
   all.add_values(static_cast<PairNumbers&>(p));
   all.add_readback(p.requested);
 }

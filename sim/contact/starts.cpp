@@ -12,6 +12,7 @@
 #include "sim/contact/convex.h"
 #include "sim/contact/moving_obstacle.h"
 #include "sim/contact/pairs.h"
+#include "sim/contact/surfaces.h"
 #include "sim/error.h"
 
 namespace tetpbd {
@@ -31,9 +32,9 @@ struct Shape {
   std::string name;
   std::vector<Cell> cells;
   Bounds box;
-  double size = 0, mass = 0;
-  bool held = false;  // has a fixed vertex
-  CellGrid grid{1};   // of cells, by number
+  double size = 0, mass = 0, offset = 0;  // offset: m, that its surface keeps from others, in the mean
+  bool held = false;                      // has a fixed vertex
+  CellGrid grid{1};                       // of cells, by number
 };
 
 struct Place {
@@ -145,14 +146,18 @@ Depth depth_in(const MovingObstacle& obstacle, const Shape& shape, const glm::dv
   return deepest;
 }
 
-// Calls f with each pair of cells of the two that overlap by more than touching, but for those whose boxes say enough.
+Bounds grown(const Bounds& box, double by) { return {box.low - by, box.high + by}; }
+
+// Calls f with each pair of cells of the two that overlap by more than touching, or are nearer than a gap, but for
+// those whose boxes say enough.
 template <class Skip, class F>
-void for_each_overlap(const Shape& a, const glm::dvec3& by, const Shape& b, Skip&& skip, F&& f) {
-  if (are_apart(moved(a.box, by), b.box)) return;
+void for_each_overlap(const Shape& a, const glm::dvec3& by, const Shape& b, Skip&& skip, F&& f, double gap = 0) {
+  if (are_apart(grown(moved(a.box, by), gap), b.box)) return;
   const double enough = touching * std::min(a.size, b.size);
   std::vector<std::uint32_t> near;
   for (const Cell& own : a.cells) {
-    const Cell cell = moved(own, by);
+    Cell cell = moved(own, by);
+    cell.box = grown(cell.box, gap);
     if (are_apart(cell.box, b.box)) continue;
     near.clear();
     b.grid.for_each(cell.box, [&](std::uint32_t c) { near.push_back(c); });
@@ -161,19 +166,41 @@ void for_each_overlap(const Shape& a, const glm::dvec3& by, const Shape& b, Skip
     near.erase(same.begin(), same.end());
     for (const std::uint32_t c : near)
       if (!are_apart(cell.box, b.cells[c].box) && !skip(cell.box, b.cells[c].box) &&
-          overlap_depth(cell, b.cells[c]) > enough)
+          overlap_depth(cell, b.cells[c], gap) > enough)
         if (!f(cell, b.cells[c])) return;
   }
 }
 
-bool overlap(const Shape& a, const Shape& b) {
+bool overlap(const Shape& a, const Shape& b, double gap = 0) {
   bool any = false;
   const auto never = [](const Bounds&, const Bounds&) { return false; };
-  for_each_overlap(a, glm::dvec3(0), b, never, [&](const Cell&, const Cell&) {
-    any = true;
-    return false;
-  });
+  for_each_overlap(
+      a, glm::dvec3(0), b, never,
+      [&](const Cell&, const Cell&) {
+        any = true;
+        return false;
+      },
+      gap);
   return any;
+}
+
+// m, along a direction until there is a gap between the two; infinite beyond `limit`.
+double find_travel(const Shape& a, const Shape& b, const glm::dvec3& direction, double gap, double limit) {
+  const auto never = [](const Bounds&, const Bounds&) { return false; };
+  double travel = 0;
+  for (int tries = 0; tries < 40 && travel < limit; ++tries) {
+    double further = 0;
+    for_each_overlap(
+        a, travel * direction, b, never,
+        [&](const Cell& own, const Cell& other) {
+          further = std::max(further, exit_distance(own, other, direction, further, gap));
+          return true;
+        },
+        gap);
+    if (further == 0) return travel;
+    travel += further;
+  }
+  return infinite;
 }
 
 // What one body has to be free of.
@@ -285,14 +312,60 @@ class Separation {
   std::vector<StartMotion> run() {
     for (std::size_t b = 0; b < world_.shapes.size(); ++b) free_of_obstacles(b);
     if (!bodies_touch(model_, settings_)) return std::move(motions_);
-    for (Shape& shape : world_.shapes) fill_grid(shape);
+    const Surfaces surfaces = lay_out_surfaces(model_);
+    for (std::size_t b = 0; b < world_.shapes.size(); ++b) {
+      fill_grid(world_.shapes[b]);
+      world_.shapes[b].offset = mean_offset(model_.bodies[b], surfaces);
+    }
     for (std::size_t b = 0; b < world_.shapes.size(); ++b)
       for (std::size_t o = 0; o < b; ++o)
         if (overlap(world_.shapes[b], world_.shapes[o])) part(b, o);
+    keep_gaps();
     return std::move(motions_);
   }
 
  private:
+  // Moves bodies that touch apart by their offset, upwards where one lies on the other: what is pressed together from
+  // the start has no gap in which contact could act. Where the gap does not fit they stay.
+  void keep_gaps() {
+    constexpr double nearest = 0.1;  // of the offset, that contact can do with
+    constexpr int rounds = 40;
+    std::vector<glm::dvec3> motions(world_.shapes.size(), glm::dvec3(0));
+    bool any = true;
+    for (int round = 0; round < rounds && any; ++round) {
+      any = false;
+      for (std::size_t b = 0; b < world_.shapes.size(); ++b)
+        for (std::size_t o = 0; o < b; ++o) {
+          Shape &one = world_.shapes[b], &other = world_.shapes[o];
+          const double gap = std::min(one.offset, other.offset);
+          if (!overlap(one, other, nearest * gap) || (one.held && other.held)) continue;
+          const glm::dvec3 way = shortest_gap(one, other, gap);
+          if (way == glm::dvec3(0)) continue;
+          const double upwards = way.y * (settings_.gravity < 0 ? -1 : 1);
+          const bool level = std::abs(upwards) < 1e-6 * glm::length(way);
+          const bool first = other.held || (!one.held && (level ? one.mass <= other.mass : upwards > 0));
+          any = true;
+          shift(first ? b : o, first ? way : -way);
+          motions[first ? b : o] += first ? way : -way;
+        }
+    }
+    for (std::size_t b = 0; b < motions.size(); ++b)
+      if (motions[b] != glm::dvec3(0)) note(b, "", motions[b]);
+  }
+
+  // The shortest motion of `one` that leaves a gap, along an axis of space or away from the middle of the other.
+  static glm::dvec3 shortest_gap(const Shape& one, const Shape& other, double gap) {
+    std::vector<glm::dvec3> ways = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}};
+    const glm::dvec3 apart = one.box.centre() - other.box.centre();
+    if (glm::length(apart) > 0) ways.push_back(glm::normalize(apart));
+    double least = one.size;
+    glm::dvec3 best(0);
+    for (const glm::dvec3& way : ways)
+      if (const double travel = find_travel(one, other, way, gap, least); travel < least)
+        least = travel, best = travel * way;
+    return best;
+  }
+
   void free_of_obstacles(std::size_t b) {
     const Shape& shape = world_.shapes[b];
     std::vector<std::string> names;
@@ -330,13 +403,21 @@ class Separation {
   }
 
   void move(std::size_t b, const std::string& from, const glm::dvec3& motion) {
+    shift(b, motion);
+    note(b, from, motion);
+  }
+
+  void shift(std::size_t b, const glm::dvec3& motion) {
     const Body& body = model_.bodies[b];
     for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) model_.positions[v] += motion;
     Shape& shape = world_.shapes[b];
     shape.box = moved(shape.box, motion);
     for (Cell& cell : shape.cells) cell = moved(cell, motion);
     fill_grid(shape);
-    motions_.push_back({body.name, from, motion, shape.mass * settings_.gravity * motion.y});
+  }
+
+  void note(std::size_t b, const std::string& from, const glm::dvec3& motion) {
+    motions_.push_back({model_.bodies[b].name, from, motion, world_.shapes[b].mass * settings_.gravity * motion.y});
   }
 
   Model& model_;
@@ -352,6 +433,9 @@ std::vector<StartMotion> separate_starts(Model& model, const Settings& settings)
 }
 
 std::string describe(const StartMotion& m) {
+  if (m.from.empty())
+    return fmt::format("body '{}' touched others at the start and was moved away by ({:.3g}, {:.3g}, {:.3g}) m", m.body,
+                       m.motion.x, m.motion.y, m.motion.z);
   return fmt::format("body '{}' started {:.3g} m inside {} and was moved out by ({:.3g}, {:.3g}, {:.3g}) m", m.body,
                      glm::length(m.motion), m.from, m.motion.x, m.motion.y, m.motion.z);
 }

@@ -9,9 +9,6 @@ namespace tetpbd {
 
 namespace {
 
-// Of the mean length of the edges around a vertex. Less would ask for shorter steps, more would be seen.
-constexpr double offset_part = 0.15;
-
 struct Side {
   std::uint32_t low, high, beside, triangle, corner;
 };
@@ -63,10 +60,18 @@ Surfaces lay_out_surfaces(const Model& model) {
     for (std::uint32_t k = first; k < end; ++k)
       length += glm::distance(model.rest.positions[v], model.rest.positions[result.neighbours[k]]);
     const Body& body = body_at(model, v);
-    result.offsets[v] = offset_part * length / std::max(1u, end - first);
+    result.offsets[v] = Surfaces::offset_part * length / std::max(1u, end - first);
     if (body.thickness > 0) result.offsets[v] = std::min(result.offsets[v], body.thickness);
   }
   return result;
+}
+
+double mean_offset(const Body& body, const Surfaces& surfaces) {
+  double sum = 0;
+  long count = 0;
+  for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
+    if (surfaces.offsets[v] > 0) sum += surfaces.offsets[v], ++count;
+  return count > 0 ? sum / double(count) : 0;
 }
 
 }  // namespace tetpbd

@@ -9,6 +9,8 @@ namespace tetpbd {
 
 struct Surfaces {
   static constexpr std::uint32_t none = ~0u;
+  /// Of the mean length of the edges around a vertex. Less would ask for shorter steps, more would be seen.
+  static constexpr double offset_part = 0.15;
   struct Edge {
     std::array<std::uint32_t, 2> ends, beside;  ///< beside: the third corners of its triangles; none where there is one
     std::uint32_t body;
@@ -24,5 +26,7 @@ struct Surfaces {
   std::vector<double> offsets;  ///< m, by vertex of the model: the distance that its surface keeps from others
 };
 Surfaces lay_out_surfaces(const Model& model);
+/// m, of the vertices of a body's surface.
+double mean_offset(const Body& body, const Surfaces& surfaces);
 
 }  // namespace tetpbd

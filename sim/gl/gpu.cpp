@@ -166,6 +166,12 @@ std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<floa
   glBindTexture(GL_TEXTURE_BUFFER, 0);
   return made;
 }
+Texture make_texel_view(const Buffer& buffer) {
+  Texture texture(buffer.label(), GL_TEXTURE_BUFFER);
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, buffer.id());
+  glBindTexture(GL_TEXTURE_BUFFER, 0);
+  return texture;
+}
 void bind_texels(int unit, const Texture& texture) {
   glActiveTexture(GL_TEXTURE0 + GLenum(unit));
   glBindTexture(GL_TEXTURE_BUFFER, texture.id());

@@ -229,6 +229,8 @@ class Program : public Owned<GLuint, delete_program> {
 
 /// A buffer that shaders read as a samplerBuffer of floats. Throws Error with this remedy where it is too long.
 std::pair<Buffer, Texture> make_texels(const char* label, const std::vector<float>& values, const char* remedy);
+/// Four floats a texel of a buffer that kernels write.
+Texture make_texel_view(const Buffer& buffer);
 void bind_texels(int unit, const Texture& texture);
 
 }  // namespace tetpbd

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "sim/contact/cell_grid.h"
-#include "sim/contact/pairs.h"
+#include "sim/contact/surfaces.h"
 #include "sim/model/formulas.h"
 #include "sim/parallel.h"
 
@@ -24,8 +24,12 @@ bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x
 }  // namespace
 
 Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bool self) {
-  const PairMesh mesh = pair_mesh(model);
-  const double cell = 2 * mesh.edge, near = 2.4 * mesh.edge;
+  const Surfaces surfaces = lay_out_surfaces(model);
+  double edge = 0;
+  for (const Surfaces::Edge& e : surfaces.edges)
+    edge += glm::distance(model.rest.positions[e.ends[0]], model.rest.positions[e.ends[1]]);
+  edge /= double(std::max<std::size_t>(surfaces.edges.size(), 1));
+  const double cell = 2 * edge, near = 2.4 * edge;
   const auto& rest = model.rest.positions;
   std::vector<Bounds> boxes;
   std::vector<double> sizes;
@@ -38,6 +42,7 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
       if (b != body && !are_apart(box, boxes[b])) return true;
     return self;
   };
+  const auto body_of = [&](std::uint32_t v) { return surfaces.triangle_bodies[surfaces.own_triangle[v]]; };
   CellGrid grid(cell);
   std::vector<std::uint32_t> tet_body(model.rest.tets.size());
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
@@ -47,19 +52,20 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
       const Bounds box = bounds({x[i], x[j], x[k], x[l]});
       if (may_overlap(b, box)) grid.add(box, std::uint32_t(t));
     }
-  std::vector<double> depths(mesh.vertices.size(), 0);  // in the first tet that a vertex is in
+  std::vector<double> depths(surfaces.vertices.size(), 0);  // in the first tet that a vertex is in
   parallel_for(depths.size(), 64, [&](std::size_t s) {
-    const auto& item = mesh.vertices[s];
-    const auto is_near = [&](std::uint32_t v) { return glm::distance(rest[v], rest[item.vertex]) < near; };
-    grid.for_each({x[item.vertex], x[item.vertex]}, [&](std::uint32_t t) {
+    const std::uint32_t own_vertex = surfaces.vertices[s], own_body = body_of(own_vertex);
+    const auto is_near = [&](std::uint32_t v) { return glm::distance(rest[v], rest[own_vertex]) < near; };
+    grid.for_each({x[own_vertex], x[own_vertex]}, [&](std::uint32_t t) {
       const Tet& tet = model.rest.tets[t];
-      const bool own = tet_body[t] == item.body;
-      if (depths[s] > 0 || (own && (!self || std::ranges::any_of(tet, is_near))) || !is_in(x[item.vertex], tet, x))
+      const bool own = tet_body[t] == own_body;
+      if (depths[s] > 0 || (own && (!self || std::ranges::any_of(tet, is_near))) || !is_in(x[own_vertex], tet, x))
         return;
       double least = 1e30;
-      for (const auto& [i, j, k, body] : mesh.triangles)
-        if (body == tet_body[t] && !(own && is_near(i))) {
-          const glm::dvec3 a = x[i] - x[item.vertex], b = x[j] - x[item.vertex], c = x[k] - x[item.vertex];
+      const Body& body = model.bodies[tet_body[t]];
+      for (std::size_t s = body.first_triangle; s < body.first_triangle + body.triangles; ++s)
+        if (const auto& [i, j, k] = model.rest.surface[s]; !(own && is_near(i))) {
+          const glm::dvec3 a = x[i] - x[own_vertex], b = x[j] - x[own_vertex], c = x[k] - x[own_vertex];
           const glm::dvec3 w = Formulas<double>{}.nearest_weights(a, b, c);
           least = std::min(least, glm::length(w.x * a + w.y * b + w.z * c));
         }
@@ -70,7 +76,7 @@ Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bo
   result.crossings = find_crossings(model, x, self);
   if (depths.empty()) return result;
   result.deepest = std::ranges::max(depths);
-  for (std::size_t s = 0; s < depths.size(); ++s) depths[s] /= sizes[mesh.vertices[s].body];
+  for (std::size_t s = 0; s < depths.size(); ++s) depths[s] /= sizes[body_of(surfaces.vertices[s])];
   result.inside = std::size_t(std::ranges::count_if(depths, [](double d) { return d > 0; }));
   std::ranges::sort(depths);
   result.largest = depths.back();

@@ -21,6 +21,7 @@ struct LibraryMath {
 template <class Real, class Math = LibraryMath>
 struct Formulas {
   using real = Real;
+  using vec2 = glm::vec<2, Real>;
   using vec3 = glm::vec<3, Real>;
   using mat3 = glm::mat<3, 3, Real>;
   static constexpr real rounding = std::numeric_limits<real>::epsilon();
@@ -48,7 +49,7 @@ struct Formulas {
 #include "shaders/constraints/types.glsl"
 #include "constraint_formulas.inc"  // CMake's: every other file there
 #include "shaders/contact/plane.glsl"
-#include "shaders/contact/bodies/formulas.glsl"
+#include "shaders/contact/bodies/proximity.glsl"
 #include "shaders/contact/solid.glsl"
 #include "obstacle_formulas.inc"  // CMake's: every file of shaders/contact/obstacles
 #include "shaders/contact/find_contact.glsl"

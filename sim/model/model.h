@@ -17,13 +17,7 @@ namespace tetpbd {
 struct State {
   std::vector<glm::dvec3> positions;   ///< m
   std::vector<glm::dvec3> velocities;  ///< m/s
-  /// A vertex and a triangle, or two edges, that touched, and how they share their vertices' masses with others.
-  struct Touching {
-    std::uint32_t edges, first, second;  ///< whether two edges; their numbers (contact/surfaces.h)
-    std::array<std::uint8_t, 4> shares;
-  };
-  std::vector<Touching> touching{};  ///< in the last substep, in CPU modes where bodies touch
-  std::vector<double> work{};        ///< J that obstacles that move have done on each vertex; empty: none
+  std::vector<double> work{};          ///< J that obstacles that move have done on each vertex; empty: none
 };
 
 /// A contiguous part of the rest mesh, and its material.

@@ -116,7 +116,7 @@ void advance(Leapfrog& run, long steps) {
     if (s == 0 || std::ranges::any_of(run.input.model.obstacles, moves))
       obstacles = obstacles_at(run.input.model, settings, run.time[0], run.h);
     const Points a = accelerations(run);
-    run.pairs.begin(settings, run.x);
+    run.pairs.begin(settings, run.x, run.v);
     parallel_for(a.size(), 4096, [&](std::size_t i) {
       if (run.input.inverse_masses[i] == 0) return;
       const glm::dvec3 before = run.x[i];
@@ -129,7 +129,7 @@ void advance(Leapfrog& run, long steps) {
         resolve_contact(surface.normal, -surface.distance, friction, moved, run.h, x, run.v[i]);
       }
     });
-    run.pairs.resolve(settings, run.x, run.v, run.touching, run.input.inverse_masses, run.h);
+    run.pairs.resolve(settings, run.x, run.v, run.input.inverse_masses, run.h);
   }
   for (std::size_t i = 0; i < run.x.size(); ++i)
     if (!std::isfinite(glm::dot(run.x[i], run.x[i]) + glm::dot(run.v[i], run.v[i])))

@@ -25,7 +25,6 @@ struct Leapfrog {
   std::vector<TenNodeTet> tets;     ///< of ten nodes, whose parts come last
   Grouped at_vertex;                ///< the parts that act on each vertex
   std::vector<double> time = {0};   ///< s, one number
-  std::vector<State::Touching> touching{};  ///< as in State
   std::vector<Average> averages{};  ///< of smoothed tets, by vertex
   OffsetContact pairs{input.model};
 };

@@ -110,7 +110,7 @@ TwoRuns leapfrog_runs(const ReferenceInput& input, double stable) {
   return make_runs(
       input.settings.dt, long(std::ceil(input.settings.dt / (part * stable))),
       [&](double h) { return leapfrog(input, reference_compliances(input), start, h); },
-      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.touching), each(run.time); });
+      [](Leapfrog& run, auto&& each) { each(run.x), each(run.v), each(run.time); });
 }
 
 TwoRuns implicit_runs(const ReferenceInput& input) {

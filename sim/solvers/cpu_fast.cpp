@@ -135,7 +135,7 @@ class FastPbd {
       }
       if (thread == 0) {
         if (s == 0) pairs_.begin_step();
-        pairs_.begin(step.settings, step.state.positions);  // of the step's start, then of the last resolve()
+        pairs_.begin(step.settings, step.state.positions, v);  // of the step's start, then of the last resolve()
       }
       for_each_free_vertex([&](std::size_t i) {
         predicted_[i] = rigid_.predict(substep, i, x[i].position(), v[i]);
@@ -154,7 +154,7 @@ class FastPbd {
         barrier.wait(thread);
         if (thread == 0) {
           write_positions(step.state);
-          pairs_.resolve(step.settings, step.state.positions, v, step.state.touching, step.inverse_masses, substep.h,
+          pairs_.resolve(step.settings, step.state.positions, v, step.inverse_masses, substep.h,
                          substep.h / OffsetContact::recovery);
           read_positions(step.state);
         }

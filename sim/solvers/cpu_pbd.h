@@ -143,7 +143,7 @@ class CpuPbd {
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
       substep.begin(s);
-      pairs_.begin(settings, x);
+      pairs_.begin(settings, x, v);
       rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards);
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) x[i] = rigid_.predict(substep, i, x[i], v[i]);
@@ -172,7 +172,7 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
-      pairs_.resolve(settings, x, v, state.touching, inverse_masses, substep.h, substep.h / OffsetContact::recovery);
+      pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery);
     }
     return guards;
   }

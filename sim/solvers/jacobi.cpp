@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <memory>
 
-#include "sim/contact/pairs.h"
 #include "sim/sim.h"
 #include "sim/solvers/rings.h"
 
@@ -19,7 +18,7 @@ void move_vertices(Sim& sim, Pass& pass, unsigned phases) {
   } variants[] = {{"", 0}, {", predict", 3}, {", finish", 3}, {", predict, finish", 2}};
   const bool predicts = phases & PHASE_PREDICT, finishes = phases & PHASE_FINISH;
   const auto& [name, accesses] = variants[predicts + 2 * finishes];
-  run_kernel(sim, pass, phases | (predicts ? sim.pairs.phases : 0), name,
+  run_kernel(sim, pass, phases | (finishes ? sim.pairs.phases : 0), name,
              accesses * sim.model->positions.size() * sizeof(Velocity));
   turn_quantized(sim);
 }
@@ -87,8 +86,7 @@ Pass make_patch_pass(Solver& solver, const SolverInput& input, const Patches& pa
                                  define("MAX_VERTICES", vertices), define("MAX_OWNED", owned),
                                  define("CHUNKED", patches.chunked), define("AVERAGED", has_averages(input.system)),
                                  define("RING_LANES", 16), define("COUNT_GUARDS", input.tuning.count_guards)});
-  const std::size_t most_blocks = contacts_lag(input.model, input.settings) ? 10 : 8;
-  return {Program::compute(shader, {{}, kind_words(input.system)}, defines, most_blocks), patches.count, bytes};
+  return {Program::compute(shader, {{}, kind_words(input.system)}, defines), patches.count, bytes};
 }
 
 Pass make_average_pass(Solver& solver, const SolverInput& input, unsigned group, bool float_sums) {

@@ -110,15 +110,14 @@ Tuning tuning_from_environment() {
   const char* variable = std::getenv("TETPBD_TUNE");
   for (const std::string& assignment : split(variable ? variable : "", ',')) {
     unsigned* target = nullptr;
-    for (const auto& [name, member] :
-         {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch), std::pair("row=", &tuning.row),
-          std::pair("lanes=", &tuning.lanes), std::pair("threads=", &tuning.threads)})
+    for (const auto& [name, member] : {std::pair("group=", &tuning.group), std::pair("patch=", &tuning.patch),
+                                       std::pair("row=", &tuning.row), std::pair("threads=", &tuning.threads)})
       if (assignment.starts_with(name)) target = member;
     const char* end = assignment.data() + assignment.size();
     const char* number = assignment.data() + std::min(assignment.find('=') + 1, assignment.size());
     if (!target || std::from_chars(number, end, *target).ptr != end)
       throw Error(fmt::format("'{}' is no tuning", assignment), "TETPBD_TUNE",
-                  "write group=N, patch=N, row=N, lanes=N or threads=N, separated by commas");
+                  "write group=N, patch=N, row=N or threads=N, separated by commas");
   }
   return tuning;
 }
@@ -161,11 +160,10 @@ std::vector<std::string> quanta_defines(const SolverInput& input) {
 std::vector<std::string> vertex_defines(const SolverInput& input) {
   std::vector<std::string> defines = obstacle_defines(input.model);
   std::ranges::move(quanta_defines(input), std::back_inserter(defines));
-  defines.insert(
-      defines.end(),
-      {define("COMPLIANT", input.compliant), define("RIGID_CONTACT", input.rigid),
-       define("BODY_COUNT", input.model.bodies.size()), define("CONTACTS", contacts_lag(input.model, input.settings)),
-       define("VERTICES", bodies_touch(input.model, input.settings) ? input.model.positions.size() : 0)});
+  defines.insert(defines.end(),
+                 {define("COMPLIANT", input.compliant), define("LEAPFROG", solver_mode(input.settings).leapfrog),
+                  define("RIGID_CONTACT", input.rigid), define("BODY_COUNT", input.model.bodies.size()),
+                  define("CONTACTS", bodies_touch(input.model, input.settings))});
   return defines;
 }
 

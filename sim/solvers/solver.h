@@ -22,7 +22,8 @@ struct Carried;
 using GuardCounts = std::array<std::uint64_t, GUARDS + DROPS>;
 inline constexpr std::array<const char*, GUARDS> guard_names = {"direction", "hinge", "angle",     "volume_floor",
                                                                 "collapsed", "limit", "not_finite"};
-inline constexpr std::array<const char*, DROPS> drop_names = {"rigid_contacts", "rigid_sweeps", "rigid_range"};
+inline constexpr std::array<const char*, DROPS> drop_names = {"rigid_contacts", "rigid_sweeps", "rigid_range",
+                                                              "contact_speed"};
 
 /// What a mode does with a simulation. Whatever else it needs it keeps inside these functions.
 struct Solver {
@@ -60,7 +61,6 @@ struct Tuning {
   unsigned patch = 0;         ///< constraints of a patch in mode constraint, vertices of a patch in mode node
   unsigned row = 0;           ///< most work-groups in a dispatch's first dimension
   std::size_t storage = 0;    ///< most bytes of a storage buffer
-  unsigned lanes = 0;         ///< invocations that find the contacts of a vertex, a power of two up to 8
   unsigned threads = 0;       ///< of mode cpu-fast; 0: up to the number of cores, as there is work for
   bool count_guards = false;  ///< GPU kernels count how often each guard triggers (CPU modes always do)
 };

@@ -30,7 +30,7 @@ struct BarrierRun {
   Points listed{};                    // where `near` is of
   static constexpr double spare = 1;  // times reach: how far vertices may move before the list is made anew
 
-  using Formulas = glsl::ProximityFormulas;
+  using Formulas = tetpbd::Formulas<double>;
   Formulas::Proximity proximity(const Pair& pair, const Points& at) const {
     const auto side = [&](std::size_t k) { return at[pair.vertices[k]] - at[pair.vertices[0]]; };
     return pair.edges ? Formulas{}.edge_edge_proximity(side(1), side(2), side(3))

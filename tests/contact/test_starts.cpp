@@ -156,7 +156,8 @@ TEST_CASE("starts: bodies in each other are parted, by whole cells as well, and 
     add_block(model, "a", {0, 0, 0}, 0.5), add_block(model, "b", at, 0.5);
     const auto motions = separate_starts(model, settings);
     const double deep = 0.5 - at.x;
-    REQUIRE(motions.size() == (deep > 0 ? 1u : 0u));
+    // Out of the other, and then as far from it as contact keeps them.
+    REQUIRE(std::ranges::count_if(motions, [](const auto& m) { return !m.from.empty(); }) == (deep > 0 ? 1 : 0));
     if (deep > 0) CHECK(glm::length(motions[0].motion) == doctest::Approx(deep).epsilon(0.01));
     Settings apart = settings;
     apart.contact = "none";
@@ -167,7 +168,7 @@ TEST_CASE("starts: bodies in each other are parted, by whole cells as well, and 
   add_block(stack, "lower", {0, -0.02, 0}, 0.5), add_block(stack, "upper", {0, 0.47, 0}, 0.5);
   settings.ground = true;
   const auto motions = separate_starts(stack, settings);
-  REQUIRE(motions.size() == 2);
+  REQUIRE(motions.size() == 3);
   CHECK(glm::length(motions[0].motion - glm::dvec3(0, 0.02, 0)) < 1e-9);
   CHECK(glm::length(motions[1].motion - glm::dvec3(0, 0.03, 0)) < 1e-4);
 }

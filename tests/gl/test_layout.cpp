@@ -66,8 +66,8 @@ void check_block(const Program& program, const char* block, const BufferLayout& 
 
 TEST_CASE("struct offsets and strides are GL's") {
   GlTest gl;
-  const Program predict =
-      Program::compute("solvers/predict.comp", {{{"SCHEME", "corrections"}}, {}}, {"COMPLIANT 1", "SOLIDS 0"});
+  const Program predict = Program::compute("solvers/predict.comp", {{{"SCHEME", "corrections"}}, {}},
+                                           {"COMPLIANT 1", "LEAPFROG 1", "SOLIDS 0"});
   const auto variable = [&](const std::string& name) { return property(predict, GL_BUFFER_VARIABLE, name, GL_OFFSET); };
   CHECK(variable("positions[0].high") == offsetof(Position, high));
   CHECK(variable("positions[0].inverse_mass") == offsetof(Position, inverse_mass));
@@ -137,30 +137,20 @@ TEST_CASE("members of mode newton's blocks lie where GL reads them, and no array
 
 TEST_CASE("members of the blocks of contact lie where GL reads them, and no array is empty") {
   GlTest gl;
-  const PairSizes sheet{.triangles = 7,
-                        .edges = 0,
-                        .vertices = 9,
-                        .leaves = 1,
-                        .slices = 1,
-                        .tets = 0,
-                        .bodies = 1,
-                        .all_vertices = 9,
-                        .lanes = 8};
+  const PairSizes sheet{.triangles = 7, .edges = 13, .surface_vertices = 9, .vertices = 9, .places = 18, .leaves = 1};
   PairSizes solid = sheet;
-  solid.edges = 5, solid.tets = 3, solid.bodies = 2, solid.slices = 3, solid.leaves = 3, solid.lanes = 1;
+  solid.triangles = 5, solid.edges = 6, solid.vertices = 11, solid.leaves = 3;
   for (const PairSizes& sizes : {sheet, solid}) {
     const PairRanges layout = lay_out_pairs(sizes);
     std::vector<std::string> defines = pair_defines(sizes);
-    defines.insert(defines.end(), {"COMPLIANT 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1", "IMPLICIT 0",
-                                   "SHEETS 1", "CONTACT_SELF 1", "LAGGED 1", "QUERY_EDGES 0", "ROW 9u", "EDGE 1.0",
-                                   "SELF_MARGIN 1.0", "VERTICES " + std::to_string(sizes.all_vertices)});
-    for (const char* name : {"contact/bodies/boxes", "contact/bodies/cull", "contact/bodies/query",
-                             "contact/bodies/meet", "contact/bodies/push", "render/touches", "solvers/average"}) {
+    defines.insert(defines.end(), {"COMPLIANT 1", "LEAPFROG 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1",
+                                   "IMPLICIT 0", "BEFORE_SUBSTEP 0", "CONTACT_SELF 1", "ROW 9u", "TASKS 6u",
+                                   "GROUP_SIZE 64u", "PAIR_GROUP 64u", "TOTAL_MASS 1.0", "BODY_FRICTION 0"});
+    for (const char* name : {"boxes", "near", "cull", "find", "impulses", "truncate"}) {
       const Program program =
-          Program::compute(std::string(name) + ".comp", {{{"SCHEME", "leapfrog"}}, {}}, defines, 10);
+          Program::compute(std::string("contact/bodies/") + name + ".comp", {{{"SCHEME", "leapfrog"}}, {}}, defines);
       check_block(program, "PairMesh", layout.mesh);
       check_block(program, "PairLists", layout.lists);
-      check_block(program, "PairSums", layout.sums);
     }
   }
 }

@@ -116,6 +116,7 @@ void main() {
 #if RIGID_START
   note_fast(i, x, v);
 #endif
+  put(OFFSET, i, u, offset.w);  // contact of bodies asks for the way
   put(DISPLACEMENT, i, displacement, uintBitsToFloat(touched | KNOWN));
   put(GAIN, i, gain, push);
   put(LEFT, i, friction, slips ? 1.0 : 0.0);

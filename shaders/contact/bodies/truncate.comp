@@ -1,0 +1,120 @@
+// Moves the vertices of pairs by what pairs do to them, and stops them before they cross: each side of a pair may go a
+// part of the gap between them. There is an invocation per pair; the work-group of the last that asks for a vertex
+// moves it.
+#include "types.glsl"
+#include "double_single.glsl"
+layout(local_size_x = PAIR_GROUP) in;
+#include "contact/bodies/pairs.glsl"
+#if !IMPLICIT
+#include "quantize.glsl"
+#include "seen.glsl"
+layout(std430) restrict writeonly buffer QuantizedOut { ivec4 quantized_out[]; };
+#endif
+layout(binding = UNIT_LISTED) uniform samplerBuffer listed_places;
+uniform uint side;
+shared uint moving[4u * PAIR_GROUP], moving_count;
+vec3 in_metres(int x, int y, int z) { return vec3(x, y, z) * (params.quantum / SUM_PARTS); }
+vec3 stopped_by(uint i) {
+  return in_metres(pair_sums[i].stopped[0], pair_sums[i].stopped[1], pair_sums[i].stopped[2]);
+}
+vec3 pushed_by(uint i) { return in_metres(pair_sums[i].pushed[0], pair_sums[i].pushed[1], pair_sums[i].pushed[2]); }
+// m, of its place: after an implicit substep impulses change velocities alone, because what is moved against forces that
+// balance would be thrown back by them.
+#define MOVED_BY(stopped, pushed) (IMPLICIT != 0 ? pushed : stopped + pushed)
+vec3 placed_by(uint i) { return MOVED_BY(stopped_by(i), pushed_by(i)); }
+void turn(SurfacePair pair) {
+  PairState s = state_of(pair.vertices);
+  if (!s.turns) return;
+  Proximity t = proximity_of(s.places, (pair.first & OF_EDGES) != 0u);
+  vec3 way = vec3(0.0);
+  for (int k = 0; k < 4; ++k) way += t.weights[k] * (s.ways[k] + stopped_by(pair.vertices[k]));
+  for (int k = 0; k < 4; ++k) {
+    ivec3 turned =
+        ivec3(round(s.weights[k] * push_turn(k, t, way, pair.push) * (params.inverse_quantum * SUM_PARTS)));
+    for (int c = 0; c < 3; ++c)
+      if (turned[c] != 0) atomicAdd(pair_sums[pair.vertices[k]].turned[c], turned[c]);
+  }
+}
+void limit_ways(SurfacePair pair) {
+  int own = (pair.first & OF_EDGES) != 0u ? 2 : 1;
+  vec3 n = pair.normal.xyz;
+  float approaches[4];
+  vec2 sides = vec2(0.0);
+  for (int k = 0; k < 4; ++k) {
+    uint i = pair.vertices[k];
+    approaches[k] = (k < own ? -1.0 : 1.0) * dot(n, way_of(i) + placed_by(i));
+    if (k < own) sides.x = max(sides.x, approaches[k]);
+    else sides.y = max(sides.y, approaches[k]);
+  }
+  Proximity t;
+  t.distance = pair.normal.w;
+  for (int k = 0; k < 4; ++k) {
+    float part = allowed_part(t, pair.offset, sides, k < own ? 0 : 1, approaches[k]);
+    if (part < 1.0) atomicMin(pair_sums[pair.vertices[k]].part, floatBitsToUint(part));
+  }
+}
+vec3 taken(uint i, int which) {
+  ivec3 sum;
+  for (int c = 0; c < 3; ++c)
+    sum[c] = which == 0 ? atomicExchange(pair_sums[i].stopped[c], 0)
+             : which == 1 ? atomicExchange(pair_sums[i].pushed[c], 0) : atomicExchange(pair_sums[i].turned[c], 0);
+  return in_metres(sum.x, sum.y, sum.z);
+}
+void note_truncated(float mass, vec3 velocity) {
+  atomicAdd(totals.truncated, 1u);
+  atomicAdd(totals.taken, uint(min(length(velocity) * mass / (TOTAL_MASS * TAKEN_UNIT), 1e9)));
+}
+void move(uint i) {
+  vec3 stopped = taken(i, 0), pushed = taken(i, 1), turned = taken(i, 2);
+  float part = uintBitsToFloat(atomicExchange(pair_sums[i].part, floatBitsToUint(1.0)));
+  atomicExchange(pair_sums[i].asked[side], 0u);
+  atomicExchange(pair_sums[i].left, pair_sums[i].pairs);
+  Position own = positions[i];
+  if (!(own.inverse_mass > 0.0)) return;
+  Velocity speed = velocities[i];
+  DoubleSingle x = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low);
+  vec3 moved = MOVED_BY(stopped, pushed), way = way_of(i) + moved;
+  vec4 listed = texelFetch(listed_places, int(i));
+  vec3 before = (x.high - listed.xyz) - way_of(i);
+  float limit = uintBitsToFloat(floatBitsToUint(listed.w) & ~PAIRED);
+  if (length(before + part * way) > limit) part *= clamp((limit - length(before)) / (part * length(way)), 0.0, 1.0);
+  v = add_double(v, (stopped + turned) * params.inverse_h);
+  x = add_double(x, moved + (part - 1.0) * way);
+  if (part < 1.0) {
+    note_truncated(1.0 / own.inverse_mass, (1.0 - part) * v.high);
+    v = DoubleSingle(part * v.high, part * v.low);
+  }
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
+  velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
+#if IMPLICIT
+  // BDF2 goes on as if the vertex had always moved as it does now: a stop that it knew of would be given back in part.
+  if (part < 1.0 || stopped != vec3(0.0)) {
+    uint known = floatBitsToUint(vectors[DISPLACEMENT * VERTICES + i].w);
+    vectors[DISPLACEMENT * VERTICES + i] = vec4(params.h * v.high, uintBitsToFloat(known));
+  }
+#else
+  begin_body(i);
+#if COMPLIANT
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(x, v), 0.0);
+#endif
+  quantized_out[i] = quantize(seen_by_neighbours(x, v), weight_of(own));
+#endif
+}
+void main() {
+  if (lane() == 0u) moving_count = 0u;
+  barrier();
+  uint p = group_index() * PAIR_GROUP + lane();
+  bool exists = p < min(counts.pairs, uint(pairs.length()));
+  if (exists) {
+    SurfacePair pair = pairs[p];
+    if (pair.push > 0.0) turn(pair);
+    limit_ways(pair);
+    memoryBarrierBuffer();
+    for (int k = 0; k < 4; ++k)
+      if (atomicAdd(pair_sums[pair.vertices[k]].left, 0xffffffffu) == 1u)
+        moving[atomicAdd(moving_count, 1u)] = pair.vertices[k];
+  }
+  memoryBarrierBuffer();
+  barrier();
+  for (uint j = lane(); j < moving_count; j += PAIR_GROUP) move(moving[j]);
+}

@@ -105,11 +105,10 @@ Verdict judge(const RunErrors& errors, Sim& sim) {
     if (count > 0) find(Verdict::doubtful, fmt::format("{} corrections were {}", count, what), solver_remedy(sim));
   };
   told(GUARD_LIMIT, "longer than a body and cut short"), told(GUARD_NOT_FINITE, "no numbers and dropped");
-  for (const auto& [name, count] : dropped(sim))
-    if (name == "contact_pairs")
-      find(Verdict::wrong,
-           fmt::format("{} pairs of surfaces had no room, so bodies may have passed through each other", count),
-           "take a shorter --dt");
+  if (const std::uint64_t count = touched(sim).left_out; count > 0)
+    find(Verdict::wrong,
+         fmt::format("{} pairs of surfaces had no room, so bodies may have passed through each other", count),
+         "take a shorter --dt");
   for (const StartMotion& motion : sim.model->start_motions)
     if (!motion.from.empty())
       find(Verdict::doubtful, fmt::format("body '{}' started inside {} and was moved", motion.body, motion.from),

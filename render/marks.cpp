@@ -44,8 +44,7 @@ void draw_body_contacts(Renderer& renderer, const Frame& frame) {
   }
   Recorder& recorder = renderer.recorder;
   recorder.give("Positions", frame.positions), recorder.give("Arrows", renderer.contact_arrows);
-  recorder.give("PairMesh", pairs.mesh), recorder.give("PairLists", pairs.lists);
-  recorder.give("Pairs", pairs.pairs);
+  recorder.give("PairLists", pairs.lists), recorder.give("Pairs", pairs.pairs);
   run_over(renderer, kernel(renderer, "touches"), count);
   recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
   const GLuint arrows = renderer.contact_arrows.id();

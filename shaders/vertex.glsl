@@ -2,7 +2,6 @@
 // includes a scheme of solvers/, corrections.glsl or leapfrog.glsl, that defines move_vertex().
 #include "vertex_state.glsl"
 #include "contact/obstacles.glsl"
-
 #include "seen.glsl"
 
 #if RIGID_CONTACT

@@ -79,7 +79,10 @@ Buffer checked(const Tuning& tuning, Buffer buffer) {
 
 // As much as a block may have at most: what then has no room is counted.
 void make_room(Pairs& p, const Tuning& tuning, std::size_t pairs, std::size_t leaf_pairs) {
-  if (p.pairs) pairs = std::min(pairs, tuning.storage / sizeof(SurfacePair));
+  if (p.pairs) {
+    pairs = std::min(pairs, tuning.storage / sizeof(SurfacePair));
+    leaf_pairs = std::min(leaf_pairs, tuning.storage / sizeof(glm::uvec2));
+  }
   p.pairs = checked(tuning, Buffer("pairs of surfaces", sizeof(SurfacePair) * pairs));
   p.leaf_pairs = checked(tuning, Buffer("pairs of leaves", sizeof(glm::uvec2) * leaf_pairs));
 }
@@ -147,7 +150,7 @@ void make_passes(Pairs& p, const SolverInput& input) {
     std::vector<std::string> all = defines;
     all.push_back(fmt::format("GROUP_SIZE {}u", size));
     all.push_back(fmt::format("BEFORE_SUBSTEP {:d}", before_substep));
-    return Program::compute(fmt::format("contact/bodies/{}.comp", name), scheme_words(input), all);
+    return Program::compute(fmt::format("contact/bodies/{}.comp", name), {}, all);
   };
   const auto counted = [&](Program program, std::size_t at) {
     Pass pass{std::move(program)};

@@ -171,9 +171,10 @@ void for_each_overlap(const Shape& a, const glm::dvec3& by, const Shape& b, Skip
   }
 }
 
+constexpr auto never = [](const Bounds&, const Bounds&) { return false; };
+
 bool overlap(const Shape& a, const Shape& b, double gap = 0) {
   bool any = false;
-  const auto never = [](const Bounds&, const Bounds&) { return false; };
   for_each_overlap(
       a, glm::dvec3(0), b, never,
       [&](const Cell&, const Cell&) {
@@ -184,23 +185,29 @@ bool overlap(const Shape& a, const Shape& b, double gap = 0) {
   return any;
 }
 
-// m, along a direction until there is a gap between the two; infinite beyond `limit`.
-double find_travel(const Shape& a, const Shape& b, const glm::dvec3& direction, double gap, double limit) {
-  const auto never = [](const Bounds&, const Bounds&) { return false; };
+// m, until nothing further is needed; infinite beyond `limit`. `least_further`: no shorter way from there does.
+template <class F>
+double find_travel(int most_tries, double limit, F&& least_further) {
   double travel = 0;
-  for (int tries = 0; tries < 40 && travel < limit; ++tries) {
-    double further = 0;
-    for_each_overlap(
-        a, travel * direction, b, never,
-        [&](const Cell& own, const Cell& other) {
-          further = std::max(further, exit_distance(own, other, direction, further, gap));
-          return true;
-        },
-        gap);
+  for (int tries = 0; tries < most_tries && travel < limit; ++tries) {
+    const double further = least_further(travel);
     if (further == 0) return travel;
     travel += further;
   }
   return infinite;
+}
+
+// m, along a direction until there is a gap between the two; infinite beyond `limit`.
+double find_travel(const Shape& a, const Shape& b, const glm::dvec3& direction, double gap, double limit) {
+  return find_travel(40, limit, [&](double travel) {
+    double further = 0;
+    const auto exit = [&](const Cell& own, const Cell& other) {
+      further = std::max(further, exit_distance(own, other, direction, further, gap));
+      return true;
+    };
+    for_each_overlap(a, travel * direction, b, never, exit, gap);
+    return further;
+  });
 }
 
 // What one body has to be free of.
@@ -242,13 +249,7 @@ double least_further(const Wanted& wanted, const glm::dvec3& by, const glm::dvec
 
 // m, along a direction until the body is free; infinite beyond `limit`.
 double find_travel(const Wanted& wanted, const glm::dvec3& direction, double limit) {
-  double travel = 0;
-  for (int tries = 0; tries < 400 && travel < limit; ++tries) {
-    const double further = least_further(wanted, travel * direction, direction);
-    if (further == 0) return travel;
-    travel += further;
-  }
-  return infinite;
+  return find_travel(400, limit, [&](double travel) { return least_further(wanted, travel * direction, direction); });
 }
 
 // Ways out: the axes and diagonals of space, normals of obstacles where the body is deepest, and away from the middle

@@ -266,7 +266,7 @@ TEST_CASE("a run that stops being numbers leaves those of the last good step, an
   const Folder folder;
   fs::copy(TEST_MODELS "/../shaders", folder.path / "shaders", fs::copy_options::recursive);
   std::string text = read(folder.path / "shaders/solvers/corrections.glsl");
-  const std::string end = "positions[i] = Position(";
+  const std::string end = "stay_listed(i, x, v);";
   REQUIRE(text.find(end) != std::string::npos);
   // The free end of the beam falls: at a certain speed its numbers end.
   text.insert(text.find(end), "if ((phases & PHASE_FINISH) != 0u && v.high.y < -0.2) v.high.x = sqrt(v.high.y);\n  ");

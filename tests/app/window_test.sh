@@ -251,10 +251,10 @@ forget; sleep 1.1; cp good.comp shaders/solvers/predict.comp; await '^message sh
 key s; await '^step 3$'
 
 # A state that is not finite: said, paused, and mended by a reset.
-cp shaders/vertex.glsl good.glsl
+cp shaders/seen.glsl good.glsl
 sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.glsl >bad.glsl
-cmp -s good.glsl bad.glsl && fail "vertex.glsl has no gravity to spoil"
-sleep 1.1; forget; cp bad.glsl shaders/vertex.glsl; await '^message shaders compiled again'
+cmp -s good.glsl bad.glsl && fail "seen.glsl has no gravity to spoil"
+sleep 1.1; forget; cp bad.glsl shaders/seen.glsl; await '^message shaders compiled again'
 key m  # also without the plots, where nothing is measured
 key space; await '^error the state is not finite: at step [0-9]+, vertex [0-9]+: '
 new_events | grep -q '^pause' || fail "it did not pause"
@@ -264,7 +264,7 @@ sleep 4.2  # until older messages are gone and this one stays where it is
 click_until back '^back [0-9]+$'
 await_other not_finite.png back.png 2000 "the body is back"
 key space; await '^error the state is not finite'
-forget; sleep 1.1; cp good.glsl shaders/vertex.glsl; await '^message shaders compiled again'
+forget; sleep 1.1; cp good.glsl shaders/seen.glsl; await '^message shaders compiled again'
 key r; await '^reset'
 key space; await '^running [1-9]'
 new_events | grep -q '^error' && fail "an error after the reset"

@@ -1,7 +1,6 @@
 // Boxes around leaves and the speeds of their vertices; with `detects`, vertices also forget their pairs. There is a
 // work-group per leaf.
 #include "types.glsl"
-#include "double_single.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 #include "contact/bodies/surfaces.glsl"
 #include "contact/bodies/lists.glsl"

@@ -1,7 +1,6 @@
 // Lists pairs of leaves that are near each other, and how far their vertices may go until they are looked for again.
 // There is a work-group per leaf.
 #include "types.glsl"
-#include "double_single.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 #include "contact/bodies/surfaces.glsl"
 #include "contact/bodies/lists.glsl"

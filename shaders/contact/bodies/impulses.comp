@@ -14,10 +14,6 @@ float friction_between(uint a, uint b) { return mean_friction(body_friction(a), 
 #else  // with a mean of equal values the compiler would round what follows differently
 float friction_between(uint a, uint b) { return params.friction; }
 #endif
-ivec3 to_quanta(vec3 change) {
-  float most = 0.2 * params.body_size;
-  return ivec3(round(clamp(change, -most, most) * (params.inverse_quantum * SUM_PARTS)));
-}
 // Adds what the pair does now, and returns its push.
 float act(PairState s, Proximity t, uint shares, float offset) {
   float split[4];

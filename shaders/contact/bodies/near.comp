@@ -1,6 +1,5 @@
 // How fast what each leaf may meet is: what is hit goes on as fast. There is a work-group per leaf.
 #include "types.glsl"
-#include "double_single.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 #include "contact/bodies/surfaces.glsl"
 #include "contact/bodies/lists.glsl"

@@ -37,3 +37,8 @@ uint packed_shares(Proximity t) {
   return shares;
 }
 uint share_of(uint shares, int k) { return (shares >> (8 * k)) & 255u; }
+// Of sums of pairs, from m.
+ivec3 to_quanta(vec3 change) {
+  float most = 0.2 * params.body_size;
+  return ivec3(round(clamp(change, -most, most) * (params.inverse_quantum * SUM_PARTS)));
+}

@@ -18,8 +18,8 @@ vec3 stopped_by(uint i) {
   return in_metres(pair_sums[i].stopped[0], pair_sums[i].stopped[1], pair_sums[i].stopped[2]);
 }
 vec3 pushed_by(uint i) { return in_metres(pair_sums[i].pushed[0], pair_sums[i].pushed[1], pair_sums[i].pushed[2]); }
-// m, of its place: after an implicit substep impulses change velocities alone, because what is moved against forces that
-// balance would be thrown back by them.
+// m, of its place: after an implicit substep impulses change velocities alone, because forces that balance would throw
+// back what is moved against them.
 #define MOVED_BY(stopped, pushed) (IMPLICIT != 0 ? pushed : stopped + pushed)
 vec3 placed_by(uint i) { return MOVED_BY(stopped_by(i), pushed_by(i)); }
 void turn(SurfacePair pair) {
@@ -29,8 +29,7 @@ void turn(SurfacePair pair) {
   vec3 way = vec3(0.0);
   for (int k = 0; k < 4; ++k) way += t.weights[k] * (s.ways[k] + stopped_by(pair.vertices[k]));
   for (int k = 0; k < 4; ++k) {
-    ivec3 turned =
-        ivec3(round(s.weights[k] * push_turn(k, t, way, pair.push) * (params.inverse_quantum * SUM_PARTS)));
+    ivec3 turned = to_quanta(s.weights[k] * push_turn(k, t, way, pair.push));
     for (int c = 0; c < 3; ++c)
       if (turned[c] != 0) atomicAdd(pair_sums[pair.vertices[k]].turned[c], turned[c]);
   }
@@ -87,11 +86,9 @@ void move(uint i) {
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
 #if IMPLICIT
-  // BDF2 goes on as if the vertex had always moved as it does now: a stop that it knew of would be given back in part.
-  if (part < 1.0 || stopped != vec3(0.0)) {
-    uint known = floatBitsToUint(vectors[DISPLACEMENT * VERTICES + i].w);
-    vectors[DISPLACEMENT * VERTICES + i] = vec4(params.h * v.high, uintBitsToFloat(known));
-  }
+  // BDF2 goes on from what the substep did to the vertex: impulses are part of that.
+  vectors[GAIN * VERTICES + i].xyz += (stopped + turned) * params.inverse_h;
+  vectors[DISPLACEMENT * VERTICES + i].xyz += stopped;
 #else
   begin_body(i);
 #if COMPLIANT

@@ -13,6 +13,7 @@
 
 #include "app/ui.h"
 #include "app/widgets.h"
+#include "sim/contact/surfaces.h"
 #include "sim/error.h"
 #include "sim/model/material.h"
 
@@ -85,6 +86,7 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   }
   if (name == "restitution") return settings.restitution != 0 || moves_rigidly(settings);
   if (name == "ground_height") return settings.ground;
+  if (name == "contact_distance") return bool(s.loaded.sim().pairs);
   if (name == "friction") return settings.ground || !s.loaded.scene.obstacles.empty();
   if (name == "young_modulus" || name == "poisson_ratio") return material;
   if (name == "element") return settings.material == "neo-hookean" && mode.smoothed;
@@ -98,9 +100,10 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
 template <class T>
 void automatic_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
   const Plan& plan = s.loaded.sim().plan;
-  const T decided = row.name == "iterations" ? T(plan.iterations)
-                    : row.name == "substeps" ? T(plan.substeps)
-                                             : T(smoothing_of(s.loaded.sim().settings));
+  const T decided = row.name == "iterations"         ? T(plan.iterations)
+                    : row.name == "substeps"         ? T(plan.substeps)
+                    : row.name == "contact_distance" ? T(Surfaces::offset_part * s.loaded.sim().pairs.edge)
+                                                     : T(smoothing_of(s.loaded.sim().settings));
   const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize("auto").x +
                     ImGui::GetStyle().ItemSpacing.x;
   T shown = value == automatic ? decided : value;
@@ -153,7 +156,11 @@ const std::vector<Group> groups = {
      true,
      {"mode", "substeps", "iterations", "stability", "dt"},
      {"omega", "mass_splitting", "mass_scaling"}},
-    {"Contact", false, {"gravity", "ground", "friction", "restitution"}, {"ground_height", "rigid_contact"}}};
+    {"Contact",
+     false,
+     {"gravity", "ground", "friction", "restitution"},
+     {"ground_height", "contact_distance", "rigid_contact"}},
+};
 
 bool names(const std::string& pattern, const std::string& name) {
   return pattern.back() == '*' ? name.starts_with(pattern.substr(0, pattern.size() - 1)) : name == pattern;

@@ -222,7 +222,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
     return std::tuple(s.mode, any_material(*sim.model, s, compliant), any_moves_rigidly(*sim.model, s), s.contact,
-                      has_obstacles(*sim.model, s));
+                      s.contact_distance, has_obstacles(*sim.model, s));
   };
   if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))
     adopt_settings(sim, settings);

@@ -12,6 +12,8 @@ inline bool are_apart(const Bounds& a, const Bounds& b) {
   return glm::any(glm::lessThan(a.high, b.low)) || glm::any(glm::lessThan(b.high, a.low));
 }
 
+inline Bounds grown(const Bounds& box, double by) { return {box.low - by, box.high + by}; }
+
 class CellGrid {
  public:
   explicit CellGrid(double cell) : cell_(cell) {}  ///< edge of a cell, m

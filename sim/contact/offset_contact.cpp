@@ -60,7 +60,7 @@ void OffsetContact::begin(const Settings& settings, const Points& x, const Point
 void OffsetContact::resolve(const Settings& settings, Points& x, Points& v, const std::vector<double>& inverse_masses,
                             double h, double push_limit) {
   if (start_.empty()) return;
-  if (surfaces_.vertices.empty()) surfaces_ = lay_out_surfaces(*model_);
+  if (surfaces_.vertices.empty()) surfaces_ = lay_out_surfaces(*model_, settings.contact_distance);
   Substep substep{x, v, inverse_masses, h};
   const bool anew = !list_holds(x);
   if (anew) {
@@ -110,10 +110,7 @@ OffsetContact::Extents OffsetContact::find_extents() const {
     const auto first = margins_.begin() + std::ptrdiff_t(body.first_vertex);
     result.margins.push_back(*std::max_element(first, first + std::ptrdiff_t(body.vertices)));
   }
-  double edge = 0;
-  for (const Surfaces::Edge& e : surfaces_.edges) edge += glm::distance(start_[e.ends[0]], start_[e.ends[1]]);
-  edge /= double(std::max<std::size_t>(surfaces_.edges.size(), 1));
-  result.cell = 2 * edge + std::ranges::max(result.margins);
+  result.cell = 2 * mean_edge(surfaces_, start_) + std::ranges::max(result.margins);
   return result;
 }
 

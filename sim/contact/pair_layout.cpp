@@ -49,6 +49,9 @@ std::vector<std::string> pair_defines(const PairSizes& sizes) {
           fmt::format("EDGES {}u", sizes.edges),
           fmt::format("SURFACE_VERTICES {}u", sizes.surface_vertices),
           fmt::format("LEAVES {}u", sizes.leaves),
+          fmt::format("BRANCHES {}u", sizes.branches()),
+          fmt::format("FIRST_BALL_OF_TRIANGLES {}u", sizes.surface_vertices),
+          fmt::format("FIRST_BALL_OF_EDGES {}u", sizes.surface_vertices + sizes.triangles),
           fmt::format("VERTICES {}u", sizes.vertices),
           fmt::format("PLACES {}u", sizes.places)};
 }
@@ -69,8 +72,10 @@ PairRanges lay_out_pairs(const PairSizes& sizes) {
   to.leaves = to.mesh.add<SurfaceLeaf>("leaves", sizes.leaves);
   to.leaf_lows = to.lists.add<glm::vec4>("leaf_lows", sizes.leaves);
   to.leaf_highs = to.lists.add<glm::vec4>("leaf_highs", sizes.leaves);
+  to.lists.add<glm::vec4>("leaf_velocities", sizes.leaves);
   to.totals = to.lists.add<ContactTotals>("totals");
   to.counts = to.lists.add<PairCounts>("counts");
+  to.branches = to.lists.add<SurfaceBranch>("branches", sizes.branches());
   return to;
 }
 
@@ -106,10 +111,13 @@ std::vector<std::byte> make_empty_lists(const PairRanges& ranges) {
   ContactTotals totals{};
   totals.nearest = std::bit_cast<std::uint32_t>(1e30f);
   PairCounts counts{};
-  counts.leaf_pair_groups = counts.pair_groups = {0, 1, 1};
+  counts.leaf_pair_groups = counts.candidate_groups = counts.pair_groups = {0, 1, 1};
+  const std::uint32_t most = 0xffffffff;
+  const SurfaceBranch branch{{most, most, most}, {0, 0, 0}, 0, 0};
   std::vector<std::byte> contents(ranges.lists.bytes);
   put(contents, ranges.totals, std::vector{totals});
   put(contents, ranges.counts, std::vector{counts});
+  put(contents, ranges.branches, std::vector(ranges.branches.count, branch));
   return contents;
 }
 

@@ -12,7 +12,7 @@ using glm::uint;
 using glm::uvec4;
 using glm::vec4;
 #include "shaders/contact/bodies/layout.glsl"
-static_assert(sizeof(SurfaceLeaf) == 32 && sizeof(ContactTotals) == 24 && sizeof(PairCounts) == 32);
+static_assert(sizeof(SurfaceLeaf) == 32 && sizeof(ContactTotals) == 28 && sizeof(PairCounts) == 48);
 static_assert(sizeof(SurfacePair) == 64 && sizeof(PairSums) == 56);
 }  // namespace pair_layout
 
@@ -28,6 +28,7 @@ struct PairSizes {
   std::size_t triangles, edges, surface_vertices;
   std::size_t vertices, places;  ///< inner ones among them; once more where bodies touch themselves
   std::size_t leaves;
+  std::size_t branches() const { return (leaves + pair_layout::BRANCH - 1) / pair_layout::BRANCH; }
 };
 std::vector<std::string> pair_defines(const PairSizes& sizes);
 
@@ -42,6 +43,7 @@ struct PairRanges {
   Range<glm::vec4> leaf_lows, leaf_highs;  ///< these and the following of `lists`
   Range<pair_layout::ContactTotals> totals;
   Range<pair_layout::PairCounts> counts;
+  Range<pair_layout::SurfaceBranch> branches;
 };
 PairRanges lay_out_pairs(const PairSizes& sizes);
 /// The contents of `mesh` of PairRanges.

@@ -22,22 +22,25 @@ bool bodies_touch(const Model& model, const Settings& settings) {
 
 namespace {
 
-constexpr double most_limit = 1.5;                                    // edges, that a vertex may go between detections
-constexpr unsigned tasks = 6;                                         // work-groups of a pair of leaves
-constexpr std::size_t group = 64, pair_group = 64, find_group = 128;  // invocations
+constexpr double least_limit = 0.075, most_limit = 1.5;  // edges, that a vertex may go between detections
+constexpr const char *pairs_label = "pairs of surfaces", *candidates_label = "candidates for pairs",
+                     *leaf_pairs_label = "pairs of leaves";
+constexpr std::size_t group = 64, find_group = 256;  // invocations
 
 void give_pairs(Sim& sim) {
   const Pairs& p = sim.pairs;
   Recorder& recorder = sim.recorder;
   recorder.give("PairMesh", p.mesh), recorder.give("PairLists", p.lists);
-  recorder.give("LeafPairs", p.leaf_pairs), recorder.give("Pairs", p.pairs);
+  recorder.give("LeafPairs", p.leaf_pairs), recorder.give("Candidates", p.candidates), recorder.give("Pairs", p.pairs);
+  recorder.give("Balls", p.balls);
   recorder.give("PairSumsByVertex", p.sums), recorder.give("Listed", p.listed);
   recorder.counts = p.lists.id();
 }
 
 void find_boxes(Sim& sim, bool detects) {
   Pairs& p = sim.pairs;
-  p.empty.copy_to(p.lists, p.ranges.counts.at, p.ranges.counts.at, p.ranges.counts.bytes());
+  const std::size_t at = p.ranges.counts.at;
+  p.empty.copy_to(p.lists, at, at, p.lists.bytes() - at);
   sim.recorder.run(p.boxes, {{"detects", unsigned(detects)}});
   p.boxed = true;
 }
@@ -63,12 +66,13 @@ void plan_detection(Sim& sim, const std::vector<Extent>& bodies) {
   p.fastest = 0;
   for (const Extent& body : bodies) p.fastest = std::max(p.fastest, body.fastest);
   const double seconds = 2 * double(Pairs::readback_interval + 1) * s.dt,
-               apart = 2 * (p.fastest + std::abs(s.gravity) * seconds) * seconds + p.edge;
+               apart = 2 * (p.fastest + std::abs(s.gravity) * seconds) * seconds + p.edge +
+                       std::max(0.0, s.contact_distance);
   p.near = s.contact == "self";
   for (std::size_t a = 0; a < bodies.size() && !p.near; ++a)
     for (std::size_t b = a + 1; b < bodies.size() && !p.near; ++b) {
       const Bounds &one = bodies[a].box, &other = bodies[b].box;
-      p.near = !are_apart({one.low - apart, one.high + apart}, other);
+      p.near = !are_apart(grown(one, apart), other);
     }
 }
 
@@ -77,14 +81,17 @@ Buffer checked(const Tuning& tuning, Buffer buffer) {
   return buffer;
 }
 
-// As much as a block may have at most: what then has no room is counted.
-void make_room(Pairs& p, const Tuning& tuning, std::size_t pairs, std::size_t leaf_pairs) {
-  if (p.pairs) {
-    pairs = std::min(pairs, tuning.storage / sizeof(SurfacePair));
-    leaf_pairs = std::min(leaf_pairs, tuning.storage / sizeof(glm::uvec2));
-  }
-  p.pairs = checked(tuning, Buffer("pairs of surfaces", sizeof(SurfacePair) * pairs));
-  p.leaf_pairs = checked(tuning, Buffer("pairs of leaves", sizeof(glm::uvec2) * leaf_pairs));
+template <class T>
+void make_room(Buffer& list, const char* label, const Tuning& tuning, std::size_t count) {
+  list = checked(tuning, Buffer(label, sizeof(T) * count));
+}
+
+// Makes room for four times as many as a detection found, if that was more than a quarter of it.
+template <class T>
+void follow(Pairs& p, Buffer& list, const char* label, const Tuning& tuning, std::size_t found) {
+  const std::size_t room = list.bytes() / sizeof(T), most = tuning.storage / sizeof(T);
+  p.left_out += std::max(found, room) - room;
+  if (found > room / 4 && room < most) make_room<T>(list, label, tuning, std::min(4 * found, most));
 }
 
 void read_contacts(Sim& sim) {
@@ -94,16 +101,11 @@ void read_contacts(Sim& sim) {
   const ContactTotals totals = get(*contents, p.ranges.totals)[0];
   p.touches += totals.touching, p.truncated += totals.truncated;
   p.taken += double(totals.taken) * TAKEN_UNIT;
-  p.nearest_lately = std::min(1.0, double(std::bit_cast<float>(totals.nearest)));
-  p.nearest = std::min(p.nearest, p.nearest_lately);
+  p.nearest = std::min(p.nearest, double(std::bit_cast<float>(totals.nearest)));
   p.listed_pairs = std::max<std::uint64_t>(p.listed_pairs, totals.most_pairs);
-  const std::size_t pairs = p.pairs.bytes() / sizeof(SurfacePair),
-                    leaf_pairs = p.leaf_pairs.bytes() / sizeof(glm::uvec2);
-  p.left_out += std::max<std::size_t>(totals.most_pairs, pairs) - pairs;
-  p.left_out += std::max<std::size_t>(totals.most_leaf_pairs, leaf_pairs) - leaf_pairs;
-  if (totals.most_pairs > pairs / 2 || totals.most_leaf_pairs > leaf_pairs / 2)
-    make_room(p, sim.tuning, std::max<std::size_t>(pairs, 4 * std::size_t(totals.most_pairs)),
-              std::max<std::size_t>(leaf_pairs, 4 * std::size_t(totals.most_leaf_pairs)));
+  follow<SurfacePair>(p, p.pairs, pairs_label, sim.tuning, totals.most_pairs);
+  follow<glm::uvec2>(p, p.candidates, candidates_label, sim.tuning, totals.most_candidates);
+  follow<glm::uvec2>(p, p.leaf_pairs, leaf_pairs_label, sim.tuning, totals.most_leaf_pairs);
   std::vector<Extent> bodies(sim.model->bodies.size(), {{glm::dvec3(INFINITY), glm::dvec3(-INFINITY)}, 0});
   const std::vector<glm::vec4> lows = get(*contents, p.ranges.leaf_lows), highs = get(*contents, p.ranges.leaf_highs);
   std::vector<double> speeds;
@@ -133,7 +135,12 @@ void make_buffers(Pairs& p, const SolverInput& input, const Surfaces& surfaces, 
   p.listed = checked(input.tuning, Buffer("places of listing", std::vector<glm::vec4>(count), GL_DYNAMIC_COPY));
   p.listed_texels = make_texel_view(p.listed);
   p.readback = Buffer("contacts read-back", p.empty.bytes(), nullptr, GL_STREAM_READ);
-  make_room(p, input.tuning, 65536 + 8 * triangles, 4096 + 24 * p.leaf_bodies.size());
+  p.balls =
+      checked(input.tuning, Buffer("balls around parts of surfaces",
+                                   sizeof(glm::vec4) * (surfaces.vertices.size() + triangles + surfaces.edges.size())));
+  make_room<SurfacePair>(p.pairs, pairs_label, input.tuning, 65536 + 8 * triangles);
+  make_room<glm::uvec2>(p.candidates, candidates_label, input.tuning, 131072 + 24 * triangles);
+  make_room<glm::uvec2>(p.leaf_pairs, leaf_pairs_label, input.tuning, 4096 + 24 * p.leaf_bodies.size());
 }
 
 void make_passes(Pairs& p, const SolverInput& input) {
@@ -143,12 +150,11 @@ void make_passes(Pairs& p, const SolverInput& input) {
   defines.insert(defines.end(), p.defines.begin(), p.defines.end());
   const double mass = std::accumulate(input.model.masses.begin(), input.model.masses.end(), 0.0);
   defines.insert(defines.end(), {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
-                                 fmt::format("PAIR_GROUP {}u", pair_group), fmt::format("TASKS {}u", tasks),
-                                 fmt::format("TOTAL_MASS {:.9g}", mass),
+                                 fmt::format("PAIR_GROUP {}u", group), fmt::format("GROUP_SIZE {}u", group),
+                                 fmt::format("FIND_GROUP {}u", find_group), fmt::format("TOTAL_MASS {:.9g}", mass),
                                  fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
-  const auto kernel = [&](const char* name, std::size_t size = group, bool before_substep = true) {
+  const auto kernel = [&](const char* name, bool before_substep = true) {
     std::vector<std::string> all = defines;
-    all.push_back(fmt::format("GROUP_SIZE {}u", size));
     all.push_back(fmt::format("BEFORE_SUBSTEP {:d}", before_substep));
     return Program::compute(fmt::format("contact/bodies/{}.comp", name), {}, all);
   };
@@ -160,19 +166,18 @@ void make_passes(Pairs& p, const SolverInput& input) {
   p.boxes = {kernel("boxes"), p.leaf_bodies.size()};
   p.near_leaves = {kernel("near"), p.leaf_bodies.size()};
   p.cull = {kernel("cull"), p.leaf_bodies.size()};
-  p.find = counted(kernel("find", find_group), offsetof(PairCounts, leaf_pair_groups));
-  p.impulses = counted(kernel("impulses", pair_group, false), offsetof(PairCounts, pair_groups));
-  p.truncate = counted(kernel("truncate", pair_group, false), offsetof(PairCounts, pair_groups));
+  p.find = counted(kernel("find"), offsetof(PairCounts, leaf_pair_groups));
+  p.list = counted(kernel("list"), offsetof(PairCounts, candidate_groups));
+  p.impulses = counted(kernel("impulses", false), offsetof(PairCounts, pair_groups));
+  p.truncate = counted(kernel("truncate", false), offsetof(PairCounts, pair_groups));
 }
 
 // Substeps between detections, so that meanwhile surfaces come nearer by a part of an edge: with much less detections
 // take the time, with much more there are many pairs that never touch.
 int detection_interval(const Sim& sim) {
   const Pairs& p = sim.pairs;
-  const bool self = sim.settings.contact == "self";  // neighbours would be listed
   const double gained = std::abs(sim.settings.gravity) * double(2 * Pairs::readback_interval) * sim.settings.dt;
-  const double usual = (self ? 0.1 : 0.2) * p.edge / (p.usual + gained),
-               most = 0.4 * most_limit * p.edge / (p.fastest + gained);
+  const double usual = 0.2 * p.edge / (p.usual + gained), most = 0.4 * most_limit * p.edge / (p.fastest + gained);
   return int(std::clamp(std::min(usual, most) / sim.plan.h, 1.0, double(sim.plan.substeps)));
 }
 
@@ -180,7 +185,7 @@ int detection_interval(const Sim& sim) {
 
 Pairs make_pairs(const SolverInput& input) {
   const Model& model = input.model;
-  const Surfaces surfaces = lay_out_surfaces(model);
+  const Surfaces surfaces = lay_out_surfaces(model, input.settings.contact_distance);
   const SurfaceLeaves leaves = cut_leaves(model, surfaces);
   const PairSizes sizes{.triangles = model.rest.surface.size(),
                         .edges = surfaces.edges.size(),
@@ -190,8 +195,7 @@ Pairs make_pairs(const SolverInput& input) {
                         .leaves = leaves.leaves.size()};
   Pairs p;
   for (const SurfaceLeaf& leaf : leaves.leaves) p.leaf_bodies.push_back(leaf.body);
-  for (const std::uint32_t v : surfaces.vertices) p.offset += surfaces.offsets[v] / double(surfaces.vertices.size());
-  p.edge = p.offset / Surfaces::offset_part;
+  p.edge = mean_edge(surfaces, model.rest.positions);
   p.ranges = lay_out_pairs(sizes), p.defines = pair_defines(sizes);
   make_buffers(p, input, surfaces, leaves);
   make_passes(p, input);
@@ -218,15 +222,17 @@ void list_pairs(Sim& sim, int substep) {
   if (substep % interval != 0) return;
   Recorder& recorder = sim.recorder;
   find_boxes(sim, true);
-  for (Pass* pass : {&p.near_leaves, &p.cull, &p.find}) {
+  for (Pass* pass : {&p.near_leaves, &p.cull, &p.find, &p.list}) {
     const Program& program = recorder.use(pass->program);
     program.set("lifetime", float(interval * sim.plan.h));
-    program.set("least_limit", float(0.5 * p.offset)), program.set("most_limit", float(most_limit * p.edge));
+    program.set("least_limit", float(least_limit * p.edge)), program.set("most_limit", float(most_limit * p.edge));
   }
   recorder.run(p.near_leaves);
   recorder.run(p.cull);
-  recorder.barrier(GL_COMMAND_BARRIER_BIT);  // cull counts the work-groups of find, and find those of the others
+  recorder.barrier(GL_COMMAND_BARRIER_BIT);  // each counts the work-groups of the next
   recorder.run(p.find);
+  recorder.barrier(GL_COMMAND_BARRIER_BIT);
+  recorder.run(p.list);
   recorder.barrier(GL_COMMAND_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
   ++p.detections, p.side = 0;
 }

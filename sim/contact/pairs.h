@@ -23,9 +23,8 @@ struct PairNumbers {
   std::uint64_t truncated = 0;     ///< vertices stopped on their way, likewise
   double taken = 0;                ///< m/s, the momentum that this took over the mass of all bodies, likewise
   double nearest = 1;              ///< the least distance of a pair that acted, over its offset
-  double nearest_lately = 1;       ///< the same between the last two readbacks
   std::uint64_t listed_pairs = 0;  ///< the most of a detection
-  std::uint64_t left_out = 0;      ///< pairs for which there was no room
+  std::uint64_t left_out = 0;      ///< pairs for which there was no room, so that their vertices were held
   bool boxed = false;              ///< boxes of leaves are known
   bool near = true;                ///< bodies may touch before the readback after the next
   double fastest = 0, usual = 0;   ///< m/s, of any vertex of a surface, and of most leaves, at the last readback
@@ -34,13 +33,13 @@ struct PairNumbers {
 /// Part of a Sim.
 struct Pairs : PairNumbers {
   static constexpr long readback_interval = 2;  ///< steps
-  Buffer mesh, lists, leaf_pairs, pairs, sums, listed, empty, readback;
+  Buffer mesh, lists, balls, leaf_pairs, candidates, pairs, sums, listed, empty, readback;
   Texture listed_texels;
   Fence requested;
-  Pass boxes, near_leaves, cull, find, impulses, truncate;  ///< from `find` on with work-groups from `lists`
-  unsigned phases = 0;                                      ///< of dispatches that end a substep
-  unsigned side = 0;                                        ///< of vertices' shares: the next substep's
-  double edge = 1, offset = 0;                              ///< m, the means of surfaces
+  Pass boxes, near_leaves, cull, find, list, impulses, truncate;  ///< from `find` on with work-groups from `lists`
+  unsigned phases = 0;                                            ///< of dispatches that end a substep
+  unsigned side = 0;                                              ///< of vertices' shares: the next substep's
+  double edge = 1;                                                ///< m, the mean of surfaces
   std::vector<std::uint32_t> leaf_bodies;
   PairRanges ranges;
   std::vector<std::string> defines;  ///< for kernels that read `mesh`, `lists` and `pairs` (surfaces.glsl)

@@ -146,8 +146,6 @@ Depth depth_in(const MovingObstacle& obstacle, const Shape& shape, const glm::dv
   return deepest;
 }
 
-Bounds grown(const Bounds& box, double by) { return {box.low - by, box.high + by}; }
-
 // Calls f with each pair of cells of the two that overlap by more than touching, or are nearer than a gap, but for
 // those whose boxes say enough.
 template <class Skip, class F>
@@ -313,7 +311,7 @@ class Separation {
   std::vector<StartMotion> run() {
     for (std::size_t b = 0; b < world_.shapes.size(); ++b) free_of_obstacles(b);
     if (!bodies_touch(model_, settings_)) return std::move(motions_);
-    const Surfaces surfaces = lay_out_surfaces(model_);
+    const Surfaces surfaces = lay_out_surfaces(model_, settings_.contact_distance);
     for (std::size_t b = 0; b < world_.shapes.size(); ++b) {
       fill_grid(world_.shapes[b]);
       world_.shapes[b].offset = mean_offset(model_.bodies[b], surfaces);

@@ -27,7 +27,7 @@ std::vector<Side> sort_sides(const Model& model) {
 
 }  // namespace
 
-Surfaces lay_out_surfaces(const Model& model) {
+Surfaces lay_out_surfaces(const Model& model, double distance) {
   Surfaces result;
   const std::size_t count = model.rest.positions.size();
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
@@ -62,8 +62,15 @@ Surfaces lay_out_surfaces(const Model& model) {
     const Body& body = body_at(model, v);
     result.offsets[v] = Surfaces::offset_part * length / std::max(1u, end - first);
     if (body.thickness > 0) result.offsets[v] = std::min(result.offsets[v], body.thickness);
+    if (distance != automatic) result.offsets[v] = distance;
   }
   return result;
+}
+
+double mean_edge(const Surfaces& surfaces, const std::vector<glm::dvec3>& positions) {
+  double sum = 0;
+  for (const Surfaces::Edge& e : surfaces.edges) sum += glm::distance(positions[e.ends[0]], positions[e.ends[1]]);
+  return sum / double(std::max<std::size_t>(surfaces.edges.size(), 1));
 }
 
 double mean_offset(const Body& body, const Surfaces& surfaces) {

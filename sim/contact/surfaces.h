@@ -4,6 +4,7 @@
 #include <array>
 
 #include "sim/model/model.h"
+#include "sim/model/settings.h"
 
 namespace tetpbd {
 
@@ -25,7 +26,10 @@ struct Surfaces {
   std::vector<std::uint32_t> own_triangle;
   std::vector<double> offsets;  ///< m, by vertex of the model: the distance that its surface keeps from others
 };
-Surfaces lay_out_surfaces(const Model& model);
+/// `distance`: m, that all keep; automatic: by the edges around each vertex, of sheets at most their thickness.
+Surfaces lay_out_surfaces(const Model& model, double distance = automatic);
+/// m, of all edges of surfaces.
+double mean_edge(const Surfaces& surfaces, const std::vector<glm::dvec3>& positions);
 /// m, of the vertices of a body's surface.
 double mean_offset(const Body& body, const Surfaces& surfaces);
 

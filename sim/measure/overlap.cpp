@@ -25,10 +25,7 @@ bool is_in(const glm::dvec3& p, const Tet& tet, const std::vector<glm::dvec3>& x
 
 Overlap measure_overlap(const Model& model, const std::vector<glm::dvec3>& x, bool self) {
   const Surfaces surfaces = lay_out_surfaces(model);
-  double edge = 0;
-  for (const Surfaces::Edge& e : surfaces.edges)
-    edge += glm::distance(model.rest.positions[e.ends[0]], model.rest.positions[e.ends[1]]);
-  edge /= double(std::max<std::size_t>(surfaces.edges.size(), 1));
+  const double edge = mean_edge(surfaces, model.rest.positions);
   const double cell = 2 * edge, near = 2.4 * edge;
   const auto& rest = model.rest.positions;
   std::vector<Bounds> boxes;

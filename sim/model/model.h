@@ -31,9 +31,9 @@ struct Body {
   bool is_sheet() const { return tets == 0; }
 };
 
-/// A body that started inside something and was moved out before the run (contact/starts.h).
+/// A body that started inside something, or touched another, and was moved before the run (contact/starts.h).
 struct StartMotion {
-  std::string body, from;  ///< its name, and what it was in
+  std::string body, from;  ///< its name, and what it was in; empty: it touched
   glm::dvec3 motion{0};    ///< m
   double work = 0;         ///< J, against gravity
 };

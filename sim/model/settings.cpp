@@ -97,6 +97,10 @@ const std::vector<Parameter>& parameters() {
          "whether bodies touch each other (bodies), and also themselves (self); else they pass through each "
          "other",
          0, 1, "", false, Effect::rebuild},
+        {"contact_distance", "world", &S::contact_distance,
+         "distance that surfaces of bodies which touch keep from each other. auto: 0.15 of the edges around, of sheets "
+         "at most their thickness",
+         1e-6, 1, "m", true, Effect::rebuild, true},
         {"friction", "world", &S::friction,
          "Coulomb friction of ground, walls and bodies: 0 is ice, 0.5 wood, 1 rubber", 0, 10},
         {"restitution", "world", &S::restitution,

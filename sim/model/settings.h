@@ -19,10 +19,11 @@ inline constexpr int automatic = -1;
 struct World {
   double gravity = 9.81;  ///< m/s^2, downwards
   bool ground = true;
-  double ground_height = 0;      ///< m
-  double friction = 0.5;         ///< of obstacles and bodies without their own
-  double restitution = 0;        ///< of hard bodies, where an obstacle has none of its own
-  std::string contact = "none";  ///< of bodies with each other: none, bodies, self
+  double ground_height = 0;             ///< m
+  double friction = 0.5;                ///< of obstacles and bodies without their own
+  double restitution = 0;               ///< of hard bodies, where an obstacle has none of its own
+  std::string contact = "none";         ///< of bodies with each other: none, bodies, self
+  double contact_distance = automatic;  ///< m, that their surfaces keep; automatic: by their edges and thickness
   bool operator==(const World&) const = default;
 };
 

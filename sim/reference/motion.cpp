@@ -205,7 +205,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
   add(numbers);
-  if (bodies_touch(model, s)) add(s.contact + ", offsets");
+  if (bodies_touch(model, s)) add(s.contact + ", offsets"), add(std::array{s.contact_distance});
   return key;
 }
 

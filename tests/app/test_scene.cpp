@@ -117,6 +117,21 @@ TEST_CASE("the command line overrides, and its errors name the flag") {
   CHECK_THROWS_AS(load_scene("no-such-scene"), Error);
 }
 
+TEST_CASE("several bodies touch each other unless the scene or a flag says otherwise") {
+  const std::string cube = R"({"block": {"size": [1, 1, 1], "cells": [1, 1, 1]}, "position": [0, 1, 0]})",
+                    two = R"({"bodies": [)" + cube + "," + cube;
+  const auto contact = [](const std::string& text, const SceneOverrides& overrides = {}) {
+    return load_scene(SceneFile(text).path.string(), overrides).settings.contact;
+  };
+  CHECK(contact(two + "]}") == "bodies");
+  CHECK(contact("{" + block + "}") == "none");
+  CHECK(contact(two + R"(], "world": {"contact": "none"}})") == "none");
+  CHECK(contact(two + R"(], "world": {"contact": "self"}})") == "self");
+  CHECK(contact(two + R"(], "world": {"restitution": 0.5}})") == "none");
+  CHECK(contact(two + "]}", {.parameters = {{"contact", "none"}}}) == "none");
+  CHECK(contact(two + "]}", {.set = {"world.contact=none"}}) == "none");
+}
+
 TEST_CASE("a scene of a lattice takes TetGen from the command line, and the size of the lattice goes") {
   const BodyDescription shipped = load_scene("jelly-bunny").bodies[0];
   CHECK(shipped.fill == "lattice");

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <glm/gtc/constants.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "app/run_loop.h"
@@ -287,6 +288,58 @@ TEST_CASE("pairs: three blocks on each other come to rest") {
     const glm::dvec3 before = centre_of(*model, read_state(sim).positions);
     for (int s = 0; s < 100; ++s) step(sim);
     CHECK(glm::distance(centre_of(*model, read_state(sim).positions), before) < (is_long_run() ? 1.5e-4 : 1e-3));
+  }
+}
+
+TEST_CASE("pairs: what rests keeps the contact distance that was asked for, whatever the meshes") {
+  GlTest gl;
+  Settings settings = touching("explicit", 1e6);
+  settings.gravity = 9.81, settings.damping = 10, settings.constraint_damping = 3e-3;
+  for (const double distance : {0.005, 0.03}) {
+    CAPTURE(distance);
+    settings.contact_distance = distance;
+    Placed below{{0, 0.25, 0}}, above{{0.02, 0.752 + distance, 0.03}};
+    below.cells = glm::ivec3(3), above.cells = glm::ivec3(2);
+    for (std::uint32_t v = 0; v < 4 * 4 * 4; ++v) below.fixed.push_back(v);
+    const auto model = blocks({below, above});
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 120; ++s) step(sim);
+    const State state = read_state(sim);
+    const Body& body = model->bodies[1];
+    double lowest = 1e30;
+    for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v)
+      lowest = std::min(lowest, state.positions[v].y);
+    CHECK(lowest - 0.5 == doctest::Approx(distance).epsilon(0.1));
+  }
+}
+
+TEST_CASE("pairs: what finds no room in a list is held, counted and does not cross, until there is more") {
+  GlTest gl;
+  Placed below{{0, 0.25, 0}}, above{{0.02, 0.9, 0.03}, {0, -3, 0}};
+  below.cells = above.cells = glm::ivec3(3);
+  above.turn = glm::dmat3(glm::rotate(glm::dmat4(1), 0.3, glm::normalize(glm::dvec3(1, 2, 3))));
+  for (std::uint32_t v = 0; v < 4 * 4 * 4; ++v) below.fixed.push_back(v);
+  const auto model = blocks({below, above});
+  Settings settings = touching("explicit", 1e6);
+  settings.gravity = 9.81;
+  for (Buffer Pairs::*list : {&Pairs::pairs, &Pairs::candidates, &Pairs::leaf_pairs}) {
+    Sim sim = create_sim(model, settings);
+    const std::size_t little = list == &Pairs::leaf_pairs ? 8 : 64, room = (sim.pairs.*list).bytes();
+    const auto step_apart = [&] {
+      step(sim);
+      REQUIRE(find_crossings(*model, read_state(sim).positions, false).pairs == 0);
+    };
+    for (int s = 0; s < 40; ++s) {
+      sim.pairs.*list = Buffer("little room", little);
+      step_apart();
+    }
+    const std::uint64_t left_out = touched(sim).left_out;
+    CHECK(left_out > 0);
+    for (int s = 0; s < 60; ++s) step_apart();
+    CHECK((sim.pairs.*list).bytes() > little);
+    CHECK((sim.pairs.*list).bytes() < room);
+    CHECK(touched(sim).touches > 0);
+    CHECK(touched(sim).left_out < 2 * left_out);
   }
 }
 

@@ -4,21 +4,30 @@
 bool leads_off_edge(uint edge, vec3 to) {
   uvec4 e = edge_vertices(edge);
   vec3 along = between(e.x, e.y);
+  bool off = true;
   for (int side = 0; side < 2; ++side) {
     uint beside = side == 0 ? e.z : e.w;
-    if (beside == NONE) continue;
-    vec3 across = between(e.x, beside);
-    if (!leads_away(to, across - along * (dot(across, along) / dot(along, along)))) return false;
+    vec3 across = between(e.x, beside == NONE ? e.y : beside);
+    bool away = leads_away(to, across - along * (dot(across, along) / dot(along, along)));
+    off = off && (away || beside == NONE);
   }
-  return true;
+  return off;
 }
 bool leads_off_vertex(uint vertex, vec3 to) {
-  for (uint k = first_neighbour_of(vertex); k < first_neighbour_of(vertex + 1u); ++k)
-    if (!leads_away(to, between(vertex, neighbour_at(k)))) return false;
-  return true;
+  bool off = true;
+  uint end = first_neighbour_of(vertex + 1u);
+  for (uint k = first_neighbour_of(vertex); k < end; ++k) {
+    bool away = leads_away(to, between(vertex, neighbour_at(k)));
+    off = off && away;
+  }
+  return off;
 }
 bool belongs(Proximity t, bool edges, uint first, uint second) {
-  if (edges) return t.part == 0 && leads_off_edge(first, -t.normal) && leads_off_edge(second, t.normal);
+  if (edges) {
+    if (t.part != 0) return false;
+    bool off_first = leads_off_edge(first, -t.normal), off_second = leads_off_edge(second, t.normal);
+    return off_first && off_second;
+  }
   if (t.part == 0) return true;
   uvec4 corners = triangle_corners(second);
   if (t.part < 4) {

@@ -15,10 +15,10 @@ float friction_between(uint a, uint b) { return mean_friction(body_friction(a), 
 float friction_between(uint a, uint b) { return params.friction; }
 #endif
 // Adds what the pair does now, and returns its push.
-float act(PairState s, Proximity t, uint shares, float offset) {
+float act(PairState s, Proximity t, uint shares, uint asked[4], float offset) {
   float split[4];
   for (int k = 0; k < 4; ++k)
-    split[k] = s.weights[k] * float(pair_sums[s.vertices[k]].asked[side]) / float(share_of(shares, k));
+    split[k] = s.weights[k] * float(asked[k]) / float(share_of(shares, k));
   Meeting m = meet(t, s.ways, split, s.turns);
   if (!(m.weight > 0.0)) return 0.0;
   float stop = stopping_impulse(t, m, offset), push = push_apart(t, m, offset, push_limit);
@@ -37,12 +37,14 @@ void meet_pair(uint p) {
   SurfacePair pair = pairs[p];
   bool of_edges = (pair.first & OF_EDGES) != 0u;
   PairState s = state_of(pair.vertices);
+  uint asked[4];
+  for (int k = 0; k < 4; ++k) asked[k] = pair_sums[s.vertices[k]].asked[side];
   Proximity t = proximity_of(s.places, of_edges);
   bool soon = touches_soon(t, s.ways, pair.offset);
   bool counts_now = (soon || pair.shares != 0u) && belongs(t, of_edges, pair.first & ~OF_EDGES, pair.second);
   float push = 0.0;
   if (counts_now && pair.shares != 0u) {
-    push = act(s, t, pair.shares, pair.offset);
+    push = act(s, t, pair.shares, asked, pair.offset);
     atomicAdd(touching, 1u);
     atomicMin(nearest, floatBitsToUint(t.distance / pair.offset));
   }
@@ -57,9 +59,5 @@ void main() {
   uint p = group_index() * PAIR_GROUP + lane();
   if (p < min(counts.pairs, uint(pairs.length()))) meet_pair(p);
   barrier();
-  if (p == 0u) {
-    atomicMax(totals.most_pairs, counts.pairs);
-    atomicMax(totals.most_leaf_pairs, counts.leaf_pairs);
-  }
   if (lane() == 0u && touching > 0u) atomicAdd(totals.touching, touching), atomicMin(totals.nearest, nearest);
 }

@@ -2,7 +2,9 @@
 #ifndef PAIR_LAYOUT
 #define PAIR_LAYOUT
 const uint NONE = 0xffffffffu;
-const uint OF_EDGES = 0x80000000u;  // of a pair's first part: two edges, else a vertex and a triangle
+const uint OF_EDGES = 0x80000000u;   // of a pair's first part: two edges, else a vertex and a triangle
+const uint SAME_BODY = 0x80000000u;  // of a candidate's second part
+const uint BRANCH = 32u;             // leaves
 
 // About 64 triangles that are together at rest, with the vertices and edges of no earlier leaf: first and end.
 struct SurfaceLeaf {
@@ -15,7 +17,7 @@ struct ContactTotals {
   uint truncated;  // vertices stopped on their way
   uint taken;      // momentum that this took, in TAKEN_UNITs of all bodies' mass times 1 m/s
   uint nearest;    // distance of a pair that acted over its offset, a float's bits
-  uint most_pairs, most_leaf_pairs;  // found by a detection
+  uint most_pairs, most_candidates, most_leaf_pairs;  // found by a detection
 };
 #define TAKEN_UNIT 1e-9
 // Three numbers for an indirect dispatch.
@@ -24,8 +26,15 @@ struct WorkGroups {
 };
 // Of a detection. Found may be more than there is room for.
 struct PairCounts {
-  uint leaf_pairs, pairs;
-  WorkGroups leaf_pair_groups, pair_groups;
+  uint leaf_pairs, candidates, pairs;
+  WorkGroups leaf_pair_groups, candidate_groups, pair_groups;
+};
+// Of leaves with consecutive numbers, at a detection. Corners of its box as whole numbers in the order of floats; the
+// others are floats' bits.
+struct SurfaceBranch {
+  uint low[3], high[3];
+  uint speed;    // m/s, of its fastest vertex
+  uint fastest;  // m/s, that its leaves may meet
 };
 // A vertex and a triangle, or two edges, that may touch before the next detection.
 struct SurfacePair {
@@ -43,7 +52,7 @@ struct PairSums {
   int pushed[3];
   int turned[3];   // changes its velocity alone
   uint part;       // of its way, a float's bits
-  uint asked[2];  // sum of its pairs' shares, in this substep and the next by turns
+  uint asked[2];   // sum of its pairs' shares, in this substep and the next by turns
   uint pairs;      // that have it
   uint left;       // of these, in this substep
 };

@@ -3,8 +3,10 @@
 layout(std430) restrict buffer PairLists {
   vec4 leaf_lows[LEAVES];   // corners of boxes; m/s, of its fastest vertex
   vec4 leaf_highs[LEAVES];  // m/s, of the fastest that it may meet
+  vec4 leaf_velocities[LEAVES];  // the middle of its vertices' velocities, m/s; how far any is from it
   ContactTotals totals;
   PairCounts counts;
+  SurfaceBranch branches[BRANCHES];
 };
 uint lane() { return gl_LocalInvocationIndex; }
 // Makes an indirect dispatch have so many work-groups, ROW of them in a row.

@@ -4,19 +4,23 @@ layout(local_size_x = GROUP_SIZE) in;
 #include "contact/bodies/surfaces.glsl"
 #include "contact/bodies/lists.glsl"
 #include "contact/bodies/proximity.glsl"
+#define VISITS_LEAVES
 #include "contact/bodies/reach.glsl"
 shared uint fastest;
+float branch_speed(uint branch) { return uintBitsToFloat(branches[branch].speed); }
+void visit(uint leaf, uint other) {
+  float speed = leaf_lows[other].w;
+  if (speed <= leaf_lows[leaf].w) return;
+  float way = way_until_then(speed), reach = leaf_offset(leaf, other) + further_than_offset(leaf, other, way, way);
+  if (are_near(leaf, other, reach)) atomicMax(fastest, floatBitsToUint(speed));
+}
 void main() {
   uint leaf = group_index();
   if (leaf >= LEAVES) return;
-  float own = leaf_lows[leaf].w;
-  if (lane() == 0u) fastest = floatBitsToUint(own);
+  if (lane() == 0u) fastest = floatBitsToUint(leaf_lows[leaf].w);
   barrier();
-  for (uint l = lane(); l < LEAVES; l += GROUP_SIZE) {
-    float other = leaf_lows[l].w;
-    float way = way_until_then(other), reach = leaf_offset(leaf, l) + further_than_offset(leaf, l, way, way);
-    if (other > own && may_touch(leaf, l) && are_near(leaf, l, reach)) atomicMax(fastest, floatBitsToUint(other));
-  }
-  barrier();
-  if (lane() == 0u) leaf_highs[leaf].w = uintBitsToFloat(fastest);
+  visit_near_leaves(leaf, leaf_lows[leaf].w);
+  if (lane() != 0u) return;
+  leaf_highs[leaf].w = uintBitsToFloat(fastest);
+  atomicMax(branches[leaf / BRANCH].fastest, fastest);
 }

@@ -8,9 +8,16 @@ float way_until_then(float speed) {
 }
 // What is so fast that it would have too many pairs is held up where it may meet others.
 float limit_of(float speed) { return min(way_until_then(speed), most_limit); }
-// m: what both may go, and the way of the substeps before which a pair that will touch gets its share.
+// m, nearer than which parts must be a pair, as they could cross.
+float way_of_both(float way, float other_way) { return 1.02 * (way + other_way); }
+// m/s, that parts of two leaves approach each other by at most.
+float approach_between(uint a, uint b) {
+  vec4 one = leaf_velocities[a], other = leaf_velocities[b];
+  return distance(one.xyz, other.xyz) + one.w + other.w;
+}
+// m: that, and the way of the substeps before which a pair that will touch gets its share.
 float further_than_offset(uint a, uint b, float way, float other_way) {
-  return 1.02 * (way + other_way) + AHEAD * params.h * (leaf_lows[a].w + leaf_lows[b].w);
+  return way_of_both(way, other_way) + AHEAD * params.h * approach_between(a, b);
 }
 float further_than_offset(uint a, uint b) {
   return further_than_offset(a, b, limit_of(leaf_highs[a].w), limit_of(leaf_highs[b].w));
@@ -20,3 +27,34 @@ bool are_near(uint a, uint b, float reach) {
   return overlap(leaf_lows[a].xyz - reach, leaf_highs[a].xyz + reach, leaf_lows[b].xyz, leaf_highs[b].xyz);
 }
 bool may_touch(uint a, uint b) { return CONTACT_SELF != 0 || leaves[a].body != leaves[b].body; }
+float float_of(uint ordered) {
+  return uintBitsToFloat((ordered >> 31) != 0u ? ordered & 0x7fffffffu : ~ordered);
+}
+#ifdef VISITS_LEAVES
+shared uint near_branches[GROUP_SIZE], near_count;
+// What a kernel does with a pair of leaves that are near each other by their branches.
+void visit(uint leaf, uint other);
+// Of the fastest that leaves of a branch are asked for by.
+float branch_speed(uint branch);
+void visit_near_leaves(uint leaf, float own_speed) {
+  for (uint base = 0u; base < BRANCHES; base += GROUP_SIZE) {
+    if (lane() == 0u) near_count = 0u;
+    barrier();
+    uint b = base + lane();
+    if (b < BRANCHES) {
+      float speed = max(own_speed, branch_speed(b)), way = way_until_then(speed);
+      float reach = leaves[leaf].offset + way_of_both(way, way) + 2.0 * AHEAD * params.h * speed;
+      vec3 low, high;
+      for (int c = 0; c < 3; ++c) low[c] = float_of(branches[b].low[c]), high[c] = float_of(branches[b].high[c]);
+      if (overlap(leaf_lows[leaf].xyz - reach, leaf_highs[leaf].xyz + reach, low, high))
+        near_branches[atomicAdd(near_count, 1u)] = b;
+    }
+    barrier();
+    for (uint at = lane(); at < BRANCH * near_count; at += GROUP_SIZE) {
+      uint other = near_branches[at / BRANCH] * BRANCH + at % BRANCH;
+      if (other < LEAVES && may_touch(leaf, other)) visit(leaf, other);
+    }
+    barrier();
+  }
+}
+#endif

@@ -97,20 +97,21 @@ void move(uint i) {
   quantized_out[i] = quantize(seen_by_neighbours(x, v), weight_of(own));
 #endif
 }
+void act(uint p) {
+  SurfacePair pair = pairs[p];
+  if (pair.push > 0.0) turn(pair);
+  limit_ways(pair);
+  memoryBarrierBuffer();
+  uint left[4];
+  for (int k = 0; k < 4; ++k) left[k] = atomicAdd(pair_sums[pair.vertices[k]].left, 0xffffffffu);
+  for (int k = 0; k < 4; ++k)
+    if (left[k] == 1u) moving[atomicAdd(moving_count, 1u)] = pair.vertices[k];
+}
 void main() {
   if (lane() == 0u) moving_count = 0u;
   barrier();
   uint p = group_index() * PAIR_GROUP + lane();
-  bool exists = p < min(counts.pairs, uint(pairs.length()));
-  if (exists) {
-    SurfacePair pair = pairs[p];
-    if (pair.push > 0.0) turn(pair);
-    limit_ways(pair);
-    memoryBarrierBuffer();
-    for (int k = 0; k < 4; ++k)
-      if (atomicAdd(pair_sums[pair.vertices[k]].left, 0xffffffffu) == 1u)
-        moving[atomicAdd(moving_count, 1u)] = pair.vertices[k];
-  }
+  if (p < min(counts.pairs, uint(pairs.length()))) act(p);
   memoryBarrierBuffer();
   barrier();
   for (uint j = lane(); j < moving_count; j += PAIR_GROUP) move(moving[j]);

@@ -49,5 +49,10 @@ show squishy-balls 120 'Balls of jelly fall on each other in a corner' --scene s
 show twisted-beams 200 'Twisted beams are let go against each other' --scene twisted-beams
 show bowl-32 160 'Bunnies of jelly fall into a bowl: 346 000 tets (minutes per step without a GPU)' --scene bowl-32
 show folded-ears 240 'A roller bends the ears of a bunny onto its face' --scene folded-ears
+show layers 60 'Four cloths fall over a ball' --scene layers
+show cloth-heap 60 'A cloth falls into a heap' --scene cloth-heap
+show cards 400 'Thin plates fall onto each other' --scene cards
+show chain 60 'A chain of soft rings swings' --scene chain
+show knot 40 'A weight pulls at a knot' --scene knot
 show cloth-on-bunny 200 'A cloth falls on a bunny' --scene cloth-on-bunny
 du -sh "$folder"

@@ -374,6 +374,47 @@ TEST_CASE("offset contact: bodies bounce as barriers have it") {
   }
 }
 
+TEST_CASE("offset contact: a stack of three and cloth on a ball rest where barriers have them") {
+  for (const bool cloth : {false, true}) {
+    CAPTURE(cloth);
+    Stage s;
+    s.settings.friction = 0, s.settings.constraint_damping = 0, s.settings.damping = cloth ? 60 : 30;
+    if (cloth) {
+      Material material = s.settings;
+      material.material = "none", material.constraints = "stretch,isobend";
+      material.compliance[index_of<Stretch>] = 1e-4, material.compliance[index_of<Isobend>] = 1e3;
+      TetMesh sheet = make_sheet({0.4, 0.4}, {7, 7});
+      sheet.thickness = 0.004;
+      s.add(ball(3, 0.12), {0, 0, 0}, {}, {}, 1000, true);
+      s.add(sheet, {0, 0.1242, 0}, {}, {}, 300).material = material;
+    } else {
+      s.settings.young_modulus = 1e5;
+      for (int b = 0; b < 3; ++b)
+        s.add(make_block(glm::dvec3(0.2), glm::ivec3(2)), {0.013 * b, 0.209 * b, 0.006 * b}, {}, {}, 1000, b == 0);
+    }
+    s.begin();
+    s.scale = 1;
+    const double seconds = is_long_run() ? 0.5 : 0.2;
+    s.advance_to(seconds);
+    CHECK(s.crossings == 0);
+    const double gap = cloth ? 0.004 : 0.009;
+    BarrierRun barrier{s.model, s.system, none, 2.5e-4, gap, 1e8, s.settings.gravity};
+    for (double t = 0; t < seconds - 1e-9; t += barrier.h) {
+      barrier.step();
+      for (glm::dvec3& v : barrier.v) v *= std::exp(-s.settings.damping * barrier.h);
+    }
+    for (std::size_t b = 1; b < s.model.bodies.size(); ++b) {
+      const Body& body = s.model.bodies[b];
+      const double start = s.mean(body, s.model.positions).y, ours = start - s.centre(b).y,
+                   right = start - s.mean(body, barrier.x).y;
+      MESSAGE("cloth ", cloth, ", body ", b, ": sank by ", ours, " m, with barriers by ", right);
+      CHECK(right > 0.002);
+      CHECK(std::abs(ours - right) < 0.05 * right + 0.05 * gap * double(b));  // surfaces rest at 0.95 of their offset
+    }
+    CHECK(find_crossings(s.model, barrier.x, false).pairs == 0);
+  }
+}
+
 TEST_CASE("offset contact: three cloths bear a block, and nothing goes through") {
   Stage s;
   Material cloth = s.settings;

@@ -1,7 +1,7 @@
-// Fits the shadow map's projection to the bodies' bounds. These are found in integers that sort like the floats, since
-// their atomic minimum and maximum do not depend on the order of invocations. The work-group that ends last then finds
-// the projection. Its size is in steps and its centre in whole texels, so that shadow edges do not crawl.
+// Fits the shadow map's projection to the bodies' bounds. The work-group that ends last finds it. Its size is in steps
+// and its centre in whole texels, so that shadow edges do not crawl.
 #include "layout.glsl"
+#include "ordered.glsl"
 #include "render/view.glsl"
 layout(local_size_x = 128) in;
 layout(std430) readonly buffer Positions { Position positions[]; };
@@ -17,12 +17,6 @@ uniform vec3 obstacles_low, obstacles_high;  // bounds of obstacles; low > high 
 uniform float reach;     // m, the distance from the bodies up to which obstacles count
 
 shared uint low_bits[3], high_bits[3];
-
-uint ordered(float x) {
-  uint bits = floatBitsToUint(x);
-  return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
-}
-float decoded(uint bits) { return uintBitsToFloat((bits & 0x80000000u) != 0u ? bits & 0x7fffffffu : ~bits); }
 
 void find_bounds(uint i, uint lane) {
   if (lane < 3u) {

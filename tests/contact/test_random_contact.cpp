@@ -94,7 +94,7 @@ TEST_CASE("random contact: bodies of all shapes, masses and speeds do not cross"
   GlTest gl;
   const std::uint64_t first = seed_of_run(1);
   const auto file = std::filesystem::temp_directory_path() / ("tetpbd_random_" + std::to_string(getpid()) + ".json");
-  long touches = 0;
+  long touches = 0, scenes = 0;
   for (std::uint64_t seed = first; seed < first + (is_long_run() ? 200 : 6); ++seed) {
     const std::string text = RandomScene(seed).make().dump();
     CAPTURE(seed);
@@ -105,6 +105,7 @@ TEST_CASE("random contact: bodies of all shapes, masses and speeds do not cross"
     const auto model = build_model(scene);
     const bool self = scene.settings.contact == "self";
     if (find_crossings(*model, model->positions, self).pairs > 0) continue;  // no room to move them apart
+    ++scenes;
     Sim sim = create_sim(model, scene.settings);
     for (int s = 0; s < (is_long_run() ? 60 : 12); ++s) {
       step(sim);
@@ -113,5 +114,7 @@ TEST_CASE("random contact: bodies of all shapes, masses and speeds do not cross"
     }
     touches += long(touched(sim).touches);
   }
+  MESSAGE(scenes, " scenes, ", touches, " touches");
+  CHECK(scenes > 3);
   CHECK(touches > 0);
 }

@@ -2,6 +2,7 @@
 // forget their pairs. There is a work-group per leaf.
 #include "types.glsl"
 layout(local_size_x = GROUP_SIZE) in;
+#include "ordered.glsl"
 #include "contact/bodies/surfaces.glsl"
 #include "contact/bodies/lists.glsl"
 #define WITHOUT_CHECK
@@ -13,11 +14,6 @@ uniform bool detects;
 shared vec3 lows[GROUP_SIZE];
 shared vec4 highs[GROUP_SIZE];                         // w: m/s
 shared vec3 slowest[GROUP_SIZE], fastest[GROUP_SIZE];  // by component
-// As whole numbers in the same order.
-uint ordered(float x) {
-  uint bits = floatBitsToUint(x);
-  return (bits >> 31) != 0u ? ~bits : bits | 0x80000000u;
-}
 void forget_pairs(uint i) {
   listed[i] = uvec4(floatBitsToUint(positions[i].high), floatBitsToUint(1e30));
   for (int c = 0; c < 3; ++c) pair_sums[i].stopped[c] = pair_sums[i].pushed[c] = pair_sums[i].turned[c] = 0;

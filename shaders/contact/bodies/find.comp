@@ -43,7 +43,7 @@ bool is_candidate(uint a, uint b, bool once) {
   return distance(p.xyz, q.xyz) <= p.w + q.w + reach && !(once && parts[0][a] >= parts[1][b]);
 }
 void hold_candidate(uvec2 candidate) {
-  uvec4 vertices = vertices_of(candidate);
+  uvec4 vertices = candidate_vertices(candidate);
   for (int k = 0; k < 4; ++k) hold(vertices[k], 0.0);
 }
 // All pairs of parts of one kind in a leaf and of another in the other leaf. Whether any of the latter is near.

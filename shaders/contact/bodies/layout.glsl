@@ -29,8 +29,8 @@ struct PairCounts {
   uint leaf_pairs, candidates, pairs;
   WorkGroups leaf_pair_groups, candidate_groups, pair_groups;
 };
-// Of leaves with consecutive numbers, at a detection. Corners of its box as whole numbers in the order of floats; the
-// others are floats' bits.
+// Of leaves with consecutive numbers, at a detection. Corners of its box are encoded by ordered.glsl, the others
+// are floats' bits.
 struct SurfaceBranch {
   uint low[3], high[3];
   uint speed;    // m/s, of its fastest vertex

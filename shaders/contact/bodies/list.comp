@@ -20,7 +20,7 @@ float given_distance(uvec4 vertices, bool of_edges, uint from) {
 bool make_pair(uvec2 candidate, out SurfacePair pair) {
   bool of_edges = (candidate.x & OF_EDGES) != 0u, same_body = (candidate.y & SAME_BODY) != 0u;
   uint first = candidate.x & ~OF_EDGES, second = candidate.y & ~SAME_BODY;
-  pair.vertices = vertices_of(candidate);
+  pair.vertices = candidate_vertices(candidate);
   pair.first = candidate.x, pair.second = second, pair.offset = 1e30;
   pair.push = pair._0 = pair._1 = pair._2 = 0.0, pair.shares = 0u;
   PairState s = state_of(pair.vertices);

@@ -27,14 +27,12 @@ bool are_near(uint a, uint b, float reach) {
   return overlap(leaf_lows[a].xyz - reach, leaf_highs[a].xyz + reach, leaf_lows[b].xyz, leaf_highs[b].xyz);
 }
 bool may_touch(uint a, uint b) { return CONTACT_SELF != 0 || leaves[a].body != leaves[b].body; }
-float float_of(uint ordered) {
-  return uintBitsToFloat((ordered >> 31) != 0u ? ordered & 0x7fffffffu : ~ordered);
-}
 #ifdef VISITS_LEAVES
+#include "ordered.glsl"
 shared uint near_branches[GROUP_SIZE], near_count;
-// What a kernel does with a pair of leaves that are near each other by their branches.
+// What a kernel does with a leaf and one that may touch it, of a branch that is near.
 void visit(uint leaf, uint other);
-// Of the fastest that leaves of a branch are asked for by.
+// m/s, the most that the kernel knows of a branch's leaves: of their vertices, or of what these may meet.
 float branch_speed(uint branch);
 void visit_near_leaves(uint leaf, float own_speed) {
   for (uint base = 0u; base < BRANCHES; base += GROUP_SIZE) {
@@ -45,7 +43,7 @@ void visit_near_leaves(uint leaf, float own_speed) {
       float speed = max(own_speed, branch_speed(b)), way = way_until_then(speed);
       float reach = leaves[leaf].offset + way_of_both(way, way) + 2.0 * AHEAD * params.h * speed;
       vec3 low, high;
-      for (int c = 0; c < 3; ++c) low[c] = float_of(branches[b].low[c]), high[c] = float_of(branches[b].high[c]);
+      for (int c = 0; c < 3; ++c) low[c] = decoded(branches[b].low[c]), high[c] = decoded(branches[b].high[c]);
       if (overlap(leaf_lows[leaf].xyz - reach, leaf_highs[leaf].xyz + reach, low, high))
         near_branches[atomicAdd(near_count, 1u)] = b;
     }

@@ -15,7 +15,7 @@ layout(std430) restrict readonly buffer PairMesh {
   uint leaf_edges[EDGES];
   SurfaceLeaf leaves[LEAVES];
 };
-uvec4 vertices_of(uvec2 candidate) {
+uvec4 candidate_vertices(uvec2 candidate) {
   uint first = candidate.x & ~OF_EDGES, second = candidate.y & ~SAME_BODY;
   if ((candidate.x & OF_EDGES) != 0u) return uvec4(edges[first].xy, edges[second].xy);
   return uvec4(first, triangles[second].xyz);

@@ -11,7 +11,7 @@ namespace tetpbd {
 namespace {
 
 constexpr std::size_t most_neighbours = 32;
-constexpr std::size_t most_held = 128;  // each is a copy into the GPU's buffers, before every step
+constexpr std::size_t most_held = 128;
 
 // A hold falls behind by so much of its radius: with more its own tets are sheared by more than a half.
 constexpr double slack_of_radius = 0.3;
@@ -24,6 +24,9 @@ constexpr double edges_a_step = 0.25;
 // So many edges from the mean of its neighbours the vertex stops, and beyond turns back: what does not follow
 // is held somewhere (a clamped end, another pin), and pulling on would only draw out a spike of flat tets.
 constexpr double edges_at_most = 2.5;
+
+// So many edges ahead of the vertex it waits for one that something holds back; a read-back is some steps old.
+constexpr double edges_ahead = 4;
 
 // Takes in the watched positions that have come back, and asks for the next.
 void watch(Grab& grab, const Sim& sim, bool wait = false) {
@@ -159,7 +162,9 @@ void lead(Grab& grab) {
   const double pace = std::clamp((limit - apart(grab)) / limit, -1.0, 1.0);
   const glm::dvec3 way = (pace < 0 ? grab.neighbours + grab.resting : grab.target) - grab.position;
   const double distance = glm::length(way), most = edges_a_step * grab.edge * std::abs(pace);
-  grab.position += distance > most ? way * (most / distance) : way;
+  const glm::dvec3 next = grab.position + (distance > most ? way * (most / distance) : way);
+  const double ahead = glm::distance(next, grab.seen);
+  if (ahead < std::max(edges_ahead * grab.edge, glm::distance(grab.position, grab.seen))) grab.position = next;
 }
 
 }  // namespace tetpbd

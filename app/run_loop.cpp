@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "sim/contact/faces.h"
 #include "sim/contact/pairs.h"
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
@@ -74,6 +75,12 @@ Crossings current_crossings(const Sim& sim) {
   return find_crossings(*sim.model, read_state(sim).positions, sim.settings.contact == "self");
 }
 
+// Of faces that obstacles could get in between, over the size.
+double depth_of_faces(const Sim& sim, const std::vector<Triangle>& faces) {
+  const auto obstacles = obstacles_at(*sim.model, sim.settings, simulated_time(sim));
+  return deepest_face(faces, obstacles, read_state(sim).positions) / sim.model->size;
+}
+
 // Whether more pairs of triangles cut each other than at the start, which goes into the errors.
 bool crossed(const Sim& sim, std::size_t at_start, RunErrors& errors) {
   const Crossings now = current_crossings(sim);
@@ -102,6 +109,7 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     hold_against(run, plan.standard, *sim.model, s, double(s) * sim.settings.dt, [&] { return read_state(sim); });
   };
   const bool touching = metrics && bodies_touch(*sim.model, sim.settings);
+  const std::vector<Triangle> faces = metrics ? wide_faces(*sim.model) : std::vector<Triangle>();
   if (metrics) measure(*metrics, sim);
   hold(0);
   const std::size_t at_start = plan.check_crossings ? current_crossings(sim).pairs : 0;
@@ -119,7 +127,10 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     if (plan.wait) run.wall_ms.push_back(seconds * 1e3), run.seconds += seconds;
     take(false);
     hold(s);
-    if (touching && (s % steps_per_frame(sim.settings.dt) == 0 || s == steps))
+    const bool seen = s % steps_per_frame(sim.settings.dt) == 0 || s == steps;  // in a film
+    if (seen && !faces.empty())
+      run.errors.penetration_max = std::fmax(run.errors.penetration_max, depth_of_faces(sim, faces));
+    if (seen && touching)
       run.errors.overlap =
           largest(run.errors.overlap.value_or(Overlap{}),
                   measure_overlap(*sim.model, read_state(sim).positions, sim.settings.contact == "self"));

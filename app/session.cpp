@@ -138,11 +138,7 @@ void step_lanes(Session& s) {
   auto& lanes = s.loaded.lanes;
   for (Lane& lane : lanes) {
     if (lanes.size() > 1 && check_finite(lane.sim)) continue;
-    const auto move = [&] { move_held(lane.sim, *s.hold, s.grab->position); };
-    if (s.grab && lane.metrics && s.measuring)
-      measure_hand(*lane.metrics, lane.sim, move);
-    else if (s.grab)
-      move();
+    if (s.grab) move_held(lane.sim, *s.hold, s.grab->position);
     const auto begin = Steady::now();
     step(lane.sim);
     if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
@@ -621,14 +617,13 @@ void measure_frame(Session& s, bool stepped) {
     if (!lane.metrics) lane.metrics = create_metrics(lane.sim);
     while (const auto now = collect(*lane.metrics)) {
       follow_energy(s, lane, *now);
-      if (now->by_hand) continue;
       lane.volume_error.add(now->finite() ? now->volume_error_percent : 0.0, now->time);
       lane.energy.add(now->finite() ? now->energy() + now->elastic : 0.0, now->time);
       const double depth = now->penetration_max;  // NaN without obstacles
       if (!std::isnan(depth)) lane.depth.add(100 * depth, now->time);
     }
     // Half the ring of results: with more under way, asking again would wait for the oldest.
-    if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim);
+    if (stepped && lane.metrics->pending.size() < 8) measure(*lane.metrics, lane.sim, s.hold.has_value());
   }
 }
 

@@ -8,6 +8,12 @@ struct Position {
   vec3 low;
   float constraints;   // n_i, the number of constraints on this vertex
 };
+struct LedVertex {
+  vec3 high;    // of the place that it is led to
+  uint vertex;
+  vec3 low;
+  float speed;  // m/s, at most in this step
+};
 struct Velocity {
   vec3 high;
   float work;  // J that obstacles that move have done on the vertex

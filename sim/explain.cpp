@@ -20,7 +20,7 @@ Explanation explain(Sim& sim, int timed_steps) {
   add_all(sim.positions, sim.velocities, sim.predicted, sim.quantized[0], sim.quantized[1], sim.step_block,
           sim.guard_counts, sim.check.words, sim.check.read_back, sim.check.checkpoint, sim.rigid_bodies,
           sim.obstacles.records, sim.obstacles.fields, p.mesh, p.lists, p.balls, p.leaf_pairs, p.candidates, p.pairs,
-          p.sums, p.listed, p.empty, p.readback);
+          p.sums, p.listed, p.empty, p.readback, sim.faces.corners, sim.faces.sums, sim.led.records);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 

@@ -42,7 +42,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
         make_texels("fineness of quanta", fineness, "make bodies of more similar size");
     input.fine_quanta = true;
   }
-  const auto defines = vertex_defines(input);
+  const auto defines = sim.led.defines = vertex_defines(input);
   sim.obstacles = make_obstacles(*sim.model);
   sim.solver = solver_mode(settings).create(input);
   sim.solver.retune(sim, nullptr);
@@ -65,6 +65,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
                          4 * count};
   }
   if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(input);
+  sim.faces = make_faces(input);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", std::vector<GLuint>(4 + DROPS), GL_DYNAMIC_COPY);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -170,7 +171,8 @@ bool same_constraints(const Model& model, const Settings& a, const Settings& b) 
 
 void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
   const KeepBindings kept;
-  if (!share_kernels(*sim.model, *model)) return remake(sim, sim.settings, model);
+  if (!share_kernels(*sim.model, *model) || wide_faces(*sim.model) != wide_faces(*model))
+    return remake(sim, sim.settings, model);
   sim.model = std::move(model);
   write_step_block(sim);
 }
@@ -193,6 +195,7 @@ void forget_all(Sim& sim) {
 void start_with(Sim& sim, State state, double fall) {
   const KeepBindings kept;
   forget_readbacks(sim);
+  sim.led.vertices.clear(), sim.led.places.clear();
   start_pairs(sim, state);
   sim.solver.start(sim, state);  // may change the plan, on which the fall depends
   add_upwards(sim, state, half_substep_fall(sim.settings, sim.plan) - fall);

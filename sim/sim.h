@@ -17,6 +17,7 @@
 
 #include "sim/adaptive_substeps.h"
 #include "sim/carried.h"
+#include "sim/contact/faces.h"
 #include "sim/contact/obstacles.h"
 #include "sim/contact/pairs.h"
 #include "sim/finite_check.h"
@@ -27,6 +28,17 @@
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
+
+using VertexList = std::vector<std::uint32_t>;
+
+/// Pinned vertices and where they are to be at the end of the next step, m (led.cpp).
+struct Led {
+  VertexList vertices;
+  std::vector<glm::dvec3> places;
+  Buffer records;
+  std::vector<std::string> defines;
+  Pass pass;  ///< made when it is first needed
+};
 
 struct Sim : StepValues {
   std::shared_ptr<const Model> model;
@@ -50,6 +62,8 @@ struct Sim : StepValues {
   Buffer rigid_bodies;  ///< RigidRecord, of hard bodies, and their vertices in contact (contact/rigid.glsl)
   Pass rigid_contact;   ///< before each substep, where there are hard bodies
   Pairs pairs;          ///< contact between bodies, where there is any
+  Faces faces;          ///< that obstacles could get in between
+  Led led;
   Tuning tuning;
   double longest_substep = 0;       ///< s, the longest that is stable at rest, in mode explicit
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
@@ -140,9 +154,8 @@ const std::optional<NonFinite>& check_finite(Sim& sim, bool wait = false);
 /// Goes back to the last checkpoint before the state found, at most 64 steps earlier; false where there is none.
 bool restore_checkpoint(Sim& sim);
 
-/// Pinned vertices have infinite mass and stay where they are or are put. Any number of them costs one or two writes to
+/// Pinned vertices have infinite mass and stay where they are or are led. Any number of them costs one or two writes to
 /// the GPU, none of which waits.
-using VertexList = std::vector<std::uint32_t>;
 void pin(Sim& sim, const VertexList& vertices);
 void unpin(Sim& sim, const VertexList& vertices);
 inline void pin(Sim& sim, std::uint32_t vertex) { pin(sim, VertexList{vertex}); }
@@ -150,11 +163,17 @@ inline void unpin(Sim& sim, std::uint32_t vertex) { unpin(sim, VertexList{vertex
 bool is_pinned(const Sim& sim, std::uint32_t vertex);
 /// 1/kg, of a vertex while it is not pinned.
 double free_inverse_mass(const Sim& sim, std::size_t vertex);
-/// `positions` in metres, one for each vertex.
-void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions);
-inline void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& position) {
-  move_pinned(sim, VertexList{vertex}, {position});
+/// In the next step these go to `places`, m, with the velocity that takes, unless what they hit holds them back.
+void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& places);
+inline void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& place) {
+  move_pinned(sim, VertexList{vertex}, {place});
 }
+/// For a step: before its first substep; before each substep of a GPU mode and once its pairs are listed; and after the
+/// last, when the velocities are 0 again.
+void begin_leading(Sim& sim);
+void aim_led(Sim& sim, int substep);
+void lead(Sim& sim, int substep);
+void end_leading(Sim& sim);
 
 struct Explanation {
   struct Item {

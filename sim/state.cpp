@@ -114,14 +114,4 @@ double free_inverse_mass(const Sim& sim, std::size_t vertex) {
 
 bool is_pinned(const Sim& sim, std::uint32_t vertex) { return !(sim.inverse_masses[vertex] > 0); }
 
-void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& positions) {
-  const KeepBindings kept;
-  std::vector<Position> records;
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    records.push_back(to_gpu(sim, vertices[i], positions[i]));
-    if (on_cpu(sim)) sim.host.positions[vertices[i]] = positions[i];
-  }
-  write_vertices<Position>(sim, sim.positions, 0, vertices, records);
-}
-
 }  // namespace tetpbd

@@ -103,17 +103,24 @@ void step(Sim& sim) {
   sim.solver.prepare(sim);  // readbacks, number of substeps, preconditioner
   const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
   if (on_cpu(sim)) {
+    begin_leading(sim);
     sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
+    end_leading(sim);
     upload(sim, sim.host);
   } else {
     begin_on_gpu(sim, moving);
+    begin_leading(sim);
     for (int k = 0; k < sim.plan.substeps; ++k) {
       if (moving) bind_next_obstacles(sim);
       move_rigid_bodies(sim);
+      aim_led(sim, k);
       list_pairs(sim, k);
+      lead(sim, k);
       sim.solver.substep(sim, k);
+      move_faces_out(sim);
       resolve_body_contacts(sim);
     }
+    end_leading(sim);
     // Vertex fetches and copies read the state next.
     sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     if (sim.timed) sim.timer.end();

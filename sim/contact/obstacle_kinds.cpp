@@ -55,6 +55,7 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .needs = {"half"},
        .reads = {"centre", "rotation"},
        .half = [](const Obstacle& o) { return o.half; },
+       .edged = true,
        .picture =
            [](const Obstacle& o) {
              const float round = rounding_radius(o.half);
@@ -66,6 +67,7 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .reads = {"centre", "rotation"},
        .half = [](const Obstacle& o) { return glm::dvec3(o.radius, o.half_length, o.radius); },
        .reach = [](const Obstacle& o) { return glm::length(glm::dvec2(o.half_length, o.radius)); },
+       .edged = true,
        .picture =
            [](const Obstacle& o) {
              const float round = rounding_radius({o.radius, o.half_length, o.radius});
@@ -78,6 +80,7 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .half = [](const Obstacle& o) { return o.half; },
        .reach = [](const Obstacle&) { return std::numeric_limits<double>::infinity(); },  // it has no bottom
        .convex = false,
+       .edged = true,
        .picture = height_triangles},
       {.name = "mesh",
        .distance = &Rules::mesh_surface,
@@ -86,6 +89,7 @@ const std::vector<ObstacleKind>& obstacle_kinds() {
        .half = mesh_half,
        .reach = field_reach,
        .convex = false,
+       .edged = true,
        .picture = mesh_triangles},
       // The next row goes here.
   };

@@ -26,6 +26,7 @@ struct ObstacleKind {
   double (*reach)(const Obstacle&) = nullptr;
   bool convex = true;  ///< lies behind the plane that its distance and normal at any point outside give
   bool flat = false;   ///< is the half space behind that plane
+  bool edged = false;  ///< may have sharp edges
   /// Its triangles for pictures; nullptr: found from the distance.
   std::vector<ObstacleCorner> (*picture)(const Obstacle&) = nullptr;
 

@@ -319,15 +319,15 @@ void OffsetContact::truncate(Substep& substep) {
                    Formulas<double>{}.allowed_part(pair.near, pair.offset, sides, side_of(pair.edges, k), own(k)));
   }
   for (const std::uint32_t i : surfaces_.vertices) {
-    if (!(weights[i] > 0)) continue;
     const glm::dvec3 way = x[i] - start_[i];
+    if (!(weights[i] > 0) && way == glm::dvec3(0)) continue;
     // What is not listed is at least half of both margins apart.
     const double away = glm::distance(start_[i] + part[i] * way, listed_[i]), most = limit_part * margins_[i];
     if (away > most)
       part[i] *= std::clamp((most - glm::distance(start_[i], listed_[i])) / (part[i] * glm::length(way)), 0.0, 1.0);
     if (part[i] == 1) continue;
     ++counts_.truncated;
-    counts_.truncated_momentum += (part[i] - 1) * v[i] / weights[i];
+    if (weights[i] > 0) counts_.truncated_momentum += (part[i] - 1) * v[i] / weights[i];
     x[i] = start_[i] + part[i] * way, v[i] *= part[i];
   }
 }

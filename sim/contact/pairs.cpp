@@ -173,11 +173,13 @@ void make_passes(Pairs& p, const SolverInput& input) {
 }
 
 // Substeps between detections, so that meanwhile surfaces come nearer by a part of an edge: with much less detections
-// take the time, with much more there are many pairs that never touch.
+// take the time, with much more there are many pairs that never touch, which costs little as long as they are few.
 int detection_interval(const Sim& sim) {
   const Pairs& p = sim.pairs;
+  constexpr std::uint64_t few = 16384;  // pairs
   const double gained = std::abs(sim.settings.gravity) * double(2 * Pairs::readback_interval) * sim.settings.dt;
-  const double usual = 0.2 * p.edge / (p.usual + gained), most = 0.4 * most_limit * p.edge / (p.fastest + gained);
+  const double part = p.listed_pairs < few ? 0.4 : 0.2, usual = part * p.edge / (p.usual + gained),
+               most = 0.4 * most_limit * p.edge / (p.fastest + gained);
   return int(std::clamp(std::min(usual, most) / sim.plan.h, 1.0, double(sim.plan.substeps)));
 }
 

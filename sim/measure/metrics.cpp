@@ -156,7 +156,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made, const s
   return m;
 }
 
-void measure(Metrics& m, const Sim& sim) {
+void measure(Metrics& m, const Sim& sim, bool by_hand) {
   const KeepBindings kept;
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
@@ -201,18 +201,11 @@ void measure(Metrics& m, const Sim& sim) {
   }
   m.pending.push_back({Fence::here(),
                        slot,
-                       {.step = sim.steps, .time = simulated_time(sim)},
+                       {.step = sim.steps, .time = simulated_time(sim), .by_hand = by_hand},
                        sim.settings.ground ? sim.settings.ground_height : 0.0,
                        sim.settings.gravity,
                        midway,
                        has_obstacles(*sim.model, sim.settings)});
-}
-
-void measure_hand(Metrics& m, const Sim& sim, const std::function<void()>& change) {
-  measure(m, sim);
-  change();
-  measure(m, sim);
-  m.pending.back().result.by_hand = true;
 }
 
 std::optional<Measurement> collect(Metrics& m, bool wait) {

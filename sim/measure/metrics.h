@@ -3,7 +3,6 @@
 
 #include <array>
 #include <deque>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -38,7 +37,7 @@ struct Measurement {
   double total = 0;
   double stored = 0;           ///< J, the elastic part of the total
   double work = 0;             ///< J that obstacles that move have done since the start
-  bool by_hand = false;        ///< what the total changed by since the measurement before is work of a hand
+  bool by_hand = false;        ///< what the total changed by since the measurement before counts as work of a hand
   double contacts = 0;         ///< pairs of a vertex and an obstacle, or the ground, that it touches
   double penetration_max = 0;  ///< depth of the deepest vertex over the body's size; NaN without obstacles
   double penetration_999 = 0;  ///< depth below which 99.9 % of the vertices stay, likewise
@@ -79,10 +78,9 @@ struct Metrics {
 /// model's.
 Metrics create_metrics(const Model& model, const ConstraintSystem& made = {}, const std::vector<double>& masses = {});
 inline Metrics create_metrics(const Sim& sim) { return create_metrics(*sim.model, sim.system, sim.masses); }
-/// Queues a measurement of the current state. Waits only if the ring of results is full.
-void measure(Metrics& metrics, const Sim& sim);
-/// Changes a state from outside, as a hand does that moves vertices, between two measurements: the difference is work.
-void measure_hand(Metrics& metrics, const Sim& sim, const std::function<void()>& change);
+/// Queues a measurement of the current state. Waits only if the ring of results is full. `by_hand`: since the one
+/// before, somebody has led vertices.
+void measure(Metrics& metrics, const Sim& sim, bool by_hand = false);
 /// The oldest measurement that is ready; with `wait`, the oldest of all.
 std::optional<Measurement> collect(Metrics& metrics, bool wait = false);
 
@@ -97,7 +95,7 @@ struct RunErrors {
   double linear_drift = std::numeric_limits<double>::quiet_NaN();
   double angular_drift = std::numeric_limits<double>::quiet_NaN();
   double start_energy = 0, max_energy = 0;          ///< J
-  double penetration_max = 0, penetration_999 = 0;  ///< the largest of all measurements
+  double penetration_max = 0, penetration_999 = 0;  ///< the largest of all measurements, the first of wide faces too
   EnergyLedger ledger;
   std::optional<Overlap> overlap;          ///< the largest of each, where bodies touch
   std::optional<long> crossed;             ///< the step at whose end surfaces cut each other, where that ends a run

@@ -53,6 +53,7 @@ struct Formulas {
 #include "shaders/contact/solid.glsl"
 #include "obstacle_formulas.inc"  // CMake's: every file of shaders/contact/obstacles
 #include "shaders/contact/find_contact.glsl"
+#include "shaders/contact/deepest.glsl"
 #define SHARED_TOUCHES  // of a work-group in GLSL, of the caller in C++
 #define TOUCHES Touch *contacts,
 #include "shaders/contact/impulses.glsl"

@@ -44,6 +44,7 @@ class FastPbd {
   FastPbd(const SolverInput& input)
       : model_(&input.model),
         pairs_(input.model),
+        faces_(wide_faces(input.model)),
         rigid_(input.model, input.system.lists[std::size_t(index_of<Stretch>)]) {
     std::size_t all = 0;
     for_each_kind([&](auto is, int kind) {
@@ -64,7 +65,7 @@ class FastPbd {
     threads_ = input.tuning.threads ? input.tuning.threads : std::clamp<std::size_t>(useful, 1, cores);
   }
 
-  void change_model(const Model& model) { model_ = &model, pairs_.change_model(model); }
+  void change_model(const Model& model) { model_ = &model, pairs_.change_model(model), faces_ = wide_faces(model); }
 
   /// Takes the step of CpuPbd::step, with constraints in another order.
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, double time) {
@@ -137,10 +138,11 @@ class FastPbd {
         if (s == 0) pairs_.begin_step();
         pairs_.begin(step.settings, step.state.positions, v);  // of the step's start, then of the last resolve()
       }
-      for_each_free_vertex([&](std::size_t i) {
-        predicted_[i] = rigid_.predict(substep, i, x[i].position(), v[i]);
+      for (std::size_t i = begin; i < end; ++i) {
+        const bool free = step.inverse_masses[i] > 0;
+        predicted_[i] = free ? rigid_.predict(substep, i, x[i].position(), v[i]) : x[i].position() + substep.h * v[i];
         x[i].move_to(predicted_[i]);
-      });
+      }
       for (int iteration = 0; iteration < step.plan.iterations; ++iteration) {
         solve(step, thread, iteration == 0, counts);
         for_each_free_vertex([&](std::size_t i) {
@@ -150,10 +152,12 @@ class FastPbd {
       }
       for_each_free_vertex(
           [&](std::size_t i) { v[i] = rigid_.velocity_after(substep, i, x[i].position(), predicted_[i], v[i]); });
-      if (bodies_touch(*model_, step.settings)) {
+      if (bodies_touch(*model_, step.settings) || !faces_.empty()) {
         barrier.wait(thread);
         if (thread == 0) {
           write_positions(step.state);
+          move_faces_out(*model_, faces_, substep.obstacles, substep.h, step.state.positions, v, step.inverse_masses,
+                         done);
           pairs_.resolve(step.settings, step.state.positions, v, step.inverse_masses, substep.h,
                          substep.h / OffsetContact::recovery);
           read_positions(step.state);
@@ -185,6 +189,7 @@ class FastPbd {
 
   const Model* model_;
   OffsetContact pairs_;
+  std::vector<Triangle> faces_;
   RigidContact rigid_;
   batches::Work work_;
   std::vector<Colour> colours_;

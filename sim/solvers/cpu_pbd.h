@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "sim/contact/faces.h"
 #include "sim/contact/offset_contact.h"
 #include "sim/contact/rigid_contact.h"
 #include "sim/model/constraints.h"
@@ -102,6 +103,7 @@ class CpuPbd {
   CpuPbd(const Model& model, const ConstraintSystem& system)
       : model_(&model),
         pairs_(model),
+        faces_(wide_faces(model)),
         rigid_(model, system.lists[std::size_t(index_of<Stretch>)]),
         at_vertex_(system.at_vertex) {
     for_each_kind([&](auto kind, int k) {
@@ -119,7 +121,7 @@ class CpuPbd {
   }
 
   /// Goes on with a model that differs in its obstacles alone.
-  void change_model(const Model& model) { model_ = &model, pairs_.change_model(model); }
+  void change_model(const Model& model) { model_ = &model, pairs_.change_model(model), faces_ = wide_faces(model); }
 
   /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26).
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep,
@@ -146,7 +148,7 @@ class CpuPbd {
       pairs_.begin(settings, x, v);
       rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards);
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) x[i] = rigid_.predict(substep, i, x[i], v[i]);
+        x[i] = inverse_masses[i] > 0 ? rigid_.predict(substep, i, x[i], v[i]) : x[i] + substep.h * v[i];
       predicted = x;
       for (int iteration = 0; iteration < plan.iterations; ++iteration) {
         if (jacobi) sums.assign(x.size(), glm::dvec3(0));
@@ -172,6 +174,7 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
+      move_faces_out(*model_, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
       pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery);
     }
     return guards;
@@ -198,6 +201,7 @@ class CpuPbd {
 
   const Model* model_;
   OffsetContact pairs_;
+  std::vector<Triangle> faces_;
   RigidContact rigid_;
   std::vector<std::uint32_t> at_vertex_;
   OfEachKind<Items> items_;

@@ -64,12 +64,9 @@ EnergyLedger ledger_after(const Setup& setup, int steps, const std::function<voi
   };
   measure(metrics, sim), take();
   for (int s = 0; s < steps; ++s) {
-    if (before && by_hand)
-      measure_hand(metrics, sim, [&] { before(sim, s); }), take();
-    else if (before)
-      before(sim, s);
+    if (before) before(sim, s);
     step(sim);
-    measure(metrics, sim), take();
+    measure(metrics, sim, by_hand), take();
   }
   REQUIRE_FALSE(check_finite(sim, true));
   return ledger;

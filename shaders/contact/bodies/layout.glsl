@@ -46,7 +46,7 @@ struct SurfacePair {
   float push;          // push_apart()
   float _0, _1, _2;
 };
-// What pairs do to a vertex in a substep, in SUM_PARTS of a quantum. It moves when none has yet to see where it was.
+// What pairs do to a vertex in a substep, summed by contact/sums.glsl. It moves when none has yet to see where it was.
 struct PairSums {
   int stopped[3];  // changes its velocity as well
   int pushed[3];
@@ -56,6 +56,5 @@ struct PairSums {
   uint pairs;      // that have it
   uint left;       // of these, in this substep
 };
-#define SUM_PARTS 64.0
 #define PAIRED 0x80000000u  // of a vertex's limit: it has pairs
 #endif

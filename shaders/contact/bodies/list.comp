@@ -34,7 +34,7 @@ bool make_pair(uvec2 candidate, out SurfacePair pair) {
     if (i < own) limits.x = max(limits.x, limit_at(vertex));
     else limits.y = max(limits.y, limit_at(vertex));
     ways[i] = params.h * velocities[vertex].high;
-    free = free || s.weights[i] > 0.0;
+    free = free || s.weights[i] > 0.0 || ways[i] != vec3(0.0);  // one that is pinned may be led
     for (int j = own; j < 4; ++j)
       if (same_body && i < own && vertex == pair.vertices[j]) return false;
   }

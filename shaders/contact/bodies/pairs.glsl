@@ -4,6 +4,7 @@ layout(std430) restrict buffer Pairs { SurfacePair pairs[]; };
 layout(std430) restrict buffer PairSumsByVertex { PairSums pair_sums[]; };
 #include "contact/bodies/way.glsl"
 #include "contact/bodies/proximity.glsl"
+#include "contact/sums.glsl"
 
 // A pair's vertices where the substep began, from the first; their ways in it, m; their inverse masses, 1/kg.
 struct PairState {
@@ -37,8 +38,3 @@ uint packed_shares(Proximity t) {
   return shares;
 }
 uint share_of(uint shares, int k) { return (shares >> (8 * k)) & 255u; }
-// Of sums of pairs, from m.
-ivec3 to_quanta(vec3 change) {
-  float most = 0.2 * params.body_size;
-  return ivec3(round(clamp(change, -most, most) * (params.inverse_quantum * SUM_PARTS)));
-}

@@ -5,15 +5,10 @@
 #include "double_single.glsl"
 layout(local_size_x = PAIR_GROUP) in;
 #include "contact/bodies/pairs.glsl"
-#if !IMPLICIT
-#include "quantize.glsl"
-#include "seen.glsl"
-layout(std430) restrict writeonly buffer QuantizedOut { ivec4 quantized_out[]; };
-#endif
+#include "contact/moved.glsl"
 layout(binding = UNIT_LISTED) uniform samplerBuffer listed_places;
 uniform uint side;
 shared uint moving[4u * PAIR_GROUP], moving_count;
-vec3 in_metres(int x, int y, int z) { return vec3(x, y, z) * (params.quantum / SUM_PARTS); }
 vec3 stopped_by(uint i) {
   return in_metres(pair_sums[i].stopped[0], pair_sums[i].stopped[1], pair_sums[i].stopped[2]);
 }
@@ -69,8 +64,9 @@ void move(uint i) {
   atomicExchange(pair_sums[i].asked[side], 0u);
   atomicExchange(pair_sums[i].left, pair_sums[i].pairs);
   Position own = positions[i];
-  if (!(own.inverse_mass > 0.0)) return;
   Velocity speed = velocities[i];
+  bool is_free = own.inverse_mass > 0.0;
+  if (!is_free && speed.high == vec3(0.0)) return;  // not even led
   DoubleSingle x = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low);
   vec3 moved = MOVED_BY(stopped, pushed), way = way_of(i) + moved;
   vec4 listed = texelFetch(listed_places, int(i));
@@ -80,21 +76,14 @@ void move(uint i) {
   v = add_double(v, (stopped + turned) * params.inverse_h);
   x = add_double(x, moved + (part - 1.0) * way);
   if (part < 1.0) {
-    note_truncated(1.0 / own.inverse_mass, (1.0 - part) * v.high);
+    note_truncated(is_free ? 1.0 / own.inverse_mass : 0.0, (1.0 - part) * v.high);
     v = DoubleSingle(part * v.high, part * v.low);
   }
-  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
+  write_moved(i, own, x, v, speed.work);
 #if IMPLICIT
   // BDF2 goes on from what the substep did to the vertex: impulses are part of that.
   vectors[GAIN * VERTICES + i].xyz += (stopped + turned) * params.inverse_h;
   vectors[DISPLACEMENT * VERTICES + i].xyz += stopped;
-#else
-  begin_body(i);
-#if COMPLIANT
-  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(x, v), 0.0);
-#endif
-  quantized_out[i] = quantize(seen_by_neighbours(x, v), weight_of(own));
 #endif
 }
 void act(uint p) {

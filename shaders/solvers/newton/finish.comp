@@ -57,7 +57,7 @@ void main() {
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low);
   vec4 offset = at(OFFSET, i);
-  vec3 u = vec3(0.0), v = vec3(0.0), before = velocities[i].high + velocities[i].low;
+  vec3 u = vec3(0.0), before = velocities[i].high + velocities[i].low, v = before;
   vec3 displacement = vec3(0.0), gain = vec3(0.0), friction = vec3(0.0);
   uint touched = 0u;
   bool slips = false;
@@ -116,7 +116,8 @@ void main() {
 #if RIGID_START
   note_fast(i, x, v);
 #endif
-  put(OFFSET, i, u, offset.w);  // contact of bodies asks for the way
+  // Contact of bodies asks for the way, of a pinned one where it was led.
+  put(OFFSET, i, own.inverse_mass > 0.0 ? u : params.h * v, offset.w);
   put(DISPLACEMENT, i, displacement, uintBitsToFloat(touched | KNOWN));
   put(GAIN, i, gain, push);
   put(LEFT, i, friction, slips ? 1.0 : 0.0);

@@ -1,0 +1,17 @@
+// Writes a vertex that contact moved after the solver did, and what neighbours see of it.
+#if !IMPLICIT
+#include "quantize.glsl"
+#include "seen.glsl"
+layout(std430) restrict writeonly buffer QuantizedOut { ivec4 quantized_out[]; };
+#endif
+void write_moved(uint i, Position own, DoubleSingle x, DoubleSingle v, float work) {
+  positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
+  velocities[i] = Velocity(v.high, work, v.low, 0.0);
+#if !IMPLICIT
+  begin_body(i);
+#if COMPLIANT
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(x, v), 0.0);
+#endif
+  quantized_out[i] = quantize(own.inverse_mass > 0.0 ? seen_by_neighbours(x, v) : x, weight_of(own));
+#endif
+}

@@ -6,6 +6,7 @@
 #include "sim/gl/keep_bindings.h"
 #include "sim/model/material.h"
 #include "sim/sim.h"
+#include "sim/solvers/substep.h"
 
 namespace tetpbd {
 
@@ -117,7 +118,7 @@ void step(Sim& sim) {
       list_pairs(sim, k);
       lead(sim, k);
       sim.solver.substep(sim, k);
-      move_faces_out(sim);
+      if (are_faces_due(sim.plan, k)) move_faces_out(sim);
       resolve_body_contacts(sim);
     }
     end_leading(sim);

@@ -52,9 +52,10 @@ void add(Face f, vec3 at, vec3 placed, vec3 sped, uint solid) {
     atomicMax(face_sums[i].solid, solid + 1u);
   }
 }
-void meet(Face f, int k) {
+void meet(Face f, int k, vec3 centre, float radius) {
   vec3 arm = arm_from_solid(k, f.first);
   Solid s = solid_at(k);
+  if (surface_of(s, into_solid(k, arm + centre)).distance * s.trust > radius) return;
   Deepest d = deepest_point(s, into_solid(k, arm + f.places[0]), into_solid(k, arm + f.places[1]),
                             into_solid(k, arm + f.places[2]));
   float largest = max(d.weights.x, max(d.weights.y, d.weights.z));
@@ -102,7 +103,7 @@ void act(uint number) {
   float radius = length(centre);
   for (int k = 1; k < 3; ++k) radius = max(radius, distance(centre, f.places[k]));
   for (uint left = near_solids(add_double(f.first, centre), 0.5 * radius); left != 0u; left &= left - 1u)
-    meet(f, findLSB(left));
+    meet(f, findLSB(left), centre, radius);
   memoryBarrierBuffer();
   for (int k = 0; k < 3; ++k)
     if (atomicAdd(face_sums[f.corners[k]].left, 0xffffffffu) == 1u)

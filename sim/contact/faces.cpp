@@ -12,15 +12,16 @@ namespace {
 
 constexpr unsigned group = 64;  // invocations
 
-double longest_edge(const Model& model, const Body& body) {
-  double longest = 0;
+// m, of a body's triangles at rest.
+double mean_edge(const Model& model, const Body& body) {
+  double sum = 0;
   const auto& x = model.rest.positions;
   for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t)
     for (std::size_t c = 0; c < 3; ++c) {
       const Triangle& corners = model.rest.surface[t];
-      longest = std::max(longest, glm::distance(x[corners[c]], x[corners[(c + 1) % 3]]));
+      sum += glm::distance(x[corners[c]], x[corners[(c + 1) % 3]]);
     }
-  return longest;
+  return sum / double(std::max<std::size_t>(3 * body.triangles, 1));
 }
 
 // An obstacle's distance at the deepest point of a face, of which no corner is.
@@ -33,6 +34,7 @@ std::optional<Met> meet(const MovingObstacle& o, const std::array<glm::dvec3, 3>
   double radius = 0;
   for (const glm::dvec3& p : corners) radius = std::max(radius, glm::distance(p, centre));
   if (o.is_plane || glm::distance(centre, o.pose.centre) > o.reach + radius) return std::nullopt;
+  if (o.surface_at(centre).distance * o.solid.trust > radius) return std::nullopt;
   std::array<glm::dvec3, 3> p;
   for (std::size_t k = 0; k < 3; ++k) p[k] = glm::transpose(o.pose.axes) * (corners[k] - o.pose.centre);
   const auto d = Formulas<double>{o.texels, o.kind->distance}.deepest_point(o.solid, p[0], p[1], p[2]);
@@ -46,7 +48,7 @@ std::vector<Triangle> wide_faces(const Model& model) {
   std::vector<Triangle> wide;
   if (model.obstacles.empty()) return wide;
   for (const Body& body : model.bodies) {
-    const double edge = longest_edge(model, body);
+    const double edge = mean_edge(model, body);
     const auto gets_between = [&](const Obstacle& o) {
       if (o.kind->flat || !o.kind->half) return false;
       const glm::dvec3 half = o.kind->half(o);

@@ -25,7 +25,7 @@ namespace {
 constexpr double least_limit = 0.075, most_limit = 1.5;  // edges, that a vertex may go between detections
 constexpr const char *pairs_label = "pairs of surfaces", *candidates_label = "candidates for pairs",
                      *leaf_pairs_label = "pairs of leaves";
-constexpr std::size_t group = 64, find_group = 256;  // invocations
+constexpr std::size_t group = 64, find_group = 256, pair_group = 32;  // invocations
 
 void give_pairs(Sim& sim) {
   const Pairs& p = sim.pairs;
@@ -150,7 +150,7 @@ void make_passes(Pairs& p, const SolverInput& input) {
   defines.insert(defines.end(), p.defines.begin(), p.defines.end());
   const double mass = std::accumulate(input.model.masses.begin(), input.model.masses.end(), 0.0);
   defines.insert(defines.end(), {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
-                                 fmt::format("PAIR_GROUP {}u", group), fmt::format("GROUP_SIZE {}u", group),
+                                 fmt::format("PAIR_GROUP {}u", pair_group), fmt::format("GROUP_SIZE {}u", group),
                                  fmt::format("FIND_GROUP {}u", find_group), fmt::format("TOTAL_MASS {:.9g}", mass),
                                  fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
   const auto kernel = [&](const char* name, bool before_substep = true) {
@@ -176,7 +176,7 @@ void make_passes(Pairs& p, const SolverInput& input) {
 // take the time, with much more there are many pairs that never touch, which costs little as long as they are few.
 int detection_interval(const Sim& sim) {
   const Pairs& p = sim.pairs;
-  constexpr std::uint64_t few = 16384;  // pairs
+  constexpr std::uint64_t few = 65536;  // pairs
   const double gained = std::abs(sim.settings.gravity) * double(2 * Pairs::readback_interval) * sim.settings.dt;
   const double part = p.listed_pairs < few ? 0.4 : 0.2, usual = part * p.edge / (p.usual + gained),
                most = 0.4 * most_limit * p.edge / (p.fastest + gained);

@@ -152,12 +152,14 @@ class FastPbd {
       }
       for_each_free_vertex(
           [&](std::size_t i) { v[i] = rigid_.velocity_after(substep, i, x[i].position(), predicted_[i], v[i]); });
-      if (bodies_touch(*model_, step.settings) || !faces_.empty()) {
+      const bool faces = !faces_.empty() && are_faces_due(step.plan, s);
+      if (bodies_touch(*model_, step.settings) || faces) {
         barrier.wait(thread);
         if (thread == 0) {
           write_positions(step.state);
-          move_faces_out(*model_, faces_, substep.obstacles, substep.h, step.state.positions, v, step.inverse_masses,
-                         done);
+          if (faces)
+            move_faces_out(*model_, faces_, substep.obstacles, substep.h, step.state.positions, v, step.inverse_masses,
+                           done);
           pairs_.resolve(step.settings, step.state.positions, v, step.inverse_masses, substep.h,
                          substep.h / OffsetContact::recovery);
           read_positions(step.state);

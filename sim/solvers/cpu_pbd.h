@@ -174,7 +174,8 @@ class CpuPbd {
       }
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
-      move_faces_out(*model_, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
+      if (are_faces_due(plan, s))
+        move_faces_out(*model_, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
       pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery);
     }
     return guards;

@@ -2,13 +2,12 @@
 // candidate.
 #include "types.glsl"
 #include "double_single.glsl"
-layout(local_size_x = PAIR_GROUP) in;
+layout(local_size_x = GROUP_SIZE) in;
 #include "contact/bodies/pairs.glsl"
 #include "contact/bodies/belonging.glsl"
 #include "contact/bodies/listed.glsl"
 layout(std430) restrict readonly buffer Candidates { uvec2 candidates[]; };
 #include "contact/bodies/reach.glsl"
-#define SPARE 0.2  // of what both may go, for those that begin to approach before the next detection
 shared uint found, first_found;
 // m, between the two parts of a pair at rest or at the start.
 float given_distance(uvec4 vertices, bool of_edges, uint from) {
@@ -54,7 +53,7 @@ bool make_pair(uvec2 candidate, out SurfacePair pair) {
 void join(SurfacePair pair) {
   for (int k = 0; k < 4; ++k) {
     uint i = pair.vertices[k];
-    atomicOr(listed[4u * i + 3u], PAIRED);
+    if ((listed[4u * i + 3u] & PAIRED) == 0u) atomicOr(listed[4u * i + 3u], PAIRED);
     atomicAdd(pair_sums[i].pairs, 1u);
     atomicAdd(pair_sums[i].left, 1u);
     if (pair.shares != 0u) atomicAdd(pair_sums[i].asked[0], share_of(pair.shares, k));
@@ -63,7 +62,7 @@ void join(SurfacePair pair) {
 void main() {
   if (lane() == 0u) found = 0u;
   barrier();
-  uint at = group_index() * PAIR_GROUP + lane(), slot = 0u;
+  uint at = group_index() * GROUP_SIZE + lane(), slot = 0u;
   SurfacePair pair;
   bool is_pair = at < min(counts.candidates, uint(candidates.length())) && make_pair(candidates[at], pair);
   if (is_pair) slot = atomicAdd(found, 1u);

@@ -10,6 +10,7 @@ float way_until_then(float speed) {
 float limit_of(float speed) { return min(way_until_then(speed), most_limit); }
 // m, nearer than which parts must be a pair, as they could cross.
 float way_of_both(float way, float other_way) { return 1.02 * (way + other_way); }
+#define SPARE 0.2  // of what both may go, for those that begin to approach before the next detection
 // m/s, that parts of two leaves approach each other by at most.
 float approach_between(uint a, uint b) {
   vec4 one = leaf_velocities[a], other = leaf_velocities[b];

@@ -25,7 +25,7 @@ constexpr double edges_a_step = 0.25;
 // is held somewhere (a clamped end, another pin), and pulling on would only draw out a spike of flat tets.
 constexpr double edges_at_most = 2.5;
 
-// So many edges ahead of the vertex it waits for one that something holds back; a read-back is some steps old.
+// It stays within this many edges of a vertex that something holds back; a read-back is some steps old.
 constexpr double edges_ahead = 4;
 
 // Takes in the watched positions that have come back, and asks for the next.
@@ -152,7 +152,7 @@ void aim(Grab& grab, const Sim& sim, const Camera& camera, const Ray& cursor) {
   // At the depth of the hit, and as far beside the cursor as the vertex was: catching it moves nothing.
   const double reach = glm::dot(grab.hit - origin, forward) / glm::dot(along, forward);
   grab.target = origin + along * reach + grab.start - grab.hit;
-  // A pinned vertex has infinite mass and no contact, so it is kept out of obstacles here.
+  // A pinned vertex has no contact with obstacles, so it is kept out of them here.
   grab.target = out_of_obstacles(*sim.model, sim.settings, simulated_time(sim), grab.target);
 }
 
@@ -162,9 +162,10 @@ void lead(Grab& grab) {
   const double pace = std::clamp((limit - apart(grab)) / limit, -1.0, 1.0);
   const glm::dvec3 way = (pace < 0 ? grab.neighbours + grab.resting : grab.target) - grab.position;
   const double distance = glm::length(way), most = edges_a_step * grab.edge * std::abs(pace);
-  const glm::dvec3 next = grab.position + (distance > most ? way * (most / distance) : way);
-  const double ahead = glm::distance(next, grab.seen);
-  if (ahead < std::max(edges_ahead * grab.edge, glm::distance(grab.position, grab.seen))) grab.position = next;
+  grab.position += distance > most ? way * (most / distance) : way;
+  const glm::dvec3 ahead = grab.position - grab.seen;
+  const double too_far = glm::length(ahead) / (edges_ahead * grab.edge);
+  if (too_far > 1) grab.position = grab.seen + ahead / too_far;
 }
 
 }  // namespace tetpbd

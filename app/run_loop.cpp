@@ -75,10 +75,21 @@ Crossings current_crossings(const Sim& sim) {
   return find_crossings(*sim.model, read_state(sim).positions, sim.settings.contact == "self");
 }
 
-// Of faces that obstacles could get in between, over the size.
+// Of faces that obstacles could get in between, over their body's size.
 double depth_of_faces(const Sim& sim, const std::vector<Triangle>& faces) {
-  const auto obstacles = obstacles_at(*sim.model, sim.settings, simulated_time(sim));
-  return deepest_face(faces, obstacles, read_state(sim).positions) / sim.model->size;
+  const Model& model = *sim.model;
+  const auto obstacles = obstacles_at(model, sim.settings, simulated_time(sim));
+  const State state = read_state(sim);
+  double deepest = 0;
+  for (const Body& body : model.bodies) {
+    std::vector<Triangle> own;
+    std::ranges::copy_if(faces, std::back_inserter(own), [&](const Triangle& face) {
+      return face[0] >= body.first_vertex && face[0] < body.first_vertex + body.vertices;
+    });
+    const double size = body_bounds(body, model.rest.positions).size();
+    deepest = std::max(deepest, deepest_face(own, obstacles, state.positions) / size);
+  }
+  return deepest;
 }
 
 // Whether more pairs of triangles cut each other than at the start, which goes into the errors.

@@ -2,7 +2,7 @@
 // touch others as anything else that moves does.
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <map>
 
 #include "sim/gl/keep_bindings.h"
 #include "sim/sim.h"
@@ -44,21 +44,17 @@ void write_records(Led& led) {
 
 void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dvec3>& places) {
   Led& led = sim.led;
-  for (std::size_t k = 0; k < vertices.size(); ++k) {
-    const auto known = std::ranges::find(led.vertices, vertices[k]);
-    if (known != led.vertices.end())
-      led.places[std::size_t(known - led.vertices.begin())] = places[k];
-    else
-      led.vertices.push_back(vertices[k]), led.places.push_back(places[k]);
-  }
+  led.vertices.insert(led.vertices.end(), vertices.begin(), vertices.end());
+  led.places.insert(led.places.end(), places.begin(), places.end());
 }
 
 void begin_leading(Sim& sim) {
   Led& led = sim.led;
-  for (std::size_t k = led.vertices.size(); k-- > 0;)
-    if (!is_pinned(sim, led.vertices[k]))  // let go of since
-      led.vertices.erase(led.vertices.begin() + std::ptrdiff_t(k)),
-          led.places.erase(led.places.begin() + std::ptrdiff_t(k));
+  std::map<std::uint32_t, glm::dvec3> last;
+  for (std::size_t k = 0; k < led.vertices.size(); ++k)
+    if (is_pinned(sim, led.vertices[k])) last[led.vertices[k]] = led.places[k];  // others were let go of since
+  led.vertices.clear(), led.places.clear();
+  for (const auto& [vertex, place] : last) led.vertices.push_back(vertex), led.places.push_back(place);
   if (led.vertices.empty()) return;
   if (on_cpu(sim)) {
     for (std::size_t k = 0; k < led.vertices.size(); ++k)

@@ -103,6 +103,7 @@ void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Mode
   fresh.origin = settings.dt == sim.settings.dt ? sim.origin : TimeOrigin{sim.steps, simulated_time(sim)};
   fresh.timed = sim.timed;
   start_with(fresh, std::move(state), half_substep_fall(sim.settings, sim.plan));
+  fresh.led.vertices = sim.led.vertices, fresh.led.places = sim.led.places;
   sim = std::move(fresh);
 }
 

@@ -22,6 +22,7 @@ void restore_all(Sim& sim, const Snapshot& then, const Buffer& from) {
     std::copy_n(byte, values.size(), values.data()), byte += values.size();
   static_cast<StepValues&>(sim) = then.step;
   sim.plan = then.plan;
+  sim.led.vertices.clear(), sim.led.places.clear();
   sim.solver.refresh(sim);
   write_step_block(sim);
   if (then.host) sim.host = *then.host, upload(sim, *then.host);

@@ -9,6 +9,26 @@ layout(local_size_x = FACE_GROUP) in;
 #include "contact/deepest.glsl"
 #include "contact/sums.glsl"
 #include "contact/moved.glsl"
+#if CONTACTS
+#include "contact/bodies/layout.glsl"
+layout(binding = UNIT_LISTED) uniform samplerBuffer listed_places;
+layout(std430) restrict buffer PairSumsByVertex { PairSums pair_sums[]; };
+// What moves in place alone must not go past other surfaces unseen: where a vertex has pairs they see to it, else it
+// stays within its limit.
+vec3 seen_by_pairs(uint i, DoubleSingle x, vec3 placed, vec3 sped) {
+  if ((phases & PHASE_NEAR) == 0u) return placed;
+  vec4 listed = texelFetch(listed_places, int(i));
+  vec3 away = x.high - listed.xyz;
+  if (floatBitsToInt(listed.w) > 0)
+    return length(away + placed) <= listed.w ? placed
+           : placed * clamp((listed.w - length(away)) / length(placed), 0.0, 1.0);
+  ivec3 pushed = to_quanta(placed - sped);
+  for (int c = 0; c < 3; ++c) pair_sums[i].pushed[c] += pushed[c];
+  return sped;
+}
+#else
+vec3 seen_by_pairs(uint i, DoubleSingle x, vec3 placed, vec3 sped) { return placed; }
+#endif
 layout(std430) restrict readonly buffer Faces { uvec4 faces[]; };
 // By vertex: places and velocities' ways, times weights; the sum of these; an obstacle, from 1; its faces, and of these
 // those that have yet to ask.
@@ -55,7 +75,11 @@ void add(Face f, vec3 at, vec3 placed, vec3 sped, uint solid) {
 void meet(Face f, int k, vec3 centre, float radius) {
   vec3 arm = arm_from_solid(k, f.first);
   Solid s = solid_at(k);
-  if (surface_of(s, into_solid(k, arm + centre)).distance * s.trust > radius) return;
+  Surface middle = surface_of(s, into_solid(k, arm + centre));
+  float lowest = 0.0;
+  for (int j = 0; j < 3; ++j) lowest = min(lowest, dot(middle.normal, into_solid(k, f.places[j] - centre)));
+  // A convex solid's distance rises at least as that from its plane does: what rests on one is searched no further.
+  if (s.convex != 0 ? middle.distance + lowest > -1e-3 * radius : middle.distance * s.trust > radius) return;
   Deepest d = deepest_point(s, into_solid(k, arm + f.places[0]), into_solid(k, arm + f.places[1]),
                             into_solid(k, arm + f.places[2]));
   float largest = max(d.weights.x, max(d.weights.y, d.weights.z));
@@ -84,6 +108,7 @@ void move(uint i) {
   vec3 placed = taken(i, false, weight), sped = taken(i, true, weight);
   Position own = positions[i];
   Velocity speed = velocities[i];
+  placed = seen_by_pairs(i, DoubleSingle(own.high, own.low), placed, sped);
   DoubleSingle x = add_double(DoubleSingle(own.high, own.low), placed);
   DoubleSingle v = add_double(DoubleSingle(speed.high, speed.low), sped * params.inverse_h);
 #if MOVING_SOLIDS

@@ -10,7 +10,8 @@ void write_moved(uint i, Position own, DoubleSingle x, DoubleSingle v, float wor
 #if !IMPLICIT
   begin_body(i);
 #if COMPLIANT
-  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(x, v), 0.0);
+  DoubleSingle before = own.inverse_mass > 0.0 ? place_before(x, v) : x;
+  if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(before, 0.0);
 #endif
   quantized_out[i] = quantize(own.inverse_mass > 0.0 ? seen_by_neighbours(x, v) : x, weight_of(own));
 #endif

@@ -34,7 +34,12 @@ std::optional<Met> meet(const MovingObstacle& o, const std::array<glm::dvec3, 3>
   double radius = 0;
   for (const glm::dvec3& p : corners) radius = std::max(radius, glm::distance(p, centre));
   if (o.is_plane || glm::distance(centre, o.pose.centre) > o.reach + radius) return std::nullopt;
-  if (o.surface_at(centre).distance * o.solid.trust > radius) return std::nullopt;
+  const auto middle = o.surface_at(centre);
+  double lowest = 0;
+  for (const glm::dvec3& p : corners) lowest = std::min(lowest, glm::dot(middle.normal, p - centre));
+  // A convex solid's distance rises at least as that from its plane does: what rests on one is searched no further.
+  if (o.solid.convex != 0 ? middle.distance + lowest > -1e-3 * radius : middle.distance * o.solid.trust > radius)
+    return std::nullopt;
   std::array<glm::dvec3, 3> p;
   for (std::size_t k = 0; k < 3; ++k) p[k] = glm::transpose(o.pose.axes) * (corners[k] - o.pose.centre);
   const auto d = Formulas<double>{o.texels, o.kind->distance}.deepest_point(o.solid, p[0], p[1], p[2]);
@@ -48,11 +53,13 @@ std::vector<Triangle> wide_faces(const Model& model) {
   std::vector<Triangle> wide;
   if (model.obstacles.empty()) return wide;
   for (const Body& body : model.bodies) {
-    const double edge = mean_edge(model, body);
+    double edge = 0;  // not found where nothing asks for it
     const auto gets_between = [&](const Obstacle& o) {
       if (o.kind->flat || !o.kind->half) return false;
+      if (body.thickness > 0 && o.kind->edged) return true;
+      if (edge == 0) edge = mean_edge(model, body);
       const glm::dvec3 half = o.kind->half(o);
-      return (body.thickness > 0 && o.kind->edged) || edge > 0.5 * std::min({half.x, half.y, half.z});
+      return edge > (o.kind->edged ? 0.5 : 1) * std::min({half.x, half.y, half.z});
     };
     if (!std::ranges::any_of(model.obstacles, gets_between)) continue;
     const auto first = model.rest.surface.begin() + std::ptrdiff_t(body.first_triangle);
@@ -131,7 +138,7 @@ void move_faces_out(Sim& sim) {
   Recorder& recorder = sim.recorder;
   recorder.give("Faces", sim.faces.corners), recorder.give("FaceSumsByVertex", sim.faces.sums);
   if (sim.solver.quantized_buffers > 0) recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
-  recorder.run(sim.faces.pass);
+  recorder.run(sim.faces.pass, {{"phases", sim.pairs.phases}});
   give_quantized(sim);
 }
 

@@ -173,13 +173,11 @@ void make_passes(Pairs& p, const SolverInput& input) {
 }
 
 // Substeps between detections, so that meanwhile surfaces come nearer by a part of an edge: with much less detections
-// take the time, with much more there are many pairs that never touch, which costs little as long as they are few.
+// take the time, with much more there are many pairs that never touch.
 int detection_interval(const Sim& sim) {
   const Pairs& p = sim.pairs;
-  constexpr std::uint64_t few = 65536;  // pairs
   const double gained = std::abs(sim.settings.gravity) * double(2 * Pairs::readback_interval) * sim.settings.dt;
-  const double part = p.listed_pairs < few ? 0.4 : 0.2, usual = part * p.edge / (p.usual + gained),
-               most = 0.4 * most_limit * p.edge / (p.fastest + gained);
+  const double usual = 0.2 * p.edge / (p.usual + gained), most = 0.4 * most_limit * p.edge / (p.fastest + gained);
   return int(std::clamp(std::min(usual, most) / sim.plan.h, 1.0, double(sim.plan.substeps)));
 }
 
@@ -217,7 +215,7 @@ void plan_body_contacts(Sim& sim) {
 
 void list_pairs(Sim& sim, int substep) {
   Pairs& p = sim.pairs;
-  p.phases = p && p.near ? PHASE_NEAR : 0u;
+  p.phases = p && (p.near || !sim.led.vertices.empty()) ? PHASE_NEAR : 0u;  // boxes do not know what is led
   if (!p.phases) return;
   give_pairs(sim);
   const int interval = detection_interval(sim);

@@ -34,7 +34,8 @@ void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& 
   if (!now.finite()) return;
   if (now.step < ledger.step) ledger = {};  // somebody went back in time
   ledger.step = now.step;
-  if (now.by_hand && ledger.begun) ledger.by_hand += now.total - ledger.total;
+  const double work_so_far = ledger.work - ledger.by_hand + ledger.work_before;  // of obstacles
+  if (now.by_hand && ledger.begun) ledger.by_hand += now.total - ledger.total - (now.work - work_so_far);
   ledger.total = now.total;
   if (!ledger.begun) ledger.work_before = now.work;
   ledger.work = ledger.by_hand + now.work - ledger.work_before;

@@ -138,6 +138,7 @@ class FastPbd {
         if (s == 0) pairs_.begin_step();
         pairs_.begin(step.settings, step.state.positions, v);  // of the step's start, then of the last resolve()
       }
+      if (bodies_touch(*model_, step.settings)) barrier.wait(thread);  // prediction changes velocities
       for (std::size_t i = begin; i < end; ++i) {
         const bool free = step.inverse_masses[i] > 0;
         predicted_[i] = free ? rigid_.predict(substep, i, x[i].position(), v[i]) : x[i].position() + substep.h * v[i];

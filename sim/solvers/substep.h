@@ -16,10 +16,12 @@ inline bool splits_masses(const Model& model, const Settings& settings) {
   return (settings.mass_splitting && !solver_mode(settings).published) || any_material(model, settings, compliant);
 }
 
-/// Whether faces are moved out of obstacles (faces.h) after this substep of a step: not after each that is very short.
+/// Whether faces are moved out of obstacles (faces.h) after this substep of a step: not after each that is very short,
+/// but after the last.
 inline bool are_faces_due(const Plan& plan, int substep) {
   constexpr double often_enough = 1.25e-3;  // s
-  return (substep + 1) % std::clamp(int(often_enough / plan.h), 1, plan.substeps) == 0;
+  const int times = std::clamp(int(std::ceil(plan.h * plan.substeps / often_enough)), 1, plan.substeps);
+  return (substep + 1) * times / plan.substeps > substep * times / plan.substeps;
 }
 
 struct Substep {

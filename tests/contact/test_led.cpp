@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "sim/measure/crossings.h"
 #include "sim/sim.h"
@@ -11,12 +12,12 @@ using namespace tetpbd;
 
 namespace {
 
-// A cube, and a slab beside it along x that is `thick` and, with `held`, fixed.
+// A cube, and a slab `gap` beside it along x that is `thick` and, with `held`, fixed.
 struct Scene {
   std::shared_ptr<const Model> model;
   VertexList far_side;  // of the cube
 };
-Scene scene_of(double thick, bool held) {
+Scene scene_of(double thick, bool held, double gap = 0.05) {
   Scene made;
   auto model = std::make_shared<Model>();
   const TetMesh cube = make_block(glm::dvec3(0.2), glm::ivec3(3), true),
@@ -29,7 +30,7 @@ Scene scene_of(double thick, bool held) {
   VertexList all;
   for (std::uint32_t v = 0; v < slab.positions.size() && held; ++v) all.push_back(v);
   add_body(*model, "cube", cube, 1000, placed(cube, 0), glm::dvec3(0), glm::dvec3(0), {});
-  add_body(*model, "slab", slab, 1000, placed(slab, 0.15 + thick / 2), glm::dvec3(0), glm::dvec3(0), all);
+  add_body(*model, "slab", slab, 1000, placed(slab, 0.1 + gap + thick / 2), glm::dvec3(0), glm::dvec3(0), all);
   for (std::uint32_t v = 0; v < model->bodies[0].vertices; ++v)
     if (model->positions[v].x < -0.1 + 1e-9) made.far_side.push_back(v);
   made.model = model;
@@ -102,6 +103,18 @@ TEST_CASE("led: pulled against what is fixed, nothing passes through, not even t
         if (const glm::dvec3& p = state.positions[v]; std::max(std::abs(p.y), std::abs(p.z)) < 0.2)
           CHECK(p.x < 0.17 + 1e-6);
     }
+}
+
+TEST_CASE("led: what is led from afar is seen in time, also where nothing else moves") {
+  GlTest gl;
+  for (const char* mode : {"explicit", "node", "newton"}) {
+    CAPTURE(std::string(mode));
+    const Scene scene = scene_of(0.02, true, 1);
+    Sim sim = create_sim(scene.model, settings_of(mode));
+    VertexList all(scene.model->bodies[0].vertices);
+    std::iota(all.begin(), all.end(), 0u);
+    CHECK(crossings_led(sim, all, 20, 12) == 0);  // 1.2 m
+  }
 }
 
 TEST_CASE("led: a vertex goes evenly over the substeps of a step, and is still after it") {

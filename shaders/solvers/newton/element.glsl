@@ -45,6 +45,8 @@ void add_$KIND(uint number, uint start, int i, int j, inout mat3 block, inout ve
       vec3 moved = vec3(0.0);
       if (own.inverse_mass > 0.0)
         moved = start_displacement(v, DoubleSingle(own.high, own.low)) - at(OFFSET, v).xyz;
+      else
+        moved = h * velocities[v].high;  // where it is led
       rate += dot(c.gradient[k], moved) / h;
     }
     push += tau * rate;

@@ -76,10 +76,9 @@ Crossings current_crossings(const Sim& sim) {
 }
 
 // Of faces that obstacles could get in between, over their body's size.
-double depth_of_faces(const Sim& sim, const std::vector<Triangle>& faces) {
+double depth_of_faces(const Sim& sim, const std::vector<Triangle>& faces, const State& state) {
   const Model& model = *sim.model;
   const auto obstacles = obstacles_at(model, sim.settings, simulated_time(sim));
-  const State state = read_state(sim);
   double deepest = 0;
   for (const Body& body : model.bodies) {
     std::vector<Triangle> own;
@@ -139,12 +138,14 @@ MeasuredRun run_loop(Sim& sim, Metrics* metrics, long steps, const RunPlan& plan
     take(false);
     hold(s);
     const bool seen = s % steps_per_frame(sim.settings.dt) == 0 || s == steps;  // in a film
-    if (seen && !faces.empty())
-      run.errors.penetration_max = std::fmax(run.errors.penetration_max, depth_of_faces(sim, faces));
-    if (seen && touching)
-      run.errors.overlap =
-          largest(run.errors.overlap.value_or(Overlap{}),
-                  measure_overlap(*sim.model, read_state(sim).positions, sim.settings.contact == "self"));
+    if (seen && (touching || !faces.empty())) {
+      const State state = read_state(sim);
+      if (!faces.empty())
+        run.errors.penetration_max = std::fmax(run.errors.penetration_max, depth_of_faces(sim, faces, state));
+      if (touching)
+        run.errors.overlap = largest(run.errors.overlap.value_or(Overlap{}),
+                                     measure_overlap(*sim.model, state.positions, sim.settings.contact == "self"));
+    }
     if (plan.check_crossings && crossed(sim, at_start, run.errors)) run.errors.crossed = s;
     if (plan.stepped) plan.stepped(s);
     if (run.errors.crossed || !run.errors.finite || seconds_since(begin) >= plan.most_seconds) break;

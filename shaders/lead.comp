@@ -11,13 +11,12 @@ layout(std430) restrict buffer LedVertices { LedVertex led[]; };
 layout(std430) restrict writeonly buffer QuantizedOut { ivec4 quantized_out[]; };
 #endif
 #if CONTACTS
-layout(binding = UNIT_LISTED) uniform samplerBuffer listed_places;  // and how far from there a vertex may be, m
+#include "contact/bodies/limit.glsl"
 // One without pairs must not go where none were looked for; the others are stopped by contact/bodies/truncate.comp.
 vec3 listed_way(uint i, DoubleSingle x, vec3 way) {
   vec4 listed = texelFetch(listed_places, int(i));
-  vec3 away = x.high - listed.xyz;
-  if ((phases & PHASE_NEAR) == 0u || floatBitsToInt(listed.w) <= 0 || length(away + way) <= listed.w) return way;
-  return way * clamp((listed.w - length(away)) / length(way), 0.0, 1.0);
+  bool limited = (phases & PHASE_NEAR) != 0u && floatBitsToInt(listed.w) > 0;
+  return limited ? within_limit(listed, x, way) : way;
 }
 #else
 vec3 listed_way(uint i, DoubleSingle x, vec3 way) { return way; }

@@ -4,7 +4,6 @@
 
 #include <map>
 
-#include "sim/gl/keep_bindings.h"
 #include "sim/sim.h"
 
 namespace tetpbd {

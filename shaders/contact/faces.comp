@@ -11,17 +11,14 @@ layout(local_size_x = FACE_GROUP) in;
 #include "contact/moved.glsl"
 #if CONTACTS
 #include "contact/bodies/layout.glsl"
-layout(binding = UNIT_LISTED) uniform samplerBuffer listed_places;
+#include "contact/bodies/limit.glsl"
 layout(std430) restrict buffer PairSumsByVertex { PairSums pair_sums[]; };
 // What moves in place alone must not go past other surfaces unseen: where a vertex has pairs they see to it, else it
 // stays within its limit.
 vec3 seen_by_pairs(uint i, DoubleSingle x, vec3 placed, vec3 sped) {
   if ((phases & PHASE_NEAR) == 0u) return placed;
   vec4 listed = texelFetch(listed_places, int(i));
-  vec3 away = x.high - listed.xyz;
-  if (floatBitsToInt(listed.w) > 0)
-    return length(away + placed) <= listed.w ? placed
-           : placed * clamp((listed.w - length(away)) / length(placed), 0.0, 1.0);
+  if (floatBitsToInt(listed.w) > 0) return within_limit(listed, x, placed);
   ivec3 pushed = to_quanta(placed - sped);
   for (int c = 0; c < 3; ++c) pair_sums[i].pushed[c] += pushed[c];
   return sped;

@@ -204,7 +204,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   if (!std::exchange(scene.mode_open, false)) return std::nullopt;
   Settings& s = scene.settings;
   if (!has_forces(s)) {
-    if (!scene.by_device || !hard(s) || !is_software_renderer() || s.contact != "none") return std::nullopt;
+    if (!scene.by_device || !hard(s) || !is_software_renderer()) return std::nullopt;
     set_mode(s, "cpu-fast", scene.name);
     return "cpu-fast: on a software renderer faster than node and nearer to what is right";
   }

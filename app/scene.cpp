@@ -288,12 +288,6 @@ void set_mode_in(json& document, const std::string& assignment) {
   document["solver"].erase("iterations"), document["solver"].erase("substeps");
 }
 
-// Several bodies touch each other where nobody says otherwise, but for restitution, which is of hard bodies that move
-// as rigid ones and touch nothing but obstacles.
-void touch_each_other(Scene& scene) {
-  if (scene.bodies.size() > 1 && scene.settings.restitution == 0) scene.settings.contact = "bodies";
-}
-
 // Puts a named solver's settings in place; whether it is auto, which chooses them later.
 bool apply_solver(Settings& settings, const SceneOverrides& overrides) {
   const std::string name = overrides.solver.empty() && overrides.budget_ms ? "auto" : overrides.solver;
@@ -486,7 +480,8 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   const bool jacobi = flag("mode") || said("mode") || flag("omega") || flag("mass_splitting");
   scene.mode_open = scene.mode_open || (scene.by_device && !jacobi && overrides.solver.empty() &&
                                         !overrides.budget_ms && hard(scene.settings));
-  if (!document.contains("/world/contact"_json_pointer) && !flag("contact")) touch_each_other(scene);
+  const bool says_contact = document.contains("/world/contact"_json_pointer) || flag("contact");
+  if (!says_contact && scene.bodies.size() > 1) scene.settings.contact = "bodies";
   if (overrides.fill == "file" && std::ranges::none_of(scene.bodies, has_tets))
     throw Error("no body is from a file of tets", "--fill file", "leave it out, or name one by --mesh");
   for (BodyDescription& body : scene.bodies) {

@@ -44,6 +44,8 @@ show press 210 'A press on a ball of jelly and a bunny' --scene press
 show spikes 100 'A slab of jelly on spikes, and a bunny on the slab' --scene spikes
 show stairs 100 'A cube of jelly and a bunny tumble down stairs' --scene stairs
 show stack 200 'Ten cubes stand on each other' --scene stack
+show hard-stack 200 'Ten hard cubes stand on each other' --scene hard-stack
+show press-cloth 300 'A plate presses a heap of cloths' --scene press-cloth
 show ring 80 'Balls of jelly, thrown at each other' --scene ring
 show squishy-balls 120 'Balls of jelly fall on each other in a corner' --scene squishy-balls
 show twisted-beams 200 'Twisted beams are let go against each other' --scene twisted-beams

@@ -117,14 +117,43 @@ struct RigidSide {
   float _4;
   vec3 angular;
   float _5;
+  vec3 shift;             // m, of its centre, by pairs after vertices were summed
+  float _6;
+  vec3 given;             // m, by which the impulses that pairs had in the substep before change its way in the next
+  float _7;
+  vec3 given_turn;        // m^2, likewise, about its centre
+  float _8;
   vec4 impulses[MOST_TOUCHES];
   uint touches[MOST_TOUCHES];  // vertex * MAX_OBSTACLES + obstacle
+};
+// What pairs of surfaces do to a body that moves as a rigid one, in a substep (contact/bodies/hard.glsl).
+struct HardBody {
+  uint moves;         // 1: it moves so
+  uint pairs;         // that act on it
+  uint part;          // of its way that does not cross anything, a float's bits
+  float inverse_mass; // 1/kg
+  vec3 origin;        // of `centre`
+  float _0;
+  vec3 centre;        // where the substep began
+  float _1;
+  vec3 way;           // m, in this substep
+  float _2;
+  vec3 turn;          // rad
+  float _3;
+  vec4 inverse_inertia[3];  // 1/(kg m^2)
+  int changed[6];     // way and turn by all pairs, fixed-point (contact/sums.glsl); turns times the size of a body
+  int pushed[6];      // of its place alone
+  int next[6];        // with which it begins the next substep: of its way, and about its centre
+  uint sharing[2];    // pairs of a pass that have an impulse or need one, by turns
+  vec4 moving;        // m, rad, in a pass
+  vec4 turning;
 };
 struct RigidRecord {
   uint first;      // of its vertices
   uint vertices;
   float slack;     // m, more than constraints correct a vertex by while it keeps its shape; 0: it is never rigid
   float mass;      // kg
+  HardBody hard;
   RigidSide sides[2];
 };
 

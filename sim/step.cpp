@@ -63,6 +63,7 @@ std::vector<double> mean_edges(const Model& model, const ConstraintList& edges) 
 // Resets the records of hard bodies, because vertices were moved from outside.
 void forget_contacts(Sim& sim) {
   if (!sim.rigid_bodies) return;
+  forget_impulses(sim.pairs);
   const std::vector<double> edges = mean_edges(*sim.model, sim.system.lists[std::size_t(index_of<Stretch>)]);
   std::vector<RigidRecord> records;
   for (const Body& body : sim.model->bodies) {
@@ -119,7 +120,7 @@ void step(Sim& sim) {
       lead(sim, k);
       sim.solver.substep(sim, k);
       if (are_faces_due(sim.plan, k)) move_faces_out(sim);
-      resolve_body_contacts(sim);
+      resolve_body_contacts(sim, k + 1 == sim.plan.substeps);
     }
     end_leading(sim);
     // Vertex fetches and copies read the state next.

@@ -1,24 +1,7 @@
 // Hard bodies that move as rigid ones (method.md, "Hard bodies are rigid"): what vertices add to the records of their
 // bodies at the end of a substep for rigid_contact.comp, and whether a body is moved as a rigid one in this substep.
-// Records have two sides, of which one is read and the other written, in turn.
-layout(std430) buffer RigidBodies {
-  RigidRecord rigid_bodies[BODY_COUNT];
-  uint near[];  // by side and body the vertices that will be in an obstacle after the next substep, in any order
-};
+#include "contact/rigid_records.glsl"
 shared int rigid_sums[RIGID_SUMS];
-
-uint side_now() { return (phases & PHASE_SIDE) != 0u ? 1u : 0u; }
-uint body_of(uint i) {  // the last that starts at vertex i or before
-  uint low = 0u, high = BODY_COUNT;
-  while (low + 1u < high) {
-    uint middle = (low + high) / 2u;
-    if (rigid_bodies[middle].first <= i) low = middle;
-    else high = middle;
-  }
-  return low;
-}
-// The position relative to the origin of its body.
-vec3 arm_of(DoubleSingle x, vec3 origin) { return (x.high - origin) + x.low; }
 
 // What vertices read of a body's record.
 struct RigidState {

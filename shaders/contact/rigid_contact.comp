@@ -12,6 +12,7 @@ layout(local_size_x = 256) in;
 shared Rigid before, body;  // the centre from the body's origin; momenta per mass
 shared vec3 angular, velocity_low;  // of `before`, then of the motion in flight
 shared vec3 turn;                   // in flight (turn_in_flight)
+shared vec3 given, given_spin;      // m/s, rad/s, by the pairs of the substep before
 shared uint worst, worst_place;
 #if MOVING_SOLIDS
 shared float worked;  // J, of obstacles that move, on the body in this substep
@@ -31,7 +32,7 @@ Rigid rigid_motion(uint b, uint s) {
                  outerProduct(c, c);
   Rigid motion;
   motion.unsettled = false;
-  motion.centre = reach * c;
+  motion.centre = reach * c + rigid_bodies[b].sides[s].shift;
   motion.inverse_inertia = inverse_inertia_of(moments * (reach * reach));
   velocity_low = vec3(0.0);
   if (rigid_bodies[b].sides[s].carried != 0u) {  // more exact than sums
@@ -44,6 +45,8 @@ Rigid rigid_motion(uint b, uint s) {
     angular = reach * RIGID_SPEED * (2.0 * vec3(sums[6], sums[7], sums[8]) - cross(c, speed));
   }
   motion.spin = motion.inverse_inertia * angular;
+  given = rigid_bodies[b].sides[s].given * params.inverse_h;
+  given_spin = motion.inverse_inertia * rigid_bodies[b].sides[s].given_turn * params.inverse_h;
   return motion;
 }
 
@@ -56,6 +59,7 @@ struct Contact {
 };
 Contact contact_with(int k, uint vertex, DoubleSingle x, vec3 arm) {
   vec3 velocity = (velocity_at(before, arm) + params.h * params.gravity) * params.velocity_scale;
+  velocity += given + cross(given_spin, arm);
   Surface surface = surface_before(k, x, velocity);
   return Contact(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex),
                  obstacle_restitution(k));
@@ -125,10 +129,10 @@ void write_contacts(uint b, uint o, int touching, bool full) {
 // Finds the motion of body b in flight, once `before` is known.
 void find_flight(uint b, uint o, bool writes) {
   if (gl_LocalInvocationIndex != 0u) return;
-  DoubleSingle velocity = predict_velocity(DoubleSingle(before.velocity, velocity_low));
+  DoubleSingle velocity = add_double(predict_velocity(DoubleSingle(before.velocity, velocity_low)), given);
   body.velocity = velocity.high, velocity_low = velocity.low;
   body.centre = before.centre;
-  angular *= params.velocity_scale;
+  angular = angular * params.velocity_scale + rigid_bodies[b].sides[1u - o].given_turn * params.inverse_h;
   turn = turn_in_flight(before.inverse_inertia, angular, params.h);
   if (!writes) return;
   rigid_bodies[b].sides[o].touching = 0u;
@@ -158,6 +162,7 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
   Rigid now = before;
   now.velocity = (now.velocity + params.h * params.gravity) * params.velocity_scale;
   now.spin *= params.velocity_scale;
+  now.velocity += given, now.spin += given_spin;
   float enough = 2e-7 * length(now.velocity) + 2e-5 * fall, loose = 1e-3 * fall + 4.0 * enough;
   barrier();
   if (lane == 0u) {  // starts from the impulses of the substep before
@@ -191,6 +196,23 @@ bool find_motion(uint b, uint s, uint count, bool writes) {
   return true;
 }
 
+#if CONTACTS
+// What pairs need of body b, whose motion is known.
+void write_hard(uint b, uint s, bool moves, uint count) {
+  rigid_bodies[b].hard.moves = moves ? 1u : 0u, rigid_bodies[b].hard.pairs = 0u;
+  rigid_bodies[b].hard.part = floatBitsToUint(1.0);
+  rigid_bodies[b].hard.sharing[0] = rigid_bodies[b].hard.sharing[1] = 0u;
+  for (int k = 0; k < 6; ++k)
+    rigid_bodies[b].hard.changed[k] = rigid_bodies[b].hard.pushed[k] = rigid_bodies[b].hard.next[k] = 0;
+  if (!moves) return;
+  rigid_bodies[b].hard.inverse_mass = 1.0 / rigid_bodies[b].mass;
+  rigid_bodies[b].hard.origin = rigid_bodies[b].sides[s].origin, rigid_bodies[b].hard.centre = before.centre;
+  rigid_bodies[b].hard.way = params.h * body.velocity;
+  rigid_bodies[b].hard.turn = params.h * (count == 0u ? before.inverse_inertia * angular : body.spin);
+  for (int k = 0; k < 3; ++k)
+    rigid_bodies[b].hard.inverse_inertia[k] = vec4(before.inverse_inertia[k] / rigid_bodies[b].mass, 0.0);
+}
+#endif
 void main() {
   uint lane = gl_LocalInvocationIndex, base = group_index() * gl_WorkGroupSize.x, i = base + lane, s = side_now(),
        o = 1u - s;
@@ -211,6 +233,11 @@ void main() {
         rigid_bodies[b].sides[o].carried = moves ? 1u : 0u;
         rigid_bodies[b].sides[o].origin = positions[first].high;
         if (!moves) rigid_bodies[b].sides[o].touching = 0u;
+        rigid_bodies[b].sides[o].shift = rigid_bodies[b].sides[o].given = vec3(0.0);
+        rigid_bodies[b].sides[o].given_turn = vec3(0.0);
+#if CONTACTS
+        write_hard(b, s, moves, count);
+#endif
       }
     }
     if (moves && i >= first && i < first + rigid_bodies[b].vertices) {

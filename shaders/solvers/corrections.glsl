@@ -34,7 +34,12 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
     predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
-  if (predicts || finishes) velocities[i] = Velocity(v.high, speed.work, v.low, 0.0);
+  DoubleSingle kept = v;
+#if RIGID_CONTACT && CONTACTS
+  // Pairs of surfaces look back to where the vertex was; then carry.comp gives it the velocity of its body.
+  if (carried && finishes && (phases & PHASE_NEAR) != 0u) kept = add_double(v, relative(x, start) * params.inverse_h);
+#endif
+  if (predicts || finishes) velocities[i] = Velocity(kept.high, speed.work, kept.low, 0.0);
   if (!carried) book_work(i, own.inverse_mass);
 #if COMPLIANT
   if (finishes && params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);

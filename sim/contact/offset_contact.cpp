@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "sim/contact/cell_grid.h"
 #include "sim/contact/pairs.h"
@@ -17,8 +18,6 @@ using Proximity = Formulas<double>::Proximity;
 
 constexpr double limit_part = 0.49;  // of the margin, which a vertex may go: what is not listed is a margin apart
 constexpr double reserve = 16;       // times the longest motion in a substep: a list holds for some
-
-int side_of(bool edges, std::size_t k) { return (edges ? k < 2 : k == 0) ? 0 : 1; }
 
 }  // namespace
 
@@ -50,15 +49,26 @@ struct SurfaceFormulas : Formulas<double> {
 
 }  // namespace glsl
 
+void OffsetContact::begin_step(const State& state) {
+  listed_.clear(), pairs_.clear();
+  kept_ = state.impulses, wrenches_ = state.wrenches;
+}
+
+void OffsetContact::end_step(State& state) const {
+  state.impulses.clear();
+  for (const Pair& pair : pairs_) keep(pair, state.impulses);
+  state.wrenches = wrenches_;
+}
+
 void OffsetContact::begin(const Settings& settings, const Points& x, const Points& v) {
   if (bodies_touch(*model_, settings))
     start_ = x, start_velocities_ = v;
   else
-    start_.clear(), listed_.clear();
+    start_.clear(), listed_.clear(), wrenches_.clear();
 }
 
 void OffsetContact::resolve(const Settings& settings, Points& x, Points& v, const std::vector<double>& inverse_masses,
-                            double h, double push_limit) {
+                            double h, double push_limit, std::span<const char> rigid) {
   if (start_.empty()) return;
   if (surfaces_.vertices.empty()) surfaces_ = lay_out_surfaces(*model_, settings.contact_distance);
   Substep substep{x, v, inverse_masses, h};
@@ -76,10 +86,27 @@ void OffsetContact::resolve(const Settings& settings, Points& x, Points& v, cons
     }
   const double before = kinetic_energy(substep);
   const Points moved = x;
+  find_hard_bodies(substep, rigid);
   apply_impulses(settings, push_limit, substep);
   counts_.gained += std::max(0.0, kinetic_energy(substep) - before);
   for (Pair& pair : pairs_) share_masses(pair, ways_of(pair, moved));
   truncate(substep);
+}
+
+void OffsetContact::keep(const Pair& pair, std::vector<PairImpulse>& kept) {
+  if (pair.warm.size > 0) kept.push_back({pair.edges, pair.first, pair.second, pair.warm});
+}
+
+void OffsetContact::take_up_kept() {
+  const auto order = [](const auto& a, const auto& b) {
+    return std::tie(a.edges, a.first, a.second) < std::tie(b.edges, b.first, b.second);
+  };
+  std::ranges::sort(kept_, order);
+  for (Pair& pair : pairs_) {
+    const auto at = std::lower_bound(kept_.begin(), kept_.end(), pair, order);
+    if (at != kept_.end() && !order(pair, *at)) pair.warm = at->warm;
+  }
+  kept_.clear();
 }
 
 // Whether all pairs are listed that this substep may ask for: those that touch, or will in `ahead` such substeps.
@@ -166,8 +193,10 @@ void OffsetContact::find_pairs(bool self) {
     near.erase(repeated.begin(), repeated.end());
     for (const std::uint32_t other : near) add_pair(self, edges, own, other, found[item]);
   });
+  for (const Pair& pair : pairs_) keep(pair, kept_);
   pairs_.clear();
   for (const std::vector<Pair>& each : found) pairs_.insert(pairs_.end(), each.begin(), each.end());
+  take_up_kept();
   ++counts_.detections, counts_.pairs = long(pairs_.size());
 }
 
@@ -192,7 +221,7 @@ void OffsetContact::add_pair(bool self, bool edges, std::uint32_t first, std::ui
   pair.offset = INFINITY;
   for (std::size_t k = 0; k < 4; ++k) {
     const std::uint32_t i = pair.vertices[k];
-    double& margin = margins[std::size_t(side_of(edges, k))];
+    double& margin = margins[pair.side_of(k)];
     margin = std::max(margin, margins_[i]), pair.offset = std::min(pair.offset, surfaces_.offsets[i]);
   }
   if (margins[0] + margins[1] == 0) return;  // neither moves
@@ -247,6 +276,7 @@ void OffsetContact::apply_impulses(const Settings& settings, double push_limit, 
     if (!pair.acts()) continue;
     ++counts_.touching;
     counts_.nearest = std::min(counts_.nearest, pair.near.distance / pair.offset);
+    if (const auto [own, other] = hard_sides(pair); own || other) continue;
     std::array<double, 4> split;
     for (std::size_t k = 0; k < 4; ++k)
       split[k] = weights[pair.vertices[k]] * shared[pair.vertices[k]] / double(pair.shares[k]);
@@ -254,11 +284,8 @@ void OffsetContact::apply_impulses(const Settings& settings, double push_limit, 
     const bool turns = all_move(pair, weights);
     const auto m = f.meet(pair.near, ways.data(), split.data(), turns);
     if (!(m.weight > 0)) continue;
-    const auto friction = [&](std::uint32_t vertex) {
-      return body_at(*model_, vertex).friction.value_or(settings.friction);
-    };
-    const double both = f.mean_friction(friction(pair.vertices[0]), friction(pair.vertices[3]));
-    const double stop = f.stopping_impulse(pair.near, m, pair.offset), slip = f.slip_impulse(m, stop, both);
+    const double stop = f.stopping_impulse(pair.near, m, pair.offset),
+                 slip = f.slip_impulse(m, stop, friction_of(settings, pair));
     pair.push = f.push_apart(pair.near, m, pair.offset, push_limit);
     for (std::size_t k = 0; k < 4; ++k) {
       const std::uint32_t i = pair.vertices[k];
@@ -266,9 +293,16 @@ void OffsetContact::apply_impulses(const Settings& settings, double push_limit, 
       pushed[i] += (weights[i] * pair.near.weights[k] * pair.push) * pair.near.normal;
     }
   }
+  solve_hard_pairs(settings, push_limit, shared, substep, stopped, pushed);
   for (const std::uint32_t i : surfaces_.vertices) v[i] += stopped[i] / h, x[i] += stopped[i];
   turn_pushed(substep);
   for (const std::uint32_t i : surfaces_.vertices) x[i] += pushed[i];
+  move_hard_bodies(substep);
+}
+
+double OffsetContact::friction_of(const Settings& settings, const Pair& pair) const {
+  const auto own = [&](std::uint32_t vertex) { return body_at(*model_, vertex).friction.value_or(settings.friction); };
+  return Formulas<double>{}.mean_friction(own(pair.vertices[0]), own(pair.vertices[3]));
 }
 
 bool OffsetContact::all_move(const Pair& pair, const std::vector<double>& weights) {
@@ -307,16 +341,16 @@ void OffsetContact::truncate(Substep& substep) {
     glm::dvec2 sides(0);
     const auto own = [&](std::size_t k) {
       const std::uint32_t i = pair.vertices[k];
-      return (side_of(pair.edges, k) == 0 ? -1 : 1) * glm::dot(pair.near.normal, x[i] - start_[i]);
+      return (int(pair.side_of(k)) == 0 ? -1 : 1) * glm::dot(pair.near.normal, x[i] - start_[i]);
     };
     for (std::size_t k = 0; k < 4; ++k) {
-      double& of_side = sides[side_of(pair.edges, k)];
+      double& of_side = sides[int(pair.side_of(k))];
       of_side = std::max(of_side, own(k));
     }
     for (std::size_t k = 0; k < 4; ++k)
       part[pair.vertices[k]] =
           std::min(part[pair.vertices[k]],
-                   Formulas<double>{}.allowed_part(pair.near, pair.offset, sides, side_of(pair.edges, k), own(k)));
+                   Formulas<double>{}.allowed_part(pair.near, pair.offset, sides, int(pair.side_of(k)), own(k)));
   }
   for (const std::uint32_t i : surfaces_.vertices) {
     const glm::dvec3 way = x[i] - start_[i];
@@ -325,6 +359,14 @@ void OffsetContact::truncate(Substep& substep) {
     const double away = glm::distance(start_[i] + part[i] * way, listed_[i]), most = limit_part * margins_[i];
     if (away > most)
       part[i] *= std::clamp((most - glm::distance(start_[i], listed_[i])) / (part[i] * glm::length(way)), 0.0, 1.0);
+  }
+  for (std::size_t b = 0; b < hard_.size(); ++b) {  // rigid bodies are cut as a whole
+    const auto first = part.begin() + std::ptrdiff_t(model_->bodies[b].first_vertex),
+               end = first + std::ptrdiff_t(model_->bodies[b].vertices);
+    if (hard_[b].moves) std::fill(first, end, *std::min_element(first, end));
+  }
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const glm::dvec3 way = x[i] - start_[i];
     if (part[i] == 1) continue;
     ++counts_.truncated;
     if (weights[i] > 0) counts_.truncated_momentum += (part[i] - 1) * v[i] / weights[i];

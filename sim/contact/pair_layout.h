@@ -10,10 +10,12 @@ namespace tetpbd {
 namespace pair_layout {
 using glm::uint;
 using glm::uvec4;
+using glm::vec3;
 using glm::vec4;
 #include "shaders/contact/bodies/layout.glsl"
 static_assert(sizeof(SurfaceLeaf) == 32 && sizeof(ContactTotals) == 28 && sizeof(PairCounts) == 48);
 static_assert(sizeof(SurfacePair) == 64 && sizeof(PairSums) == 56);
+static_assert(sizeof(HardPair) == 144 && sizeof(KeptImpulse) == 32);
 }  // namespace pair_layout
 
 /// Parts of surfaces in leaves: about 64 triangles that are together at rest, with the vertices and edges of no earlier

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "sim/contact/cell_grid.h"
 #include "sim/contact/offset_contact.h"
@@ -25,7 +26,7 @@ namespace {
 constexpr double least_limit = 0.075, most_limit = 1.5;  // edges, that a vertex may go between detections
 constexpr const char *pairs_label = "pairs of surfaces", *candidates_label = "candidates for pairs",
                      *leaf_pairs_label = "pairs of leaves";
-constexpr std::size_t group = 64, find_group = 256, pair_group = 32;  // invocations
+constexpr std::size_t group = 64, find_group = 256, pair_group = 32, hard_group = 512;  // invocations
 
 void give_pairs(Sim& sim) {
   const Pairs& p = sim.pairs;
@@ -33,6 +34,7 @@ void give_pairs(Sim& sim) {
   recorder.give("PairMesh", p.mesh), recorder.give("PairLists", p.lists);
   recorder.give("LeafPairs", p.leaf_pairs), recorder.give("Candidates", p.candidates), recorder.give("Pairs", p.pairs);
   recorder.give("Balls", p.balls);
+  if (p.hard) recorder.give("HardPairs", p.hard_pairs), recorder.give("KeptImpulses", p.kept);
   recorder.give("PairSumsByVertex", p.sums), recorder.give("Listed", p.listed);
   recorder.counts = p.lists.id();
 }
@@ -94,6 +96,13 @@ void follow(Pairs& p, Buffer& list, const char* label, const Tuning& tuning, std
   if (found > room / 4 && room < most) make_room<T>(list, label, tuning, std::min(4 * found, most));
 }
 
+// Any pair may be one of hard bodies.
+void make_hard_room(Pairs& p, const Tuning& tuning) {
+  const std::size_t most = std::min(p.pairs.bytes() / sizeof(SurfacePair), tuning.storage / sizeof(HardPair) - 1);
+  p.hard_pairs = checked(tuning, Buffer("pairs of hard bodies", 16 + sizeof(HardPair) * most));
+  p.hard_pairs.clear();
+}
+
 void read_contacts(Sim& sim) {
   Pairs& p = sim.pairs;
   const auto contents = poll_readback<std::byte>(p.requested, p.readback, "contacts", true);
@@ -103,7 +112,9 @@ void read_contacts(Sim& sim) {
   p.taken += double(totals.taken) * TAKEN_UNIT;
   p.nearest = std::min(p.nearest, double(std::bit_cast<float>(totals.nearest)));
   p.listed_pairs = std::max<std::uint64_t>(p.listed_pairs, totals.most_pairs);
+  const std::size_t room = p.pairs.bytes();
   follow<SurfacePair>(p, p.pairs, pairs_label, sim.tuning, totals.most_pairs);
+  if (p.hard && p.pairs.bytes() > room) make_hard_room(p, sim.tuning);
   follow<glm::uvec2>(p, p.candidates, candidates_label, sim.tuning, totals.most_candidates);
   follow<glm::uvec2>(p, p.leaf_pairs, leaf_pairs_label, sim.tuning, totals.most_leaf_pairs);
   std::vector<Extent> bodies(sim.model->bodies.size(), {{glm::dvec3(INFINITY), glm::dvec3(-INFINITY)}, 0});
@@ -139,6 +150,12 @@ void make_buffers(Pairs& p, const SolverInput& input, const Surfaces& surfaces, 
       checked(input.tuning, Buffer("balls around parts of surfaces",
                                    sizeof(glm::vec4) * (surfaces.vertices.size() + triangles + surfaces.edges.size())));
   make_room<SurfacePair>(p.pairs, pairs_label, input.tuning, 65536 + 8 * triangles);
+  if (input.rigid) {
+    make_hard_room(p, input.tuning);
+    // More that have impulses at once are not taken up by the next list.
+    const std::size_t most = 32768 + 4 * triangles;
+    p.kept = checked(input.tuning, Buffer("impulses of hard bodies", 16 + sizeof(KeptImpulse) * most));
+  }
   make_room<glm::uvec2>(p.candidates, candidates_label, input.tuning, 131072 + 24 * triangles);
   make_room<glm::uvec2>(p.leaf_pairs, leaf_pairs_label, input.tuning, 4096 + 24 * p.leaf_bodies.size());
 }
@@ -149,10 +166,13 @@ void make_passes(Pairs& p, const SolverInput& input) {
   std::vector<std::string> defines = vertex_defines(input);
   defines.insert(defines.end(), p.defines.begin(), p.defines.end());
   const double mass = std::accumulate(input.model.masses.begin(), input.model.masses.end(), 0.0);
-  defines.insert(defines.end(), {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
-                                 fmt::format("PAIR_GROUP {}u", pair_group), fmt::format("GROUP_SIZE {}u", group),
-                                 fmt::format("FIND_GROUP {}u", find_group), fmt::format("TOTAL_MASS {:.9g}", mass),
-                                 fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
+  defines.insert(
+      defines.end(),
+      {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
+       fmt::format("PAIR_GROUP {}u", pair_group), fmt::format("GROUP_SIZE {}u", group),
+       fmt::format("HARD_GROUP {}u", hard_group), fmt::format("MOST_PASSES {}", OffsetContact::most_passes),
+       fmt::format("SETTLED {}", OffsetContact::settled), fmt::format("FIND_GROUP {}u", find_group),
+       fmt::format("TOTAL_MASS {:.9g}", mass), fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
   const auto kernel = [&](const char* name, bool before_substep = true) {
     std::vector<std::string> all = defines;
     all.push_back(fmt::format("BEFORE_SUBSTEP {:d}", before_substep));
@@ -170,6 +190,10 @@ void make_passes(Pairs& p, const SolverInput& input) {
   p.list = counted(kernel("list"), offsetof(PairCounts, candidate_groups));
   p.impulses = counted(kernel("impulses", false), offsetof(PairCounts, pair_groups));
   p.truncate = counted(kernel("truncate", false), offsetof(PairCounts, pair_groups));
+  if (!input.rigid) return;
+  p.keep = counted(kernel("keep"), offsetof(PairCounts, pair_groups));
+  p.hard = {kernel("hard", false), 1};
+  p.carry = {kernel("carry", false), work_groups(input.model.positions.size(), group)};
 }
 
 // Substeps between detections, so that meanwhile surfaces come nearer by a part of an edge: with much less detections
@@ -179,6 +203,13 @@ int detection_interval(const Sim& sim) {
   const double gained = std::abs(sim.settings.gravity) * double(2 * Pairs::readback_interval) * sim.settings.dt;
   const double usual = 0.2 * p.edge / (p.usual + gained), most = 0.4 * most_limit * p.edge / (p.fastest + gained);
   return int(std::clamp(std::min(usual, most) / sim.plan.h, 1.0, double(sim.plan.substeps)));
+}
+
+void keep_impulses(Sim& sim) {
+  Pairs& p = sim.pairs;
+  if (!p.keep) return;
+  p.kept.clear(), p.kept_any = true;
+  sim.recorder.run(p.keep, {{"takes_up", 0}});
 }
 
 }  // namespace
@@ -213,14 +244,19 @@ void plan_body_contacts(Sim& sim) {
   request_readback(p);
 }
 
+void forget_impulses(Pairs& p) {
+  if (std::exchange(p.kept_any, false)) p.kept.clear();
+}
+
 void list_pairs(Sim& sim, int substep) {
   Pairs& p = sim.pairs;
   p.phases = p && (p.near || !sim.led.vertices.empty()) ? PHASE_NEAR : 0u;  // boxes do not know what is led
-  if (!p.phases) return;
+  if (!p.phases) return forget_impulses(p);
   give_pairs(sim);
   const int interval = detection_interval(sim);
   if (substep % interval != 0) return;
   Recorder& recorder = sim.recorder;
+  if (substep > 0) keep_impulses(sim);
   find_boxes(sim, true);
   for (Pass* pass : {&p.near_leaves, &p.cull, &p.find, &p.list}) {
     const Program& program = recorder.use(pass->program);
@@ -234,20 +270,25 @@ void list_pairs(Sim& sim, int substep) {
   recorder.barrier(GL_COMMAND_BARRIER_BIT);
   recorder.run(p.list);
   recorder.barrier(GL_COMMAND_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+  if (p.kept_any) recorder.run(p.keep, {{"takes_up", 1}});
   ++p.detections, p.side = 0;
 }
 
-void resolve_body_contacts(Sim& sim) {
+void resolve_body_contacts(Sim& sim, bool last) {
   Pairs& p = sim.pairs;
   if (!p.phases) return;
   Recorder& recorder = sim.recorder;
   recorder.give("QuantizedOut", sim.quantized[sim.read_index]);
   // What has no velocity of its own but that of its motion must not be pushed apart at once.
   const bool by_force = solver_mode(sim.settings).leapfrog;
-  recorder.use(p.impulses.program).set("push_limit", by_force ? 1e30f : float(sim.plan.h / OffsetContact::recovery));
+  const float push_limit = by_force ? 1e30f : float(sim.plan.h / OffsetContact::recovery);
+  recorder.use(p.impulses.program).set("push_limit", push_limit);
   recorder.run(p.impulses, {{"side", p.side}});
+  if (p.hard) recorder.use(p.hard.program).set("push_limit", push_limit), recorder.run(p.hard);
   recorder.run(p.truncate, {{"side", p.side}});
+  if (p.carry) run_kernel(sim, p.carry);
   p.side = 1 - p.side;
+  if (last) keep_impulses(sim);  // for the next step
   give_quantized(sim);
 }
 
@@ -264,11 +305,13 @@ void start_pairs(Sim& sim, const State& state) {
   plan_detection(sim, bodies);
   p.usual = p.fastest;
   p.lists.write(0, p.empty.bytes(), make_empty_lists(p.ranges).data());
+  forget_impulses(p);
 }
 
 void add_carried(Carried& all, Pairs& p) {
   if (!p) return;
   all.add(p.lists), all.add(p.readback);
+  if (p.keep) all.add(p.kept);
   all.add_values(static_cast<PairNumbers&>(p));
   all.add_readback(p.requested);
 }

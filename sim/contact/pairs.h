@@ -26,6 +26,7 @@ struct PairNumbers {
   std::uint64_t listed_pairs = 0;  ///< the most of a detection
   std::uint64_t left_out = 0;      ///< pairs for which there was no room, so that their vertices were held
   bool boxed = false;              ///< boxes of leaves are known
+  bool kept_any = false;           ///< impulses of hard bodies, for the next list of pairs
   bool near = true;                ///< bodies may touch before the readback after the next
   double fastest = 0, usual = 0;   ///< m/s, of any vertex of a surface, and of most leaves, at the last readback
 };
@@ -34,12 +35,15 @@ struct PairNumbers {
 struct Pairs : PairNumbers {
   static constexpr long readback_interval = 2;  ///< steps
   Buffer mesh, lists, balls, leaf_pairs, candidates, pairs, sums, listed, empty, readback;
+  Buffer hard_pairs, kept;  ///< only where bodies move as rigid ones
   Texture listed_texels;
   Fence requested;
-  Pass boxes, near_leaves, cull, find, list, impulses, truncate;  ///< from `find` on with work-groups from `lists`
-  unsigned phases = 0;                                            ///< of dispatches that end a substep
-  unsigned side = 0;                                              ///< of vertices' shares: the next substep's
-  double edge = 1;                                                ///< m, the mean of surfaces
+  Pass boxes, near_leaves, cull;
+  Pass find, list, impulses, truncate;  ///< with work-groups from `lists`
+  Pass keep, hard, carry;               ///< only where bodies move as rigid ones
+  unsigned phases = 0;                  ///< of dispatches that end a substep
+  unsigned side = 0;                    ///< of vertices' shares: the next substep's
+  double edge = 1;                      ///< m, the mean of surfaces
   std::vector<std::uint32_t> leaf_bodies;
   PairRanges ranges;
   std::vector<std::string> defines;  ///< for kernels that read `mesh`, `lists` and `pairs` (surfaces.glsl)
@@ -50,9 +54,12 @@ Pairs make_pairs(const SolverInput& input);
 void plan_body_contacts(Sim& sim);
 /// Before a substep of a step: lists pairs anew, if it is time.
 void list_pairs(Sim& sim, int substep);
-/// After the solver's last dispatch of a substep: changes positions, velocities and quantized positions.
-void resolve_body_contacts(Sim& sim);
+/// After the solver's last dispatch of a substep, which may be the `last` of its step: changes positions, velocities
+/// and quantized positions.
+void resolve_body_contacts(Sim& sim, bool last);
 void add_carried(Carried& all, Pairs& pairs);
+/// Before the next step bodies were moved from outside: impulses that pairs had are not those of the next.
+void forget_impulses(Pairs& pairs);
 /// From a given state.
 void start_pairs(Sim& sim, const State& state);
 /// The values after the last step; waits for the GPU.

@@ -11,11 +11,12 @@
 
 namespace tetpbd {
 
-/// Whether hard bodies move as rigid ones: if moves_rigidly(). No body does if any is soft, because a kernel would need
-/// more than 8 storage blocks for records and multipliers.
+/// Whether hard bodies move as rigid ones. On the GPU none does beside bodies with compliance, because a kernel would
+/// need more than 8 storage blocks for records and multipliers.
 inline bool any_moves_rigidly(const Model& model, const Settings& settings) {
   const auto is_rigid = [&](const Body& body) { return moves_rigidly(settings, body_material(body, settings)); };
-  return !any_material(model, settings, compliant) && std::ranges::any_of(model.bodies, is_rigid);
+  return (solver_mode(settings).cpu || !any_material(model, settings, compliant)) &&
+         std::ranges::any_of(model.bodies, is_rigid);
 }
 
 class RigidContact {
@@ -49,6 +50,12 @@ class RigidContact {
   /// Whether vertex i has the velocity of a rigid body for the whole substep, in contact or at all.
   bool touches(std::size_t i) const { return motions_[body_of_[i]].is == Motion::touching; }
   bool carries(std::size_t i) const { return motions_[body_of_[i]].is != Motion::free; }
+  /// By body, whether it has; empty if no body ever does.
+  std::vector<char> carried() const {
+    std::vector<char> result;
+    for (std::size_t b = 0; b < motions_.size() && wanted_; ++b) result.push_back(motions_[b].is != Motion::free);
+    return result;
+  }
 
   /// The position to which prediction moves vertex i from x; changes v if its body is free.
   glm::dvec3 predict(const Substep& s, std::size_t i, const glm::dvec3& x, glm::dvec3& v) const {
@@ -69,9 +76,11 @@ class RigidContact {
   /// At the start of a substep: finds the bodies that move as rigid ones, and sets the velocities v of those in
   /// contact. `place.at(i)` is the position of vertex i, m; `counts` counts contacts left out and sweeps that did not
   /// converge; what obstacles that move do on a body is added to the `work` of its first vertex, if there is any.
+  /// `wrenches`: by body, with what pairs did to it in the substep before it begins this one; or empty.
   template <class Place>
   void prepare(const Substep& s, const std::vector<double>& inverse_masses, const Place& place,
-               std::vector<glm::dvec3>& v, std::vector<double>& work, GuardCounts& counts) {
+               std::vector<glm::dvec3>& v, std::vector<double>& work, GuardCounts& counts,
+               const std::vector<Wrench>& wrenches = {}) {
     for (std::size_t b = 0; b < model_->bodies.size() && wanted_; ++b) {
       const Body& body = model_->bodies[b];
       Motion& motion = motions_[b];
@@ -82,9 +91,10 @@ class RigidContact {
       if (std::any_of(&inverse_masses[first], &inverse_masses[first] + body.vertices, is_fixed)) continue;
       const auto near = near_contacts(s, place, v, first, end);
       const bool touches = !near.empty();
-      if (touches && move(s, near, place, v, work.empty() ? nullptr : &work[first], body, counts))
+      const Wrench given = wrenches.empty() ? Wrench{} : wrenches[b];
+      if (touches && move(s, near, place, v, given, work.empty() ? nullptr : &work[first], body, counts))
         motion.is = Motion::touching;
-      else if (!touches && keeps_shape(motion, place) && fly(s, place, v, motion, first, end))
+      else if (!touches && keeps_shape(motion, place) && fly(s, place, v, given, motion, first, end))
         motion.is = Motion::flying;
     }
   }
@@ -129,10 +139,11 @@ class RigidContact {
 
   // Finds how the body moves in flight; false if it has no inertia about some axis.
   template <class Place>
-  bool fly(const Substep& s, const Place& place, const std::vector<glm::dvec3>& v, Motion& motion, std::size_t first,
-           std::size_t end) const {
-    const Rules::Rigid body = rigid_motion(place, v, first, end);
+  bool fly(const Substep& s, const Place& place, const std::vector<glm::dvec3>& v, const Wrench& given, Motion& motion,
+           std::size_t first, std::size_t end) const {
+    Rules::Rigid body = rigid_motion(place, v, first, end);
     if (!Rules{}.has_inertia(body)) return false;
+    give(given, s, body);
     motion.centre = body.centre;
     motion.velocity = (body.velocity + s.h * s.gravity) * s.velocity_scale;
     const glm::dvec3 angular = glm::inverse(body.inverse_inertia) * body.spin * s.velocity_scale;
@@ -165,16 +176,23 @@ class RigidContact {
     return body;
   }
 
+  static void give(const Wrench& given, const Substep& s, Rules::Rigid& body) {
+    body.velocity += given.impulse / s.h;
+    const glm::dvec3 turning = given.turning + glm::cross(given.about - body.centre, given.impulse);
+    body.spin += body.inverse_inertia * turning / s.h;
+  }
+
   // Sets the velocities of a body in contact; false if it has no inertia about some axis.
   template <class Place>
   bool move(const Substep& s, const std::vector<std::size_t>& near, const Place& place, std::vector<glm::dvec3>& v,
-            double* work, const Body& own, GuardCounts& counts) const {
+            const Wrench& given, double* work, const Body& own, GuardCounts& counts) const {
     const std::size_t first = own.first_vertex, end = first + own.vertices;
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
     const Rules::Rigid before = rigid_motion(place, v, first, end);
     if (!Rules{}.has_inertia(before)) return false;
     Rules::Rigid body = before;
     body.velocity = (body.velocity + s.h * s.gravity) * s.velocity_scale, body.spin *= s.velocity_scale;
+    give(given, s, body);
     const double fall = s.h * glm::length(s.gravity), enough = 1e-9 * (fall + glm::length(body.velocity)),
                  loose = 1e-3 * fall + enough;
     const Rules::Rigid falling = body;

@@ -13,11 +13,29 @@
 
 namespace tetpbd {
 
+/// With what impulse a pair of surfaces of hard bodies begins its next substep, and how large it was in the last.
+struct WarmImpulse {
+  glm::dvec3 impulse{0};  ///< kg m, of a velocity times the substep's length
+  double size = 0;
+};
+/// Of two edges, or a vertex and a triangle, by their numbers (contact/surfaces.h).
+struct PairImpulse {
+  bool edges;
+  std::uint32_t first, second;
+  WarmImpulse warm;
+};
+/// The sum of a body's, over its mass.
+struct Wrench {
+  glm::dvec3 impulse{0}, turning{0}, about{0};  ///< m, m^2, m
+};
+
 /// The state on the CPU, in double: what CPU modes step and what tests compare.
 struct State {
-  std::vector<glm::dvec3> positions;   ///< m
-  std::vector<glm::dvec3> velocities;  ///< m/s
-  std::vector<double> work{};          ///< J that obstacles that move have done on each vertex; empty: none
+  std::vector<glm::dvec3> positions;    ///< m
+  std::vector<glm::dvec3> velocities;   ///< m/s
+  std::vector<double> work{};           ///< J that obstacles that move have done on each vertex; empty: none
+  std::vector<PairImpulse> impulses{};  ///< of hard bodies that touch each other, in CPU modes
+  std::vector<Wrench> wrenches{};       ///< of these by body, or empty
 };
 
 /// A contiguous part of the rest mesh, and its material.

@@ -283,8 +283,7 @@ bool uses(const Material& material, const ConstraintKind& kind) {
 }
 
 bool moves_rigidly(const Settings& settings, const Material& material) {
-  return settings.rigid_contact && settings.contact == "none" && hard(material) && uses(material, Stretch::row) &&
-         !solver_mode(settings).published;
+  return settings.rigid_contact && hard(material) && uses(material, Stretch::row) && !solver_mode(settings).published;
 }
 
 bool hard(const Material& material) {

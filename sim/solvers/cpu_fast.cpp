@@ -79,6 +79,7 @@ class FastPbd {
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
     if (step.substep.moving) state.work.resize(x.size());
     read_positions(state);
+    pairs_.begin_step(state);
 // Loops inside the region itself would be 4 % slower on one thread.
 #pragma omp parallel num_threads(int(threads_))
     {
@@ -88,6 +89,7 @@ class FastPbd {
     }
     step.barrier.rethrow();
     write_positions(state);
+    pairs_.end_step(state);
     return step.guards;
   }
 
@@ -131,13 +133,12 @@ class FastPbd {
       if (!work_.starts.empty()) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
       if (rigid_.wanted() || (substep.moving && s > 0)) {
         barrier.wait(thread);
-        if (thread == 0) substep.begin(s), rigid_.prepare(substep, step.inverse_masses, work_, v, done, counts);
+        if (thread == 0)
+          substep.begin(s), rigid_.prepare(substep, step.inverse_masses, work_, v, done, counts, pairs_.wrenches());
         barrier.wait(thread);
       }
-      if (thread == 0) {
-        if (s == 0) pairs_.begin_step();
+      if (thread == 0)
         pairs_.begin(step.settings, step.state.positions, v);  // of the step's start, then of the last resolve()
-      }
       if (bodies_touch(*model_, step.settings)) barrier.wait(thread);  // prediction changes velocities
       for (std::size_t i = begin; i < end; ++i) {
         const bool free = step.inverse_masses[i] > 0;
@@ -162,7 +163,7 @@ class FastPbd {
             move_faces_out(*model_, faces_, substep.obstacles, substep.h, step.state.positions, v, step.inverse_masses,
                            done);
           pairs_.resolve(step.settings, step.state.positions, v, step.inverse_masses, substep.h,
-                         substep.h / OffsetContact::recovery);
+                         substep.h / OffsetContact::recovery, rigid_.carried());
           read_positions(step.state);
         }
         barrier.wait(thread);

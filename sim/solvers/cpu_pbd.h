@@ -141,12 +141,12 @@ class CpuPbd {
       for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
     GuardCounts guards{};
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
-    pairs_.begin_step();
+    pairs_.begin_step(state);
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(*model_, settings, damped)) start = x;
       substep.begin(s);
       pairs_.begin(settings, x, v);
-      rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards);
+      rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards, pairs_.wrenches());
       for (std::size_t i = 0; i < x.size(); ++i)
         x[i] = inverse_masses[i] > 0 ? rigid_.predict(substep, i, x[i], v[i]) : x[i] + substep.h * v[i];
       predicted = x;
@@ -176,8 +176,9 @@ class CpuPbd {
         if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
       if (are_faces_due(plan, s))
         move_faces_out(*model_, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
-      pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery);
+      pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery, rigid_.carried());
     }
+    pairs_.end_step(state);
     return guards;
   }
 

@@ -14,6 +14,46 @@ float friction_between(uint a, uint b) { return mean_friction(body_friction(a), 
 #else  // with a mean of equal values the compiler would round what follows differently
 float friction_between(uint a, uint b) { return params.friction; }
 #endif
+#if RIGID_CONTACT
+#include "contact/bodies/hard.glsl"
+layout(std430) restrict buffer HardPairs {
+  uint hard_count;
+  uint _0, _1, _2;
+  HardPair hard_pairs[];
+};
+// Leaves a pair of which a side is a rigid body to hard.comp.
+void leave_to_hard(uint p, PairState s, Proximity t, SurfacePair pair, uvec2 bodies, bool acts, uint asked[4]) {
+  uint m = atomicAdd(hard_count, 1u);
+  if (m >= uint(hard_pairs.length())) return;
+  HardPair c;
+  c.pair = p, c.acts = acts ? 1u : 0u;
+  c.normal = t.normal, c.distance = t.distance, c.offset = pair.offset;
+  c.least = -max(0.0, t.distance - pair.offset), c.friction = friction_between(s.vertices[0], s.vertices[3]);
+  c.soft_way = vec3(0.0), c.soft_weight = 0.0;
+  c.impulse = c.before = vec3(pair.impulse[0], pair.impulse[1], pair.impulse[2]), c.more = vec3(0.0);
+  int own = (pair.first & OF_EDGES) != 0u ? 2 : 1;
+  vec3 arms[2] = vec3[2](vec3(0.0), vec3(0.0));
+  for (int k = 0; k < 4; ++k) {
+    int side = k < own ? 0 : 1;
+    float b = t.weights[k];
+    if (bodies[side] != NONE) {
+      arms[side] += abs(b) * arm_at_start(bodies[side], s.vertices[k], s.ways[k]);
+    } else {
+      c.soft_way += b * s.ways[k];
+      uint share = share_of(pair.shares, k);
+      if (share != 0u) c.soft_weight += b * b * s.weights[k] * float(asked[k]) / float(share);
+    }
+  }
+  // Both sides have the impulse at the same point, or it would turn them.
+  float part = bodies.x != NONE && bodies.y != NONE ? 0.5 : 1.0;
+  for (int side = 0; side < 2; ++side) {
+    c.bodies[side] = bodies[side];
+    c.arms[side] = vec4(arms[side] + (side == 0 ? -part : part) * t.distance * t.normal, 0.0);
+    if (bodies[side] != NONE) atomicAdd(rigid_bodies[bodies[side]].hard.pairs, 1u);
+  }
+  hard_pairs[m] = c;
+}
+#endif
 // Adds what the pair does now, and returns its push.
 float act(PairState s, Proximity t, uint shares, uint asked[4], float offset) {
   float split[4];
@@ -43,8 +83,17 @@ void meet_pair(uint p) {
   bool soon = touches_soon(t, s.ways, pair.offset);
   bool counts_now = (soon || pair.shares != 0u) && belongs(t, of_edges, pair.first & ~OF_EDGES, pair.second);
   float push = 0.0;
-  if (counts_now && pair.shares != 0u) {
-    push = act(s, t, pair.shares, asked, pair.offset);
+  bool acts = counts_now && pair.shares != 0u;
+#if RIGID_CONTACT
+  uvec2 bodies = uvec2(hard_body_of(s.vertices[0]), hard_body_of(s.vertices[3]));
+  bool is_hard = bodies != uvec2(NONE);
+  if (is_hard && (acts || pair.push > 0.0)) leave_to_hard(p, s, t, pair, bodies, acts, asked);
+  if (is_hard) push = pair.push;
+#else
+  const bool is_hard = false;
+#endif
+  if (acts) {
+    if (!is_hard) push = act(s, t, pair.shares, asked, pair.offset);
     atomicAdd(touching, 1u);
     atomicMin(nearest, floatBitsToUint(t.distance / pair.offset));
   }

@@ -43,8 +43,34 @@ struct SurfacePair {
   float offset;        // m
   uint shares;         // of its vertices' masses, in 255ths, a byte each; 0: it does not touch
   vec4 normal;         // where the substep began; m, the distance there
-  float push;          // push_apart()
-  float _0, _1, _2;
+  float push;          // push_apart(); where a side is a rigid body, how large its impulse was
+  float impulse[3];    // kg m, with which the next substep begins there
+};
+// A pair that acts of which a side is a rigid body, in a substep (hard.comp).
+struct HardPair {
+  uint pair;
+  uint bodies[2];     // NONE: soft
+  uint acts;          // 0: no more, but it did in the substep before
+  vec3 normal;
+  float least;        // m, the least way along it that is allowed
+  vec4 arms[2];       // m, from the bodies' centres to where they touch
+  vec3 soft_way;      // m, of soft sides as they were solved
+  float soft_weight;  // 1/kg, of these
+  vec3 impulse;       // kg m, so far
+  float distance;     // m
+  vec3 before;        // the impulse of the last pass, without what it went further
+  float offset;       // m
+  vec3 more;          // what this pass adds to the impulse
+  float friction;
+  uint needs;         // 1: in this pass it: has an impulse or needs one
+  uint _0, _1, _2;
+};
+// With what impulse a pair begins the next substep, for when pairs are found anew (keep.comp).
+struct KeptImpulse {
+  uint used, first, second;
+  float size;
+  float impulse[3];
+  float _0;
 };
 // What pairs do to a vertex in a substep, summed by contact/sums.glsl. It moves when none has yet to see where it was.
 struct PairSums {

@@ -21,7 +21,7 @@ bool make_pair(uvec2 candidate, out SurfacePair pair) {
   uint first = candidate.x & ~OF_EDGES, second = candidate.y & ~SAME_BODY;
   pair.vertices = candidate_vertices(candidate);
   pair.first = candidate.x, pair.second = second, pair.offset = 1e30;
-  pair.push = pair._0 = pair._1 = pair._2 = 0.0, pair.shares = 0u;
+  pair.push = pair.impulse[0] = pair.impulse[1] = pair.impulse[2] = 0.0, pair.shares = 0u;
   PairState s = state_of(pair.vertices);
   int own = of_edges ? 2 : 1;
   bool free = false;

@@ -16,7 +16,31 @@ vec3 pushed_by(uint i) { return in_metres(pair_sums[i].pushed[0], pair_sums[i].p
 // m, of its place: after an implicit substep impulses change velocities alone, because forces that balance would throw
 // back what is moved against them.
 #define MOVED_BY(stopped, pushed) (IMPLICIT != 0 ? pushed : stopped + pushed)
+#if RIGID_CONTACT
+#include "contact/bodies/hard.glsl"
+vec3 placed_by(uint i) {
+  uint b = hard_body_of(i);
+  if (b != NONE) return hard_motion(b, arm_at_start(b, i, way_of(i)));
+  return MOVED_BY(stopped_by(i), pushed_by(i));
+}
+#else
+uint hard_body_of(uint i) { return NONE; }
 vec3 placed_by(uint i) { return MOVED_BY(stopped_by(i), pushed_by(i)); }
+#endif
+bool is_soft(SurfacePair pair) {
+  return hard_body_of(pair.vertices[0]) == NONE && hard_body_of(pair.vertices[3]) == NONE;
+}
+// Makes a vertex, or all of its body where that is rigid, go a part of its way.
+void cut(uint i, float part) {
+#if RIGID_CONTACT
+  uint b = hard_body_of(i);
+  if (b != NONE) {
+    atomicMin(rigid_bodies[b].hard.part, floatBitsToUint(part));
+    return;
+  }
+#endif
+  atomicMin(pair_sums[i].part, floatBitsToUint(part));
+}
 void turn(SurfacePair pair) {
   PairState s = state_of(pair.vertices);
   if (!s.turns) return;
@@ -44,7 +68,7 @@ void limit_ways(SurfacePair pair) {
   t.distance = pair.normal.w;
   for (int k = 0; k < 4; ++k) {
     float part = allowed_part(t, pair.offset, sides, k < own ? 0 : 1, approaches[k]);
-    if (part < 1.0) atomicMin(pair_sums[pair.vertices[k]].part, floatBitsToUint(part));
+    if (part < 1.0) cut(pair.vertices[k], part);
   }
 }
 vec3 taken(uint i, int which) {
@@ -63,6 +87,7 @@ void move(uint i) {
   float part = uintBitsToFloat(atomicExchange(pair_sums[i].part, floatBitsToUint(1.0)));
   atomicExchange(pair_sums[i].asked[side], 0u);
   atomicExchange(pair_sums[i].left, pair_sums[i].pairs);
+  if (hard_body_of(i) != NONE) return;  // carry.comp moves it
   Position own = positions[i];
   Velocity speed = velocities[i];
   bool is_free = own.inverse_mass > 0.0;
@@ -88,7 +113,7 @@ void move(uint i) {
 }
 void act(uint p) {
   SurfacePair pair = pairs[p];
-  if (pair.push > 0.0) turn(pair);
+  if (pair.push > 0.0 && is_soft(pair)) turn(pair);
   limit_ways(pair);
   memoryBarrierBuffer();
   uint left[4];

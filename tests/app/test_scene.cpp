@@ -127,7 +127,7 @@ TEST_CASE("several bodies touch each other unless the scene or a flag says other
   CHECK(contact("{" + block + "}") == "none");
   CHECK(contact(two + R"(], "world": {"contact": "none"}})") == "none");
   CHECK(contact(two + R"(], "world": {"contact": "self"}})") == "self");
-  CHECK(contact(two + R"(], "world": {"restitution": 0.5}})") == "none");
+  CHECK(contact(two + R"(], "world": {"restitution": 0.5}})") == "bodies");
   CHECK(contact(two + "]}", {.parameters = {{"contact", "none"}}}) == "none");
   CHECK(contact(two + "]}", {.set = {"world.contact=none"}}) == "none");
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sim/contact/offset_contact.h"
+#include "sim/contact/rigid_contact.h"
 
 namespace tetpbd {
 
@@ -15,24 +16,15 @@ double sign_of(std::size_t side) { return side == 0 ? 1 : -1; }
 // The body's motion where the substep began.
 HardBody make_hard_body(const Model& model, const Body& body, const std::vector<glm::dvec3>& x,
                         const std::vector<glm::dvec3>& v, double h) {
-  const std::size_t first = body.first_vertex, end = first + body.vertices;
-  HardBody hard{.moves = true};
-  double mass = 0;
-  for (std::size_t i = first; i < end; ++i) {
-    const double m = model.masses[i];
-    mass += m, hard.centre += m * x[i], hard.way += m * h * v[i];
-  }
-  hard.inverse_mass = 1 / mass, hard.centre /= mass, hard.way /= mass;
-  glm::dmat3 moments(0);
-  glm::dvec3 angular(0);
-  for (std::size_t i = first; i < end; ++i) {
-    const glm::dvec3 arm = x[i] - hard.centre;
-    const double part = model.masses[i] / mass;
-    moments += part * glm::outerProduct(arm, arm), angular += part * glm::cross(arm, h * v[i]);
-  }
-  const glm::dmat3 inverse = Formula{}.inverse_inertia_of(moments);
-  hard.inverse_inertia = inverse / mass, hard.turn = inverse * angular;
-  return hard;
+  const Formula::Rigid motion =
+      RigidContact::mean_motion(model, x, v, body.first_vertex, body.first_vertex + body.vertices);
+  const double inverse_mass = 1 / body_mass(model, body);
+  return {.moves = true,
+          .inverse_mass = inverse_mass,
+          .centre = motion.centre,
+          .inverse_inertia = motion.inverse_inertia * inverse_mass,
+          .way = h * motion.velocity,
+          .turn = h * motion.spin};
 }
 
 }  // namespace

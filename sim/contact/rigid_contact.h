@@ -99,6 +99,29 @@ class RigidContact {
     }
   }
 
+  /// The mean motion of vertices from `first` to `end`; has_inertia() is false if they have none about some axis.
+  template <class Place>
+  static Formulas<double>::Rigid mean_motion(const Model& model, const Place& place, const std::vector<glm::dvec3>& v,
+                                             std::size_t first, std::size_t end) {
+    double mass = 0;
+    Formulas<double>::Rigid body{};
+    for (std::size_t i = first; i < end; ++i) {
+      const double m = model.masses[i];
+      mass += m, body.centre += m * place.at(std::uint32_t(i)), body.velocity += m * v[i];
+    }
+    body.centre /= mass, body.velocity /= mass;
+    glm::dvec3 angular(0);
+    glm::dmat3 moments(0);
+    for (std::size_t i = first; i < end; ++i) {
+      const glm::dvec3 arm = place.at(std::uint32_t(i)) - body.centre;
+      angular += model.masses[i] / mass * glm::cross(arm, v[i]);
+      moments += model.masses[i] / mass * glm::outerProduct(arm, arm);
+    }
+    body.inverse_inertia = Formulas<double>{}.inverse_inertia_of(moments);
+    body.spin = body.inverse_inertia * angular;
+    return body;
+  }
+
  private:
   using Rules = Formulas<double>;
 
@@ -141,7 +164,7 @@ class RigidContact {
   template <class Place>
   bool fly(const Substep& s, const Place& place, const std::vector<glm::dvec3>& v, const Wrench& given, Motion& motion,
            std::size_t first, std::size_t end) const {
-    Rules::Rigid body = rigid_motion(place, v, first, end);
+    Rules::Rigid body = mean_motion(*model_, place, v, first, end);
     if (!Rules{}.has_inertia(body)) return false;
     give(given, s, body);
     motion.centre = body.centre;
@@ -151,29 +174,6 @@ class RigidContact {
     const glm::dvec3 spin = body.inverse_inertia * (angular + Rules{}.moved_by_turn(-motion.turn, angular));
     motion.spin = spin + Rules{}.moved_by_turn(motion.turn, spin);
     return true;
-  }
-
-  // The mean motion of vertices from `first` to `end`; has_inertia() is false if they have none about some axis.
-  template <class Place>
-  Rules::Rigid rigid_motion(const Place& place, const std::vector<glm::dvec3>& v, std::size_t first,
-                            std::size_t end) const {
-    double mass = 0;
-    Rules::Rigid body{};
-    for (std::size_t i = first; i < end; ++i) {
-      const double m = model_->masses[i];
-      mass += m, body.centre += m * place.at(std::uint32_t(i)), body.velocity += m * v[i];
-    }
-    body.centre /= mass, body.velocity /= mass;
-    glm::dvec3 angular(0);
-    glm::dmat3 moments(0);
-    for (std::size_t i = first; i < end; ++i) {
-      const glm::dvec3 arm = place.at(std::uint32_t(i)) - body.centre;
-      angular += model_->masses[i] / mass * glm::cross(arm, v[i]);
-      moments += model_->masses[i] / mass * glm::outerProduct(arm, arm);
-    }
-    body.inverse_inertia = Rules{}.inverse_inertia_of(moments);
-    body.spin = body.inverse_inertia * angular;
-    return body;
   }
 
   static void give(const Wrench& given, const Substep& s, Rules::Rigid& body) {
@@ -188,7 +188,7 @@ class RigidContact {
             const Wrench& given, double* work, const Body& own, GuardCounts& counts) const {
     const std::size_t first = own.first_vertex, end = first + own.vertices;
     const auto at = [&](std::size_t i) { return place.at(std::uint32_t(i)); };
-    const Rules::Rigid before = rigid_motion(place, v, first, end);
+    const Rules::Rigid before = mean_motion(*model_, place, v, first, end);
     if (!Rules{}.has_inertia(before)) return false;
     Rules::Rigid body = before;
     body.velocity = (body.velocity + s.h * s.gravity) * s.velocity_scale, body.spin *= s.velocity_scale;

@@ -78,7 +78,7 @@ std::shared_ptr<Model> alone(const Made& body, std::size_t number) {
 Settings of_body(Settings settings, const Made& body) {
   static_cast<Material&>(settings) = body.material;
   settings.friction = body.friction;
-  settings.rigid_contact = false;  // no hard body is carried beside a soft one
+  settings.rigid_contact = solver_mode(settings).cpu;  // On the GPU none is carried beside one with compliance.
   return settings;
 }
 

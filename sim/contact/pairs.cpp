@@ -34,7 +34,8 @@ void give_pairs(Sim& sim) {
   recorder.give("PairMesh", p.mesh), recorder.give("PairLists", p.lists);
   recorder.give("LeafPairs", p.leaf_pairs), recorder.give("Candidates", p.candidates), recorder.give("Pairs", p.pairs);
   recorder.give("Balls", p.balls);
-  if (p.hard) recorder.give("HardPairs", p.hard_pairs), recorder.give("KeptImpulses", p.kept);
+  if (p.hard) recorder.give("HardPairs", p.hard_pairs);
+  if (p.keep) recorder.give("KeptImpulses", p.kept);
   recorder.give("PairSumsByVertex", p.sums), recorder.give("Listed", p.listed);
   recorder.counts = p.lists.id();
 }
@@ -150,8 +151,8 @@ void make_buffers(Pairs& p, const SolverInput& input, const Surfaces& surfaces, 
       checked(input.tuning, Buffer("balls around parts of surfaces",
                                    sizeof(glm::vec4) * (surfaces.vertices.size() + triangles + surfaces.edges.size())));
   make_room<SurfacePair>(p.pairs, pairs_label, input.tuning, 65536 + 8 * triangles);
-  if (input.rigid) {
-    make_hard_room(p, input.tuning);
+  if (input.rigid) make_hard_room(p, input.tuning);
+  if (input.rigid || solver_mode(input.settings).implicit) {
     // More that have impulses at once are not taken up by the next list.
     const std::size_t most = 32768 + 4 * triangles;
     p.kept = checked(input.tuning, Buffer("impulses of hard bodies", 16 + sizeof(KeptImpulse) * most));
@@ -166,13 +167,12 @@ void make_passes(Pairs& p, const SolverInput& input) {
   std::vector<std::string> defines = vertex_defines(input);
   defines.insert(defines.end(), p.defines.begin(), p.defines.end());
   const double mass = std::accumulate(input.model.masses.begin(), input.model.masses.end(), 0.0);
-  defines.insert(
-      defines.end(),
-      {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
-       fmt::format("PAIR_GROUP {}u", pair_group), fmt::format("GROUP_SIZE {}u", group),
-       fmt::format("HARD_GROUP {}u", hard_group), fmt::format("MOST_PASSES {}", OffsetContact::most_passes),
-       fmt::format("SETTLED {}", OffsetContact::settled), fmt::format("FIND_GROUP {}u", find_group),
-       fmt::format("TOTAL_MASS {:.9g}", mass), fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
+  defines.insert(defines.end(), {fmt::format("ROW {}u", input.tuning.row), fmt::format("IMPLICIT {:d}", implicit),
+                                 fmt::format("GROUP_SIZE {}u", group), fmt::format("HARD_GROUP {}u", hard_group),
+                                 fmt::format("MOST_PASSES {}", OffsetContact::most_passes),
+                                 fmt::format("SETTLED {}", OffsetContact::settled),
+                                 fmt::format("FIND_GROUP {}u", find_group), fmt::format("TOTAL_MASS {:.9g}", mass),
+                                 fmt::format("CONTACT_SELF {:d}", settings.contact == "self")});
   const auto kernel = [&](const char* name, bool before_substep = true) {
     std::vector<std::string> all = defines;
     all.push_back(fmt::format("BEFORE_SUBSTEP {:d}", before_substep));
@@ -188,10 +188,10 @@ void make_passes(Pairs& p, const SolverInput& input) {
   p.cull = {kernel("cull"), p.leaf_bodies.size()};
   p.find = counted(kernel("find"), offsetof(PairCounts, leaf_pair_groups));
   p.list = counted(kernel("list"), offsetof(PairCounts, candidate_groups));
-  p.impulses = counted(kernel("impulses", false), offsetof(PairCounts, pair_groups));
+  if (!implicit) p.impulses = counted(kernel("impulses", false), offsetof(PairCounts, pair_groups));
   p.truncate = counted(kernel("truncate", false), offsetof(PairCounts, pair_groups));
+  if (input.rigid || implicit) p.keep = counted(kernel("keep"), offsetof(PairCounts, pair_groups));
   if (!input.rigid) return;
-  p.keep = counted(kernel("keep"), offsetof(PairCounts, pair_groups));
   p.hard = {kernel("hard", false), 1};
   p.carry = {kernel("carry", false), work_groups(input.model.positions.size(), group)};
 }
@@ -228,6 +228,7 @@ Pairs make_pairs(const SolverInput& input) {
   for (const SurfaceLeaf& leaf : leaves.leaves) p.leaf_bodies.push_back(leaf.body);
   p.edge = mean_edge(surfaces, model.rest.positions);
   p.ranges = lay_out_pairs(sizes), p.defines = pair_defines(sizes);
+  p.defines.push_back(fmt::format("PAIR_GROUP {}u", pair_group));
   make_buffers(p, input, surfaces, leaves);
   make_passes(p, input);
   return p;
@@ -282,8 +283,10 @@ void resolve_body_contacts(Sim& sim, bool last) {
   // What has no velocity of its own but that of its motion must not be pushed apart at once.
   const bool by_force = solver_mode(sim.settings).leapfrog;
   const float push_limit = by_force ? 1e30f : float(sim.plan.h / OffsetContact::recovery);
-  recorder.use(p.impulses.program).set("push_limit", push_limit);
-  recorder.run(p.impulses, {{"side", p.side}});
+  if (p.impulses) {
+    recorder.use(p.impulses.program).set("push_limit", push_limit);
+    recorder.run(p.impulses, {{"side", p.side}});
+  }
   if (p.hard) recorder.use(p.hard.program).set("push_limit", push_limit), recorder.run(p.hard);
   recorder.run(p.truncate, {{"side", p.side}});
   if (p.carry) run_kernel(sim, p.carry);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <tuple>
 
+#include "sim/contact/offset_contact.h"
 #include "sim/sim.h"
 #include "sim/solvers/newton_buffers.h"
 #include "sim/solvers/rings.h"
@@ -29,6 +30,10 @@ struct Newton {
   Pass again;                ///< before a second round
   Pass momentum;             ///< only where a body is free
   Pass start_motion, place;  ///< only where obstacles can stop one
+  Pass meet, islands, start_moves, press_at_start, press_product, end_moves,
+      press_at_end;         ///< only where bodies may touch
+  Buffer presses, touches;  ///< by pair of surfaces, and by body
+  std::vector<std::string> defines, vertex_defines;
   std::shared_ptr<const NewtonLevels> levels;
   NewtonBuffers layout;
   std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0, rings = 0;  ///< indices of Solver::buffers
@@ -76,28 +81,75 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   return n;
 }
 
-void run_round(Sim& sim, Newton& n, unsigned again) {
+constexpr std::size_t press_bytes = 32;  // of a Press in newton/press.glsl
+
+// The passes that need a Sim's pairs of surfaces, which are made after its solver.
+void make_presses(Sim& sim, Newton& n) {
+  const Pairs& p = sim.pairs;
+  const auto pass = [&](const char* name, std::vector<std::string> defines, const std::string& more) {
+    defines.push_back(more);
+    Pass made{Program::compute(fmt::format("solvers/newton/{}.comp", name), {}, defines)};
+    made.counts_at = p.ranges.counts.at + offsetof(pair_layout::PairCounts, pair_groups);
+    return made;
+  };
+  std::vector<std::string> of_pairs = n.vertex_defines;
+  of_pairs.insert(of_pairs.end(), p.defines.begin(), p.defines.end());
+  n.meet = pass("meet", of_pairs, "MEETS 1");
+  n.islands = pass("islands", n.defines, "MEETS 1");
+  n.islands.work_groups = 1;
+  const std::size_t bodies = sim.model->bodies.size();
+  n.touches = Buffer("bodies that press each other", std::vector<GLuint>(bodies * ((bodies + 31) / 32)));
+  n.start_moves = pass("displace", n.defines, "AT_END 0"), n.end_moves = pass("displace", n.defines, "AT_END 1");
+  n.start_moves.work_groups = n.end_moves.work_groups = n.predict.work_groups;
+  n.press_at_start = pass("press", of_pairs, "PRESS_AT 0");
+  n.press_product = pass("press", of_pairs, "PRESS_AT 1");
+  n.press_at_end = pass("press", of_pairs, "PRESS_AT 2");
+}
+
+// Whether pairs of surfaces are part of this substep's matrix; then gives kernels what they need.
+bool presses(Sim& sim, Newton& n) {
+  const Pairs& p = sim.pairs;
+  if (!p || !p.phases) return false;
+  const std::size_t room = p.pairs.bytes() / sizeof(pair_layout::SurfacePair);
+  if (!n.presses || n.presses.bytes() < press_bytes * room) n.presses = Buffer("presses", press_bytes * room);
+  sim.recorder.give("Presses", n.presses), sim.recorder.give("Touches", n.touches);
+  return true;
+}
+
+void run_round(Sim& sim, Newton& n, unsigned iterations, unsigned again) {
+  const bool together = (again & TOGETHER) != 0;
   run_kernel(sim, n.start, again);
   if (n.averages) run_kernel(sim, n.averages, again);
+  if (together) run_kernel(sim, n.start_moves, again), run_kernel(sim, n.press_at_start, again);
   run_kernel(sim, n.linearise, again), run_kernel(sim, n.residual, again);
-  for (unsigned k = 0; k < unsigned(sim.plan.iterations); ++k) {
+  for (unsigned k = 0; k < iterations; ++k) {
     run_kernel(sim, n.update, k | again), run_kernel(sim, n.coarse, k | again), run_kernel(sim, n.prolong, k | again);
     if (n.stresses) run_kernel(sim, n.stresses, k | again);
+    if (together) run_kernel(sim, n.press_product, (k + 1) | again);
     run_kernel(sim, n.product, (k + 1) | again);
   }
 }
 
 void run_substep(Sim& sim, Newton& n) {
-  const unsigned iterations = unsigned(sim.plan.iterations);
   const unsigned changed = std::exchange(sim.adaptive.changed, false) ? PHASE_CHANGED : 0u;
   run_kernel(sim, n.predict, changed);
-  if (n.place) run_kernel(sim, n.start_motion), run_kernel(sim, n.place, changed);
-  run_round(sim, n, 0);
+  const unsigned together = presses(sim, n) ? TOGETHER : 0u;
+  // The coarse level does not know how bodies move each other, which takes more iterations: half as many again.
+  const unsigned iterations = unsigned(together ? (3 * sim.plan.iterations + 1) / 2 : sim.plan.iterations);
+  if (together) {
+    sim.recorder.use(n.meet.program).set("push_limit", float(sim.plan.h / OffsetContact::recovery));
+    run_kernel(sim, n.meet), run_kernel(sim, n.islands);
+  }
+  if (n.place) run_kernel(sim, n.start_motion), run_kernel(sim, n.place, changed | together);
+  if (n.place && together) run_kernel(sim, n.start_motion, together);  // how bodies answer a force now
+  run_round(sim, n, iterations, together);
   const unsigned again =
       iterations > 0 && sim.adaptive.substep_factor > 1 && sim.adaptive.hard_readbacks > 0 ? AGAIN : 0;
-  if (again) run_kernel(sim, n.again, iterations), run_round(sim, n, again);
-  if (n.momentum && iterations > 0) run_kernel(sim, n.momentum, iterations | again);
-  run_kernel(sim, n.finish, iterations | again);
+  if (again) run_kernel(sim, n.again, iterations | together), run_round(sim, n, iterations, again | together);
+  if (together) run_kernel(sim, n.end_moves, iterations | again | together);
+  if (together) run_kernel(sim, n.press_at_end, iterations | again | together);
+  if (n.momentum && iterations > 0) run_kernel(sim, n.momentum, iterations | again | together);
+  run_kernel(sim, n.finish, iterations | again | together);
 }
 
 void begin_refresh(Sim& sim, Newton& n) {
@@ -198,6 +250,7 @@ void start(Sim& sim, Newton& n, const State& state) {
   while (n.refresh.inverse.valid()) end_refresh(sim, n);
   AdaptiveSubsteps& w = sim.adaptive;
   w = AdaptiveValues{.substep_factor = w.substep_factor};
+  if (sim.pairs && !n.meet) make_presses(sim, n);
   const double turn = fastest_spin(*sim.model, state) * plan_for(sim.settings).h;
   const bool near = sim.pairs && sim.pairs.near;
   set_substep_factor(sim, n, turn > TURN_LIMIT || near ? refined_substeps : 1);
@@ -249,6 +302,11 @@ Solver create_newton_solver(const SolverInput& whole) {
   const NewtonSizes sizes = measure_newton(input, *levels);
   const auto made = std::make_shared<Newton>(make_passes(input, sizes));
   Newton& n = *made;
+  n.defines = newton_defines(sizes, input), n.vertex_defines = vertex_defines(input);
+  n.vertex_defines.insert(n.vertex_defines.end(), {define("BEFORE_SUBSTEP", 0), define("IMPLICIT", 1),
+                                                   define("CONTACT_SELF", input.settings.contact == "self")});
+  for (const std::string& define : n.defines)
+    if (define.starts_with("TOTAL_MASS") || define.starts_with("BODIES")) n.vertex_defines.push_back(define);
   n.levels = levels, n.layout = lay_out_newton_buffers(sizes, input.system);
   n.refreshed_for = input.plan.h;
   const auto add = [&](const char* block, Buffer buffer) {
@@ -271,7 +329,7 @@ Solver create_newton_solver(const SolverInput& whole) {
   solver.refresh = [made](Sim& sim) { refresh(sim, *made); };
   solver.carried = [made](Sim& sim, Carried& all) {
     const std::vector<Buffer>& buffers = sim.solver.buffers;
-    for (const std::size_t slot : {newton::DISPLACEMENT, newton::GAIN, newton::LEFT})
+    for (const std::size_t slot : {newton::DISPLACEMENT, newton::GAIN, newton::LEFT, newton::OWN, newton::OWN2})
       all.ranges.push_back({&buffers[made->vectors], made->layout.slots[slot].at, made->layout.slots[slot].bytes()});
     all.ranges.push_back({&buffers[made->sums], made->layout.rotations.at, made->layout.rotations.bytes()});
     if (made->momentum)

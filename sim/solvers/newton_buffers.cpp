@@ -6,9 +6,11 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 #include "sim/contact/moving_obstacle.h"
 #include "sim/contact/obstacles.h"
+#include "sim/contact/pairs.h"
 #include "sim/model/material.h"
 
 namespace tetpbd {
@@ -83,7 +85,8 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
           .group = group,
           .product_groups = last.first_group + groups_of_rows(last.end - last.first, group),
           .parts = std::clamp<std::size_t>((largest + 127) / 128, 1, 32),
-          .rigid_start = !levels.free_bodies.empty() && has_obstacles(input.model, input.settings),
+          .rigid_start = !levels.free_bodies.empty() &&
+                         (has_obstacles(input.model, input.settings) || bodies_touch(input.model, input.settings)),
           .tets = tets};
 }
 
@@ -106,6 +109,9 @@ std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverIn
                                     {"RIGID_START", sizes.rigid_start}})
     defines.push_back(fmt::format("{} {}u", name, value));
   defines.push_back(define("AVERAGED", has_averages(input.system)));
+  defines.push_back(define("TOUCHING", bodies_touch(input.model, input.settings)));
+  const std::vector<double>& masses = input.model.masses;
+  defines.push_back(fmt::format("TOTAL_MASS {:.9g}", std::accumulate(masses.begin(), masses.end(), 0.0)));
   for (std::size_t k = 0; k < kind_count; ++k)
     if (input.system.present[k])
       defines.push_back(fmt::format("COUNT_{} {}u", constraint_kinds[k].name, input.system.lists[k].count()));
@@ -189,6 +195,7 @@ NewtonBuffers lay_out_newton_buffers(const NewtonSizes& sizes, const ConstraintS
   to.sums.add<float>("coarse_y", sizes.unknowns());
   to.sums.add<float>("is_free", sizes.aggregates);
   to.sums.add<float>("first_rz", sizes.bodies);
+  to.sums.add<std::uint32_t>("islands", sizes.bodies);
   to.sums.add<std::uint32_t>("bad_starts", 6 * sizes.bodies);
   to.sums.add<std::uint32_t>("products_done", sizes.bodies);
   to.sums.add<std::uint32_t>("parts_done", sizes.free_bodies);

@@ -1,4 +1,4 @@
-// Impulses of hard bodies' pairs from one list of pairs to the next: a table by the numbers of both parts, by open
+// Impulses of hard bodies' pairs, or forces of pairs in implicit steps, from one list of pairs to the next: a table by the numbers of both parts, by open
 // addressing. There is an invocation per pair.
 #include "types.glsl"
 #include "double_single.glsl"

@@ -1,7 +1,9 @@
 // Pairs of surfaces that may touch, and what they do to vertices (method.md, "Bodies in contact").
 #include "contact/bodies/lists.glsl"
 layout(std430) restrict buffer Pairs { SurfacePair pairs[]; };
+#ifndef MEETS
 layout(std430) restrict buffer PairSumsByVertex { PairSums pair_sums[]; };
+#endif
 #include "contact/bodies/way.glsl"
 #include "contact/bodies/proximity.glsl"
 #include "contact/sums.glsl"

@@ -13,19 +13,16 @@ vec3 stopped_by(uint i) {
   return in_metres(pair_sums[i].stopped[0], pair_sums[i].stopped[1], pair_sums[i].stopped[2]);
 }
 vec3 pushed_by(uint i) { return in_metres(pair_sums[i].pushed[0], pair_sums[i].pushed[1], pair_sums[i].pushed[2]); }
-// m, of its place: after an implicit substep impulses change velocities alone, because forces that balance would throw
-// back what is moved against them.
-#define MOVED_BY(stopped, pushed) (IMPLICIT != 0 ? pushed : stopped + pushed)
 #if RIGID_CONTACT
 #include "contact/bodies/hard.glsl"
 vec3 placed_by(uint i) {
   uint b = hard_body_of(i);
   if (b != NONE) return hard_motion(b, arm_at_start(b, i, way_of(i)));
-  return MOVED_BY(stopped_by(i), pushed_by(i));
+  return stopped_by(i) + pushed_by(i);
 }
 #else
 uint hard_body_of(uint i) { return NONE; }
-vec3 placed_by(uint i) { return MOVED_BY(stopped_by(i), pushed_by(i)); }
+vec3 placed_by(uint i) { return stopped_by(i) + pushed_by(i); }
 #endif
 bool is_soft(SurfacePair pair) {
   return hard_body_of(pair.vertices[0]) == NONE && hard_body_of(pair.vertices[3]) == NONE;
@@ -93,7 +90,7 @@ void move(uint i) {
   bool is_free = own.inverse_mass > 0.0;
   if (!is_free && speed.high == vec3(0.0)) return;  // not even led
   DoubleSingle x = DoubleSingle(own.high, own.low), v = DoubleSingle(speed.high, speed.low);
-  vec3 moved = MOVED_BY(stopped, pushed), way = way_of(i) + moved;
+  vec3 moved = stopped + pushed, way = way_of(i) + moved;
   vec4 listed = texelFetch(listed_places, int(i));
   vec3 before = (x.high - listed.xyz) - way_of(i);
   float limit = uintBitsToFloat(floatBitsToUint(listed.w) & ~PAIRED);
@@ -105,15 +102,10 @@ void move(uint i) {
     v = DoubleSingle(part * v.high, part * v.low);
   }
   write_moved(i, own, x, v, speed.work);
-#if IMPLICIT
-  // BDF2 goes on from what the substep did to the vertex: impulses are part of that.
-  vectors[GAIN * VERTICES + i].xyz += (stopped + turned) * params.inverse_h;
-  vectors[DISPLACEMENT * VERTICES + i].xyz += stopped;
-#endif
 }
 void act(uint p) {
   SurfacePair pair = pairs[p];
-  if (pair.push > 0.0 && is_soft(pair)) turn(pair);
+  if (IMPLICIT == 0 && pair.push > 0.0 && is_soft(pair)) turn(pair);  // an implicit step has done what it does
   limit_ways(pair);
   memoryBarrierBuffer();
   uint left[4];

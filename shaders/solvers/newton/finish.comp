@@ -2,6 +2,16 @@
 // vertex.
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"
+#if TOUCHING
+#include "contact/bodies/limit.glsl"
+// How much of its way a vertex goes that has no pair, so that it stays where pairs were listed for.
+float listed_part(uint i, DoubleSingle x, vec3 u) {
+  vec4 listed = texelFetch(listed_places, int(i));
+  if ((phases & TOGETHER) == 0u || floatBitsToInt(listed.w) <= 0) return 1.0;
+  float whole = length(u);
+  return whole > 0.0 ? length(within_limit(listed, x, u)) / whole : 1.0;
+}
+#endif
 #if MOVING_SOLIDS
 // W, of the obstacles that move: what holds the vertex, what pushed it out at the end, and friction, along their
 // velocities.
@@ -75,6 +85,10 @@ void main() {
       u = kept_out(x, u);
       load = motions[body].load, falls = falls && motions[body].held == 0.0;
     }
+#if TOUCHING
+    float part = listed_part(i, x, u);
+    u *= part;
+#endif
     v = (u - offset.xyz) / offset.w;
     if (falls) v += (0.5 * params.h) * params.gravity;
     for (int k = 0; k < obstacle_count(); ++k) {

@@ -17,7 +17,18 @@ const uint REST = 12u;         // position; bits: the number of the body
 const uint FRICTION = 13u;     // by obstacles, N; bits of what holds the vertex
 const uint START = 14u;        // Newton's furthest start, where bodies start rigidly; 1: of a stiff body that is held
 const uint LEFT = 15u;         // of friction by the last step, N; 1: the vertex slipped
-const uint SLOTS = 16u;
+// Sums of fixed-point integers over the pairs of surfaces that act on a vertex (pressed.glsl).
+const uint PRESS = 16u;      // force, N, or a product with the pairs' part of the matrix, in high quanta
+const uint PRESS_LOW = 17u;  // what is left of that, in low ones
+const uint BLOCK = 18u;      // the pairs' part of A's 3x3 block: xx, yy, zz
+const uint BLOCK2 = 19u;     // xy, xz, yz
+const uint HELD = 20u;       // what of BLOCK comes from surfaces that are fixed
+const uint HELD2 = 21u;      // likewise of BLOCK2
+const uint MOVED = 22u;      // displacement, for press.comp
+// N/m, the body's own part of A's 3x3 block in the last substep.
+const uint OWN = 23u;        // xx, yy, zz; m, how far pairs press it
+const uint OWN2 = 24u;       // xy, xz, yz; m, how far they pressed it in the substep before
+const uint SLOTS = 25u;
 const uint KNOWN = 0x80000000u;
 
 // An edge of the matrix: the columns of the block in its first vertex's row and second one's column. Their w are the
@@ -45,6 +56,7 @@ struct BodyRange {
 // touches something: sound crosses it within a few substeps, which BDF2 does not follow.
 #define STIFF_BODY 0.05
 #define AGAIN 65536u  // with an iteration: it is of a second round, which linearises where the first has ended
+#define TOGETHER 131072u  // with an iteration: bodies that may touch are solved as one system
 // A vertex's share of an aggregate.
 #define PACKED_SHARE(aggregate, weight) ((aggregate) << 16 | (weight))
 #define SHARE_AGGREGATE(share) ((share) >> 16)

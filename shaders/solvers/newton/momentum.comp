@@ -51,7 +51,7 @@ float[6] solved(float b[6]) {
 
 shared float totals[4u * MOMENTUM_COLUMNS];
 vec3 total3(uint at) { return vec3(totals[at], totals[at + 1u], totals[at + 2u]); }
-void write_motion(uint body, DoubleSingle origin) {
+BodyMotion motion_of(uint body, DoubleSingle origin) {
   float mass = totals[3u], K[6][6], b[6], reach = sqrt((totals[MATRIX_AT + 15u] + totals[MATRIX_AT + 18u]) / mass);
   // Turns are measured by how far they take vertices, which makes all six unknowns lengths.
   uint at = MATRIX_AT;
@@ -65,7 +65,6 @@ void write_motion(uint body, DoubleSingle origin) {
     responses[body].inverse[row] =
         inverse_matrix[row / 6u][row % 6u] / (row < 18u ? 1.0 : reach) / (row % 6u < 3u ? 1.0 : reach);
 #endif
-  if (gl_LocalInvocationIndex != 0u) return;
   float q[6] = solved(b), rest[6];
   for (int i = 0; i < 6; ++i) {  // again for what rounding left
     rest[i] = b[i];
@@ -81,7 +80,7 @@ void write_motion(uint body, DoubleSingle origin) {
   DoubleSingle middle = add_double(origin, centre);
   vec4 turn = vec4(good && angle > 0.0 ? w * (sin(0.5 * angle) / angle) : vec3(0.0), good ? cos(0.5 * angle) : 1.0);
 #if AT_START
-  responses[body].arm = vec4(centre, 0.0);
+  if (gl_LocalInvocationIndex == 0u) responses[body].arm = vec4(centre, 0.0);
 #endif
   vec3 push = total3(PUSH_AT), need = total3(NEED_AT) + mass * displacement;
   // At the start there is no residual to compare with.
@@ -89,7 +88,7 @@ void write_motion(uint body, DoubleSingle origin) {
   float held = dot(push, push) > 0.0 ? 1.0 : 0.0;
   float is_whole = good && AT_START == 1 && is_stiff(body) ? 1.0 : 0.0;
   displacement = good ? displacement : vec3(0.0);
-  motions[body] = BodyMotion(turn, displacement, load, middle.high, held, middle.low, is_whole);
+  return BodyMotion(turn, displacement, load, middle.high, held, middle.low, is_whole);
 }
 
 float sums[4 * MOMENTUM_COLUMNS];
@@ -116,23 +115,48 @@ void add_up() {
     barrier();
   }
 }
+// The free bodies that a motion is of: one, or in a step's end those of an island.
+struct Members {
+  uint island;  // NO_ISLAND: `first` alone
+  uint first, count;
+  bool are_free;  // all that the island has
+};
+#define NO_ISLAND 0xffffffffu
+bool is_member(Members m, uint number) {
+  return m.island == NO_ISLAND ? number == m.first : islands[free_bodies[number]] == m.island;
+}
+Members members_with(uint number) {
+  Members m = Members(NO_ISLAND, number, 1u, true);
+  if (AT_START == 1 || BODIES == 1u || (phases & TOGETHER) == 0u) return m;
+  m = Members(islands[free_bodies[number]], FREE_BODIES, 0u, true);
+  uint bodies_of = 0u;
+  for (uint b = 0u; b < BODIES; ++b)
+    if (islands[b] == m.island) ++bodies_of;
+  for (uint n = 0u; n < FREE_BODIES; ++n)
+    if (is_member(m, n)) m.first = min(m.first, n), ++m.count;
+  m.are_free = m.count == bodies_of;
+  return m;
+}
 // Adds the work-groups' sums up into `totals`, which are read side by side, because each takes long to arrive.
-void add_up_parts(uint number) {
+void add_up_parts(Members members) {
   const uint count = 4u * MOMENTUM_COLUMNS, at_once = AT_A_TIME * GROUP_SIZE / count;
   uint lane = gl_LocalInvocationIndex;
   float sum = 0.0;
-  for (uint begin = 0u; begin < PARTS; begin += at_once) {
-    uint here = min(at_once, PARTS - begin);
-    for (uint k = lane; k < here * count; k += GROUP_SIZE) {
-      uint part = number * PARTS + begin + k / count;
-      cells[k / GROUP_SIZE][k % GROUP_SIZE] = momentum_sums[part].columns[k % count / 4u][k % 4u];
+  for (uint number = members.first; number < FREE_BODIES; ++number) {
+    if (!is_member(members, number)) continue;
+    for (uint begin = 0u; begin < PARTS; begin += at_once) {
+      uint here = min(at_once, PARTS - begin);
+      for (uint k = lane; k < here * count; k += GROUP_SIZE) {
+        uint part = number * PARTS + begin + k / count;
+        cells[k / GROUP_SIZE][k % GROUP_SIZE] = momentum_sums[part].columns[k % count / 4u][k % 4u];
+      }
+      barrier();
+      for (uint p = 0u; p < here && lane < count; ++p) {
+        uint k = p * count + lane;
+        sum += cells[k / GROUP_SIZE][k % GROUP_SIZE];
+      }
+      barrier();
     }
-    barrier();
-    for (uint p = 0u; p < here && lane < count; ++p) {
-      uint k = p * count + lane;
-      sum += cells[k / GROUP_SIZE][k % GROUP_SIZE];
-    }
-    barrier();
   }
   if (lane < count) totals[lane] = sum;
   barrier();
@@ -200,6 +224,9 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
   add3(4u, cross(arm, f));
   sums[7] += aim.w > 0.0 ? 0.0 : 1.0;
   add3(8u, aim.w * arm);
+#if TOUCHING
+  if (aim.w > 0.0 && ((phases & TOGETHER) != 0u || motions[body].held > 0.0)) B += pressed_block(i, BLOCK, BLOCK2);
+#endif
   add_block(arm, B);
 }
 #else
@@ -212,6 +239,14 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
   vec3 u = start_displacement(i, x) + now.step, arm = relative(x, origin) + u, f = aim.w * (aim.xyz - u);
   add3(NEED_AT, -f);
   mat3 B = mat3(aim.w);
+#if TOUCHING
+  if (aim.w > 0.0) {
+    vec3 push = pressed(i);
+    mat3 block = pressed_block(i, HELD, HELD2);
+    f += push, B += block;
+    if (block[0][0] + block[1][1] + block[2][2] > 0.0) add3(PUSH_AT, push);
+  }
+#endif
   uint holds = held_by(i), touched = floatBitsToUint(at(INVERSE2, i).w);
   float slides = at(INVERSE, i).w;
   if (friction_limit(i, touched) > 0.0) {
@@ -242,27 +277,35 @@ void add_vertex(uint i, uint body, DoubleSingle origin) {
 }
 #endif
 
+void write_motion(Members members, BodyMotion motion) {
+  if (!members.are_free) motion.turn = vec4(0.0, 0.0, 0.0, 1.0), motion.displacement = vec3(0.0), motion.load = 1.0;
+  for (uint n = members.first; n < FREE_BODIES; ++n)
+    if (is_member(members, n)) motions[free_bodies[n]] = motion;
+}
 void main() {
   uint lane = gl_LocalInvocationIndex, number = group_index() / PARTS, part = group_index() % PARTS;
   if (number >= FREE_BODIES) return;
   uint body = free_bodies[number];
+  Members members = members_with(number);
   uint first = range_of(body).first, end = range_of(body).end, slice = (end - first + PARTS - 1u) / PARTS;
-  DoubleSingle origin = position(first);
+  DoubleSingle origin = position(range_of(free_bodies[members.first]).first);
   for (int k = 0; k < 4 * MOMENTUM_COLUMNS; ++k) sums[k] = 0.0;
   for (uint i = first + part * slice + lane; i < min(first + (part + 1u) * slice, end); i += GROUP_SIZE)
     add_vertex(i, body, origin);
   add_up();
-  if (PARTS > 1u) {
+  if (PARTS * members.count > 1u) {
     for (uint k = lane; k < 4u * MOMENTUM_COLUMNS; k += GROUP_SIZE)
       momentum_sums[group_index()].columns[k / 4u][k % 4u] = totals[k];
     memoryBarrierBuffer();
     barrier();
-    if (lane == 0u) last = atomicAdd(parts_done[number], 1u) + 1u == PARTS;
+    if (lane == 0u) last = atomicAdd(parts_done[members.first], 1u) + 1u == PARTS * members.count;
     barrier();
     if (!last) return;
     memoryBarrierBuffer();
-    add_up_parts(number);
+    add_up_parts(members);
   }
-  write_motion(body, origin);
-  if (lane == 0u) parts_done[number] = 0u;
+  BodyMotion motion = motion_of(body, origin);
+  if (lane != 0u) return;
+  if (AT_START == 0 || (phases & TOGETHER) == 0u) write_motion(members, motion);
+  parts_done[members.first] = 0u;
 }

@@ -13,7 +13,7 @@ layout(local_size_x = GROUP_SIZE) in;
 
 #include "solvers/newton/layout.glsl"
 uint iteration() { return phases % AGAIN; }
-uint round_of_newton() { return phases / AGAIN; }
+uint round_of_newton() { return (phases / AGAIN) & 1u; }
 layout(std430) restrict buffer Vectors { vec4 vectors[]; };  // by slot, then vertex
 vec4 at(uint slot, uint i) { return vectors[slot * VERTICES + i]; }
 void put(uint slot, uint i, vec3 v, float w) { vectors[slot * VERTICES + i] = vec4(v, w); }
@@ -77,6 +77,7 @@ layout(std430) restrict buffer Sums {
   float coarse_r[UNKNOWNS + 3u], coarse_q[max(UNKNOWNS, 1u)], coarse_y[max(UNKNOWNS, 1u)];
   float is_free[max(AGGREGATES, 1u)];  // 1: no obstacle holds the aggregate, else 0
   float first_rz[BODIES];              // r . z of a step's first iteration that was healthy
+  uint islands[BODIES];                //  of bodies that press each other, the first
   uint bad_starts[6u * BODIES];        // by round, how many of a body's tets each start turns over or blows up
   coherent uint products_done[BODIES], parts_done[max(FREE_BODIES, 1u)];  // work-groups that have added their sums
 };
@@ -101,6 +102,22 @@ vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.
 vec4 opposite(vec4 q) { return vec4(-q.xyz, q.w); }
 DoubleSingle position(uint i) { return DoubleSingle(positions[i].high, positions[i].low); }
 bool is_step_known(uint i) { return (floatBitsToUint(at(DISPLACEMENT, i).w) & KNOWN) != 0u; }
+
+#if TOUCHING
+#include "solvers/newton/pressed.glsl"
+vec3 pressed(uint i) { return pressed_in(floatBitsToInt(at(PRESS, i)), floatBitsToInt(at(PRESS_LOW, i))); }
+vec3 taken_press(uint i) {
+  vec3 sum = pressed(i);
+  put(PRESS, i, vec3(0.0), 0.0);
+  put(PRESS_LOW, i, vec3(0.0), 0.0);
+  return sum;
+}
+// N/m, the pairs' part of A's 3x3 block, or in HELD and HELD2 that of fixed surfaces.
+mat3 pressed_block(uint i, uint slot, uint slot2) {
+  vec3 d = vec3(floatBitsToInt(at(slot, i).xyz)), a = vec3(floatBitsToInt(at(slot2, i).xyz));
+  return mat3(d.x, a.x, a.y, a.x, d.y, a.z, a.y, a.z, d.z) * (at(AIM, i).w * BLOCK_QUANTUM);
+}
+#endif
 
 // u, moved out of the obstacles that x + u is in.
 vec3 kept_out(DoubleSingle x, vec3 u) {
@@ -207,7 +224,13 @@ struct Lengths {
 // body, and is left out of the rest of the step.
 Lengths lengths(uint iteration, uint body) {
   Iteration before = iterations[2u * body + ((iteration - 1u) & 1u)];
-  float rz = dots[body].x, curvature = dots[body].y;
+  vec2 sums = dots[body];
+  if (BODIES > 1u && (phases & TOGETHER) != 0u) {
+    sums = vec2(0.0);
+    for (uint b = 0u; b < BODIES; ++b)
+      if (islands[b] == islands[body]) sums += dots[b];
+  }
+  float rz = sums.x, curvature = sums.y;
   Lengths l = Lengths(0.0, 0.0, rz, before.coarse != 0u);
   if (before.rz > 0.0) {
     l.beta = rz / before.rz;

@@ -59,6 +59,9 @@ void main() {
     for (uint k = 1u; k < LANES; ++k) sum += parts[lane + k];
     float inertia = at(AIM, i).w, slides = at(INVERSE, i).w;
     sum += inertia * own;
+#if TOUCHING
+    sum += taken_press(i);
+#endif
     if (slides > 0.0)
       sum += slides * without(free_part(own, floatBitsToUint(at(INVERSE2, i).w), i), slip_direction(i));
     if (!(inertia > 0.0)) sum = vec3(0.0);

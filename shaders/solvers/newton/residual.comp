@@ -31,8 +31,15 @@ void finish(uint i, vec3 force, vec3 diagonal, vec3 across) {
   if (aim.w > 0.0) {
     vec3 u = start_displacement(i, x);
     r = -force - aim.w * (u - aim.xyz);
+#if TOUCHING
+    put(OWN, i, diagonal + aim.w, 0.0), put(OWN2, i, across, at(OWN2, i).w);
+    r += taken_press(i);
+#endif
     mat3 D = mat3(diagonal.x + aim.w, across.x, across.y, across.x, diagonal.y + aim.w, across.z, across.y, across.z,
                   diagonal.z + aim.w);
+#if TOUCHING
+    D += pressed_block(i, BLOCK, BLOCK2);
+#endif
     float limit = friction_limit(i, touched);
     if (limit > 0.0) {
       slides = grip * aim.w;

@@ -13,7 +13,7 @@ vec3 predict(uint i, bool history, float part) {
   }
   float drag = 1.0 + params.drag * h;
   vec3 aim = offset + (h * speed + (part * h * h) * params.gravity) / drag;
-  if (fixed_) offset = aim = vec3(0.0);
+  if (fixed_) offset = vec3(0.0), aim = params.h * speed;  // the way that it was led
   put(AIM, i, aim, fixed_ ? 0.0 : drag / (own.inverse_mass * h * h));
   put(OFFSET, i, offset, h);
   return aim;

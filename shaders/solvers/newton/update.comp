@@ -17,6 +17,9 @@ void restrict_to(uint aggregate, uint slot, Lengths l) {
     float weight = float(members[k].y) * WEIGHT_UNIT;
     vec3 f = weight * turned(back, free_part(at(slot, i).xyz, held, i));
     if (held != 0u) holds = 1.0;
+#if TOUCHING
+    if (at(BLOCK, i).xyz != vec3(0.0)) holds = 1.0;
+#endif
     force += f;
     torque += cross((at(REST, i).xyz - centre.xyz) / centre.w, f);
   }
@@ -44,7 +47,7 @@ Lengths lengths_in(uint body) {
 // Leaves a body's iteration to its next.
 void note(uint body, Lengths l) {
   iterations[2u * body + (iteration() & 1u)] = Iteration(l.rz, l.alpha, l.coarse ? 1u : 0u);
-  if (phases == 0u) first_rz[body] = 0.0;
+  if (iteration() == 0u && round_of_newton() == 0u) first_rz[body] = 0.0;
   else if (!(first_rz[body] > 0.0)) first_rz[body] = l.rz;
   if (iteration() == 1u && dots[body].x > 0.0) atomicMin(least, floatBitsToUint(l.alpha));
 }

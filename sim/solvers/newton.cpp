@@ -86,8 +86,8 @@ constexpr std::size_t press_bytes = 32;  // of a Press in newton/press.glsl
 // The passes that need a Sim's pairs of surfaces, which are made after its solver.
 void make_presses(Sim& sim, Newton& n) {
   const Pairs& p = sim.pairs;
-  const auto pass = [&](const char* name, std::vector<std::string> defines, const std::string& more) {
-    defines.push_back(more);
+  const auto pass = [&](const char* name, std::vector<std::string> defines, const char* more = nullptr) {
+    if (more) defines.push_back(more);
     Pass made{Program::compute(fmt::format("solvers/newton/{}.comp", name), {}, defines)};
     made.counts_at = p.ranges.counts.at + offsetof(pair_layout::PairCounts, pair_groups);
     return made;
@@ -95,7 +95,7 @@ void make_presses(Sim& sim, Newton& n) {
   std::vector<std::string> of_pairs = n.vertex_defines;
   of_pairs.insert(of_pairs.end(), p.defines.begin(), p.defines.end());
   n.meet = pass("meet", of_pairs, "MEETS 1");
-  n.islands = pass("islands", n.defines, "MEETS 1");
+  n.islands = pass("islands", n.defines);
   n.islands.work_groups = 1;
   const std::size_t bodies = sim.model->bodies.size();
   n.touches = Buffer("bodies that press each other", std::vector<GLuint>(bodies * ((bodies + 31) / 32)));
@@ -140,16 +140,18 @@ void run_substep(Sim& sim, Newton& n) {
     sim.recorder.use(n.meet.program).set("push_limit", float(sim.plan.h / OffsetContact::recovery));
     run_kernel(sim, n.meet), run_kernel(sim, n.islands);
   }
-  if (n.place) run_kernel(sim, n.start_motion), run_kernel(sim, n.place, changed | together);
-  if (n.place && together) run_kernel(sim, n.start_motion, together);  // how bodies answer a force now
+  if (n.place) {
+    run_kernel(sim, n.start_motion), run_kernel(sim, n.place, changed | together);
+    if (together) run_kernel(sim, n.start_motion, together);  // how bodies answer a force now
+  }
   run_round(sim, n, iterations, together);
   const unsigned again =
       iterations > 0 && sim.adaptive.substep_factor > 1 && sim.adaptive.hard_readbacks > 0 ? AGAIN : 0;
   if (again) run_kernel(sim, n.again, iterations | together), run_round(sim, n, iterations, again | together);
-  if (together) run_kernel(sim, n.end_moves, iterations | again | together);
-  if (together) run_kernel(sim, n.press_at_end, iterations | again | together);
-  if (n.momentum && iterations > 0) run_kernel(sim, n.momentum, iterations | again | together);
-  run_kernel(sim, n.finish, iterations | again | together);
+  const unsigned end = iterations | again | together;
+  if (together) run_kernel(sim, n.end_moves, end), run_kernel(sim, n.press_at_end, end);
+  if (n.momentum && iterations > 0) run_kernel(sim, n.momentum, end);
+  run_kernel(sim, n.finish, end);
 }
 
 void begin_refresh(Sim& sim, Newton& n) {

@@ -5,15 +5,10 @@
 layout(local_size_x = PAIR_GROUP) in;
 #include "contact/bodies/pairs.glsl"
 #include "contact/bodies/belonging.glsl"
-#include "contact/friction.glsl"
+#include "contact/bodies/pair_friction.glsl"
 uniform uint side;         // of vertices' shares: this substep's
 uniform float push_limit;  // offsets in a substep
 shared uint touching, nearest;
-#if BODY_FRICTION
-float friction_between(uint a, uint b) { return mean_friction(body_friction(a), body_friction(b)); }
-#else  // with a mean of equal values the compiler would round what follows differently
-float friction_between(uint a, uint b) { return params.friction; }
-#endif
 #if RIGID_CONTACT
 #include "contact/bodies/hard.glsl"
 layout(std430) restrict buffer HardPairs {

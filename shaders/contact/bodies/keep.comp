@@ -1,5 +1,5 @@
-// Impulses of hard bodies' pairs, or forces of pairs in implicit steps, from one list of pairs to the next: a table by the numbers of both parts, by open
-// addressing. There is an invocation per pair.
+// Impulses of hard bodies' pairs, or forces of pairs in implicit steps, from one list of pairs to the next: a table by
+// the numbers of both parts, by open addressing. There is an invocation per pair.
 #include "types.glsl"
 #include "double_single.glsl"
 layout(local_size_x = PAIR_GROUP) in;

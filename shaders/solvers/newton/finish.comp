@@ -86,8 +86,7 @@ void main() {
       load = motions[body].load, falls = falls && motions[body].held == 0.0;
     }
 #if TOUCHING
-    float part = listed_part(i, x, u);
-    u *= part;
+    u *= listed_part(i, x, u);
 #endif
     v = (u - offset.xyz) / offset.w;
     if (falls) v += (0.5 * params.h) * params.gravity;

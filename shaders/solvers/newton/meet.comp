@@ -5,13 +5,12 @@
 layout(local_size_x = PAIR_GROUP) in;
 #include "contact/bodies/pairs.glsl"
 #include "contact/bodies/belonging.glsl"
-#include "contact/friction.glsl"
+#include "contact/bodies/pair_friction.glsl"
 #include "solvers/newton/press.glsl"
 #include "solvers/newton/pressed.glsl"
 #include "solvers/newton/touches.glsl"
 uniform float push_limit;  // offsets in a substep
 shared uint touching, nearest;
-float friction_between(uint a, uint b) { return mean_friction(body_friction(a), body_friction(b)); }
 // The stiffness of a pair, over that with which its vertices resist by themselves.
 const float firm = 10.0;
 void add_integers(uint slot, uint i, vec3 numbers) {

@@ -5,12 +5,11 @@
 layout(local_size_x = PAIR_GROUP) in;
 #include "contact/bodies/lists.glsl"
 #include "contact/bodies/proximity.glsl"
-#include "contact/friction.glsl"
+#include "contact/bodies/pair_friction.glsl"
 layout(std430) restrict buffer Pairs { SurfacePair pairs[]; };
 #include "solvers/newton/words.glsl"
 #include "solvers/newton/press.glsl"
 #include "solvers/newton/pressed.glsl"
-float friction_between(uint a, uint b) { return mean_friction(body_friction(a), body_friction(b)); }
 const float kept_friction = 0.25;
 vec3 moved_by(uint i) { return at(PRESS_AT == 1 ? SEARCH : MOVED, i).xyz; }
 void add_force(uint i, vec3 force, float quantum) {

@@ -32,7 +32,7 @@ std::vector<Settings> candidates(const Settings& own) {
   set_mode(base, "node", "auto");
   base.iterations = base.substeps = 1;
   std::vector<Settings> all;
-  if (compliant(own)) {
+  if (any_material(own, compliant)) {
     all = {base};  // masses are split; over-relaxation leaves their compliance alone and gains little
   } else {
     base.omega = 1.5, base.mass_splitting = true;
@@ -104,13 +104,11 @@ Motion motion_of_run(Sim& sim, long steps) {
   return motion;
 }
 
-bool has_forces(const Settings& settings) { return compliant(settings) && !kind_without_force(settings); }
-
 double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
                            long steps) {
-  if (smoothed(settings) && !solver_mode(settings).smoothed) {  // what is right is of smoothed tets, as asked for
+  if (any_material(settings, smoothed) && !solver_mode(settings).smoothed) {  // what is right is of smoothed tets, as asked for
     Settings own = settings;
     set_mode(own, "newton", "auto");
     return choose_solver(model, own, budget_ms, steps);
@@ -119,7 +117,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
   std::optional<Motion> right = right_motion(*model, settings);
   if (right) choice.judged = "motion";
   for (const Settings& candidate : candidates(settings)) {
-    if (smoothed(settings) && !solver_mode(candidate).smoothed) continue;
+    if (any_material(settings, smoothed) && !solver_mode(candidate).smoothed) continue;
     const bool first = choice.trials.empty(), as_it_is = candidate == settings || solver_mode(candidate).leapfrog;
     SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
     Sim sim = create_sim(model, candidate);
@@ -129,7 +127,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
     if (first && !right) {
       if (const auto found = rigid_motion(*model, settings, steps)) {
         right = found, choice.judged = "motion";
-      } else if (compliant(settings) || hard(settings)) {
+      } else if (any_material(settings, compliant) || all_materials(settings, hard)) {
         Sim fine = finer_than(trial.settings, model);
         // What a slow machine can afford: the reference takes as long as all trials together.
         const double seconds = 1e-3 * fine.plan.substeps / double(sim.plan.substeps) * budget_ms;
@@ -181,7 +179,7 @@ constexpr double hard_impact = 0.5;  // of Young's modulus; a body of 10 kPa tha
 double impact_strain(const Model& model, const Settings& settings) {
   double most = 0;
   for (const Body& body : model.bodies) {
-    const Material& material = body_material(body, settings);
+    const Material& material = material_of(settings, body.number);
     if (!settings.ground || body.is_sheet() || material.material == "none") continue;
     double fastest = 0;
     bool held = false;
@@ -204,7 +202,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   if (!std::exchange(scene.mode_open, false)) return std::nullopt;
   Settings& s = scene.settings;
   if (!has_forces(s)) {
-    if (!scene.by_device || !hard(s) || !is_software_renderer()) return std::nullopt;
+    if (!scene.by_device || !all_materials(s, hard) || !is_software_renderer()) return std::nullopt;
     set_mode(s, "cpu-fast", scene.name);
     return "cpu-fast: on a software renderer faster than node and nearer to what is right";
   }
@@ -252,7 +250,7 @@ std::string describe(const SolverChoice& choice) {
   const Plan& plan = best.plan;
   return fmt::format("{}, {} iteration{} x {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps",
                      s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps,
-                     plan.substeps == 1 ? "" : "s", s.omega, s.mass_splitting && !compliant(s) ? ", masses split" : "",
+                     plan.substeps == 1 ? "" : "s", s.omega, s.mass_splitting && !any_material(s, compliant) ? ", masses split" : "",
                      best.ms, choice.budget_ms,
                      fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the right motion"
                                               : choice.judged == "finer steps" ? "{:.2g} % from finer steps"

@@ -33,8 +33,6 @@ struct SolverChoice {
 
 /// Positions of a run, some twenty times on its way, for others to be held against.
 Motion motion_of_run(Sim& sim, long steps);
-/// What modes explicit and newton can take.
-bool has_forces(const Settings& settings);
 /// The budget without --budget-ms: a tenth of the time that a step simulates.
 double default_budget_ms(const Settings& settings);
 /// Tries the scene's own setting, and one iteration per substep in mode node, with two over-relaxations and

@@ -117,7 +117,7 @@ std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
   const double size = s.loaded.model->size, far = 100 * (size + double(s.camera.distance));
   const auto& all = s.loaded.scene.obstacles;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const MovingObstacle obstacle = moving_obstacle(all[i], simulated_time(s.loaded.sim()), 0, 0, 0);
+    const MovingObstacle obstacle = moving_obstacle(all[i], simulated_time(s.loaded.sim()), 0);
     double t = 0, gap = 0;
     for (int turn = 0; turn < 400 && t < far; ++turn) {
       gap = obstacle.surface_at(glm::dvec3(ray.origin) + t * glm::dvec3(ray.direction)).distance;

@@ -107,7 +107,7 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
   text += array("Float32", "velocity", rows_of(model, state.velocities));
   text += array("Int32", "body", body_numbers(model)) + "</PointData>\n<CellData>\n";
   text += array("Float32", "volume_error", values[0]) + array("Float32", "strain", values[1]);
-  if (any_material(model, sim.settings, has_energy)) text += array("Float32", "energy_density", values[2]);
+  if (any_material(sim.settings, has_energy)) text += array("Float32", "energy_density", values[2]);
   return text + "</CellData>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_" + data +
          "\n</AppendedData>\n</VTKFile>\n";
 }

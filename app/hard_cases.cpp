@@ -49,7 +49,7 @@ Settings settings_of(const Scene& scene, std::string mode) {
     const Plan plan = plan_for(settings);
     settings.substeps = plan.iterations, settings.iterations = plan.substeps;
   }
-  if (compliant(settings)) settings.omega = std::min(settings.omega, 2.0);  // soft variants of any case
+  if (any_material(settings, compliant)) settings.omega = std::min(settings.omega, 2.0);  // soft variants of any case
   set_mode(settings, mode, where);
   check_settings(settings, where);
   return settings;
@@ -60,7 +60,7 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
   Sim sim = create_sim(model, settings, {.count_guards = true});
   Metrics metrics = create_metrics(sim);
   const MeasuredRun run = run_loop(sim, &metrics, steps);
-  const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps, hard(settings)) : std::nullopt;
+  const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps, all_materials(settings, hard)) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
   row.update({{"steps", run.steps},
               {"recovered_at_step", recovered ? ordered_json(*recovered) : nullptr},

@@ -16,6 +16,7 @@
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
+#include "sim/model/material.h"
 #include "sim/reference/reference.h"
 
 namespace tetpbd {
@@ -53,9 +54,12 @@ struct FrameWriter {
     const double rate = std::clamp(1 / (double(video_every) * dt), 1.0, 120.0);  // of real time
     if (run.view.colour == Colour::motion && !right)
       throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
-    if (run.view.colour == Colour::residual && compliant(scene.settings))
+    if (run.view.colour == Colour::residual && any_material(scene.settings, compliant))
       throw Error("constraints with compliance give way as they should", "--colour residual",
                   "take --colour energy or stretch");
+    if (run.view.colour == Colour::energy && has_own_materials(scene.settings))
+      throw Error("bodies of different materials have no common scale of energy", "--colour energy",
+                  "take --colour stretch or volume");
     if (run.view.colour == Colour::energy && scene.settings.material == "none")
       throw Error("there is no material", "--colour energy", "give one, as in --material neo-hookean");
     if (!run.camera_path.empty()) path = read_camera_path(run.camera_path);
@@ -149,6 +153,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                             ? sim.longest_substep
                             : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}),
                         fit_of(*sim.model));
+  j["bodies"] = bodies_json(sim);
   for (const BodyFill& fill : sim.model->fills)
     if (!fill.what.empty()) j["fills"].push_back({{"body", sim.model->bodies[fill.body].name}, {"what", fill.what}});
   for (const StartMotion& m : sim.model->start_motions)

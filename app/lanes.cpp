@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "app/auto_solver.h"
+#include "app/bodies.h"
 #include "sim/error.h"
 #include "sim/model/did_you_mean.h"
 #include "sim/model/material.h"
@@ -42,8 +43,9 @@ std::string describe(const Lane& lane, bool material) {
   };
   add(lane.sim.plan.substeps, "substep");
   add(lane.sim.plan.iterations, "iteration");
-  if (material && s.material != "none") text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
-  if (smoothed(in_mode(s, s))) text += ", smoothed";
+  if (material && s.material != "none" && !has_own_materials(s))
+    text += fmt::format(", {} {:.3g} Pa", s.material, s.young_modulus);
+  if (solver_mode(s).smoothed && any_material(s, smoothed)) text += ", smoothed";
   if (lane.stopped()) text += fmt::format(": not finite from step {} on", lane.sim.check.found->step);
   return text;
 }
@@ -141,9 +143,9 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     const Parameter* row = find_parameter(word.substr(0, equals));
     if (row && shared_by_lanes(*row))
       throw Error(fmt::format("{} is that of all lanes", row->name), where, "give it as a flag or in the scene");
-    if (equals != std::string::npos && row)
-      set_parameter(settings, *row, word.substr(equals + 1), where);
-    else if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
+    if (equals != std::string::npos && set_by_name(settings, word.substr(0, equals), word.substr(equals + 1), where))
+      continue;
+    if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
       throw Error(fmt::format("'{}' is no way to solve", word), where,
                   did_you_mean(word, preset_names(solver_presets())) +
                       fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",

@@ -204,7 +204,7 @@ void open_scene(Arguments& a) {
   if (!a.run.replay.empty()) return;
   a.opened = load_scene(a.scene, a.overrides);
   std::vector<std::string> modes;
-  if (a.opened->mode_open && compliant(a.opened->settings)) modes = {"explicit", "newton"};  // what it may be
+  if (a.opened->mode_open && any_material(a.opened->settings, compliant)) modes = {"explicit", "newton"};  // what it may be
   if (a.run.lanes.empty()) note_unused(a.opened->settings, modes, a.overrides);
 }
 

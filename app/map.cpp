@@ -87,8 +87,8 @@ MapAxis map_axis(const std::string& text, const std::string& flag) {
 std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps,
                                  const std::function<void(long)>& progress) {
   if (auto known = right_motion(model, settings); known && known->kept.back() >= steps) return known;
-  if (!compliant(settings)) return rigid_motion(model, settings, steps);
-  if (kind_without_force(settings)) return std::nullopt;
+  if (!any_material(settings, compliant)) return rigid_motion(model, settings, steps);
+  if (!has_forces(settings)) return std::nullopt;
   const ConstraintSystem system = build_constraints(model, settings);
   return find_motion({model, system, settings, model.inverse_masses}, steps, {}, {}, progress);
 }

@@ -16,7 +16,7 @@ namespace {
 std::pair<const char*, const char*> usual_axes(const Settings& settings) {
   if (solver_mode(settings).leapfrog) return {"stability=0.2:1:8", "dt=0.001,0.002,0.005,0.01,0.02"};
   if (solver_mode(settings).implicit) return {"iterations=1,2,4,8,16", "dt=0.001,0.002,0.005,0.01,0.02"};
-  if (compliant(settings)) return {"iterations=1,2,4,8,16", "substeps=1,2,5,10,20"};
+  if (any_material(settings, compliant)) return {"iterations=1,2,4,8,16", "substeps=1,2,5,10,20"};
   return {"omega=0.5:4:8", "substeps=1,2,5,10,20"};
 }
 

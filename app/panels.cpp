@@ -11,6 +11,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "app/bodies.h"
 #include "app/ui.h"
 #include "app/widgets.h"
 #include "sim/contact/surfaces.h"
@@ -82,9 +83,9 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   if (name == "rigid_contact") {
     Settings on = settings;
     on.rigid_contact = true;
-    return moves_rigidly(on);
+    return any_moves_rigidly(on);
   }
-  if (name == "restitution") return settings.restitution != 0 || moves_rigidly(settings);
+  if (name == "restitution") return settings.restitution != 0 || any_moves_rigidly(settings);
   if (name == "ground_height") return settings.ground;
   if (name == "contact_distance") return bool(s.loaded.sim().pairs);
   if (name == "friction") return settings.ground || !s.loaded.scene.obstacles.empty();
@@ -100,10 +101,11 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
 template <class T>
 void automatic_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
   const Plan& plan = s.loaded.sim().plan;
-  const T decided = row.name == "iterations"         ? T(plan.iterations)
-                    : row.name == "substeps"         ? T(plan.substeps)
-                    : row.name == "contact_distance" ? T(Surfaces::offset_part * s.loaded.sim().pairs.edge)
-                                                     : T(smoothing_of(s.loaded.sim().settings));
+  const T decided = row.name == "iterations" ? T(plan.iterations)
+                    : row.name == "substeps" ? T(plan.substeps)
+                    : row.name == "contact_distance"
+                        ? T(Surfaces::offset_part * s.loaded.sim().pairs.edge)
+                        : T(smoothing_of(settings_for_body(s.loaded.sim().settings, s.loaded.body)));
   const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize("auto").x +
                     ImGui::GetStyle().ItemSpacing.x;
   T shown = value == automatic ? decided : value;
@@ -116,11 +118,12 @@ void automatic_widget(Session& s, const Parameter& row, const std::string& id, T
 }
 
 bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
-  const std::string usual = parameter_text(s.loaded.own, row), before = parameter_text(settings, row),
+  const Settings own = settings_for_body(s.loaded.own, s.loaded.body);
+  const std::string usual = parameter_text(own, row), before = parameter_text(settings, row),
                     back = before == usual ? "" : usual;
   if (const auto* word = std::get_if<std::string Settings::*>(&row.member)) {
     std::string& value = settings.**word;
-    if (row.name == "constraints") return words_widget(s, row, value, s.loaded.own.**word);
+    if (row.name == "constraints") return words_widget(s, row, value, own.**word);
     const auto chosen = combo(s, row.name, value, choices(row), help_text(row), usual);
     if (chosen) set_parameter(settings, row, *chosen, row.name);
     return value != before;
@@ -166,15 +169,22 @@ bool names(const std::string& pattern, const std::string& name) {
   return pattern.back() == '*' ? name.starts_with(pattern.substr(0, pattern.size() - 1)) : name == pattern;
 }
 
+// What the panel shows is of all bodies or of the chosen one.
+Settings shown_settings(const Session& s) { return settings_for_body(s.loaded.sim().settings, s.loaded.body); }
+void change_shown(Session& s, const Settings& wanted) {
+  if (!s.loaded.body) return change_settings(s, wanted);
+  change_settings(s, with_body_changed(s.loaded.sim().settings, wanted, *s.loaded.body, s.loaded.model->bodies.size()));
+}
+
 void draw_settings(Session& s, const Group& group) {
-  const Settings now = s.loaded.sim().settings;
+  const Settings now = shown_settings(s), own = settings_for_body(s.loaded.own, s.loaded.body);
   const auto differs = [](const Settings& a, const Settings& b, const Parameter& row) {
     return parameter_text(a, row) != parameter_text(b, row);
   };
   std::vector<const Parameter*> shown, rest;
   const auto put = [&](const Parameter& row, bool matters) {
     // What the scene itself sets matters there.
-    matters = matters || differs(s.loaded.own, Settings(), row);
+    matters = matters || differs(own, Settings(), row);
     if (has_effect(s, now, row)) (matters ? shown : rest).push_back(&row);
   };
   for (const Words* list : {&group.shown, &group.more})
@@ -191,10 +201,10 @@ void draw_settings(Session& s, const Group& group) {
   Settings wanted = now;
   bool changed = false;
   for (const Parameter* row : shown) changed |= parameter_widget(s, *row, wanted);
-  const bool unusual = std::ranges::any_of(rest, [&](const auto* row) { return differs(now, s.loaded.own, *row); });
+  const bool unusual = std::ranges::any_of(rest, [&](const auto* row) { return differs(now, own, *row); });
   if (!rest.empty() && more(s, group.name, unusual))
     for (const Parameter* row : rest) changed |= parameter_widget(s, *row, wanted);
-  if (changed) change_settings(s, wanted);
+  if (changed) change_shown(s, wanted);
 }
 
 // A choice among presets; `current`: the one that is set, if any.
@@ -248,12 +258,27 @@ void draw_solver(Session& s) {
   ImGui::TextWrapped("%s", describe(*choice).c_str());
 }
 
+// Which body the panel is of.
+void draw_body_choice(Session& s) {
+  const auto& bodies = s.loaded.model->bodies;
+  if (bodies.size() < 2) return;
+  const std::string all = has_own_materials(s.loaded.sim().settings) ? "all without their own" : "all";
+  Words words = {all};
+  for (const Body& body : bodies) words.push_back(fmt::format("{} {}", body.number, body.name));
+  const std::size_t now = s.loaded.body ? *s.loaded.body + 1 : 0;
+  const std::string help = "whose material, friction and restitution are shown and changed\nB: the one under the mouse";
+  if (const auto chosen = combo(s, "body", words[now], words, help)) {
+    const auto at = std::size_t(std::ranges::find(words, *chosen) - words.begin());
+    s.loaded.body = at > 0 ? std::optional(at - 1) : std::nullopt;
+  }
+}
+
 // What the body is made of, by name; its numbers are below.
 void draw_material(Session& s) {
-  Ways ways = ways_of(s.loaded.sim().settings, material_presets(),
+  draw_body_choice(s);
+  Ways ways = ways_of(shown_settings(s), material_presets(),
                       "a material by name, with its stiffness; for bodies that are to be soft");
-  if (const auto chosen = combo(s, "made of", ways.current, ways.words, ways.help))
-    change_settings(s, ways.to[*chosen]);
+  if (const auto chosen = combo(s, "made of", ways.current, ways.words, ways.help)) change_shown(s, ways.to[*chosen]);
 }
 
 void draw_run(Session& s) {

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "app/bodies.h"
 #include "app/commands.h"
 #include "app/edit_obstacles.h"
 #include "app/files.h"
@@ -21,6 +22,9 @@ ordered_json settings_text(const Settings& settings, const Settings* before) {
   for (const Parameter& row : parameters())
     if (const std::string text = parameter_text(settings, row); !before || text != parameter_text(*before, row))
       result[row.name] = text;
+  for (std::size_t b = 0; b < settings.bodies.size(); ++b)
+    if (!before || b >= before->bodies.size() || settings.bodies[b] != before->bodies[b])
+      result["bodies"][std::to_string(b)] = body_settings_json(settings.bodies[b]);
   return result;
 }
 
@@ -110,8 +114,19 @@ ordered_json hashes(Session& s) {
   return result;
 }
 
-void set_all(Settings& settings, const ordered_json& values, const std::string& where) {
+// Of a model of `count` bodies.
+void set_all(Settings& settings, const ordered_json& values, std::size_t count, const std::string& where) {
   for (const auto& [name, value] : values.items()) {
+    if (name == "bodies") {
+      for (const auto& [number, own] : value.items()) {
+        const std::size_t body = std::stoul(number);
+        if (body >= count)
+          throw Error(fmt::format("there is no body {}", body), where, fmt::format("count from 0 to {}", count - 1));
+        settings.bodies.resize(count);
+        settings.bodies[body] = read_body_settings(own, settings, fmt::format("bodies.{}", body), where);
+      }
+      continue;
+    }
     const Parameter* row = find_parameter(name);
     if (!row) throw Error(fmt::format("'{}' is no setting", name), where, "see docs/guide.md");
     set_parameter(settings, *row, setting_text(*row, value), where);
@@ -130,7 +145,7 @@ void load_scene_of(Session& s, const ordered_json& scene, const std::string& whe
     if (scene.contains(key)) *value = scene[key];
   const std::string name = scene.at("scene");
   Scene opened = load_scene(name, overrides);
-  if (scene.contains("settings")) set_all(opened.settings, scene["settings"], where);
+  if (scene.contains("settings")) set_all(opened.settings, scene["settings"], opened.bodies.size(), where);
   opened.mode_open = false, opened.budget_ms.reset();
   take_over(s, load(name, overrides, opened), false);
 }
@@ -156,7 +171,7 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
     std::vector<Lane> made;
     for (const ordered_json& values : a["lanes"]) {
       Settings settings = s.loaded.scene.settings;
-      set_all(settings, values, where);
+      set_all(settings, values, s.loaded.scene.bodies.size(), where);
       made.push_back({create_sim(s.loaded.sim().model, settings)});
     }
     lanes = std::move(made);
@@ -171,7 +186,7 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
   } else if (a.contains("set")) {
     const std::size_t lane = lane_of();
     Settings settings = lanes[lane].sim.settings;
-    set_all(settings, a["set"], where);
+    set_all(settings, a["set"], s.loaded.scene.bodies.size(), where);
     const std::size_t chosen = std::exchange(s.loaded.chosen, lane);
     change_settings(s, settings);
     s.loaded.chosen = chosen;

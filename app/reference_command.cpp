@@ -132,7 +132,7 @@ std::optional<Motion> right_motion(const Model& model, const Settings& settings,
 }
 
 std::optional<Motion> rigid_motion(const Model& model, const Settings& settings, long steps) {
-  if (compliant(settings)) return std::nullopt;
+  if (any_material(settings, compliant)) return std::nullopt;
   try {
     return find_motion({model, {}, settings, model.inverse_masses}, steps);
   } catch (const Interrupted&) {
@@ -161,7 +161,7 @@ int run_reference(const Scene& scene, const ReferenceOptions& options) {
   catch_interrupts();
   Scene own = options.method == "ten-node" ? finer_scene(scene) : scene;
   // A run chooses a mode that has them.
-  if (smoothed(own.settings) && own.mode_open) set_mode(own.settings, "newton", own.name);
+  if (any_material(own.settings, smoothed) && own.mode_open) set_mode(own.settings, "newton", own.name);
   fmt::print("{}\n", find_and_keep(own, *build_model(own), options).string());
   return 0;
 }

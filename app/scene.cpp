@@ -10,6 +10,7 @@
 #include <random>
 
 #include "app/auto_solver.h"
+#include "app/bodies.h"
 #include "app/commands.h"
 #include "app/obstacles.h"
 #include "app/run_loop.h"
@@ -57,8 +58,7 @@ json schema() {
     "bodies": {"least": 1, "most": 10000, "of": "1 to 10000 bodies", "each": {
       "name": "text", "mesh": "text", "surface": "text", "tetgen": "text", "up": "text", "deform": "text",
       "tets": [10, 1e8], "spacing": [1e-9, 1e6],
-      "material": {"or": "text", "model": null, "young_modulus": null, "poisson_ratio": null,
-        "element": null, "smoothing": null},
+      "material": {"or": "text", "model": null}, "friction": [0, 10], "restitution": [0, 1],
       "block": {"size": {"three": [1e-6, 1e6]}, "cells": {"three": [1, 2000, "whole number"]},
         "taper": [0, 0.95], "mirror": "true or false"},
       "sheet": {"size": {"least": 2, "most": 2, "of": "two numbers", "each": [1e-6, 1e6]},
@@ -82,7 +82,10 @@ json schema() {
   constexpr int most = MAX_OBSTACLES - 1;  // beside the ground
   result["world"]["obstacles"].update(
       {{"most", most}, {"of", fmt::format("at most {} obstacles", most)}, {"each", obstacle_schema()}});
-  for (const Parameter& row : parameters()) result[row.section][row.name] = nullptr;
+  for (const Parameter& row : parameters()) {
+    result[row.section][row.name] = nullptr;
+    if (is_of_material(row) && row.name != "material") body["material"][row.name] = nullptr;
+  }
   return result;
 }
 
@@ -131,31 +134,6 @@ void check(const json& value, const json& allowed, const std::string& path, cons
       check(held, allowed[key], inner(key), file);
     }
   }
-}
-
-void read_settings(const json& section, Settings& settings, const std::string& file) {
-  for (const Parameter& row : parameters())  // the mode first, which decides what others mean
-    if (const auto value = section.find(row.name); value != section.end())
-      set_parameter(settings, row, setting_text(row, *value), file);
-}
-
-// By name, or its model and moduli, which are settings; all bodies have the same.
-void read_material(const json& bodies, Settings& settings, const std::string& file) {
-  const json material = bodies[0].value("material", json());
-  for (const json& body : bodies)
-    if (body.value("material", json()) != material)
-      refuse("bodies of different materials cannot be in one scene", file);
-  if (material.is_null()) return;
-  if (material.is_string()) {
-    if (apply_preset(settings, material_presets(), material)) return;
-    refuse(fmt::format("'bodies.0.material' is no material; there are {}",
-                       fmt::join(preset_names(material_presets()), ", ")),
-           file);
-  }
-  settings.material = "neo-hookean";
-  json rows = material;
-  if (rows.contains("model")) rows["material"] = rows["model"], rows.erase("model");
-  read_settings(rows, settings, file);
 }
 
 bool has_tets(const BodyDescription& body) { return !body.mesh.empty() && !is_surface_file(body.mesh); }
@@ -214,7 +192,7 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
   for (const json& body : document["bodies"])
     scene.bodies.push_back(read_body(body, fmt::format("bodies.{}", scene.bodies.size()), file, path.parent_path()));
   for (const char* section : {"world", "solver"}) read_settings(document.value(section, json()), scene.settings, file);
-  read_material(document["bodies"], scene.settings, file);
+  read_bodies_settings(document["bodies"], scene.settings, file);
   for (const json& obstacle : document.value("/world/obstacles"_json_pointer, json()))
     scene.obstacles.push_back(
         read_obstacle(obstacle, fmt::format("world.obstacles.{}", scene.obstacles.size()), file, path.parent_path()));
@@ -371,6 +349,12 @@ void add_carried(CarriedSurface& all, const CarriedSurface& more, std::size_t fi
 
 }  // namespace
 
+void read_settings(const json& section, Settings& settings, const std::string& file) {
+  for (const Parameter& row : parameters())  // the mode first, which decides what others mean
+    if (const auto value = section.find(row.name); value != section.end())
+      set_parameter(settings, row, setting_text(row, *value), file);
+}
+
 std::vector<CameraKey> read_camera_path(const fs::path& file) {
   if (!fs::is_regular_file(file))
     throw Error("no such camera path", file.string(), "give a file: a list of cameras in JSON");
@@ -479,7 +463,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   scene.by_device = overrides.by_device;
   const bool jacobi = flag("mode") || said("mode") || flag("omega") || flag("mass_splitting");
   scene.mode_open = scene.mode_open || (scene.by_device && !jacobi && overrides.solver.empty() &&
-                                        !overrides.budget_ms && hard(scene.settings));
+                                        !overrides.budget_ms && all_materials(scene.settings, hard));
   const bool says_contact = document.contains("/world/contact"_json_pointer) || flag("contact");
   if (!says_contact && scene.bodies.size() > 1) scene.settings.contact = "bodies";
   if (overrides.fill == "file" && std::ranges::none_of(scene.bodies, has_tets))
@@ -497,16 +481,18 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   return scene;
 }
 
-namespace {
-
-// Nothing where it may change something.
 std::string why_unused(const Settings& s, const std::string& name) {
   const auto is = [&](auto... names) { return ((name == names) || ...); };
   const SolverMode& mode = solver_mode(s);
   if (mode.leapfrog && is("iterations")) return "mode explicit has no iterations";
   if (!mode.leapfrog && is("stability", "mass_scaling")) return "it is of mode explicit";
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
-  if (is("mass_splitting") && compliant(s)) return "with compliance or a material masses are always split";
+  if (is("mass_splitting") && any_material(s, compliant))
+    return "with compliance or a material masses are always split";
+  const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
+  if (const Parameter& row = *find_parameter(name);
+      is_of_material(row) && !s.bodies.empty() && std::ranges::all_of(s.bodies, has_own))
+    return fmt::format("each body has a material of its own: change it by --set bodies.0.material.{}=VALUE", row.name);
   if (s.material == "none" && is("young_modulus", "poisson_ratio", "element")) return "there is no material";
   if (is("element") && s.material == "springs") return "springs have no tets";
   if (is("smoothing") && !smoothed(in_mode(s, s))) return "no tets are smoothed";
@@ -517,15 +503,13 @@ std::string why_unused(const Settings& s, const std::string& name) {
       return fmt::format("{} is not among the constraints", kind.name);
   if (is("ground_height") && !s.ground) return "there is no ground";
   if (is("contact_distance") && s.contact == "none") return "bodies do not touch each other";
-  if (is("rigid_contact") && !hard(s)) return "the bodies are not hard";
+  if (is("rigid_contact") && !any_material(s, hard)) return "the bodies are not hard";
   return {};
 }
 
-}  // namespace
-
 void note_unused(const Settings& settings, const std::vector<std::string>& modes, const SceneOverrides& overrides) {
   for (const std::string& mode : modes.empty() ? std::vector{settings.mode} : modes)
-    if (const SolverMode* row = find_solver_mode(mode); row && smoothed(settings) && !row->smoothed)
+    if (const SolverMode* row = find_solver_mode(mode); row && any_material(settings, smoothed) && !row->smoothed)
       print_error(fmt::format("tetpbd: mode {} has no smoothed tets, and solves linear ones\n", mode));
   for (const auto& [name, text] : overrides.parameters) {
     const std::string key = find_parameter(name)->name;
@@ -565,16 +549,9 @@ json body_json(const BodyDescription& body) {
 ordered_json scene_json(const Scene& scene) {
   ordered_json result = {{"name", scene.name}, {"description", scene.description}};
   for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
-  for (const Parameter& row : parameters())
-    with_value(scene.settings, row, [&]<class T>(const T& value) {
-      if (row.automatic && parameter_text(scene.settings, row) == "auto")
-        result[row.section][row.name] = "auto";
-      else
-        result[row.section][row.name] = value;
-    });
-  std::vector<std::string> kinds = split(scene.settings.constraints, ',');
-  if (scene.settings.constraints.empty()) kinds.clear();
-  result["solver"]["constraints"] = kinds;
+  for (std::size_t b = 0; b < scene.settings.bodies.size(); ++b)
+    result["bodies"][b].update(ordered_json(body_settings_json(scene.settings.bodies[b])));
+  for (const Parameter& row : parameters()) result[row.section][row.name] = setting_json(scene.settings, row);
   result["world"]["obstacles"] = ordered_json::array();
   for (const Obstacle& obstacle : scene.obstacles)
     result["world"]["obstacles"].push_back(ordered_json(obstacle_json(obstacle)));
@@ -594,7 +571,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   bool carries = false;
   for (const BodyDescription& body : scene.bodies) {
-    Filled filled = body_of(body, scene.name, compliant(scene.settings));
+    Filled filled = body_of(body, scene.name, compliant(material_of(scene.settings, model->bodies.size())));
     TetMesh& mesh = filled.mesh;
     const CarriedSurface& carried = filled.carried;
     const bool sized = !mesh.fill.empty();  // before it was filled

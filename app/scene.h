@@ -103,6 +103,10 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
 /// `run --camera-path`. What a camera does not say is as in the one before. Throws Error.
 std::vector<CameraKey> read_camera_path(const std::filesystem::path& file);
 std::vector<std::string> scene_names(const std::string& folder = "scenes");
+/// Sets what a section of a scene says of settings. Throws Error naming `file`.
+void read_settings(const nlohmann::json& section, Settings& settings, const std::string& file);
+/// Why a setting changes nothing; empty where it may.
+std::string why_unused(const Settings& settings, const std::string& name);
 /// Says on standard error which flags of these change nothing, and why, in any of these modes; none named:
 /// that of the settings.
 void note_unused(const Settings& settings, const std::vector<std::string>& modes, const SceneOverrides& overrides);

@@ -14,6 +14,7 @@
 #include "app/verdict.h"
 #include "sim/contact/starts.h"
 #include "sim/error.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -301,6 +302,15 @@ void change_settings(Session& s, const Settings& wanted) {
   });
 }
 
+void choose_body(Session& s) {
+  const auto& bodies = s.loaded.model->bodies;
+  if (bodies.size() < 2) return;
+  const auto& reading = s.loaded.probe.reading;
+  s.loaded.body = reading ? std::optional(body_at(*s.loaded.model, reading->vertex).number) : std::nullopt;
+  s.log("body {}", s.loaded.body ? bodies[*s.loaded.body].name : "all");
+  say(s, s.loaded.body ? fmt::format("the panel is of {}", bodies[*s.loaded.body].name) : "the panel is of all bodies");
+}
+
 void undo(Session& s) { take_back(s, "undo", s.changes.past, s.changes.future); }
 void redo(Session& s) { take_back(s, "redo", s.changes.future, s.changes.past); }
 
@@ -320,6 +330,9 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.changes = {};
   s.obstacle = -1;
   s.loaded = std::move(loaded);
+  const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
+  if (const auto& bodies = s.loaded.sim().settings.bodies; !bodies.empty() && std::ranges::all_of(bodies, has_own))
+    s.loaded.body = 0;
   note_scene(s);
   if (!keep_camera) {
     s.camera = scene_camera(s.loaded.scene, *s.loaded.sim().model, s.aspect);
@@ -395,8 +408,8 @@ void save_scene(Session& s) {
 bool has_colour(const Session& s, Colour colour) {
   if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
   const Settings& now = s.loaded.sim().settings;
-  if (colour == Colour::residual) return !compliant(now);
-  return colour != Colour::energy || now.material != "none";
+  if (colour == Colour::residual) return !any_material(now, compliant);
+  return colour != Colour::energy || (now.material != "none" && !has_own_materials(now));
 }
 
 void choose_colour(Session& s, Colour colour) {
@@ -557,7 +570,7 @@ std::optional<Advice> faster_way(const Session& s) {
   const SolverMode& fast = *std::ranges::find_if(solver_modes(), &SolverMode::all_cores);
   if (!solver_mode(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
     return Advice{fmt::format("mode {}", fast.name), fmt::format("mode={}", fast.name)};
-  if (const Plan& plan = s.loaded.sim().plan; hard(own) && plan.iterations * plan.substeps > 5)
+  if (const Plan& plan = s.loaded.sim().plan; all_materials(own, hard) && plan.iterations * plan.substeps > 5)
     return Advice{"solver hard", "hard,mode=" + own.mode};
   return Advice{"a smaller scene", ""};
 }

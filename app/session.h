@@ -40,6 +40,7 @@ struct Loaded {
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
   std::size_t chosen = 0;                ///< the lane that the panel is of
+  std::optional<std::size_t> body{};     ///< whose material, friction and restitution it shows; none: of all
   std::optional<Motion> right{};         ///< where it is known, of several lanes or for its colours
   bool comparable = true;                ///< lanes differ in how they are solved alone
   bool disturbed = false;                ///< they are no longer held against it, until they start anew
@@ -199,6 +200,8 @@ void change_speed(Session& session, int halvings);
 void restart(Session& session);
 /// Refuses those whose steps would stop the window for minutes.
 void change_settings(Session& session, const Settings& wanted);
+/// Chooses the body under the mouse for the panel, or, beside the bodies, all.
+void choose_body(Session& session);
 /// Settings as they were before the last change, or again as they were after it.
 void undo(Session& session);
 Change settings_and_obstacles(const Session& session);

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/bodies.h"
 #include "app/commands.h"
+#include "sim/model/material.h"
 
 namespace tetpbd {
 
@@ -70,7 +72,7 @@ std::string question_units(const glm::dvec3& size) {
 double longest_stable_step(const ReferenceInput& input) {
   constexpr std::size_t most_tets = 300'000;
   const std::size_t tets = input.model.rest.tets.size();
-  if (input.settings.material == "none" || tets == 0 || tets > most_tets) return 0;
+  if (!any_material(input.settings, has_energy) || tets == 0 || tets > most_tets) return 0;
   return stable_step(input, input.settings.compliance, input.model.rest.positions, 30);
 }
 
@@ -83,6 +85,46 @@ ordered_json mesh_json(const MeshReport& counts, double mass, double longest_sta
   all["thinnest_part"] = fit.thinnest;
   all["thinnest_at"] = std::isnan(fit.thinnest) ? ordered_json() : ordered_json{at.x, at.y, at.z};
   all["surface_gap"] = fit.gap, all["surface_gap_of_edge"] = fit.gap / fit.edge;
+  return all;
+}
+
+ordered_json bodies_json(const Sim& sim) {
+  const Model& model = *sim.model;
+  const State state = read_state(sim);
+  TetMesh now = model.rest;
+  now.positions = state.positions;
+  const std::vector<double> volumes = tet_volumes(now), at_rest = tet_volumes(model.rest);
+  const auto three = [](const glm::dvec3& v) { return ordered_json{v.x, v.y, v.z}; };
+  ordered_json all = ordered_json::array();
+  for (const Body& body : model.bodies) {
+    const BodySettings own{.material = solved_material(body, sim.settings),
+                           .friction = friction_of(sim.settings, body.number),
+                           .restitution = restitution_of(sim.settings, body.number)};
+    glm::dvec3 centre(0), momentum(0);
+    double kinetic = 0, volume = 0, rest_volume = 0, worst = 0;
+    for (std::size_t i = body.first_vertex; i < body.first_vertex + body.vertices; ++i) {
+      const double m = model.masses[i];
+      centre += m * state.positions[i], momentum += m * state.velocities[i];
+      kinetic += 0.5 * m * glm::dot(state.velocities[i], state.velocities[i]);
+    }
+    long inverted = 0;
+    for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t) {
+      volume += volumes[t], rest_volume += at_rest[t], inverted += volumes[t] <= 0;
+      worst = std::max(worst, std::abs(volumes[t] / at_rest[t] - 1));
+    }
+    const double mass = body_mass(model, body);
+    const Bounds box = body_bounds(body, state.positions);
+    ordered_json row = {{"name", body.name}, {"vertices", body.vertices}, {"tets", body.tets}, {"mass", mass}};
+    row.update(body_settings_json(own));
+    row.update({{"size", three(box.high - box.low)},
+                {"centre", three(centre / mass)},
+                {"velocity", three(momentum / mass)},
+                {"kinetic_energy", kinetic},
+                {"volume_error_percent", body.is_sheet() ? 0 : 100 * (volume / rest_volume - 1)},
+                {"tet_volume_max", worst},
+                {"inverted_tets", inverted}});
+    all.push_back(std::move(row));
+  }
   return all;
 }
 

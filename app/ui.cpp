@@ -265,6 +265,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_L, "L", "follow the bodies", [](Session& s) { flip(s, "follow", s.view.follow); }},
       {GLFW_KEY_M, "M", "plots", [](Session& s) { flip(s, "plots", s.ui.plots); }},
       {GLFW_KEY_TAB, "Tab", "panels", [](Session& s) { flip(s, "panels", s.ui.panels); }},
+      {GLFW_KEY_B, "B", "the panel is of the body under the mouse", choose_body},
       {GLFW_KEY_P, "P", "screenshot without panels", [](Session& s) { s.take_screenshot = true; }},
       {GLFW_KEY_H, "H, F1", "this help", [](Session& s) { flip(s, "help", s.ui.help); }, GLFW_KEY_F1},
       {GLFW_KEY_K, "K", "a lane more", [](Session& s) { add_lane(s); }},

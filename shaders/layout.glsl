@@ -80,9 +80,9 @@ struct ObstacleRecord {
   vec3 centre;
   int kind;         // the row of the table of kinds
   vec3 centre_low;  // the low part of `centre`
-  float friction;
+  float friction;   // its own, or negative
   vec3 right;       // its x axis
-  float restitution;
+  float restitution;  // likewise
   vec3 up;          // y
   float radius;
   vec3 front;       // z
@@ -94,9 +94,9 @@ struct ObstacleRecord {
   vec3 spin;        // rad/s
   int convex;       // 1: lies behind the plane at any nearest point
   vec3 origin;      // of a field's points
-  int own_friction; // 1: its own, 0: the world's, before which a body's has precedence
-  ivec3 cells;      // points of a field along each axis
   int _0;
+  ivec3 cells;      // points of a field along each axis
+  int _1;
 };
 
 // A hard body that moves as a rigid one (contact/rigid.glsl). Momenta and impulses are over the mass of the body.
@@ -190,6 +190,6 @@ struct RigidRecord {
 #define UNIT_FIELDS 15    // the signed distance fields of all obstacles, one after the other
 #define UNIT_LISTED 12    // where vertices were when pairs of surfaces were listed
 #define UNIT_QUANTA 13    // how much finer the quanta of each vertex are, where some bodies are far smaller
-#define UNIT_FRICTION 14  // the friction of each vertex, where bodies have their own
+#define UNIT_SURFACES 14  // friction and restitution of each vertex, where bodies have their own
 // Binding points of atomic counters.
 #define BIND_GUARDS 0

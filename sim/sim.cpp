@@ -35,15 +35,15 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.system = std::move(system);
   const std::size_t count = sim.model->positions.size();
   SolverInput input{*sim.model, sim.system, sim.settings, sim.plan, sim.tuning, is_software_renderer()};
-  input.compliant = any_material(*sim.model, settings, compliant);
-  input.rigid = any_moves_rigidly(*sim.model, settings);
+  input.compliant = any_material(settings, compliant);
+  input.rigid = any_moves_rigidly(settings);
   if (const std::vector<float> fineness = quantum_fineness(*sim.model, settings); !fineness.empty() && !on_cpu(sim)) {
     std::tie(sim.fineness, sim.fineness_texture) =
         make_texels("fineness of quanta", fineness, "make bodies of more similar size");
     input.fine_quanta = true;
   }
   const auto defines = sim.led.defines = vertex_defines(input);
-  sim.obstacles = make_obstacles(*sim.model);
+  sim.obstacles = make_obstacles(*sim.model, settings);
   sim.solver = solver_mode(settings).create(input);
   sim.solver.retune(sim, nullptr);
   const auto buffer = [&](const char* label, std::size_t bytes) {
@@ -52,10 +52,9 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   };
   sim.step_block = Buffer("step", sizeof(Step));
   sim.positions = buffer("positions", count * sizeof(Position));
-  sim.velocities = buffer("velocities", count * sizeof(Velocity));
+  sim.velocities = buffer("velocities", (sim.solver.keeps_prediction ? 2 : 1) * count * sizeof(Velocity));
   sim.recorder.row = sim.tuning.row, sim.recorder.storage = sim.tuning.storage;
   if (on_cpu(sim)) return sim;
-  if (sim.solver.keeps_prediction) sim.predicted = buffer("predicted", count * sizeof(Velocity));
   const std::size_t quantized_bytes = count * 16 * (input.compliant ? 2 : 1);
   if (sim.solver.quantized_buffers > 0) sim.quantized[0] = buffer("quantized positions", quantized_bytes);
   if (sim.solver.quantized_buffers > 1) sim.quantized[1] = buffer("quantized positions, other side", quantized_bytes);
@@ -79,7 +78,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 
 // Takes over the constraints of other settings, if they differ from the present ones in numbers alone.
 bool adopt_constraints(Sim& sim, const Settings& settings) {
-  if (same_constraints(*sim.model, settings, sim.settings)) return true;
+  if (same_constraints(settings, sim.settings)) return true;
   if (!sim.solver.takes_constraints) return false;
   ConstraintSystem system = build_constraints(*sim.model, settings);
   const auto like = [](const ConstraintList& a, const ConstraintList& b) {
@@ -94,9 +93,8 @@ bool adopt_constraints(Sim& sim, const Settings& settings) {
 void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Model>& model) {
   if (check_finite(sim, true)) restore_checkpoint(sim);
   State state = read_state(sim);
-  Sim fresh = make_sim(
-      model, settings, sim.tuning,
-      same_constraints(*sim.model, settings, sim.settings) ? sim.system : build_constraints(*sim.model, settings));
+  Sim fresh = make_sim(model, settings, sim.tuning,
+                       same_constraints(settings, sim.settings) ? sim.system : build_constraints(*sim.model, settings));
   for (std::size_t v = 0; v < sim.inverse_masses.size(); ++v)
     if (is_pinned(sim, std::uint32_t(v))) fresh.inverse_masses[v] = 0;
   fresh.steps = sim.steps, fresh.guards = guard_counts(sim);
@@ -129,6 +127,7 @@ void adopt_settings(Sim& sim, const Settings& settings) {
   }
   forget_readbacks(sim);
   write_step_block(sim);
+  write_surfaces(sim);
   const double upwards = half_substep_fall(sim.settings, sim.plan) - fall;
   const bool heavier = sim.masses != masses;
   if (upwards == 0 && !heavier) return;
@@ -159,7 +158,7 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
   return sim;
 }
 
-bool same_constraints(const Model& model, const Settings& a, const Settings& b) {
+bool same_constraints(const Settings& a, const Settings& b) {
   const auto decides = [](const Settings& s) {
     const bool dashpots = s.material == "neo-hookean";
     return std::tuple(kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
@@ -167,7 +166,9 @@ bool same_constraints(const Model& model, const Settings& a, const Settings& b) 
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
-  return decides(a) == decides(b) && (!has_own_materials(model) || numbers(a) == numbers(b));
+  const auto same = [](const BodySettings& one, const BodySettings& other) { return one.material == other.material; };
+  return decides(a) == decides(b) && std::ranges::equal(a.bodies, b.bodies, same) &&
+         (!has_own_materials(a) || numbers(a) == numbers(b));
 }
 
 void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
@@ -212,7 +213,8 @@ void write_state(Sim& sim, const State& state) { start_with(sim, state, half_sub
 Carried carried(Sim& sim) {
   Carried all;
   if (on_cpu(sim)) return all;
-  all.add(sim.positions), all.add(sim.velocities);
+  all.add(sim.positions);
+  all.ranges.push_back({&sim.velocities, 0, sim.masses.size() * sizeof(Velocity)});
   if (sim.quantized[0]) all.add(sim.quantized[sim.read_index]);
   if (sim.rigid_bodies) all.add(sim.rigid_bodies);
   sim.solver.carried(sim, all);
@@ -225,8 +227,8 @@ void apply_settings(Sim& sim, const Settings& settings) {
   const KeepBindings kept;
   check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
-    return std::tuple(s.mode, any_material(*sim.model, s, compliant), any_moves_rigidly(*sim.model, s), s.contact,
-                      s.contact_distance, has_obstacles(*sim.model, s));
+    return std::tuple(s.mode, any_material(s, compliant), any_moves_rigidly(s), s.contact, s.contact_distance,
+                      has_obstacles(*sim.model, s), has_own_materials(s), has_own_surfaces(s));
   };
   if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))
     adopt_settings(sim, settings);

@@ -50,8 +50,7 @@ struct Sim : StepValues {
   MassScaling mass_scaling;
 
   Buffer positions;     ///< Position
-  Buffer velocities;    ///< Velocity
-  Buffer predicted;     ///< DoubleSingle of each vertex, padded as a Velocity, from the first iteration to the last
+  Buffer velocities;    ///< Velocity, and where Solver::keeps_prediction says so predicted positions
   Buffer quantized[2];  ///< positions that neighbours see (quantized.glsl); a solver may read one and write the other
   Buffer step_block;    ///< Step
   Buffer fineness;      ///< quantum_fineness(), where some bodies are far smaller than others
@@ -125,7 +124,7 @@ void add_guards(Sim& sim, const GuardCounts& counts);
 /// velocities are those at the end.
 double half_substep_fall(const Settings& settings, const Plan& plan);
 /// Whether a model has the same constraints with both.
-bool same_constraints(const Model& model, const Settings& a, const Settings& b);
+bool same_constraints(const Settings& a, const Settings& b);
 State make_state(const std::vector<Position>& positions, const std::vector<Velocity>& velocities);
 /// Waits for the GPU.
 State read_state(const Sim& sim);

@@ -45,6 +45,12 @@ void write_inverse_masses(Sim& sim, const VertexList& vertices) {
   write_vertices<Position>(sim, sim.positions, offsetof(Position, inverse_mass), vertices, values);
 }
 
+std::vector<Velocity> read_velocities(const Sim& sim) {
+  std::vector<Velocity> velocities(sim.masses.size());
+  sim.velocities.read(0, velocities.size() * sizeof(Velocity), velocities.data());
+  return velocities;
+}
+
 }  // namespace
 
 void write_velocities(const Sim& sim, const State& state) {
@@ -76,7 +82,7 @@ State make_state(const std::vector<Position>& positions, const std::vector<Veloc
 State read_state(const Sim& sim) {
   if (on_cpu(sim)) return sim.host;
   const KeepBindings kept;
-  return make_state(sim.positions.read_all<Position>(), sim.velocities.read_all<Velocity>());
+  return make_state(sim.positions.read_all<Position>(), read_velocities(sim));
 }
 
 std::uint64_t state_hash(const Sim& sim) {
@@ -84,7 +90,7 @@ std::uint64_t state_hash(const Sim& sim) {
   std::uint64_t hash = fnv_basis;
   const auto add = [&](const glm::vec3& value) { hash = hash_values(std::span(&value.x, 3), hash); };
   for (const Position& p : sim.positions.read_all<Position>()) add(p.high), add(p.low);
-  for (const Velocity& v : sim.velocities.read_all<Velocity>()) add(v.high), add(v.low);
+  for (const Velocity& v : read_velocities(sim)) add(v.high), add(v.low);
   return hash;
 }
 

@@ -35,7 +35,7 @@ void give_buffers(Sim& sim) {
   recorder.begin();
   sim.step_block.bind_uniform(BIND_STEP);
   recorder.give("Positions", sim.positions), recorder.give("Velocities", sim.velocities);
-  recorder.give("Predicted", sim.predicted), recorder.give("Check", sim.check.words);
+  recorder.give("Check", sim.check.words);
   if (sim.fineness) bind_texels(UNIT_QUANTA, sim.fineness_texture);
   recorder.give("RigidBodies", sim.rigid_bodies);
   for (const auto& [block, buffer] : sim.solver.bindings) recorder.give(block, buffer);
@@ -70,7 +70,7 @@ void forget_contacts(Sim& sim) {
     const double edge = edges[records.size()];
     RigidRecord& record = records.emplace_back();
     record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
-    if (body.one_piece && moves_rigidly(sim.settings, body_material(body, sim.settings)))
+    if (body.one_piece && moves_rigidly(sim.settings, material_of(sim.settings, body.number)))
       record.slack = float(RigidContact::slack * edge);
     record.mass = float(body_mass(*sim.model, body));
   }

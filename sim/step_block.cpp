@@ -31,7 +31,7 @@ double choose_quantum(const Sim& sim, const State& state) {
 void write_step_block(Sim& sim, int substeps_before) {
   const Settings& s = sim.settings;
   const double h = sim.plan.h;
-  const bool soft = any_material(*sim.model, s, compliant);
+  const bool soft = any_material(s, compliant);
   Step block{};
   block.gravity = {0.0f, float(-s.gravity), 0.0f};
   block.h = float(h);
@@ -46,12 +46,12 @@ void write_step_block(Sim& sim, int substeps_before) {
   block.velocity_scale = float(std::exp(-s.damping * h));
   block.max_correction = float(longest_correction(*sim.model, s));
   block.correction_quantum = float(longest_correction(*sim.model, s) / double(1 << 30));
-  block.mass_splitting = splits_masses(*sim.model, s);
+  block.mass_splitting = splits_masses(s);
   block.quantum = float(sim.quantum);
   block.inverse_quantum = float(1 / sim.quantum);
   block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
   block.vertex_count = unsigned(sim.model->positions.size());
-  block.damping = float(most_damping(*sim.model, s) / h);
+  block.damping = float(most_damping(s) / h);
   block.turn_limit = float(TURN_LIMIT / sim.adaptive.substep_factor);
   block.look_ahead = float(LOOK_AHEAD * s.dt);
   write_planes(*sim.model, s, block);

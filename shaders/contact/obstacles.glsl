@@ -1,7 +1,7 @@
 // Contact of a vertex with the obstacles of a step, by number (method.md, "Contact and friction"). The first are planes
 // in the step's block; then come SOLIDS others, whose records hold their state at the end of a substep.
 #include "contact/plane.glsl"
-#include "contact/friction.glsl"
+#include "contact/body_surfaces.glsl"
 float plane_distance(DoubleSingle x, vec4 plane) { return (dot(plane.xyz, x.high) - plane.w) + dot(plane.xyz, x.low); }
 Surface plane_surface(int k, DoubleSingle x) {
   return Surface(params.planes[k].xyz, plane_distance(x, params.planes[k]));
@@ -41,10 +41,10 @@ bool is_near_solid(int k, DoubleSingle x, float moved) {
   float most = reaches[k].w + 2.0 * moved;
   return dot(arm, arm) <= most * most;
 }
-float solid_friction(int k, uint i) {
-  return BODY_FRICTION == 0 || solids[k].own_friction == 1 ? solids[k].friction : body_friction(i);
+float solid_friction(int k, uint i) { return solids[k].friction < 0.0 ? body_friction(i) : solids[k].friction; }
+float solid_restitution(int k, uint i) {
+  return solids[k].restitution < 0.0 ? body_restitution(i) : solids[k].restitution;
 }
-float solid_restitution(int k) { return solids[k].restitution; }
 float solid_distance(int k, DoubleSingle x) {
   return surface_of(solid_at(k), into_solid(k, arm_from_solid(k, x))).distance;
 }
@@ -58,7 +58,7 @@ Surface solid_contact(int k, DoubleSingle x, vec3 displacement) {
 bool is_near_solid(int k, DoubleSingle x, float moved) { return false; }
 vec3 solid_velocity(int k, DoubleSingle x) { return vec3(0.0); }
 float solid_friction(int k, uint i) { return 0.0; }
-float solid_restitution(int k) { return 0.0; }
+float solid_restitution(int k, uint i) { return 0.0; }
 float solid_distance(int k, DoubleSingle x) { return 0.0; }
 Surface solid_contact(int k, DoubleSingle x, vec3 displacement) { return Surface(vec3(0.0), 0.0); }
 #endif
@@ -76,8 +76,8 @@ bool is_solid(int k) { return SOLIDS > 0 && k >= params.plane_count; }
 float obstacle_friction(int k, uint i) {
   return is_solid(k) ? solid_friction(k - params.plane_count, i) : body_friction(i);
 }
-float obstacle_restitution(int k) {
-  return is_solid(k) ? solid_restitution(k - params.plane_count) : params.restitution;
+float obstacle_restitution(int k, uint i) {
+  return is_solid(k) ? solid_restitution(k - params.plane_count, i) : body_restitution(i);
 }
 // m/s, of the obstacle's material at x.
 vec3 obstacle_velocity(int k, DoubleSingle x) {

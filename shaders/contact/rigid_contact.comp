@@ -62,7 +62,7 @@ Contact contact_with(int k, uint vertex, DoubleSingle x, vec3 arm) {
   velocity += given + cross(given_spin, arm);
   Surface surface = surface_before(k, x, velocity);
   return Contact(surface.normal, surface.distance, obstacle_velocity(k, x), obstacle_friction(k, vertex),
-                 obstacle_restitution(k));
+                 obstacle_restitution(k, vertex));
 }
 // The least normal velocity that the contact allows.
 float least_at(Contact m, vec3 arm) {

@@ -1,7 +1,9 @@
 // How corrections move a vertex in a substep: prediction before the first iteration, contacts in each, and the velocity
 // after the last (method.md eqs. 1-2, 5, 11-13).
 #include "vertex.glsl"
-layout(std430) buffer Predicted { Velocity predicted[]; };  // a DoubleSingle, padded
+// Predicted positions stay from the first iteration of a substep to the last, behind the velocities: kernels have room
+// for 8 storage blocks.
+#define PREDICTED(i) velocities[params.vertex_count + i]
 
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {
   bool predicts = (phases & PHASE_PREDICT) != 0u, finishes = (phases & PHASE_FINISH) != 0u;
@@ -20,18 +22,18 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
     if (may_touch(corrected)) {
       vec3 moved = correction;
       if (predicts) moved += params.h * v.high;
-      else moved += params.h * velocities[i].high + relative(x, DoubleSingle(predicted[i].high, predicted[i].low));
+      else moved += params.h * velocities[i].high + relative(x, DoubleSingle(PREDICTED(i).high, PREDICTED(i).low));
       corrected = resolve_contacts(i, corrected, moved);
     }
     x = corrected;
   }
   if (finishes) {
-    if (!predicts) start = DoubleSingle(predicted[i].high, predicted[i].low);
+    if (!predicts) start = DoubleSingle(PREDICTED(i).high, PREDICTED(i).low);
     if (!carried) v = add_double(v, relative(x, start) * params.inverse_h);
     stay_listed(i, x, v);
     note_unless_finite(i, x.high + x.low, v.high + v.low);
   } else if (predicts) {
-    predicted[i] = Velocity(start.high, 0.0, start.low, 0.0);
+    PREDICTED(i) = Velocity(start.high, 0.0, start.low, 0.0);
   }
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   DoubleSingle kept = v;

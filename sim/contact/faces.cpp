@@ -68,7 +68,7 @@ std::vector<Triangle> wide_faces(const Model& model) {
   return wide;
 }
 
-void move_faces_out(const Model& model, const std::vector<Triangle>& faces,
+void move_faces_out(const Model& model, const Settings& settings, const std::vector<Triangle>& faces,
                     const std::vector<MovingObstacle>& obstacles, double h, std::vector<glm::dvec3>& x,
                     std::vector<glm::dvec3>& v, const std::vector<double>& inverse_masses, std::vector<double>& work) {
   Formulas<double> f;
@@ -87,7 +87,7 @@ void move_faces_out(const Model& model, const std::vector<Triangle>& faces,
       way -= h * speed;
       // What was inside before is moved out without becoming faster.
       const double depth = met->surface.distance, came = std::max(depth, std::min(0.0, glm::dot(n, way))),
-                   friction = friction_on(o, model, face[0]);
+                   friction = friction_on(o, settings, body_at(model, face[0]).number);
       const glm::dvec3 placed = f.plane_correction(n, depth, way, friction) / weight,
                        sped = f.plane_correction(n, came, way, friction) / weight;
       for (std::size_t k = 0; k < 3; ++k) {

@@ -15,7 +15,7 @@ struct SolverInput;
 std::vector<Triangle> wide_faces(const Model& model);
 
 /// Moves vertices at `x` of velocities `v` after a substep of `h` on the CPU; adds to `work`, if it is not empty.
-void move_faces_out(const Model& model, const std::vector<Triangle>& faces,
+void move_faces_out(const Model& model, const Settings& settings, const std::vector<Triangle>& faces,
                     const std::vector<MovingObstacle>& obstacles, double h, std::vector<glm::dvec3>& x,
                     std::vector<glm::dvec3>& v, const std::vector<double>& inverse_masses, std::vector<double>& work);
 /// m, how deep any of them is in an obstacle; 0: none is.

@@ -88,10 +88,11 @@ void OffsetContact::set_out(const Settings& settings, const std::vector<int>& sh
                 .response = {},
                 .stopping = {},
                 .surface = {},
-                .friction = friction_of(settings, pair)};
+                .friction = mean_of_bodies(friction_of, settings, pair)};
   hard.before = hard.touch.impulse;
-  hard.touch.least = Formula{}.least_way(glm::dot(way_of(hard), hard.touch.normal), hard.touch.least,
-                                         substep.h * substep.h * settings.gravity, settings.restitution);
+  hard.touch.least =
+      Formula{}.least_way(glm::dot(way_of(hard), hard.touch.normal), hard.touch.least,
+                          substep.h * substep.h * settings.gravity, mean_of_bodies(restitution_of, settings, pair));
 }
 
 // Of the first side relative to the second, with all impulses so far.

@@ -23,10 +23,9 @@ Order order_obstacles(const Model& model) {
   return order;
 }
 
-MovingObstacle plane_obstacle(const glm::dvec3& normal, double d, const Settings& settings) {
+MovingObstacle plane_obstacle(const glm::dvec3& normal, double d) {
   MovingObstacle o;
   o.is_plane = true, o.plane = glm::dvec4(normal, d);
-  o.friction = settings.friction, o.restitution = settings.restitution;
   o.reach = bound_reach({});
   return o;
 }
@@ -48,7 +47,7 @@ MovingObstacle::Surface MovingObstacle::find_contact(const glm::dvec3& x, const 
   return surface;
 }
 
-MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double friction, double restitution) {
+MovingObstacle moving_obstacle(const Obstacle& o, double start, double h) {
   MovingObstacle moving;
   moving.kind = o.kind, moving.solid = describe_solid(o), moving.reach = bound_reach(o);
   if (o.field) moving.texels = o.field->values.data();
@@ -61,21 +60,19 @@ MovingObstacle moving_obstacle(const Obstacle& o, double start, double h, double
     const double sine = glm::length(axis);
     if (sine > 0) moving.spin = axis / sine * (2 * std::atan2(sine, turn.w) / h);
   }
-  moving.own_friction = o.friction.has_value();
-  moving.friction = o.friction.value_or(friction), moving.restitution = o.restitution.value_or(restitution);
+  moving.friction = o.friction, moving.restitution = o.restitution;
   return moving;
 }
 
 std::vector<MovingObstacle> obstacles_at(const Model& model, const Settings& settings, double start, double h) {
   const Order order = order_obstacles(model);
   std::vector<MovingObstacle> list;
-  if (settings.ground) list.push_back(plane_obstacle({0, 1, 0}, settings.ground_height, settings));
+  if (settings.ground) list.push_back(plane_obstacle({0, 1, 0}, settings.ground_height));
   for (const Obstacle* o : order.planes) {
     const glm::dvec3 normal = glm::normalize(o->normal);
-    list.push_back(plane_obstacle(normal, glm::dot(normal, o->centre), settings));
+    list.push_back(plane_obstacle(normal, glm::dot(normal, o->centre)));
   }
-  for (const Obstacle* o : order.solids)
-    list.push_back(moving_obstacle(*o, start, h, settings.friction, settings.restitution));
+  for (const Obstacle* o : order.solids) list.push_back(moving_obstacle(*o, start, h));
   return list;
 }
 

@@ -14,10 +14,9 @@ struct MovingObstacle {
 
   const ObstacleKind* kind = default_obstacle_kind();
   Pose pose;
-  glm::dvec3 velocity{0}, spin{0};  ///< m/s of the centre, rad/s
-  double friction = 0, restitution = 0;
-  bool own_friction = false;  ///< else the world's, which a body's own replaces
-  double reach = 0;           ///< m, no shorter than the distance of any point of its surface from its centre
+  glm::dvec3 velocity{0}, spin{0};              ///< m/s of the centre, rad/s
+  std::optional<double> friction, restitution;  ///< its own, before those of bodies and of the world
+  double reach = 0;  ///< m, no shorter than the distance of any point of its surface from its centre
   /// Half spaces at rest without friction or restitution of their own, at most MAX_PLANES in a step, are described by
   /// their plane n.x >= d alone, as (n, d).
   bool is_plane = false;
@@ -51,12 +50,15 @@ struct MovingObstacle {
   Surface find_surface(const glm::dvec3& x) const;
   Surface find_contact(const glm::dvec3& x, const glm::dvec3& displacement) const;
 };
-/// Over a substep of h from `start` on, s; with this friction and restitution where it has none of its own.
-MovingObstacle moving_obstacle(const Obstacle& obstacle, double start, double h, double friction, double restitution);
+/// Over a substep of h from `start` on, s.
+MovingObstacle moving_obstacle(const Obstacle& obstacle, double start, double h);
 
-/// Of a vertex on the obstacle, whose own friction goes before the body's, and that before the world's.
-inline double friction_on(const MovingObstacle& o, const Model& model, std::size_t vertex) {
-  return o.own_friction ? o.friction : body_at(model, vertex).friction.value_or(o.friction);
+/// Of a body on the obstacle, by its number.
+inline double friction_on(const MovingObstacle& o, const Settings& settings, std::size_t body) {
+  return o.friction ? *o.friction : friction_of(settings, body);
+}
+inline double restitution_on(const MovingObstacle& o, const Settings& settings, std::size_t body) {
+  return o.restitution ? *o.restitution : restitution_of(settings, body);
 }
 
 /// All obstacles over a substep of h from `start` on, s: first those that are only planes, led by the ground.

@@ -35,7 +35,7 @@ ObstacleRecord make_record(const MovingObstacle& o, int first) {
   record.extent = glm::vec3(s.extent), record.origin = glm::vec3(s.origin);
   record.radius = float(s.radius), record.spacing = float(s.spacing), record.trust = float(s.trust);
   record.velocity = glm::vec3(o.velocity), record.spin = glm::vec3(o.spin);
-  record.friction = float(o.friction), record.own_friction = o.own_friction, record.restitution = float(o.restitution);
+  record.friction = float(o.friction.value_or(-1)), record.restitution = float(o.restitution.value_or(-1));
   return record;
 }
 
@@ -45,13 +45,20 @@ std::vector<std::shared_ptr<const DistanceField>> obstacle_fields(const Model& m
   return fields;
 }
 
-bool bodies_have_friction(const Model& model) {
-  return std::ranges::any_of(model.bodies, [](const Body& body) { return body.friction.has_value(); });
+// Two numbers by vertex; the world's where a body has none of its own.
+std::vector<float> surface_values(const Model& model, const Settings& settings) {
+  std::vector<float> values;
+  values.reserve(2 * model.positions.size());
+  for (const Body& body : model.bodies)
+    for (std::size_t i = 0; i < body.vertices; ++i)
+      values.insert(values.end(),
+                    {float(friction_of(settings, body.number)), float(restitution_of(settings, body.number))});
+  return values;
 }
 
 }  // namespace
 
-std::vector<std::string> obstacle_defines(const Model& model) {
+std::vector<std::string> obstacle_defines(const Model& model, bool own_surfaces) {
   const auto solids = solid_obstacles(model);
   std::set<std::pair<int, std::string>> kinds;
   for (const Obstacle* o : solids) kinds.emplace(o->kind->number(), o->kind->function());
@@ -59,28 +66,24 @@ std::vector<std::string> obstacle_defines(const Model& model) {
   for (const auto& [number, function] : kinds) rows += fmt::format(" ROW({}, {})", number, function);
   const bool fields = std::ranges::any_of(solids, [](const Obstacle* o) { return bool(o->field); });
   return {fmt::format("SOLIDS {}", solids.size()), fmt::format("FIELDS {:d}", fields),
-          fmt::format("BODY_FRICTION {:d}", bodies_have_friction(model)),
+          fmt::format("BODY_SURFACES {:d}", own_surfaces),
           fmt::format("MOVING_SOLIDS {:d}", std::ranges::any_of(model.obstacles, moves)), "OBSTACLE_KINDS(ROW)" + rows};
 }
 
 bool share_kernels(const Model& model, const Model& other) {
-  return obstacle_defines(model) == obstacle_defines(other) && obstacle_fields(model) == obstacle_fields(other) &&
-         model.obstacles.empty() == other.obstacles.empty();
+  return obstacle_defines(model, false) == obstacle_defines(other, false) &&
+         obstacle_fields(model) == obstacle_fields(other) && model.obstacles.empty() == other.obstacles.empty();
 }
 
-Obstacles make_obstacles(const Model& model) {
+Obstacles make_obstacles(const Model& model, const Settings& settings) {
   constexpr std::size_t most = MAX_OBSTACLES - 1;
   if (model.obstacles.size() > most)
     throw Error("too many obstacles", fmt::format("{} of them", model.obstacles.size()),
                 fmt::format("at most {} beside the ground", most));
   Obstacles obstacles;
-  if (bodies_have_friction(model)) {
-    std::vector<float> values;
-    for (const Body& body : model.bodies)
-      values.resize(values.size() + body.vertices, float(body.friction.value_or(-1)));
-    std::tie(obstacles.friction, obstacles.friction_texture) =
-        make_texels("friction of vertices", values, "give all bodies the same friction");
-  }
+  if (has_own_surfaces(settings))
+    std::tie(obstacles.surfaces, obstacles.surfaces_texture) = make_texels(
+        "friction and restitution of vertices", surface_values(model, settings), "give all bodies the same");
   const std::size_t count = solid_obstacles(model).size();
   if (count == 0) return obstacles;
   GLint alignment = 256;
@@ -95,6 +98,12 @@ Obstacles make_obstacles(const Model& model) {
     std::tie(obstacles.fields, obstacles.fields_texture) =
         make_texels("fields of obstacles", values, "give their meshes fewer voxels");
   return obstacles;
+}
+
+void write_surfaces(Sim& sim) {
+  if (!sim.obstacles.surfaces) return;
+  const std::vector<float> values = surface_values(*sim.model, sim.settings);
+  sim.obstacles.surfaces.write(0, values.size() * sizeof(float), values.data());
 }
 
 void write_planes(const Model& model, const Settings& settings, Step& block) {
@@ -139,7 +148,7 @@ void bind_next_obstacles(Sim& sim) {
 }
 
 void bind_obstacles(const Obstacles& obstacles) {
-  if (obstacles.friction) bind_texels(UNIT_FRICTION, obstacles.friction_texture);
+  if (obstacles.surfaces) bind_texels(UNIT_SURFACES, obstacles.surfaces_texture);
   if (!obstacles.records) return;
   glBindBufferRange(GL_UNIFORM_BUFFER, BIND_OBSTACLES, obstacles.records.id(),
                     GLintptr(std::size_t(obstacles.present - obstacles.first) * obstacles.stride),

@@ -285,7 +285,7 @@ void OffsetContact::apply_impulses(const Settings& settings, double push_limit, 
     const auto m = f.meet(pair.near, ways.data(), split.data(), turns);
     if (!(m.weight > 0)) continue;
     const double stop = f.stopping_impulse(pair.near, m, pair.offset),
-                 slip = f.slip_impulse(m, stop, friction_of(settings, pair));
+                 slip = f.slip_impulse(m, stop, mean_of_bodies(friction_of, settings, pair));
     pair.push = f.push_apart(pair.near, m, pair.offset, push_limit);
     for (std::size_t k = 0; k < 4; ++k) {
       const std::uint32_t i = pair.vertices[k];
@@ -300,9 +300,10 @@ void OffsetContact::apply_impulses(const Settings& settings, double push_limit, 
   move_hard_bodies(substep);
 }
 
-double OffsetContact::friction_of(const Settings& settings, const Pair& pair) const {
-  const auto own = [&](std::uint32_t vertex) { return body_at(*model_, vertex).friction.value_or(settings.friction); };
-  return Formulas<double>{}.mean_friction(own(pair.vertices[0]), own(pair.vertices[3]));
+double OffsetContact::mean_of_bodies(double (*of)(const Settings&, std::size_t), const Settings& settings,
+                                     const Pair& pair) const {
+  const auto own = [&](std::uint32_t vertex) { return of(settings, body_at(*model_, vertex).number); };
+  return Formulas<double>{}.mean_of_surfaces(own(pair.vertices[0]), own(pair.vertices[3]));
 }
 
 bool OffsetContact::all_move(const Pair& pair, const std::vector<double>& weights) {

@@ -85,7 +85,8 @@ class OffsetContact {
   void share_masses(Pair& pair, Ways ways) const;
   Ways ways_of(const Pair& pair, const Points& x) const;  // since the substep began
   void apply_impulses(const Settings& settings, double push_limit, Substep& substep);
-  double friction_of(const Settings& settings, const Pair& pair) const;
+  /// Of the two bodies of a pair, with `of` one of friction_of() and restitution_of().
+  double mean_of_bodies(double (*of)(const Settings&, std::size_t), const Settings& settings, const Pair& pair) const;
   void turn_pushed(Substep& substep);
   static bool all_move(const Pair& pair, const std::vector<double>& weights);
   double kinetic_energy(const Substep& substep) const;  // J, of surfaces

@@ -11,14 +11,6 @@
 
 namespace tetpbd {
 
-/// Whether hard bodies move as rigid ones. On the GPU none does beside bodies with compliance, because a kernel would
-/// need more than 8 storage blocks for records and multipliers.
-inline bool any_moves_rigidly(const Model& model, const Settings& settings) {
-  const auto is_rigid = [&](const Body& body) { return moves_rigidly(settings, body_material(body, settings)); };
-  return (solver_mode(settings).cpu || !any_material(model, settings, compliant)) &&
-         std::ranges::any_of(model.bodies, is_rigid);
-}
-
 class RigidContact {
  public:
   /// The largest strain of an edge in a body that is not deformed.
@@ -43,7 +35,7 @@ class RigidContact {
 
   /// Begins a step. The model and the settings have to live longer than it.
   void begin(const Model& model, const Settings& settings) {
-    model_ = &model, settings_ = &settings, wanted_ = any_moves_rigidly(model, settings);
+    model_ = &model, settings_ = &settings, wanted_ = any_moves_rigidly(settings);
     for (Motion& motion : motions_) motion.is = Motion::free;
   }
   bool wanted() const { return wanted_; }  ///< else prepare() does nothing
@@ -85,7 +77,7 @@ class RigidContact {
       const Body& body = model_->bodies[b];
       Motion& motion = motions_[b];
       motion.is = Motion::free;
-      if (!body.one_piece || !moves_rigidly(*settings_, body_material(body, *settings_))) continue;
+      if (!body.one_piece || !moves_rigidly(*settings_, material_of(*settings_, body.number))) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto is_fixed = [](double inverse_mass) { return !(inverse_mass > 0); };
       if (std::any_of(&inverse_masses[first], &inverse_masses[first] + body.vertices, is_fixed)) continue;
@@ -209,14 +201,14 @@ class RigidContact {
           const glm::dvec3 surface = o.velocity_at(at(i)),
                            displacement = s.h * (Rules{}.velocity_at(falling, arm) - surface);
           const auto [n, gap] = o.surface_ahead(at(i), s.h * surface + displacement, displacement);
-          const double least =
-              Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
-                                     gap - Rules{}.closed_gap * model_->size, s.h, fall, o.restitution);
+          const double least = Rules{}.least_velocity(glm::dot(n, Rules{}.velocity_at(before, arm) - surface),
+                                                      gap - Rules{}.closed_gap * model_->size, s.h, fall,
+                                                      restitution_on(o, *settings_, own.number));
           ++number;
           const double over = least - glm::dot(n, Rules{}.velocity_at(body, arm) - surface);
           if (!(over > most)) continue;
           most = over, numbers[std::size_t(count)] = number;
-          worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, friction_on(o, *model_, i));
+          worst = Rules{}.touch_at(body, n, arm, least, glm::dvec3(0), surface, friction_on(o, *settings_, own.number));
         }
       }
       const auto added = numbers.begin() + count;

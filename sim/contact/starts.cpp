@@ -87,7 +87,7 @@ Shape make_shape(const Model& model, const Body& body) {
 std::vector<Place> make_places(const Model& model, const Settings& settings) {
   std::vector<Place> places;
   const auto add = [&](const std::string& name, const Obstacle& o) {
-    places.push_back({name, moving_obstacle(o, 0, 0, settings.friction, settings.restitution)});
+    places.push_back({name, moving_obstacle(o, 0, 0)});
   };
   Obstacle ground;
   ground.centre = {0, settings.ground_height, 0}, ground.normal = {0, 1, 0};

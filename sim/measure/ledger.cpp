@@ -21,7 +21,7 @@ double reserve(const Model& model, const Settings& settings) {
     const double drop = settings.ground ? std::max(0.0, lowest - settings.ground_height) : 0;
     fall += body_mass(model, body) * std::abs(settings.gravity) *
             std::max(drop, body_bounds(body, model.rest.positions).size());
-    const Material& material = body_material(body, settings);
+    const Material& material = material_of(settings, body.number);
     const double modulus = has_energy(material) ? material.young_modulus : 0;
     for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t) strain += 1e-6 * modulus * volumes[t];
   }
@@ -62,9 +62,9 @@ void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& 
 std::optional<const char*> why_not_judged(const Model& model, const Settings& settings) {
   const SolverMode& mode = solver_mode(settings);
   if (mode.published) return "mode paper corrects positions as published";
-  if (!settings.rigid_contact && any_material(model, settings, hard)) return "rigid_contact is off";
+  if (!settings.rigid_contact && any_material(settings, hard)) return "rigid_contact is off";
   const auto deformed = [&](const Body& body) {
-    if (has_energy(body_material(body, settings))) return false;
+    if (has_energy(material_of(settings, body.number))) return false;
     const std::size_t first = body.first_vertex, end = first + body.vertices;
     for (std::size_t v = first + 1; v < end; ++v) {
       const double at_rest = glm::distance(model.rest.positions[v], model.rest.positions[first]);

@@ -52,6 +52,15 @@ glm::vec4 energy_per_square(const Material& material) {
   return factors;
 }
 
+// Whether a body has all constraints of the kinds that are measured.
+bool has_all(const ConstraintSystem& system, const Body& body) {
+  for (std::size_t k = 0; k < measured_kinds; ++k) {
+    const auto range = constraint_range(system.lists[k], {body.first_vertex, body.first_vertex + body.vertices});
+    if (range.x == range.y && !(k == std::size_t(index_of<Volume>) && body.is_sheet())) return false;
+  }
+  return true;
+}
+
 // Reads a measurement back; false where it has not arrived yet.
 bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   if (!pending.fence.sync()) return true;
@@ -114,7 +123,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made, const s
   const std::vector<double>& masses = own_masses.empty() ? model.masses : own_masses;
   static_assert(index_of<Stretch> == 0 && index_of<Bend> == 1 && index_of<Volume> == 2);
   const bool all_made = made.present.size() >= measured_kinds &&
-                        std::ranges::all_of(made.present | std::views::take(measured_kinds), std::identity{});
+                        std::ranges::all_of(model.bodies, [&](const Body& body) { return has_all(made, body); });
   const ConstraintSystem own = all_made ? ConstraintSystem{} : build_constraints(model.rest, "stretch,bend,volume");
   const std::vector<ConstraintList>& lists = (all_made ? made : own).lists;
   Metrics m;
@@ -151,7 +160,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made, const s
   for (std::size_t slot = 0; slot < ring_size; ++slot)
     m.rows.emplace_back("metrics row", model.bodies.size() * M_STRIDE * sizeof(float), nullptr, GL_STREAM_READ);
   for (const char* name : {"sums", "rigid"})
-    m.passes.push_back({Program::compute(fmt::format("measure/{}.comp", name), {}, obstacle_defines(model))});
+    m.passes.push_back({Program::compute(fmt::format("measure/{}.comp", name), {}, obstacle_defines(model, false))});
   m.vertices = double(model.positions.size());
   return m;
 }

@@ -114,7 +114,7 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
 }
 
 ConstraintSystem build_constraints(const Model& model, const Settings& settings) {
-  if (!has_own_materials(model)) return build_constraints(model.rest, in_mode(settings, settings));
+  if (!has_own_materials(settings)) return build_constraints(model.rest, in_mode(settings, settings));
   ConstraintSystem system = build_constraints(TetMesh{model.rest.positions, {}, {}}, "");
   for (const Body& body : model.bodies) {
     const Material own = solved_material(body, settings);

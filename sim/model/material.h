@@ -25,7 +25,7 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
 ConstraintSystem build_constraints(const Model& model, const Settings& settings);
 /// The body's material as the mode solves it.
 inline Material solved_material(const Body& body, const Settings& settings) {
-  return in_mode(body_material(body, settings), settings);
+  return in_mode(material_of(settings, body.number), settings);
 }
 
 /// Materials by name, as a scene's "material": "rubber" asks for them.

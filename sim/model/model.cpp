@@ -23,6 +23,7 @@ void add_body(Model& model, const std::string& name, const TetMesh& mesh, double
               const std::vector<std::uint32_t>& fixed, const std::vector<double>& mass_factors) {
   const std::uint32_t base = std::uint32_t(model.rest.positions.size());
   Body body{name,
+            model.bodies.size(),
             base,
             mesh.positions.size(),
             model.rest.tets.size(),
@@ -116,32 +117,13 @@ TetMesh body_mesh(const Model& model, const Body& body) {
   return mesh;
 }
 
-bool has_own_materials(const Model& model) {
-  return std::ranges::any_of(model.bodies, [](const Body& body) { return body.material.has_value(); });
-}
-
-bool any_material(const Model& model, const Material& all, bool (*is_such)(const Material&)) {
-  if (!has_own_materials(model)) return is_such(all);
-  return std::ranges::any_of(model.bodies, [&](const Body& body) { return is_such(body_material(body, all)); });
-}
-
-double most_damping(const Model& model, const Material& all) {
-  double most = has_own_materials(model) ? 0 : all.constraint_damping;
-  for (const Body& body : model.bodies) most = std::max(most, body_material(body, all).constraint_damping);
-  return most;
-}
-
 void check_settings(const Model& model, const Settings& settings) {
-  if (!has_own_materials(model)) return check_settings(settings, "settings");
-  for (const Body& body : model.bodies) {
-    const std::string where = body.material ? "body " + body.name : "settings";
-    if (solver_mode(settings).published)
-      throw Error(fmt::format("mode {} has one material for all bodies", settings.mode), where,
-                  "use mode node or constraint");
-    Settings own = settings;
-    static_cast<Material&>(own) = body_material(body, settings);
-    check_settings(own, where);
-  }
+  if (!settings.bodies.empty() && settings.bodies.size() != model.bodies.size())
+    throw Error(fmt::format("there are settings of {} bodies", settings.bodies.size()),
+                fmt::format("a model of {}", model.bodies.size()), "give one for each body, or none");
+  std::vector<std::string> names;
+  for (const Body& body : model.bodies) names.push_back(body.name);
+  check_settings(settings, "settings", names);
 }
 
 void renumber(Model& model) {

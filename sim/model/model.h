@@ -38,14 +38,13 @@ struct State {
   std::vector<Wrench> wrenches{};       ///< of these by body, or empty
 };
 
-/// A contiguous part of the rest mesh, and its material.
+/// A contiguous part of the rest mesh.
 struct Body {
   std::string name;
+  std::size_t number = 0;  ///< in the model, and in Settings::bodies
   std::size_t first_vertex = 0, vertices = 0, first_tet = 0, tets = 0, first_triangle = 0, triangles = 0;
-  bool one_piece = false;              ///< has no hinges, and so is a rigid body if it is hard
-  std::optional<Material> material{};  ///< its own; none: that of the settings
-  std::optional<double> friction{};    ///< on obstacles without their own; none: the world's
-  double thickness = 0;                ///< m, of a sheet
+  bool one_piece = false;  ///< has no hinges, and so is a rigid body if it is hard
+  double thickness = 0;    ///< m, of a sheet
   bool is_sheet() const { return tets == 0; }
 };
 
@@ -90,17 +89,7 @@ double body_mass(const Model& model, const Body& body);  ///< kg
 TetMesh body_mesh(const Model& model, const Body& body);
 /// Bounds of the body's vertices, given the positions of all.
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions);
-/// The body's material; `all` is that of the settings, for bodies without their own.
-inline const Material& body_material(const Body& body, const Material& all) {
-  return body.material ? *body.material : all;
-}
-/// Whether any body has a material of its own. Each constraint then has its own coefficients.
-bool has_own_materials(const Model& model);
-/// Whether `is_such` is true of the material of any body.
-bool any_material(const Model& model, const Material& all, bool (*is_such)(const Material&));
-/// The largest constraint_damping of all bodies, s.
-double most_damping(const Model& model, const Material& all);
-/// check_settings() of settings.h with the material of each body; errors name the body that has its own.
+/// check_settings() of settings.h with what each body has of its own; errors name the body.
 void check_settings(const Model& model, const Settings& settings);
 
 /// Adds a body. `positions` (m) are its start positions, as many as the mesh has; `density` is in kg/m^3, `spin` in

@@ -222,6 +222,13 @@ std::string parameter_text(const Settings& settings, const Parameter& row) {
   });
 }
 
+bool is_of_material(const Parameter& row) {
+  const Settings settings;
+  const auto* begin = reinterpret_cast<const std::byte*>(static_cast<const Material*>(&settings));
+  const auto* at = with_value(settings, row, [](const auto& v) { return reinterpret_cast<const std::byte*>(&v); });
+  return at >= begin && at < begin + sizeof(Material);
+}
+
 void set_mode(Settings& settings, const std::string& word, const std::string& where) {
   if (!find_solver_mode(word)) check_words(*find_parameter("mode"), word, where);
   if (!solver_mode(settings).solves_like(*find_solver_mode(word))) settings.iterations = settings.substeps = automatic;
@@ -257,6 +264,34 @@ std::vector<std::string> preset_names(const std::vector<Preset>& presets) {
   return names;
 }
 
+bool has_own_materials(const Settings& settings) {
+  return std::ranges::any_of(settings.bodies, [](const BodySettings& body) { return body.material.has_value(); });
+}
+
+bool has_own_surfaces(const Settings& settings) {
+  return std::ranges::any_of(settings.bodies,
+                             [](const BodySettings& body) { return body.friction || body.restitution; });
+}
+
+bool any_material(const Settings& settings, bool (*is_such)(const Material&)) {
+  if (settings.bodies.empty()) return is_such(settings);
+  return std::ranges::any_of(
+      settings.bodies, [&](const BodySettings& body) { return is_such(body.material ? *body.material : settings); });
+}
+
+bool all_materials(const Settings& settings, bool (*is_such)(const Material&)) {
+  if (settings.bodies.empty()) return is_such(settings);
+  return std::ranges::all_of(
+      settings.bodies, [&](const BodySettings& body) { return is_such(body.material ? *body.material : settings); });
+}
+
+double most_damping(const Settings& settings) {
+  double most = settings.bodies.empty() ? settings.constraint_damping : 0;
+  for (std::size_t b = 0; b < settings.bodies.size(); ++b)
+    most = std::max(most, material_of(settings, b).constraint_damping);
+  return most;
+}
+
 bool damped(const Material& material) { return material.constraint_damping > 0; }
 
 std::string kinds_in_use(const Material& material) {
@@ -286,6 +321,18 @@ bool moves_rigidly(const Settings& settings, const Material& material) {
   return settings.rigid_contact && hard(material) && uses(material, Stretch::row) && !solver_mode(settings).published;
 }
 
+bool has_forces(const Settings& settings) {
+  return any_material(settings, compliant) &&
+         !any_material(settings, [](const Material& m) { return kind_without_force(m).has_value(); });
+}
+
+bool any_moves_rigidly(const Settings& settings) {
+  if (settings.bodies.empty()) return moves_rigidly(settings, settings);
+  for (std::size_t b = 0; b < settings.bodies.size(); ++b)
+    if (moves_rigidly(settings, material_of(settings, b))) return true;
+  return false;
+}
+
 bool hard(const Material& material) {
   bool all = !compliant(material);
   for (std::size_t k = 0; k < kind_count; ++k)
@@ -308,7 +355,10 @@ std::optional<std::string> kind_without_force(const Material& material) {
   return std::nullopt;
 }
 
-void check_settings(const Settings& settings, const std::string& where) {
+namespace {
+
+// With one material for all bodies.
+void check_material(const Settings& settings, const std::string& where) {
   for (const Parameter& row : parameters())
     with_value(settings, row, [&]<class T>(const T& value) {
       if constexpr (std::is_same_v<T, std::string>) {
@@ -334,12 +384,32 @@ void check_settings(const Settings& settings, const std::string& where) {
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");
-  if (settings.restitution > 0 && !moves_rigidly(settings))
+  if (settings.restitution > 0 && !moves_rigidly(settings, settings))
     throw Error("restitution is of hard bodies", where,
                 "set it to 0, or rigid_contact to true and all k to 1, without compliance or material");
   if (compliant(settings) && settings.omega > 2)
     throw Error(fmt::format("'omega' cannot be {:g} with compliance", settings.omega), where,
                 "give at most 2: beyond it corrections grow");
+}
+
+}  // namespace
+
+void check_settings(const Settings& settings, const std::string& where, const std::vector<std::string>& names) {
+  if (settings.bodies.empty()) return check_material(settings, where);
+  for (std::size_t b = 0; b < settings.bodies.size(); ++b) {
+    const BodySettings& body = settings.bodies[b];
+    const std::string name = names.empty() ? fmt::format("number {}", b) : names[b];
+    const std::string place = body.material || body.restitution ? fmt::format("body {}", name) : where;
+    if (has_own_materials(settings) && solver_mode(settings).published)
+      throw Error(fmt::format("mode {} has one material for all bodies", settings.mode), place,
+                  "use mode node or constraint");
+    Settings own = settings;
+    static_cast<Material&>(own) = material_of(settings, b);
+    // The world's restitution is of those bodies that are hard.
+    own.restitution = body.restitution.value_or(any_moves_rigidly(settings) ? 0 : settings.restitution);
+    own.friction = friction_of(settings, b);
+    check_material(own, place);
+  }
 }
 
 }  // namespace tetpbd

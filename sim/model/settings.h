@@ -61,11 +61,41 @@ struct SolverSettings {
   bool operator==(const SolverSettings&) const = default;
 };
 
-/// The settings that the user asked for, with one material for all bodies. Only the user changes them; what they mean
-/// for a step is its Plan.
+/// What a body has of its own, in place of the settings' material and the world's friction and restitution.
+struct BodySettings {
+  std::optional<Material> material{};
+  std::optional<double> friction{};     ///< on obstacles without their own, and on other bodies
+  std::optional<double> restitution{};  ///< likewise, of a hard body
+  bool operator==(const BodySettings&) const = default;
+};
+
+/// The settings that the user asked for. Only the user changes them; what they mean for a step is its Plan.
 struct Settings : World, Material, SolverSettings {
+  std::vector<BodySettings> bodies{};  ///< by body of the model; empty: none has anything of its own
   bool operator==(const Settings&) const = default;
 };
+
+/// The material of a body, by its number in the model.
+inline const Material& material_of(const Settings& settings, std::size_t body) {
+  const bool own = !settings.bodies.empty() && settings.bodies[body].material;
+  return own ? *settings.bodies[body].material : settings;
+}
+inline double friction_of(const Settings& settings, std::size_t body) {
+  return settings.bodies.empty() ? settings.friction : settings.bodies[body].friction.value_or(settings.friction);
+}
+inline double restitution_of(const Settings& settings, std::size_t body) {
+  return settings.bodies.empty() ? settings.restitution
+                                 : settings.bodies[body].restitution.value_or(settings.restitution);
+}
+/// Whether any body has a material of its own. Each constraint then has its own coefficients.
+bool has_own_materials(const Settings& settings);
+/// Whether any body has a friction or a restitution of its own, which kernels then read by vertex.
+bool has_own_surfaces(const Settings& settings);
+/// Whether `is_such` is true of the material of any body, or of all.
+bool any_material(const Settings& settings, bool (*is_such)(const Material&));
+bool all_materials(const Settings& settings, bool (*is_such)(const Material&));
+/// The largest constraint_damping of all bodies, s.
+double most_damping(const Settings& settings);
 
 /// The substeps of a step, `h` long, and the iterations of each.
 struct Plan {
@@ -117,6 +147,7 @@ void set_parameter(Settings& settings, const Parameter& parameter, const std::st
 /// The value as a text that set_parameter reads.
 std::string parameter_text(const Settings& settings, const Parameter& parameter);
 std::string flag_name(const Parameter& parameter);  ///< "--k-stretch"
+bool is_of_material(const Parameter& parameter);    ///< a member of Material, which a body may have of its own
 /// The allowed words of a parameter, of which "constraints" accepts several; empty for numbers.
 std::vector<std::string> choices(const Parameter& parameter);
 /// Sets the mode, be it one that choices() does not offer. Iterations and substeps become automatic where they mean
@@ -137,12 +168,15 @@ std::vector<std::string> preset_names(const std::vector<Preset>& presets);
 bool compliant(const Material& material);
 /// The name of a kind in use whose constraints have no force, because its k is below 1 or it has no compliance.
 std::optional<std::string> kind_without_force(const Material& material);
+/// Whether the bodies are held by forces alone, as modes explicit and newton need it.
+bool has_forces(const Settings& settings);
 /// Whether constraints resist their rate.
 bool damped(const Material& material);
 /// Whether bodies of this material move as rigid ones (method.md, "Hard bodies are rigid"): the kinds in use keep a
 /// shape and all have k = 1.
 bool moves_rigidly(const Settings& settings, const Material& material);
-inline bool moves_rigidly(const Settings& settings) { return moves_rigidly(settings, settings); }
+/// Whether any body of the scene does.
+bool any_moves_rigidly(const Settings& settings);
 /// Whether all kinds in use have k = 1 and none has compliance. With stretch among them, the exact solution is then the
 /// motion of a rigid body.
 bool hard(const Material& material);
@@ -158,8 +192,9 @@ double smoothing_of(const Material& material);
 Material in_mode(Material material, const Settings& settings);
 bool uses(const Material& material, const ConstraintKind& kind);  ///< whether the kind is in use
 
-/// Throws Error for values out of range and for settings that exclude each other; `where` names the file or flag.
-void check_settings(const Settings& settings, const std::string& where);
+/// Throws Error for values out of range and for settings that exclude each other; `where` names the file or flag, or
+/// the body is named, by number where there are no names.
+void check_settings(const Settings& settings, const std::string& where, const std::vector<std::string>& names = {});
 /// The parts of a text between separators; empty ones are left out.
 std::vector<std::string> split(const std::string& text, char separator);
 

@@ -47,7 +47,7 @@ Objective make_objective(const Implicit& run, const Start& start) {
     o.predicted.push_back(w > 0 ? start.z[i] + free / drag : run.now.positions[i]);
   }
   o.unit = mass * o.inertia * run.input.model.size * run.input.model.size;
-  if (any_material(run.input.model, settings, damped)) {
+  if (any_material(settings, damped)) {
     const bool has_dashpots = run.input.system.lists[index_of<Dashpot>].count() > 0;  // in place of damping of C
     o.before = constraint_values(o, run.now.positions);
     const std::vector<double> earlier = constraint_values(o, run.before.positions);
@@ -82,7 +82,7 @@ double find_planes(const Implicit& run, const std::vector<MovingObstacle>& obsta
 }
 
 // Friction by the normal forces of the last solution, against the displacement since z.
-std::vector<Objective::Drag> find_drags(const Model& model, const Objective& o, const Start& start,
+std::vector<Objective::Drag> find_drags(const ReferenceInput& input, const Objective& o, const Start& start,
                                         const std::vector<MovingObstacle>& obstacles,
                                         const std::vector<Touching>& touching) {
   std::vector<Objective::Drag> list;
@@ -92,7 +92,8 @@ std::vector<Objective::Drag> find_drags(const Model& model, const Objective& o, 
       const double h = start.h[t.vertex];
       const glm::dvec3 at = start.z[t.vertex], from = at + h * obstacle.velocity_at(at);
       list.push_back({t.vertex, glm::dvec3(o.plane(t.vertex, t.plane)), from,
-                      friction_on(obstacle, model, t.vertex) * t.force, least_slip * h});
+                      friction_on(obstacle, input.settings, body_at(input.model, t.vertex).number) * t.force,
+                      least_slip * h});
     }
   return list;
 }
@@ -101,11 +102,12 @@ std::vector<Objective::Drag> find_drags(const Model& model, const Objective& o, 
 Minimum solve(const Implicit& run, const Start& start) {
   Objective o = make_objective(run, start);
   const auto obstacles = obstacles_at(run.input.model, run.input.settings, run.time[0], run.h);
-  const bool has_friction =
-      std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
-      std::ranges::any_of(run.input.model.bodies, [](const Body& b) { return b.friction.has_value(); });
+  const bool has_friction = std::ranges::any_of(obstacles, [](const auto& o) { return o.friction > 0; }) ||
+                            std::ranges::any_of(run.input.model.bodies, [&](const Body& b) {
+                              return friction_of(run.input.settings, b.number) > 0;
+                            });
   find_planes(run, obstacles, o.predicted, o);
-  o.drags = find_drags(run.input.model, o, start, obstacles, run.touching);
+  o.drags = find_drags(run.input, o, start, obstacles, run.touching);
   const int most_rounds = run.most > 0 || o.plane_count == 0 ? 0 : 50;
   Minimum minimum = minimise(o, o.predicted, run.most);
   for (int round = 0; minimum.converged && round < most_rounds; ++round) {
@@ -114,7 +116,7 @@ Minimum solve(const Implicit& run, const Start& start) {
     std::vector<double> change(run.now.positions.size(), 0);
     double all = 0, most = 0;
     for (const Objective::Drag& d : o.drags) all += d.force, change[d.vertex] -= d.force;
-    std::vector<Objective::Drag> next = find_drags(run.input.model, o, start, obstacles, minimum.touching);
+    std::vector<Objective::Drag> next = find_drags(run.input, o, start, obstacles, minimum.touching);
     for (const Objective::Drag& d : next) change[d.vertex] += d.force;
     for (const double c : change) most = std::max(most, std::abs(c));
     if (!moved && most <= 1e-8 * all) break;

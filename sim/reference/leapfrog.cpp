@@ -125,7 +125,7 @@ void advance(Leapfrog& run, long steps) {
       for (const MovingObstacle& obstacle : obstacles) {
         const glm::dvec3 moved = x - before - run.h * obstacle.velocity_at(x);
         const auto surface = obstacle.surface_met(x, moved);
-        const double friction = friction_on(obstacle, run.input.model, i);
+        const double friction = friction_on(obstacle, settings, body_at(run.input.model, i).number);
         resolve_contact(surface.normal, -surface.distance, friction, moved, run.h, x, run.v[i]);
       }
     });
@@ -189,7 +189,7 @@ double stable_step(const ReferenceInput& input, const Compliances& compliances, 
   };
   const double stiffness = eigenvalue(run.x, 1e-7 * input.model.size);
   // What damps may be less than what is stiff: dashpots resist lengths alone.
-  const double damping = most_damping(input.model, input.settings) > 0 ? eigenvalue(run.v, 1) : 0;
+  const double damping = most_damping(input.settings) > 0 ? eigenvalue(run.v, 1) : 0;
   // h^2 W^2 + 2 h D = 4, both with the reserve that a few power iterations need.
   const double omega = std::sqrt(1.02 * stiffness), damped = 1.02 * damping / omega;
   return (std::sqrt(damped * damped + 4) - damped) / omega;

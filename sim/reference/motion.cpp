@@ -47,7 +47,7 @@ void require_reference(const ReferenceInput& input) {
   const char* hint =
       "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
   const auto refuse = [&](const std::string& what) { throw Error("the scene has no right motion", what, hint); };
-  const bool soft = any_material(input.model, settings, compliant);
+  const bool soft = any_material(settings, compliant);
   const auto check = [&](const Material& own) {
     if (!soft && !uses(own, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");
     for (std::size_t k = 0; own.material == "none" && k < kind_count; ++k) {
@@ -57,8 +57,8 @@ void require_reference(const ReferenceInput& input) {
         refuse(fmt::format("compliance_{} is 0 and another is not", constraint_kinds[k].name));
     }
   };
-  if (!has_own_materials(input.model)) return check(settings);
-  for (const Body& body : input.model.bodies) check(body_material(body, settings));
+  if (settings.bodies.empty()) return check(settings);
+  for (const Body& body : input.model.bodies) check(material_of(settings, body.number));
 }
 
 // Runs of make(h), with `steps` of them and twice as many in a step of the scene. arrays(run, f) calls f for all arrays
@@ -198,9 +198,10 @@ std::uint64_t scene_key(const ReferenceInput& input) {
     if (smoothed(in_mode(m, s))) add(m.element), add(std::array{smoothing_of(m)});
   };
   add_material(s);
-  for (const Body& body : model.bodies) {
+  for (const BodySettings& body : s.bodies) {
     if (body.material) add_material(*body.material), add(std::array{body.material->constraint_damping});
     if (body.friction) add(std::array{*body.friction});
+    if (body.restitution) add(std::string("restitution")), add(std::array{*body.restitution});
   }
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),
                             s.ground_height,      s.friction, s.restitution};
@@ -234,7 +235,7 @@ Motion find_ten_node_motion(const ReferenceInput& input, long steps, const std::
                             const std::function<void(long)>& progress) {
   const auto is_elastic = [](const Material& m) { return m.material != "none"; };
   const bool all_elastic = std::ranges::all_of(input.model.bodies, [&](const Body& body) {
-    return !body.is_sheet() && is_elastic(body_material(body, input.settings));
+    return !body.is_sheet() && is_elastic(material_of(input.settings, body.number));
   });
   if (!all_elastic)
     throw Error("the bodies have no motion on finer meshes", "constraints alone, or a sheet",
@@ -260,7 +261,7 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
   require_reference(input);
   Motion motion;
   motion.method = method;
-  const bool soft = any_material(input.model, input.settings, compliant);
+  const bool soft = any_material(input.settings, compliant);
   const double stable =
       !soft || method == "implicit" ? 0 : stable_step(input, reference_compliances(input), input.model.rest.positions);
   const bool touching = bodies_touch(input.model, input.settings);

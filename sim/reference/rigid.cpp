@@ -59,7 +59,7 @@ struct ContactPoint {
 };
 
 std::vector<ContactPoint> find_contacts(const RigidBody& b, const std::vector<MovingObstacle>& obstacles,
-                                        const glm::dmat3& inverse) {
+                                        const glm::dmat3& inverse, const Settings& settings) {
   std::vector<ContactPoint> found;
   const glm::dvec3 spin = angular_velocity(b);
   for (std::size_t k = 0; k < obstacles.size(); ++k)
@@ -72,7 +72,7 @@ std::vector<ContactPoint> find_contacts(const RigidBody& b, const std::vector<Mo
       const glm::dvec3 t = glm::normalize(glm::cross(n, side));
       ContactPoint c;
       c.number = k * b.rest.size() + i, c.arm = arm, c.surface = o.velocity_at(b.centre + arm);
-      c.friction = o.own_friction ? o.friction : b.friction.value_or(o.friction), c.restitution = o.restitution;
+      c.friction = friction_on(o, settings, b.number), c.restitution = restitution_on(o, settings, b.number);
       c.axes = glm::dmat3(n, t, glm::cross(n, t));
       const glm::dmat3 cross(glm::cross(arm, c.axes[0]), glm::cross(arm, c.axes[1]), glm::cross(arm, c.axes[2]));
       c.response = glm::dmat3(1 / b.mass) + glm::transpose(cross) * inverse * cross;
@@ -112,7 +112,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
   std::vector<RigidBody> bodies;
   for (const Body& body : model.bodies) {
     RigidBody b;
-    b.first = body.first_vertex, b.held = is_held(model, body), b.friction = body.friction;
+    b.first = body.first_vertex, b.held = is_held(model, body), b.number = body.number;
     glm::dvec3 rest_centre(0), momentum(0);
     const auto each = [&](auto&& visit) {
       for (std::size_t i = b.first; i < b.first + body.vertices; ++i) visit(i, model.masses[i]);
@@ -156,7 +156,7 @@ void advance(RigidBody& b, const Model& model, const Settings& settings, double 
   const std::vector<MovingObstacle> obstacles = obstacles_at(model, settings, b.time, h);
   b.time += h;
   find_near(b, obstacles, std::ranges::any_of(model.obstacles, moves));
-  std::vector<ContactPoint> contacts = find_contacts(b, obstacles, inverse);
+  std::vector<ContactPoint> contacts = find_contacts(b, obstacles, inverse, settings);
   b.velocity.y -= h * settings.gravity;
   glm::dvec3 spin = angular_velocity(b);
   const auto apply = [&](const ContactPoint& c, const glm::dvec3& impulse) {

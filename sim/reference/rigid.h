@@ -20,7 +20,7 @@ struct RigidBody {
   glm::dmat3 rotation{1};
   glm::dvec3 velocity{0};            ///< m/s
   glm::dvec3 angular{0};             ///< kg m^2/s, about the centre
-  std::optional<double> friction{};  ///< its own
+  std::size_t number = 0;  ///< of the body in the model
   double radius = 0;                 ///< m, of the vertices about the centre
   bool held = false;                 ///< by fixed vertices: it stays in place
   /// The vertices that were within `reach` (m) of an obstacle when they were found, and how far any has moved since.

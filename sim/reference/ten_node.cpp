@@ -49,7 +49,6 @@ void halve_body(const Model& model, const Body& body, Halved& result) {
   add_body(result.model, body.name, fine, body_mass(model, body) / filled_volume(fine), with_middles(model.positions),
            glm::dvec3(0), glm::dvec3(0), fixed);
   Body& added = result.model.bodies.back();
-  added.material = body.material, added.friction = body.friction;
   std::ranges::copy(with_middles(model.velocities),
                     result.model.velocities.begin() + std::ptrdiff_t(added.first_vertex));
   for (std::uint32_t v : fixed) result.model.velocities[added.first_vertex + v] = glm::dvec3(0);

@@ -74,7 +74,7 @@ class FastPbd {
     rigid_.begin(*model_, settings);
     auto& x = work_.x;
     x.resize(state.positions.size());
-    work_.starts.resize(any_material(*model_, settings, damped) ? x.size() : 0);
+    work_.starts.resize(any_material(settings, damped) ? x.size() : 0);
     predicted_.resize(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
     if (step.substep.moving) state.work.resize(x.size());
@@ -160,8 +160,8 @@ class FastPbd {
         if (thread == 0) {
           write_positions(step.state);
           if (faces)
-            move_faces_out(*model_, faces_, substep.obstacles, substep.h, step.state.positions, v, step.inverse_masses,
-                           done);
+            move_faces_out(*model_, step.settings, faces_, substep.obstacles, substep.h, step.state.positions, v,
+                           step.inverse_masses, done);
           pairs_.resolve(step.settings, step.state.positions, v, step.inverse_masses, substep.h,
                          substep.h / OffsetContact::recovery, rigid_.carried());
           read_positions(step.state);

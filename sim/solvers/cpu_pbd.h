@@ -90,7 +90,7 @@ template <class Kind, class real, class Vertices>
 /// The longest correction of one constraint, m. It is shorter with mass splitting, so that the fixed-point sums are
 /// finer: only their rounding moves the centre of a free body then.
 inline double longest_correction(const Model& model, const Settings& settings) {
-  return splits_masses(model, settings) ? model.size / 64 : model.size;
+  return splits_masses(settings) ? model.size / 64 : model.size;
 }
 
 /// Jacobi makes all corrections from the same positions and averages them with omega / n_i, or splits masses;
@@ -126,7 +126,7 @@ class CpuPbd {
   /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26).
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep,
                    double time = 0) {
-    const bool jacobi = sweep == Sweep::jacobi, soft = any_material(*model_, settings, compliant);
+    const bool jacobi = sweep == Sweep::jacobi, soft = any_material(settings, compliant);
     const double omega = soft ? 1 : settings.omega;
     const double longest = jacobi ? longest_correction(*model_, settings) : model_->size;
     const Plan plan = plan_for(settings);
@@ -137,13 +137,13 @@ class CpuPbd {
     if (substep.moving) state.work.resize(x.size());
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
-    if (jacobi && splits_masses(*model_, settings))
+    if (jacobi && splits_masses(settings))
       for (std::size_t i = 0; i < x.size(); ++i) weights[i] *= real(at_vertex_[i]);
     GuardCounts guards{};
     const Vertices vertices{x, start, weights, jacobi ? sums : x};
     pairs_.begin_step(state);
     for (int s = 0; s < plan.substeps; ++s) {
-      if (any_material(*model_, settings, damped)) start = x;
+      if (any_material(settings, damped)) start = x;
       substep.begin(s);
       pairs_.begin(settings, x, v);
       rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards, pairs_.wrenches());
@@ -175,7 +175,7 @@ class CpuPbd {
       for (std::size_t i = 0; i < x.size(); ++i)
         if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
       if (are_faces_due(plan, s))
-        move_faces_out(*model_, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
+        move_faces_out(*model_, settings, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
       pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery, rigid_.carried());
     }
     pairs_.end_step(state);

@@ -274,7 +274,7 @@ void retune(Sim& sim, Newton& n, const Settings* before) {
   const bool other_shares = std::exchange(sim.solver.stiffness_shares, shares) != shares;
   const Buffer& mesh = sim.solver.buffers[n.mesh];
   const auto forces = [](const Settings& s) { return std::tuple(s.compliance, s.constraint_damping, plan_for(s).h); };
-  const bool others = other_shares || !same_constraints(*sim.model, *before, sim.settings);
+  const bool others = other_shares || !same_constraints(*before, sim.settings);
   const ConstraintSystem system = others ? soften(sim.system, *sim.model, shares) : ConstraintSystem{};
   for (std::size_t k = 0; others && k < kind_count; ++k)
     for (const auto& [name, array, range] : constraint_arrays)

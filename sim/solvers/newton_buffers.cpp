@@ -91,7 +91,7 @@ NewtonSizes measure_newton(const SolverInput& input, const NewtonLevels& levels)
 }
 
 std::vector<std::string> newton_defines(const NewtonSizes& sizes, const SolverInput& input) {
-  std::vector<std::string> defines = obstacle_defines(input.model);
+  std::vector<std::string> defines = obstacle_defines(input.model, has_own_surfaces(input.settings));
   std::ranges::move(quanta_defines(input), std::back_inserter(defines));
   for (const auto& [name, value] : {std::pair<const char*, std::size_t>{"GROUP_SIZE", sizes.group},
                                     {"LANES", sizes.lanes},
@@ -123,7 +123,7 @@ std::vector<float> stiffness_shares(const Model& model, const Settings& settings
   const double h = settings.dt / settings.substeps;
   std::vector<float> shares;
   for (const Body& body : model.bodies) {
-    const Material& material = body_material(body, settings);
+    const Material& material = material_of(settings, body.number);
     const double size = body_bounds(body, model.rest.positions).size();
     double volume = 0;
     for (std::size_t t = body.first_tet; t < body.first_tet + body.tets; ++t)

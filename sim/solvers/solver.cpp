@@ -158,7 +158,7 @@ std::vector<std::string> quanta_defines(const SolverInput& input) {
 }
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {
-  std::vector<std::string> defines = obstacle_defines(input.model);
+  std::vector<std::string> defines = obstacle_defines(input.model, has_own_surfaces(input.settings));
   std::ranges::move(quanta_defines(input), std::back_inserter(defines));
   defines.insert(defines.end(),
                  {define("COMPLIANT", input.compliant), define("LEAPFROG", solver_mode(input.settings).leapfrog),

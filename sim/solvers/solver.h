@@ -32,7 +32,8 @@ struct Solver {
   /// How many buffers of quantized positions it needs: one is read and written by turns; of two an iteration reads one
   /// and writes the other.
   int quantized_buffers = 0;
-  bool keeps_prediction = false;   ///< predicted positions stay from the first iteration of a substep to the last
+  /// Predicted positions stay from the first iteration of a substep to the last, behind the velocities.
+  bool keeps_prediction = false;
   std::size_t vertex_patches = 0;  ///< patches that own the vertices (block Patches), 0: none do
 
   /// Starts from a state, with nothing known of the steps before it.

@@ -12,8 +12,8 @@ namespace tetpbd {
 
 /// Whether Jacobi shares a vertex's mass out among its constraints, in place of averaging corrections. With compliance
 /// it always does: with averages, a constraint's multiplier would not be what moved its vertices.
-inline bool splits_masses(const Model& model, const Settings& settings) {
-  return (settings.mass_splitting && !solver_mode(settings).published) || any_material(model, settings, compliant);
+inline bool splits_masses(const Settings& settings) {
+  return (settings.mass_splitting && !solver_mode(settings).published) || any_material(settings, compliant);
 }
 
 /// Whether faces are moved out of obstacles (faces.h) after this substep of a step: not after each that is very short,
@@ -56,8 +56,8 @@ struct Substep {
       const glm::dvec3 displacement = h * (v - o.velocity_at(x)) + (x - predicted);
       const auto met = o.surface_met(x, displacement);
       if (!(met.distance < 0)) continue;
-      const glm::dvec3 correction =
-          Formulas<double>{}.plane_correction(met.normal, met.distance, displacement, friction_on(o, model_, i));
+      const glm::dvec3 correction = Formulas<double>{}.plane_correction(
+          met.normal, met.distance, displacement, friction_on(o, settings_, body_at(model_, i).number));
       if (work) *work += model_.masses[i] / h * glm::dot(correction, o.velocity_at(x));
       x += correction;
     }

@@ -345,7 +345,7 @@ TEST_CASE("contact: restitution is of hard bodies") {
   const auto refused = [&](auto&& change) {
     Settings other = settings;
     change(other);
-    CHECK(!moves_rigidly(other));
+    CHECK(!any_moves_rigidly(other));
     CHECK_THROWS_AS(check_settings(other, "here"), Error);
   };
   refused([](Settings& s) { s.stiffness[0] = 0.9; });

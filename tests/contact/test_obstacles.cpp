@@ -72,7 +72,7 @@ std::vector<Obstacle> every_shape() {
           grid_sphere(0.7, 28)};
 }
 
-MovingObstacle still(const Obstacle& o) { return moving_obstacle(o, 0, 0, 0.5, 0); }
+MovingObstacle still(const Obstacle& o) { return moving_obstacle(o, 0, 0); }
 
 double unit(std::mt19937& random) { return double(random()) / 4294967296.0; }
 glm::dvec3 within(std::mt19937& random, double reach) {
@@ -111,7 +111,7 @@ double deepest(const Sim& sim) {
   double most = 0;
   const State state = read_state(sim);
   for (const Obstacle& o : sim.model->obstacles) {
-    const MovingObstacle shape = moving_obstacle(o, simulated_time(sim), 0, 0, 0);
+    const MovingObstacle shape = moving_obstacle(o, simulated_time(sim), 0);
     for (const glm::dvec3& x : state.positions) most = std::max(most, -shape.surface_at(x).distance);
   }
   return most / sim.model->size;

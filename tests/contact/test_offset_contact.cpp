@@ -37,14 +37,14 @@ struct Stage {
     settings.poisson_ratio = 0.3, settings.ground = false, settings.contact = "bodies", settings.friction = 0.5;
     settings.constraint_damping = 1e-4;
   }
-  Body& add(const TetMesh& mesh, const glm::dvec3& at, const glm::dvec3& velocity = glm::dvec3(0),
-            const glm::dvec3& spin = glm::dvec3(0), double density = 1000, bool fixed = false) {
+  BodySettings& add(const TetMesh& mesh, const glm::dvec3& at, const glm::dvec3& velocity = glm::dvec3(0),
+                    const glm::dvec3& spin = glm::dvec3(0), double density = 1000, bool fixed = false) {
     std::vector<glm::dvec3> positions = mesh.positions;
     for (glm::dvec3& p : positions) p += at;
     std::vector<std::uint32_t> held;
     for (std::uint32_t i = 0; i < positions.size() && fixed; ++i) held.push_back(i);
     add_body(model, "body", mesh, density, positions, velocity, spin, held);
-    return model.bodies.back();
+    return settings.bodies.emplace_back();
   }
   void floor(double half) { add(make_block({2 * half, 0.1, 2 * half}, {2, 1, 2}), {0, -0.05, 0}, {}, {}, 1000, true); }
   // `part` of the longest stable step.
@@ -177,7 +177,7 @@ TEST_CASE("offset contact: a ball at 50 m/s bounces off a plate of 2 cm, fixed o
     TetMesh plate = make_block({0.4, 0.4, 0.02}, soft ? glm::ivec3(16, 16, 1) : glm::ivec3(8, 8, 1));
     s.add(plate, glm::dvec3(0), {}, {}, 1000, !soft);
     s.add(ball(6, 0.08), {0.01, 0.02, 0.2}, {0, 0, -50});
-    s.model.bodies[1].material = s.settings, s.model.bodies[1].material->young_modulus = 1e7;
+    s.settings.bodies[1].material = s.settings, s.settings.bodies[1].material->young_modulus = 1e7;
     for (std::size_t i = 0; i < plate.positions.size() && soft; ++i)
       if (std::max(std::abs(plate.positions[i].x), std::abs(plate.positions[i].y)) > 0.19)
         s.model.inverse_masses[i] = 0;

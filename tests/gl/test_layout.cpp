@@ -145,7 +145,7 @@ TEST_CASE("members of the blocks of contact lie where GL reads them, and no arra
     std::vector<std::string> defines = pair_defines(sizes);
     defines.insert(defines.end(), {"COMPLIANT 1", "LEAPFROG 1", "RIGID_CONTACT 0", "SOLIDS 0", "FIELDS 0", "CONTACTS 1",
                                    "IMPLICIT 0", "BEFORE_SUBSTEP 0", "CONTACT_SELF 1", "ROW 9u", "GROUP_SIZE 64u",
-                                   "FIND_GROUP 128u", "PAIR_GROUP 64u", "TOTAL_MASS 1.0", "BODY_FRICTION 0"});
+                                   "FIND_GROUP 128u", "PAIR_GROUP 64u", "TOTAL_MASS 1.0", "BODY_SURFACES 0"});
     for (const char* name : {"boxes", "near", "cull", "find", "list", "impulses", "truncate"}) {
       const Program program =
           Program::compute(std::string("contact/bodies/") + name + ".comp", {{{"SCHEME", "leapfrog"}}, {}}, defines);

@@ -64,11 +64,13 @@ void add(Model& model, const char* name, double at) {
 
 std::shared_ptr<Model> together(const std::vector<Made>& bodies) {
   auto model = std::make_shared<Model>();
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    add(*model, bodies[b].name, apart * double(b));
-    model->bodies[b].material = bodies[b].material, model->bodies[b].friction = bodies[b].friction;
-  }
+  for (std::size_t b = 0; b < bodies.size(); ++b) add(*model, bodies[b].name, apart * double(b));
   return model;
+}
+// With what each body has of its own.
+Settings with_bodies(Settings settings, const std::vector<Made>& bodies) {
+  for (const Made& body : bodies) settings.bodies.push_back({.material = body.material, .friction = body.friction});
+  return settings;
 }
 std::shared_ptr<Model> alone(const Made& body, std::size_t number) {
   auto model = std::make_shared<Model>();
@@ -76,9 +78,9 @@ std::shared_ptr<Model> alone(const Made& body, std::size_t number) {
   return model;
 }
 Settings of_body(Settings settings, const Made& body) {
+  settings.bodies.clear();
   static_cast<Material&>(settings) = body.material;
   settings.friction = body.friction;
-  settings.rigid_contact = solver_mode(settings).cpu;  // On the GPU none is carried beside one with compliance.
   return settings;
 }
 
@@ -121,7 +123,7 @@ TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in ev
       if (mode.implicit) body.friction = 0;
     const auto model = together(bodies);
     const Settings settings = settings_for(mode);
-    Settings any = settings;  // of no body
+    Settings any = with_bodies(settings, bodies);  // its own material is of no body
     static_cast<Material&>(any) = of_model("neo-hookean", 3e4, 0.2, 0.01);
     const auto created = [&](const std::shared_ptr<const Model>& of, const Settings& with) {
       Sim sim = create_sim(of, with);
@@ -130,12 +132,10 @@ TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in ev
     };
     Sim all = created(model, any);
     const State state = run(all, 40);
-    const auto alike = std::make_shared<Model>(*model);
-    for (Body& body : alike->bodies) body.material.reset(), body.friction.reset();
     const std::size_t every = is_long_run() ? 1 : 2;
     for (std::size_t b = mode.cpu ? 0 : every - 1; b < bodies.size(); b += every) {
       CAPTURE(std::string(bodies[b].name));
-      Sim own = created(alike, of_body(settings, bodies[b]));
+      Sim own = created(model, of_body(settings, bodies[b]));
       const double most = difference(*model, b, state, part(*model, b, run(own, 40)));
       CHECK(most < 1e-5);
     }
@@ -145,7 +145,7 @@ TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in ev
 TEST_CASE("bodies: the reference has each one's material and friction") {
   const auto& bodies = soft_bodies();
   const auto model = together(bodies);
-  Settings settings;
+  Settings settings = with_bodies({}, bodies);
   static_cast<Material&>(settings) = of_model("neo-hookean", 3e4, 0.2, 0.01);
   const ConstraintSystem system = build_constraints(*model, settings);
   const ReferenceInput input{*model, system, settings, model->inverse_masses};
@@ -167,9 +167,9 @@ TEST_CASE("bodies: the reference has each one's material and friction") {
 }
 
 TEST_CASE_FIXTURE(GlTest, "bodies: elastic energy is the sum of what each has alone") {
-  const auto& bodies = soft_bodies();
+  const auto bodies = all_bodies();
   const auto model = together(bodies);
-  Settings settings = settings_for(*find_solver_mode("node"));
+  const Settings settings = with_bodies(settings_for(*find_solver_mode("node")), bodies);
   const auto elastic = [](Sim& sim) {
     Metrics metrics = create_metrics(*sim.model, sim.system);
     measure(metrics, sim);
@@ -188,10 +188,10 @@ TEST_CASE_FIXTURE(GlTest, "bodies: elastic energy is the sum of what each has al
 TEST_CASE_FIXTURE(GlTest, "bodies: settings are of those without a material of their own, also live") {
   const std::vector<Made> bodies = {soft_bodies()[0], soft_bodies()[3]};
   const auto model = together(bodies);
-  model->bodies[1].material.reset(), model->bodies[1].friction.reset();
   for (const SolverMode& mode : solver_modes()) {
     CAPTURE(std::string(mode.name));
-    Settings settings = of_body(settings_for(mode), bodies[1]);
+    Settings settings = with_bodies(of_body(settings_for(mode), bodies[1]), {bodies[0]});
+    settings.bodies.emplace_back();
     Sim sim = create_sim(model, settings);
     run(sim, 2 * AdaptiveSubsteps::every);  // substeps adapt at every so many steps of the whole run
     settings.compliance.fill(8e-6), settings.friction = 0.7;
@@ -216,11 +216,10 @@ TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of
     Settings settings = of_body(settings_for(mode), soft_bodies()[0]);
     settings.contact = "bodies", settings.ground = false;
     const auto centre_after = [&](double world, std::optional<double> below, std::optional<double> above) {
-      auto own = std::make_shared<Model>(*model);
-      own->bodies[0].friction = below, own->bodies[1].friction = above;
+      settings.bodies = {{.friction = below}, {.friction = above}};
       settings.friction = world;
-      Sim sim = create_sim(own, settings);
-      return run(sim, 30).velocities[own->bodies[1].first_vertex].x;
+      Sim sim = create_sim(model, settings);
+      return run(sim, 30).velocities[model->bodies[1].first_vertex].x;
     };
     const double as_world = centre_after(0.6, {}, {}), as_bodies = centre_after(0, 0.9, 0.4);
     // What sticks turns on the last bits in newton.
@@ -231,10 +230,10 @@ TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of
 
 TEST_CASE_FIXTURE(GlTest, "bodies: a mode that cannot have a body's material says which body it is") {
   const auto model = together(all_bodies());
-  Settings settings;
+  Settings settings = with_bodies({}, all_bodies());
   settings.mode = "explicit", settings.material = "neo-hookean";
   CHECK_THROWS_WITH(create_sim(model, settings), doctest::Contains("body stiff"));
-  Sim sim = create_sim(model, settings_for(*find_solver_mode("node")));
+  Sim sim = create_sim(model, with_bodies(settings_for(*find_solver_mode("node")), all_bodies()));
   CHECK_THROWS_WITH(apply_settings(sim, settings), doctest::Contains("body stiff"));
   settings.mode = "paper", settings.material = "none";
   CHECK_THROWS_WITH(create_sim(model, settings), doctest::Contains("one material"));

@@ -352,7 +352,46 @@ TEST_CASE("material: scenes and flags name it, and say what is wrong with it") {
   refused(R"({"modulus": 3})", "'bodies.0.material.modulus' is not known here");
   refused(R"({"poisson_ratio": 0.5})", "'poisson_ratio' cannot be 0.5");
   refused(R"({"model": "springs", "poisson_ratio": 0.1})", "springs have no Poisson's ratio of 0.1");
-  std::ofstream(folder.path / "m.json")
-      << R"({"bodies": [{"block": {}, "material": "foam"}, {"block": {}, "position": [3, 0, 0]}]})";
-  CHECK(program("run --scene m.json --steps 1 --out r", folder).err.find("different materials") != std::string::npos);
+}
+
+TEST_CASE("material: bodies of a scene have their own, also beside a sheet and a hard body") {
+  const Folder folder;
+  std::ofstream(folder.path / "m.json") << R"({"bodies": [
+    {"name": "soft", "block": {}, "material": "foam", "friction": 0.9},
+    {"name": "firm", "block": {}, "position": [3, 0, 0],
+     "material": {"young_modulus": 2e5, "poisson_ratio": 0.3, "constraint_damping": 1e-3}},
+    {"name": "cloth", "sheet": {}, "position": [6, 1, 0],
+     "material": {"constraints": ["stretch", "isobend"], "compliance_stretch": 1e-5, "compliance_isobend": 10}},
+    {"name": "stone", "block": {}, "position": [9, 0, 0], "restitution": 0.5}]})";
+  const auto bodies = [&](const std::string& more) {
+    const Outcome run = program("run --steps 2 --out r " + more, folder);
+    CHECK_MESSAGE(run.status == 0, run.err);
+    return nlohmann::json::parse(read(folder.path / "r/stats.json"))["bodies"];
+  };
+  const auto first = bodies("--scene m.json --mode cpu");
+  REQUIRE(first.size() == 4);
+  CHECK(first[0]["material"]["model"] == "neo-hookean");
+  CHECK(first[0]["material"]["young_modulus"] == 1e5);
+  CHECK(first[0]["friction"] == 0.9);
+  CHECK(first[1]["material"]["constraint_damping"] == 1e-3);
+  CHECK(first[2]["material"]["compliance_stretch"] == 1e-5);
+  CHECK(first[2]["material"]["constraints"] == std::vector<std::string>{"stretch", "isobend"});
+  CHECK(first[3]["material"]["model"] == "none");
+  CHECK(first[3]["restitution"] == 0.5);
+  CHECK(first[3]["mass"].get<double>() == doctest::Approx(1000));
+  // The scene that a run writes is the same run.
+  std::filesystem::copy(folder.path / "r/scene.json", folder.path / "again.json");
+  CHECK(bodies("--scene again.json --mode cpu") == first);
+  CHECK(bodies("--scene m.json --mode cpu --young-modulus 3e4") == first);  // all but the stone have their own
+  CHECK(bodies("--scene m.json --mode cpu --set bodies.1.material.young_modulus=3e4")[1]["material"]["young_modulus"] ==
+        3e4);
+  const auto refused = [&](const std::string& more, const std::string& message) {
+    const Outcome run = program("run --scene m.json --steps 1 --out r " + more, folder);
+    CHECK(run.status == 2);
+    CHECK_MESSAGE(run.err.find(message) != std::string::npos, run.err);
+  };
+  refused("--mode newton", "body stone");
+  refused("--mode node --set bodies.0.restitution=0.5", "body soft");
+  refused("--mode cpu --set bodies.1.material.poisson_ratio=0.7", "bodies.1.material");
+  refused("--mode cpu --set bodies.2.material=foam", "a sheet has no material");
 }

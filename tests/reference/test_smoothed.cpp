@@ -260,7 +260,7 @@ TEST_CASE("smoothed tets: modes without them solve linear ones, and averages kee
     add_body(model, "beam", mesh, 1000, mesh.positions, glm::dvec3(0), glm::dvec3(0), {});
     Settings own = scene.settings;
     own.element = element;
-    model.bodies.back().material = own;
+    scene.settings.bodies.push_back({.material = own});
   }
   scene.settings.mode = "newton";
   const ConstraintSystem both = build_constraints(model, scene.settings);

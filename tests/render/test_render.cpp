@@ -684,7 +684,7 @@ TEST_CASE("render: an obstacle's surface is where its distance is zero, and face
       o.radius = r, o.half_length = l, o.half = {0.4, 0.2, 0.3};
       if (heights) set_heights(o, {{0.2, 0.5, 1}, {0.4, 0.6, 0.3}, {0.1, 0, 0.5}, {0.3, 0.3, 0.2}});
       const auto corners = tessellate(o);
-      const MovingObstacle exact = moving_obstacle(o, 0, 0, 0, 0);
+      const MovingObstacle exact = moving_obstacle(o, 0, 0);
       double volume = 0, farthest = 0;
       for (std::size_t c = 0; c < corners.size(); c += 3) {
         const glm::dvec3 p[] = {glm::dvec3(corners[c].position), glm::dvec3(corners[c + 1].position),

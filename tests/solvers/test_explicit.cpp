@@ -237,14 +237,16 @@ TEST_CASE("explicit, newton: bodies of linear and of smoothed tets move as each 
       for (const char* element : elements) {
         const auto block = irregular_block(1, true);
         add_body(*model, element, block->rest, 1000, block->positions, {}, {}, {0, 1});
-        Settings own = settings;
-        own.element = element;
-        model->bodies.back().material = own;
       }
       return model;
     };
     const auto moved = [&](const std::vector<const char*>& elements) {
-      Sim sim = create_sim(model_of(elements), settings);
+      Settings own = settings;
+      for (const char* element : elements) {
+        own.bodies.push_back({.material = settings});
+        own.bodies.back().material->element = element;
+      }
+      Sim sim = create_sim(model_of(elements), own);
       for (int s = 0; s < 20; ++s) step(sim);
       return read_state(sim).positions;
     };

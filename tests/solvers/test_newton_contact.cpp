@@ -32,7 +32,6 @@ std::shared_ptr<Model> on_plane(const Block& block) {
   plane.kind = find_obstacle_kind("half-space");
   plane.normal = rotation_of({0, 0, block.slope}) * glm::dvec3(0, 1, 0);
   add_body(*model, "block", mesh, block.density, mesh.positions, block.velocity, glm::dvec3(0), {});
-  model->bodies[0].friction = block.friction;
   return model;
 }
 
@@ -50,7 +49,9 @@ struct Outcome {
 };
 Outcome after(const Block& block, const Settings& settings, double seconds) {
   const auto model = on_plane(block);
-  Sim sim = create_sim(model, settings);
+  Settings own = settings;
+  own.bodies = {{.friction = block.friction}};
+  Sim sim = create_sim(model, own);
   Metrics metrics = create_metrics(*model, sim.system);
   const Measurement first = measure_now(metrics, sim);
   for (int s = 0; s < int(seconds / settings.dt); ++s) step(sim);

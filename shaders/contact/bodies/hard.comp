@@ -96,7 +96,7 @@ void find_needs(uint m, int pass) {
   float along = dot(way_between(c), c.normal);
   if (pass == 0) {
     float fall = params.h * params.h * length(params.gravity);
-    c.least = least_way(along, c.least, fall, params.restitution);
+    c.least = least_way(along, c.least, fall, c.restitution);
     hard_pairs[m].least = c.least;
   }
   bool needs = c.impulse != vec3(0.0) || (c.acts != 0u && along < c.least);

@@ -24,6 +24,7 @@ void leave_to_hard(uint p, PairState s, Proximity t, SurfacePair pair, uvec2 bod
   c.pair = p, c.acts = acts ? 1u : 0u;
   c.normal = t.normal, c.distance = t.distance, c.offset = pair.offset;
   c.least = -max(0.0, t.distance - pair.offset), c.friction = friction_between(s.vertices[0], s.vertices[3]);
+  c.restitution = restitution_between(s.vertices[0], s.vertices[3]);
   c.soft_way = vec3(0.0), c.soft_weight = 0.0;
   c.impulse = c.before = vec3(pair.impulse[0], pair.impulse[1], pair.impulse[2]), c.more = vec3(0.0);
   int own = (pair.first & OF_EDGES) != 0u ? 2 : 1;

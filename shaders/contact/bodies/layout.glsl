@@ -63,7 +63,8 @@ struct HardPair {
   vec3 more;          // what this pass adds to the impulse
   float friction;
   uint needs;         // 1: in this pass it: has an impulse or needs one
-  uint _0, _1, _2;
+  float restitution;
+  uint _0, _1;
 };
 // With what impulse a pair begins the next substep, for when pairs are found anew (keep.comp).
 struct KeptImpulse {

@@ -178,4 +178,4 @@ real allowed_part(Proximity t, real offset, vec2 sides, int side, real own) {
   return own > limit ? limit / own : real(1);
 }
 // Between two bodies with these coefficients.
-real mean_friction(real a, real b) { return a == b ? a : sqrt(a * b); }
+real mean_of_surfaces(real a, real b) { return a == b ? a : sqrt(a * b); }

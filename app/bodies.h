@@ -1,0 +1,32 @@
+// What bodies have of their own (BodySettings): in scenes, in lists of words, and for the panel of one body.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "sim/model/settings.h"
+
+namespace tetpbd {
+
+/// The keys material, friction and restitution of a scene's bodies. A material that all have is the settings' own,
+/// which flags and widgets change. Throws Error naming `file`.
+void read_bodies_settings(const nlohmann::json& bodies, Settings& settings, const std::string& file);
+/// Of one body, whose material has the settings' values where it says nothing. Throws Error naming `where` and `file`.
+BodySettings read_body_settings(const nlohmann::json& body, const Settings& settings, const std::string& where,
+                                const std::string& file);
+/// The same keys; of a material only what has an effect.
+nlohmann::ordered_json body_settings_json(const BodySettings& body);
+/// A setting's value, as setting_text() reads it.
+nlohmann::ordered_json setting_json(const Settings& settings, const Parameter& row);
+
+/// Sets "young_modulus", or "bodies.1.young_modulus" of a body alone; false if there is no setting of that name. Throws
+/// Error as set_parameter() does, and where there is no such body.
+bool set_by_name(Settings& settings, const std::string& name, const std::string& text, const std::string& where);
+
+/// The settings as they are for one body: its material, friction and restitution in place of those of all.
+Settings settings_for_body(Settings settings, std::optional<std::size_t> body);
+/// `settings` changed in what `wanted`, once settings_for_body(), says otherwise, for `count` bodies.
+Settings with_body_changed(const Settings& settings, const Settings& wanted, std::size_t body, std::size_t count);
+
+}  // namespace tetpbd

@@ -47,6 +47,12 @@ BodySettings read_body_settings(const json& body, const Settings& settings, cons
   }
   if (body.contains("friction")) own.friction = body["friction"].get<double>();
   if (body.contains("restitution")) own.restitution = body["restitution"].get<double>();
+  for (const json& region : body.value("regions", json())) {
+    RegionModuli& moduli = own.regions.emplace_back();
+    if (region.contains("young_modulus")) moduli.young_modulus = region["young_modulus"].get<double>();
+    if (region.contains("poisson_ratio")) moduli.poisson_ratio = region["poisson_ratio"].get<double>();
+  }
+  if (std::ranges::count(own.regions, RegionModuli()) == std::ssize(own.regions)) own.regions.clear();
   return own;
 }
 
@@ -76,6 +82,12 @@ ordered_json body_settings_json(const BodySettings& body) {
     for (const Parameter& row : parameters())
       if (is_of_material(row) && why_unused(with, row.name).empty())
         result["material"][row.name == "material" ? "model" : row.name] = setting_json(with, row);
+  }
+  for (const RegionModuli& region : body.regions) {
+    ordered_json moduli = ordered_json::object();
+    if (region.young_modulus) moduli["young_modulus"] = *region.young_modulus;
+    if (region.poisson_ratio) moduli["poisson_ratio"] = *region.poisson_ratio;
+    result["regions"].push_back(std::move(moduli));
   }
   if (body.friction) result["friction"] = *body.friction;
   if (body.restitution) result["restitution"] = *body.restitution;

@@ -75,7 +75,7 @@ std::string vtu_text(const Sim& sim, const State& state, const std::vector<glm::
         average_energy(sim.system.averages, v, x, energy_material(solved_material(body_at(model, v), sim.settings)));
   for (std::size_t t = 0; t < tets; ++t) {
     const auto [a, b, c, d] = model.rest.tets[t];
-    const glm::vec4 material = energy_material(solved_material(body_at(model, a), sim.settings));
+    const glm::vec4 material = tet_energy_material(model, sim.settings, t);
     TetValues now = tet_values(model, t, {x[a], x[b], x[c], x[d]}, material);
     for (const std::uint32_t corner : {a, b, c, d})
       if (material.z == 3) now.energy += 0.25f * stored[corner];

@@ -158,6 +158,11 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
     if (!fill.what.empty()) j["fills"].push_back({{"body", sim.model->bodies[fill.body].name}, {"what", fill.what}});
   for (const StartMotion& m : sim.model->start_motions)
     j["start_motions"].push_back({{"body", m.body}, {"from", m.from}, {"motion", vector(m.motion)}, {"work", m.work}});
+  const State state = sim.model->fixtures.empty() ? State{} : read_state(sim);
+  for (const Fixture& fixture : sim.model->fixtures)
+    j["fixtures"].push_back({{"body", sim.model->bodies[fixture.body].name},
+                             {"fixed", fixture.region},
+                             {"lag", lag_of(sim, fixture, state)}});
   j["device"] = device_json(device);
   j["timing"] = {{"steps", sim.steps},
                  {"gpu_ms_per_step", times(run.gpu_ms)},

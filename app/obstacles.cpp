@@ -84,7 +84,6 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
   get("point", o.centre), get("centre", o.centre), get("normal", o.normal), get("rotation", o.rotation);
   get("radius", o.radius), get("half_length", o.half_length), get("half", o.half);
   get("heights", o.heights), get("scale", o.scale), get("height", o.height), get("voxels", o.voxels);
-  get("velocity", o.velocity), get("spin", o.spin);
   if (value.contains("friction")) o.friction = value["friction"];
   if (value.contains("restitution")) o.restitution = value["restitution"];
   if (o.kind->has("normal") && !(glm::length(o.normal) > 1e-9)) refuse("normal", "must not be zero");
@@ -98,20 +97,35 @@ Obstacle read_obstacle(const json& value, const std::string& where, const std::s
       if (!fs::is_regular_file(path)) refuse(key, fmt::format("is no file: {}", path.string()));
       (key[0] == 'i' ? o.image : o.mesh) = path;
     }
+  read_motion(value, o, "centre", where, file);
+  return o;
+}
+
+void read_motion(const json& value, Path& path, const char* place, const std::string& where, const std::string& file) {
+  if (value.contains("velocity")) value["velocity"].get_to(path.velocity);
+  if (value.contains("spin")) value["spin"].get_to(path.spin);
   const json frames = value.value("keyframes", json::array());
   if (!frames.empty() && (value.contains("velocity") || value.contains("spin")))
-    refuse("keyframes", "already say how it moves", "leave out velocity and spin");
-  Obstacle::Key key{0, o.centre, o.rotation};
+    throw Error(fmt::format("'{}.keyframes' already say how it moves", where), file, "leave out velocity and spin");
+  Path::Key key{0, path.centre, path.rotation};
   for (const json& frame : frames) {
     const double time = frame.value("time", 0.0);
     if (!(time > key.time))
-      refuse(fmt::format("keyframes.{}.time", o.keyframes.size()), "must be later than the one before, and 0");
+      throw Error(
+          fmt::format("'{}.keyframes.{}.time' must be later than the one before, and 0", where, path.keyframes.size()),
+          file, "see docs/guide.md");
     key.time = time;
-    if (frame.contains("centre")) frame["centre"].get_to(key.centre);
+    if (frame.contains(place)) frame[place].get_to(key.centre);
     if (frame.contains("rotation")) frame["rotation"].get_to(key.rotation);
-    o.keyframes.push_back(key);
+    path.keyframes.push_back(key);
   }
-  return o;
+}
+
+void put_motion(json& value, const Path& path, const char* place) {
+  if (path.velocity != glm::dvec3(0)) value["velocity"] = path.velocity;
+  if (path.spin != glm::dvec3(0)) value["spin"] = path.spin;
+  for (const Path::Key& key : path.keyframes)
+    value["keyframes"].push_back({{"time", key.time}, {place, key.centre}, {"rotation", key.rotation}});
 }
 
 json obstacle_json(const Obstacle& o) {
@@ -129,10 +143,7 @@ json obstacle_json(const Obstacle& o) {
   if (o.height > 0) result["height"] = o.height;
   if (o.friction) result["friction"] = *o.friction;
   if (o.restitution) result["restitution"] = *o.restitution;
-  if (o.velocity != glm::dvec3(0)) result["velocity"] = o.velocity;
-  if (o.spin != glm::dvec3(0)) result["spin"] = o.spin;
-  for (const Obstacle::Key& key : o.keyframes)
-    result["keyframes"].push_back({{"time", key.time}, {"centre", key.centre}, {"rotation", key.rotation}});
+  put_motion(result, o, "centre");
   return result;
 }
 

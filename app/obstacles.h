@@ -23,6 +23,11 @@ namespace tetpbd {
 
 /// What one may have, as scene files are checked by.
 nlohmann::json obstacle_schema();
+/// Its motion: velocity and spin, or keyframes, whose places stand under the key `place`. Throws Error naming `where`
+/// and `file`.
+void read_motion(const nlohmann::json& value, Path& path, const char* place, const std::string& where,
+                 const std::string& file);
+void put_motion(nlohmann::json& value, const Path& path, const char* place);
 /// Of a value that has passed this check. Throws Error naming `where` and `file`; files are beside the scene,
 /// in `folder`, or are shipped.
 Obstacle read_obstacle(const nlohmann::json& value, const std::string& where, const std::string& file,

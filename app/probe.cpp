@@ -64,7 +64,7 @@ Reading reading_of(const Probe& probe, const Lane& lane, const std::vector<float
   for (std::size_t i = 0; i < probe.read.size(); ++i) now[probe.read[i]] = pair(8 * i);
   reading.position = now[reading.vertex];
   reading.speed = glm::length(pair(velocity_at(probe)));
-  const glm::vec4 material = energy_material(solved_material(body_at(model, reading.vertex), lane.sim.settings));
+  const glm::vec4 material = tet_energy_material(model, lane.sim.settings, reading.tet);
   const TetValues measured = tet_values(model, reading.tet, corners_of(model.rest.tets[reading.tet], now), material);
   reading.volume = double(measured.volume), reading.strain = double(measured.strain);
   if (material.z > 0) reading.energy = double(measured.energy);

@@ -68,6 +68,10 @@ json schema() {
       "scale": {"three": [1e-6, 1e6]}, "height": [1e-6, 1e6],
       "rotation": {"three": [-3600, 3600]}, "position": {"three": [-1e6, 1e6]},
       "density": [1e-6, 1e9], "velocity": {"three": [-1e5, 1e5]}, "spin": {"three": [-1e5, 1e5]},
+      "regions": {"least": 0, "most": 200, "of": "at most 200 regions", "each": {
+        "low": {"three": [-1, 2]}, "high": {"three": [-1, 2]}, "centre": {"three": [-1, 2]}, "radius": [1e-6, 2],
+        "tag": [-2147483648, 2147483647, "whole number"], "young_modulus": [1, 1e12], "poisson_ratio": [0, 0.499],
+        "density": [1e-6, 1e9]}},
       "fixed": {"least": 0, "most": 100, "of": "at most 100 boxes {\"low\": [x,y,z], \"high\": [x,y,z]}",
         "each": {"low": {"three": [-1, 2]}, "high": {"three": [-1, 2]}}}}},
     "world": {"obstacles": {"least": 0}},
@@ -78,6 +82,10 @@ json schema() {
   json& body = result["bodies"]["each"];
   body["fill"]["one of"] = fill_kinds;
   body["heavy"] = body["fixed"];
+  const json motion = obstacle_schema();
+  for (const char* key : {"velocity", "spin", "keyframes"}) body["fixed"]["each"][key] = motion[key];
+  json& frame = body["fixed"]["each"]["keyframes"]["each"];
+  frame["move"] = frame["centre"], frame.erase("centre");
   body["heavy"]["each"].update({{"ratio", {1e-9, 1e9}}, {"share", {0, 1}}});
   constexpr int most = MAX_OBSTACLES - 1;  // beside the ground
   result["world"]["obstacles"].update(
@@ -138,6 +146,19 @@ void check(const json& value, const json& allowed, const std::string& path, cons
 
 bool has_tets(const BodyDescription& body) { return !body.mesh.empty() && !is_surface_file(body.mesh); }
 
+BodyDescription::Region read_region(const json& value, const std::string& where, const std::string& file) {
+  BodyDescription::Region region;
+  const bool box = value.contains("low") || value.contains("high"), ball = value.contains("radius");
+  if (box + ball + value.contains("tag") != 1)
+    refuse(fmt::format("'{}' needs a box (\"low\", \"high\"), a ball (\"centre\", \"radius\") or a \"tag\"", where),
+           file);
+  if (box) region.box = value.get<BodyDescription::Box>();
+  if (ball) region.centre = value.value("centre", glm::dvec3(0.5)), region.radius = value["radius"];
+  if (value.contains("tag")) region.tag = value["tag"].get<std::int32_t>();
+  if (value.contains("density")) region.density = value["density"].get<double>();
+  return region;
+}
+
 BodyDescription read_body(const json& value, const std::string& where, const std::string& file,
                           const fs::path& folder) {
   auto body = value.get<BodyDescription>();
@@ -146,6 +167,8 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (value.contains("tet")) body.tet = value["tet"].get<std::array<glm::dvec3, 4>>();
   if (value.contains("tets")) body.tets = value["tets"].get<double>();
   if (value.contains("spacing")) body.spacing = value["spacing"].get<double>();
+  for (const json& region : value.value("regions", json()))
+    body.regions.push_back(read_region(region, fmt::format("{}.regions.{}", where, body.regions.size()), file));
   const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet) + bool(body.sheet);
   if (kinds > 1 || (kinds == 0 && body.surface.empty()))
     refuse(fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where), file);
@@ -176,6 +199,8 @@ BodyDescription read_body(const json& value, const std::string& where, const std
       if (const auto& box = (*boxes)[b]; glm::any(glm::greaterThan(box.low, box.high)))
         refuse(fmt::format("'{}.{}.{}' has a \"low\" above its \"high\", so that nothing is inside", where, key, b),
                file);
+  for (std::size_t b = 0; b < body.fixed.size(); ++b)
+    read_motion(value["fixed"][b], body.fixed[b].path, "move", fmt::format("{}.fixed.{}", where, b), file);
   for (fs::path* named : {&body.mesh, &body.surface})
     if (!named->empty()) *named = found_file(*named, folder);
   return body;
@@ -339,6 +364,64 @@ Filled body_of(const BodyDescription& body, const std::string& scene, bool soft)
     result.fit.gap = NAN;  // how far it is from the tets has not been measured
   }
   return result;
+}
+
+// By tet, the number from 1 on of the last region that its middle is in, and its density over the body's.
+struct TetRegions {
+  std::vector<std::uint8_t> number;
+  std::vector<double> density;
+};
+TetRegions find_regions(const BodyDescription& body, const TetMesh& mesh, const Bounds& own, const std::string& scene) {
+  TetRegions found{std::vector<std::uint8_t>(mesh.tets.size()), std::vector<double>(mesh.tets.size(), 1)};
+  const glm::dvec3 extent = own.high - own.low;
+  const double largest = std::max({extent.x, extent.y, extent.z});
+  for (std::size_t r = 0; r < body.regions.size(); ++r) {
+    const BodyDescription::Region& region = body.regions[r];
+    const auto place = [&] { return fmt::format("'regions.{}' of body '{}' of {}", r, body.name, scene); };
+    if (region.tag && mesh.tags.size() != mesh.tets.size())
+      throw Error("the body's tets have no tags", place(),
+                  "name a .msh with physical groups or an .ele with an attribute, or give a box");
+    bool any = false;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+      glm::dvec3 middle(0);
+      for (const std::uint32_t v : mesh.tets[t]) middle += mesh.positions[v] / 4.0;
+      const glm::dvec3 at = middle - own.low;
+      bool inside = region.tag && mesh.tags[t] == *region.tag;
+      if (region.box)
+        inside = glm::all(glm::lessThanEqual(region.box->low * extent, at)) &&
+                 glm::all(glm::lessThanEqual(at, region.box->high * extent));
+      if (region.radius > 0) inside = glm::distance(at, region.centre * extent) <= region.radius * largest;
+      if (!inside) continue;
+      any = true, found.number[t] = std::uint8_t(r + 1);
+      found.density[t] = region.density.value_or(body.density) / body.density;
+    }
+    if (!any) throw Error("a region holds no tet", place(), "make it larger; low, high and centre are fractions");
+  }
+  return found;
+}
+
+// Moves so many of these points, m, about the middle of where they start.
+Fixture fixture_of(const Path& from_start, std::vector<std::uint32_t> vertices,
+                   const std::vector<glm::dvec3>& positions) {
+  std::vector<glm::dvec3> held;
+  for (const std::uint32_t v : vertices) held.push_back(positions[v]);
+  Fixture fixture{0, 0, std::move(vertices), from_start};
+  fixture.path.centre = bounds(held).centre();
+  for (Path::Key& key : fixture.path.keyframes) key.centre += fixture.path.centre;
+  return fixture;
+}
+
+// How many times the mass of each vertex is that of a body of one density.
+std::vector<double> region_mass_factors(const TetMesh& mesh, const TetRegions& regions) {
+  std::vector<double> mass(mesh.positions.size()), plain(mesh.positions.size());
+  const std::vector<double> volumes = tet_volumes(mesh);
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    for (const std::uint32_t v : mesh.tets[t]) {
+      const double own = volumes[t] * fill_of(mesh, t);
+      mass[v] += regions.density[t] * own, plain[v] += own;
+    }
+  for (std::size_t v = 0; v < mass.size(); ++v) mass[v] = plain[v] > 0 ? mass[v] / plain[v] : 1;
+  return mass;
 }
 
 void add_carried(CarriedSurface& all, const CarriedSurface& more, std::size_t first_tet) {
@@ -539,7 +622,18 @@ json body_json(const BodyDescription& body) {
   if (body.up == "y") result.erase("up");
   if (body.height == 0) result.erase("height");
   if (body.thickness == 0) result.erase("thickness");
-  for (json& box : result["fixed"]) box.erase("ratio"), box.erase("share");
+  for (std::size_t b = 0; b < body.fixed.size(); ++b) {
+    json& box = result["fixed"][b];
+    box.erase("ratio"), box.erase("share");
+    put_motion(box, body.fixed[b].path, "move");
+  }
+  for (const BodyDescription::Region& region : body.regions) {
+    json one = region.box ? json{{"low", region.box->low}, {"high", region.box->high}} : json::object();
+    if (region.radius > 0) one = {{"centre", region.centre}, {"radius", region.radius}};
+    if (region.tag) one["tag"] = *region.tag;
+    if (region.density) one["density"] = *region.density;
+    result["regions"].push_back(one);
+  }
   if (body.block) result["block"] = *body.block;
   if (body.tet) result["tet"] = *body.tet;
   if (body.sheet) result["sheet"] = *body.sheet;
@@ -549,8 +643,13 @@ json body_json(const BodyDescription& body) {
 ordered_json scene_json(const Scene& scene) {
   ordered_json result = {{"name", scene.name}, {"description", scene.description}};
   for (const BodyDescription& body : scene.bodies) result["bodies"].push_back(ordered_json(body_json(body)));
-  for (std::size_t b = 0; b < scene.settings.bodies.size(); ++b)
-    result["bodies"][b].update(ordered_json(body_settings_json(scene.settings.bodies[b])));
+  for (std::size_t b = 0; b < scene.settings.bodies.size(); ++b) {
+    ordered_json own = body_settings_json(scene.settings.bodies[b]);
+    const ordered_json moduli = own.value("regions", ordered_json::array());
+    own.erase("regions");
+    result["bodies"][b].update(own);
+    for (std::size_t r = 0; r < moduli.size(); ++r) result["bodies"][b]["regions"][r].update(moduli[r]);
+  }
   for (const Parameter& row : parameters()) result[row.section][row.name] = setting_json(scene.settings, row);
   result["world"]["obstacles"] = ordered_json::array();
   for (const Obstacle& obstacle : scene.obstacles)
@@ -594,12 +693,13 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
       return glm::all(glm::lessThanEqual(glm::abs(away), glm::max(0.5 * (box.high - box.low) + 1e-9, least)));
     };
     std::vector<std::uint32_t> fixed;
-    std::vector<double> mass_factors(mesh.positions.size(), 1);
+    const TetRegions regions = find_regions(body, mesh, own, scene.name);
+    std::vector<double> mass_factors = region_mass_factors(mesh, regions);
     std::mt19937 generator{std::uint32_t(scene.settings.seed)};
+    std::vector<std::vector<char>> in_fixed(body.fixed.size());  // before the mesh is turned
     for (std::size_t b = 0; b < body.fixed.size(); ++b) {
-      std::size_t inside = 0;
-      while (inside < mesh.positions.size() && !is_in(inside, body.fixed[b])) ++inside;
-      if (inside == mesh.positions.size())
+      for (std::size_t i = 0; i < mesh.positions.size(); ++i) in_fixed[b].push_back(is_in(i, body.fixed[b]));
+      if (!std::ranges::count(in_fixed[b], 1))
         throw Error("a fixed region holds no vertex",
                     fmt::format("'fixed.{}' of body '{}' of {}", b, body.name, scene.name),
                     "low and high are fractions of the body's bounding box: make it larger");
@@ -629,9 +729,24 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     fit.thinnest_at = turn * (fit.thinnest_at - own.centre()) + body.position - bottom;
     if ((!body.mesh.empty() || !body.surface.empty()) && !mesh.tets.empty())
       model->fills.push_back({model->bodies.size(), filled.note, fit});
+    for (std::size_t b = 0; b < body.fixed.size(); ++b) {
+      if (!moves(body.fixed[b].path)) continue;
+      std::vector<std::uint32_t> held;
+      for (std::uint32_t i = 0; i < start.size(); ++i)
+        if (in_fixed[b][i]) held.push_back(i);
+      model->fixtures.push_back(fixture_of(body.fixed[b].path, std::move(held), start));
+      Fixture& made = model->fixtures.back();
+      made.body = model->bodies.size(), made.region = b;
+      for (std::uint32_t& v : made.vertices) v += std::uint32_t(model->positions.size());
+    }
+    if (const auto& has = scene.settings.bodies; !has.empty() && !has[model->bodies.size()].regions.empty()) {
+      model->regions.resize(model->rest.tets.size());
+      model->regions.insert(model->regions.end(), regions.number.begin(), regions.number.end());
+    }
     add_body(*model, body.name, mesh, body.density, start, body.velocity, body.spin, fixed, mass_factors);
   }
   if (!carries) model->carried = {};
+  if (!model->regions.empty()) model->regions.resize(model->rest.tets.size());
   for (const Obstacle& obstacle : scene.obstacles) {
     model->obstacles.push_back(obstacle);
     load_field(model->obstacles.back());

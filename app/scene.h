@@ -43,6 +43,15 @@ struct BodyDescription {
   struct Box {
     glm::dvec3 low{0}, high{1};  ///< fractions of the body's bounding box
     double ratio = 1, share = 1;
+    Path path{};  ///< of fixed ones, from where they start
+  };
+  /// Tets whose middle is in a box, in a ball, or that a file gives a number.
+  struct Region {
+    std::optional<Box> box;
+    glm::dvec3 centre{0};               ///< fractions of the body's bounding box
+    double radius = 0;                  ///< of its largest side; above 0: a ball
+    std::optional<std::int32_t> tag{};  ///< TetMesh::tags
+    std::optional<double> density{};    ///< kg/m^3
   };
   std::string name;
   std::filesystem::path mesh;                    ///< a file, or
@@ -65,6 +74,7 @@ struct BodyDescription {
   glm::dvec3 spin{0};             ///< rad/s about the centre of mass
   std::vector<Box> fixed;         ///< vertices in any of these boxes are fixed
   std::vector<Box> heavy;
+  std::vector<Region> regions;    ///< of several the last counts
   std::string deform = "none";
 };
 

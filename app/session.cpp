@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "app/bodies.h"
 #include "app/edit_obstacles.h"
 #include "app/files.h"
 #include "app/reference_command.h"
@@ -96,6 +97,10 @@ void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
     if (row.effect == Effect::restart) say(s, fmt::format("{} takes effect at the next reset (R)", row.name));
     if (row.effect == Effect::rebuild) s.loaded.lane().step_ms = {};
   }
+  const auto& now = s.loaded.sim().settings.bodies;
+  for (std::size_t b = 0; b < now.size(); ++b)
+    if (b >= old.bodies.size() || now[b] != old.bodies[b])
+      s.log("set body {} {}", b, json_text(body_settings_json(now[b]), -1));
 }
 
 void take_back(Session& s, const char* word, std::vector<Change>& from, std::vector<Change>& to) {

@@ -99,7 +99,9 @@ ordered_json bodies_json(const Sim& sim) {
   for (const Body& body : model.bodies) {
     const BodySettings own{.material = solved_material(body, sim.settings),
                            .friction = friction_of(sim.settings, body.number),
-                           .restitution = restitution_of(sim.settings, body.number)};
+                           .restitution = restitution_of(sim.settings, body.number),
+                           .regions = sim.settings.bodies.empty() ? std::vector<RegionModuli>()
+                                                                  : sim.settings.bodies[body.number].regions};
     glm::dvec3 centre(0), momentum(0);
     double kinetic = 0, volume = 0, rest_volume = 0, worst = 0;
     for (std::size_t i = body.first_vertex; i < body.first_vertex + body.vertices; ++i) {

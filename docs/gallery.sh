@@ -45,6 +45,7 @@ show spikes 100 'A slab of jelly on spikes, and a bunny on the slab' --scene spi
 show stairs 100 'A cube of jelly and a bunny tumble down stairs' --scene stairs
 show stack 200 'Ten cubes stand on each other' --scene stack
 show hard-stack 200 'Ten hard cubes stand on each other' --scene hard-stack
+show gripper 420 'Soft pads lift a bunny by friction' --scene gripper
 show mixed 60 'A stone falls on a jelly on a slab of stone' --scene mixed
 show press-cloth 300 'A plate presses a heap of cloths' --scene press-cloth
 show ring 80 'Balls of jelly, thrown at each other' --scene ring

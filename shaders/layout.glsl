@@ -32,6 +32,7 @@ struct Record4 {
 struct TetRecord {
   uint vertices[4];
   float rest, filled;  // m^3; what the body fills of it
+  float mu, lambda;    // Pa, of its region, or negative
 };
 #define MAX_OBSTACLES 31     // of a step, with the ground; each has a bit of a word in newton/layout.glsl
 #define MAX_PLANES 8         // half spaces at rest among them that have no properties of their own

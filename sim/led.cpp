@@ -49,7 +49,12 @@ void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dv
 
 void begin_leading(Sim& sim) {
   Led& led = sim.led;
+  led.by_hand = !led.vertices.empty();
   std::map<std::uint32_t, glm::dvec3> last;
+  for (const Fixture& fixture : sim.model->fixtures)
+    for (const std::uint32_t v : fixture.vertices)
+      if (is_pinned(sim, v))
+        last[v] = moved_along(fixture.path, sim.model->positions[v], simulated_time(sim) + sim.settings.dt);
   for (std::size_t k = 0; k < led.vertices.size(); ++k)
     if (is_pinned(sim, led.vertices[k])) last[led.vertices[k]] = led.places[k];  // others were let go of since
   led.vertices.clear(), led.places.clear();
@@ -67,6 +72,15 @@ void begin_leading(Sim& sim) {
   write_records(led);
 }
 
+double lag_of(const Sim& sim, const Fixture& fixture, const State& state) {
+  double most = 0;
+  for (const std::uint32_t v : fixture.vertices)
+    if (is_pinned(sim, v))
+      most = std::max(most, glm::distance(state.positions[v],
+                                          moved_along(fixture.path, sim.model->positions[v], simulated_time(sim))));
+  return most;
+}
+
 void aim_led(Sim& sim, int substep) {
   if (!sim.led.vertices.empty()) run(sim, aims, substep);
 }
@@ -77,10 +91,9 @@ void lead(Sim& sim, int substep) {
 
 void end_leading(Sim& sim) {
   Led& led = sim.led;
-  if (led.vertices.empty()) return;
-  if (on_cpu(sim))
+  if (led.by_hand && on_cpu(sim))  // the scene's own go on
     for (const std::uint32_t v : led.vertices) sim.host.velocities[v] = glm::dvec3(0);
-  else
+  else if (led.by_hand)
     run(sim, stops, 0);
   led.vertices.clear(), led.places.clear();
 }

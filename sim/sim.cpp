@@ -166,7 +166,9 @@ bool same_constraints(const Settings& a, const Settings& b) {
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
-  const auto same = [](const BodySettings& one, const BodySettings& other) { return one.material == other.material; };
+  const auto same = [](const BodySettings& one, const BodySettings& other) {
+    return one.material == other.material && one.regions == other.regions;
+  };
   return decides(a) == decides(b) && std::ranges::equal(a.bodies, b.bodies, same) &&
          (!has_own_materials(a) || numbers(a) == numbers(b));
 }

@@ -31,8 +31,10 @@ namespace tetpbd {
 
 using VertexList = std::vector<std::uint32_t>;
 
-/// Pinned vertices and where they are to be at the end of the next step, m (led.cpp).
+/// Pinned vertices and where they are to be at the end of the next step, m (led.cpp): those of the model's fixtures,
+/// and where a caller wants others.
 struct Led {
+  bool by_hand = false;  ///< some are not of fixtures
   VertexList vertices;
   std::vector<glm::dvec3> places;
   Buffer records;
@@ -167,8 +169,10 @@ void move_pinned(Sim& sim, const VertexList& vertices, const std::vector<glm::dv
 inline void move_pinned(Sim& sim, std::uint32_t vertex, const glm::dvec3& place) {
   move_pinned(sim, VertexList{vertex}, {place});
 }
+/// m, how far what is in its way holds back a fixture in this state.
+double lag_of(const Sim& sim, const Fixture& fixture, const State& state);
 /// For a step: before its first substep; before each substep of a GPU mode and once its pairs are listed; and after the
-/// last, when the velocities are 0 again.
+/// last, when the velocities are 0 again where a caller led any.
 void begin_leading(Sim& sim);
 void aim_led(Sim& sim, int substep);
 void lead(Sim& sim, int substep);

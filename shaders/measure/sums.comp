@@ -80,7 +80,8 @@ float tet_elastic(TetRecord r, vec3 x[4]) {
   if (material.z > 0.0) {
     vec3 at_rest[4];
     find_rest(r.vertices, at_rest);
-    return r.filled * tet_energy(x, at_rest, material);
+    vec4 own = r.mu < 0.0 ? material : vec4(r.mu, r.lambda, material.zw);
+    return r.filled * tet_energy(x, at_rest, own);
   }
   float error = volume_of(x) - r.rest;
   return energy_per_square.z * error * error;

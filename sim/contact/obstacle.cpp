@@ -1,22 +1,11 @@
 #include "sim/contact/obstacle.h"
 
-#define GLM_ENABLE_EXPERIMENTAL  // euler_angles
-
 #include <algorithm>
 #include <cmath>
-#include <glm/gtc/quaternion.hpp>
-#include <glm/gtx/euler_angles.hpp>
 
 #include "sim/contact/obstacle_kinds.h"
 
 namespace tetpbd {
-
-bool moves(const Obstacle& o) { return o.velocity != glm::dvec3(0) || o.spin != glm::dvec3(0) || !o.keyframes.empty(); }
-
-glm::dmat3 rotation_of(const glm::dvec3& degrees) {
-  const glm::dvec3 angle = glm::radians(degrees);
-  return glm::dmat3(glm::eulerAngleZYX(angle.z, angle.y, angle.x));
-}
 
 std::vector<double> obstacle_values(const Obstacle& o) {
   std::vector<double> all = {double(o.kind->number()), o.radius, o.half_length, o.friction.value_or(-1),
@@ -39,11 +28,6 @@ glm::dmat3 unrotated_axes(const Obstacle& o) {
   return {right, up, glm::cross(right, up)};
 }
 
-glm::dmat3 rotate_about(const glm::dvec3& axis) {
-  const double angle = glm::length(axis);
-  return angle > 0 ? glm::mat3_cast(glm::angleAxis(angle, axis / angle)) : glm::dmat3(1);
-}
-
 }  // namespace
 
 void set_heights(Obstacle& o, const std::vector<std::vector<double>>& rows) {
@@ -64,17 +48,8 @@ void set_heights(Obstacle& o, const std::vector<std::vector<double>>& rows) {
 }
 
 Pose pose_at(const Obstacle& o, double time) {
-  Obstacle::Key now{time, o.centre, o.rotation}, last{0, o.centre, o.rotation};
-  for (const Obstacle::Key& key : o.keyframes) {
-    if (time < key.time) {
-      const double part = std::max(0.0, time - last.time) / (key.time - last.time);
-      now.centre = glm::mix(last.centre, key.centre, part);
-      now.rotation = glm::mix(last.rotation, key.rotation, part);
-      break;
-    }
-    last = key, now.centre = key.centre, now.rotation = key.rotation;
-  }
-  return {now.centre + time * o.velocity, rotate_about(time * o.spin) * rotation_of(now.rotation) * unrotated_axes(o)};
+  const Pose turned = pose_at(static_cast<const Path&>(o), time);
+  return {turned.centre, turned.axes * unrotated_axes(o)};
 }
 
 }  // namespace tetpbd

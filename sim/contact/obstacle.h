@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "sim/contact/path.h"
 #include "sim/mesh/distance_field.h"
 
 namespace tetpbd {
@@ -17,15 +18,9 @@ struct ObstacleKind;
 const ObstacleKind* default_obstacle_kind();
 
 /// Members that its kind does not name have no effect.
-struct Obstacle {
-  struct Key {
-    double time = 0;                    ///< s
-    glm::dvec3 centre{0}, rotation{0};  ///< m, degrees
-  };
+struct Obstacle : Path {  // whose centre is a point of the surface of a half space
   const ObstacleKind* kind = default_obstacle_kind();
-  glm::dvec3 centre{0};                ///< m; of a half space, a point of its surface
   glm::dvec3 normal{0};                ///< of a half space, of any length but 0
-  glm::dvec3 rotation{0};              ///< degrees about x, then y, then z
   double radius = 0, half_length = 0;  ///< m
   glm::dvec3 half{0};                  ///< m, half lengths along its own axes
   std::filesystem::path image, mesh;
@@ -34,8 +29,6 @@ struct Obstacle {
   double height = 0;                            ///< m, of a mesh
   int voxels = 64;                              ///< along the longest side of a mesh
   std::optional<double> friction, restitution;  ///< none: the world's
-  glm::dvec3 velocity{0}, spin{0};              ///< m/s; rad/s about the centre
-  std::vector<Key> keyframes;  ///< by time, linear in between and from the start, at rest after the last
 
   /// Of a mesh, signed distances in its own coordinates; of a height field, heights in m (size.y is 1).
   std::shared_ptr<const DistanceField> field;
@@ -45,17 +38,9 @@ struct Obstacle {
 /// Makes the field of a height field from rows like `heights`.
 void set_heights(Obstacle& obstacle, const std::vector<std::vector<double>>& rows);
 
-bool moves(const Obstacle& obstacle);
-
 /// All that its motion and contact with it depend on, except the values of its field.
 std::vector<double> obstacle_values(const Obstacle& obstacle);
 
-struct Pose {
-  glm::dvec3 centre{0};
-  glm::dmat3 axes{1};  ///< columns: directions of its own axes
-};
-/// The rotation by angles in degrees about x, then y, then z.
-glm::dmat3 rotation_of(const glm::dvec3& degrees);
 Pose pose_at(const Obstacle& obstacle, double time);
 
 }  // namespace tetpbd

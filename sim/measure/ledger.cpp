@@ -61,6 +61,7 @@ void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& 
 
 std::optional<const char*> why_not_judged(const Model& model, const Settings& settings) {
   const SolverMode& mode = solver_mode(settings);
+  if (!model.fixtures.empty()) return "fixed vertices move, and their work is not measured";
   if (mode.published) return "mode paper corrects positions as published";
   if (!settings.rigid_contact && any_material(settings, hard)) return "rigid_contact is off";
   const auto deformed = [&](const Body& body) {

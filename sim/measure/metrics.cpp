@@ -37,6 +37,7 @@ Buffer tet_records(const ConstraintList& tets, const TetMesh& mesh) {
     layout::TetRecord& record = records[t];
     std::ranges::copy(tets.ends(t), record.vertices);
     record.rest = float(tets.rest[t]), record.filled = float(tets.rest[t] * fill_of(mesh, t));
+    record.mu = record.lambda = -1;
   });
   return Buffer("records volume", records);
 }
@@ -59,6 +60,23 @@ bool has_all(const ConstraintSystem& system, const Body& body) {
     if (range.x == range.y && !(k == std::size_t(index_of<Volume>) && body.is_sheet())) return false;
   }
   return true;
+}
+
+// Gives tets of regions their moduli, of which the solver may hold a part only, where these have changed.
+void write_regions(Metrics& m, const Sim& sim) {
+  const auto& shares = sim.solver.stiffness_shares;
+  if (sim.model->regions.empty() || (m.of_regions == sim.settings.bodies && m.shares == shares)) return;
+  m.of_regions = sim.settings.bodies, m.shares = shares;
+  std::vector<std::size_t> places;
+  std::vector<glm::vec2> values;
+  for (std::size_t t = 0; t < sim.model->regions.size(); ++t) {
+    if (sim.model->regions[t] == 0) continue;
+    const Lame moduli = tet_moduli(*sim.model, sim.settings, t);
+    const double share = shares.empty() ? 1 : double(shares[body_at(*sim.model, sim.model->rest.tets[t][0]).number]);
+    places.push_back(t * sizeof(layout::TetRecord) + offsetof(layout::TetRecord, mu));
+    values.emplace_back(share * moduli.mu, share * moduli.lambda);
+  }
+  m.records[std::size_t(index_of<Volume>)].write_each(places, sizeof values[0], values.data());
 }
 
 // Reads a measurement back; false where it has not arrived yet.
@@ -167,6 +185,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made, const s
 
 void measure(Metrics& m, const Sim& sim, bool by_hand) {
   const KeepBindings kept;
+  write_regions(m, sim);
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);

@@ -66,6 +66,8 @@ struct Metrics {
   double mass_sizes = 0;                      ///< the sum of mass times size
   std::vector<Buffer> records;                ///< by kind
   std::array<std::size_t, 3> counts{};        ///< constraints, by kind
+  std::vector<BodySettings> of_regions;       ///< whose moduli the records of tets have, where bodies have regions
+  std::vector<float> shares;                  ///< and the parts of them that the solver holds
   Buffer rest, partials;
   std::vector<Pass> passes;  ///< in order of dispatch
   Recorder recorder;

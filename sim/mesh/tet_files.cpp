@@ -41,7 +41,8 @@ TetMesh read_msh(const fs::path& file) {
   Order order = Order::text;
   const bool blocks = read_msh_format(text, file, order), bytes = order != Order::text;
   TetMesh mesh;
-  std::unordered_map<long long, std::uint32_t> indices;  // by a node's number, which can be any
+  std::unordered_map<long long, std::uint32_t> indices;   // by a node's number, which can be any
+  std::unordered_map<long long, std::int32_t> groups;  // by a volume's number
   const auto whole = [&](const char* name) {
     return blocks ? text.whole<std::int64_t>(name) : text.whole<std::int32_t>(name);
   };
@@ -72,6 +73,25 @@ TetMesh read_msh(const fs::path& file) {
     mesh.positions.push_back(text.any_position("node"));
     text.take(8 * parameters, "node");
   };
+  // Of the volumes, the first physical group that each belongs to; the others are passed over.
+  const auto read_entities = [&] {
+    text.set_order(order);
+    if (!bytes) text.require_line("numbers of entities");
+    std::array<std::size_t, 4> counts;
+    for (std::size_t& here : counts) here = count("number of entities");
+    for (std::size_t dimension = 0; dimension < 4; ++dimension)
+      text.lines(counts[dimension], "entity", [&] {
+        const auto entity = text.whole<std::int32_t>("entity");
+        for (int k = dimension == 0 ? 3 : 6; k > 0; --k) text.number_of(real, "bound of an entity");
+        for (std::size_t k = count("number of groups"), first = k; k > 0; --k)
+          if (const auto group = text.whole<std::int32_t>("group"); dimension == 3 && k == first)
+            groups[entity] = std::int32_t(group);
+        for (std::size_t k = dimension > 0 ? count("number of entities around it") : 0; k > 0; --k)
+          text.whole<std::int32_t>("entity around it");
+      });
+    text.set_order(Order::text);
+    if (!text.next_line() || text.line() != "$EndEntities") text.fail("$EndEntities does not follow the entities");
+  };
   const auto read_nodes = [&] {
     const auto [block_count, total] = read_counts("number of nodes");
     text.lines(block_count, "node block", [&] {
@@ -90,6 +110,7 @@ TetMesh read_msh(const fs::path& file) {
     const auto [block_count, total] = read_counts("number of elements");
     std::size_t found = 0, tags = 0;
     long long type = 0;
+    std::int32_t group = 0;  // the physical group; of version 4 that of the block's volume
     // Tets of any order have their corners first. Other solids are hexahedra, prisms and pyramids, of any order.
     const auto is_one_of = [&](auto... types) { return ((type == types) || ...); };
     const auto read_element = [&] {
@@ -97,9 +118,13 @@ TetMesh read_msh(const fs::path& file) {
       if (!blocks && !bytes) type = whole("element type"), tags = count("number of tags");
       if (bytes && (type < 1 || type >= std::ssize(msh_nodes)))
         text.fail(fmt::format("there is no element type {}", type));
-      for (std::size_t i = 0; i < tags; ++i) whole("tag");
+      for (std::size_t i = 0; i < tags; ++i) {
+        const long long tag = whole("tag");
+        if (i == 0) group = std::int32_t(tag);
+      }
       const std::size_t corners = is_one_of(4, 11, 29, 30, 31) ? 4 : 0;
       mesh.other_cells += is_one_of(5, 6, 7, 12, 13, 14, 17, 18, 19, 92, 93);
+      if (corners > 0) mesh.tags.push_back(group);
       if (corners > 0)
         for (std::uint32_t& v : mesh.tets.emplace_back()) {
           const long long number = whole("node of the tet");
@@ -111,7 +136,11 @@ TetMesh read_msh(const fs::path& file) {
       ++found;
     };
     const auto read_block = [&] {
-      if (blocks) text.whole<std::int32_t>("dimension"), text.whole<std::int32_t>("entity");
+      if (blocks) {
+        const bool solid = text.whole<std::int32_t>("dimension") == 3;
+        const auto found_group = groups.find(text.whole<std::int32_t>("entity"));
+        group = solid && found_group != groups.end() ? found_group->second : 0;
+      }
       type = text.whole<std::int32_t>("element type");
       const std::size_t here = count("number of elements in the block");
       if (!blocks) tags = count("number of tags");
@@ -124,7 +153,9 @@ TetMesh read_msh(const fs::path& file) {
   };
 
   while (text.next_line())
-    if (text.line() == "$Nodes")
+    if (text.line() == "$Entities" && blocks)
+      read_entities();
+    else if (text.line() == "$Nodes")
       read_nodes();
     else if (text.line() == "$Elements")
       read_elements();
@@ -164,7 +195,8 @@ TetMesh read_medit(const fs::path& file) {
           text.fail(fmt::format("tet names vertex {}, outside 1 .. {}", number, mesh.positions.size()));
         v = std::uint32_t(number - 1);
       }
-      for (int other = keyword == "Tetrahedra" ? 1 : 7; other > 0; --other) whole("tet");  // edges' vertices, reference
+      for (int other = keyword == "Tetrahedra" ? 0 : 6; other > 0; --other) whole("tet");  // edges' vertices
+      mesh.tags.push_back(std::int32_t(whole("reference of a tet")));
     }
   }
   return mesh;
@@ -200,6 +232,7 @@ TetMesh read_node_ele(const fs::path& file) {
   const std::size_t tet_count = elements.count("number of tets");
   const long long corners = elements.more() ? elements.integer("nodes per tet") : 4,
                   last = base + std::ssize(mesh.positions) - 1;
+  const bool attributes = elements.more() && elements.integer("number of attributes") > 0;
   if (corners != 4 && corners != 10) elements.fail(fmt::format("{} nodes per tet, neither 4 nor 10", corners));
   elements.lines(tet_count, "tet", [&] {
     elements.integer("tet number");
@@ -209,6 +242,8 @@ TetMesh read_node_ele(const fs::path& file) {
         elements.fail(fmt::format("tet names node {}, outside {} .. {}", number, base, last));
       v = std::uint32_t(number - base);
     }
+    for (long long k = corners; k > 4; --k) elements.integer("node of the tet");
+    if (attributes) mesh.tags.push_back(std::int32_t(elements.number("attribute")));
   });
   if (elements.next_line()) elements.fail(fmt::format("{} tets declared, more follow", tet_count));
   return mesh;

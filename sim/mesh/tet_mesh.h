@@ -41,6 +41,8 @@ struct TetMesh {
   double thickness = 0;
   /// By tet, the share of its volume that the body fills, which its mass and stiffness are of; empty: all of it.
   std::vector<float> fill{};
+  /// By tet, the number of its part in its file (Gmsh's physical group, TetGen's attribute); empty: none has one.
+  std::vector<std::int32_t> tags{};
   std::size_t other_cells = 0;  ///< solid cells of its file that are no tets, and so were left out
 };
 

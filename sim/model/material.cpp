@@ -27,10 +27,10 @@ namespace {
 Lame smith_moduli(const Lame& m) { return {4.0 / 3 * m.mu, m.lambda + 5.0 / 6 * m.mu}; }
 
 // `share` is the part of mu that the tets have themselves.
-void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m, double share) {
-  const auto [whole, lambda] = smith_moduli(m);
-  const double mu = share * whole;
+void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const auto& moduli, double share) {
   for (std::size_t c = 0; c < tets.count(); ++c) {
+    const auto [whole, lambda] = smith_moduli(moduli(c));
+    const double mu = share * whole;
     double* rest = tets.rest.data() + 8 * c;
     rest[7] = 1 + 0.75 * mu / lambda;
     const double volume = fill_of(mesh, c) / (6 * rest[6]);
@@ -41,7 +41,7 @@ void make_neo_hookean(ConstraintList& tets, const TetMesh& mesh, const Lame& m, 
 // Springs of stiffness k and length L in all directions alike are isotropic with mu = lambda = (sum k L^2) / (15 V)
 // (Cauchy: Poisson's ratio 1/4). Each tet gives its six edges the same k L^2; volume(t) is what the body fills of tet
 // t at rest.
-std::vector<double> spring_stiffness(const ConstraintList& edges, const ConstraintList& tets, double mu,
+std::vector<double> spring_stiffness(const ConstraintList& edges, const ConstraintList& tets, const auto& mu,
                                      const auto& volume) {
   std::vector<double> stiffness(edges.count());
   const auto numbers = std::views::iota(std::size_t(0), edges.count());  // sorted by the edges' vertices
@@ -51,24 +51,27 @@ std::vector<double> spring_stiffness(const ConstraintList& edges, const Constrai
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t j = 0; j < i; ++j) {
         const std::size_t e = *std::ranges::lower_bound(numbers, std::minmax({v[i], v[j]}), {}, ends);
-        stiffness[e] += 15.0 / 6 * mu * volume(t) / (edges.rest[e] * edges.rest[e]);
+        stiffness[e] += 15.0 / 6 * mu(t) * volume(t) / (edges.rest[e] * edges.rest[e]);
       }
   }
   return stiffness;
 }
 
 // Springs contribute lambda = mu; constraints of volume add what is missing of lambda.
-void make_springs(ConstraintList& edges, ConstraintList& volumes, const TetMesh& mesh, const Lame& m) {
+void make_springs(ConstraintList& edges, ConstraintList& volumes, const TetMesh& mesh, const auto& moduli) {
   const auto volume = [&](std::size_t t) { return volumes.rest[t] * fill_of(mesh, t); };
-  for (const double k : spring_stiffness(edges, volumes, m.mu, volume)) edges.compliance.push_back(1 / k);
+  const auto mu = [&](std::size_t t) { return moduli(t).mu; };
+  for (const double k : spring_stiffness(edges, volumes, mu, volume)) edges.compliance.push_back(1 / k);
   for (std::size_t t = 0; t < volumes.count(); ++t)
-    volumes.compliance.push_back(volumes.rest[t] / fill_of(mesh, t) / (m.lambda - m.mu));
+    volumes.compliance.push_back(volumes.rest[t] / fill_of(mesh, t) / (moduli(t).lambda - moduli(t).mu));
 }
 
 // Dashpots lie along edges and damp by tau (s) times the stiffness that springs there would have.
-void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const TetMesh& mesh, const Lame& m, double tau) {
+void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const TetMesh& mesh, const auto& moduli,
+                   double tau) {
+  const auto mu = [&](std::size_t t) { return moduli(t).mu; };
   const auto volume = [&](std::size_t t) { return fill_of(mesh, t) / (6 * tets.rest[8 * t + 6]); };
-  for (const double k : spring_stiffness(edges, tets, m.mu, volume)) edges.compliance.push_back(1 / (k * tau));
+  for (const double k : spring_stiffness(edges, tets, mu, volume)) edges.compliance.push_back(1 / (k * tau));
 }
 
 // Adds a body's constraints. Other bodies may be of other materials, so each constraint gets its own coefficients.
@@ -91,34 +94,61 @@ void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body&
     append(to.averages, from.averages, body.vertices, std::uint32_t(body.first_vertex));
 }
 
+// By tet; empty where no body has regions.
+std::vector<Lame> region_moduli(const Model& model, const Settings& settings) {
+  std::vector<Lame> moduli;
+  for (std::size_t t = 0; t < model.regions.size(); ++t) moduli.push_back(tet_moduli(model, settings, t));
+  return moduli;
+}
+
 }  // namespace
 
-ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material) {
+Lame tet_moduli(const Model& model, const Settings& settings, std::size_t tet) {
+  const std::size_t body = body_at(model, model.rest.tets[tet][0]).number;
+  const Material& own = material_of(settings, body);
+  const std::size_t region = model.regions.empty() ? 0 : model.regions[tet];
+  const bool has_own = region > 0 && !settings.bodies.empty() && region <= settings.bodies[body].regions.size();
+  const RegionModuli moduli = has_own ? settings.bodies[body].regions[region - 1] : RegionModuli{};
+  return lame(moduli.young_modulus.value_or(own.young_modulus), moduli.poisson_ratio.value_or(own.poisson_ratio));
+}
+
+glm::vec4 tet_energy_material(const Model& model, const Settings& settings, std::size_t tet) {
+  glm::vec4 all = energy_material(solved_material(body_at(model, model.rest.tets[tet][0]), settings));
+  const Lame own = tet_moduli(model, settings, tet);
+  if (all.z > 0) all.x = float(own.mu), all.y = float(own.lambda);
+  return all;
+}
+
+ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material, std::span<const Lame> moduli) {
   if (mesh.thickness > 0 && material.material != "none")
     throw Error("a sheet has no material", "material " + material.material,
                 "give constraints stretch and isobend their compliance, and material none");
   ConstraintSystem system = build_constraints(mesh, kinds_in_use(material));
-  const Lame m = lame(material.young_modulus, material.poisson_ratio);
+  const Lame all = lame(material.young_modulus, material.poisson_ratio);
+  const auto of_tet = [&](std::size_t t) { return moduli.empty() ? all : moduli[t]; };
   if (material.material == "springs")
-    make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], mesh, m);
+    make_springs(system.lists[index_of<Stretch>], system.lists[index_of<Volume>], mesh, of_tet);
   const double own = smoothed(material) ? smoothing_of(material) : 1;
   ConstraintList& tets = system.lists[smoothed(material) ? index_of<Smoothed> : index_of<NeoHookean>];
-  if (material.material == "neo-hookean") make_neo_hookean(tets, mesh, m, own);
+  if (material.material == "neo-hookean") make_neo_hookean(tets, mesh, of_tet, own);
   if (smoothed(material)) {
-    const auto [mu, lambda] = smith_moduli(m);
+    const auto [mu, lambda] = smith_moduli(all);
     system.averages = average_tets(mesh, mu, lambda, own);
   }
   if (system.present[index_of<Dashpot>])
-    make_dashpots(system.lists[index_of<Dashpot>], tets, mesh, m, material.constraint_damping);
+    make_dashpots(system.lists[index_of<Dashpot>], tets, mesh, of_tet, material.constraint_damping);
   return system;
 }
 
 ConstraintSystem build_constraints(const Model& model, const Settings& settings) {
-  if (!has_own_materials(settings)) return build_constraints(model.rest, in_mode(settings, settings));
+  const std::vector<Lame> moduli = region_moduli(model, settings);
+  if (!has_own_materials(settings)) return build_constraints(model.rest, in_mode(settings, settings), moduli);
   ConstraintSystem system = build_constraints(TetMesh{model.rest.positions, {}, {}}, "");
   for (const Body& body : model.bodies) {
     const Material own = solved_material(body, settings);
-    append_body(system, build_constraints(body_mesh(model, body), own), body, own);
+    const auto of_body =
+        moduli.empty() ? std::span<const Lame>() : std::span(moduli).subspan(body.first_tet, body.tets);
+    append_body(system, build_constraints(body_mesh(model, body), own, of_body), body, own);
   }
   return system;
 }

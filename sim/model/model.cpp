@@ -146,6 +146,8 @@ void renumber(Model& model) {
   for (auto* vectors : {&model.rest.positions, &model.positions, &model.velocities}) reorder(*vectors);
   for (auto* numbers : {&model.inverse_masses, &model.masses}) reorder(*numbers);
   reorder(model.original);
+  for (Fixture& fixture : model.fixtures)
+    for (std::uint32_t& v : fixture.vertices) v = now[v];
   const auto rename = [&](auto& elements) {
     parallel_for(elements.size(), [&](std::size_t i) {
       for (std::uint32_t& v : elements[i]) v = now[v];

@@ -55,6 +55,13 @@ struct StartMotion {
   double work = 0;         ///< J, against gravity
 };
 
+/// Fixed vertices of a body that move.
+struct Fixture {
+  std::size_t body, region;  ///< of the model's bodies, and of what the scene fixes of this one
+  std::vector<std::uint32_t> vertices;
+  Path path;
+};
+
 /// How a body was made of its file.
 struct BodyFill {
   std::size_t body;  ///< of the model's
@@ -70,7 +77,10 @@ struct Model {
   std::vector<glm::dvec3> positions;   ///< m, where the run starts
   std::vector<glm::dvec3> velocities;  ///< m/s
   std::vector<Obstacle> obstacles;     ///< without the ground
-  double size = 1;                     ///< m, diagonal of the largest body at rest
+  std::vector<Fixture> fixtures{};
+  /// By tet: 0, or the number, from 1 on, of its body's region that has moduli of its own. Empty: no body has any.
+  std::vector<std::uint8_t> regions{};
+  double size = 1;  ///< m, diagonal of the largest body at rest
   /// The number a vertex had when its body was added; what leaves the program is in that order.
   std::vector<std::uint32_t> original;
   std::vector<BodyFill> fills;             ///< of bodies from files; others have none

@@ -409,6 +409,16 @@ void check_settings(const Settings& settings, const std::string& where, const st
     own.restitution = body.restitution.value_or(any_moves_rigidly(settings) ? 0 : settings.restitution);
     own.friction = friction_of(settings, b);
     check_material(own, place);
+    if (!body.regions.empty() && (own.material == "none" || smoothed(own)))
+      throw Error(own.material == "none" ? "regions have moduli of a material, and the body has none"
+                                         : "smoothed tets are of one material, and the body has regions",
+                  fmt::format("body {}", name),
+                  own.material == "none" ? "give it one, or leave out its regions" : "make its element linear");
+    for (const RegionModuli& region : body.regions) {
+      own.young_modulus = region.young_modulus.value_or(own.young_modulus);
+      own.poisson_ratio = region.poisson_ratio.value_or(own.poisson_ratio);
+      check_material(own, fmt::format("a region of body {}", name));
+    }
   }
 }
 

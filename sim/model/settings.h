@@ -61,11 +61,19 @@ struct SolverSettings {
   bool operator==(const SolverSettings&) const = default;
 };
 
+/// Of a region of a body, in place of those of its material.
+struct RegionModuli {
+  std::optional<double> young_modulus{};  ///< Pa
+  std::optional<double> poisson_ratio{};
+  bool operator==(const RegionModuli&) const = default;
+};
+
 /// What a body has of its own, in place of the settings' material and the world's friction and restitution.
 struct BodySettings {
   std::optional<Material> material{};
   std::optional<double> friction{};     ///< on obstacles without their own, and on other bodies
   std::optional<double> restitution{};  ///< likewise, of a hard body
+  std::vector<RegionModuli> regions{};  ///< as Model::regions counts them; more or fewer are of no harm
   bool operator==(const BodySettings&) const = default;
 };
 

@@ -47,6 +47,7 @@ void require_reference(const ReferenceInput& input) {
   const char* hint =
       "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
   const auto refuse = [&](const std::string& what) { throw Error("the scene has no right motion", what, hint); };
+  if (!input.model.fixtures.empty()) refuse("fixed vertices move");
   const bool soft = any_material(settings, compliant);
   const auto check = [&](const Material& own) {
     if (!soft && !uses(own, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");
@@ -183,6 +184,7 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   add(model.rest.positions), add(model.rest.tets), add(model.positions), add(model.velocities);
   add(model.masses), add(input.inverse_masses);
   if (model.rest.thickness > 0) add(model.rest.surface);
+  if (!model.regions.empty()) add(model.regions);
   for (const Obstacle& obstacle : model.obstacles) {
     add(obstacle_values(obstacle));
     if (obstacle.field) add(obstacle.field->values);
@@ -201,6 +203,8 @@ std::uint64_t scene_key(const ReferenceInput& input) {
   for (const BodySettings& body : s.bodies) {
     if (body.material) add_material(*body.material), add(std::array{body.material->constraint_damping});
     if (body.friction) add(std::array{*body.friction});
+    for (const RegionModuli& region : body.regions)
+      add(std::array{region.young_modulus.value_or(-1), region.poisson_ratio.value_or(-1)});
     if (body.restitution) add(std::string("restitution")), add(std::array{*body.restitution});
   }
   const double numbers[] = {s.constraint_damping, s.dt,       s.damping,    s.gravity, double(s.ground),

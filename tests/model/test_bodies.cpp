@@ -238,3 +238,109 @@ TEST_CASE_FIXTURE(GlTest, "bodies: a mode that cannot have a body's material say
   settings.mode = "paper", settings.material = "none";
   CHECK_THROWS_WITH(create_sim(model, settings), doctest::Contains("one material"));
 }
+
+namespace {
+
+// A column along y of 2 cells across and 8 along, hung by its top; the lower half is region 1.
+std::shared_ptr<Model> column(bool with_region) {
+  auto model = std::make_shared<Model>();
+  const TetMesh mesh = make_block({0.2, 0.8, 0.2}, {2, 8, 2});
+  VertexList top;
+  // A weight at the lower end, beside which the column's own counts for nothing.
+  std::vector<double> factors(mesh.positions.size(), 1e-3);
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    if (mesh.positions[v].y > 0.399) top.push_back(v);
+    if (mesh.positions[v].y < -0.399) factors[v] = 1;
+  }
+  add_body(*model, "column", mesh, 1000, mesh.positions, {}, {}, top, factors);
+  for (const Tet& tet : mesh.tets) {
+    double y = 0;
+    for (const std::uint32_t v : tet) y += mesh.positions[v].y / 4;
+    if (with_region) model->regions.push_back(y < 0);
+  }
+  return model;
+}
+
+Settings pulled(double young_modulus) {
+  Settings settings;
+  settings.mode = "newton", settings.substeps = 1, settings.iterations = 24, settings.damping = 20;
+  settings.dt = 0.01, settings.ground = false;
+  settings.material = "neo-hookean", settings.young_modulus = young_modulus, settings.poisson_ratio = 0;
+  return settings;
+}
+
+// Mean y of the vertices near a height at rest.
+double height_at(const Model& model, const std::vector<glm::dvec3>& x, double y) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t v = 0; v < x.size(); ++v)
+    if (std::abs(model.rest.positions[v].y - y) < 1e-6) sum += x[v].y, ++count;
+  return sum / count;
+}
+
+}  // namespace
+
+TEST_CASE_FIXTURE(GlTest, "regions: two blocks in series are strained as theory says") {
+  const auto model = column(true);
+  Settings settings = pulled(2e4);
+  double weight = 0;
+  for (std::size_t v = 0; v < model->masses.size(); ++v)
+    if (model->inverse_masses[v] > 0) weight += model->masses[v];
+  settings.gravity = 1e-3 * 2e4 * 0.04 / weight;  // a thousandth of strain in the soft half
+  for (const std::string mode : {"newton", "explicit"}) {
+    CAPTURE(mode);
+    settings.mode = mode;
+    if (!solver_mode(settings).implicit) settings.iterations = automatic, settings.substeps = 40;
+    settings.bodies = {{.regions = {{.young_modulus = 2e6}}}};
+    Sim sim = create_sim(model, settings);
+    const State state = run(sim, 400);
+    const double middle = height_at(*model, state.positions, 0), end = height_at(*model, state.positions, -0.4);
+    CHECK(-middle / 0.4 == doctest::Approx(1e-3).epsilon(0.01));
+    CHECK((middle - end - 0.4) / 0.4 == doctest::Approx(1e-5).epsilon(0.02));
+    Metrics metrics = create_metrics(sim);
+    const double half = 0.2 * 0.2 * 0.4;  // m^3
+    CHECK(measure_now(metrics, sim).elastic == doctest::Approx(0.5 * half * (2e4 * 1e-6 + 2e6 * 1e-10)).epsilon(0.02));
+    settings.bodies[0].regions[0].young_modulus = 2e5;  // live
+    apply_settings(sim, settings);
+    const State softer = run(sim, 400);
+    const double now = height_at(*model, softer.positions, 0) - height_at(*model, softer.positions, -0.4);
+    CHECK((now - 0.4) / 0.4 == doctest::Approx(1e-4).epsilon(0.02));
+  }
+}
+
+TEST_CASE_FIXTURE(GlTest, "regions: of the body's own moduli change nothing, and a whole body is a region of others") {
+  for (const std::string mode : {"newton", "explicit", "node", "constraint", "cpu"})
+    for (const std::string material : {"neo-hookean", "springs"}) {
+      CAPTURE(mode);
+      CAPTURE(material);
+      Settings settings = pulled(3e4);
+      settings.mode = mode, settings.material = material, settings.poisson_ratio = 0.3;
+      settings.constraint_damping = 1e-3;
+      if (!solver_mode(settings).implicit) settings.iterations = settings.substeps = automatic;
+      const auto moved = [&](const std::shared_ptr<const Model>& model) {
+        Sim sim = create_sim(model, settings);
+        return run(sim, 10).positions;
+      };
+      settings.bodies = {{.regions = {{.young_modulus = 3e4}}}};
+      const auto without = moved(column(false));
+      CHECK(moved(column(true)) == without);
+      auto whole = std::make_shared<Model>(*column(true));
+      std::ranges::fill(whole->regions, std::uint8_t(1));
+      settings.young_modulus = 1e6;
+      CHECK(moved(whole) == without);
+    }
+}
+
+TEST_CASE("regions: what has none of a material's moduli is refused by name") {
+  const auto model = column(true);
+  Settings settings = pulled(1e4);
+  settings.bodies = {{.regions = {{.poisson_ratio = 0.4}}}};
+  check_settings(*model, settings);
+  settings.element = "smoothed";
+  CHECK_THROWS_WITH(check_settings(*model, settings), doctest::Contains("body column"));
+  settings.element = "linear", settings.material = "none", settings.mode = "node";
+  CHECK_THROWS_WITH(check_settings(*model, settings), doctest::Contains("the body has none"));
+  settings.material = "springs", settings.poisson_ratio = 0.3;
+  settings.bodies[0].regions[0].poisson_ratio = 0.1;
+  CHECK_THROWS_WITH(check_settings(*model, settings), doctest::Contains("a region of body column"));
+}

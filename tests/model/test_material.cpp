@@ -395,3 +395,53 @@ TEST_CASE("material: bodies of a scene have their own, also beside a sheet and a
   refused("--mode cpu --set bodies.1.material.poisson_ratio=0.7", "bodies.1.material");
   refused("--mode cpu --set bodies.2.material=foam", "a sheet has no material");
 }
+
+TEST_CASE("regions: of a scene are boxes, balls and the parts of a file") {
+  const Folder folder;
+  // Its file cuts the bar into two groups.
+  const TetMesh mesh = make_block({1, 0.5, 0.5}, {4, 2, 2});
+  std::ofstream msh(folder.path / "bar.msh");
+  msh << "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n" << mesh.positions.size() << "\n";
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    msh << v + 1 << " " << mesh.positions[v].x << " " << mesh.positions[v].y << " " << mesh.positions[v].z << "\n";
+  msh << "$EndNodes\n$Elements\n" << mesh.tets.size() << "\n";
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    double x = 0;
+    for (const std::uint32_t v : mesh.tets[t]) x += mesh.positions[v].x;
+    msh << t + 1 << " 4 2 " << (x < 0 ? 7 : 9) << " 1";
+    for (const std::uint32_t v : mesh.tets[t]) msh << " " << v + 1;
+    msh << "\n";
+  }
+  msh << "$EndElements\n";
+  msh.close();
+  const auto body = [&](const std::string& shape, const std::string& region) {
+    std::ofstream(folder.path / "m.json") << R"({"bodies": [{"name": "bar", )" << shape << R"(, "material": "foam",
+      "regions": [{)" << region << R"(, "young_modulus": 5e5, "density": 3000}]}], "solver": {"mode": "cpu"}})";
+    const Outcome run = program("run --scene m.json --steps 2 --out r", folder);
+    CHECK_MESSAGE(run.status == 0, run.err);
+    return nlohmann::json::parse(read(folder.path / "r/stats.json"))["bodies"][0];
+  };
+  const std::string block = R"("block": {"size": [1, 0.5, 0.5], "cells": [4, 2, 2]})", file = R"("mesh": "bar.msh")";
+  const auto boxed = body(block, R"("low": [0, 0, 0], "high": [0.5, 1, 1])"), tagged = body(file, R"("tag": 7)");
+  CHECK(boxed["mass"].get<double>() == doctest::Approx(0.25 * (0.5 * 3000 + 0.5 * 1000)));
+  CHECK(boxed["regions"] == nlohmann::json::parse(R"([{"young_modulus": 5e5}])"));
+  CHECK(tagged["mass"].get<double>() == doctest::Approx(boxed["mass"].get<double>()));
+  CHECK(tagged["centre"][0].get<double>() == doctest::Approx(-0.125).epsilon(1e-3));
+  const auto ball = body(block, R"("centre": [0, 0.5, 0.5], "radius": 0.3)");
+  CHECK(ball["mass"] < boxed["mass"]);
+  CHECK(ball["mass"] > 250);
+  std::filesystem::copy(folder.path / "r/scene.json", folder.path / "again.json");
+  CHECK(program("run --scene again.json --steps 2 --out s", folder).status == 0);
+  CHECK(nlohmann::json::parse(read(folder.path / "s/stats.json"))["bodies"][0] == ball);
+  const auto refused = [&](const std::string& region, const std::string& message) {
+    std::ofstream(folder.path / "m.json") << R"({"bodies": [{"name": "bar", )" << block << R"(, "material": "foam",
+      "regions": [{)" << region << R"(}]}]})";
+    const Outcome run = program("run --scene m.json --steps 1 --mode cpu --out r", folder);
+    CHECK(run.status == 2);
+    CHECK_MESSAGE(run.err.find(message) != std::string::npos, run.err);
+  };
+  refused(R"("young_modulus": 1e5)", "bodies.0.regions.0");
+  refused(R"("tag": 7, "young_modulus": 1e5)", "have no tags");
+  refused(R"("low": [1.5, 0, 0], "high": [2, 1, 1], "young_modulus": 1e5)", "holds no tet");
+  refused(R"("tag": 7, "radius": 0.1, "young_modulus": 1e5)", "a box");
+}

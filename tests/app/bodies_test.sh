@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Drives the real window over a scene of two materials: the body under the mouse is chosen for the panel and changed,
+# which is undone, recorded and saved.
+# Usage: bodies_test.sh PROGRAM FOLDER
+set -uo pipefail
+if [[ ${1:-} != --inside ]]; then
+  exec xvfb-run -a -s "-screen 0 1280x800x24" "$0" --inside "$@"
+fi
+program=$(realpath "$2") folder=$3 here=$(dirname "$(realpath "$0")")
+rm -rf "$folder" && mkdir -p "$folder" && cd "$folder" || exit 1
+export TETPBD_GL_DEBUG=1 TETPBD_WINDOW_LOG=$PWD/events.log TETPBD_CACHE=$PWD/cache MESA_GL_VERSION_OVERRIDE=4.3
+log=$TETPBD_WINDOW_LOG
+source "$here/window_driver.sh"
+
+cat >two.json <<'JSON'
+{"name": "two", "bodies": [
+   {"name": "left", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [-0.8, 0.3, 0], "material": "rubber"},
+   {"name": "right", "block": {"size": [1, 1, 1], "cells": [2, 2, 2]}, "position": [0.8, 0.3, 0],
+    "material": {"young_modulus": 3e4}}],
+ "solver": {"mode": "node", "substeps": 5, "dt": 0.01}, "camera": {"target": [0, 0.7, 0], "distance": 5, "azimuth": 0, "elevation": 8}}
+JSON
+open_window --scene two.json --size 1100x780 --samples 0 --record session.jsonl
+key space; await '^pause'
+key r; await '^reset'
+
+forget; xdotool mousemove $((vx + vw * 68 / 100)) $((vy + vh / 2)); await '^probe '
+key b; await '^body right$'; pause_for_frame; shot right.png
+forget; xdotool mousemove $((vx + vw * 32 / 100)) $((vy + vh / 2)); sleep 1
+key b; await '^body left$'; pause_for_frame; shot left.png
+choose body "1 right"; pause_for_frame
+forget; to young_modulus 0.5 0.5; press 1; release 1; await '^set body 1 .*"young_modulus":'
+[[ $(new_events | grep -c '^set young_modulus') -eq 0 ]] || fail "the material of all was changed"
+key ctrl+z; await '^undo'; await '^set body 1 .*"young_modulus":30000.0'
+key ctrl+y; await '^redo'; await '^set body 1 '
+for step in 1 2 3; do key s; await "^step $step\$"; await "^state $step "; done
+here_now=$(grep -E '^state 3 ' "$log" | tail -n 1)
+key ctrl+s; await '^message saved two_000.json'
+close_window
+
+"$program" run --scene two_000.json --steps 3 --csv-every 0 --out saved >/dev/null || fail "the saved scene does not run"
+hash=$(sed -n 's/.*"state_hash": "\(.*\)".*/\1/p' saved/stats.json)
+[[ $here_now == *$hash* ]] || fail "the saved scene is another: $hash, not $here_now"
+"$program" run --replay session.jsonl --out again >again.txt || fail "the record cannot be done again"
+grep -q '"as_recorded": true' again/replay.json || fail "other states than in the window"
+echo "bodies: passed in $SECONDS s"

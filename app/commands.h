@@ -33,6 +33,8 @@ struct RunOptions {
   std::filesystem::path reference;     ///< the right motion; empty: the cache's, if any
   long measure_every = 1;              ///< steps between measurements; the last step is measured in any case
   bool positions = false;              ///< of the end, as arrays
+  std::filesystem::path from_state;    ///< what it goes on from; empty: the scene's start
+  std::filesystem::path save_state;    ///< what its end is written to; empty: nothing
   long positions_every = 0;            ///< steps a frame of trajectory.npy and exports; 0: of exports, real time
   std::vector<std::string> exports;    ///< of export_formats
   std::filesystem::path dump_shaders;  ///< folder for the text of all shaders; empty: none

@@ -18,6 +18,7 @@
 #include "sim/interrupt.h"
 #include "sim/model/material.h"
 #include "sim/reference/reference.h"
+#include "sim/state_file.h"
 
 namespace tetpbd {
 
@@ -246,6 +247,10 @@ int run_headless(Scene scene, const RunOptions& options) {
   tuning.count_guards = true;
   Sim sim = create_sim(model, scene.settings, tuning);
   warm_up(sim);
+  if (!options.from_state.empty() && !load_state(sim, options.from_state))
+    print_error(
+        fmt::format("tetpbd: {}: it was saved with other settings: goes on from positions and velocities alone\n",
+                    printable(options.from_state.string())));
   Metrics metrics = create_metrics(sim);
   const auto right = right_motion(*model, sim.settings, options.reference);
   std::optional<FrameWriter> frames;
@@ -280,6 +285,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   while (good && found && sim.steps < found->step - 1) step(sim);  // to the last good one, by the same bits
   if (good && found) good = !check_finite(sim, true);
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
+  if (!options.save_state.empty() && good && !interrupted()) save_state(sim, options.save_state);
   const Verdict verdict = judge(run.errors, sim);
   auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice, verdict);
   statistics["error"]["measured_every"] = options.measure_every;

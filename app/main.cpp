@@ -204,7 +204,8 @@ void open_scene(Arguments& a) {
   if (!a.run.replay.empty()) return;
   a.opened = load_scene(a.scene, a.overrides);
   std::vector<std::string> modes;
-  if (a.opened->mode_open && any_material(a.opened->settings, compliant)) modes = {"explicit", "newton"};  // what it may be
+  if (a.opened->mode_open && any_material(a.opened->settings, compliant))
+    modes = {"explicit", "newton"};  // what it may be
   if (a.run.lanes.empty()) note_unused(a.opened->settings, modes, a.overrides);
 }
 
@@ -300,6 +301,9 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(run, "--measure-every", a.run.measure_every, 1L, most_steps, "measure errors every K steps and at the end");
   run.add_flag("--positions", a.run.positions,
                "write positions, velocities, rest (positions), tets, faces and bodies (of vertices) as .npy");
+  add(run, "--save-state", a.run.save_state, "write the end, with all that the next step depends on, into this file");
+  add(run, "--from-state", a.run.from_state,
+      "go on from there, for --steps further steps: with the same settings by the same bits");
   add(run, "--positions-every", a.run.positions_every, 1L, most_steps,
       "those, and positions every K steps in trajectory.npy");
   add(run, "--export", a.run.exports,
@@ -314,11 +318,12 @@ void add_commands(CLI::App& app, Arguments& a) {
   CLI::Option* replay = add(run, "--replay", a.run.replay,
                             "instead: what a record of tetpbd view --record says, lanes and all; with "
                             "--video, drawn at the speed it was played");
-  for (const char* dropped : {"--scene",     "--mesh",        "--tetgen",          "--set",       "--deform",
-                              "--solver",    "--budget-ms",   "--explain",         "--steps",     "--png-every",
-                              "--positions", "--video-every", "--csv-every",       "--reference", "--measure-every",
-                              "--turntable", "--camera-path", "--positions-every", "--export",    "--height",
-                              "--fill",      "--tets",        "--spacing",         "--up",        "--check-crossings"})
+  for (const char* dropped : {"--save-state", "--from-state",     "--scene",     "--mesh",        "--tetgen",
+                              "--set",        "--deform",         "--solver",    "--budget-ms",   "--explain",
+                              "--steps",      "--png-every",      "--positions", "--video-every", "--csv-every",
+                              "--reference",  "--measure-every",  "--turntable", "--camera-path", "--positions-every",
+                              "--export",     "--height",         "--fill",      "--tets",        "--spacing",
+                              "--up",         "--check-crossings"})
     a.apart.push_back({replay, run.get_option(dropped)});
   for (const Parameter& row : parameters()) a.apart.push_back({replay, run.get_option(flag_name(row))});
   run.add_flag("--strict", a.run.strict, "exit status 1 also where the verdict is doubtful");

@@ -181,6 +181,8 @@ void apply(Session& s, const ordered_json& a, const std::string& where) {
     std::vector<Obstacle> wanted;
     for (const ordered_json& o : a["obstacles"]) wanted.push_back(read_obstacle(o, "obstacles", where, {}));
     change_obstacles(s, std::move(wanted));
+  } else if (a.contains("state")) {
+    open_state(s, a["state"].get<std::string>());
   } else if (a.contains("reset")) {
     restart(s);
   } else if (a.contains("set")) {

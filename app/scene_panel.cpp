@@ -143,18 +143,25 @@ void draw_scene(Session& s) {
   begin_row(s, "open file");
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
   bool load_it = ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
-  end_row(s, "mesh",
-          fmt::format("a scene (.json), or a mesh in place of this scene's first body: {}. A file can also be "
-                      "dropped onto the window",
-                      mesh_formats));
+  end_row(
+      s, "mesh",
+      fmt::format(
+          "a scene (.json), a state (.state), or a mesh in place of this scene's first body: {}. A file can also be "
+          "dropped onto the window",
+          mesh_formats));
   ImGui::SameLine();
   load_it |= button(s, "Load", "load", "opens the file of this path");
   if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
-  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
   if (button(s, "Save scene", "save scene",
              "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S", width))
     save_scene(s);
   ImGui::SameLine();
+  if (button(s, "Save state", "save state",
+             "the state of now, into a file in the current folder: open it to go on from there\non the command line: "
+             "--from-state",
+             width))
+    save_state_file(s);
   ImGui::BeginDisabled(s.changes.past.empty());
   if (button(s, "Undo", "undo", "takes back the last change of a setting\nCtrl+Z", width)) undo(s);
   ImGui::EndDisabled();

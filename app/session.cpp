@@ -16,6 +16,7 @@
 #include "sim/contact/starts.h"
 #include "sim/error.h"
 #include "sim/model/material.h"
+#include "sim/state_file.h"
 
 namespace tetpbd {
 
@@ -379,7 +380,41 @@ void load_soon(Session& s, const std::string& name, const SceneOverrides& overri
                 }};
 }
 
+namespace {
+
+// What a file may be called by that keeps something of a scene.
+std::string file_stem(std::string name) {
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return !std::isalnum(c) && c != '-'; }, '_');
+  return name;
+}
+
+}  // namespace
+
+void save_state_file(Session& s) {
+  attempt(s, [&] {
+    const fs::path file = free_name(file_stem(s.loaded.scene.name), "state");
+    save_state(s.loaded.sim(), file);
+    say(s, fmt::format("saved {}: open it here, or tetpbd run --from-state {}", file.string(), file.string()));
+  });
+}
+
+void open_state(Session& s, const fs::path& file) {
+  let_go(s);
+  attempt(s, [&] {
+    bool all = true;
+    for (Lane& lane : s.loaded.lanes) all &= load_state(lane.sim, file);
+    play(s, false);
+    disturb(s), start_afresh(s), begin_timeline(s);
+    note(s, {{"state", fs::absolute(file).string()}});
+    s.log("state of {}", s.loaded.sim().steps);
+    say(s, fmt::format("{}: {}", file.filename().string(),
+                       all ? "goes on from there" : "other settings, so positions and velocities alone"));
+  });
+}
+
 void open_file(Session& s, const fs::path& file) {
+  if (file.extension() == ".state") return open_state(s, file);
   if (file.extension() == ".json") return load_soon(s, file.string(), {}, false, false);
   SceneOverrides overrides = s.loaded.overrides;
   overrides.mesh = file;
@@ -394,10 +429,7 @@ void save_scene(Session& s) {
     scene.camera = s.camera;
     if (s.view.follow && s.centre)  // seen from where it starts
       scene.camera->target += glm::vec3(bounds(model.positions).centre()) - *s.centre;
-    std::string name = scene.name;
-    std::ranges::replace_if(
-        name, [](unsigned char c) { return !std::isalnum(c) && c != '-'; }, '_');
-    const fs::path file = free_name(name, "json");
+    const fs::path file = free_name(file_stem(scene.name), "json");
     write_file(file, json_text(scene_json(scene), 2) + "\n");
     const Target target = make_target(picture_width, picture_height, 4);
     const ViewOptions view = std::exchange(s.view, s.first_view);

@@ -210,6 +210,8 @@ void keep_change(Session& session, const Change& before);
 void disturb(Session& session);
 void redo(Session& session);
 /// The scene with the settings and the camera of now, into a file of its own, with a picture beside it.
+void save_state_file(Session& session);
+void open_state(Session& session, const std::filesystem::path& file);
 void save_scene(Session& session);
 /// Makes it the task to load what was dropped, typed or opened before: a scene, or a mesh for this scene's
 /// first body.

@@ -35,6 +35,14 @@ key ctrl+y; await '^redo'; await '^set body 1 '
 for step in 1 2 3; do key s; await "^step $step\$"; await "^state $step "; done
 here_now=$(grep -E '^state 3 ' "$log" | tail -n 1)
 key ctrl+s; await '^message saved two_000.json'
+click "save state"; await '^message saved two_000.state'
+key s; await '^state 4 '; at_four=$(grep -E '^state 4 ' "$log" | tail -n 1)
+key s; await '^state 5 '
+click mesh; pause_for_frame; xdotool type --delay 60 two_000.state; pause_for_frame
+forget; xdotool keydown Return; pause_for_frame; xdotool keyup Return; await '^state of 3$'
+key s; await '^state 4 '
+[[ $(new_events | grep -E '^state 4 ' | tail -n 1) == "$at_four" ]] || fail "from the file it goes on to another state"
+shot state.png
 close_window
 
 "$program" run --scene two_000.json --steps 3 --csv-every 0 --out saved >/dev/null || fail "the saved scene does not run"

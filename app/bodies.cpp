@@ -61,10 +61,10 @@ void read_bodies_settings(const json& bodies, Settings& settings, const std::str
   const bool alike = std::ranges::all_of(bodies, [&](const json& b) { return b.value("material", json()) == first; });
   if (alike && !first.is_null()) read_material(first, settings, "bodies.0", file);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    BodySettings own = read_body_settings(bodies[b], settings, fmt::format("bodies.{}", b), file);
-    if (alike) own.material.reset();
-    if (bodies.size() > 1 || own != BodySettings()) settings.bodies.push_back(std::move(own));
+    settings.bodies.push_back(read_body_settings(bodies[b], settings, fmt::format("bodies.{}", b), file));
+    if (alike) settings.bodies.back().material.reset();
   }
+  if (std::ranges::count(settings.bodies, BodySettings()) == std::ssize(settings.bodies)) settings.bodies.clear();
 }
 
 ordered_json setting_json(const Settings& settings, const Parameter& row) {
@@ -94,7 +94,8 @@ ordered_json body_settings_json(const BodySettings& body) {
   return result;
 }
 
-bool set_by_name(Settings& settings, const std::string& name, const std::string& text, const std::string& where) {
+bool set_by_name(Settings& settings, const std::string& name, const std::string& text, std::size_t count,
+                 const std::string& where) {
   if (const Parameter* row = find_parameter(name)) {
     set_parameter(settings, *row, text, where);
     return true;
@@ -104,7 +105,7 @@ bool set_by_name(Settings& settings, const std::string& name, const std::string&
                        parts[1].find_first_not_of("0123456789") == std::string::npos;
   const Parameter* row = of_body ? find_parameter(parts[2]) : nullptr;
   if (!row || !(is_of_material(*row) || row->name == "friction" || row->name == "restitution")) return false;
-  const std::size_t body = std::stoul(parts[1]), count = std::max<std::size_t>(settings.bodies.size(), 1);
+  const std::size_t body = std::stoul(parts[1]);
   if (body >= count)
     throw Error(fmt::format("there is no body {}", body), where, fmt::format("count from 0 to {}", count - 1));
   Settings wanted = settings_for_body(settings, body);

@@ -128,8 +128,9 @@ bool shared_by_lanes(const Parameter& row) {
 }
 
 Settings lane_settings(Settings settings, const std::string& words, const std::string& where,
-                       const std::shared_ptr<const Model>& model) {
+                       const std::shared_ptr<const Model>& model, std::size_t bodies) {
   double budget_ms = 0;
+  const std::size_t count = model ? model->bodies.size() : std::max(bodies, settings.bodies.size());
   for (const std::string& word : split(words, ',')) {
     if (const std::string budget = "budget_ms="; word.starts_with(budget)) {
       char* end = nullptr;
@@ -143,7 +144,8 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     const Parameter* row = find_parameter(word.substr(0, equals));
     if (row && shared_by_lanes(*row))
       throw Error(fmt::format("{} is that of all lanes", row->name), where, "give it as a flag or in the scene");
-    if (equals != std::string::npos && set_by_name(settings, word.substr(0, equals), word.substr(equals + 1), where))
+    if (equals != std::string::npos &&
+        set_by_name(settings, word.substr(0, equals), word.substr(equals + 1), count, where))
       continue;
     if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
       throw Error(fmt::format("'{}' is no way to solve", word), where,

@@ -65,8 +65,9 @@ const std::vector<Comparison>& comparisons();
 bool shared_by_lanes(const Parameter& row);
 /// Words "budget_ms=X" take what auto chooses within that time per step, for this model; without one nothing.
 /// Throws Error naming `where` for words that are none of these, or that all lanes share.
+/// `bodies`: how many the scene has, where there is no model.
 Settings lane_settings(Settings settings, const std::string& words, const std::string& where,
-                       const std::shared_ptr<const Model>& model = nullptr);
+                       const std::shared_ptr<const Model>& model = nullptr, std::size_t bodies = 1);
 
 /// That lanes have taken, but for stopped ones.
 long steps_of(const std::vector<Lane>& lanes);

@@ -259,7 +259,8 @@ int start_view(const Arguments& a) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
     throw Error("no display", "DISPLAY and WAYLAND_DISPLAY are not set",
                 "start it in a desktop session, or use tetpbd run");
-  for (const std::string& words : a.run.lanes) lane_settings(a.opened->settings, words, "--lane " + words);
+  for (const std::string& words : a.run.lanes)
+    lane_settings(a.opened->settings, words, "--lane " + words, nullptr, a.opened->bodies.size());
   return run_window(*a.opened, a.scene, a.overrides, a.run);
 }
 

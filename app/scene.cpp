@@ -575,7 +575,8 @@ std::string why_unused(const Settings& s, const std::string& name) {
   const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
   if (const Parameter& row = *find_parameter(name);
       is_of_material(row) && !s.bodies.empty() && std::ranges::all_of(s.bodies, has_own))
-    return fmt::format("each body has a material of its own: change it by --set bodies.0.material.{}=VALUE", row.name);
+    return fmt::format("each body has a material of its own: change it by --set bodies.0.material.{}=VALUE",
+                       row.name == "material" ? "model" : row.name);
   if (s.material == "none" && is("young_modulus", "poisson_ratio", "element")) return "there is no material";
   if (is("element") && s.material == "springs") return "springs have no tets";
   if (is("smoothing") && !smoothed(in_mode(s, s))) return "no tets are smoothed";

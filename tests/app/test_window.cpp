@@ -111,6 +111,13 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
   CHECK(lane_settings(own, "hard,substeps=7", "--lane").substeps == 7);
   CHECK(lane_settings(own, "rubber,mode=explicit", "--lane").poisson_ratio == 0.48);
   CHECK(lane_settings(own, "", "--lane") == own);
+  const Settings of_one = lane_settings(own, "bodies.1.young_modulus=2e4,bodies.1.friction=0.9", "--lane", nullptr, 3);
+  REQUIRE(of_one.bodies.size() == 3);
+  CHECK(material_of(of_one, 1).young_modulus == 2e4);
+  CHECK(friction_of(of_one, 1) == 0.9);
+  CHECK(material_of(of_one, 2) == static_cast<const Material&>(own));
+  CHECK_THROWS_WITH(lane_settings(own, "bodies.3.friction=0.9", "--lane", nullptr, 3), doctest::Contains("no body 3"));
+  CHECK_THROWS_AS(lane_settings(own, "bodies.1.dt=0.9", "--lane", nullptr, 3), Error);
   CHECK(lane_settings(own, "budget_ms=2", "--lane") == own);  // nothing to try it on
   for (const char* none : {"budget_ms=", "budget_ms=-1", "budget_ms=2ms", "budget_ms=inf"})
     CHECK_THROWS_WITH_AS(lane_settings(own, none, "--lane"), doctest::Contains("is no time"), Error);

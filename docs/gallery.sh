@@ -50,7 +50,7 @@ show mixed 60 'A stone falls on a jelly on a slab of stone' --scene mixed
 show press-cloth 300 'A plate presses a heap of cloths' --scene press-cloth
 show ring 80 'Balls of jelly, thrown at each other' --scene ring
 show squishy-balls 120 'Balls of jelly fall on each other in a corner' --scene squishy-balls
-show twisted-beams 200 'Twisted beams are let go against each other' --scene twisted-beams
+show twisted-beams 340 'Beams are twisted and pressed against each other' --scene twisted-beams
 show bowl-32 160 'Bunnies of jelly fall into a bowl: 346 000 tets (minutes per step without a GPU)' --scene bowl-32
 show folded-ears 240 'A roller bends the ears of a bunny onto its face' --scene folded-ears
 show layers 60 'Four cloths fall over a ball' --scene layers

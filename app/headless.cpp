@@ -58,10 +58,9 @@ struct FrameWriter {
     if (run.view.colour == Colour::residual && any_material(scene.settings, compliant))
       throw Error("constraints with compliance give way as they should", "--colour residual",
                   "take --colour energy or stretch");
-    if (run.view.colour == Colour::energy && has_own_materials(scene.settings))
-      throw Error("bodies of different materials have no common scale of energy", "--colour energy",
-                  "take --colour stretch or volume");
-    if (run.view.colour == Colour::energy && scene.settings.material == "none")
+    if (run.view.colour == Colour::energy && !sim.model->regions.empty())
+      throw Error("energies of regions are not drawn", "--colour energy", "take --colour stretch or --export vtk");
+    if (run.view.colour == Colour::energy && !any_material(scene.settings, has_energy))
       throw Error("there is no material", "--colour energy", "give one, as in --material neo-hookean");
     if (!run.camera_path.empty()) path = read_camera_path(run.camera_path);
     if (!run.video.empty()) video.emplace(run.video, run.size[0], run.size[1], rate);

@@ -42,9 +42,13 @@ Frame make_frame(const Sim& sim, const Camera& camera, const ViewOptions& option
   frame.viewport = {0, 0, target.width, target.height};
   frame.options = options;
   if (sim.settings.ground) frame.ground = float(sim.settings.ground_height);
-  frame.material = energy_material(in_mode(sim.settings, sim.settings));
-  if (frame.material.z != 3)
-    frame.material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
+  frame.materials.clear();
+  for (const Body& body : sim.model->bodies) {
+    glm::vec4& material = frame.materials.emplace_back(energy_material(solved_material(body, sim.settings)));
+    if (material.z != 3)
+      material.w = float(sim.system.present[index_of<Stretch>] + 2 * sim.system.present[index_of<Volume>]);
+    if (!has_own_materials(sim.settings)) break;
+  }
   frame.model = sim.model;
   update(frame, sim);
   const auto is_pinned = [&](std::uint32_t v) { return !(sim.inverse_masses[v] > 0); };

@@ -98,7 +98,8 @@ struct Frame {
   GLuint velocities = 0;         ///< buffer of Velocity, only for Colour::velocity and arrows
   GLuint values = 0;             ///< buffer of floats by vertex, only for Colour::motion (measure_distances) and patch
   const Pairs* pairs = nullptr;  ///< contact between bodies, only for `contacts`
-  glm::vec4 material{0};         ///< energy_material(), with w for tet_residual; only for Colour::energy and residual
+  /// By body, or one for all: energy_material(), with w for tet_residual; only for colours of tets' values.
+  std::vector<glm::vec4> materials{glm::vec4(0)};
   Camera camera;
   Viewport viewport;
   ViewOptions options;

@@ -8,6 +8,8 @@ namespace tetpbd {
 
 /// The buffer of this frame's values by vertex, or 0 if it shows none; with `worst` also copies them for readback.
 GLuint find_values(Renderer& renderer, const Frame& frame);
+/// Binds what bodies are made of, for kernels and shaders that show values of tets.
+void bind_materials(Renderer& renderer, const Frame& frame);
 /// Finds the cofactors of the deformation gradients, by which the normals of an embedded surface turn.
 void fill_cofactors(Renderer& renderer, const Frame& frame);
 /// Finds the corners of the surface, three of each triangle.

@@ -80,7 +80,7 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   const bool tets = options.look == Look::tets;
   view.tets = tets ? glm::vec4(options.shrink, options.explode, 1, 0) : glm::vec4(0);
   view.cut = cut_plane(renderer, options);
-  view.material = glm::vec4(glm::vec3(frame.material), frame.opacity);
+  view.bodies.x = frame.opacity;
   const Viewport& window = frame.viewport;
   view.window = glm::vec4(window.x, window.y, window.width, window.height);
   const std::vector<glm::vec4> planes = find_planes(frame);
@@ -230,8 +230,18 @@ const Buffer& rest_buffer(Renderer& renderer) {
   return renderer.rest = Buffer("render rest", rest);
 }
 
+void bind_materials(Renderer& renderer, const Frame& frame) {
+  if (renderer.made_materials != frame.materials) {
+    renderer.materials = Buffer("materials of bodies", frame.materials);
+    renderer.materials_texture = make_texel_view(renderer.materials);
+    renderer.made_materials = frame.materials;
+  }
+  bind_texels(UNIT_MATERIALS, renderer.materials_texture);
+}
+
 void bind_view(Renderer& renderer, const Frame& frame) {
   renderer.recorder.begin();
+  bind_materials(renderer, frame);
   const View view = view_block(renderer, frame);
   renderer.view.write(0, sizeof view, &view);
   renderer.view.bind_uniform(BIND_RENDER_VIEW);

@@ -55,7 +55,10 @@ struct Renderer {
   Buffer arrow_vertices, contact_arrows;
   std::vector<std::string> contact_sizes;  ///< Pairs::sizes for which `contact_arrows` was made
   Buffer rest;                             ///< vec4: rest position and body
-  CarriedSurface carried;                  ///< embedded surface of all bodies, or empty
+  Buffer materials;                        ///< Frame::materials
+  Texture materials_texture;
+  std::vector<glm::vec4> made_materials;  ///< for which `materials` was made
+  CarriedSurface carried;                 ///< embedded surface of all bodies, or empty
   Buffer carried_vertices, carried_triangles;
   VertexArray carried_array;
   std::array<Texture, 5> carried_texels;

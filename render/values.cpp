@@ -62,7 +62,7 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
     });
   Pass& pass = kernel(renderer, "tet values");
   pass.program.set("kind", int(colour));
-  pass.program.set("material", frame.material);
+  bind_materials(renderer, frame);
   return gathered(renderer, frame, values, pass,
                   [&](const TetMesh& mesh) { return gather<4>(mesh, mesh.tets, tet_faces, label, bytes); });
 }
@@ -81,7 +81,7 @@ GLuint find_values(Renderer& renderer, const Frame& frame) {
   const ViewOptions& options = frame.options;
   const bool of_vertices =
       options.colour == Colour::velocity || options.colour == Colour::motion || options.colour == Colour::patch;
-  const bool averaged = frame.material.z == 3;
+  const bool averaged = std::ranges::any_of(frame.materials, [](const glm::vec4& m) { return m.z == 3; });
   if (options.look == Look::tets && !of_vertices && !averaged && !options.worst) return 0;
   const GLuint value = vertex_values(renderer, frame);
   if (value) glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);

@@ -11,6 +11,7 @@
 #define UNIT_REST 5
 #define UNIT_COFACTORS 6
 #define UNIT_VALUES 7
+#define UNIT_MATERIALS 8     // of bodies
 #define IMAGE_PLANES 0       // UNIT_PLANES while it is made
 // A contact of a vertex or an edge with another body.
 struct ContactArrow {
@@ -46,7 +47,7 @@ struct View {
   vec4 colour;                  // COLOUR_..., low and high end of the range; w: edge opacity of the wire view
   vec4 tets;                    // shrink 0..1, explode >= 0; z: 1 where tets are drawn
   vec4 cut;                     // only the part of the rest shape where dot(xyz, x) <= w is shown
-  vec4 material;                // Lame's mu and lambda, Pa; z: the model (energy.glsl); w: opacity
+  vec4 bodies;                  // x: opacity
   vec4 window;                  // the viewport in pixels: lower left, width, height
   vec4 scene;                   // x: number of planes; y: 1 if the first is the ground, from which light bounces
   vec4 planes[MAX_OBSTACLES];   // dot(xyz, x) = w

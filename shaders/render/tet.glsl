@@ -1,5 +1,6 @@
 // A tet as it is shown, for geometry shaders that get its four corners.
 #include "render/values.glsl"
+#include "render/material.glsl"
 
 // The body's colour, where tets are drawn apart a little lighter or darker for each, to tell neighbours apart.
 vec3 tone() {
@@ -18,11 +19,12 @@ bool place_tet(out vec3 p[4], out float value[4]) {
     if (!finite(p[i])) return false;
   }
   int kind = int(view.colour.x);
-  bool averaged = view.material.z == 3.0 && (kind == COLOUR_VOLUME || kind == COLOUR_ENERGY);  // of smoothed tets
+  vec4 material = body_material(corner[0].rest.w);
+  bool averaged = material.z == 3.0 && (kind == COLOUR_VOLUME || kind == COLOUR_ENERGY);  // of smoothed tets
   bool by_tet = kind == COLOUR_VOLUME || kind == COLOUR_STRETCH || kind == COLOUR_ENERGY || kind == COLOUR_RESIDUAL;
   if (by_tet && !averaged) {
     // The exact value of the tet replaces means by vertex, which the surface shows.
-    float own = tet_value(kind, p, r, view.material);
+    float own = tet_value(kind, p, r, material);
     for (int i = 0; i < 4; ++i) value[i] = own;
   }
   shrink_tet(p);

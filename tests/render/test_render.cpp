@@ -11,7 +11,9 @@
 #include "render/layout.h"
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"
+#include "sim/model/material.h"
 #include "sim/reference/smoothed.h"
+#include "tests/gl_test.h"
 #include "tests/render/render_stage.h"
 
 namespace colour_maps {
@@ -279,7 +281,7 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
     for (const double stretch : {1.1, 0.8, 1.0})
       for (const int kind : {1, 2}) {
         stage.frame.options.look = look;
-        stage.frame.material = glm::vec4(mu, lambda, kind, 0);
+        stage.frame.materials = {glm::vec4(mu, lambda, kind, 0)};
         stage.move(stretch);
         stage.image();
         const auto values = poll_values(stage.renderer, true);
@@ -291,7 +293,7 @@ TEST_CASE("render: energy, distances, values that come back, rings around vertic
       }
   stage.frame.options.colour = Colour::residual;
   for (const auto& [kinds, expected] : {std::pair(1.0f, 0.1), {2.0f, 0.331}, {3.0f, 0.331}}) {
-    stage.frame.material = glm::vec4(0, 0, 0, kinds);
+    stage.frame.materials = {glm::vec4(0, 0, 0, kinds)};
     stage.move(1.1);
     stage.image();
     const auto values = poll_values(stage.renderer, true);
@@ -363,7 +365,7 @@ TEST_CASE("render: smoothed tets are coloured by the averages around vertices") 
   std::vector<Position> moved(count);
   for (std::size_t v = 0; v < count; ++v) moved[v].high = glm::vec3(x[v]);
   stage.positions.write(0, moved.size() * sizeof(Position), moved.data());
-  stage.frame.material = glm::vec4(mu, lambda, 3, s);
+  stage.frame.materials = {glm::vec4(mu, lambda, 3, s)};
   stage.frame.options.worst = true;
   for (const Colour colour : {Colour::volume, Colour::energy}) {
     stage.frame.options.colour = colour;
@@ -376,7 +378,7 @@ TEST_CASE("render: smoothed tets are coloured by the averages around vertices") 
       const double stored = (1 - s) * m * shear(at.F, glm::determinant(at.F)) + l / 2 * (at.J - 1) * (at.J - 1);
       const double right = colour == Colour::volume ? at.J - 1 : own[v] / volume[v] + stored;
       CHECK(double((*values)[v]) == doctest::Approx(right).epsilon(1e-4).scale(colour == Colour::volume ? 0.1 : 100));
-      CHECK(double(average_energy(averages, v, x, stage.frame.material)) ==
+      CHECK(double(average_energy(averages, v, x, stage.frame.materials[0])) ==
             doctest::Approx(stored).epsilon(1e-4).scale(100));
       least = std::min(least, right), most = std::max(most, right);
     }
@@ -754,4 +756,41 @@ TEST_CASE("render: a driver that takes few work-groups in a row gives the same p
   const auto wide = look(65535);
   CHECK(look(1) == wide);
   CHECK(look(2) == wide);
+}
+
+TEST_CASE("colours of energy are of each body's own material") {
+  GlTest gl;
+  auto model = std::make_shared<Model>();
+  const TetMesh block = make_block(glm::dvec3(1), {2, 2, 2});
+  for (const double side : {-1.0, 1.0}) {
+    auto start = block.positions;
+    for (glm::dvec3& p : start) p = glm::dvec3(1.1 * p.x + 2 * side, p.y, p.z);
+    add_body(*model, "block", block, 1000, start, {}, {}, {});
+  }
+  Settings settings;
+  settings.mode = "explicit", settings.ground = false;
+  Material soft;
+  soft.material = "neo-hookean", soft.young_modulus = 1e4;
+  Material firm = soft;
+  firm.material = "springs", firm.young_modulus = 5e4;
+  settings.bodies = {{.material = soft}, {.material = firm}};
+  Sim sim = create_sim(model, settings);
+  Renderer renderer = make_renderer(*model);
+  const Target target = make_target(64, 64, 0);
+  ViewOptions view;
+  view.colour = Colour::energy;
+  const Frame frame = make_frame(sim, Camera(), view, target);
+  const std::vector<float> values = read_values(renderer, frame);
+  REQUIRE(values.size() == model->positions.size());
+  std::vector<double> sum(values.size()), count(values.size());  // the mean of the tets around each vertex
+  const auto& x = model->positions;
+  for (std::size_t t = 0; t < model->rest.tets.size(); ++t) {
+    const auto [a, b, c, d] = model->rest.tets[t];
+    const auto of = tet_values(*model, t, {x[a], x[b], x[c], x[d]}, tet_energy_material(*model, settings, t));
+    for (const std::uint32_t v : {a, b, c, d}) sum[v] += double(of.energy), count[v] += 1;
+  }
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    CHECK(sum[v] > 10);
+    CHECK(double(values[v]) == doctest::Approx(sum[v] / count[v]).epsilon(1e-3));
+  }
 }

@@ -152,7 +152,7 @@ void draw_scene(Session& s) {
   ImGui::SameLine();
   load_it |= button(s, "Load", "load", "opens the file of this path");
   if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
-  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 3 * gap) / 4;
   if (button(s, "Save scene", "save scene",
              "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S", width))
     save_scene(s);
@@ -162,6 +162,7 @@ void draw_scene(Session& s) {
              "--from-state",
              width))
     save_state_file(s);
+  ImGui::SameLine();
   ImGui::BeginDisabled(s.changes.past.empty());
   if (button(s, "Undo", "undo", "takes back the last change of a setting\nCtrl+Z", width)) undo(s);
   ImGui::EndDisabled();

@@ -399,7 +399,7 @@ void check_settings(const Settings& settings, const std::string& where, const st
   for (std::size_t b = 0; b < settings.bodies.size(); ++b) {
     const BodySettings& body = settings.bodies[b];
     const std::string name = names.empty() ? fmt::format("number {}", b) : names[b];
-    const std::string place = body.material || body.restitution ? fmt::format("body {}", name) : where;
+    const std::string place = has_own_materials(settings) || body.restitution ? fmt::format("body {}", name) : where;
     if (has_own_materials(settings) && solver_mode(settings).published)
       throw Error(fmt::format("mode {} has one material for all bodies", settings.mode), place,
                   "use mode node or constraint");

@@ -293,7 +293,7 @@ TEST_CASE_FIXTURE(GlTest, "regions: two blocks in series are strained as theory 
     if (!solver_mode(settings).implicit) settings.iterations = automatic, settings.substeps = 40;
     settings.bodies = {{.regions = {{.young_modulus = 2e6}}}};
     Sim sim = create_sim(model, settings);
-    const State state = run(sim, 400);
+    const State state = run(sim, 150);
     const double middle = height_at(*model, state.positions, 0), end = height_at(*model, state.positions, -0.4);
     CHECK(-middle / 0.4 == doctest::Approx(1e-3).epsilon(0.01));
     CHECK((middle - end - 0.4) / 0.4 == doctest::Approx(1e-5).epsilon(0.02));
@@ -302,7 +302,7 @@ TEST_CASE_FIXTURE(GlTest, "regions: two blocks in series are strained as theory 
     CHECK(measure_now(metrics, sim).elastic == doctest::Approx(0.5 * half * (2e4 * 1e-6 + 2e6 * 1e-10)).epsilon(0.02));
     settings.bodies[0].regions[0].young_modulus = 2e5;  // live
     apply_settings(sim, settings);
-    const State softer = run(sim, 400);
+    const State softer = run(sim, 150);
     const double now = height_at(*model, softer.positions, 0) - height_at(*model, softer.positions, -0.4);
     CHECK((now - 0.4) / 0.4 == doctest::Approx(1e-4).epsilon(0.02));
   }

@@ -7,9 +7,7 @@
 #include <numbers>
 
 #include "sim/measure/crossings.h"
-#include "sim/measure/metrics.h"
 #include "sim/sim.h"
-#include "sim/snapshot.h"
 #include "tests/app/run_program.h"
 #include "tests/gl_test.h"
 
@@ -59,8 +57,7 @@ double turn_at(const Model& model, const State& state, double y) {
 
 }  // namespace
 
-TEST_CASE_FIXTURE(GlTest,
-                  "fixtures: an end that turns twists a bar evenly, in every mode, and a run goes on from a snapshot") {
+TEST_CASE_FIXTURE(GlTest, "fixtures: an end that turns twists a bar evenly, in every mode") {
   const auto model = bar({.keyframes = {{0.4, {0, 0, 0}, {0, 60, 0}}}});
   for (const SolverMode& mode : solver_modes()) {
     if (mode.published) continue;

@@ -228,6 +228,43 @@ TEST_CASE_FIXTURE(GlTest, "bodies: friction between two is the geometric mean of
   }
 }
 
+TEST_CASE_FIXTURE(GlTest, "bodies: each bounces off the ground, and off another, by its own restitution") {
+  auto model = std::make_shared<Model>();
+  const TetMesh block = make_block(glm::dvec3(0.4), {2, 2, 2}, true);
+  const auto add_block = [&](const glm::dvec3& at, const glm::dvec3& velocity) {
+    auto start = block.positions;
+    for (glm::dvec3& p : start) p += at;
+    add_body(*model, "block", block, 1000, start, velocity, {}, {});
+  };
+  // Two that fall, far from each other; two that meet in the air.
+  add_block({0, 0.45, 0}, {0, -2, 0}), add_block({3, 0.45, 0}, {0, -2, 0});
+  add_block({6, 40, 0}, {1, 0, 0}), add_block({6.6, 40, 0}, {-1, 0, 0});
+  for (const char* name : {"node", "constraint", "cpu", "cpu-fast"}) {
+    CAPTURE(std::string(name));
+    Settings settings;
+    settings.mode = name, settings.contact = "bodies", settings.substeps = 20;
+    settings.bodies = {{.restitution = 0.9}, {.restitution = 0.3}, {.restitution = 1}, {.restitution = 0.49}};
+    Sim sim = create_sim(model, settings);
+    std::array<double, 2> up{};
+    const auto mean = [&](const State& state, std::size_t b) {
+      glm::dvec3 sum(0);
+      const Body& body = model->bodies[b];
+      for (std::size_t v = body.first_vertex; v < body.first_vertex + body.vertices; ++v) sum += state.velocities[v];
+      return sum / double(body.vertices);
+    };
+    for (int s = 0; s < 60; ++s) {
+      step(sim);
+      const State state = read_state(sim);
+      for (std::size_t b = 0; b < 2; ++b) up[b] = std::max(up[b], mean(state, b).y);
+    }
+    const double hit = std::sqrt(4 + 2 * 9.81 * 0.25);
+    CHECK(up[0] == doctest::Approx(0.9 * hit).epsilon(0.03));
+    CHECK(up[1] == doctest::Approx(0.3 * hit).epsilon(0.05));
+    const State end = read_state(sim);
+    CHECK(mean(end, 3).x - mean(end, 2).x == doctest::Approx(2 * 0.7).epsilon(0.03));  // the geometric mean
+  }
+}
+
 TEST_CASE_FIXTURE(GlTest, "bodies: a mode that cannot have a body's material says which body it is") {
   const auto model = together(all_bodies());
   Settings settings = with_bodies({}, all_bodies());

@@ -39,9 +39,19 @@ std::string msh(bool bytes, bool big, bool blocks, bool ten_nodes = false) {
   const std::size_t nodes = sample.positions.size(), tets = sample.tets.size(), type = ten_nodes ? 11 : 4;
   Writer w{fmt::format("$MeshFormat\n{} {} 8\n", blocks ? "4.1" : "2.2", int(bytes)), bytes, big};
   if (bytes) w.put(1), w.text += "\n";
-  w.text += "$EndMeshFormat\n$Nodes\n";
   const auto whole = [&](std::size_t value) { blocks ? w.put(std::uint64_t(value)) : w.put(std::int32_t(value)); };
   const auto ints = [&](const std::vector<std::int32_t>& values) { w.put_all(values); };
+  w.text += "$EndMeshFormat\n";
+  if (blocks) {  // a point, a surface of group 3, and the volume of groups 7 and 8
+    const auto bounds_of = [&](std::size_t count) { w.put_all(std::vector<double>(count, 0.5)); };
+    w.text += "$Entities\n";
+    whole(1), whole(0), whole(1), whole(1), w.end_line();
+    ints({9}), bounds_of(3), whole(0), w.end_line();
+    ints({4}), bounds_of(6), whole(1), ints({3}), whole(2), ints({5, -6}), w.end_line();
+    ints({1}), bounds_of(6), whole(2), ints({7, 8}), whole(1), ints({4}), w.end_line();
+    w.text += "\n$EndEntities\n";
+  }
+  w.text += "$Nodes\n";
   const auto position = [&](const glm::dvec3& p) { w.put(p.x), w.put(p.y), w.put(p.z), w.end_line(); };
   if (blocks) {
     whole(1), whole(nodes), whole(5), whole(nodes + 4), w.end_line();
@@ -209,8 +219,12 @@ TEST_CASE("tet formats: the same mesh from each, with a byte order mark too") {
   const Folder folder;
   for (const auto& [name, text] : files()) {
     CAPTURE(name);
-    CHECK(same(load_mesh(folder.write(name, text), "unused")));
+    const TetMesh mesh = load_mesh(folder.write(name, text), "unused");
+    CHECK(same(mesh));
     CHECK(same(load_mesh(folder.write(name, "\xEF\xBB\xBF" + text), "unused")));
+    // The physical group, or the reference.
+    const bool tagged = name.ends_with(".msh") || name.ends_with(".mesh");
+    CHECK(mesh.tags == std::vector<std::int32_t>(tagged ? mesh.tets.size() : 0, name.ends_with(".msh") ? 7 : 1));
   }
 }
 
@@ -224,6 +238,19 @@ TEST_CASE("tet formats: a file cut short is refused in one line, or what is left
       const std::string error = error_of([&] { mesh = load_tets(folder.write(name, text.substr(0, size))); });
       CHECK((mesh ? same(*mesh) : error.starts_with("2 ") && !contains(error, "\n")));
     }
+}
+
+TEST_CASE("tet formats: an attribute of TetGen's tets is their part, also of ten-node ones") {
+  const Folder folder;
+  folder.write("a.node", "5 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n4 0 0 -1\n");
+  folder.write("a.ele", "2 4 1\n0 0 1 2 3 4\n1 0 2 1 4 9\n");
+  CHECK(load_tets(folder.path / "a.ele").tags == std::vector<std::int32_t>{4, 9});
+  folder.write("a.ele", "1 10 1\n0 0 1 2 3 0 0 0 0 0 0 6\n");
+  CHECK(load_tets(folder.path / "a.ele").tags == std::vector<std::int32_t>{6});
+  folder.write("a.ele", "1 4 0\n0 0 1 2 3\n");
+  CHECK(load_tets(folder.path / "a.ele").tags.empty());
+  folder.write("a.ele", "1 4 1\n0 0 1 2 3\n");
+  CHECK(contains(error_of([&] { load_tets(folder.path / "a.ele"); }), "line has no attribute"));
 }
 
 TEST_CASE("tet formats: wrong counts are refused before anything is made of them") {

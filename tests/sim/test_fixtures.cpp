@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "sim/measure/crossings.h"
+#include "sim/measure/metrics.h"
 #include "sim/sim.h"
 #include "tests/app/run_program.h"
 #include "tests/gl_test.h"
@@ -17,9 +18,9 @@ using namespace run_program;
 namespace {
 
 // A bar along y, whose lower end is fixed and whose upper end goes along `path`, from where it starts.
-std::shared_ptr<Model> bar(Path path) {
+std::shared_ptr<Model> bar(Path path, const glm::ivec3& cells = {2, 12, 2}) {
   auto model = std::make_shared<Model>();
-  const TetMesh mesh = make_block({0.1, 0.8, 0.1}, {2, 12, 2}, true);
+  const TetMesh mesh = make_block({0.1, 0.8, 0.1}, cells, true);
   VertexList fixed, upper;
   for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
     const double y = mesh.positions[v].y;
@@ -80,6 +81,24 @@ TEST_CASE_FIXTURE(GlTest, "fixtures: an end that turns twists a bar evenly, in e
     CHECK(turn_at(*model, end, 0) == doctest::Approx(30).epsilon(0.03));
     CHECK(glm::length(end.velocities[model->fixtures[0].vertices[0]]) < 1e-4);
   }
+}
+
+// The torque is the energy's derivative by the angle, 2 E over it where both are small.
+TEST_CASE_FIXTURE(GlTest, "fixtures: a twisted bar resists with the torque of Saint-Venant") {
+  Settings settings = settings_of("newton");
+  settings.iterations = 12, settings.dt = 0.01, settings.element = "smoothed", settings.constraint_damping = 0.01;
+  const auto torque = [&](int across) {
+    const auto model = bar({.keyframes = {{0.3, {0, 0, 0}, {0, 10, 0}}}}, {across, 8 * across, across});
+    Sim sim = create_sim(model, settings);
+    for (int s = 0; s < 60; ++s) step(sim);
+    Metrics metrics = create_metrics(sim);
+    return 2 * measure_now(metrics, sim).elastic / glm::radians(10.0);
+  };
+  const double coarse = torque(4), fine = torque(6), limit = fine + (fine - coarse) / (1.5 * 1.5 - 1);
+  const double shear = settings.young_modulus / (2 * (1 + settings.poisson_ratio));
+  const double right = shear * 0.1406 * std::pow(0.1, 4) * glm::radians(10.0) / 0.8;
+  MESSAGE("over the right torque: ", coarse / right, " ", fine / right, ", extrapolated ", limit / right);
+  CHECK(limit == doctest::Approx(right).epsilon(0.02));
 }
 
 TEST_CASE_FIXTURE(GlTest,

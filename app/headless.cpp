@@ -300,6 +300,10 @@ int run_headless(Scene scene, const RunOptions& options) {
              (options.out / "stats.json").string());
   for (const auto& [name, count] : dropped(sim))
     fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
+  for (const Fixture& fixture : good ? model->fixtures : std::vector<Fixture>())
+    if (const double lag = lag_of(sim, fixture, read_state(sim)); lag > 1e-3 * model->size)
+      fmt::print("held back: fixed.{} of body '{}' is {:.3g} m behind its place\n", fixture.region,
+                 model->bodies[fixture.body].name, lag);
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);

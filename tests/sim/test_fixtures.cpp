@@ -203,6 +203,14 @@ TEST_CASE("fixtures: a scene says how they move, and what is wrong with it") {
   std::filesystem::copy(folder.path / "r/scene.json", folder.path / "again.json");
   CHECK(program("run --scene again.json --steps 20 --out s", folder).status == 0);
   CHECK(nlohmann::json::parse(read(folder.path / "s/stats.json"))["bodies"] == stats["bodies"]);
+  // Against a wall that is fixed.
+  std::ofstream(folder.path / "w.json") << R"({"bodies": [
+    {"name": "cube", "block": {"size": [0.2, 0.2, 0.2], "cells": [2, 2, 2]}, "material": "foam",
+     "fixed": [{"low": [0, 0, 0], "high": [0, 1, 1], "velocity": [2, 0, 0]}]},
+    {"name": "wall", "block": {"size": [0.1, 0.4, 0.4], "cells": [1, 2, 2]}, "position": [0.3, -0.1, 0], "material": "foam",
+     "fixed": [{"low": [0, 0, 0], "high": [1, 1, 1]}]}], "world": {"gravity": 0, "ground": false}})";
+  const Outcome pressed = program("run --scene w.json --mode cpu --steps 60 --out w", folder);
+  CHECK_MESSAGE(pressed.out.find("held back: fixed.0 of body 'cube' is 0.") != std::string::npos, pressed.out);
   const auto refused = [&](const std::string& fixed, const std::string& message) {
     const Outcome wrong = run(fixed);
     CHECK(wrong.status == 2);

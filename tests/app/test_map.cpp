@@ -89,3 +89,12 @@ TEST_CASE("map: its picture has a cell of the error's colour each, and says wher
   CHECK(again.find("largest net volume loss") != std::string::npos);
   CHECK(again.find(">3<") != std::string::npos);
 }
+
+TEST_CASE("map: a setting that each body has of its own is no axis") {
+  const Folder folder;
+  std::ofstream(folder.path / "own.json") << R"({"bodies": [{"block": {}, "material": "foam"},
+    {"block": {}, "position": [0, 1.2, 0], "material": "rubber"}]})";
+  const Outcome run = program("map --scene own.json --x young_modulus=1e4,1e5 --y dt=0.005,0.01 --out m", folder);
+  CHECK(run.status == 2);
+  CHECK(run.err.find("each body has a material of its own: young_modulus") != std::string::npos);
+}

@@ -108,7 +108,8 @@ double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
                            long steps) {
-  if (any_material(settings, smoothed) && !solver_mode(settings).smoothed) {  // what is right is of smoothed tets, as asked for
+  if (any_material(settings, smoothed) &&
+      !solver_mode(settings).smoothed) {  // what is right is of smoothed tets, as asked for
     Settings own = settings;
     set_mode(own, "newton", "auto");
     return choose_solver(model, own, budget_ms, steps);
@@ -250,8 +251,8 @@ std::string describe(const SolverChoice& choice) {
   const Plan& plan = best.plan;
   return fmt::format("{}, {} iteration{} x {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps",
                      s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps,
-                     plan.substeps == 1 ? "" : "s", s.omega, s.mass_splitting && !any_material(s, compliant) ? ", masses split" : "",
-                     best.ms, choice.budget_ms,
+                     plan.substeps == 1 ? "" : "s", s.omega,
+                     s.mass_splitting && !any_material(s, compliant) ? ", masses split" : "", best.ms, choice.budget_ms,
                      fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the right motion"
                                               : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
                                                                                : "loss {:.3g} %"),

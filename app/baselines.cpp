@@ -94,9 +94,13 @@ MeasuredRun direct_run(const Model& model, const Settings& settings, long steps,
 
 const std::vector<Baseline>& baselines() {
   static const std::vector<Baseline> rows = {
-      {"rigid-body", "with k = 1 and stretch", [](const Settings& s) { return all_materials(s, [](const Material& m) { return hard(m) && uses(m, Stretch::row); }); },
+      {"rigid-body", "with k = 1 and stretch",
+       [](const Settings& s) {
+         return all_materials(s, [](const Material& m) { return hard(m) && uses(m, Stretch::row); });
+       },
        rigid_run},
-      {"direct", "with compliance or a material", [](const Settings& s) { return any_material(s, compliant); }, direct_run},
+      {"direct", "with compliance or a material", [](const Settings& s) { return any_material(s, compliant); },
+       direct_run},
   };
   return rows;
 }

@@ -94,6 +94,19 @@ ordered_json body_settings_json(const BodySettings& body) {
   return result;
 }
 
+bool all_have_own_materials(const Settings& settings) {
+  const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
+  return !settings.bodies.empty() && std::ranges::all_of(settings.bodies, has_own);
+}
+
+std::size_t body_number(const std::string& text, std::size_t count, const std::string& where) {
+  const bool number = !text.empty() && text.size() < 8 && text.find_first_not_of("0123456789") == std::string::npos;
+  const std::size_t body = number ? std::stoul(text) : count;
+  if (body >= count)
+    throw Error(fmt::format("there is no body {}", text), where, fmt::format("count from 0 to {}", count - 1));
+  return body;
+}
+
 bool set_by_name(Settings& settings, const std::string& name, const std::string& text, std::size_t count,
                  const std::string& where) {
   if (const Parameter* row = find_parameter(name)) {
@@ -101,13 +114,9 @@ bool set_by_name(Settings& settings, const std::string& name, const std::string&
     return true;
   }
   const std::vector<std::string> parts = split(name, '.');
-  const bool of_body = parts.size() == 3 && parts[0] == "bodies" && parts[1].size() < 8 &&
-                       parts[1].find_first_not_of("0123456789") == std::string::npos;
-  const Parameter* row = of_body ? find_parameter(parts[2]) : nullptr;
+  const Parameter* row = parts.size() == 3 && parts[0] == "bodies" ? find_parameter(parts[2]) : nullptr;
   if (!row || !(is_of_material(*row) || row->name == "friction" || row->name == "restitution")) return false;
-  const std::size_t body = std::stoul(parts[1]);
-  if (body >= count)
-    throw Error(fmt::format("there is no body {}", body), where, fmt::format("count from 0 to {}", count - 1));
+  const std::size_t body = body_number(parts[1], count, where);
   Settings wanted = settings_for_body(settings, body);
   set_parameter(wanted, *row, text, where);
   settings = with_body_changed(settings, wanted, body, count);

@@ -20,8 +20,12 @@ nlohmann::ordered_json body_settings_json(const BodySettings& body);
 /// A setting's value, as setting_text() reads it.
 nlohmann::ordered_json setting_json(const Settings& settings, const Parameter& row);
 
-/// Sets "young_modulus", or "bodies.1.young_modulus" of one of `count` bodies; false if there is no setting of that name.
-/// Throws Error as set_parameter() does, and where there is no such body.
+/// Whether no body is of the settings' own material.
+bool all_have_own_materials(const Settings& settings);
+/// The number of one of `count` bodies from a text. Throws Error naming `where`.
+std::size_t body_number(const std::string& text, std::size_t count, const std::string& where);
+/// Sets "young_modulus", or "bodies.1.young_modulus" of one of `count` bodies; false if there is no setting of that
+/// name. Throws Error as set_parameter() does, and where there is no such body.
 bool set_by_name(Settings& settings, const std::string& name, const std::string& text, std::size_t count,
                  const std::string& where);
 

@@ -188,7 +188,7 @@ double longest_stable_step(const ReferenceInput& input);
 ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step, const Fit& fit);
 ordered_json error_json(const RunErrors& errors);
 /// Of each body: what it is made of, and how it is now.
-ordered_json bodies_json(const Sim& sim);
+ordered_json bodies_json(const Sim& sim, const State& state);
 /// The distance from a standard, "motion" or "total"; nulls where there is none, and of runs that are not finite.
 ordered_json distance_json(const std::string& standard, const std::optional<MotionError>& error, bool finite);
 /// {"step", "vertex"}, or null.

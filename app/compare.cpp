@@ -81,7 +81,9 @@ double remaining_after_one_step(const std::shared_ptr<const Model>& model, Setti
   return run.errors.last->rigid_distance / run.errors.first->rigid_distance;
 }
 
-bool has_smoothed_tets(const Settings& settings) { return solver_mode(settings).smoothed && any_material(settings, smoothed); }
+bool has_smoothed_tets(const Settings& settings) {
+  return solver_mode(settings).smoothed && any_material(settings, smoothed);
+}
 
 /// What is compared: a scene, whose bodies are filled as `fill` says, and what its runs are held against.
 struct Subject {

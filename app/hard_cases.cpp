@@ -60,7 +60,8 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
   Sim sim = create_sim(model, settings, {.count_guards = true});
   Metrics metrics = create_metrics(sim);
   const MeasuredRun run = run_loop(sim, &metrics, steps);
-  const auto recovered = run.errors.finite ? recovered_at(run.measurements, steps, all_materials(settings, hard)) : std::nullopt;
+  const auto recovered =
+      run.errors.finite ? recovered_at(run.measurements, steps, all_materials(settings, hard)) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
   row.update({{"steps", run.steps},
               {"recovered_at_step", recovered ? ordered_json(*recovered) : nullptr},

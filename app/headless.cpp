@@ -153,12 +153,12 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                             ? sim.longest_substep
                             : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}),
                         fit_of(*sim.model));
-  j["bodies"] = bodies_json(sim);
+  const State state = read_state(sim);
+  j["bodies"] = bodies_json(sim, state);
   for (const BodyFill& fill : sim.model->fills)
     if (!fill.what.empty()) j["fills"].push_back({{"body", sim.model->bodies[fill.body].name}, {"what", fill.what}});
   for (const StartMotion& m : sim.model->start_motions)
     j["start_motions"].push_back({{"body", m.body}, {"from", m.from}, {"motion", vector(m.motion)}, {"work", m.work}});
-  const State state = sim.model->fixtures.empty() ? State{} : read_state(sim);
   for (const Fixture& fixture : sim.model->fixtures)
     j["fixtures"].push_back({{"body", sim.model->bodies[fixture.body].name},
                              {"fixed", fixture.region},
@@ -300,10 +300,10 @@ int run_headless(Scene scene, const RunOptions& options) {
              (options.out / "stats.json").string());
   for (const auto& [name, count] : dropped(sim))
     fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
-  for (const Fixture& fixture : good ? model->fixtures : std::vector<Fixture>())
-    if (const double lag = lag_of(sim, fixture, read_state(sim)); lag > 1e-3 * model->size)
-      fmt::print("held back: fixed.{} of body '{}' is {:.3g} m behind its place\n", fixture.region,
-                 model->bodies[fixture.body].name, lag);
+  for (const ordered_json& fixture : statistics.value("fixtures", ordered_json::array()))
+    if (const double lag = fixture["lag"]; good && lag > 1e-3 * model->size)
+      fmt::print("held back: fixed.{} of body '{}' is {:.3g} m behind its place\n", fixture["fixed"].get<int>(),
+                 fixture["body"].get<std::string>(), lag);
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);

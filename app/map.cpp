@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "app/auto_solver.h"
+#include "app/bodies.h"
 #include "app/chart.h"
 #include "app/commands.h"
 #include "app/report.h"
@@ -108,10 +109,8 @@ int run_map(const MapOptions& options) {
   ordered_json document = run_or_merge(sweep, {}, options.out, options.gpu, [&] {
     Scene scene = load_scene(options.scene, options.overrides);
     const auto model = build_model(scene);
-    const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
-    const std::vector<BodySettings>& bodies = scene.settings.bodies;
     for (const Parameter* row : {x.row, y.row})
-      if (is_of_material(*row) && !bodies.empty() && std::ranges::all_of(bodies, has_own))
+      if (is_of_material(*row) && all_have_own_materials(scene.settings))
         throw Error("each body has a material of its own", row->name, "vary another setting, or leave theirs out");
     const auto varied = [&](const char* name) { return x.row->name == name || y.row->name == name; };
     if (varied("substeps") || varied("iterations") || varied("omega")) scene.mode_open = false;

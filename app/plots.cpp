@@ -48,7 +48,8 @@ std::string title_of(const Session& s, const PlotRow& row) {
   const bool right = right_now(s);
   const std::string from = right ? "distance from the right motion" : "distance from the finest lane";
   const Settings& own = s.loaded.sim().settings;
-  if (row.of == &Lane::energy && !any_material(own, has_energy) && !all_materials(own, hard)) return "energy but for elastic";
+  if (row.of == &Lane::energy && !any_material(own, has_energy) && !all_materials(own, hard))
+    return "energy but for elastic";
   return row.of != &Lane::distance ? row.title : row.over_cost ? "distance over time per step" : from;
 }
 

@@ -119,9 +119,7 @@ void set_all(Settings& settings, const ordered_json& values, std::size_t count, 
   for (const auto& [name, value] : values.items()) {
     if (name == "bodies") {
       for (const auto& [number, own] : value.items()) {
-        const std::size_t body = std::stoul(number);
-        if (body >= count)
-          throw Error(fmt::format("there is no body {}", body), where, fmt::format("count from 0 to {}", count - 1));
+        const std::size_t body = body_number(number, count, where);
         settings.bodies.resize(count);
         settings.bodies[body] = read_body_settings(own, settings, fmt::format("bodies.{}", body), where);
       }

@@ -572,9 +572,7 @@ std::string why_unused(const Settings& s, const std::string& name) {
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && any_material(s, compliant))
     return "with compliance or a material masses are always split";
-  const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
-  if (const Parameter& row = *find_parameter(name);
-      is_of_material(row) && !s.bodies.empty() && std::ranges::all_of(s.bodies, has_own))
+  if (const Parameter& row = *find_parameter(name); is_of_material(row) && all_have_own_materials(s))
     return fmt::format("each body has a material of its own: change it by --set bodies.0.material.{}=VALUE",
                        row.name == "material" ? "model" : row.name);
   if (s.material == "none" && is("young_modulus", "poisson_ratio", "element")) return "there is no material";
@@ -694,8 +692,10 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
       return glm::all(glm::lessThanEqual(glm::abs(away), glm::max(0.5 * (box.high - box.low) + 1e-9, least)));
     };
     std::vector<std::uint32_t> fixed;
-    const TetRegions regions = find_regions(body, mesh, own, scene.name);
-    std::vector<double> mass_factors = region_mass_factors(mesh, regions);
+    TetRegions regions;
+    std::vector<double> mass_factors(mesh.positions.size(), 1);
+    if (!body.regions.empty())
+      regions = find_regions(body, mesh, own, scene.name), mass_factors = region_mass_factors(mesh, regions);
     std::mt19937 generator{std::uint32_t(scene.settings.seed)};
     std::vector<std::vector<char>> in_fixed(body.fixed.size());  // before the mesh is turned
     for (std::size_t b = 0; b < body.fixed.size(); ++b) {
@@ -706,7 +706,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
                     "low and high are fractions of the body's bounding box: make it larger");
     }
     for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
-      if (std::ranges::any_of(body.fixed, [&](const auto& box) { return is_in(i, box); })) fixed.push_back(i);
+      if (std::ranges::any_of(in_fixed, [&](const auto& inside) { return bool(inside[i]); })) fixed.push_back(i);
       for (const BodyDescription::Box& heavy : body.heavy) {
         const bool chosen = double(generator()) / 4294967296.0 < heavy.share;
         if (chosen && is_in(i, heavy)) mass_factors[i] *= heavy.ratio;

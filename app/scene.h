@@ -74,7 +74,7 @@ struct BodyDescription {
   glm::dvec3 spin{0};             ///< rad/s about the centre of mass
   std::vector<Box> fixed;         ///< vertices in any of these boxes are fixed
   std::vector<Box> heavy;
-  std::vector<Region> regions;    ///< of several the last counts
+  std::vector<Region> regions;  ///< of several the last counts
   std::string deform = "none";
 };
 

@@ -336,9 +336,7 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.changes = {};
   s.obstacle = -1;
   s.loaded = std::move(loaded);
-  const auto has_own = [](const BodySettings& body) { return body.material.has_value(); };
-  if (const auto& bodies = s.loaded.sim().settings.bodies; !bodies.empty() && std::ranges::all_of(bodies, has_own))
-    s.loaded.body = 0;
+  if (all_have_own_materials(s.loaded.sim().settings)) s.loaded.body = 0;
   note_scene(s);
   if (!keep_camera) {
     s.camera = scene_camera(s.loaded.scene, *s.loaded.sim().model, s.aspect);

@@ -88,9 +88,8 @@ ordered_json mesh_json(const MeshReport& counts, double mass, double longest_sta
   return all;
 }
 
-ordered_json bodies_json(const Sim& sim) {
+ordered_json bodies_json(const Sim& sim, const State& state) {
   const Model& model = *sim.model;
-  const State state = read_state(sim);
   TetMesh now = model.rest;
   now.positions = state.positions;
   const std::vector<double> volumes = tet_volumes(now), at_rest = tet_volumes(model.rest);

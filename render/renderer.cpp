@@ -80,11 +80,10 @@ View view_block(const Renderer& renderer, const Frame& frame) {
   const bool tets = options.look == Look::tets;
   view.tets = tets ? glm::vec4(options.shrink, options.explode, 1, 0) : glm::vec4(0);
   view.cut = cut_plane(renderer, options);
-  view.bodies.x = frame.opacity;
   const Viewport& window = frame.viewport;
   view.window = glm::vec4(window.x, window.y, window.width, window.height);
   const std::vector<glm::vec4> planes = find_planes(frame);
-  view.scene = glm::vec4(planes.size(), frame.ground ? 1 : 0, 0, 0);
+  view.scene = glm::vec4(planes.size(), frame.ground ? 1 : 0, frame.opacity, 0);
   std::ranges::copy(planes, view.planes);
   const std::array turns{0.0f, 165.0f, 35.0f, 205.0f, -40.0f, 130.0f, 75.0f, 240.0f};
   for (std::size_t i = 0; i < PALETTE_SIZE; ++i) {

@@ -62,7 +62,6 @@ GLuint vertex_values(Renderer& renderer, const Frame& frame) {
     });
   Pass& pass = kernel(renderer, "tet values");
   pass.program.set("kind", int(colour));
-  bind_materials(renderer, frame);
   return gathered(renderer, frame, values, pass,
                   [&](const TetMesh& mesh) { return gather<4>(mesh, mesh.tets, tet_faces, label, bytes); });
 }
@@ -128,6 +127,7 @@ void fill_corners(Renderer& renderer, const Frame& frame, GLuint values) {
 std::vector<float> read_values(Renderer& renderer, const Frame& frame) {
   renderer.recorder.begin();
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  bind_materials(renderer, frame);
   const GLuint values = vertex_values(renderer, frame);
   std::vector<float> result(values ? renderer.mesh.positions.size() : 0);
   if (values) read_buffer(values, 0, result.size() * sizeof(float), result.data());

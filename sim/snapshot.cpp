@@ -69,11 +69,14 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   const KeepBindings kept;
   if (then.settings == sim.settings) return restore_all(sim, then, from);
   State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
+  go_on_from(sim, std::move(state), then.step, then.settings.dt, half_substep_fall(then.settings, then.plan));
+}
+
+void go_on_from(Sim& sim, State state, const StepValues& then, double dt, double fall) {
   forget_all(sim);
-  const auto& [step, time] = then.step.origin;
-  sim.steps = then.step.steps;
-  sim.origin = {sim.steps, time + double(sim.steps - step) * then.settings.dt};
-  start_with(sim, std::move(state), half_substep_fall(then.settings, then.plan));
+  sim.steps = then.steps;
+  sim.origin = {sim.steps, then.origin.time + double(sim.steps - then.origin.step) * dt};
+  start_with(sim, std::move(state), fall);
 }
 
 }  // namespace tetpbd

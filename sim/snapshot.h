@@ -15,4 +15,8 @@ Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_onl
 /// finished at once, whereas the steps that followed then still had the old preconditioner for a while.
 void restore_snapshot(Sim& sim, const Snapshot& snapshot, const Buffer& from);
 
+/// From places and velocities alone, with the present settings; `dt` and `fall`, half_substep_fall(), are those of
+/// the settings that led there.
+void go_on_from(Sim& sim, State state, const StepValues& then, double dt, double fall);
+
 }  // namespace tetpbd

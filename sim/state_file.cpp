@@ -47,8 +47,9 @@ std::uint64_t hash_of(const Settings& settings) {
     for (const Parameter& row : parameters()) hash = hash_bytes(parameter_text(one, row) + "\n", hash);
   };
   add(settings);
+  Settings own = settings;  // of one body after the other
+  own.bodies.clear();
   for (std::size_t b = 0; b < settings.bodies.size(); ++b) {
-    Settings own = settings;
     static_cast<Material&>(own) = material_of(settings, b);
     own.friction = friction_of(settings, b), own.restitution = restitution_of(settings, b);
     add(own);
@@ -191,10 +192,7 @@ bool load_state(Sim& sim, const fs::path& file) {
     restore_snapshot(sim, saved.snapshot, Buffer("state", saved.buffers));
     return true;
   }
-  forget_all(sim);
-  sim.steps = long(h.steps);
-  sim.origin = {sim.steps, h.origin_time + double(h.steps - h.origin_step) * h.dt};
-  start_with(sim, std::move(saved.state), h.fall);
+  go_on_from(sim, std::move(saved.state), saved.snapshot.step, h.dt, h.fall);
   return false;
 }
 

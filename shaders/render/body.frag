@@ -24,5 +24,5 @@ void main() {
   vec3 normal = normalize(gl_FrontFacing ? point.normal : -point.normal);
   vec3 colour = shade(albedo, point.position, normal, plain);
   if (view.colour.w > 0.0) colour *= 1.0 - view.colour.w * edge_cover(point.edge);
-  result = vec4(colour, view.bodies.x);
+  result = vec4(colour, view.scene.z);
 }

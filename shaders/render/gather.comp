@@ -10,7 +10,8 @@ layout(std430) writeonly buffer Values { float values[]; };
 #include "render/values.glsl"
 #include "render/material.glsl"
 uniform int kind;
-float error(uint v, uint k, vec4 material) {
+vec4 material;  // of the vertex's body
+float error(uint v, uint k) {
   uvec4 at = uvec4(v, items[3u * k], items[3u * k + 1u], items[3u * k + 2u]);
   vec3 p[4], r[4];
   for (int i = 0; i < 4; ++i) {
@@ -21,7 +22,7 @@ float error(uint v, uint k, vec4 material) {
 }
 // Of smoothed tets by averages around the vertex (method.md, "Smoothed tets"): J - 1, or the energy, with their own.
 // Tets count by their whole volume, also where the body does not fill them.
-float averaged(uint v, vec4 material) {
+float averaged(uint v) {
   mat3 F = mat3(0.0);
   float volume = 0.0, J = 0.0, own = 0.0;
   for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
@@ -41,22 +42,20 @@ float averaged(uint v, vec4 material) {
   return kind == COLOUR_VOLUME ? J - 1.0 : own / volume + averaged_energy(F / volume, J, material);
 }
 #else
-float error(uint v, uint k, vec4 material) {
+float error(uint v, uint k) {
   return distance(position(items[k]), position(v)) / distance(rest[items[k]].xyz, rest[v].xyz) - 1.0;
 }
 #endif
 
 float gathered(uint v) {
 #ifdef TETS
-  vec4 material = body_material(rest[v].w);
-  if (material.z == 3.0 && (kind == COLOUR_VOLUME || kind == COLOUR_ENERGY)) return averaged(v, material);
-#else
-  const vec4 material = vec4(0.0);
+  material = body_material(rest[v].w);
+  if (material.z == 3.0 && (kind == COLOUR_VOLUME || kind == COLOUR_ENERGY)) return averaged(v);
 #endif
   float sum = 0.0;
   uint n = 0u;
   for (uint k = offsets[v]; k < offsets[v + 1u]; ++k) {
-    float e = error(v, k, material);
+    float e = error(v, k);
     if (!finite(vec3(e * 1e-25))) continue;  // energies may be large
     sum += e;
     ++n;

@@ -47,9 +47,9 @@ struct View {
   vec4 colour;                  // COLOUR_..., low and high end of the range; w: edge opacity of the wire view
   vec4 tets;                    // shrink 0..1, explode >= 0; z: 1 where tets are drawn
   vec4 cut;                     // only the part of the rest shape where dot(xyz, x) <= w is shown
-  vec4 bodies;                  // x: opacity
   vec4 window;                  // the viewport in pixels: lower left, width, height
-  vec4 scene;                   // x: number of planes; y: 1 if the first is the ground, from which light bounces
+  vec4 scene;                   // x: number of planes; y: 1 if the first is the ground, from which light bounces;
+                                // z: opacity of bodies
   vec4 planes[MAX_OBSTACLES];   // dot(xyz, x) = w
   vec4 palette[PALETTE_SIZE];   // body colours
 };

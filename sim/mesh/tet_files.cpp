@@ -41,8 +41,8 @@ TetMesh read_msh(const fs::path& file) {
   Order order = Order::text;
   const bool blocks = read_msh_format(text, file, order), bytes = order != Order::text;
   TetMesh mesh;
-  std::unordered_map<long long, std::uint32_t> indices;   // by a node's number, which can be any
-  std::unordered_map<long long, std::int32_t> groups;  // by a volume's number
+  std::unordered_map<long long, std::uint32_t> indices;  // by a node's number, which can be any
+  std::unordered_map<long long, std::int32_t> groups;    // by a volume's number
   const auto whole = [&](const char* name) {
     return blocks ? text.whole<std::int64_t>(name) : text.whole<std::int32_t>(name);
   };

@@ -273,22 +273,29 @@ bool has_own_surfaces(const Settings& settings) {
                              [](const BodySettings& body) { return body.friction || body.restitution; });
 }
 
+namespace {
+
+// Of each body, or the settings' own where none has anything of its own.
+std::vector<const Material*> materials_in(const Settings& settings) {
+  if (settings.bodies.empty()) return {&settings};
+  std::vector<const Material*> all;
+  for (std::size_t b = 0; b < settings.bodies.size(); ++b) all.push_back(&material_of(settings, b));
+  return all;
+}
+
+}  // namespace
+
 bool any_material(const Settings& settings, bool (*is_such)(const Material&)) {
-  if (settings.bodies.empty()) return is_such(settings);
-  return std::ranges::any_of(
-      settings.bodies, [&](const BodySettings& body) { return is_such(body.material ? *body.material : settings); });
+  return std::ranges::any_of(materials_in(settings), [&](const Material* m) { return is_such(*m); });
 }
 
 bool all_materials(const Settings& settings, bool (*is_such)(const Material&)) {
-  if (settings.bodies.empty()) return is_such(settings);
-  return std::ranges::all_of(
-      settings.bodies, [&](const BodySettings& body) { return is_such(body.material ? *body.material : settings); });
+  return std::ranges::all_of(materials_in(settings), [&](const Material* m) { return is_such(*m); });
 }
 
 double most_damping(const Settings& settings) {
-  double most = settings.bodies.empty() ? settings.constraint_damping : 0;
-  for (std::size_t b = 0; b < settings.bodies.size(); ++b)
-    most = std::max(most, material_of(settings, b).constraint_damping);
+  double most = 0;
+  for (const Material* m : materials_in(settings)) most = std::max(most, m->constraint_damping);
   return most;
 }
 
@@ -327,10 +334,7 @@ bool has_forces(const Settings& settings) {
 }
 
 bool any_moves_rigidly(const Settings& settings) {
-  if (settings.bodies.empty()) return moves_rigidly(settings, settings);
-  for (std::size_t b = 0; b < settings.bodies.size(); ++b)
-    if (moves_rigidly(settings, material_of(settings, b))) return true;
-  return false;
+  return std::ranges::any_of(materials_in(settings), [&](const Material* m) { return moves_rigidly(settings, *m); });
 }
 
 bool hard(const Material& material) {
@@ -396,17 +400,19 @@ void check_material(const Settings& settings, const std::string& where) {
 
 void check_settings(const Settings& settings, const std::string& where, const std::vector<std::string>& names) {
   if (settings.bodies.empty()) return check_material(settings, where);
+  const bool differ = has_own_materials(settings), any_rigid = any_moves_rigidly(settings);
+  Settings own = settings;  // of one body after the other
+  own.bodies.clear();
   for (std::size_t b = 0; b < settings.bodies.size(); ++b) {
     const BodySettings& body = settings.bodies[b];
     const std::string name = names.empty() ? fmt::format("number {}", b) : names[b];
-    const std::string place = has_own_materials(settings) || body.restitution ? fmt::format("body {}", name) : where;
-    if (has_own_materials(settings) && solver_mode(settings).published)
+    const std::string place = differ || body.restitution ? fmt::format("body {}", name) : where;
+    if (differ && solver_mode(settings).published)
       throw Error(fmt::format("mode {} has one material for all bodies", settings.mode), place,
                   "use mode node or constraint");
-    Settings own = settings;
     static_cast<Material&>(own) = material_of(settings, b);
     // The world's restitution is of those bodies that are hard.
-    own.restitution = body.restitution.value_or(any_moves_rigidly(settings) ? 0 : settings.restitution);
+    own.restitution = body.restitution.value_or(any_rigid ? 0 : settings.restitution);
     own.friction = friction_of(settings, b);
     check_material(own, place);
     if (!body.regions.empty() && (own.material == "none" || smoothed(own)))
@@ -415,9 +421,10 @@ void check_settings(const Settings& settings, const std::string& where, const st
                   fmt::format("body {}", name),
                   own.material == "none" ? "give it one, or leave out its regions" : "make its element linear");
     for (const RegionModuli& region : body.regions) {
-      own.young_modulus = region.young_modulus.value_or(own.young_modulus);
-      own.poisson_ratio = region.poisson_ratio.value_or(own.poisson_ratio);
-      check_material(own, fmt::format("a region of body {}", name));
+      Settings part = own;
+      part.young_modulus = region.young_modulus.value_or(own.young_modulus);
+      part.poisson_ratio = region.poisson_ratio.value_or(own.poisson_ratio);
+      check_material(part, fmt::format("a region of body {}", name));
     }
   }
 }

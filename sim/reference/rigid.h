@@ -18,11 +18,11 @@ struct RigidBody {
   glm::dmat3 inertia{0};         ///< kg m^2, in the rest shape's axes
   glm::dvec3 centre{0};          ///< m
   glm::dmat3 rotation{1};
-  glm::dvec3 velocity{0};            ///< m/s
-  glm::dvec3 angular{0};             ///< kg m^2/s, about the centre
+  glm::dvec3 velocity{0};  ///< m/s
+  glm::dvec3 angular{0};   ///< kg m^2/s, about the centre
   std::size_t number = 0;  ///< of the body in the model
-  double radius = 0;                 ///< m, of the vertices about the centre
-  bool held = false;                 ///< by fixed vertices: it stays in place
+  double radius = 0;       ///< m, of the vertices about the centre
+  bool held = false;       ///< by fixed vertices: it stays in place
   /// The vertices that were within `reach` (m) of an obstacle when they were found, and how far any has moved since.
   std::vector<std::uint32_t> near{};
   double reach = 0, moved = 1;

@@ -125,9 +125,10 @@ std::vector<float> stiffness_shares(const Model& model, const Settings& settings
   for (const Body& body : model.bodies) {
     const Material& material = material_of(settings, body.number);
     const double size = body_bounds(body, model.rest.positions).size();
+    const Lame whole = lame(material.young_modulus, material.poisson_ratio);
     double stiffness = 0;
     for (std::size_t t = body.first_tet; has_energy(material) && t < body.first_tet + body.tets; ++t) {
-      const Lame m = tet_moduli(model, settings, t);
+      const Lame m = model.regions.empty() ? whole : tet_moduli(model, settings, t);
       stiffness += 3 * (m.lambda + 2 * m.mu) * tet_volume(model.rest, model.rest.tets[t]) / (size * size);
     }
     shares.push_back(float(std::min(1.0, most * body_mass(model, body) / (stiffness * h * h))));

@@ -2,14 +2,8 @@
 # Drives the real window back and forth in time, records what is done, and does it again without a window.
 # Usage: time_test.sh PROGRAM FOLDER
 set -uo pipefail
-if [[ ${1:-} != --inside ]]; then
-  exec xvfb-run -a -s "-screen 0 1280x800x24" "$0" --inside "$@"
-fi
-program=$(realpath "$2") folder=$3 here=$(dirname "$(realpath "$0")")
-rm -rf "$folder" && mkdir -p "$folder" && cd "$folder" || exit 1
-export TETPBD_GL_DEBUG=1 TETPBD_WINDOW_LOG=$PWD/events.log TETPBD_CACHE=$PWD/cache MESA_GL_VERSION_OVERRIDE=4.3
-log=$TETPBD_WINDOW_LOG
-source "$here/window_driver.sh"
+source "$(dirname "$(realpath "$0")")/window_driver.sh"
+begin_inside "$@"
 
 cat >block.json <<'JSON'
 {"name": "block", "bodies": [{"name": "block", "block": {"size": [1, 1, 1], "cells": [3, 3, 3]}, "position": [0, 0.3, 0], "material": "rubber"}],

@@ -1,5 +1,13 @@
 # How tests drive the real window: sourced, with $program and $log set, in the folder where files may be made.
 pid=
+# Starts the script again under Xvfb, where it then sets these and goes to its folder.
+begin_inside() {  # PROGRAM FOLDER
+  [[ ${1:-} != --inside ]] && exec xvfb-run -a -s "-screen 0 1280x800x24" "$0" --inside "$@"
+  program=$(realpath "$2") folder=$3
+  rm -rf "$folder" && mkdir -p "$folder" && cd "$folder" || exit 1
+  export TETPBD_GL_DEBUG=1 TETPBD_WINDOW_LOG=$PWD/events.log TETPBD_CACHE=$PWD/cache MESA_GL_VERSION_OVERRIDE=4.3
+  log=$TETPBD_WINDOW_LOG
+}
 fail() {
   echo "FAILED: $*" >&2
   echo "--- last events:" >&2

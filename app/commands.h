@@ -187,6 +187,8 @@ double longest_stable_step(const ReferenceInput& input);
 /// `mass` in kg.
 ordered_json mesh_json(const MeshReport& report, double mass, double longest_stable_step, const Fit& fit);
 ordered_json error_json(const RunErrors& errors);
+/// Of an attachment, by number: what it holds, and what it bears now.
+ordered_json attachment_json(const Sim& sim, std::size_t number, const State& state);
 /// Of each body: what it is made of, and how it is now.
 ordered_json bodies_json(const Sim& sim, const State& state);
 /// The distance from a standard, "motion" or "total"; nulls where there is none, and of runs that are not finite.

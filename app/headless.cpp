@@ -163,6 +163,8 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
     j["fixtures"].push_back({{"body", sim.model->bodies[fixture.body].name},
                              {"fixed", fixture.region},
                              {"lag", lag_of(sim, fixture, state)}});
+  for (std::size_t n = 0; n < sim.model->attachments.size(); ++n)
+    j["attachments"].push_back(attachment_json(sim, n, state));
   j["device"] = device_json(device);
   j["timing"] = {{"steps", sim.steps},
                  {"gpu_ms_per_step", times(run.gpu_ms)},
@@ -304,6 +306,10 @@ int run_headless(Scene scene, const RunOptions& options) {
     if (const double lag = fixture["lag"]; good && lag > 1e-3 * model->size)
       fmt::print("held back: fixed.{} of body '{}' is {:.3g} m behind its place\n", fixture["fixed"].get<int>(),
                  fixture["body"].get<std::string>(), lag);
+  for (const ordered_json& held : statistics.value("attachments", ordered_json::array()))
+    if (held["broken"])
+      fmt::print("let go: '{}' of '{}', which pulled too much\n", held["body"].get<std::string>(),
+                 held["to"].get<std::string>());
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);

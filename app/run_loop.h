@@ -58,9 +58,9 @@ std::function<void(double)> fill_progress(const std::string& file);
 struct RunPlan {
   long measure_every = 1;  ///< steps; the start and the last step are measured in any case
   double most_seconds = std::numeric_limits<double>::infinity();  ///< ends then, after one step at least
-  bool wait = true;   ///< for each step, to time it; without: steps are queued, and timed all together
+  bool wait = true;              ///< for each step, to time it; without: steps are queued, and timed all together
   bool check_crossings = false;  ///< ends a run where surfaces cut each other that did not at the start
-  bool timed = true;  ///< GPU time of each step; its queries are GL objects that come and go
+  bool timed = true;             ///< GPU time of each step; its queries are GL objects that come and go
   std::function<void(long)> stepped{};  ///< after each step
   Standard standard{};
   /// Takes each measurement as it arrives; without, the run keeps them.

@@ -82,6 +82,8 @@ json schema() {
   json& body = result["bodies"]["each"];
   body["fill"]["one of"] = fill_kinds;
   body["heavy"] = body["fixed"];
+  body["fibres"] = fibres_schema();
+  result.update(parts_schema());
   const json motion = obstacle_schema();
   for (const char* key : {"velocity", "spin", "keyframes"}) body["fixed"]["each"][key] = motion[key];
   json& frame = body["fixed"]["each"]["keyframes"]["each"];
@@ -169,6 +171,8 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (value.contains("spacing")) body.spacing = value["spacing"].get<double>();
   for (const json& region : value.value("regions", json()))
     body.regions.push_back(read_region(region, fmt::format("{}.regions.{}", where, body.regions.size()), file));
+  for (const json& fibres : value.value("fibres", json()))
+    body.fibres.push_back(read_fibres(fibres, fmt::format("{}.fibres.{}", where, body.fibres.size()), file));
   const int kinds = !body.mesh.empty() + bool(body.block) + bool(body.tet) + bool(body.sheet);
   if (kinds > 1 || (kinds == 0 && body.surface.empty()))
     refuse(fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where), file);
@@ -216,6 +220,13 @@ Scene read_scene(const json& document, const std::string& file, const fs::path& 
   scene.duration = document.value("duration", scene.duration);
   for (const json& body : document["bodies"])
     scene.bodies.push_back(read_body(body, fmt::format("bodies.{}", scene.bodies.size()), file, path.parent_path()));
+  std::vector<std::string> names;
+  for (const BodyDescription& body : scene.bodies) names.push_back(body.name);
+  for (const json& one : document.value("attachments", json()))
+    scene.attachments.push_back(
+        read_attachment(one, names, fmt::format("attachments.{}", scene.attachments.size()), file));
+  for (const json& one : document.value("forces", json()))
+    scene.forces.push_back(read_force(one, names, fmt::format("forces.{}", scene.forces.size()), file));
   for (const char* section : {"world", "solver"}) read_settings(document.value(section, json()), scene.settings, file);
   read_bodies_settings(document["bodies"], scene.settings, file);
   for (const json& obstacle : document.value("/world/obstacles"_json_pointer, json()))
@@ -633,6 +644,7 @@ json body_json(const BodyDescription& body) {
     if (region.density) one["density"] = *region.density;
     result["regions"].push_back(one);
   }
+  for (const FibresDescription& fibres : body.fibres) result["fibres"].push_back(part_json(fibres));
   if (body.block) result["block"] = *body.block;
   if (body.tet) result["tet"] = *body.tet;
   if (body.sheet) result["sheet"] = *body.sheet;
@@ -649,6 +661,9 @@ ordered_json scene_json(const Scene& scene) {
     result["bodies"][b].update(own);
     for (std::size_t r = 0; r < moduli.size(); ++r) result["bodies"][b]["regions"][r].update(moduli[r]);
   }
+  for (const AttachmentDescription& one : scene.attachments)
+    result["attachments"].push_back(ordered_json(part_json(one)));
+  for (const ForceDescription& one : scene.forces) result["forces"].push_back(ordered_json(part_json(one)));
   for (const Parameter& row : parameters()) result[row.section][row.name] = setting_json(scene.settings, row);
   result["world"]["obstacles"] = ordered_json::array();
   for (const Obstacle& obstacle : scene.obstacles)
@@ -687,7 +702,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     const glm::dvec3 extent = glm::max(own.high - own.low, glm::dvec3(1e-300));
     // A flat side of a surface is nearly flat on its lattice: a box as thin as a plane takes what is near it.
     const glm::dvec3 least = mesh.fill.empty() ? glm::dvec3(0) : 0.3 * mean_edge(mesh) / extent;
-    const auto is_in = [&](std::size_t vertex, const BodyDescription::Box& box) {
+    const auto is_in = [&](std::size_t vertex, const auto& box) {
       const glm::dvec3 away = (mesh.positions[vertex] - own.low) / extent - 0.5 * (box.low + box.high);
       return glm::all(glm::lessThanEqual(glm::abs(away), glm::max(0.5 * (box.high - box.low) + 1e-9, least)));
     };
@@ -705,6 +720,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
                     fmt::format("'fixed.{}' of body '{}' of {}", b, body.name, scene.name),
                     "low and high are fractions of the body's bounding box: make it larger");
     }
+    choose_parts({*model, mesh, turn, is_in}, scene.attachments, scene.forces, body.fibres);
     for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
       if (std::ranges::any_of(in_fixed, [&](const auto& inside) { return bool(inside[i]); })) fixed.push_back(i);
       for (const BodyDescription::Box& heavy : body.heavy) {
@@ -756,6 +772,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
   model->start_motions = separate_starts(*model, scene.settings);
   for (const StartMotion& motion : model->start_motions)
     print_error(fmt::format("tetpbd: {}: {}\n", scene.name, describe(motion)));
+  finish_parts(*model, scene.attachments, scene.forces, scene.settings, scene.name);
   return model;
 }
 

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/scene_parts.h"
 #include "render/camera.h"
 #include "sim/mesh/fill.h"
 #include "sim/model/model.h"
@@ -75,6 +76,7 @@ struct BodyDescription {
   std::vector<Box> fixed;         ///< vertices in any of these boxes are fixed
   std::vector<Box> heavy;
   std::vector<Region> regions;  ///< of several the last counts
+  std::vector<FibresDescription> fibres;
   std::string deform = "none";
 };
 
@@ -82,6 +84,8 @@ struct Scene {
   std::string name, description;
   std::vector<BodyDescription> bodies;
   std::vector<Obstacle> obstacles;
+  std::vector<AttachmentDescription> attachments;
+  std::vector<ForceDescription> forces;
   Settings settings;
   std::optional<Camera> camera;
   double duration = 2;              ///< s

@@ -6,6 +6,7 @@
 
 #include "app/bodies.h"
 #include "app/commands.h"
+#include "sim/model/attachments.h"
 #include "sim/model/material.h"
 
 namespace tetpbd {
@@ -72,7 +73,9 @@ std::string question_units(const glm::dvec3& size) {
 double longest_stable_step(const ReferenceInput& input) {
   constexpr std::size_t most_tets = 300'000;
   const std::size_t tets = input.model.rest.tets.size();
-  if (!any_material(input.settings, has_energy) || tets == 0 || tets > most_tets) return 0;
+  const ConstraintList& held = input.system.lists[index_of<Attach>];
+  const bool hard = std::ranges::count(held.compliance, 0.0) > 0 || (held.count() > 0 && held.compliance.empty());
+  if (!any_material(input.settings, has_energy) || tets == 0 || tets > most_tets || hard) return 0;
   return stable_step(input, input.settings.compliance, input.model.rest.positions, 30);
 }
 
@@ -85,6 +88,19 @@ ordered_json mesh_json(const MeshReport& counts, double mass, double longest_sta
   all["thinnest_part"] = fit.thinnest;
   all["thinnest_at"] = std::isnan(fit.thinnest) ? ordered_json() : ordered_json{at.x, at.y, at.z};
   all["surface_gap"] = fit.gap, all["surface_gap_of_edge"] = fit.gap / fit.edge;
+  return all;
+}
+
+ordered_json attachment_json(const Sim& sim, std::size_t number, const State& state) {
+  const Attachment& a = sim.model->attachments[number];
+  const double stiffness = attachment_stiffness(a, *sim.model, sim.settings);
+  const bool broken = !sim.broken.empty() && sim.broken[number];
+  ordered_json all = {{"body", sim.model->bodies[a.body].name},
+                      {"to", sim.model->bodies[a.to].name},
+                      {"vertices", a.vertices.size()},
+                      {"stiffness", stiffness},
+                      {"broken", broken}};
+  if (stiffness > 0 && !broken) all["force"] = glm::length(attachment_force(a, stiffness, state.positions));
   return all;
 }
 

@@ -47,6 +47,10 @@ show stack 200 'Ten cubes stand on each other' --scene stack
 show hard-stack 200 'Ten hard cubes stand on each other' --scene hard-stack
 show gripper 420 'Soft pads lift a bunny by friction' --scene gripper
 show mixed 60 'A stone falls on a jelly on a slab of stone' --scene mixed
+show beads 60 'Hard balls hang from a soft rope' --scene beads
+show muscle-arm 200 'The fibres of a muscle bend an arm' --scene muscle-arm
+show balloon 300 'A limp ball is blown up' --scene balloon
+show sewn-bag 240 'Two sheets, sewn along their edges and blown up' --scene sewn-bag
 show press-cloth 300 'A plate presses a heap of cloths' --scene press-cloth
 show ring 80 'Balls of jelly, thrown at each other' --scene ring
 show squishy-balls 120 'Balls of jelly fall on each other in a corner' --scene squishy-balls

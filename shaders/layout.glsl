@@ -14,9 +14,20 @@ struct LedVertex {
   vec3 low;
   float speed;  // m/s, at most in this step
 };
+// What loads vertices, with the factor of a time (loads.comp).
+#define LOAD_ACCELERATION 0u
+#define LOAD_PRESSURE 1u
+#define LOAD_WIND 2u
+#define MAX_LOADS 32
+struct LoadRecord {
+  vec3 vector;   // m/s^2, of wind m/s
+  uint kind;
+  float amount;  // of pressure Pa, of wind kg/m^3
+  float _0, _1, _2;
+};
 struct Velocity {
   vec3 high;
-  float work;  // J that obstacles that move have done on the vertex
+  float work;  // J that obstacles that move, and loads, have done on the vertex
   vec3 low;
   float _0;
 };
@@ -29,6 +40,12 @@ struct Record4 {
   uint vertices[4];
   float rest;
 };
+struct HeldRecord {
+  uint vertices[4];
+  float rest[5];
+  float stiffness;  // 1 over the compliance
+  uint is_fibre;
+};
 struct TetRecord {
   uint vertices[4];
   float rest, filled;  // m^3; what the body fills of it
@@ -36,6 +53,7 @@ struct TetRecord {
 };
 #define MAX_OBSTACLES 31     // of a step, with the ground; each has a bit of a word in newton/layout.glsl
 #define MAX_PLANES 8         // half spaces at rest among them that have no properties of their own
+#define MAX_ACTIVATIONS 16   // of fibres, each by keyframes of its own
 #define RIGID_SUMS 21
 #define RIGID_SPEED 1024.0   // m/s, the fastest velocity that sums can hold
 #define RIGID_PARTS 256.0    // parts of a quantum, of which sums over 2^23 vertices do not overflow
@@ -70,9 +88,10 @@ struct Step {
   float kick;               // factor on accelerations in a substep after longer or shorter ones, of any length
   float turn_limit;         // rad; turning further in a substep lowers the health (mode newton)
   float look_ahead;         // s, in which a stiff body that will hit something lowers it (mode newton)
-  vec4 stiffness[2];        // by constraint kind
+  vec4 stiffness[3];        // by constraint kind
   vec4 planes[MAX_PLANES];  // half spaces n.x >= d as (n, d); the ground is the first if there is one
-  vec4 compliance[2];       // over h^2, by constraint kind
+  vec4 compliance[3];       // over h^2, by constraint kind
+  vec4 activation[MAX_ACTIVATIONS / 4];  // of fibres, by number
 };
 
 // An obstacle that is more than a plane, at the end of a substep (a uniform block, std140). Its coordinates have their
@@ -189,6 +208,7 @@ struct RigidRecord {
 #define BIND_OBSTACLES 1
 // Texture units of the simulation.
 #define UNIT_FIELDS 15    // the signed distance fields of all obstacles, one after the other
+#define UNIT_LOADS 11     // accelerations beside gravity, by vertex
 #define UNIT_LISTED 12    // where vertices were when pairs of surfaces were listed
 #define UNIT_QUANTA 13    // how much finer the quanta of each vertex are, where some bodies are far smaller
 #define UNIT_SURFACES 14  // friction and restitution of each vertex, where bodies have their own

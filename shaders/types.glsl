@@ -4,6 +4,7 @@ const float rounding = 1.1920929e-7;  // 2^-23
 #define quantization_size FINE(params.quantized_size)
 #include "layout.glsl"
 layout(std140, binding = BIND_STEP) uniform StepBlock { Step params; };
+float activation_of(uint fibres) { return params.activation[fibres / 4u][fibres % 4u]; }
 // The block's quanta are those of the largest body. A body that is far smaller has finer ones, by a power of two: that
 // of the vertex which begin_body() named.
 #ifdef BODY_QUANTA

@@ -67,6 +67,7 @@ struct Snapshot {
   std::vector<bool> readbacks{};    ///< whether each was under way
   std::optional<NonFinite> found{};
   std::optional<State> host{};  ///< of a CPU mode
+  std::vector<char> broken{};   ///< attachments that had let go
   std::size_t at = 0;           ///< first byte in the buffer
 };
 

@@ -65,6 +65,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   }
   if (bodies_touch(*sim.model, settings)) sim.pairs = make_pairs(input);
   sim.faces = make_faces(input);
+  sim.loads = make_loads(*sim.model);
   if (sim.tuning.count_guards) sim.guard_counts = Buffer("guard counts", GUARDS * sizeof(GLuint));
   sim.check.words = Buffer("check", std::vector<GLuint>(4 + DROPS), GL_DYNAMIC_COPY);
   sim.check.read_back = Buffer("check read-back", 8, nullptr, GL_STREAM_READ);
@@ -80,7 +81,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 bool adopt_constraints(Sim& sim, const Settings& settings) {
   if (same_constraints(settings, sim.settings)) return true;
   if (!sim.solver.takes_constraints) return false;
-  ConstraintSystem system = build_constraints(*sim.model, settings);
+  ConstraintSystem system = build_constraints(*sim.model, settings, sim.broken);
   const auto like = [](const ConstraintList& a, const ConstraintList& b) {
     return a.count() == b.count() && a.compliance.size() == b.compliance.size();
   };
@@ -93,8 +94,10 @@ bool adopt_constraints(Sim& sim, const Settings& settings) {
 void remake(Sim& sim, const Settings& settings, const std::shared_ptr<const Model>& model) {
   if (check_finite(sim, true)) restore_checkpoint(sim);
   State state = read_state(sim);
-  Sim fresh = make_sim(model, settings, sim.tuning,
-                       same_constraints(settings, sim.settings) ? sim.system : build_constraints(*sim.model, settings));
+  Sim fresh = make_sim(
+      model, settings, sim.tuning,
+      same_constraints(settings, sim.settings) ? sim.system : build_constraints(*sim.model, settings, sim.broken));
+  fresh.broken = sim.broken;
   for (std::size_t v = 0; v < sim.inverse_masses.size(); ++v)
     if (is_pinned(sim, std::uint32_t(v))) fresh.inverse_masses[v] = 0;
   fresh.steps = sim.steps, fresh.guards = guard_counts(sim);
@@ -161,8 +164,10 @@ Sim create_sim(std::shared_ptr<const Model> model, const Settings& settings, con
 bool same_constraints(const Settings& a, const Settings& b) {
   const auto decides = [](const Settings& s) {
     const bool dashpots = s.material == "neo-hookean";
-    return std::tuple(kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
-                      dashpots ? s.constraint_damping : 0, solver_mode(s).smoothed);
+    return std::tuple(
+        kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
+        dashpots ? std::tuple(s.constraint_damping, s.viscosity, s.bulk_viscosity) : std::tuple(0.0, 0.0, 0.0),
+        solver_mode(s).smoothed, solver_mode(s).leapfrog || solver_mode(s).implicit);
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
@@ -183,12 +188,20 @@ void change_obstacles(Sim& sim, std::shared_ptr<const Model> model) {
 
 void reset(Sim& sim) {
   const KeepBindings kept;
+  set_broken(sim, {});
   if (sim.guard_counts) sim.guard_counts.clear();
   if (sim.check.words) clear_drops(sim);
   sim.guards = {};
   for (std::size_t v = 0; v < sim.masses.size(); ++v) sim.inverse_masses[v] = free_inverse_mass(sim, v);
   forget_all(sim);
   start_with(sim, {sim.model->positions, sim.model->velocities}, 0);
+}
+
+void set_broken(Sim& sim, const std::vector<char>& broken) {
+  if (broken == sim.broken) return;
+  sim.broken = broken;
+  sim.system = build_constraints(*sim.model, sim.settings, broken);
+  remake(sim, sim.settings, sim.model);
 }
 
 void forget_all(Sim& sim) {

@@ -23,6 +23,7 @@
 #include "sim/finite_check.h"
 #include "sim/gl/gpu.h"
 #include "sim/gl/layout.h"
+#include "sim/loads.h"
 #include "sim/model/model.h"
 #include "sim/solvers/mass_scaling.h"
 #include "sim/solvers/solver.h"
@@ -60,11 +61,14 @@ struct Sim : StepValues {
   Obstacles obstacles;
   Buffer guard_counts;  ///< GUARDS counters, where they are counted
   Solver solver;
-  Buffer rigid_bodies;  ///< RigidRecord, of hard bodies, and their vertices in contact (contact/rigid.glsl)
-  Pass rigid_contact;   ///< before each substep, where there are hard bodies
-  Pairs pairs;          ///< contact between bodies, where there is any
-  Faces faces;          ///< that obstacles could get in between
+  Buffer rigid_bodies;       ///< RigidRecord, of hard bodies, and their vertices in contact (contact/rigid.glsl)
+  Pass rigid_contact;        ///< before each substep, where there are hard bodies
+  Pairs pairs;               ///< contact between bodies, where there is any
+  Faces faces;               ///< that obstacles could get in between
+  std::vector<char> broken;  ///< by attachment of the model, those that have let go; empty: none
   Led led;
+  Loads loads;  ///< where the model has any
+  Activation activation;
   Tuning tuning;
   double longest_substep = 0;       ///< s, the longest that is stable at rest, in mode explicit
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
@@ -93,6 +97,8 @@ void rebuild_shaders(Sim& sim);
 void step(Sim& sim);
 /// Back to the model's start.
 void reset(Sim& sim);
+/// Goes on with these attachments alone let go of.
+void set_broken(Sim& sim, const std::vector<char>& broken);
 
 /// Whether the mode steps on the CPU: then `host` is the state.
 inline bool on_cpu(const Sim& sim) { return solver_mode(sim.settings).cpu; }

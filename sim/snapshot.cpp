@@ -55,7 +55,7 @@ std::size_t snapshot_memory(const Sim& sim) {
 Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_only) {
   const KeepBindings kept;
   Snapshot taken{sim.settings, sim.plan, sim};
-  taken.found = sim.check.found, taken.at = at;
+  taken.found = sim.check.found, taken.at = at, taken.broken = sim.broken;
   if (on_cpu(sim)) taken.host = sim.host;
   const Carried all = carried(sim);
   for (const std::span<std::byte> values : all.values)
@@ -67,7 +67,8 @@ Snapshot take_snapshot(Sim& sim, const Buffer& to, std::size_t at, bool good_onl
 
 void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   const KeepBindings kept;
-  if (then.settings == sim.settings) return restore_all(sim, then, from);
+  if (then.settings == sim.settings && then.broken == sim.broken) return restore_all(sim, then, from);
+  set_broken(sim, then.broken);
   State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
   go_on_from(sim, std::move(state), then.step, then.settings.dt, half_substep_fall(then.settings, then.plan));
 }

@@ -4,6 +4,7 @@
 #include "sim/contact/moving_obstacle.h"
 #include "sim/contact/rigid_contact.h"
 #include "sim/gl/keep_bindings.h"
+#include "sim/model/attachments.h"
 #include "sim/model/material.h"
 #include "sim/sim.h"
 #include "sim/solvers/substep.h"
@@ -77,14 +78,30 @@ void forget_contacts(Sim& sim) {
   sim.rigid_bodies.write(0, records.size() * sizeof(RigidRecord), records.data());
 }
 
+// Sets the activations of the step, and books what fibres gain by their change.
+void activate(Sim& sim) {
+  const Model& model = *sim.model;
+  if (model.fibres.empty()) return;
+  const Activations step = activations_of_step(model, sim.settings, simulated_time(sim));
+  sim.step_block.write(offsetof(Step, activation), step.now.size() * sizeof(float), step.now.data());
+  if (on_cpu(sim) || step.now == step.before) return;
+  if (!sim.activation) sim.activation = make_activation(sim.system);
+  sim.activation.before.write(0, step.before.size() * sizeof(float), step.before.data());
+  sim.recorder.give("Held", sim.activation.records), sim.recorder.give("Before", sim.activation.before);
+  sim.recorder.run(sim.activation.pass, {{"count", unsigned(sim.activation.count)}});
+}
+
 void begin_on_gpu(Sim& sim, bool moving) {
   if (moving) write_obstacles(sim);
+  write_loads(sim);
   give_buffers(sim);
+  activate(sim);
   plan_body_contacts(sim);
   bind_obstacles(sim.obstacles);
   if (sim.timed) sim.timer.begin();
   sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be reading these buffers
   if (!sim.needs_predict) return;
+  find_loads(sim);
   forget_contacts(sim);
   sim.solver.predict(sim);
   sim.needs_predict = false;
@@ -98,6 +115,22 @@ void move_rigid_bodies(Sim& sim) {
   sim.rigid_side = 1 - sim.rigid_side;
 }
 
+// Lets go of attachments on which the force has become too large.
+void break_attachments(Sim& sim) {
+  std::vector<char> broken = sim.broken;
+  State state;
+  for (std::size_t n = 0; n < sim.model->attachments.size(); ++n) {
+    const Attachment& attachment = sim.model->attachments[n];
+    if (!attachment.break_force || (!broken.empty() && broken[n])) continue;
+    if (state.positions.empty()) state = read_state(sim);
+    const double stiffness = attachment_stiffness(attachment, *sim.model, sim.settings);
+    if (!(glm::length(attachment_force(attachment, stiffness, state.positions)) > *attachment.break_force)) continue;
+    broken.resize(sim.model->attachments.size());
+    broken[n] = 1;
+  }
+  set_broken(sim, broken);
+}
+
 }  // namespace
 
 void step(Sim& sim) {
@@ -106,6 +139,7 @@ void step(Sim& sim) {
   const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
   if (on_cpu(sim)) {
     begin_leading(sim);
+    activate(sim);
     sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
     end_leading(sim);
     upload(sim, sim.host);
@@ -118,6 +152,7 @@ void step(Sim& sim) {
       aim_led(sim, k);
       list_pairs(sim, k);
       lead(sim, k);
+      find_loads(sim);
       sim.solver.substep(sim, k);
       if (are_faces_due(sim.plan, k)) move_faces_out(sim);
       resolve_body_contacts(sim, k + 1 == sim.plan.substeps);
@@ -130,6 +165,7 @@ void step(Sim& sim) {
   ++sim.steps;
   if (on_cpu(sim) && moving) write_obstacles(sim);
   check_step(sim);
+  break_attachments(sim);
 }
 
 }  // namespace tetpbd

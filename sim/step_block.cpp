@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/model/attachments.h"
 #include "sim/sim.h"
 #include "sim/solvers/cpu_pbd.h"
 
@@ -55,6 +56,8 @@ void write_step_block(Sim& sim, int substeps_before) {
   block.turn_limit = float(TURN_LIMIT / sim.adaptive.substep_factor);
   block.look_ahead = float(LOOK_AHEAD * s.dt);
   write_planes(*sim.model, s, block);
+  const std::vector<float> active = activations_of_step(*sim.model, s, simulated_time(sim)).before;
+  for (std::size_t k = 0; k < active.size(); ++k) block.activation[k / 4][glm::length_t(k % 4)] = active[k];
   for (std::size_t k = 0; k < kind_count; ++k) {
     block.stiffness[k / 4][glm::length_t(k % 4)] = float(s.stiffness[k]);
     block.compliance[k / 4][glm::length_t(k % 4)] = float(s.compliance[k] / (h * h));

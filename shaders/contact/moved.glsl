@@ -13,6 +13,6 @@ void write_moved(uint i, Position own, DoubleSingle x, DoubleSingle v, float wor
   DoubleSingle before = own.inverse_mass > 0.0 ? place_before(x, v) : x;
   if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(before, 0.0);
 #endif
-  quantized_out[i] = quantize(own.inverse_mass > 0.0 ? seen_by_neighbours(x, v) : x, weight_of(own));
+  quantized_out[i] = quantize(own.inverse_mass > 0.0 ? seen_by_neighbours(i, x, v) : x, weight_of(own));
 #endif
 }

@@ -31,5 +31,7 @@
 #define M_CENTRE 69            // 3: c - x0
 #define M_ROTATION 72          // 4: quaternion w, x, y, z
 #define M_ORIGIN 76            // 3: x0
-#define M_ROW 79
+#define M_HELD 79              // J, of attachments and fibres, in the row of the first body
+#define M_HELD_MIDWAY 80
+#define M_ROW 81
 #define M_STRIDE 128           // floats from one body's row to the next: a multiple of any driver's binding alignment

@@ -14,7 +14,7 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
   carried = body.carried;
 #endif
   if (predicts) {
-    if (!carried) v = predict_velocity(v);
+    if (!carried) v = predict_velocity(i, v);
     start = x = predict_position(x, v);
   }
   if ((phases & PHASE_SOLVE) != 0u) {
@@ -41,6 +41,9 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
   // Pairs of surfaces look back to where the vertex was; then carry.comp gives it the velocity of its body.
   if (carried && finishes && (phases & PHASE_NEAR) != 0u) kept = add_double(v, relative(x, start) * params.inverse_h);
 #endif
+#if LOADED
+  if (finishes) speed.work += work_of_loads(i, params.h * v.high, own.inverse_mass);
+#endif
   if (predicts || finishes) velocities[i] = Velocity(kept.high, speed.work, kept.low, 0.0);
   if (!carried) book_work(i, own.inverse_mass);
 #if COMPLIANT
@@ -48,7 +51,7 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
 #endif
   if (finishes) {
     DoubleSingle here = x;
-    x = seen_by_neighbours(x, v);
+    x = seen_by_neighbours(i, x, v);
 #if RIGID_CONTACT
     note_motion(body, i, here, v, x, correction, own.inverse_mass);
 #endif

@@ -11,7 +11,7 @@ void predict(uint i) {
   begin_body(i);
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low), here = x, v = DoubleSingle(velocities[i].high, velocities[i].low);
-  if (own.inverse_mass > 0.0) x = seen_by_neighbours(x, v);
+  if (own.inverse_mass > 0.0) x = seen_by_neighbours(i, x, v);
 #if COMPLIANT
   if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(here, v), 0.0);
 #endif

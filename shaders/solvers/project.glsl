@@ -16,6 +16,9 @@ void project_$KIND(uint number, uint owned) {
 #else
   float rest[$VALUES];
   for (uint v = 0u; v < $VALUES; ++v) rest[v] = record_value(number, 1u + v);
+#if $DRIVEN
+  rest[$VALUES - 2] -= activation_of(uint(rest[$VALUES - 1]));
+#endif
 #endif
   Constraint$ARITY c = $KIND(x, rest, record.x);
 #if $OWN

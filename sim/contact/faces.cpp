@@ -12,18 +12,6 @@ namespace {
 
 constexpr unsigned group = 64;  // invocations
 
-// m, of a body's triangles at rest.
-double mean_edge(const Model& model, const Body& body) {
-  double sum = 0;
-  const auto& x = model.rest.positions;
-  for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t)
-    for (std::size_t c = 0; c < 3; ++c) {
-      const Triangle& corners = model.rest.surface[t];
-      sum += glm::distance(x[corners[c]], x[corners[(c + 1) % 3]]);
-    }
-  return sum / double(std::max<std::size_t>(3 * body.triangles, 1));
-}
-
 // An obstacle's distance at the deepest point of a face, of which no corner is.
 struct Met {
   glm::dvec3 weights;

@@ -65,9 +65,12 @@ std::vector<std::string> obstacle_defines(const Model& model, bool own_surfaces)
   std::string rows;
   for (const auto& [number, function] : kinds) rows += fmt::format(" ROW({}, {})", number, function);
   const bool fields = std::ranges::any_of(solids, [](const Obstacle* o) { return bool(o->field); });
-  return {fmt::format("SOLIDS {}", solids.size()), fmt::format("FIELDS {:d}", fields),
+  return {fmt::format("SOLIDS {}", solids.size()),
+          fmt::format("FIELDS {:d}", fields),
           fmt::format("BODY_SURFACES {:d}", own_surfaces),
-          fmt::format("MOVING_SOLIDS {:d}", std::ranges::any_of(model.obstacles, moves)), "OBSTACLE_KINDS(ROW)" + rows};
+          fmt::format("LOADED {:d}", !model.loads.empty()),
+          fmt::format("MOVING_SOLIDS {:d}", std::ranges::any_of(model.obstacles, moves)),
+          "OBSTACLE_KINDS(ROW)" + rows};
 }
 
 bool share_kernels(const Model& model, const Model& other) {

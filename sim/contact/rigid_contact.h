@@ -52,7 +52,7 @@ class RigidContact {
   /// The position to which prediction moves vertex i from x; changes v if its body is free.
   glm::dvec3 predict(const Substep& s, std::size_t i, const glm::dvec3& x, glm::dvec3& v) const {
     const Motion& motion = motions_[body_of_[i]];
-    if (motion.is == Motion::free) return s.predict(x, v);
+    if (motion.is == Motion::free) return s.predict(i, x, v);
     if (motion.is == Motion::touching) return x + s.h * v;
     return x + s.h * motion.velocity + Rules{}.moved_by_turn(motion.turn, x - motion.centre);
   }
@@ -132,7 +132,7 @@ class RigidContact {
     std::vector<std::size_t> found;
     for (std::size_t i = first; i < end && !s.obstacles.empty(); ++i) {
       glm::dvec3 velocity = v[i];
-      const glm::dvec3 here = place.at(std::uint32_t(i)), next = s.predict(here, velocity);
+      const glm::dvec3 here = place.at(std::uint32_t(i)), next = s.predict(i, here, velocity);
       const auto stops = [&](const MovingObstacle& o) {
         return o.surface_met(next, next - here - s.h * o.velocity_at(here)).distance < 0;
       };

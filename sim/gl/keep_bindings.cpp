@@ -8,7 +8,8 @@ namespace tetpbd {
 
 namespace {
 
-constexpr GLenum units[] = {GL_TEXTURE0 + UNIT_FIELDS, GL_TEXTURE0 + UNIT_SURFACES, GL_TEXTURE0 + UNIT_QUANTA};
+constexpr GLenum units[] = {GL_TEXTURE0 + UNIT_FIELDS, GL_TEXTURE0 + UNIT_SURFACES, GL_TEXTURE0 + UNIT_QUANTA,
+                            GL_TEXTURE0 + UNIT_LOADS, GL_TEXTURE0 + UNIT_LISTED};
 
 // Targets and what to ask for their buffers; glBindBufferBase() binds to the generic target as well.
 constexpr GLenum targets[][2] = {{GL_COPY_READ_BUFFER, GL_COPY_READ_BUFFER},

@@ -20,7 +20,7 @@ class KeepBindings {
  private:
   GLint program_ = 0, unit_ = 0;
   GLint texture_ = 0;                ///< of the active unit
-  std::array<GLint, 3> textures_{};  ///< of the units that sim uses
+  std::array<GLint, 5> textures_{};  ///< of the units that sim uses
   std::array<GLint, 6> buffers_{};
 };
 

@@ -18,5 +18,5 @@ using layout::Step;
 using layout::Velocity;
 static_assert(sizeof(Position) == 32 && sizeof(Velocity) == 32 && sizeof(layout::Record4) == 20);
 static_assert(sizeof(ObstacleRecord) == 160);
-static_assert(sizeof(Step) == 96 + 32 + 16 * MAX_PLANES + 32);
+static_assert(sizeof(Step) == 96 + 48 + 16 * MAX_PLANES + 48 + 4 * MAX_ACTIVATIONS);
 }  // namespace tetpbd

@@ -79,6 +79,25 @@ void write_regions(Metrics& m, const Sim& sim) {
   m.records[std::size_t(index_of<Volume>)].write_each(places, sizeof values[0], values.data());
 }
 
+// Makes the records of attachments and fibres anew where the simulation has others.
+void write_held(Metrics& m, const Sim& sim) {
+  const auto& shares = sim.solver.stiffness_shares;
+  std::vector<std::vector<double>> compliances{std::vector<double>(shares.begin(), shares.end())};
+  for (const std::size_t kind : {index_of<Attach>, index_of<Fibre>})
+    compliances.push_back(sim.system.lists[kind].compliance);
+  if (std::exchange(m.held.compliances, compliances) == compliances) return;
+  std::vector<layout::HeldRecord> records;
+  for (const std::size_t kind : {index_of<Attach>, index_of<Fibre>})
+    for (layout::HeldRecord& record : held_records(sim.system.lists[kind], kind == index_of<Fibre>)) {
+      if (!shares.empty()) record.stiffness *= shares[body_at(*sim.model, record.vertices[0]).number];
+      records.push_back(record);
+    }
+  m.held.count = records.size();
+  if (records.empty()) return;
+  m.held.records = Buffer("attachments and fibres", records);
+  if (!m.held.pass) m.held.pass = {Program::compute("measure/held.comp"), 1};
+}
+
 // Reads a measurement back; false where it has not arrived yet.
 bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   if (!pending.fence.sync()) return true;
@@ -125,8 +144,9 @@ bool read(const Metrics& m, Metrics::Pending& pending, bool wait) {
   result.angular_momentum -= glm::cross(result.centre, result.momentum);
   result.kinetic = sums[M_KINETIC];
   result.potential = pending.gravity * (sums[M_HEIGHT] - m.mass * pending.ground);
-  result.elastic = sums[M_ELASTIC] + sums[M_AVERAGED];
-  result.stored = sums[M_ELASTIC_MIDWAY] + sums[M_AVERAGED_MIDWAY];
+  result.elastic = sums[M_ELASTIC] + sums[M_AVERAGED] + (m.held.count > 0 ? double(rows[M_HELD]) : 0);
+  result.stored =
+      sums[M_ELASTIC_MIDWAY] + sums[M_AVERAGED_MIDWAY] + (m.held.count > 0 ? double(rows[M_HELD_MIDWAY]) : 0);
   result.total = result.kinetic + result.stored + pending.gravity * (heights - m.mass * pending.ground);
   result.work = sums[M_WORK];
   result.contacts = sums[M_CONTACTS];
@@ -185,7 +205,7 @@ Metrics create_metrics(const Model& model, const ConstraintSystem& made, const s
 
 void measure(Metrics& m, const Sim& sim, bool by_hand) {
   const KeepBindings kept;
-  write_regions(m, sim);
+  write_regions(m, sim), write_held(m, sim);
   if (m.pending.size() >= ring_size) read(m, m.pending[m.pending.size() - ring_size], true);
   const std::size_t slot = m.measured++ % ring_size;
   sim.step_block.bind_uniform(BIND_STEP);
@@ -226,6 +246,12 @@ void measure(Metrics& m, const Sim& sim, bool by_hand) {
       pass.work_groups = groups;
       recorder.run(pass, {{"groups", groups}});
     }
+  }
+  if (m.held.count > 0) {
+    recorder.give("Held", m.held.records);
+    recorder.give("Row", m.rows[slot].id(), 0, M_STRIDE * sizeof(float));
+    recorder.use(m.held.pass.program).set("midway", float(midway));
+    recorder.run(m.held.pass, {{"count", unsigned(m.held.count)}});
   }
   m.pending.push_back({Fence::here(),
                        slot,
@@ -268,7 +294,7 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   errors.penetration_max = std::fmax(now.penetration_max, errors.penetration_max);
   errors.penetration_999 = std::fmax(now.penetration_999, errors.penetration_999);
   const auto is_fixed = [](double inverse_mass) { return !(inverse_mass > 0); };
-  if (now.contacts > 0 || sim.settings.damping > 0 || std::ranges::any_of(sim.inverse_masses, is_fixed))
+  if (now.contacts > 0 || sim.settings.damping > 0 || !sim.model->loads.empty() || std::ranges::any_of(sim.inverse_masses, is_fixed))
     errors.free = false;
   if (!errors.free) return;
   const double mass = std::accumulate(sim.masses.begin(), sim.masses.end(), 0.0);

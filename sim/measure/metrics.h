@@ -68,6 +68,12 @@ struct Metrics {
   std::array<std::size_t, 3> counts{};        ///< constraints, by kind
   std::vector<BodySettings> of_regions;       ///< whose moduli the records of tets have, where bodies have regions
   std::vector<float> shares;                  ///< and the parts of them that the solver holds
+  struct Held {
+    std::vector<std::vector<double>> compliances;
+    std::size_t count = 0;
+    Buffer records;
+    Pass pass;
+  } held;  ///< attachments and fibres that have energy
   Buffer rest, partials;
   std::vector<Pass> passes;  ///< in order of dispatch
   Recorder recorder;
@@ -93,7 +99,7 @@ Measurement nothing_measured();
 struct RunErrors {
   double max_volume_loss_percent = 0;  ///< the paper's measure, the largest 100 (V0 - V) / V0
   /// The largest |P - (P0 + M g t)| / sum m|v| and |L - L0| / |L0|, of a body that hardly spins |L - L0| over
-  /// size * sum m|v|. NaN with fixed vertices, damping, or contact from the start.
+  /// size * sum m|v|. NaN with fixed vertices, damping, loads, or contact from the start.
   double linear_drift = std::numeric_limits<double>::quiet_NaN();
   double angular_drift = std::numeric_limits<double>::quiet_NaN();
   double start_energy = 0, max_energy = 0;          ///< J
@@ -101,7 +107,7 @@ struct RunErrors {
   EnergyLedger ledger;
   std::optional<Overlap> overlap;          ///< the largest of each, where bodies touch
   std::optional<long> crossed;             ///< the step at whose end surfaces cut each other, where that ends a run
-  bool free = true;                        ///< no contact, damping or fixed vertex so far
+  bool free = true;                        ///< no contact, damping, load or fixed vertex so far
   std::optional<Measurement> first, last;  ///< the first and last finite state
   bool finite = true;
   std::optional<NonFinite> non_finite;  ///< the result of check_finite(), if the caller asked for it

@@ -1,5 +1,5 @@
 // The table of constraint kinds. A kind is a formula in shaders/constraints/NAME.glsl, which CMake finds, and a row
-// here, from which follow its stiffness k_NAME, its compliance compliance_NAME (unless only a material has the kind),
+// here, from which follow its stiffness k_NAME, its compliance compliance_NAME (unless users have no say in it),
 // its kernels and its CPU loops. Gauss-Seidel projects the kinds in the order of the rows.
 #pragma once
 
@@ -26,13 +26,14 @@ struct ConstraintKind {
   int arity;                    ///< vertices, 2 or 4
   const char* noun;             ///< what the constraints hold, as help texts call it
   const char* compliance_unit;  ///< of unit(C)^2 / J
-  double most_compliance = 1;   ///< the largest that settings accept; 0: only a material has this kind
+  double most_compliance = 1;   ///< the largest that settings accept; 0: they have no say in this kind
   int values = 1;               ///< numbers that describe a constraint at rest
   int components = 1;           ///< values of C, solved together, each with a compliance of its own
   bool curved = false;          ///< its Hessian has more than grad C grad C^T: NAME_curvature(), or NAME_part() of two
   bool tet = false;             ///< has NAME_jacobian(), the volume over that at rest
   bool averaged = false;        ///< its last C is by averages around its vertices (averages.h)
   bool rate = false;            ///< only C's change counts: the compliance is 1 / its damping, unit(C)^2 / (J s)
+  bool driven = false;          ///< the last rest value is the number of an activation that the one before loses
   constexpr bool of_material() const { return most_compliance == 0; }
 };
 
@@ -124,6 +125,45 @@ struct Isobend {
   static std::array<double, 4> rest(glm::dvec3* x);
 };
 ADD_KIND(Isobend)
+struct Attach {
+  static constexpr ConstraintKind row{.name = "attach",
+                                      .arity = 4,
+                                      .noun = "attached vertices",
+                                      .compliance_unit = "m/N",
+                                      .most_compliance = 0,
+                                      .values = 5};
+  FORMULA(attach)
+  static std::vector<Tet> vertices(const TetMesh&) { return {}; }  // attachments.cpp adds them
+  static std::array<double, 5> rest(glm::dvec3*) { return {}; }
+};
+ADD_KIND(Attach)
+struct Fibre {
+  static constexpr ConstraintKind row{.name = "fibre",
+                                      .arity = 4,
+                                      .noun = "fibres through tets",
+                                      .compliance_unit = "1/J",
+                                      .most_compliance = 0,
+                                      .values = 5,
+                                      .curved = true,
+                                      .driven = true};
+  FORMULA(fibre)
+  static std::vector<Tet> vertices(const TetMesh&) { return {}; }  // attachments.cpp adds them
+  static std::array<double, 5> rest(glm::dvec3*) { return {}; }
+};
+ADD_KIND(Fibre)
+struct Viscous {
+  static constexpr ConstraintKind row{.name = "viscous",
+                                      .arity = 4,
+                                      .noun = "rates of strain of tets",
+                                      .compliance_unit = "1/(J s)",
+                                      .most_compliance = 0,
+                                      .values = 2,
+                                      .rate = true};
+  FORMULA(viscous)
+  static std::vector<Tet> vertices(const TetMesh&) { return {}; }  // material.cpp adds them
+  static std::array<double, 2> rest(glm::dvec3*) { return {}; }
+};
+ADD_KIND(Viscous)
 // The next row goes here.
 
 template <int... I>

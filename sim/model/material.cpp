@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <ranges>
 
+#include "sim/model/attachments.h"
+
 namespace tetpbd {
 
 Lame lame(double young_modulus, double poisson_ratio) {
@@ -74,6 +76,24 @@ void make_dashpots(ConstraintList& edges, const ConstraintList& tets, const TetM
   for (const double k : spring_stiffness(edges, tets, mu, volume)) edges.compliance.push_back(1 / (k * tau));
 }
 
+// The parts of a tet's rate of strain, of which shear has five. Together they resist a vertex no more than one alone
+// could, so that they count as one when masses are split.
+void make_viscous(ConstraintSystem& system, const ConstraintList& tets, const TetMesh& mesh, const Material& material) {
+  ConstraintList& list = system.lists[index_of<Viscous>];
+  for (std::size_t t = 0; t < tets.count(); ++t) {
+    const double volume = 1 / (6 * tets.rest[8 * t + 6]), filled = volume * fill_of(mesh, t);
+    for (int part = 0; part < 6; ++part) {
+      const double resistance = part < 5 ? 2 * material.viscosity : material.bulk_viscosity;
+      if (!(resistance > 0)) continue;
+      list.vertices.insert(list.vertices.end(), mesh.tets[t].begin(), mesh.tets[t].end());
+      list.rest.insert(list.rest.end(), {double(part), volume});
+      list.compliance.push_back(1 / (resistance * filled));
+    }
+    for (const std::uint32_t v : mesh.tets[t]) ++system.at_vertex[v];
+  }
+  system.present[index_of<Viscous>] = list.count() > 0;
+}
+
 // Adds a body's constraints. Other bodies may be of other materials, so each constraint gets its own coefficients.
 void append_body(ConstraintSystem& to, const ConstraintSystem& from, const Body& body, const Material& m) {
   for (std::size_t k = 0; k < kind_count; ++k) {
@@ -137,10 +157,13 @@ ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material
   }
   if (system.present[index_of<Dashpot>])
     make_dashpots(system.lists[index_of<Dashpot>], tets, mesh, of_tet, material.constraint_damping);
+  if (uses(material, Viscous::row)) make_viscous(system, tets, mesh, material);
   return system;
 }
 
-ConstraintSystem build_constraints(const Model& model, const Settings& settings) {
+namespace {
+
+ConstraintSystem build_bodies(const Model& model, const Settings& settings) {
   const std::vector<Lame> moduli = region_moduli(model, settings);
   if (!has_own_materials(settings)) return build_constraints(model.rest, in_mode(settings, settings), moduli);
   ConstraintSystem system = build_constraints(TetMesh{model.rest.positions, {}, {}}, "");
@@ -150,6 +173,15 @@ ConstraintSystem build_constraints(const Model& model, const Settings& settings)
         moduli.empty() ? std::span<const Lame>() : std::span(moduli).subspan(body.first_tet, body.tets);
     append_body(system, build_constraints(body_mesh(model, body), own, of_body), body, own);
   }
+  return system;
+}
+
+}  // namespace
+
+ConstraintSystem build_constraints(const Model& model, const Settings& settings, const std::vector<char>& broken) {
+  ConstraintSystem system = build_bodies(model, settings);
+  add_attachments(system, model, settings, broken);
+  add_fibres(system, model);
   return system;
 }
 

@@ -23,8 +23,9 @@ inline bool has_energy(const Material& material) { return material.material != "
 /// The constraints of a mesh of the kinds that its material uses, with the material model's compliances; `moduli` of
 /// each tet, in place of the material's, or empty.
 ConstraintSystem build_constraints(const TetMesh& mesh, const Material& material, std::span<const Lame> moduli = {});
-/// The constraints of all bodies as the settings' mode solves them; their material is that of bodies without their own.
-ConstraintSystem build_constraints(const Model& model, const Settings& settings);
+/// The constraints of all bodies, their fibres and attachments as the settings' mode solves them; their material is
+/// that of bodies without their own. Attachments that have `broken` are left out.
+ConstraintSystem build_constraints(const Model& model, const Settings& settings, const std::vector<char>& broken = {});
 /// The moduli of a tet: of its region, or of its body.
 Lame tet_moduli(const Model& model, const Settings& settings, std::size_t tet);
 /// energy_material() of a tet, as the mode solves it.

@@ -78,7 +78,7 @@ const Body& body_at(const Model& model, std::size_t vertex) {
 }
 
 std::vector<float> quantum_fineness(const Model& model, const Settings& settings) {
-  if (settings.contact != "none") return {};
+  if (settings.contact != "none" || !model.attachments.empty()) return {};
   std::vector<float> fineness;
   bool any = false;
   for (const Body& body : model.bodies) {
@@ -90,6 +90,15 @@ std::vector<float> quantum_fineness(const Model& model, const Settings& settings
   return any ? fineness : std::vector<float>{};
 }
 
+double factor_at(const FactorOverTime& factors, double time) {
+  if (factors.empty()) return 1;
+  const auto next = std::ranges::upper_bound(factors, time, {}, &std::pair<double, double>::first);
+  if (next == factors.begin()) return next->second;
+  const auto last = std::prev(next);
+  if (next == factors.end()) return last->second;
+  return std::lerp(last->second, next->second, (time - last->first) / (next->first - last->first));
+}
+
 double body_mass(const Model& model, const Body& body) {
   const auto first = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
   return std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0);
@@ -98,6 +107,17 @@ double body_mass(const Model& model, const Body& body) {
 Bounds body_bounds(const Body& body, const std::vector<glm::dvec3>& positions) {
   const auto first = positions.begin() + std::ptrdiff_t(body.first_vertex);
   return bounds({first, first + std::ptrdiff_t(body.vertices)});
+}
+
+double mean_edge(const Model& model, const Body& body) {
+  double sum = 0;
+  const auto& x = model.rest.positions;
+  for (std::size_t t = body.first_triangle; t < body.first_triangle + body.triangles; ++t)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Triangle& corners = model.rest.surface[t];
+      sum += glm::distance(x[corners[c]], x[corners[(c + 1) % 3]]);
+    }
+  return sum / double(std::max<std::size_t>(3 * body.triangles, 1));
 }
 
 TetMesh body_mesh(const Model& model, const Body& body) {
@@ -121,6 +141,17 @@ void check_settings(const Model& model, const Settings& settings) {
   if (!settings.bodies.empty() && settings.bodies.size() != model.bodies.size())
     throw Error(fmt::format("there are settings of {} bodies", settings.bodies.size()),
                 fmt::format("a model of {}", model.bodies.size()), "give one for each body, or none");
+  const bool published = solver_mode(settings).published, soft = any_material(settings, compliant);
+  if (published && !(model.attachments.empty() && model.loads.empty() && model.fibres.empty()))
+    throw Error(fmt::format("mode {} has no attachments, fibres and forces beside gravity", settings.mode), "settings",
+                "use mode node or constraint");
+  if (!model.fibres.empty() && !soft)
+    throw Error("fibres pull on what is soft, and the bodies are hard", "settings", "give them a material");
+  for (const Attachment& a : model.attachments)
+    if ((a.stiffness > 0 || a.break_force) && !soft)
+      throw Error("an attachment with a stiffness or a break_force holds what is soft, and the bodies are hard",
+                  fmt::format("'{}' to '{}'", model.bodies[a.body].name, model.bodies[a.to].name),
+                  "leave these out, or give a body a material");
   std::vector<std::string> names;
   for (const Body& body : model.bodies) names.push_back(body.name);
   check_settings(settings, "settings", names);
@@ -146,8 +177,16 @@ void renumber(Model& model) {
   for (auto* vectors : {&model.rest.positions, &model.positions, &model.velocities}) reorder(*vectors);
   for (auto* numbers : {&model.inverse_masses, &model.masses}) reorder(*numbers);
   reorder(model.original);
-  for (Fixture& fixture : model.fixtures)
-    for (std::uint32_t& v : fixture.vertices) v = now[v];
+  const auto renumber_all = [&](std::vector<std::uint32_t>& vertices) {
+    for (std::uint32_t& v : vertices) v = now[v];
+  };
+  for (Fixture& fixture : model.fixtures) renumber_all(fixture.vertices);
+  for (Load& load : model.loads) renumber_all(load.vertices);
+  for (Attachment& attachment : model.attachments) {
+    renumber_all(attachment.vertices);
+    for (Triangle& t : attachment.triangles)
+      for (std::uint32_t& v : t) v = now[v];
+  }
   const auto rename = [&](auto& elements) {
     parallel_for(elements.size(), [&](std::size_t i) {
       for (std::uint32_t& v : elements[i]) v = now[v];

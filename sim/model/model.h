@@ -43,7 +43,7 @@ struct Body {
   std::string name;
   std::size_t number = 0;  ///< in the model, and in Settings::bodies
   std::size_t first_vertex = 0, vertices = 0, first_tet = 0, tets = 0, first_triangle = 0, triangles = 0;
-  bool one_piece = false;  ///< has no hinges, and so is a rigid body if it is hard
+  bool one_piece = false;  ///< has no hinges, nor is anything attached or loads it: is a rigid body if it is hard
   double thickness = 0;    ///< m, of a sheet
   bool is_sheet() const { return tets == 0; }
 };
@@ -62,6 +62,39 @@ struct Fixture {
   Path path;
 };
 
+/// What holds vertices of a body to the surface of another (attachments.h).
+struct Attachment {
+  std::size_t body, to;                 ///< of the model's bodies
+  std::vector<std::uint32_t> vertices;  ///< of `body`
+  std::vector<Triangle> triangles;      ///< of the other's surface, for each of them
+  std::vector<glm::dvec3> places;       ///< weights of its second and third corner; m, along its normal
+  double stiffness = 0;                 ///< N/m, of all together; 0: hard, by forces as stiff as the bodies there
+  std::optional<double> break_force{};  ///< N, on all together, above which it lets go
+};
+
+/// A factor over time, linear between its points, the first and last before and after them; none: 1.
+using FactorOverTime = std::vector<std::pair<double, double>>;
+double factor_at(const FactorOverTime& factors, double time);
+
+/// What pulls or presses vertices beside gravity (loads.h).
+struct Load {
+  enum class Kind { acceleration, pressure, wind };
+  Kind kind = Kind::acceleration;
+  glm::dvec3 vector{0};                 ///< m/s^2, of wind m/s
+  double amount = 0;                    ///< of pressure Pa, outwards; of wind kg/m^3, density of air times drag
+  std::vector<std::uint32_t> vertices;  ///< pressure and wind act on triangles that have three of them
+  FactorOverTime factors{};
+};
+
+/// Fibres through tets, along a direction at rest, which pull where they are longer than at rest. An activation of a
+/// half asks for half the length.
+struct Fibres {
+  std::vector<std::uint32_t> tets;
+  glm::dvec3 direction{1, 0, 0};  ///< of length 1
+  double stiffness = 0;           ///< Pa, over the area across them
+  FactorOverTime activation{};    ///< none: 0
+};
+
 /// How a body was made of its file.
 struct BodyFill {
   std::size_t body;  ///< of the model's
@@ -78,6 +111,9 @@ struct Model {
   std::vector<glm::dvec3> velocities;  ///< m/s
   std::vector<Obstacle> obstacles;     ///< without the ground
   std::vector<Fixture> fixtures{};
+  std::vector<Attachment> attachments{};
+  std::vector<Load> loads{};
+  std::vector<Fibres> fibres{};
   /// By tet: 0, or the number, from 1 on, of its body's region that has moduli of its own. Empty: no body has any.
   std::vector<std::uint8_t> regions{};
   double size = 1;  ///< m, diagonal of the largest body at rest
@@ -92,9 +128,11 @@ struct Model {
 /// The body to which a vertex belongs.
 const Body& body_at(const Model& model, std::size_t vertex);
 /// By vertex: how much finer its body's quanta are than those of the largest body, a power of two up to 1. Empty where
-/// no body is smaller than an eighth of that, and where bodies touch: corrections of contact are sums of common quanta.
+/// no body is smaller than an eighth of that, and where bodies touch or are attached: their corrections are sums of
+/// common quanta.
 std::vector<float> quantum_fineness(const Model& model, const Settings& settings);
 double body_mass(const Model& model, const Body& body);  ///< kg
+double mean_edge(const Model& model, const Body& body);  ///< m, of its surface at rest
 /// The body's part of the rest mesh, by itself: its vertices are numbered from 0.
 TetMesh body_mesh(const Model& model, const Body& body);
 /// Bounds of the body's vertices, given the positions of all.

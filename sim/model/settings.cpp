@@ -63,6 +63,11 @@ const std::vector<Parameter>& parameters() {
         {"constraint_damping", "solver", &S::constraint_damping,
          "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0, 10, "s",
          true},
+        {"viscosity", "solver", &S::viscosity,
+         "of a neo-hookean material against shear, as of a liquid beside it: honey 10, soft tissue 1 to 100", 0, 1e9,
+         "Pa s", true, Effect::rebuild},
+        {"bulk_viscosity", "solver", &S::bulk_viscosity, "likewise against a change of volume", 0, 1e9, "Pa s", true,
+         Effect::rebuild},
         {"omega", "solver", &S::omega,
          "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
          "above 2 it may not; with compliance at most 2",
@@ -295,16 +300,24 @@ bool all_materials(const Settings& settings, bool (*is_such)(const Material&)) {
 
 double most_damping(const Settings& settings) {
   double most = 0;
-  for (const Material* m : materials_in(settings)) most = std::max(most, m->constraint_damping);
+  for (const Material* m : materials_in(settings)) {
+    most = std::max(most, m->constraint_damping);
+    if (damped(*m)) most = std::max(most, std::max(m->viscosity, m->bulk_viscosity) / m->young_modulus);
+  }
   return most;
 }
 
-bool damped(const Material& material) { return material.constraint_damping > 0; }
+static bool is_viscous(const Material& material) {
+  return material.material == "neo-hookean" && (material.viscosity > 0 || material.bulk_viscosity > 0);
+}
+
+bool damped(const Material& material) { return material.constraint_damping > 0 || is_viscous(material); }
 
 std::string kinds_in_use(const Material& material) {
   if (material.material == "springs") return "stretch,volume";
   if (material.material == "none") return material.constraints;
-  return std::string(smoothed(material) ? "smoothed" : "neo_hookean") + (damped(material) ? ",dashpot" : "");
+  return std::string(smoothed(material) ? "smoothed" : "neo_hookean") +
+         (material.constraint_damping > 0 ? ",dashpot" : "") + (is_viscous(material) ? ",viscous" : "");
 }
 
 // Within 2.5 % of ten-node tets on a bunny, an armadillo and a cantilever of mirrored cells, for ratios from 0.2 to

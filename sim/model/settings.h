@@ -35,6 +35,8 @@ struct Material {
   std::string element = "linear";  ///< of neo-Hookean tets: linear or smoothed
   double smoothing = automatic;    ///< s, the part of a smoothed tet's resistance to shear that is its own
   double constraint_damping = 0;   ///< s
+  double viscosity = 0;            ///< Pa s, of neo-Hookean tets, against shear
+  double bulk_viscosity = 0;       ///< Pa s, likewise, against a change of volume
   std::string constraints = "stretch,bend,volume";
   std::array<double, kind_count> stiffness = [] {  ///< k_NAME by kind, 0 to 1
     std::array<double, kind_count> hard;
@@ -102,7 +104,7 @@ bool has_own_surfaces(const Settings& settings);
 /// Whether `is_such` is true of the material of any body, or of all.
 bool any_material(const Settings& settings, bool (*is_such)(const Material&));
 bool all_materials(const Settings& settings, bool (*is_such)(const Material&));
-/// The largest constraint_damping of all bodies, s.
+/// The largest constraint_damping of all bodies, s; above 0 where any is viscous.
 double most_damping(const Settings& settings);
 
 /// The substeps of a step, `h` long, and the iterations of each.

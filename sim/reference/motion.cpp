@@ -48,6 +48,9 @@ void require_reference(const ReferenceInput& input) {
       "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
   const auto refuse = [&](const std::string& what) { throw Error("the scene has no right motion", what, hint); };
   if (!input.model.fixtures.empty()) refuse("fixed vertices move");
+  if (!input.model.attachments.empty()) refuse("bodies are attached to each other");
+  if (!input.model.loads.empty()) refuse("forces beside gravity act");
+  if (!input.model.fibres.empty()) refuse("fibres pull");
   const bool soft = any_material(settings, compliant);
   const auto check = [&](const Material& own) {
     if (!soft && !uses(own, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");

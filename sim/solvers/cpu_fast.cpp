@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "sim/model/attachments.h"
 #include "sim/sim.h"
 #include "sim/solvers/barrier.h"
 #include "sim/solvers/colours.h"
@@ -45,7 +46,9 @@ class FastPbd {
       : model_(&input.model),
         pairs_(input.model),
         faces_(wide_faces(input.model)),
-        rigid_(input.model, input.system.lists[std::size_t(index_of<Stretch>)]) {
+        rigid_(input.model, input.system.lists[std::size_t(index_of<Stretch>)]),
+        load_mesh_(input.model.loads.empty() ? std::vector<glm::uvec4>() : lay_out_loads(input.model)),
+        fibres_(input.system.lists[std::size_t(index_of<Fibre>)]) {
     std::size_t all = 0;
     for_each_kind([&](auto is, int kind) {
       const auto& batches = std::get<batches::Batches<decltype(is)>>(work_.batches);
@@ -77,8 +80,9 @@ class FastPbd {
     work_.starts.resize(any_material(settings, damped) ? x.size() : 0);
     predicted_.resize(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
-    if (step.substep.moving) state.work.resize(x.size());
+    if (step.substep.moving || !model_->loads.empty() || !model_->fibres.empty()) state.work.resize(x.size());
     read_positions(state);
+    if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     pairs_.begin_step(state);
 // Loops inside the region itself would be 4 % slower on one thread.
 #pragma omp parallel num_threads(int(threads_))
@@ -94,6 +98,13 @@ class FastPbd {
   }
 
  private:
+  void activate(State& state, const Activations& step) {
+    state.work[0] += activation_work(fibres_, step, state.positions);
+    for (auto& batch : std::get<batches::Batches<Fibre>>(work_.batches))
+      for (std::size_t lane = 0; lane < batches::lanes; ++lane)
+        batch.rest[3][lane] = 1 - step.now[std::size_t(batch.rest[4][lane])];
+  }
+
   // How many batches of a colour a thread needs on average: a batch takes about 0.2 us, and a barrier, with fetching
   // what other threads have moved, about 2 us.
   static constexpr std::size_t batches_of_a_useful_thread = 2;
@@ -131,10 +142,13 @@ class FastPbd {
     GuardCounts counts{};
     for (int s = 0; s < step.plan.substeps; ++s) {
       if (!work_.starts.empty()) std::copy_n(x.data() + begin, end - begin, work_.starts.data() + begin);
-      if (rigid_.wanted() || (substep.moving && s > 0)) {
+      if (rigid_.wanted() || (substep.moving && s > 0) || !load_mesh_.empty()) {
         barrier.wait(thread);
         if (thread == 0)
-          substep.begin(s), rigid_.prepare(substep, step.inverse_masses, work_, v, done, counts, pairs_.wrenches());
+          substep.begin(s),
+              substep.find_loads(
+                  load_mesh_, [&](std::uint32_t i) { return x[i].position(); }, v),
+              rigid_.prepare(substep, step.inverse_masses, work_, v, done, counts, pairs_.wrenches());
         barrier.wait(thread);
       }
       if (thread == 0)
@@ -152,8 +166,10 @@ class FastPbd {
           x[i].move_to(substep.out_of_obstacles(i, x[i].position(), predicted_[i], v[i], work));
         });
       }
-      for_each_free_vertex(
-          [&](std::size_t i) { v[i] = rigid_.velocity_after(substep, i, x[i].position(), predicted_[i], v[i]); });
+      for_each_free_vertex([&](std::size_t i) {
+        v[i] = rigid_.velocity_after(substep, i, x[i].position(), predicted_[i], v[i]);
+        substep.book_loads(i, v[i], done);
+      });
       const bool faces = !faces_.empty() && are_faces_due(step.plan, s);
       if (bodies_touch(*model_, step.settings) || faces) {
         barrier.wait(thread);
@@ -198,6 +214,8 @@ class FastPbd {
   batches::Work work_;
   std::vector<Colour> colours_;
   std::vector<glm::dvec3> predicted_;
+  std::vector<glm::uvec4> load_mesh_;
+  ConstraintList fibres_;
   std::size_t threads_;
 };
 

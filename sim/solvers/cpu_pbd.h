@@ -8,6 +8,7 @@
 #include "sim/contact/faces.h"
 #include "sim/contact/offset_contact.h"
 #include "sim/contact/rigid_contact.h"
+#include "sim/model/attachments.h"
 #include "sim/model/constraints.h"
 #include "sim/model/model.h"
 #include "sim/model/settings.h"
@@ -64,7 +65,7 @@ template <class Kind, class real, class Vertices>
   for (int k = 0; k < components; ++k) a[k] = compliance ? real(compliance[k] * rule.softness) : rule.a;
   std::uint32_t triggered = 0;
   if constexpr (components == 1) {
-    if (rule.gamma > 0) {
+    if (Kind::row.rate || rule.gamma > 0) {
       const auto here = std::to_array(local);
       const auto then = evaluate([&](std::uint32_t v) { return vertices.start(v); });
       c.C = Kind::row.rate ? constraint_change(c, then, here.data(), local) : c.C + rule.gamma * (c.C - then.C);
@@ -105,7 +106,9 @@ class CpuPbd {
         pairs_(model),
         faces_(wide_faces(model)),
         rigid_(model, system.lists[std::size_t(index_of<Stretch>)]),
-        at_vertex_(system.at_vertex) {
+        at_vertex_(system.at_vertex),
+        load_mesh_(model.loads.empty() ? std::vector<glm::uvec4>() : lay_out_loads(model)),
+        fibres_(system.lists[std::size_t(index_of<Fibre>)]) {
     for_each_kind([&](auto kind, int k) {
       constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
       const ConstraintList& list = system.lists[std::size_t(k)];
@@ -134,7 +137,8 @@ class CpuPbd {
     rigid_.begin(*model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
-    if (substep.moving) state.work.resize(x.size());
+    if (substep.moving || !model_->loads.empty() || !model_->fibres.empty()) state.work.resize(x.size());
+    if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
     if (jacobi && splits_masses(settings))
@@ -145,6 +149,8 @@ class CpuPbd {
     for (int s = 0; s < plan.substeps; ++s) {
       if (any_material(settings, damped)) start = x;
       substep.begin(s);
+      substep.find_loads(
+          load_mesh_, [&](std::uint32_t i) { return x[i]; }, v);
       pairs_.begin(settings, x, v);
       rigid_.prepare(substep, inverse_masses, vertices, v, state.work, guards, pairs_.wrenches());
       for (std::size_t i = 0; i < x.size(); ++i)
@@ -173,7 +179,10 @@ class CpuPbd {
         }
       }
       for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_masses[i] > 0) v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
+        if (inverse_masses[i] > 0) {
+          v[i] = rigid_.velocity_after(substep, i, x[i], predicted[i], v[i]);
+          substep.book_loads(i, v[i], state.work);
+        }
       if (are_faces_due(plan, s))
         move_faces_out(*model_, settings, faces_, substep.obstacles, substep.h, x, v, inverse_masses, state.work);
       pairs_.resolve(settings, x, v, inverse_masses, substep.h, substep.h / OffsetContact::recovery, rigid_.carried());
@@ -183,6 +192,10 @@ class CpuPbd {
   }
 
  private:
+  void activate(State& state, const Activations& step) {
+    state.work[0] += activation_work(fibres_, step, state.positions);
+    for (auto& item : std::get<Items<Fibre>>(items_)) item.rest[3] = 1 - real(step.now[std::size_t(item.rest[4])]);
+  }
   template <class Kind>
   struct Item {
     std::array<std::uint32_t, std::size_t(Kind::row.arity)> vertices;
@@ -206,6 +219,8 @@ class CpuPbd {
   std::vector<Triangle> faces_;
   RigidContact rigid_;
   std::vector<std::uint32_t> at_vertex_;
+  std::vector<glm::uvec4> load_mesh_;
+  ConstraintList fibres_;
   OfEachKind<Items> items_;
   // What materials give constraints, else empty.
   struct Own {

@@ -35,6 +35,7 @@ struct Newton {
   Buffer presses, touches;  ///< by pair of surfaces, and by body
   std::vector<std::string> defines, vertex_defines;
   std::shared_ptr<const NewtonLevels> levels;
+  std::shared_ptr<const Model> joined;  ///< of which attached bodies are one; null: the Sim's own
   NewtonBuffers layout;
   std::size_t vectors = 0, mesh = 0, coarse_matrix = 0, sums = 0, rings = 0;  ///< indices of Solver::buffers
   Refresh refresh;
@@ -81,6 +82,26 @@ Newton make_passes(const SolverInput& input, const NewtonSizes& sizes) {
   return n;
 }
 
+// Attached bodies have one matrix, and are solved as one body, with those that stand between them in the list.
+std::shared_ptr<const Model> join_attached(const Model& model) {
+  if (model.attachments.empty()) return nullptr;
+  auto joined = std::make_shared<Model>(model);
+  std::vector<char> goes_on(model.bodies.size(), 0);  // into the next body
+  for (const Attachment& a : model.attachments)
+    for (std::size_t b = std::min(a.body, a.to); b < std::max(a.body, a.to); ++b) goes_on[b] = 1;
+  joined->bodies.clear();
+  for (std::size_t b = 0; b < model.bodies.size(); ++b) {
+    const Body& body = model.bodies[b];
+    if (b == 0 || !goes_on[b - 1]) {
+      joined->bodies.push_back(body);
+      continue;
+    }
+    Body& whole = joined->bodies.back();
+    whole.vertices += body.vertices, whole.tets += body.tets, whole.triangles += body.triangles;
+  }
+  return joined;
+}
+
 constexpr std::size_t press_bytes = 32;  // of a Press in newton/press.glsl
 
 // The passes that need a Sim's pairs of surfaces, which are made after its solver.
@@ -97,7 +118,7 @@ void make_presses(Sim& sim, Newton& n) {
   n.meet = pass("meet", of_pairs, "MEETS 1");
   n.islands = pass("islands", n.defines);
   n.islands.work_groups = 1;
-  const std::size_t bodies = sim.model->bodies.size();
+  const std::size_t bodies = (n.joined ? n.joined : sim.model)->bodies.size();
   n.touches = Buffer("bodies that press each other", std::vector<GLuint>(bodies * ((bodies + 31) / 32)));
   n.start_moves = pass("displace", n.defines, "AT_END 0"), n.end_moves = pass("displace", n.defines, "AT_END 1");
   n.start_moves.work_groups = n.end_moves.work_groups = n.predict.work_groups;
@@ -159,11 +180,12 @@ void begin_refresh(Sim& sim, Newton& n) {
   r.again = r.inverse.valid();
   if (r.again) return;
   n.refreshed_for = sim.plan.h;
-  r.inverse = std::async(std::launch::async,
-                         [model = sim.model, system = soften(sim.system, *sim.model, sim.solver.stiffness_shares),
-                          settings = sim.settings, plan = sim.plan, levels = n.levels, layout = n.layout] {
-                           return fill_newton_coarse({*model, system, settings, plan, {}}, *levels, layout);
-                         });
+  r.inverse =
+      std::async(std::launch::async, [model = n.joined ? n.joined : sim.model,
+                                      system = soften(sim.system, *sim.model, sim.solver.stiffness_shares),
+                                      settings = sim.settings, plan = sim.plan, levels = n.levels, layout = n.layout] {
+        return fill_newton_coarse({*model, system, settings, plan, {}}, *levels, layout);
+      });
   r.steps = 8 + long(sim.model->rest.tets.size() / 1000);  // about as long as the thread takes, at real time
 }
 
@@ -295,10 +317,15 @@ Solver create_newton_solver(const SolverInput& whole) {
   solver.stiffness_shares = stiffness_shares(whole.model, whole.settings);
   const ConstraintSystem softened =
       solver.stiffness_shares.empty() ? ConstraintSystem{} : soften(whole.system, whole.model, solver.stiffness_shares);
-  const SolverInput input{whole.model,     solver.stiffness_shares.empty() ? whole.system : softened,
-                          whole.settings,  whole.plan,
-                          whole.tuning,    whole.software,
-                          whole.compliant, whole.fine_quanta,
+  const std::shared_ptr<const Model> joined = join_attached(whole.model);
+  const SolverInput input{joined ? *joined : whole.model,
+                          solver.stiffness_shares.empty() ? whole.system : softened,
+                          whole.settings,
+                          whole.plan,
+                          whole.tuning,
+                          whole.software,
+                          whole.compliant,
+                          whole.fine_quanta,
                           whole.rigid};
   const auto levels = std::make_shared<const NewtonLevels>(build_newton_levels(input.model, input.system));
   const NewtonSizes sizes = measure_newton(input, *levels);
@@ -309,6 +336,7 @@ Solver create_newton_solver(const SolverInput& whole) {
                                                    define("CONTACT_SELF", input.settings.contact == "self")});
   for (const std::string& define : n.defines)
     if (define.starts_with("TOTAL_MASS") || define.starts_with("BODIES")) n.vertex_defines.push_back(define);
+  n.joined = joined;
   n.levels = levels, n.layout = lay_out_newton_buffers(sizes, input.system);
   n.refreshed_for = input.plan.h;
   const auto add = [&](const char* block, Buffer buffer) {

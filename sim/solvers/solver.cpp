@@ -143,6 +143,7 @@ std::vector<Substitutions> kind_words(const ConstraintSystem& system) {
                      {"COMPONENTS", std::to_string(kind.components)},
                      {"CURVED", kind.curved ? "1" : "0"},
                      {"TETS", kind.tet ? "1" : "0"},
+                     {"DRIVEN", kind.driven ? "1" : "0"},
                      {"KIND_ROW", std::to_string(k / 4)},
                      {"KIND_COLUMN", std::to_string(k % 4)}});
   }

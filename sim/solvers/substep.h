@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sim/contact/moving_obstacle.h"
+#include "sim/loads.h"
 #include "sim/solvers/solver.h"
 
 namespace tetpbd {
@@ -29,6 +30,7 @@ struct Substep {
   glm::dvec3 gravity;
   std::vector<MovingObstacle> obstacles;  ///< of the substep that began last
   bool moving;                            ///< obstacles differ from one substep to the next
+  std::vector<glm::dvec3> loads{};        ///< m/s^2 by vertex, beside gravity; empty: none
 
   /// The first substep of a step that begins at `time`. The model and the settings have to live longer than it.
   Substep(const Model& model, const Settings& settings, const Plan& plan, double time)
@@ -44,10 +46,23 @@ struct Substep {
   void begin(int substep) {
     if (moving && substep > 0) obstacles = obstacles_at(model_, settings_, time_ + substep * h, h);
   }
-  /// Returns where prediction moves x, and changes v (eqs. 1-2).
-  glm::dvec3 predict(const glm::dvec3& x, glm::dvec3& v) const {
-    v = (v + h * gravity) * velocity_scale;
+  /// Returns where prediction moves vertex i from x, and changes v (eqs. 1-2).
+  glm::dvec3 predict(std::size_t i, const glm::dvec3& x, glm::dvec3& v) const {
+    v = (v + h * (loads.empty() ? gravity : gravity + loads[i])) * velocity_scale;
     return x + h * v;
+  }
+  /// Finds the loads of the substep that begins; x(i) is a position.
+  void find_loads(const std::vector<glm::uvec4>& mesh, const auto& x, const std::vector<glm::dvec3>& v) {
+    if (model_.loads.empty()) return;
+    const LoadsAt now{load_records(model_, time_of_loads(settings_, time_)), mesh};
+    loads.resize(v.size());
+    for (std::uint32_t i = 0; i < v.size(); ++i)
+      loads[i] = now.acceleration(
+          i, x, [&](std::uint32_t u) { return v[u]; }, model_.inverse_masses[i], h);
+  }
+  /// Adds to `work` what loads do on vertex i, which ends the substep with velocity v.
+  void book_loads(std::size_t i, const glm::dvec3& v, std::vector<double>& work) const {
+    if (!loads.empty()) work[i] += model_.masses[i] * h * glm::dot(loads[i], v);
   }
   /// Returns where vertex i at x goes out of all obstacles (eqs. 11-12), and adds to `work` what they do on it.
   glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v,

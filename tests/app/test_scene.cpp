@@ -245,11 +245,12 @@ TEST_CASE("every shipped scene runs in every mode") {
   GlTest gl;
   CHECK(scene_names() ==
         std::vector<std::string>{
-            "armadillo-drop", "beam",           "bowl",           "bowl-32",      "bunny-drop",  "cards",     "chain",
-            "clamped-bunny",  "cloth-heap",     "cloth-on-bunny", "dragon-drop",  "folded-ears", "funnel",    "gripper",
-            "hard-stack",     "hung-armadillo", "jelly-beam",     "jelly-bunny",  "knot",        "layers",    "mixed",
-            "muscle",         "press",          "press-cloth",    "ring",         "rollers",     "soft-beam", "spikes",
-            "squishy-balls",  "stack",          "stairs",         "twisted-beams"});
+            "armadillo-drop", "balloon",     "beads",         "beam",          "bowl",       "bowl-32",
+            "bunny-drop",     "cards",       "chain",         "clamped-bunny", "cloth-heap", "cloth-on-bunny",
+            "dragon-drop",    "folded-ears", "funnel",        "gripper",       "hard-stack", "hung-armadillo",
+            "jelly-beam",     "jelly-bunny", "knot",          "layers",        "mixed",      "muscle",
+            "muscle-arm",     "press",       "press-cloth",   "ring",          "rollers",    "sewn-bag",
+            "soft-beam",      "spikes",      "squishy-balls", "stack",         "stairs",     "twisted-beams"});
   std::map<std::string, int> runs;
   for (const SolverMode& mode : pbd_modes()) runs[mode.name] = 0;
   for (const std::string& name : scene_names()) {
@@ -264,7 +265,12 @@ TEST_CASE("every shipped scene runs in every mode") {
       CAPTURE(std::string(mode.name));
       std::map<std::string, std::string> parameters = {{"mode", mode.name}, {"iterations", "2"}, {"substeps", "4"}};
       if (!mode.compliance && (name == "cloth-on-bunny" || name == "mixed")) continue;  // it needs some
-      if (mode.name != std::string("node") && name == "bowl-32") continue;              // large
+      if (name == "muscle-arm") {  // corrections need short substeps for bones, and Jacobi shorter ones
+        if (!mode.cpu) continue;
+        parameters["iterations"] = "1", parameters["substeps"] = "40";
+      }
+      if (mode.published && !(model->attachments.empty() && model->loads.empty())) continue;
+      if (mode.name != std::string("node") && name == "bowl-32") continue;  // large
       taken = true, ++runs.at(mode.name);
       const Scene scene = load_scene(name, {.parameters = {parameters.begin(), parameters.end()}});
       Sim sim = create_sim(model, scene.settings);

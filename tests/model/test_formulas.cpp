@@ -58,6 +58,69 @@ TEST_CASE_TEMPLATE("gradients match finite differences", Kind, Stretch, Bend, Vo
   }
 }
 
+TEST_CASE("gradients of attachments and fibres match finite differences") {
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int taut = 0;
+  const auto check = [&]<class Kind>(Kind, const std::array<double, 5>& rest) {
+    std::array<glm::dvec3, 4> x;
+    for (auto& p : x) p = glm::dvec3(unit(generator), unit(generator), unit(generator));
+    const auto value = [&](std::array<glm::dvec3, 4> at) { return Kind::evaluate(at.data(), rest.data()); };
+    const auto exact = value(x);
+    glm::dvec3 sum(0);
+    double largest = 1e-9;
+    for (const glm::dvec3& g : exact.gradient) sum += g, largest = std::max(largest, glm::length(g));
+    CHECK(glm::length(sum) < 1e-12 * largest);
+    if (exact.C != 0) ++taut;
+    for (std::size_t j = 0; j < 4 && exact.C != 0; ++j)
+      for (int a = 0; a < 3; ++a) {
+        auto low = x, high = x;
+        low[j][a] -= 1e-6, high[j][a] += 1e-6;
+        CHECK(std::abs(exact.gradient[j][a] - (value(high).C - value(low).C) / 2e-6) <= 1e-4 * largest);
+      }
+    // Neither depends on where the frame is, and a turn moves C of all three coordinates as a vector.
+    for (auto& p : x) p += glm::dvec3(3, -2, 1);
+    CHECK(value(x).C == doctest::Approx(exact.C).epsilon(1e-9));
+  };
+  for (int trial = 0; trial < 200; ++trial) {
+    check(Attach{}, {unit(generator), unit(generator), 0.3 * unit(generator), double(trial % 3), 0});
+    check(Fibre{}, {unit(generator), unit(generator), unit(generator), 0.8, 0});
+  }
+  CHECK(taut > 250);
+}
+
+TEST_CASE("the parts of a viscous tet resist all rates of strain alike, and no turning") {
+  std::mt19937 generator(9);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int trial = 0; trial < 100; ++trial) {
+    std::array<glm::dvec3, 4> x;
+    for (auto& p : x) p = glm::dvec3(unit(generator), unit(generator), unit(generator));
+    const double six = glm::dot(glm::cross(x[1] - x[0], x[2] - x[0]), x[3] - x[0]);
+    if (six < 0.2) continue;
+    glm::dmat3 L;
+    for (int c = 0; c < 3; ++c) L[c] = glm::dvec3(unit(generator), unit(generator), unit(generator));
+    const glm::dmat3 D = 0.5 * (L + glm::transpose(L));
+    const double trace = D[0][0] + D[1][1] + D[2][2];
+    const glm::dmat3 shear = D - glm::dmat3(trace / 3);
+    double squares = 0;
+    for (int part = 0; part < 6; ++part) {
+      const std::array<double, 2> rest = {double(part), six / 6};
+      const auto c = Viscous::evaluate(x.data(), rest.data());
+      double rate = 0, turning = 0;
+      for (std::size_t j = 0; j < 4; ++j) {
+        rate += glm::dot(c.gradient[j], L * x[j]);
+        turning += glm::dot(c.gradient[j], glm::cross(glm::dvec3(1, 2, -3), x[j]));
+      }
+      CHECK(std::abs(turning) < 1e-9);
+      if (part < 5) squares += rate * rate;
+      if (part == 5) CHECK(rate == doctest::Approx(trace));
+    }
+    double expected = 0;
+    for (int c = 0; c < 3; ++c) expected += glm::dot(shear[c], shear[c]);
+    CHECK(squares == doctest::Approx(expected));
+  }
+}
+
 TEST_CASE("every constraint kind has a formula that is zero at rest and the value expected of a hand-made change") {
   std::array<glm::dvec3, 2> edge = {glm::dvec3(0), glm::dvec3(3, 4, 0)};
   CHECK(Stretch::evaluate<double>(edge.data(), 4.0).C == doctest::Approx(1.0));

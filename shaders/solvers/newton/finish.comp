@@ -89,7 +89,7 @@ void main() {
     u *= listed_part(i, x, u);
 #endif
     v = (u - offset.xyz) / offset.w;
-    if (falls) v += (0.5 * params.h) * params.gravity;
+    if (falls) v += (0.5 * params.h) * pull_on(i);
     for (int k = 0; k < obstacle_count(); ++k) {
       Surface plane = surface_ahead(k, x, free, free);
       bool held = (holds & (1u << k)) != 0u, clamped = plane.distance < 0.0;
@@ -111,6 +111,9 @@ void main() {
     }
 #if MOVING_SOLIDS
     work += params.h * work_rate(i, x, free, u, holds, last.residual);
+#endif
+#if LOADED
+    work += work_of_loads_midway(i, u, own.inverse_mass);
 #endif
     vec3 carried = obstacle_velocity(findLSB(touched), x);  // by the first obstacle that it touches
     uint stops = began_stiff(i) ? 0u : touched;

@@ -9,6 +9,7 @@
 #include "quantize.glsl"
 #include "vertex_state.glsl"
 #include "contact/obstacles.glsl"
+#include "pull.glsl"
 layout(local_size_x = GROUP_SIZE) in;
 
 #include "solvers/newton/layout.glsl"

@@ -1,4 +1,4 @@
-// Writes and returns where inertia takes vertex i: by BDF2 if `history`, else by implicit Euler. Gravity acts for a
+// Writes and returns where inertia takes vertex i: by BDF2 if `history`, else by implicit Euler. What pulls it acts for a
 // part of the step: a half to begin a fall exactly, the whole where something holds the body.
 vec3 predict(uint i, bool history, float part) {
   Position own = positions[i];
@@ -12,7 +12,7 @@ vec3 predict(uint i, bool history, float part) {
     speed += at(GAIN, i).xyz * as_long / 3.0;
   }
   float drag = 1.0 + params.drag * h;
-  vec3 aim = offset + (h * speed + (part * h * h) * params.gravity) / drag;
+  vec3 aim = offset + (h * speed + (part * h * h) * pull_on(i)) / drag;
   if (fixed_) offset = vec3(0.0), aim = params.h * speed;  // the way that it was led
   put(AIM, i, aim, fixed_ ? 0.0 : drag / (own.inverse_mass * h * h));
   put(OFFSET, i, offset, h);

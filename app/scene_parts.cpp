@@ -238,7 +238,6 @@ void finish_parts(Model& model, const std::vector<AttachmentDescription>& attach
                   chosen == 0 ? "low and high are fractions of the body's bounding box: make it larger"
                               : fmt::format("'{}' is {:.3g} m from '{}': set \"within\" to more than that, or move it",
                                             model.bodies[a.body].name, nearest, other.name));
-    model.bodies[a.body].one_piece = model.bodies[a.to].one_piece = false;
   }
   for (std::size_t n = 0; n < forces.size(); ++n) {
     Load& made = model.loads[n];
@@ -248,8 +247,7 @@ void finish_parts(Model& model, const std::vector<AttachmentDescription>& attach
                                     : Load::Kind::acceleration;
     made.vector = f.vector, made.amount = f.amount, made.factors = f.factors;
     double mass = 0;
-    for (const std::uint32_t v : made.vertices)
-      mass += model.masses[v], model.bodies[body_at(model, v).number].one_piece = false;
+    for (const std::uint32_t v : made.vertices) mass += model.masses[v];
     if (made.vertices.empty())
       throw Error("a force acts on no vertex", fmt::format("'forces.{}' of {}", n, scene),
                   "low and high are fractions of the body's bounding box: make it larger");

@@ -66,12 +66,13 @@ void forget_contacts(Sim& sim) {
   if (!sim.rigid_bodies) return;
   forget_impulses(sim.pairs);
   const std::vector<double> edges = mean_edges(*sim.model, sim.system.lists[std::size_t(index_of<Stretch>)]);
+  const std::vector<char> loose = loose_pieces(*sim.model, sim.system);
   std::vector<RigidRecord> records;
   for (const Body& body : sim.model->bodies) {
-    const double edge = edges[records.size()];
+    const double edge = edges[body.number];
     RigidRecord& record = records.emplace_back();
     record.first = unsigned(body.first_vertex), record.vertices = unsigned(body.vertices);
-    if (body.one_piece && moves_rigidly(sim.settings, material_of(sim.settings, body.number)))
+    if (loose[body.number] && moves_rigidly(sim.settings, material_of(sim.settings, body.number)))
       record.slack = float(RigidContact::slack * edge);
     record.mass = float(body_mass(*sim.model, body));
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "sim/model/attachments.h"
 #include "sim/solvers/substep.h"
 
 namespace tetpbd {
@@ -18,17 +19,17 @@ class RigidContact {
   /// Of a mean edge: the correction of a vertex, averaged over its constraints, that such a strain makes.
   static constexpr double slack = 0.2 * most_strain;
 
-  /// `edges`: the constraints of kind stretch, sorted by vertex.
-  RigidContact(const Model& model, const ConstraintList& edges)
+  RigidContact(const Model& model, const ConstraintSystem& system)
       : model_(&model),
-        edges_(edges),
+        edges_(system.lists[std::size_t(index_of<Stretch>)]),
+        loose_(loose_pieces(model, system)),
         motions_(std::max<std::size_t>(model.bodies.size(), 1)),
         body_of_(model.positions.size()) {
     for (std::size_t b = 0; b < model.bodies.size(); ++b) {
       const Body& body = model.bodies[b];
       std::fill_n(body_of_.begin() + std::ptrdiff_t(body.first_vertex), body.vertices, std::uint32_t(b));
     }
-    for (std::size_t c = 0; c < edges.count(); ++c) ++motions_[body_of_[edges.ends(c)[0]]].edges;
+    for (std::size_t c = 0; c < edges_.count(); ++c) ++motions_[body_of_[edges_.ends(c)[0]]].edges;
     for (std::size_t b = 1; b < motions_.size(); ++b)
       motions_[b].first_edge = motions_[b - 1].first_edge + motions_[b - 1].edges;
   }
@@ -77,7 +78,7 @@ class RigidContact {
       const Body& body = model_->bodies[b];
       Motion& motion = motions_[b];
       motion.is = Motion::free;
-      if (!body.one_piece || !moves_rigidly(*settings_, material_of(*settings_, body.number))) continue;
+      if (!loose_[b] || !moves_rigidly(*settings_, material_of(*settings_, body.number))) continue;
       const std::size_t first = body.first_vertex, end = first + body.vertices;
       const auto is_fixed = [](double inverse_mass) { return !(inverse_mass > 0); };
       if (std::any_of(&inverse_masses[first], &inverse_masses[first] + body.vertices, is_fixed)) continue;
@@ -233,6 +234,7 @@ class RigidContact {
   const Settings* settings_ = nullptr;
   bool wanted_ = false;
   ConstraintList edges_;
+  std::vector<char> loose_;
   std::vector<Motion> motions_;         // by body
   std::vector<std::uint32_t> body_of_;  // by vertex
 };

@@ -128,6 +128,15 @@ void add_attachments(ConstraintSystem& system, const Model& model, const Setting
     set_compliance(system.lists[kind], std::move(compliance));
 }
 
+std::vector<char> loose_pieces(const Model& model, const ConstraintSystem& system) {
+  std::vector<char> loose;
+  for (const Body& body : model.bodies) loose.push_back(body.one_piece);
+  for (const std::uint32_t v : system.lists[index_of<Attach>].vertices) loose[body_at(model, v).number] = 0;
+  for (const Load& load : model.loads)
+    for (const std::uint32_t v : load.vertices) loose[body_at(model, v).number] = 0;
+  return loose;
+}
+
 void add_fibres(ConstraintSystem& system, const Model& model) {
   constexpr std::size_t kind = index_of<Fibre>;
   std::vector<double> compliance;

@@ -19,6 +19,9 @@ double attachment_stiffness(const Attachment& attachment, const Model& model, co
 /// N, by which an attachment of some stiffness pulls on its body where vertices are at these places.
 glm::dvec3 attachment_force(const Attachment& attachment, double stiffness, const std::vector<glm::dvec3>& positions);
 
+/// By body, whether it is in one piece and nothing is attached to it or loads it, so that it may move as a rigid one.
+std::vector<char> loose_pieces(const Model& model, const ConstraintSystem& system);
+
 /// Adds the constraints of fibres at rest.
 void add_fibres(ConstraintSystem& system, const Model& model);
 /// By number, the activations of the model's fibres in the step that begins at `time`, and in the one before it, which

@@ -43,7 +43,7 @@ struct Body {
   std::string name;
   std::size_t number = 0;  ///< in the model, and in Settings::bodies
   std::size_t first_vertex = 0, vertices = 0, first_tet = 0, tets = 0, first_triangle = 0, triangles = 0;
-  bool one_piece = false;  ///< has no hinges, nor is anything attached or loads it: is a rigid body if it is hard
+  bool one_piece = false;  ///< has no hinges, and so is a rigid body if it is hard and nothing but contact acts on it
   double thickness = 0;    ///< m, of a sheet
   bool is_sheet() const { return tets == 0; }
 };

@@ -46,7 +46,7 @@ class FastPbd {
       : model_(&input.model),
         pairs_(input.model),
         faces_(wide_faces(input.model)),
-        rigid_(input.model, input.system.lists[std::size_t(index_of<Stretch>)]),
+        rigid_(input.model, input.system),
         load_mesh_(input.model.loads.empty() ? std::vector<glm::uvec4>() : lay_out_loads(input.model)),
         fibres_(input.system.lists[std::size_t(index_of<Fibre>)]) {
     std::size_t all = 0;

@@ -105,7 +105,7 @@ class CpuPbd {
       : model_(&model),
         pairs_(model),
         faces_(wide_faces(model)),
-        rigid_(model, system.lists[std::size_t(index_of<Stretch>)]),
+        rigid_(model, system),
         at_vertex_(system.at_vertex),
         load_mesh_(model.loads.empty() ? std::vector<glm::uvec4>() : lay_out_loads(model)),
         fibres_(system.lists[std::size_t(index_of<Fibre>)]) {

@@ -47,7 +47,6 @@ TEST_CASE("attachments hold what is near, by name or number, in a box or all") {
   REQUIRE(model->attachments.size() == 1);
   const Attachment& a = model->attachments[0];
   CHECK(a.vertices.size() == 9);  // its bottom
-  CHECK(!model->bodies[0].one_piece);
   for (std::size_t k = 0; k < a.vertices.size(); ++k) {
     CHECK(body_at(*model, a.vertices[k]).name == "high");
     CHECK(std::abs(model->positions[a.vertices[k]].y - 0.2) < 1e-9);
@@ -83,9 +82,11 @@ TEST_CASE("what attachments, forces and fibres cannot be is refused by name") {
   CHECK(holds(refused(scene), "no direction"));
   scene["bodies"][0]["fibres"] = json::parse(R"([{"along": [0, 1, 0]}])");
   CHECK(holds(refused(scene), "needs a \"stiffness\""));
-  scene["bodies"][0]["fibres"] = json::parse(R"([{"along": [0, 1, 0], "stiffness": 1e4, "activation": [{"activation": 2}]}])");
+  scene["bodies"][0]["fibres"] =
+      json::parse(R"([{"along": [0, 1, 0], "stiffness": 1e4, "activation": [{"activation": 2}]}])");
   CHECK(!refused(scene).empty());
-  scene["bodies"][0]["fibres"] = json::parse(R"([{"along": [0, 1, 0], "stiffness": 1e4, "activation": [{"activation": 0.2}]}])");
+  scene["bodies"][0]["fibres"] =
+      json::parse(R"([{"along": [0, 1, 0], "stiffness": 1e4, "activation": [{"activation": 0.2}]}])");
   CHECK(refused(scene).empty());
   const auto model = build_model(read_back(scene));
   Settings hard = read_back(scene).settings;

@@ -7,6 +7,8 @@
 #include "sim/model/attachments.h"
 #include "sim/sim.h"
 #include "sim/snapshot.h"
+#include "sim/state_file.h"
+#include "tests/app/run_program.h"
 #include "tests/gl_test.h"
 
 using namespace tetpbd;
@@ -37,7 +39,6 @@ Attachment& attach_second(Model& model, double within, double stiffness = 0) {
       if (!std::exchange(chosen[v], 1)) a.vertices.push_back(v);
   attach(model, a, within, false);
   model.attachments.push_back(a);
-  for (Body& body : model.bodies) body.one_piece = false;
   return model.attachments.back();
 }
 
@@ -188,4 +189,38 @@ TEST_CASE("an attachment lets go where more pulls than it bears, and holds again
       reset(sim);
       CHECK(sim.broken.empty());
     }
+}
+
+TEST_CASE("a state says which attachments have let go, and goes on by the same bits") {
+  GlTest gl;
+  const run_program::Folder folder;
+  for (const char* mode : {"node", "cpu-fast", "explicit", "newton"}) {
+    CAPTURE(mode);
+    auto model = halves(true);
+    model->attachments[0].break_force = 1e-3;
+    Sim sim = create_sim(model, settings_of(mode));
+    for (int k = 0; k < 5; ++k) step(sim);
+    REQUIRE(!sim.broken.empty());
+    save_state(sim, folder.path / "a.state");
+    Sim other = create_sim(model, settings_of(mode));
+    CHECK(load_state(other, folder.path / "a.state"));
+    CHECK(other.broken == sim.broken);
+    for (int k = 0; k < 5; ++k) step(sim), step(other);
+    CHECK(state_hash(sim) == state_hash(other));
+  }
+}
+
+TEST_CASE("a hard body moves as a rigid one unless it is attached, and again once it has let go") {
+  GlTest gl;
+  auto model = std::make_shared<Model>();
+  add_half(*model, 0, true), add_half(*model, half.x, false), add_half(*model, 3, false);
+  attach_second(*model, 1e-6).break_force = 1e-3;
+  Settings s = settings_of("node");
+  s.bodies.resize(3);
+  for (std::size_t b : {1, 2}) s.bodies[b].material = Material{};
+  Sim sim = create_sim(model, s);
+  CHECK(loose_pieces(*model, sim.system) == std::vector<char>{0, 0, 1});
+  for (int k = 0; k < 3 && sim.broken.empty(); ++k) step(sim);
+  REQUIRE(!sim.broken.empty());
+  CHECK(loose_pieces(*model, sim.system) == std::vector<char>{1, 1, 1});
 }

@@ -23,7 +23,6 @@ std::shared_ptr<Model> block(const glm::dvec3& size, const glm::ivec3& cells, co
   for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
     if (*held && mesh.positions[v].x < -size.x / 2 + 1e-9) fixed.push_back(v);
   add_body(*model, "block", mesh, 1000, mesh.positions, {}, {}, fixed);
-  model->bodies[0].one_piece = false;
   return model;
 }
 
@@ -175,7 +174,6 @@ TEST_CASE("wind drags a sheet up to where its force is the weight") {
     TetMesh sheet = make_sheet({0.5, 0.5}, {6, 6});
     sheet.thickness = 1e-3;
     add_body(*model, "sheet", sheet, 200, sheet.positions, {}, {}, {});
-    model->bodies[0].one_piece = false;
     model->loads.push_back({Load::Kind::wind, {0, 0, 0}, 1.2, all_vertices(*model), {}});
     Settings s = settings_of(mode);
     s.material = "none", s.constraints = "stretch,isobend", s.gravity = 9.81;

@@ -92,7 +92,7 @@ TEST_CASE("states: what is none, is damaged or is of another model is refused, a
   flipped[whole.size() / 2] ^= 1;
   refused(flipped, "damaged");
   std::string newer = whole;
-  newer[13] = '2';
+  newer[13] = '9';
   refused(newer, "another version");
   CHECK_THROWS_WITH(load_state(sim, folder.path / "none.state"), doctest::Contains("no such state"));
   Scene finer = scene;

@@ -1,6 +1,6 @@
 #include "sim/loads.h"
 
-#include <fmt/format.h>
+#include <algorithm>
 
 #include "sim/error.h"
 #include "sim/parallel.h"
@@ -60,6 +60,7 @@ Loads make_loads(const Model& model) {
   loads.accelerations.clear();
   loads.texture = make_texel_view(loads.accelerations);
   loads.pass = {Program::compute("loads.comp"), work_groups(vertices, 128), loads.mesh.bytes() + 3 * 16 * vertices};
+  loads.on_faces = std::ranges::any_of(model.loads, [](const Load& l) { return l.kind != Load::Kind::acceleration; });
   return loads;
 }
 
@@ -73,8 +74,8 @@ void write_loads(Sim& sim) {
   bind_texels(UNIT_LOADS, sim.loads.texture);
 }
 
-void find_loads(Sim& sim) {
-  if (!sim.loads) return;
+void find_loads(Sim& sim, int substep) {
+  if (!sim.loads || (substep > 0 && !sim.loads.on_faces)) return;
   Recorder& recorder = sim.recorder;
   recorder.give("LoadRecords", sim.loads.records), recorder.give("LoadMesh", sim.loads.mesh);
   recorder.give("Loads", sim.loads.accelerations);

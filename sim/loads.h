@@ -23,12 +23,13 @@ struct Loads {
   Buffer records, mesh, accelerations;
   Texture texture;  ///< of the accelerations
   Pass pass;
+  bool on_faces = false;  ///< pressure or wind, which change within a step
   explicit operator bool() const { return bool(pass); }
 };
 Loads make_loads(const Model& model);
-/// For a step: the factors at its middle; and before each substep.
+/// For a step: the factors at its middle; and before each substep, by number.
 void write_loads(Sim& sim);
-void find_loads(Sim& sim);
+void find_loads(Sim& sim, int substep);
 
 /// Records of attachments or fibres that have compliance, for kernels that ask for their energy.
 std::vector<layout::HeldRecord> held_records(const ConstraintList& list, bool are_fibres);

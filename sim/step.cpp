@@ -102,7 +102,7 @@ void begin_on_gpu(Sim& sim, bool moving) {
   if (sim.timed) sim.timer.begin();
   sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be reading these buffers
   if (!sim.needs_predict) return;
-  find_loads(sim);
+  find_loads(sim, 0);
   forget_contacts(sim);
   sim.solver.predict(sim);
   sim.needs_predict = false;
@@ -153,7 +153,7 @@ void step(Sim& sim) {
       aim_led(sim, k);
       list_pairs(sim, k);
       lead(sim, k);
-      find_loads(sim);
+      find_loads(sim, k);
       sim.solver.substep(sim, k);
       if (are_faces_due(sim.plan, k)) move_faces_out(sim);
       resolve_body_contacts(sim, k + 1 == sim.plan.substeps);

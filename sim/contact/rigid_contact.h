@@ -19,9 +19,10 @@ class RigidContact {
   /// Of a mean edge: the correction of a vertex, averaged over its constraints, that such a strain makes.
   static constexpr double slack = 0.2 * most_strain;
 
+  /// A system without lists is that of bodies which keep their shape anyway.
   RigidContact(const Model& model, const ConstraintSystem& system)
       : model_(&model),
-        edges_(system.lists[std::size_t(index_of<Stretch>)]),
+        edges_(system.lists.empty() ? ConstraintList{} : system.lists[std::size_t(index_of<Stretch>)]),
         loose_(loose_pieces(model, system)),
         motions_(std::max<std::size_t>(model.bodies.size(), 1)),
         body_of_(model.positions.size()) {

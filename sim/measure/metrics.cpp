@@ -81,6 +81,7 @@ void write_regions(Metrics& m, const Sim& sim) {
 
 // Makes the records of attachments and fibres anew where the simulation has others.
 void write_held(Metrics& m, const Sim& sim) {
+  if (sim.system.lists.empty()) return;  // a baseline has no constraints
   const auto& shares = sim.solver.stiffness_shares;
   std::vector<std::vector<double>> compliances{std::vector<double>(shares.begin(), shares.end())};
   for (const std::size_t kind : {index_of<Attach>, index_of<Fibre>})
@@ -294,7 +295,8 @@ void add_measurement(RunErrors& errors, const Measurement& now, const Sim& sim) 
   errors.penetration_max = std::fmax(now.penetration_max, errors.penetration_max);
   errors.penetration_999 = std::fmax(now.penetration_999, errors.penetration_999);
   const auto is_fixed = [](double inverse_mass) { return !(inverse_mass > 0); };
-  if (now.contacts > 0 || sim.settings.damping > 0 || !sim.model->loads.empty() || std::ranges::any_of(sim.inverse_masses, is_fixed))
+  if (now.contacts > 0 || sim.settings.damping > 0 || !sim.model->loads.empty() ||
+      std::ranges::any_of(sim.inverse_masses, is_fixed))
     errors.free = false;
   if (!errors.free) return;
   const double mass = std::accumulate(sim.masses.begin(), sim.masses.end(), 0.0);

@@ -131,9 +131,11 @@ void add_attachments(ConstraintSystem& system, const Model& model, const Setting
 std::vector<char> loose_pieces(const Model& model, const ConstraintSystem& system) {
   std::vector<char> loose;
   for (const Body& body : model.bodies) loose.push_back(body.one_piece);
-  for (const std::uint32_t v : system.lists[index_of<Attach>].vertices) loose[body_at(model, v).number] = 0;
-  for (const Load& load : model.loads)
-    for (const std::uint32_t v : load.vertices) loose[body_at(model, v).number] = 0;
+  const auto hold = [&](const std::vector<std::uint32_t>& vertices) {
+    for (const std::uint32_t v : vertices) loose[body_at(model, v).number] = 0;
+  };
+  if (!system.lists.empty()) hold(system.lists[index_of<Attach>].vertices);
+  for (const Load& load : model.loads) hold(load.vertices);
   return loose;
 }
 

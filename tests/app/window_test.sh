@@ -252,7 +252,7 @@ key s; await '^step 3$'
 
 # A state that is not finite: said, paused, and mended by a reset.
 cp shaders/seen.glsl good.glsl
-sed 's/params.gravity \* params.h/vec3(sqrt(-params.h))/' good.glsl >bad.glsl
+sed 's|pull \* params.h|vec3(sqrt(-params.h))|' good.glsl >bad.glsl
 cmp -s good.glsl bad.glsl && fail "seen.glsl has no gravity to spoil"
 sleep 1.1; forget; cp bad.glsl shaders/seen.glsl; await '^message shaders compiled again'
 key m  # also without the plots, where nothing is measured

@@ -129,7 +129,8 @@ void write_contacts(uint b, uint o, int touching, bool full) {
 // Finds the motion of body b in flight, once `before` is known.
 void find_flight(uint b, uint o, bool writes) {
   if (gl_LocalInvocationIndex != 0u) return;
-  DoubleSingle velocity = add_double(pulled_velocity(DoubleSingle(before.velocity, velocity_low), params.gravity), given);
+  DoubleSingle pulled = pulled_velocity(DoubleSingle(before.velocity, velocity_low), params.gravity);
+  DoubleSingle velocity = add_double(pulled, given);
   body.velocity = velocity.high, velocity_low = velocity.low;
   body.centre = before.centre;
   angular = angular * params.velocity_scale + rigid_bodies[b].sides[1u - o].given_turn * params.inverse_h;

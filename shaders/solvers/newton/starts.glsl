@@ -1,5 +1,5 @@
-// Writes and returns where inertia takes vertex i: by BDF2 if `history`, else by implicit Euler. What pulls it acts for a
-// part of the step: a half to begin a fall exactly, the whole where something holds the body.
+// Writes and returns where inertia takes vertex i: by BDF2 if `history`, else by implicit Euler. What pulls it acts
+// for a part of the step: a half to begin a fall exactly, the whole where something holds the body.
 vec3 predict(uint i, bool history, float part) {
   Position own = positions[i];
   bool fixed_ = own.inverse_mass <= 0.0;

@@ -200,9 +200,7 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   body.name = printable(body.name);
   for (const auto& [key, boxes] : {std::pair("fixed", &body.fixed), std::pair("heavy", &body.heavy)})
     for (std::size_t b = 0; b < boxes->size(); ++b)
-      if (const auto& box = (*boxes)[b]; glm::any(glm::greaterThan(box.low, box.high)))
-        refuse(fmt::format("'{}.{}.{}' has a \"low\" above its \"high\", so that nothing is inside", where, key, b),
-               file);
+      check_box((*boxes)[b], fmt::format("{}.{}.{}", where, key, b), file);
   for (std::size_t b = 0; b < body.fixed.size(); ++b)
     read_motion(value["fixed"][b], body.fixed[b].path, "move", fmt::format("{}.fixed.{}", where, b), file);
   for (fs::path* named : {&body.mesh, &body.surface})
@@ -702,7 +700,7 @@ std::shared_ptr<Model> build_model(const Scene& scene) {
     const glm::dvec3 extent = glm::max(own.high - own.low, glm::dvec3(1e-300));
     // A flat side of a surface is nearly flat on its lattice: a box as thin as a plane takes what is near it.
     const glm::dvec3 least = mesh.fill.empty() ? glm::dvec3(0) : 0.3 * mean_edge(mesh) / extent;
-    const auto is_in = [&](std::size_t vertex, const auto& box) {
+    const auto is_in = [&](std::size_t vertex, const PartBox& box) {
       const glm::dvec3 away = (mesh.positions[vertex] - own.low) / extent - 0.5 * (box.low + box.high);
       return glm::all(glm::lessThanEqual(glm::abs(away), glm::max(0.5 * (box.high - box.low) + 1e-9, least)));
     };

@@ -41,8 +41,7 @@ struct BodyDescription {
     std::array<int, 2> cells{1, 1};
   };
   /// Vertices in a box; heavy ones, a pseudo-random `share`, have `ratio` times the mass of the material.
-  struct Box {
-    glm::dvec3 low{0}, high{1};  ///< fractions of the body's bounding box
+  struct Box : PartBox {
     double ratio = 1, share = 1;
     Path path{};  ///< of fixed ones, from where they start
   };

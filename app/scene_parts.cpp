@@ -46,8 +46,7 @@ std::optional<PartBox> read_box(const json& value, const std::string& where, con
   if (!value.contains("low") && !value.contains("high")) return std::nullopt;
   PartBox box;
   box.low = value.value("low", box.low), box.high = value.value("high", box.high);
-  if (glm::any(glm::greaterThan(box.low, box.high)))
-    refuse(fmt::format("'{}' has a \"low\" above its \"high\", so that nothing is inside", where), file);
+  check_box(box, where, file);
   return box;
 }
 
@@ -83,6 +82,11 @@ json points_schema(const char* key, double most) {
 json box_schema() { return {{"low", {{"three", {-1, 2}}}}, {"high", {{"three", {-1, 2}}}}}; }
 
 }  // namespace
+
+void check_box(const PartBox& box, const std::string& where, const std::string& file) {
+  if (glm::any(glm::greaterThan(box.low, box.high)))
+    refuse(fmt::format("'{}' has a \"low\" above its \"high\", so that nothing is inside", where), file);
+}
 
 json parts_schema() {
   json attachment = box_schema(), force = box_schema();

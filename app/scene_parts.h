@@ -16,6 +16,9 @@ struct PartBox {
   glm::dvec3 low{0}, high{1};
 };
 
+/// Throws Error where nothing can be inside.
+void check_box(const PartBox& box, const std::string& where, const std::string& file);
+
 struct AttachmentDescription {
   std::size_t body = 0, to = 0;
   std::optional<PartBox> box{};

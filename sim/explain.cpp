@@ -20,7 +20,8 @@ Explanation explain(Sim& sim, int timed_steps) {
   add_all(sim.positions, sim.velocities, sim.quantized[0], sim.quantized[1], sim.step_block, sim.guard_counts,
           sim.check.words, sim.check.read_back, sim.check.checkpoint, sim.rigid_bodies, sim.obstacles.records,
           sim.obstacles.fields, p.mesh, p.lists, p.balls, p.leaf_pairs, p.candidates, p.pairs, p.sums, p.listed,
-          p.empty, p.readback, sim.faces.corners, sim.faces.sums, sim.led.records);
+          p.empty, p.readback, sim.faces.corners, sim.faces.sums, sim.led.records, sim.loads.records, sim.loads.mesh,
+          sim.loads.accelerations, sim.activation.records, sim.activation.before);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 

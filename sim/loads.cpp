@@ -8,11 +8,8 @@
 
 namespace tetpbd {
 
-double time_of_loads(const Settings& settings, double time) {
-  return time + (solver_mode(settings).implicit ? 1 : 0.5) * settings.dt;
-}
-
 std::vector<glm::uvec4> lay_out_loads(const Model& model) {
+  if (model.loads.empty()) return {};
   const std::size_t vertices = model.positions.size();
   std::vector<glm::uvec4> mesh(vertices, glm::uvec4(0));
   unsigned on_faces = 0;
@@ -60,8 +57,11 @@ Loads make_loads(const Model& model) {
   loads.accelerations.clear();
   loads.texture = make_texel_view(loads.accelerations);
   loads.pass = {Program::compute("loads.comp"), work_groups(vertices, 128), loads.mesh.bytes() + 3 * 16 * vertices};
-  loads.on_faces = std::ranges::any_of(model.loads, [](const Load& l) { return l.kind != Load::Kind::acceleration; });
   return loads;
+}
+
+bool load_faces(const Model& model) {
+  return std::ranges::any_of(model.loads, [](const Load& l) { return l.kind != Load::Kind::acceleration; });
 }
 
 void write_loads(Sim& sim) {
@@ -75,7 +75,7 @@ void write_loads(Sim& sim) {
 }
 
 void find_loads(Sim& sim, int substep) {
-  if (!sim.loads || (substep > 0 && !sim.loads.on_faces)) return;
+  if (!sim.loads || (substep > 0 && !load_faces(*sim.model))) return;
   Recorder& recorder = sim.recorder;
   recorder.give("LoadRecords", sim.loads.records), recorder.give("LoadMesh", sim.loads.mesh);
   recorder.give("Loads", sim.loads.accelerations);

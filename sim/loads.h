@@ -11,11 +11,7 @@ namespace tetpbd {
 
 struct Sim;
 
-/// s, of the step that begins at `time`: when its loads and activations are taken. Implicit steps take them at their
-/// end.
-double time_of_loads(const Settings& settings, double time);
-
-/// Which loads act where: LoadMesh of shaders/loads.comp.
+/// Which loads act where: LoadMesh of shaders/loads.comp; empty without loads.
 std::vector<glm::uvec4> lay_out_loads(const Model& model);
 
 /// What a Sim has of loads, in modes of the GPU.
@@ -23,11 +19,12 @@ struct Loads {
   Buffer records, mesh, accelerations;
   Texture texture;  ///< of the accelerations
   Pass pass;
-  bool on_faces = false;  ///< pressure or wind, which change within a step
   explicit operator bool() const { return bool(pass); }
 };
 Loads make_loads(const Model& model);
-/// For a step: the factors at its middle; and before each substep, by number.
+/// Whether any is pressure or wind, which change within a step.
+bool load_faces(const Model& model);
+/// For a step: the factors over time; and before each substep, by number.
 void write_loads(Sim& sim);
 void find_loads(Sim& sim, int substep);
 

@@ -83,10 +83,10 @@ void write_regions(Metrics& m, const Sim& sim) {
 void write_held(Metrics& m, const Sim& sim) {
   if (sim.system.lists.empty()) return;  // a baseline has no constraints
   const auto& shares = sim.solver.stiffness_shares;
-  std::vector<std::vector<double>> compliances{std::vector<double>(shares.begin(), shares.end())};
-  for (const std::size_t kind : {index_of<Attach>, index_of<Fibre>})
-    compliances.push_back(sim.system.lists[kind].compliance);
-  if (std::exchange(m.held.compliances, compliances) == compliances) return;
+  const auto& attachments = sim.system.lists[index_of<Attach>].compliance;
+  const auto& fibres = sim.system.lists[index_of<Fibre>].compliance;
+  if (m.held.attachments == attachments && m.held.fibres == fibres && m.held.shares == shares) return;
+  m.held.attachments = attachments, m.held.fibres = fibres, m.held.shares = shares;
   std::vector<layout::HeldRecord> records;
   for (const std::size_t kind : {index_of<Attach>, index_of<Fibre>})
     for (layout::HeldRecord& record : held_records(sim.system.lists[kind], kind == index_of<Fibre>)) {

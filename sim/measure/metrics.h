@@ -69,7 +69,8 @@ struct Metrics {
   std::vector<BodySettings> of_regions;       ///< whose moduli the records of tets have, where bodies have regions
   std::vector<float> shares;                  ///< and the parts of them that the solver holds
   struct Held {
-    std::vector<std::vector<double>> compliances;
+    std::vector<double> attachments, fibres;  ///< compliances, of which the records are
+    std::vector<float> shares;
     std::size_t count = 0;
     Buffer records;
     Pass pass;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "sim/loads.h"
 #include "sim/mesh/solid.h"
 #include "sim/model/material.h"
 #include "sim/parallel.h"
@@ -36,6 +35,12 @@ void append(ConstraintSystem& system, std::size_t kind, std::span<const std::uin
   list.rest.insert(list.rest.end(), rest.begin(), rest.end());
   for (const std::uint32_t v : vertices) ++system.at_vertex[v];
   system.present[kind] = true;
+}
+
+// The rest values of a coordinate of the attachment's vertex k.
+std::array<double, 5> rest_of(const Attachment& attachment, std::size_t k, int axis) {
+  const glm::dvec3& place = attachment.places[k];
+  return {place.x, place.y, place.z, double(axis), 0};
 }
 
 // Damping of bodies is not that of what has compliance here.
@@ -95,12 +100,10 @@ double attachment_stiffness(const Attachment& attachment, const Model& model, co
 glm::dvec3 attachment_force(const Attachment& attachment, double stiffness, const std::vector<glm::dvec3>& positions) {
   glm::dvec3 sum(0);
   for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
-    const Triangle& t = attachment.triangles[k];
-    const glm::dvec3 &a = positions[t[0]], &b = positions[t[1]], &c = positions[t[2]];
-    const glm::dvec3 across = glm::cross(b - a, c - a), place = attachment.places[k];
-    const double area = glm::length(across);
-    const glm::dvec3 out = area > 0 ? across / area : glm::dvec3(0);
-    sum += a + place.x * (b - a) + place.y * (c - a) + place.z * out - positions[attachment.vertices[k]];
+    std::array<glm::dvec3, 4> x = {positions[attachment.vertices[k]]};
+    for (std::size_t c = 0; c < 3; ++c) x[c + 1] = positions[attachment.triangles[k][c]];
+    for (int axis = 0; axis < 3; ++axis)
+      sum[axis] -= Attach::evaluate(x.data(), static_cast<const double*>(rest_of(attachment, k, axis).data())).C;
   }
   return sum * (stiffness / double(attachment.vertices.size()));
 }
@@ -115,11 +118,9 @@ void add_attachments(ConstraintSystem& system, const Model& model, const Setting
     const double stiffness = attachment_stiffness(all, model, settings);
     const double own = stiffness > 0 ? double(all.vertices.size()) / stiffness : 0;
     for (std::size_t k = 0; k < all.vertices.size(); ++k)
-      for (double axis = 0; axis < 3; ++axis) {
+      for (int axis = 0; axis < 3; ++axis) {
         const Triangle& t = all.triangles[k];
-        const glm::dvec3& place = all.places[k];
-        append(system, kind, std::array{all.vertices[k], t[0], t[1], t[2]},
-               std::array{place.x, place.y, place.z, axis, 0.0});
+        append(system, kind, std::array{all.vertices[k], t[0], t[1], t[2]}, rest_of(all, k, axis));
         compliance.push_back(own);
       }
   }
@@ -149,7 +150,7 @@ void add_fibres(ConstraintSystem& system, const Model& model) {
       const glm::dmat3 sides(x[tet[1]] - x[tet[0]], x[tet[2]] - x[tet[0]], x[tet[3]] - x[tet[0]]);
       const glm::dvec3 along = glm::inverse(sides) * model.fibres[n].direction;
       append(system, kind, tet, std::array{along.x, along.y, along.z, 1.0, double(n)});
-      const double volume = std::abs(glm::determinant(sides)) / 6 * fill_of(model.rest, t);
+      const double volume = tet_volume(model.rest, tet) * fill_of(model.rest, t);
       compliance.push_back(1 / (model.fibres[n].stiffness * volume));
     }
   if (!compliance.empty()) set_compliance(system.lists[kind], std::move(compliance));

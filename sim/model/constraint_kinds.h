@@ -54,6 +54,13 @@ constexpr int first_kind = __COUNTER__ + 1;
     return Formulas<real, Math>{}.name(x, rest, id);                                         \
   }
 
+/// A row of kinds that no mesh alone has: attachments.cpp and material.cpp add their constraints.
+template <std::size_t values>
+struct OfNoMesh {
+  static std::vector<Tet> vertices(const TetMesh&) { return {}; }
+  static std::array<double, values> rest(glm::dvec3*) { return {}; }
+};
+
 // A row says what the kind is called, its formula, the vertices of every constraint, and what these measure at rest.
 struct Stretch {
   static constexpr ConstraintKind row{
@@ -125,7 +132,7 @@ struct Isobend {
   static std::array<double, 4> rest(glm::dvec3* x);
 };
 ADD_KIND(Isobend)
-struct Attach {
+struct Attach : OfNoMesh<5> {
   static constexpr ConstraintKind row{.name = "attach",
                                       .arity = 4,
                                       .noun = "attached vertices",
@@ -133,11 +140,9 @@ struct Attach {
                                       .most_compliance = 0,
                                       .values = 5};
   FORMULA(attach)
-  static std::vector<Tet> vertices(const TetMesh&) { return {}; }  // attachments.cpp adds them
-  static std::array<double, 5> rest(glm::dvec3*) { return {}; }
 };
 ADD_KIND(Attach)
-struct Fibre {
+struct Fibre : OfNoMesh<5> {
   static constexpr ConstraintKind row{.name = "fibre",
                                       .arity = 4,
                                       .noun = "fibres through tets",
@@ -147,11 +152,9 @@ struct Fibre {
                                       .curved = true,
                                       .driven = true};
   FORMULA(fibre)
-  static std::vector<Tet> vertices(const TetMesh&) { return {}; }  // attachments.cpp adds them
-  static std::array<double, 5> rest(glm::dvec3*) { return {}; }
 };
 ADD_KIND(Fibre)
-struct Viscous {
+struct Viscous : OfNoMesh<2> {
   static constexpr ConstraintKind row{.name = "viscous",
                                       .arity = 4,
                                       .noun = "rates of strain of tets",
@@ -160,8 +163,6 @@ struct Viscous {
                                       .values = 2,
                                       .rate = true};
   FORMULA(viscous)
-  static std::vector<Tet> vertices(const TetMesh&) { return {}; }  // material.cpp adds them
-  static std::array<double, 2> rest(glm::dvec3*) { return {}; }
 };
 ADD_KIND(Viscous)
 // The next row goes here.

@@ -99,6 +99,10 @@ double factor_at(const FactorOverTime& factors, double time) {
   return std::lerp(last->second, next->second, (time - last->first) / (next->first - last->first));
 }
 
+double time_of_loads(const Settings& settings, double time) {
+  return time + (solver_mode(settings).implicit ? 1 : 0.5) * settings.dt;
+}
+
 double body_mass(const Model& model, const Body& body) {
   const auto first = model.masses.begin() + std::ptrdiff_t(body.first_vertex);
   return std::accumulate(first, first + std::ptrdiff_t(body.vertices), 0.0);

@@ -76,6 +76,10 @@ struct Attachment {
 using FactorOverTime = std::vector<std::pair<double, double>>;
 double factor_at(const FactorOverTime& factors, double time);
 
+/// s, of the step that begins at `time`: when its loads and activations are taken. Implicit steps take them at their
+/// end.
+double time_of_loads(const Settings& settings, double time);
+
 /// What pulls or presses vertices beside gravity (loads.h).
 struct Load {
   enum class Kind { acceleration, pressure, wind };

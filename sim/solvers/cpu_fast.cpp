@@ -47,7 +47,7 @@ class FastPbd {
         pairs_(input.model),
         faces_(wide_faces(input.model)),
         rigid_(input.model, input.system),
-        load_mesh_(input.model.loads.empty() ? std::vector<glm::uvec4>() : lay_out_loads(input.model)),
+        load_mesh_(lay_out_loads(input.model)),
         fibres_(input.system.lists[std::size_t(index_of<Fibre>)]) {
     std::size_t all = 0;
     for_each_kind([&](auto is, int kind) {
@@ -80,7 +80,7 @@ class FastPbd {
     work_.starts.resize(any_material(settings, damped) ? x.size() : 0);
     predicted_.resize(x.size());
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
-    if (step.substep.moving || !model_->loads.empty() || !model_->fibres.empty()) state.work.resize(x.size());
+    if (step.substep.books_work()) state.work.resize(x.size());
     read_positions(state);
     if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     pairs_.begin_step(state);

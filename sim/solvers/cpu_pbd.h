@@ -107,7 +107,7 @@ class CpuPbd {
         faces_(wide_faces(model)),
         rigid_(model, system),
         at_vertex_(system.at_vertex),
-        load_mesh_(model.loads.empty() ? std::vector<glm::uvec4>() : lay_out_loads(model)),
+        load_mesh_(lay_out_loads(model)),
         fibres_(system.lists[std::size_t(index_of<Fibre>)]) {
     for_each_kind([&](auto kind, int k) {
       constexpr std::size_t arity = std::size_t(decltype(kind)::row.arity);
@@ -137,7 +137,7 @@ class CpuPbd {
     rigid_.begin(*model_, settings);
     auto& x = state.positions;
     auto& v = state.velocities;
-    if (substep.moving || !model_->loads.empty() || !model_->fibres.empty()) state.work.resize(x.size());
+    if (substep.books_work()) state.work.resize(x.size());
     if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());

@@ -42,6 +42,8 @@ struct Substep {
         model_(model),
         settings_(settings),
         time_(time) {}
+  /// Whether `work` is booked on vertices.
+  bool books_work() const { return moving || !model_.loads.empty() || !model_.fibres.empty(); }
   /// Goes on to a substep by number.
   void begin(int substep) {
     if (moving && substep > 0) obstacles = obstacles_at(model_, settings_, time_ + substep * h, h);
@@ -53,7 +55,7 @@ struct Substep {
   }
   /// Finds the loads of the substep that begins; x(i) is a position.
   void find_loads(const std::vector<glm::uvec4>& mesh, const auto& x, const std::vector<glm::dvec3>& v) {
-    if (model_.loads.empty()) return;
+    if (model_.loads.empty() || (!loads.empty() && !load_faces(model_))) return;
     const LoadsAt now{load_records(model_, time_of_loads(settings_, time_)), mesh};
     loads.resize(v.size());
     for (std::uint32_t i = 0; i < v.size(); ++i)

@@ -65,7 +65,7 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
   const auto dropped = [](const char* modulus, bool held, bool ground) {
     Scene scene = falling({.parameters = {{"material", "neo-hookean"}, {"young_modulus", modulus}}});
     scene.bodies[0].position.y = 1, scene.settings.ground = ground;
-    if (held) scene.bodies[0].fixed.push_back({{0, 0.9, 0}, {1, 1, 1}});
+    if (held) scene.bodies[0].fixed.push_back({{{0, 0.9, 0}, {1, 1, 1}}});
     return *choose_by_rule(scene, *build_model(scene));
   };
   CHECK(dropped("1e4", false, true) == "newton, 4 substeps of 8 iterations: the impact would press the body flat");

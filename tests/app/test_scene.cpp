@@ -154,7 +154,7 @@ TEST_CASE("a fixed side of a box that a lattice fills is all of that side") {
       ".obj");
   Scene scene = load_scene("clamped-bunny", {.fill = "lattice"});
   scene.bodies[0].mesh = cube.path, scene.bodies[0].tets = 1000;
-  scene.bodies[0].fixed = {{{0, 0, 0}, {1, 0, 1}}};
+  scene.bodies[0].fixed = {{{{0, 0, 0}, {1, 0, 1}}}};
   const auto model = build_model(scene);
   glm::dvec3 low(1e9), high(-1e9);
   for (std::size_t i = 0; i < model->positions.size(); ++i) {

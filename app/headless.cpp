@@ -58,6 +58,8 @@ struct FrameWriter {
     if (run.view.colour == Colour::residual && any_material(scene.settings, compliant))
       throw Error("constraints with compliance give way as they should", "--colour residual",
                   "take --colour energy or stretch");
+    if (run.view.colour == Colour::energy && sim.yielding)
+      throw Error("energies of bodies that yield are not drawn", "--colour energy", "take --colour stretch");
     if (run.view.colour == Colour::energy && !sim.model->regions.empty())
       throw Error("energies of regions are not drawn", "--colour energy", "take --colour stretch or --export vtk");
     if (run.view.colour == Colour::energy && !any_material(scene.settings, has_energy))

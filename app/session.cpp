@@ -444,7 +444,7 @@ bool has_colour(const Session& s, Colour colour) {
   if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
   const Settings& now = s.loaded.sim().settings;
   if (colour == Colour::residual) return !any_material(now, compliant);
-  return colour != Colour::energy || (any_material(now, has_energy) && s.loaded.model->regions.empty());
+  return colour != Colour::energy || (any_material(now, has_energy) && !any_material(now, yields) && s.loaded.model->regions.empty());
 }
 
 void choose_colour(Session& s, Colour colour) {

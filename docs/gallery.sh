@@ -51,6 +51,7 @@ show beads 60 'Hard balls hang from a soft rope' --scene beads
 show muscle-arm 200 'The fibres of a muscle bend an arm' --scene muscle-arm
 show balloon 300 'A limp ball is blown up' --scene balloon
 show sewn-bag 240 'Two sheets, sewn along their edges and blown up' --scene sewn-bag
+show clay 300 'Balls and a bar have pressed a face into clay' --scene clay
 show press-cloth 300 'A plate presses a heap of cloths' --scene press-cloth
 show ring 80 'Balls of jelly, thrown at each other' --scene ring
 show squishy-balls 120 'Balls of jelly fall on each other in a corner' --scene squishy-balls

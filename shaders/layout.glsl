@@ -51,6 +51,16 @@ struct TetRecord {
   float rest, filled;  // m^3; what the body fills of it
   float mu, lambda;    // Pa, of its region, or negative
 };
+// In place of a TetRecord where any body yields (yield.comp).
+struct YieldRecord {
+  uint vertices[4];
+  float rest, filled;
+  float mu, lambda;
+  float metric[6];             // 1/m^2, of its shape at rest (yield.glsl)
+  float yield_strain;          // 0: it never does
+  float creep_time;            // s
+  uint first_copy, end_copy;   // of the metric, among those in what the solver reads
+};
 #define MAX_OBSTACLES 31     // of a step, with the ground; each has a bit of a word in newton/layout.glsl
 #define MAX_PLANES 8         // half spaces at rest among them that have no properties of their own
 #define MAX_ACTIVATIONS 16   // of fibres, each by keyframes of its own

@@ -21,7 +21,8 @@ Explanation explain(Sim& sim, int timed_steps) {
           sim.check.words, sim.check.read_back, sim.check.checkpoint, sim.rigid_bodies, sim.obstacles.records,
           sim.obstacles.fields, p.mesh, p.lists, p.balls, p.leaf_pairs, p.candidates, p.pairs, p.sums, p.listed,
           p.empty, p.readback, sim.faces.corners, sim.faces.sums, sim.led.records, sim.loads.records, sim.loads.mesh,
-          sim.loads.accelerations, sim.activation.records, sim.activation.before);
+          sim.loads.accelerations, sim.activation.records, sim.activation.before, sim.yielding.records,
+          sim.yielding.copies);
   for (const Buffer& buffer : sim.solver.buffers) add(buffer);
   if (on_cpu(sim)) return result;
 

@@ -54,6 +54,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
   sim.positions = buffer("positions", count * sizeof(Position));
   sim.velocities = buffer("velocities", (sim.solver.keeps_prediction ? 2 : 1) * count * sizeof(Velocity));
   sim.recorder.row = sim.tuning.row, sim.recorder.storage = sim.tuning.storage;
+  sim.yielding = make_yielding(input, sim.solver);
   if (on_cpu(sim)) return sim;
   const std::size_t quantized_bytes = count * 16 * (input.compliant ? 2 : 1);
   if (sim.solver.quantized_buffers > 0) sim.quantized[0] = buffer("quantized positions", quantized_bytes);
@@ -80,7 +81,7 @@ Sim make_sim(std::shared_ptr<const Model> model, const Settings& settings, const
 // Takes over the constraints of other settings, if they differ from the present ones in numbers alone.
 bool adopt_constraints(Sim& sim, const Settings& settings) {
   if (same_constraints(settings, sim.settings)) return true;
-  if (!sim.solver.takes_constraints) return false;
+  if (!sim.solver.takes_constraints || any_material(settings, yields)) return false;
   ConstraintSystem system = build_constraints(*sim.model, settings, sim.broken);
   const auto like = [](const ConstraintList& a, const ConstraintList& b) {
     return a.count() == b.count() && a.compliance.size() == b.compliance.size();
@@ -128,6 +129,7 @@ void adopt_settings(Sim& sim, const Settings& settings) {
     sim.settings = before, sim.plan = plan, sim.origin = origin;
     throw;
   }
+  sim.yielding.copied = false;  // retune() may have written rest values of the start
   forget_readbacks(sim);
   write_step_block(sim);
   write_surfaces(sim);
@@ -167,7 +169,8 @@ bool same_constraints(const Settings& a, const Settings& b) {
     return std::tuple(
         kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
         dashpots ? std::tuple(s.constraint_damping, s.viscosity, s.bulk_viscosity) : std::tuple(0.0, 0.0, 0.0),
-        solver_mode(s).smoothed, solver_mode(s).leapfrog || solver_mode(s).implicit);
+        std::tuple(s.yield_strain, s.creep_time), solver_mode(s).smoothed,
+        solver_mode(s).leapfrog || solver_mode(s).implicit);
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
@@ -230,6 +233,7 @@ Carried carried(Sim& sim) {
   if (on_cpu(sim)) return all;
   all.add(sim.positions);
   all.ranges.push_back({&sim.velocities, 0, sim.masses.size() * sizeof(Velocity)});
+  if (sim.yielding) all.add(sim.yielding.records);  // here, where snapshot.cpp looks for it
   if (sim.quantized[0]) all.add(sim.quantized[sim.read_index]);
   if (sim.rigid_bodies) all.add(sim.rigid_bodies);
   sim.solver.carried(sim, all);

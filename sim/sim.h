@@ -27,6 +27,7 @@
 #include "sim/model/model.h"
 #include "sim/solvers/mass_scaling.h"
 #include "sim/solvers/solver.h"
+#include "sim/yielding.h"
 
 namespace tetpbd {
 
@@ -69,6 +70,7 @@ struct Sim : StepValues {
   Led led;
   Loads loads;  ///< where the model has any
   Activation activation;
+  Yielding yielding;  ///< where any body yields
   Tuning tuning;
   double longest_substep = 0;       ///< s, the longest that is stable at rest, in mode explicit
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build

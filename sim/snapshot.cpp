@@ -7,12 +7,15 @@
 namespace tetpbd {
 namespace {
 
-State state_in(const Buffer& from, std::size_t at, std::size_t vertices) {
+State state_in(const Buffer& from, std::size_t at, std::size_t vertices, std::size_t yielding_tets) {
   std::vector<Position> positions(vertices);
   std::vector<Velocity> velocities(vertices);
   from.read(at, vertices * sizeof(Position), positions.data());
   from.read(at + vertices * sizeof(Position), vertices * sizeof(Velocity), velocities.data());
-  return make_state(positions, velocities);
+  State state = make_state(positions, velocities);
+  const std::size_t behind = at + vertices * (sizeof(Position) + sizeof(Velocity));
+  if (yielding_tets > 0) state.rest_metrics = rest_metrics_in(from, behind, yielding_tets);
+  return state;
 }
 
 // Restores everything, so that the next steps give the same bits as those that followed then.
@@ -35,6 +38,7 @@ void restore_all(Sim& sim, const Snapshot& then, const Buffer& from) {
   for (std::size_t r = 0; r < now.readbacks.size(); ++r)
     *now.readbacks[r].first = then.readbacks[r] ? Fence::here() : Fence();
   sim.needs_predict = then.step.needs_predict;
+  sim.yielding.copied = false;
   start_check(sim, nullptr);
   sim.check.found = then.found;
 }
@@ -69,7 +73,9 @@ void restore_snapshot(Sim& sim, const Snapshot& then, const Buffer& from) {
   const KeepBindings kept;
   if (then.settings == sim.settings && then.broken == sim.broken) return restore_all(sim, then, from);
   set_broken(sim, then.broken);
-  State state = then.host ? *then.host : state_in(from, then.at, sim.model->positions.size());
+  const Model& model = *sim.model;
+  const std::size_t tets = any_material(then.settings, yields) ? model.rest.tets.size() : 0;
+  State state = then.host ? *then.host : state_in(from, then.at, model.positions.size(), tets);
   go_on_from(sim, std::move(state), then.step, then.settings.dt, half_substep_fall(then.settings, then.plan));
 }
 

@@ -67,6 +67,7 @@ void upload(Sim& sim, const State& state) {
   parallel_for(positions.size(), [&](std::size_t i) { positions[i] = to_gpu(sim, i, state.positions[i]); });
   sim.positions.write(0, positions.size() * sizeof(Position), positions.data());
   write_velocities(sim, state);
+  write_rest_metrics(sim, state.rest_metrics);
   sim.needs_predict = true;
 }
 
@@ -82,7 +83,9 @@ State make_state(const std::vector<Position>& positions, const std::vector<Veloc
 State read_state(const Sim& sim) {
   if (on_cpu(sim)) return sim.host;
   const KeepBindings kept;
-  return make_state(sim.positions.read_all<Position>(), read_velocities(sim));
+  State state = make_state(sim.positions.read_all<Position>(), read_velocities(sim));
+  if (sim.yielding) state.rest_metrics = rest_metrics_in(sim.yielding.records, 0, sim.model->rest.tets.size());
+  return state;
 }
 
 std::uint64_t state_hash(const Sim& sim) {

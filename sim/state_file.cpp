@@ -20,14 +20,15 @@ namespace fs = std::filesystem;
 namespace {
 
 // To be raised with what a state consists of.
-constexpr std::array<char, 16> magic = {"tetpbd state 2"};
+constexpr std::array<char, 16> magic = {"tetpbd state 3"};
 
 struct Header {
   std::array<char, 16> begins = magic;
   std::uint64_t checksum = 0;             ///< of all that follows
   std::uint64_t model = 0, settings = 0;  ///< hashes
-  std::uint64_t vertices = 0, pinned = 0, work = 0, impulses = 0, wrenches = 0, broken = 0, _0 = 0;  ///< items of lists
-  std::uint64_t values = 0, readbacks = 0, buffers = 0;                                              ///< bytes likewise
+  std::uint64_t vertices = 0, pinned = 0, work = 0, impulses = 0, wrenches = 0, broken = 0,
+                rest_metrics = 0;                        ///< items of lists
+  std::uint64_t values = 0, readbacks = 0, buffers = 0;  ///< bytes likewise
   std::int64_t steps = 0, origin_step = 0;
   double origin_time = 0, dt = 0, quantum = 1, h = 0, fall = 0;
   std::int32_t substeps = 1, iterations = 1;
@@ -115,6 +116,7 @@ Saved read_saved(const Sim& sim, const fs::path& file) {
   saved.state.work = reader.take<double>(h.work);
   saved.state.impulses = reader.take<PairImpulse>(h.impulses);
   saved.state.wrenches = reader.take<Wrench>(h.wrenches);
+  saved.state.rest_metrics = reader.take<double>(h.rest_metrics);
   saved.pinned = reader.take<std::uint32_t>(h.pinned);
   saved.snapshot.broken = reader.take<char>(h.broken);
   saved.snapshot.values = reader.take<std::byte>(h.values);
@@ -161,6 +163,7 @@ void save_state(Sim& sim, const fs::path& file) {
   h.model = hash_of(*sim.model), h.settings = hash_of(sim.settings);
   h.vertices = state.positions.size(), h.pinned = pinned.size(), h.work = state.work.size();
   h.impulses = state.impulses.size(), h.wrenches = state.wrenches.size(), h.broken = sim.broken.size();
+  h.rest_metrics = state.rest_metrics.size();
   h.values = snapshot.values.size(), h.readbacks = readbacks.size(), h.buffers = buffers.size();
   h.steps = sim.steps, h.origin_step = sim.origin.step, h.origin_time = sim.origin.time, h.dt = sim.settings.dt;
   h.quantum = sim.quantum, h.h = sim.plan.h, h.fall = half_substep_fall(sim.settings, sim.plan);
@@ -169,7 +172,8 @@ void save_state(Sim& sim, const fs::path& file) {
   h.on_cpu = on_cpu(sim);
   std::string bytes(reinterpret_cast<const char*>(&h), sizeof h);
   append(bytes, state.positions), append(bytes, state.velocities), append(bytes, state.work);
-  append(bytes, state.impulses), append(bytes, state.wrenches), append(bytes, pinned);
+  append(bytes, state.impulses), append(bytes, state.wrenches), append(bytes, state.rest_metrics);
+  append(bytes, pinned);
   append(bytes, sim.broken);
   append(bytes, snapshot.values), append(bytes, readbacks), append(bytes, buffers);
   const std::size_t behind = offsetof(Header, checksum) + sizeof h.checksum;

@@ -101,6 +101,7 @@ void begin_on_gpu(Sim& sim, bool moving) {
   bind_obstacles(sim.obstacles);
   if (sim.timed) sim.timer.begin();
   sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be reading these buffers
+  copy_rest_metrics(sim);
   if (!sim.needs_predict) return;
   find_loads(sim, 0);
   forget_contacts(sim);
@@ -143,6 +144,7 @@ void step(Sim& sim) {
     activate(sim);
     sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
     end_leading(sim);
+    flow(sim);
     upload(sim, sim.host);
   } else {
     begin_on_gpu(sim, moving);
@@ -159,6 +161,7 @@ void step(Sim& sim) {
       resolve_body_contacts(sim, k + 1 == sim.plan.substeps);
     }
     end_leading(sim);
+    flow(sim);
     // Vertex fetches and copies read the state next.
     sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     if (sim.timed) sim.timer.end();

@@ -19,6 +19,9 @@ uniform float midway;            // s, the age of the positions that velocities 
 uniform float touching;          // m, the distance to an obstacle that counts as contact
 layout(std430) readonly buffer Stretch { Record2 edges[]; };
 layout(std430) readonly buffer Bend { Record4 hinges[]; };
+#if YIELDING
+#define TetRecord YieldRecord
+#endif
 layout(std430) readonly buffer Volume { TetRecord tets[]; };
 shared uint depths[DEPTHS];
 shared float totals[M_ANGULAR];
@@ -32,6 +35,18 @@ void find_positions(uint v[4], float age, out vec3 x[4]) {
 void find_rest(uint v[4], out vec3 x[4]) {
   for (int j = 0; j < 4; ++j) x[j] = rest[v[j]].xyz - rest[v[0]].xyz;
 }
+#if YIELDING
+// Sides of the metric of which m is the inverse, turned somehow.
+void find_rest(float m[6], out vec3 x[4]) {
+  mat3 g = inverse(mat3(m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5]));
+  x[0] = vec3(0.0);
+  x[1] = vec3(sqrt(g[0][0]), 0.0, 0.0);
+  float b = g[0][1] / x[1].x, d = g[0][2] / x[1].x;
+  x[2] = vec3(b, sqrt(g[1][1] - b * b), 0.0);
+  float e = (g[1][2] - b * d) / x[2].y;
+  x[3] = vec3(d, e, sqrt(g[2][2] - d * d - e * e));
+}
+#endif
 
 float edge_error(Record2 r, float age) {
   return length(relative(positions[r.vertices[1]], positions[r.vertices[0]]) -
@@ -79,7 +94,11 @@ float volume_of(vec3 x[4]) { return dot(cross(x[1], x[2]), x[3]) / 6.0; }
 float tet_elastic(TetRecord r, vec3 x[4]) {
   if (material.z > 0.0) {
     vec3 at_rest[4];
+#if YIELDING
+    find_rest(r.metric, at_rest);
+#else
     find_rest(r.vertices, at_rest);
+#endif
     vec4 own = r.mu < 0.0 ? material : vec4(r.mu, r.lambda, material.zw);
     return r.filled * tet_energy(x, at_rest, own);
   }

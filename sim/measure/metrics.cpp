@@ -224,12 +224,19 @@ void measure(Metrics& m, const Sim& sim, bool by_hand) {
     if (m.passes.size() == 2) m.passes.push_back({Program::compute("measure/rigid.comp", {}, {"AVERAGED 1"})});
   }
   for (std::size_t k = 0; k < m.records.size(); ++k) recorder.give(record_blocks[k], m.records[k]);
+  Pass& of_sums = sim.yielding ? m.yielding : m.passes[0];
+  if (sim.yielding) {
+    std::vector<std::string> defines = obstacle_defines(*sim.model, false);
+    defines.push_back("YIELDING 1");
+    if (!of_sums) of_sums = {Program::compute("measure/sums.comp", {}, defines)};
+    recorder.give("Volume", sim.yielding.records);
+  }
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const Metrics::BodyRanges& body = m.bodies[b];
     recorder.give("Row", m.rows[slot].id(), b * M_STRIDE * sizeof(float), M_STRIDE * sizeof(float));
     const unsigned tets = body.tets.y - body.tets.x, items = tets > 0 ? tets : body.edges.y - body.edges.x;
     const unsigned groups = unsigned(std::clamp<std::size_t>(work_groups(items, METRICS_SIZE), 1, METRICS_GROUPS));
-    const Program& sums = recorder.use(m.passes[0].program);
+    const Program& sums = recorder.use(of_sums.program);
     sums.set("edge_range", body.edges), sums.set("hinge_range", body.hinges), sums.set("tet_range", body.tets);
     const Material material = solved_material(sim.model->bodies[b], sim.settings);
     const auto& shares = sim.solver.stiffness_shares;
@@ -240,7 +247,7 @@ void measure(Metrics& m, const Sim& sim, bool by_hand) {
     sums.set("midway", float(midway)), sums.set("touching", float(1e-5 * body.size));
     const bool averaged = smoothed(material) && rings != bindings.end();
     for (const std::size_t number : {std::size_t(0), std::size_t(averaged ? 2 : 1)}) {
-      Pass& pass = m.passes[number];
+      Pass& pass = number == 0 ? of_sums : m.passes[number];
       const Program& kernel = recorder.use(pass.program);
       kernel.set("vertex_range", body.vertices), kernel.set("mass", float(body.mass));
       if (number == 2) kernel.set("material", energies), kernel.set("midway", float(midway));

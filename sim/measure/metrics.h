@@ -77,6 +77,7 @@ struct Metrics {
   } held;  ///< attachments and fibres that have energy
   Buffer rest, partials;
   std::vector<Pass> passes;  ///< in order of dispatch
+  Pass yielding;             ///< in place of the first where any body yields
   Recorder recorder;
   std::vector<Buffer> rows;     ///< a ring of results, each with a row per body
   std::deque<Pending> pending;  ///< in order

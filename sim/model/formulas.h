@@ -48,6 +48,7 @@ struct Formulas {
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #include "shaders/constraints/types.glsl"
 #include "constraint_formulas.inc"  // CMake's: every other file there
+#include "shaders/yield.glsl"
 #include "shaders/contact/plane.glsl"
 #include "shaders/contact/bodies/proximity.glsl"
 #include "shaders/contact/solid.glsl"

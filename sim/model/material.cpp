@@ -191,6 +191,7 @@ const std::vector<Preset>& material_presets() {
       {"gelatine", "10 % in water", "material=neo-hookean,young_modulus=2e4,poisson_ratio=0.45"},
       {"muscle", "at rest, across its fibres", "material=neo-hookean,young_modulus=6e4,poisson_ratio=0.45"},
       {"foam", "soft polyurethane", "material=neo-hookean,young_modulus=1e5,poisson_ratio=0.2"},
+      {"clay", "soft, keeps its shape", "material=neo-hookean,young_modulus=2e5,poisson_ratio=0.45,yield_strain=0.03"},
   };
   return rows;
 }

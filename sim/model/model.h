@@ -36,6 +36,7 @@ struct State {
   std::vector<double> work{};           ///< J that obstacles that move have done on each vertex; empty: none
   std::vector<PairImpulse> impulses{};  ///< of hard bodies that touch each other, in CPU modes
   std::vector<Wrench> wrenches{};       ///< of these by body, or empty
+  std::vector<double> rest_metrics{};   ///< six numbers a tet, where any body yields; empty: as at the start
 };
 
 /// A contiguous part of the rest mesh.

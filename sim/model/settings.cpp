@@ -68,6 +68,11 @@ const std::vector<Parameter>& parameters() {
          "Pa s", true, Effect::rebuild},
         {"bulk_viscosity", "solver", &S::bulk_viscosity, "likewise against a change of volume", 0, 1e9, "Pa s", true,
          Effect::rebuild},
+        {"yield_strain", "solver", &S::yield_strain,
+         "strain beyond which a neo-hookean material keeps its new shape: wet clay 0.02, wax 0.05; 0: it never does", 0,
+         10, "", true, Effect::rebuild},
+        {"creep_time", "solver", &S::creep_time, "time in which strain beyond the yield strain flows away; 0: at once",
+         0, 1e6, "s", true, Effect::rebuild},
         {"omega", "solver", &S::omega,
          "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
          "above 2 it may not; with compliance at most 2",
@@ -311,6 +316,8 @@ static bool is_viscous(const Material& material) {
   return material.material == "neo-hookean" && (material.viscosity > 0 || material.bulk_viscosity > 0);
 }
 
+bool yields(const Material& material) { return material.yield_strain > 0; }
+
 bool damped(const Material& material) { return material.constraint_damping > 0 || is_viscous(material); }
 
 std::string kinds_in_use(const Material& material) {
@@ -401,6 +408,9 @@ void check_material(const Settings& settings, const std::string& where) {
   if (settings.material == "springs" && settings.poisson_ratio < 0.25)
     throw Error(fmt::format("springs have no Poisson's ratio of {:g}", settings.poisson_ratio), where,
                 "give 0.25 or more, or material neo-hookean");
+  if (yields(settings) && (settings.material != "neo-hookean" || smoothed(settings)))
+    throw Error("a yield strain is of linear neo-hookean tets", where,
+                "give material neo-hookean and element linear, or set yield_strain to 0");
   if (settings.restitution > 0 && !moves_rigidly(settings, settings))
     throw Error("restitution is of hard bodies", where,
                 "set it to 0, or rigid_contact to true and all k to 1, without compliance or material");
@@ -433,6 +443,9 @@ void check_settings(const Settings& settings, const std::string& where, const st
                                          : "smoothed tets are of one material, and the body has regions",
                   fmt::format("body {}", name),
                   own.material == "none" ? "give it one, or leave out its regions" : "make its element linear");
+    if (!body.regions.empty() && yields(own))
+      throw Error("a body that yields is of one material, and this one has regions", fmt::format("body {}", name),
+                  "leave out its regions, or set yield_strain to 0");
     for (const RegionModuli& region : body.regions) {
       Settings part = own;
       part.young_modulus = region.young_modulus.value_or(own.young_modulus);

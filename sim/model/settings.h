@@ -37,6 +37,8 @@ struct Material {
   double constraint_damping = 0;   ///< s
   double viscosity = 0;            ///< Pa s, of neo-Hookean tets, against shear
   double bulk_viscosity = 0;       ///< Pa s, likewise, against a change of volume
+  double yield_strain = 0;         ///< of neo-Hookean tets, beyond which they keep their shape; 0: they never do
+  double creep_time = 0;           ///< s, in which what is beyond flows; 0: at once
   std::string constraints = "stretch,bend,volume";
   std::array<double, kind_count> stiffness = [] {  ///< k_NAME by kind, 0 to 1
     std::array<double, kind_count> hard;
@@ -180,6 +182,8 @@ bool compliant(const Material& material);
 std::optional<std::string> kind_without_force(const Material& material);
 /// Whether the bodies are held by forces alone, as modes explicit and newton need it.
 bool has_forces(const Settings& settings);
+/// Whether what is deformed too far keeps its shape.
+bool yields(const Material& material);
 /// Whether constraints resist their rate.
 bool damped(const Material& material);
 /// Whether bodies of this material move as rigid ones (method.md, "Hard bodies are rigid"): the kinds in use keep a

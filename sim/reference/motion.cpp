@@ -51,6 +51,7 @@ void require_reference(const ReferenceInput& input) {
   if (!input.model.attachments.empty()) refuse("bodies are attached to each other");
   if (!input.model.loads.empty()) refuse("forces beside gravity act");
   if (!input.model.fibres.empty()) refuse("fibres pull");
+  if (any_material(settings, yields)) refuse("a body yields");
   const bool soft = any_material(settings, compliant);
   const auto check = [&](const Material& own) {
     if (!soft && !uses(own, Stretch::row)) refuse("without stretch constraints bodies have no shape to keep");

@@ -82,6 +82,7 @@ class FastPbd {
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
     if (step.substep.books_work()) state.work.resize(x.size());
     read_positions(state);
+    take_rest_metrics(state);
     if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     pairs_.begin_step(state);
 // Loops inside the region itself would be 4 % slower on one thread.
@@ -98,6 +99,19 @@ class FastPbd {
   }
 
  private:
+  void take_rest_metrics(const State& state) {
+    if (state.rest_metrics.empty()) return;
+    auto& all = std::get<batches::Batches<NeoHookean>>(work_.batches);
+    constexpr std::size_t lanes = batches::lanes;
+    if (tets_.empty())
+      tets_ = tets_of(model_->rest, lanes * all.size(), [&](std::size_t k) {
+        const auto& v = all[k / lanes].vertices;
+        return Tet{v[0][k % lanes], v[1][k % lanes], v[2][k % lanes], v[3][k % lanes]};
+      });
+    for (std::size_t k = 0; k < tets_.size(); ++k)
+      for (std::size_t m = 0; m < 6; ++m)
+        all[k / lanes].rest[m][k % lanes] = float(state.rest_metrics[6 * tets_[k] + m]);
+  }
   void activate(State& state, const Activations& step) {
     state.work[0] += activation_work(fibres_, step, state.positions);
     for (auto& batch : std::get<batches::Batches<Fibre>>(work_.batches))
@@ -216,6 +230,7 @@ class FastPbd {
   std::vector<glm::dvec3> predicted_;
   std::vector<glm::uvec4> load_mesh_;
   ConstraintList fibres_;
+  std::vector<std::uint32_t> tets_;  // of neo-Hookean lanes, once any has flowed
   std::size_t threads_;
 };
 

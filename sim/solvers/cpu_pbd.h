@@ -13,6 +13,7 @@
 #include "sim/model/model.h"
 #include "sim/model/settings.h"
 #include "sim/solvers/solver.h"
+#include "sim/yielding.h"
 
 namespace tetpbd {
 
@@ -138,6 +139,7 @@ class CpuPbd {
     auto& x = state.positions;
     auto& v = state.velocities;
     if (substep.books_work()) state.work.resize(x.size());
+    take_rest_metrics(state);
     if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
@@ -192,6 +194,13 @@ class CpuPbd {
   }
 
  private:
+  void take_rest_metrics(const State& state) {
+    if (state.rest_metrics.empty()) return;
+    auto& items = std::get<Items<NeoHookean>>(items_);
+    if (tets_.empty()) tets_ = tets_of(model_->rest, items.size(), [&](std::size_t c) { return items[c].vertices; });
+    for (std::size_t c = 0; c < items.size(); ++c)
+      std::copy_n(&state.rest_metrics[6 * tets_[c]], 6, items[c].rest.begin());
+  }
   void activate(State& state, const Activations& step) {
     state.work[0] += activation_work(fibres_, step, state.positions);
     for (auto& item : std::get<Items<Fibre>>(items_)) item.rest[3] = 1 - real(step.now[std::size_t(item.rest[4])]);
@@ -222,6 +231,7 @@ class CpuPbd {
   std::vector<glm::uvec4> load_mesh_;
   ConstraintList fibres_;
   OfEachKind<Items> items_;
+  std::vector<std::uint32_t> tets_;  // of neo-Hookean items, once any has flowed
   // What materials give constraints, else empty.
   struct Own {
     std::vector<double> compliance, stiffness, damping;

@@ -43,9 +43,14 @@ namespace {
 
 ReferenceInput reference_input(const Sim& sim) { return {*sim.model, sim.system, sim.settings, sim.inverse_masses}; }
 
-// The value that kernels note (NOTE_STIFFNESS).
-double stiffest(const Sim& sim, const std::vector<glm::dvec3>& positions) {
-  return stiffest_constraint(reference_input(sim), sim.settings.compliance, positions);
+// The value that kernels note (NOTE_STIFFNESS), in a state.
+double stiffest(const Sim& sim, const State& state) {
+  if (state.rest_metrics.empty())
+    return stiffest_constraint(reference_input(sim), sim.settings.compliance, state.positions);
+  ConstraintSystem flowed = sim.system;
+  put_rest_metrics(flowed.lists[index_of<NeoHookean>], sim.model->rest, state.rest_metrics);
+  return stiffest_constraint({*sim.model, flowed, sim.settings, sim.inverse_masses}, sim.settings.compliance,
+                             state.positions);
 }
 
 // Takes as many substeps as are asked for, or more where stability needs them: a stable one is `longest` at rest, else
@@ -94,7 +99,7 @@ void start(Sim& sim, const State& state) {
   AdaptiveSubsteps& w = sim.adaptive;
   w = AdaptiveValues{.at_rest = w.at_rest};
   if (w.at_rest > 0) {
-    const double now = stiffest(sim, state.positions) / w.at_rest;
+    const double now = stiffest(sim, state) / w.at_rest;
     w.stiffer = std::isfinite(now) ? now : 1;
     w.stiffening = stiffening_for(w.stiffer, kept_stability(*sim.model, sim.system, sim.settings));
   }
@@ -114,7 +119,7 @@ void retune(Sim& sim, const Settings* before) {
   sim.longest_substep = scaled.longest_step, sim.mass_scaling = scaled, sim.masses = std::move(scaled.masses);
   for (std::size_t v = 0; v < sim.masses.size(); ++v)
     if (!is_pinned(sim, std::uint32_t(v))) sim.inverse_masses[v] = 1 / sim.masses[v];
-  sim.adaptive.at_rest = stiffest(sim, sim.model->rest.positions);
+  sim.adaptive.at_rest = stiffest(sim, {sim.model->rest.positions, {}});
 }
 
 }  // namespace

@@ -71,6 +71,11 @@ Pass make_patch_pass(Solver& solver, const SolverInput& input, const Patches& pa
   words.write(0, chunk_bytes, patches.chunks.data());
   words.write(chunk_bytes, vertex_bytes, patches.vertices.data());
   words.write(chunk_bytes + vertex_bytes, record_bytes, patches.records.data());
+  if (any_material(input.settings, yields)) {
+    solver.rest_block = "Patches", solver.rest_copies = patches.tets;
+    const std::size_t first = 2 * (patches.chunks.size() / 2 + patches.vertices.size()) + 1;  // behind vertex numbers
+    for (auto& copy : solver.rest_copies) copy[1] = std::uint32_t(first + 2 * copy[1]);
+  }
   std::size_t bytes = words.bytes() + 16 * patches.vertices.size();  // and quantized positions
   add_buffer(solver, input.tuning, "Patches", std::move(words));
   if (input.compliant && multipliers) {

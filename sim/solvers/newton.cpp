@@ -350,6 +350,12 @@ Solver create_newton_solver(const SolverInput& whole) {
   n.mesh = add("Mesh", Buffer("constraints and edges", fill_newton_mesh(input, *levels, sizes, n.layout)));
   n.coarse_matrix = add("Coarse", Buffer("coarse matrix", fill_newton_coarse(input, *levels, n.layout)));
   n.sums = add("Sums", Buffer("sums", std::vector<std::byte>(n.layout.sums.bytes), GL_DYNAMIC_COPY));
+  if (any_material(input.settings, yields)) {
+    solver.rest_block = "Mesh";
+    const std::size_t first = n.layout.constraints[index_of<NeoHookean>].values.at / sizeof(float);
+    for (std::uint32_t c = 0; c < input.system.lists[index_of<NeoHookean>].count(); ++c)
+      solver.rest_copies.push_back({c, std::uint32_t(first + NeoHookean::row.values * c)});
+  }
   solver.watches = solver.takes_constraints = true;
   solver.start = [made](Sim& sim, const State& state) { start(sim, *made, state); };
   solver.predict = [made](Sim& sim) { run_kernel(sim, made->begin); };

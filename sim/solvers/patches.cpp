@@ -72,6 +72,8 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
   result.chunks.resize(chunks * result.chunk_words);
   result.vertices.resize(chunks * result.largest);
   const auto write_record = [&](const ConstraintList& list, const Record& record) {
+    if (&list == &system.lists[index_of<NeoHookean>])
+      result.tets.push_back({record[1], std::uint32_t(result.records.size())});
     std::vector<std::uint32_t> words = {record[0]};
     for (const auto* values : {&list.rest, &list.compliance, &list.stiffness, &list.damping}) {
       const std::size_t each = values->size() / list.count();

@@ -23,8 +23,9 @@ struct Patches {
   /// The records of constraints, record_pairs() pairs of words each: vertices by their numbers in the chunk, a byte
   /// each; then as float bits rest values, a material's compliances, and where bodies differ k and damping.
   std::vector<std::array<std::uint32_t, 2>> records;
-  std::size_t largest = 0, most_owned = 0;  ///< most vertices, and most owned ones, of any chunk
-  bool chunked = false;                     ///< any patch has several chunks
+  std::vector<std::array<std::uint32_t, 2>> tets;  ///< of each neo-Hookean record the constraint, and its first pair
+  std::size_t largest = 0, most_owned = 0;         ///< most vertices, and most owned ones, of any chunk
+  bool chunked = false;                            ///< any patch has several chunks
 };
 
 /// How many pairs of words a record of the list has.

@@ -34,6 +34,10 @@ struct Solver {
   int quantized_buffers = 0;
   /// Predicted positions stay from the first iteration of a substep to the last, behind the velocities.
   bool keeps_prediction = false;
+  /// Where the rest values of neo-Hookean tets stand, for bodies that yield: the name of a block, and of each copy the
+  /// constraint and the first word.
+  std::string rest_block;
+  std::vector<std::array<std::uint32_t, 2>> rest_copies;
   std::size_t vertex_patches = 0;  ///< patches that own the vertices (block Patches), 0: none do
 
   /// Starts from a state, with nothing known of the steps before it.

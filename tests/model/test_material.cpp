@@ -347,7 +347,7 @@ TEST_CASE("material: scenes and flags name it, and say what is wrong with it") {
     CHECK(run.status == 2);
     CHECK_MESSAGE(run.err.find(message) != std::string::npos, run.err);
   };
-  refused(R"("jam")", "there are rubber, gelatine, muscle, foam");
+  refused(R"("jam")", "there are rubber, gelatine, muscle, foam, clay");
   refused("3", "'bodies.0.material' must be an object in braces");
   refused(R"({"modulus": 3})", "'bodies.0.material.modulus' is not known here");
   refused(R"({"poisson_ratio": 0.5})", "'poisson_ratio' cannot be 0.5");

@@ -98,6 +98,11 @@ inline const Compliances none = [] {
 // Relative; doctest's Approx has a floor of 1.
 inline double off(double value, double right) { return std::abs(value / right - 1); }
 
+// What a stiffness goes to as cells are halved twice, by the order that it shows (Aitken).
+inline double extrapolated(const std::array<double, 3>& k) {
+  return k[2] - (k[1] - k[2]) * (k[1] - k[2]) / (k[0] - 2 * k[1] + k[2]);
+}
+
 // A clamped block of `material`, with what a run of it needs.
 inline Scene beam_of(const std::string& material, const glm::ivec3& cells, double young_modulus, double poisson_ratio,
                      const glm::dvec3& size = {1, 0.25, 0.25}, bool mirrored = false) {

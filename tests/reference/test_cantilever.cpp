@@ -26,11 +26,6 @@ double rayleigh(const Scene& scene, const Points& x) {
   return work / squares;
 }
 
-// What a stiffness goes to as cells are halved twice, by the order that it shows (Aitken).
-double extrapolated(const std::array<double, 3>& k) {
-  return k[2] - (k[1] - k[2]) * (k[1] - k[2]) / (k[0] - 2 * k[1] + k[2]);
-}
-
 // Timoshenko's cantilever of length 1, width and height b, under its weight.
 struct Cantilever {
   double E, nu, b = 0.25, density = 1000, gravity = 9.81;

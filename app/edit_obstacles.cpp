@@ -87,7 +87,15 @@ void add_obstacle(Session& s, const ObstacleKind& kind) {
   wanted.push_back(std::move(o));
   const std::size_t count = wanted.size();
   change_obstacles(s, std::move(wanted));
-  if (s.loaded.scene.obstacles.size() == count) choose_obstacle(s, int(count) - 1);
+  if (s.loaded.scene.obstacles.size() != count) return;
+  choose_obstacle(s, int(count) - 1);
+  // It is to be seen whole, or nobody knows that it is there.
+  const glm::mat4 seen = projection_matrix(s.camera, s.aspect) * view_matrix(s.camera);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::vec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : 0, corner & 4 ? 1 : -1);
+    const glm::vec4 at = seen * glm::vec4(glm::vec3(s.loaded.scene.obstacles.back().centre) + float(size) * side, 1);
+    if (at.w <= 0 || std::max(std::abs(at.x), std::abs(at.y)) > at.w) return frame_body(s);
+  }
 }
 
 void remove_obstacle(Session& s) {

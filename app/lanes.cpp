@@ -105,7 +105,7 @@ Viewport tile_of(std::size_t lane, std::size_t count, int width, int height) {
 
 const std::vector<Comparison>& comparisons() {
   static const std::vector<Comparison> rows = {
-      {"one way", "no other beside it", {}},
+      {"single", "no other beside it", {}},
       {"paper, node, cpu",
        "the paper's 25 iterations, 5 substeps with masses split, Gauss-Seidel",
        {"paper", "hard", "hard,mode=cpu-fast"}},

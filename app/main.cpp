@@ -25,6 +25,7 @@ using namespace tetpbd;
 namespace {
 
 constexpr long most_steps = 1000000000;
+constexpr const char* first_of_window = "bunny";  // soft, and solved by PBD: its settings matter at sight
 
 /// What words can set, with its defaults.
 struct Arguments {
@@ -249,8 +250,10 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device = false) {
                 "leave the picture)");
   view.add_flag_callback(
       "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
-  command.parse_complete_callback([&a, by_device] {
+  command.parse_complete_callback([&a, &command, by_device] {
     a.overrides.by_device = by_device;
+    if (command.get_name() == "view" && command.count("--scene") == 0 && a.overrides.mesh.empty())
+      a.scene = first_of_window;
     open_scene(a);
   });
 }
@@ -519,6 +522,7 @@ std::function<int()> tetpbd::parse_command_line(std::vector<std::string> words) 
   if (!arguments.start) {
     arguments.start = start_view;
     arguments.overrides.by_device = true;
+    arguments.scene = first_of_window;
     open_scene(arguments);
   }
   return [a = std::move(arguments)] {

@@ -23,25 +23,18 @@ namespace tetpbd {
 namespace {
 
 template <class T>
-bool number_widget(const Parameter& row, const std::string& id, T& value) {
+bool number_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
   constexpr bool real = std::is_same_v<T, double>;
-  constexpr ImGuiDataType type = real ? ImGuiDataType_Double : ImGuiDataType_S32;
-  const T low = T(row.low), high = T(row.high), before = value;
   // A logarithmic slider takes what its format does not show for 0: it has to hold decades down to 1e-12.
   const std::string number = !real ? "%d" : row.logarithmic ? "%.12g" : "%.4g";
   const std::string format = number + (*row.unit ? " " : "") + row.unit;
-  bool changed = false;
-  if (row.logarithmic || row.high - row.low <= 20) {
-    const int flags = ImGuiSliderFlags_AlwaysClamp | (row.logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
-    changed = ImGui::SliderScalar(id.c_str(), type, &value, &low, &high, format.c_str(), flags);
-  } else {  // a linear slider over a wide range cannot be aimed: such a value is dragged, by a part of itself
-    const float speed = real ? 0.01f * std::max(1.0f, std::abs(float(value))) : 1.0f;
-    changed =
-        ImGui::DragScalar(id.c_str(), type, &value, speed, &low, &high, format.c_str(), ImGuiSliderFlags_AlwaysClamp);
-  }
-  if (changed && real) value = T(std::stod(fmt::format("{:.4g}", double(value))));
-  if (!(value >= low && value <= high)) value = before;  // "nan" was typed
-  return changed && value != before;
+  // A linear slider over a wide range cannot be aimed: such a value is dragged, by a part of itself.
+  const bool slides = row.logarithmic || row.high - row.low <= 20;
+  const float speed = slides ? 0 : real ? 0.01f * std::max(1.0f, std::abs(float(value))) : 1.0f;
+  T edited = value;
+  if (!edit_number(s, id, row.name, edited, T(row.low), T(row.high), format, row.logarithmic, speed)) return false;
+  if (real) edited = T(std::stod(fmt::format("{:.4g}", double(edited))));
+  return std::exchange(value, edited) != edited;
 }
 
 std::string help_text(const Parameter& row) {
@@ -92,6 +85,9 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   if (name == "young_modulus" || name == "poisson_ratio") return material;
   if (name == "element") return settings.material == "neo-hookean" && mode.smoothed;
   if (name == "smoothing") return smoothed(in_mode(settings, settings));
+  if (name == "viscosity" || name == "bulk_viscosity" || name == "yield_strain")
+    return settings.material == "neo-hookean";
+  if (name == "creep_time") return yields(settings);
   if (name == "constraints") return !material;
   const auto* of = std::get_if<KindMember>(&row.member);
   return !of || (!material && uses(settings, constraint_kinds[of->kind]));
@@ -110,7 +106,7 @@ void automatic_widget(Session& s, const Parameter& row, const std::string& id, T
                     ImGui::GetStyle().ItemSpacing.x;
   T shown = value == automatic ? decided : value;
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - box);
-  if (number_widget(row, id, shown)) value = shown;
+  if (number_widget(s, row, id, shown)) value = shown;
   ImGui::SameLine();
   bool by_itself = value == automatic;
   if (ImGui::Checkbox(("auto" + id).c_str(), &by_itself)) value = by_itself ? T(automatic) : decided;
@@ -135,7 +131,7 @@ bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
     if constexpr (std::is_same_v<T, bool>)
       ImGui::Checkbox(id.c_str(), &value);
     else if constexpr (!std::is_same_v<T, std::string>)
-      number_widget(row, id, value);
+      number_widget(s, row, id, value);
   });
   const std::string unit = *row.unit ? std::string(" ") + row.unit : "";
   if (end_row(s, row.name, help_text(row), back.empty() ? "" : back + unit))
@@ -154,15 +150,14 @@ const std::vector<Group> groups = {
     {"Material",
      true,
      {"material", "young_modulus", "poisson_ratio", "element", "constraints", "k_*"},
-     {"smoothing", "compliance_*", "constraint_damping", "damping"}},
+     {"smoothing", "compliance_*", "constraint_damping", "viscosity", "bulk_viscosity", "yield_strain", "creep_time",
+      "damping"}},
     {"Solver",
      true,
      {"mode", "substeps", "iterations", "stability", "dt"},
      {"omega", "mass_splitting", "mass_scaling"}},
-    {"Contact",
-     false,
-     {"gravity", "ground", "friction", "restitution"},
-     {"ground_height", "contact_distance", "rigid_contact"}},
+    {"World", false, {"gravity", "ground"}, {"ground_height"}},
+    {"Contact", false, {"contact", "friction", "restitution"}, {"contact_distance", "rigid_contact"}},
 };
 
 bool names(const std::string& pattern, const std::string& name) {
@@ -209,7 +204,7 @@ void draw_settings(Session& s, const Group& group) {
 
 // A choice among presets; `current`: the one that is set, if any.
 struct Ways {
-  std::string current = "as set below", help;
+  std::string current = "custom", help;
   Words words;
   std::map<std::string, Settings> to{};
 };
@@ -244,10 +239,12 @@ void draw_solver(Session& s) {
         watch.stiffening > 1 ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str() : "");
   if (solver_mode(now).implicit)
     ImGui::TextWrapped(
-        "residual %.1e of the start's, health %.2f%s", watch.residual, watch.health,
-        watch.substep_factor > 1
-            ? fmt::format("; {} times the substeps until no tet is inverted", watch.substep_factor).c_str()
-            : "");
+        "%s", fmt::format("residual {:.2g} %, step health {:.2f} (1 = good){}", 100 * double(watch.residual),
+                          double(watch.health),
+                          watch.substep_factor > 1
+                              ? fmt::format("; inverted tets or contact: {} x the substeps", watch.substep_factor)
+                              : "")
+                  .c_str());
   if (!automatic) return;
   if (slider(s, "budget", s.budget_ms, 0.5, 0.01, 100, "%.3g ms per step",
              "time that a step may take: auto chooses again when you let go, which takes a second or "
@@ -278,7 +275,7 @@ void draw_material(Session& s) {
   draw_body_choice(s);
   Ways ways = ways_of(shown_settings(s), material_presets(),
                       "a material by name, with its stiffness; for bodies that are to be soft");
-  if (const auto chosen = combo(s, "made of", ways.current, ways.words, ways.help)) change_shown(s, ways.to[*chosen]);
+  if (const auto chosen = combo(s, "preset", ways.current, ways.words, ways.help)) change_shown(s, ways.to[*chosen]);
 }
 
 void draw_run(Session& s) {
@@ -299,7 +296,7 @@ void draw_lane_rows(Session& s) {
   Ways ways{.help = help, .words = {}};
   for (const Comparison& row : comparisons())
     ways.words.push_back(row.name), ways.help += fmt::format("\n{}: {}", row.name, row.help);
-  if (const auto name = combo(s, "side by side", lanes.size() > 1 ? "as below" : "one way", ways.words, ways.help))
+  if (const auto name = combo(s, "side by side", lanes.size() > 1 ? "custom" : "single", ways.words, ways.help))
     compare_lanes(s, std::ranges::find(comparisons(), *name, &Comparison::name)->lanes);
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
   if (button(s, "Add a lane", "add lane", "the same bodies once more, with the settings of this lane to change\nK",
@@ -393,7 +390,7 @@ void draw_view(Session& s) {
     slider(s, "explode", view.explode, first.explode, 0, 3, "%.2f of the way",
            "tetrahedra away from the bodies' centre");
   }
-  slider(s, "cut", view.cut, first.cut, 0, 1, "%.2f of the body",
+  slider(s, "cut", view.cut, first.cut, 0, 1, view.is_cut() ? "%.2f of the body" : "off",
          "what is below this part of the bodies at rest is shown; 1: all\nX; Alt+drag, Alt+wheel on the view");
   if (view.is_cut()) {
     const int before = view.cut_axis;
@@ -415,10 +412,11 @@ void draw_view(Session& s) {
       {"sky and ground", "also walls; without: one colour", view.backdrop, first.backdrop},
       {"legend", "the colour scale, with every colour but plain", view.legend, first.legend},
       {"vsync", "draw as often as the display shows; without, as often as can be: to measure", s.vsync, true},
-      {"fast", "steps as often as the machine can, instead of in real time", s.clock.fast, false}};
+      {"as fast as possible", "steps as often as the machine can, instead of in real time", s.clock.fast, false}};
   if (view.arrows)
     slider(s, "arrow length", view.arrow_seconds, first.arrow_seconds, 1e-3, 1, "%.3g s",
            "the time a vertex would take along its arrow", true);
+  const bool shadow = view.shadow;
   bool unusual = s.samples != s.first_samples || s.grab_radius != usual_grab_radius;
   for (const auto& [name, help, value, usual] : switches) unusual |= value != usual;
   if (!more(s, "View", unusual)) return;
@@ -426,11 +424,12 @@ void draw_view(Session& s) {
     if (i++ % 2) ImGui::SameLine(label_width());
     check_box(s, name, value, help, usual);
   }
+  if (view.shadow != shadow) s.ui.kept.shadow = view.shadow;
   const auto doublings = [](int samples) { return int(std::bit_width(unsigned(samples) / 2)); };
   int now = doublings(s.samples);
   enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, now, doublings(s.first_samples),
              "samples of a pixel: smoother edges, and more work for the GPU");
-  s.samples = now ? 1 << now : 0;
+  if (const int wanted = now ? 1 << now : 0; wanted != s.samples) s.ui.kept.samples = s.samples = wanted;
   slider(s, "grab radius", s.grab_radius, usual_grab_radius, 0, 0.3, "%.2f of the size",
          "how much of a body the mouse takes hold of; 0: a single vertex, which can draw out a spike");
   Preferences& kept = s.ui.kept;
@@ -459,12 +458,12 @@ void draw_timeline(Session& s) {
   ImGui::BeginDisabled(t.moments.size() < 2);
   bool looping = t.looping;
   if (ImGui::Checkbox("loop", &looping)) set_looping(s, looping);
-  describe_item(s, "loop", "play what is kept again and again");
+  describe_item(s, "loop", "replay the stored motion in a loop");
   ImGui::SameLine();
   ImGui::SetNextItemWidth(-1);
   const long first = t.moments.empty() ? 0 : t.moments.front()->step;
   long now = steps_of(s.loaded.lanes), last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
-  std::string text = t.moments.empty() ? "nothing is kept" : fmt::format("{:.3f} s", simulated_time(s.loaded.sim()));
+  std::string text = t.moments.empty() ? "nothing is stored" : fmt::format("{:.3f} s", simulated_time(s.loaded.sim()));
   if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
     text += fmt::format(" of {:.3f} .. {:.3f} s", t.moments.front()->time,
                         std::max(t.moments.back()->time, simulated_time(s.loaded.sim())));
@@ -472,15 +471,17 @@ void draw_timeline(Session& s) {
                           ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
     show_step(s, now);
   describe_item(s, "time",
-                fmt::format("back and forth in time, of all lanes; to play on from there forgets what came "
-                            "after\nLeft and Right: state by state\n{} states are kept, {:.3g} of {} MB: all "
-                            "of late, fewer of long ago\n--history-mb",
+                fmt::format("move all lanes in time; playing from here discards later states\nLeft and Right: state by "
+                            "state\n{} states are stored, {:.3g} of {} MB: all recent ones, fewer of the older\n"
+                            "--history-mb",
                             t.moments.size(), double(t.bytes) / 1048576, t.budget >> 20));
   ImGui::EndDisabled();
 }
 
 void draw_panel(Session& s) {
   draw_run(s);
+  if (section(s, "Side by side", false)) draw_lane_rows(s);
+  if (section(s, "Stability map", false)) draw_map(s);
   if (section(s, "Scene")) draw_scene(s);
   for (const Group& group : groups) {
     if (!section(s, group.name, group.open)) continue;
@@ -490,8 +491,6 @@ void draw_panel(Session& s) {
   }
   if (section(s, "Obstacles", !s.loaded.scene.obstacles.empty())) draw_obstacles(s);
   if (section(s, "View")) draw_view(s);
-  if (section(s, "Side by side", false)) draw_lane_rows(s);
-  if (section(s, "Stability map", false)) draw_map(s);
 }
 
 }  // namespace tetpbd

@@ -142,7 +142,8 @@ void draw_scene(Session& s) {
   draw_scenes(s);
   begin_row(s, "open file");
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
-  bool load_it = ImGui::InputTextWithHint("##mesh", "path, Enter", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
+  bool load_it =
+      ImGui::InputTextWithHint("##mesh", "path to a scene or mesh", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
   end_row(
       s, "mesh",
       fmt::format(
@@ -152,7 +153,8 @@ void draw_scene(Session& s) {
   ImGui::SameLine();
   load_it |= button(s, "Load", "load", "opens the file of this path");
   if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
-  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 3 * gap) / 4;
+  const float gap = ImGui::GetStyle().ItemSpacing.x, all = ImGui::GetContentRegionAvail().x - 3 * gap;
+  const float width = 0.3f * all, narrow = 0.2f * all;
   if (button(s, "Save scene", "save scene",
              "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S", width))
     save_scene(s);
@@ -164,11 +166,11 @@ void draw_scene(Session& s) {
     save_state_file(s);
   ImGui::SameLine();
   ImGui::BeginDisabled(s.changes.past.empty());
-  if (button(s, "Undo", "undo", "takes back the last change of a setting\nCtrl+Z", width)) undo(s);
+  if (button(s, "Undo", "undo", "takes back the last change of a setting\nCtrl+Z", narrow)) undo(s);
   ImGui::EndDisabled();
   ImGui::SameLine();
   ImGui::BeginDisabled(s.changes.future.empty());
-  if (button(s, "Redo", "redo", "what was taken back, again\nCtrl+Y, Ctrl+Shift+Z", width)) redo(s);
+  if (button(s, "Redo", "redo", "what was taken back, again\nCtrl+Y, Ctrl+Shift+Z", narrow)) redo(s);
   ImGui::EndDisabled();
 }
 

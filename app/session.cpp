@@ -444,7 +444,8 @@ bool has_colour(const Session& s, Colour colour) {
   if (colour == Colour::patch) return has_patches(s.loaded.lanes[s.loaded.chosen]);
   const Settings& now = s.loaded.sim().settings;
   if (colour == Colour::residual) return !any_material(now, compliant);
-  return colour != Colour::energy || (any_material(now, has_energy) && !any_material(now, yields) && s.loaded.model->regions.empty());
+  return colour != Colour::energy ||
+         (any_material(now, has_energy) && !any_material(now, yields) && s.loaded.model->regions.empty());
 }
 
 void choose_colour(Session& s, Colour colour) {
@@ -461,7 +462,7 @@ void choose_colour(Session& s, Colour colour) {
   if (colour != Colour::motion) return;
   attempt(s, [&] { find_right(s); });
   if (s.loaded.disturbed)
-    say(s, "the motion is no longer that of the scene: reset (R)");
+    say(s, "no reference after your change: R compares again");
   else if (!s.loaded.right && s.loaded.lanes.size() == 1)
     say(s, "no right motion is known: tetpbd reference finds it, or hold lanes against each other (K)");
 }
@@ -520,6 +521,7 @@ void add_lane(Session& s, const std::string& words) {
     let_go(s);
     lanes.push_back({create_sim(own.model, lane_settings(own.settings, words, "--lane " + words, own.model))});
     s.loaded.chosen = lanes.size() - 1;
+    s.ui.hinted[2] = true;
     start_lanes(s);
   });
 }
@@ -566,6 +568,7 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
   const bool pinned = is_pinned(s.loaded.sim(), vertex);
   note(s, {{pinned ? "unpin" : "pin", vertex}});
   for (Lane& lane : s.loaded.lanes) pinned ? unpin(lane.sim, vertex) : pin(lane.sim, vertex);
+  s.ui.hinted[1] = true;
   s.log("{} {}", pinned ? "unpin" : "pin", vertex);
 }
 
@@ -582,6 +585,7 @@ void catch_vertex(Session& s, const Pick& pick) {
   if (is_fixed(s, pick.vertex)) return;
   hold_vertex(s, pick.vertex, s.loaded.chosen, s.grab_radius);
   s.grab = begin_grab(s.loaded.sim(), *s.hold, pick);
+  s.ui.hinted[0] = true;
   s.log("grab {}", pick.vertex);
 }
 
@@ -600,7 +604,14 @@ std::optional<Advice> faster_way(const Session& s) {
   if (s.loaded.lanes.size() > 1) return Advice{"fewer lanes", ""};
   const auto& ms = s.loaded.lanes[s.loaded.chosen].step_ms.values;
   // Less than half of the time goes into steps.
-  if (!ms.empty() && double(ms.back()) * clock.factor / own.dt < 500) return Advice{"a smaller window", ""};
+  if (!ms.empty() && double(ms.back()) * clock.factor / own.dt < 500) {
+    if (s.samples == 0 && !s.view.shadow) return Advice{"a smaller window", ""};
+    return Advice{"turn off MSAA and shadows", "", [](Session& to) {
+                    to.ui.kept.samples = to.samples = 0;
+                    to.ui.kept.shadow = to.view.shadow = false;
+                    to.log("MSAA and shadows off");
+                  }};
+  }
   const bool with_forces = solver_mode(own).leapfrog || solver_mode(own).implicit;
   const SolverMode& fast = *std::ranges::find_if(solver_modes(), &SolverMode::all_cores);
   if (!solver_mode(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))

@@ -122,7 +122,10 @@ struct Ui {
   bool panels = true, plots = true, help = false;
   float scale = 1;  ///< of the display, 2 on a dense one, times that of the text
   Preferences kept;
-  bool rebudget = false;                   ///< once the slider is let go
+  bool rebudget = false;  ///< once the slider is let go
+  /// The widget into which a number is being typed, and what it says so far.
+  std::optional<std::pair<unsigned, double>> typed{};
+  std::array<bool, 3> hinted{};            ///< of hint_texts, those that were followed
   std::map<std::string, SceneCard> cards;  ///< by file, once shown
   MapWords map;
   bool at_flattest = false;            ///< the cursor is on what the panel says of the flattest tet
@@ -156,6 +159,7 @@ struct Session {
   float aspect = 1;  ///< of the viewport
   bool playing = true, vsync = true;
   bool take_screenshot = false, quit = false;
+  double hints_until = 0;  ///< s, of `now`
   Clock clock;
   Timeline timeline;
   std::unique_ptr<Record> record{};        ///< if anybody wants it
@@ -223,6 +227,7 @@ void load_soon(Session& session, const std::string& name, const SceneOverrides& 
 void choose_soon(Session& session);
 void take_over(Session& session, Loaded loaded, bool keep_camera);
 void frame_body(Session& session);
+void keep_above_ground(Session& session);
 /// Finds what it needs, or says what is missing.
 void choose_colour(Session& session, Colour colour);
 /// Whether there is something to colour by.
@@ -267,6 +272,7 @@ void watch_state(Session& session);
 /// A way to come nearer to real time, and its words (lane_settings), if it is one of settings.
 struct Advice {
   std::string said, words;
+  std::function<void(Session&)> act{};  ///< in place of words; none and no words: said alone
 };
 /// Where steps take more than twice the time that they simulate.
 std::optional<Advice> faster_way(const Session& session);

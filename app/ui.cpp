@@ -2,6 +2,7 @@
 #include "app/ui.h"
 
 #include <GLFW/glfw3.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +31,9 @@ void next_colour(Session& s) {
 void flip(Session& s, const char* name, bool& value) { s.log("{} {}", name, value = !value); }
 
 void escape(Session& s) {
-  if (s.ui.help)
+  if (ImGui::GetCurrentContext()->OpenPopupStack.Size > 0)
+    ImGui::ClosePopupToLevel(0, true), s.log("list closed");
+  else if (s.ui.help)
     flip(s, "help", s.ui.help);
   else if (s.grab)
     let_go(s);
@@ -61,10 +64,12 @@ void draw_status(Session& s, const Rect& place) {
     ImGui::SameLine();
     ImGui::TextColored(alarm(s), "%sfaster:", s.gl.software ? "(software renderer) " : "");
     ImGui::SameLine();
-    if (faster->words.empty()) {
+    if (faster->words.empty() && !faster->act) {
       ImGui::TextColored(alarm(s), "%s", faster->said.c_str());
     } else {
-      if (ImGui::SmallButton(faster->said.c_str()))
+      if (ImGui::SmallButton(faster->said.c_str()) && faster->act)
+        faster->act(s);
+      else if (ImGui::IsItemActivated())
         attempt(s, [&] { change_settings(s, lane_settings(sim.settings, faster->words, faster->said)); });
       mark(s, "faster");
     }
@@ -210,6 +215,27 @@ ImVec2 seen_at(const Session& s, const Rect& place, const glm::dvec3& point) {
           place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)};
 }
 
+// What a first look shows one can do, until it was done, in the first runs.
+void draw_hints(Session& s, const Rect& view) {
+  constexpr double fading = 4;  // s
+  const double left = s.hints_until - s.now;
+  if (left <= 0) return;
+  static constexpr const char* texts[] = {"drag the body", "double click: pin a vertex", "K: compare solvers"};
+  std::string line;
+  for (std::size_t k = 0; k < std::size(texts); ++k)
+    if (!s.ui.hinted[k]) line += (line.empty() ? "" : "  \xC2\xB7  ") + std::string(texts[k]);
+  const ImVec2 size = ImGui::CalcTextSize(line.c_str());
+  const ImVec2 at(view.x + (view.width - size.x) / 2, view.y + view.height - 2.5f * size.y);
+  const auto alpha = [&](float most) { return most * float(std::min(1.0, left / fading)); };
+  const float margin = 8 * s.ui.scale;
+  ImDrawList& draw = *ImGui::GetBackgroundDrawList();
+  if (line.empty()) return;
+  draw.AddRectFilled(ImVec2(at.x - margin, at.y - margin / 2),
+                     ImVec2(at.x + size.x + margin, at.y + size.y + margin / 2),
+                     ImGui::GetColorU32(ImVec4(0.1f, 0.1f, 0.1f, alpha(0.6f))), margin / 2);
+  draw.AddText(at, ImGui::GetColorU32(ImVec4(1, 1, 1, alpha(1))), line.c_str());
+}
+
 // From what is held to the cursor: how far it lags says how hard it is pulled.
 void draw_pull(const Session& s, const Rect& view) {
   const Rect place = lane_place(s, s.loaded.chosen, view);
@@ -252,7 +278,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_COMMA, ", .", "slower, faster", [](Session& s) { change_speed(s, s.clock.halvings + 1); }},
       {GLFW_KEY_PERIOD, "", "", [](Session& s) { change_speed(s, s.clock.halvings - 1); }},
       {GLFW_KEY_R, "R", "reset", [](Session& s) { restart(s); }},
-      {GLFW_KEY_F, "F", "show all of the body", [](Session& s) { frame_body(s); }},
+      {GLFW_KEY_F, "F", "show all bodies and obstacles", [](Session& s) { frame_body(s); }},
       {GLFW_KEY_1, "1", "surface", [](Session& s) { set_look(s, Look::surface); }, GLFW_KEY_KP_1},
       {GLFW_KEY_2, "2", "with edges", [](Session& s) { set_look(s, Look::wire); }, GLFW_KEY_KP_2},
       {GLFW_KEY_3, "3", "tetrahedra", [](Session& s) { set_look(s, Look::tets); }, GLFW_KEY_KP_3},
@@ -276,7 +302,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_Z, "", "", redo, 0, GLFW_MOD_CONTROL | GLFW_MOD_SHIFT},
       {GLFW_KEY_S, "Ctrl + S", "save the scene with its settings", save_scene, 0, GLFW_MOD_CONTROL},
       {GLFW_KEY_DELETE, "Delete", "remove the chosen obstacle", remove_obstacle},
-      {GLFW_KEY_ESCAPE, "Esc", "close help; let go; close messages", escape},
+      {GLFW_KEY_ESCAPE, "Esc", "close a list or the help; let go; close messages", escape},
       {GLFW_KEY_Q, "Ctrl + Q", "quit", [](Session& s) { s.quit = true; }, 0, GLFW_MOD_CONTROL},
   };
   return rows;
@@ -310,6 +336,7 @@ void draw_ui(Session& s, const Layout& layout) {
         (chosen ? 3.0f : 1.0f) * s.ui.scale);
   }
   if (s.grab) draw_pull(s, layout.view);
+  draw_hints(s, layout.view);
   if (s.obstacle >= 0) {
     const auto& obstacle = s.loaded.scene.obstacles[std::size_t(s.obstacle)];
     const ImVec2 at = seen_at(s, lane_place(s, s.loaded.chosen, layout.view),

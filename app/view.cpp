@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "app/edit_obstacles.h"
+#include "render/obstacles.h"
 
 namespace tetpbd {
 
@@ -71,7 +72,7 @@ void draw_lanes(Session& s, const Target& target) {
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
       frame.caption = describe(lanes[i], !s.loaded.comparable);
       if (const auto far = lanes[i].far(); far && !lanes[i].stopped())
-        frame.caption += *far < 1e-3f ? ": less than 0.001 % off" : fmt::format(": {:.2g} % off", *far);
+        frame.caption += *far < 1e-3f ? ": same" : fmt::format(": {:.2g} % error", *far);
     }
     if (s.overlaid) frame.caption.clear();
     if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;
@@ -89,11 +90,20 @@ void draw_lanes(Session& s, const Target& target) {
 
 // Waits for the GPU, once for the keystroke: no kernel and no buffer stand by for so rare a question.
 void frame_body(Session& s) {
-  const Bounds box = bounds(read_state(s.loaded.sim()).positions);
+  const Sim& sim = s.loaded.sim();
+  const Bounds bodies = bounds(read_state(sim).positions);
+  const Bounds box = with_obstacles(bodies, *sim.model, simulated_time(sim), bodies.size());
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
   note_camera(s);
   s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
+}
+
+void keep_above_ground(Session& s) {
+  const Settings& world = s.loaded.sim().settings;
+  if (!world.ground || s.camera.target.y < float(world.ground_height)) return;
+  const float least = (float(world.ground_height) - s.camera.target.y) / s.camera.distance + 0.01f;
+  s.camera.elevation = std::max(s.camera.elevation, glm::degrees(std::asin(std::clamp(least, -1.0f, 1.0f))));
 }
 
 bool follow_bodies(Session& s, double elapsed) {

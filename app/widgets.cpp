@@ -1,11 +1,17 @@
 #include "app/widgets.h"
 
+#include <imgui_internal.h>
+
 #include <algorithm>
 #include <cstdio>
 
 namespace tetpbd {
 
 std::string label_of(const char* name) {
+  for (const auto& [parameter, written] : {std::pair<std::string_view, const char*>{"young_modulus", "Young's modulus"},
+                                           {"poisson_ratio", "Poisson's ratio"},
+                                           {"dt", "time step"}})
+    if (name == parameter) return written;
   std::string label = name;
   std::ranges::replace(label, '_', ' ');
   return label;
@@ -99,6 +105,33 @@ bool more(Session& s, const std::string& section, bool unusual) {
   return shown;
 }
 
+template <class T>
+bool edit_number(Session& s, const std::string& id, const std::string& name, T& value, T low, T high,
+                 const std::string& format, bool logarithmic, float speed) {
+  constexpr ImGuiDataType type = std::is_same_v<T, double> ? ImGuiDataType_Double : ImGuiDataType_S32;
+  const ImGuiID item = ImGui::GetID(id.c_str());
+  auto& typed = s.ui.typed;
+  const bool was_typed = typed && typed->first == item;
+  T shown = was_typed ? T(typed->second) : value;
+  const int flags = logarithmic ? ImGuiSliderFlags_Logarithmic : 0;
+  const bool edited = speed > 0 ? ImGui::DragScalar(id.c_str(), type, &shown, speed, &low, &high, format.c_str(), flags)
+                                : ImGui::SliderScalar(id.c_str(), type, &shown, &low, &high, format.c_str(), flags);
+  if (ImGui::TempInputIsActive(item)) {
+    typed = {item, double(shown)};
+    return false;
+  }
+  if (was_typed) typed.reset();
+  if ((!edited && !was_typed) || shown != shown) return false;  // "nan" was typed
+  const T allowed = std::clamp(shown, low, high);
+  if (allowed != shown)
+    say(s, fmt::format("{} goes from {} to {}: it is {} now", label_of(name.c_str()), low, high, allowed));
+  return std::exchange(value, allowed) != allowed;
+}
+template bool edit_number(Session&, const std::string&, const std::string&, double&, double, double, const std::string&,
+                          bool, float);
+template bool edit_number(Session&, const std::string&, const std::string&, int&, int, int, const std::string&, bool,
+                          float);
+
 bool button(Session& s, const char* label, const char* name, const char* help, float width) {
   const bool pressed = ImGui::Button(label, ImVec2(width, 0));
   describe_item(s, name, help);
@@ -117,14 +150,11 @@ bool check_box(Session& s, const char* label, bool& value, const std::string& he
 
 bool slider(Session& s, const char* label, double& value, double usual, double low, double high, const char* format,
             const char* help, bool logarithmic) {
-  const int flags = ImGuiSliderFlags_AlwaysClamp | (logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   const double before = value;
-  ImGui::SliderScalar(begin_row(s, label, value != usual).c_str(), ImGuiDataType_Double, &value, &low, &high, format,
-                      flags);
+  edit_number(s, begin_row(s, label, value != usual), label, value, low, high, format, logarithmic);
   char shown[64];
   std::snprintf(shown, sizeof shown, format, usual);
   if (end_row(s, label, help, before != usual ? shown : "")) value = usual;
-  if (value != value) value = before;  // "nan" was typed
   return value != before;
 }
 

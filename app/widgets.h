@@ -35,6 +35,12 @@ bool section(Session& session, const char* name, bool open = true);
 /// The rest of a section.
 bool more(Session& session, const std::string& section, bool unusual);
 
+/// A slider for a number (double or int), or where `speed` is above 0 a field that is dragged by that a pixel. What is
+/// typed into it counts from Enter on, or once the focus is elsewhere; beyond the range it is brought back, and said.
+template <class T>
+bool edit_number(Session& session, const std::string& id, const std::string& name, T& value, T low, T high,
+                 const std::string& format, bool logarithmic, float speed = 0);
+
 bool button(Session& session, const char* label, const char* name, const char* help, float width = 0);
 /// Whether it changed.
 bool check_box(Session& session, const char* label, bool& value, const std::string& help,

@@ -6,8 +6,11 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
+#include <cfloat>
 #include <cmath>
 #include <cstdlib>
+#include <deque>
 #include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 #include <string_view>
@@ -39,6 +42,16 @@ struct Seen {
   bool operator==(const Seen&) const = default;
 };
 
+/// What came from the desktop, as it came.
+struct Event {
+  enum class Kind { key, text, button, move, scroll, drop } kind;
+  int code = 0, scan = 0, action = 0, modifiers = 0;  ///< as GLFW has them; of a button and of text in `code`
+  double x = 0, y = 0;                                ///< cursor; of a scroll how far it was turned
+  bool of_cut = false;                                ///< a scroll with Alt or Ctrl
+  std::string file{};
+  double time = glfwGetTime();
+};
+
 struct Input {
   Session& session;
   Rect view{};
@@ -52,10 +65,14 @@ struct Input {
   double last_press = -1, press_x = 0, press_y = 0;  ///< s, and where: for double clicks
   Seen seen{};                                       ///< by the probe
   double rested = 0;                                 ///< s, since when the cursor is where it is
-  std::vector<std::function<void()>> events{};       ///< since the last frame, in order
+  std::deque<Event> waiting{};                       ///< that no frame has seen
+  std::vector<std::function<void()>> events{};       ///< of this frame, in order
+  ImVec2 cursor{-FLT_MAX, -FLT_MAX};                 ///< as Dear ImGui is told
+  std::array<bool, 3> down{};                        ///< buttons, likewise
+  double time = 0;                                   ///< s, of the event that is handled
 
   /// Something is under way that a frame must follow.
-  bool busy() const { return drag != Drag::none || pinning || !events.empty() || session.loaded.probe.asked(); }
+  bool busy() const { return drag != Drag::none || pinning || !waiting.empty() || session.loaded.probe.asked(); }
 };
 
 using Drag = Input::Drag;
@@ -123,7 +140,7 @@ void move(Input& in, double x, double y) {
   in.x = x, in.y = y;
   if (in.drag == Drag::obstacle && (dx != 0 || dy != 0)) drag_obstacle(in, ray_before, dx, dy);
   constexpr float degrees = 0.35f;  // a window coordinate: a turn of the wrist is half a turn of the view
-  if (in.drag == Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees);
+  if (in.drag == Drag::orbit) orbit(s.camera, -dx * degrees, dy * degrees), keep_above_ground(s);
   if (in.drag == Drag::cut) {
     const Rect place = lane_place(s, s.loaded.chosen, in.view);
     move_cut(s, cut_moved(s, dx, dy, place));
@@ -148,12 +165,12 @@ void press(Input& in, int button, int modifiers) {
   } else if (button == GLFW_MOUSE_BUTTON_RIGHT) {
     in.drag = Drag::orbit;
   } else if (left) {
-    const bool twice = s.now - in.last_press < double_click && std::abs(in.x - in.press_x) < same_place &&
+    const bool twice = in.time - in.last_press < double_click && std::abs(in.x - in.press_x) < same_place &&
                        std::abs(in.y - in.press_y) < same_place;
     in.turning = modifiers & GLFW_MOD_CONTROL;
     in.pinning = twice || in.turning;
     in.drag = Drag::asking;
-    in.last_press = twice ? -1 : s.now;
+    in.last_press = twice ? -1 : in.time;
     in.press_x = in.x, in.press_y = in.y;
     request(s.loaded.picker, s.loaded.renderer, shown_frame(s, s.loaded.chosen), ray_at_cursor(in));
   }
@@ -249,37 +266,100 @@ void hover(Input& in) {
   ask(probe, s.loaded.lanes, lane, s.loaded.renderer, shown_frame(s, lane), ray);
 }
 
-// Before Dear ImGui is started, which calls on what was installed. A queue of our own, since Dear ImGui
-// forgets what came and went within a frame, and frames of a software renderer are long.
+// All that comes waits here for a frame. Dear ImGui 1.86 looks once a frame at what is down, and would forget what came
+// and went between two frames, which are long with a software renderer.
 void listen(GLFWwindow* window, Input& input) {
   static const auto of = [](GLFWwindow* w) { return static_cast<Input*>(glfwGetWindowUserPointer(w)); };
   glfwSetWindowUserPointer(window, &input);
-  glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int, int action, int modifiers) {
-    // Held down, only the keys that step go on.
-    const bool again = action == GLFW_REPEAT && (code == GLFW_KEY_S || code == GLFW_KEY_RIGHT || code == GLFW_KEY_LEFT);
-    if (action == GLFW_PRESS || again)
-      of(w)->events.push_back([in = of(w), code, modifiers] { key(*in, code, modifiers); });
+  glfwSetKeyCallback(window, [](GLFWwindow* w, int code, int scan, int action, int modifiers) {
+    of(w)->waiting.push_back(
+        {.kind = Event::Kind::key, .code = code, .scan = scan, .action = action, .modifiers = modifiers});
+  });
+  glfwSetCharCallback(window, [](GLFWwindow* w, unsigned text) {
+    of(w)->waiting.push_back({.kind = Event::Kind::text, .code = int(text)});
   });
   glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int modifiers) {
-    double x = 0, y = 0;
-    glfwGetCursorPos(w, &x, &y);
-    of(w)->events.push_back([=, in = of(w)] {
-      move(*in, x, y);
-      action == GLFW_PRESS ? press(*in, button, modifiers) : release(*in, button);
-    });
+    Event event{.kind = Event::Kind::button, .code = button, .action = action, .modifiers = modifiers};
+    glfwGetCursorPos(w, &event.x, &event.y);
+    of(w)->waiting.push_back(event);
   });
-  glfwSetCursorPosCallback(
-      window, [](GLFWwindow* w, double x, double y) { of(w)->events.push_back([=, in = of(w)] { move(*in, x, y); }); });
+  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+    of(w)->waiting.push_back({.kind = Event::Kind::move, .x = x, .y = y});
+  });
+  glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) {
+    if (!entered) of(w)->waiting.push_back({.kind = Event::Kind::move, .x = -1e6, .y = -1e6});
+  });
   glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** files) {
-    if (count > 0)
-      of(w)->events.push_back([in = of(w), file = std::string(files[0])] { open_file(in->session, file); });
+    if (count > 0) of(w)->waiting.push_back({.kind = Event::Kind::drop, .file = files[0]});
   });
-  glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turned) {
-    bool of_cut = false;  // as it is now, not in the next frame
+  glfwSetScrollCallback(window, [](GLFWwindow* w, double across, double turned) {
+    Event event{.kind = Event::Kind::scroll, .x = across, .y = turned};
     for (const int held : {GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL})
-      of_cut = of_cut || glfwGetKey(w, held) == GLFW_PRESS;
-    of(w)->events.push_back([=, in = of(w)] { wheel(*in, turned, of_cut); });
+      event.of_cut = event.of_cut || glfwGetKey(w, held) == GLFW_PRESS;
+    of(w)->waiting.push_back(event);
   });
+  glfwSetWindowFocusCallback(window, ImGui_ImplGlfw_WindowFocusCallback);
+}
+
+void show_to_imgui(Input& in, GLFWwindow* window, const Event& e) {
+  using Kind = Event::Kind;
+  if (e.kind == Kind::key) ImGui_ImplGlfw_KeyCallback(window, e.code, e.scan, e.action, e.modifiers);
+  if (e.kind == Kind::text) ImGui_ImplGlfw_CharCallback(window, unsigned(e.code));
+  if (e.kind == Kind::scroll) ImGui_ImplGlfw_ScrollCallback(window, e.x, e.y);
+  if (e.kind == Kind::move || e.kind == Kind::button) in.cursor = ImVec2(float(e.x), float(e.y));
+  if (e.kind == Kind::button && e.code < int(in.down.size())) in.down[std::size_t(e.code)] = e.action == GLFW_PRESS;
+}
+
+// For what is no widget's.
+void show_to_view(Input& in, const Event& e) {
+  in.time = e.time;
+  switch (e.kind) {
+    case Event::Kind::key: {
+      // Held down, only the keys that step go on.
+      const bool steps = e.code == GLFW_KEY_S || e.code == GLFW_KEY_RIGHT || e.code == GLFW_KEY_LEFT;
+      if (e.action == GLFW_PRESS || (e.action == GLFW_REPEAT && steps)) key(in, e.code, e.modifiers);
+      break;
+    }
+    case Event::Kind::button:
+      move(in, e.x, e.y);
+      e.action == GLFW_PRESS ? press(in, e.code, e.modifiers) : release(in, e.code);
+      break;
+    case Event::Kind::move:
+      move(in, e.x, e.y);
+      break;
+    case Event::Kind::scroll:
+      wheel(in, e.y, e.of_cut);
+      break;
+    case Event::Kind::drop:
+      open_file(in.session, e.file);
+      break;
+    case Event::Kind::text:
+      break;
+  }
+}
+
+// Before ImGui::NewFrame(): as many of the events that wait as one frame can tell apart. A button or a key that went
+// down stays so for a frame, the cursor where it was when a button changed, and what is typed after a key that acts,
+// such as Enter, waits for what that does.
+void feed(Input& in, GLFWwindow* window) {
+  bool clicked = false, acted = false;
+  std::vector<int> keys;
+  using Kind = Event::Kind;
+  while (!in.waiting.empty()) {
+    const Event e = in.waiting.front();
+    const bool changes = e.kind == Kind::key && e.action != GLFW_REPEAT, presses = changes && e.action == GLFW_PRESS;
+    if (clicked && (e.kind == Kind::move || e.kind == Kind::button)) break;
+    if (changes && std::ranges::count(keys, e.code)) break;
+    if (acted && (presses || e.kind == Kind::text || e.kind == Kind::button)) break;
+    in.waiting.pop_front();
+    clicked = clicked || e.kind == Kind::button;
+    if (changes) keys.push_back(e.code);
+    const bool modifier = e.code >= GLFW_KEY_LEFT_SHIFT && e.code <= GLFW_KEY_RIGHT_SUPER;
+    const bool writes = e.code < 256 && !(e.modifiers & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER));
+    acted = acted || (presses && !modifier && !writes);
+    show_to_imgui(in, window, e);
+    in.events.push_back([&in, e] { show_to_view(in, e); });
+  }
 }
 
 // After ImGui::NewFrame(), which knows whose the cursor and the keys are.
@@ -398,9 +478,14 @@ void take_screenshots(Session& s, View& view) {
   });
 }
 
-void begin_imgui_frame() {
+void begin_imgui_frame(Input& input, GLFWwindow* window) {
+  feed(input, window);
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
+  // In place of what is down now, which some events that wait may have changed.
+  ImGuiIO& io = ImGui::GetIO();
+  io.MousePos = input.cursor;
+  std::ranges::copy(input.down, io.MouseDown);
   ImGui::NewFrame();
 }
 
@@ -419,21 +504,22 @@ void end_imgui_frame(const Desktop& d, const Target& target) {
 }
 
 // The first scene loads before there is anything to show, so this says what is going on.
-void show_start(Session& s, Desktop& d, const std::string& scene) {
+void show_start(Session& s, Input& input, Desktop& d, const std::string& scene) {
   for (int frame = 0; frame < 2; ++frame) {  // the first has no size for what it places
     glfwPollEvents();
     measure_window(d, s);
     const Layout layout = make_layout(s.ui, float(std::max(d.width, 1)), float(std::max(d.height, 1)));
     s.aspect = layout.view.width / layout.view.height;
     if (!d.visible) return;
-    begin_imgui_frame();
+    begin_imgui_frame(input, d.window);
+    input.events.clear();  // there is nothing yet for them
     draw_busy(layout, scene);
     end_imgui_frame(d, {});
   }
 }
 
 void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
-  begin_imgui_frame();
+  begin_imgui_frame(input, d.window);
   handle_input(input, make_layout(s.ui, float(d.width), float(d.height)).view);
   const Layout layout = make_layout(s.ui, float(d.width), float(d.height));  // a key can hide the panels
   const auto pixels = [&](float length) { return std::max(int(std::lround(length * d.density)), 1); };
@@ -454,18 +540,27 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
 
 int run_window(const Scene& scene, const std::string& name, const SceneOverrides& overrides,
                const RunOptions& options) {
-  Desktop desktop(options.size[0], options.size[1], "tetpbd");
+  const std::filesystem::path kept = cache_file("window.json");
+  const Preferences before_now = read_preferences(kept);
+  const RunOptions usual_options;
+  const bool as_before = options.size == usual_options.size && before_now.width > 0;
+  Desktop desktop(as_before ? before_now.width : options.size[0], as_before ? before_now.height : options.size[1],
+                  "tetpbd");
   Session s;  // after the desktop: its GL objects go before the context does
   s.gl = load_gl();
   count_gl_errors(print_gl_error);
   if (const char* file = std::getenv("TETPBD_WINDOW_LOG")) s.log.file.open(file);
-  s.samples = options.samples;
-  s.first_samples = options.samples;
+  Preferences written = s.ui.kept = before_now;
   s.view = options.view;
   s.view.follow = true;
+  // A software renderer draws without what costs most, unless somebody has chosen.
+  s.view.shadow = s.view.shadow && s.ui.kept.shadow.value_or(!s.gl.software);
+  s.samples = options.samples;
+  if (options.samples == usual_options.samples) s.samples = s.ui.kept.samples.value_or(s.gl.software ? 0 : s.samples);
+  s.first_samples = s.samples;
   s.first_view = s.view;
-  const std::filesystem::path kept = cache_file("window.json");
-  Preferences written = s.ui.kept = read_preferences(kept);
+  constexpr int first_runs = 3;
+  if (s.ui.kept.hints < first_runs && options.lanes.empty()) ++s.ui.kept.hints, s.hints_until = 25;
   // What cannot be kept is not worth a word.
   const auto keep = [&] {
     if (written == s.ui.kept || kept.empty()) return;
@@ -481,9 +576,9 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   Input input{s};
   listen(desktop.window, input);
   ImGui::CreateContext();
-  ImGui_ImplGlfw_InitForOpenGL(desktop.window, true);
+  ImGui_ImplGlfw_InitForOpenGL(desktop.window, false);
   ImGui_ImplOpenGL3_Init("#version 430 core");
-  show_start(s, desktop, "loading " + scene.name);
+  show_start(s, input, desktop, "loading " + scene.name);
   take_over(s, load(name, overrides, scene), false);
   if (!options.lanes.empty()) compare_lanes(s, options.lanes);
 
@@ -495,6 +590,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   long frames = 0;
   double before = glfwGetTime(), last_check = before, last_event = before;
   s.log("ready");
+  if (s.hints_until > 0) s.hints_until += before;
   while (!glfwWindowShouldClose(desktop.window) && !s.quit && !interrupted()) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
     const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task &&
@@ -505,13 +601,15 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
       glfwPollEvents();
     measure_window(desktop, s);
     s.now = glfwGetTime();
-    if (!input.events.empty()) last_event = s.now;
+    if (!input.waiting.empty()) last_event = s.now;
     const double elapsed = s.now - std::exchange(before, s.now);
     if (!desktop.visible) continue;
     if (!idle && ++frames > 2)
       s.frames_per_second.add(1 / std::max(elapsed, 1e-6), s.now);  // the first compile shaders
-    if (desktop.width != last_width || desktop.height != last_height)
+    if (desktop.width != last_width || desktop.height != last_height) {
+      if (last_width > 0) s.ui.kept.width = desktop.width, s.ui.kept.height = desktop.height;
       s.log("size {} {}", last_width = desktop.width, last_height = desktop.height);
+    }
     if (s.loaded.scene.name != title)
       glfwSetWindowTitle(desktop.window, ((title = s.loaded.scene.name) + " - tetpbd").c_str());
     if (s.vsync != vsync) glfwSwapInterval((vsync = s.vsync) ? 1 : 0);

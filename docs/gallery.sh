@@ -26,6 +26,7 @@ bunny=(--scene bunny-drop "${near[@]}" --set 'camera.target=[0,0.4,0]')
 armadillo=(--scene armadillo-drop "${near[@]}" --set 'camera.target=[0,0.45,0]')
 jelly=(--material neo-hookean --young-modulus 2e5 --poisson-ratio 0.4 --mode newton --substeps 2 --iterations 8)
 show hard 80 'A hard bunny after its fall' "${bunny[@]}" --set camera.distance=2.6 --mode node
+show bunny 64 'The scene that the window begins with: a bunny of jelly, solved by PBD' --scene bunny
 show jelly 64 'A bunny of jelly lands: where its volume changes' "${bunny[@]}" "${jelly[@]}" --colour volume
 show cut 64 'The same, cut open' "${bunny[@]}" "${jelly[@]}" --look tets --cut 0.55 --cut-axis 2 --colour energy --range 5000
 show paper 64 'The method of the paper: soft because the iterations do not converge' "${bunny[@]}" --solver paper --colour stretch

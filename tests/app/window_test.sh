@@ -53,9 +53,24 @@ xdotool keydown ctrl; to omega 0.5 0.5; press 1; release 1; xdotool keyup ctrl; 
 xdotool key ctrl+a; pause_for_frame
 for k in 1 period 2; do xdotool key $k; pause_for_frame; done
 new_events | grep -qE '^(look|step|colour)' && fail "typing into a slider worked a shortcut"
+new_events | grep -q '^set omega' && fail "a number was applied while it was being typed"
 xdotool keydown Return; pause_for_frame; xdotool keyup Return
 await '^set omega 1\.2'
 pause_for_frame  # keys are text for a frame more
+# Beyond its range it is brought back, and said; with Esc nothing changes; a click elsewhere is as good as Enter.
+type_omega() {
+  forget; xdotool keydown ctrl; to omega 0.5 0.5; press 1; release 1; xdotool keyup ctrl; pause_for_frame
+  xdotool key ctrl+a; pause_for_frame; xdotool key "$1"; pause_for_frame
+}
+type_omega 9; xdotool key Return; await '^message omega goes from 0 to 4: it is 4 now'; await '^set omega 4$'; pause_for_frame
+type_omega 3; xdotool key Escape; pause_for_frame; pause_for_frame
+new_events | grep -q '^set omega' && fail "Esc applied what was typed"
+type_omega 2; click "section World" 0.6; await '^set omega 2$'; pause_for_frame; pause_for_frame
+click "section World" 0.6; pause_for_frame; pause_for_frame
+type_omega 1; xdotool key Return; await '^set omega 1$'; pause_for_frame
+for _ in 1 2 3; do key ctrl+z; await '^undo'; done; await '^set omega 1\.2'
+# Esc closes a list, and changes nothing.
+click mode; await '^at mode=cpu '; pause_for_frame; key Escape; await '^list closed'; pause_for_frame
 # One drag is one change, which a right click, Ctrl+Z and a button take back.
 key ctrl+z; await '^undo'; await '^set omega (2\.[5-9]|3)'
 key ctrl+z; await '^undo'; await '^set omega 1\.5$'
@@ -77,6 +92,9 @@ click bend 0.1; await '^set constraints stretch,bend,volume|^set constraints str
 shot panels.png
 
 # ---------------------------------------------------------------------------------------------------------------- view
+# Out of the way, which stays so.
+click "section Solver" 0.1; await '^folded Solver'; sleep 0.5
+click "section Material" 0.1; await '^folded Material'; sleep 0.5
 for look in 2:wire 3:tets 1:surface; do key "${look%:*}"; await "^look ${look#*:}"; done
 for colour in volume stretch velocity motion; do key c; await "^colour $colour"; done
 shot plain.png; key w; await '^worst true'
@@ -100,9 +118,6 @@ key g; await '^grid false'
 key g; await '^grid true'
 key l; await '^follow false'
 key l; await '^follow true'
-# Out of the way, which stays so.
-click "section Solver" 0.1; await '^folded Solver'; sleep 0.5
-click "section Material" 0.1; await '^folded Material'; sleep 0.5
 click "section View more" 0.1; await '^opened View more'; sleep 0.5
 click grid 0.1; await '^grid false'
 click grid 0.1; await '^grid true'
@@ -112,8 +127,10 @@ shot view.png
 choose theme dark; await '^scale 1 dark'
 await_other view.png dark.png 100000 "the dark theme"
 choose theme light; await '^scale 1 light'
+click "section Scene" 0.1; await '^folded Scene'; sleep 0.5
 choose "text size" "125 %"; await '^scale 1.25 light'; sleep 0.5; shot larger.png
 to "text size" 0.5 0.5; forget; press 3; release 3; await '^back text size 100 %'; await '^scale 1 light'; sleep 0.5
+click "section Scene" 0.1; await '^opened Scene'; sleep 0.5
 drag 1 $((vx + vw)) $cy -60 0; release 1; await '^at edge '
 read -r _ _ now _ < <(place view); [[ $now -eq $((vw - 60)) ]] || fail "the panel is not wider by what its edge was dragged"
 drag 1 $((vx + vw - 60)) $cy 60 0; release 1; await "^at view 0 0 $vw "
@@ -125,6 +142,8 @@ forget; shot before.png
 drag 3 $cx $cy 80 20; release 3; await '^camera'
 await_other before.png turned.png 5000 "turning the view"
 drag 1 $((vx + 15)) $((vy + 15)) -80 0; release 1; await '^camera'
+for _ in 1 2 3; do drag 3 $cx $cy 0 -300; release 3; await '^camera'; done; sleep 0.5; shot ground.png  # not from below
+drag 3 $cx $cy 0 60; release 3; await '^camera'
 drag 2 $cx $cy 40 0; release 2; await '^camera'
 drag 2 $cx $cy -40 0; release 2; await '^camera'
 forget; xdotool click 4; await '^zoom'
@@ -207,7 +226,7 @@ key space; await '^pause'
 [[ $(new_events | grep -c '^lane [123] ') -ge 3 ]] || fail "lanes did not step together"
 forget; key j; await '^reset'; key k; await '^reset'
 [[ $(new_events | grep -c '^lane cpu-fast') -eq 2 ]] || fail "a lane more is not as the chosen one"
-choose "side by side" "one way"; await '^reset'
+choose "side by side" single; await '^reset'
 
 # --------------------------------------------------------------------------------------------------- stability map
 click "section Stability map" 0.1; sleep 0.5

@@ -138,6 +138,7 @@ int run_compare(const CompareOptions& options);
 struct MapOptions {
   std::string scene = "beam", x = "omega=0.5:4:8", y = "iterations=1,2,5,10,25,50";
   SceneOverrides overrides;
+  long steps = 0;  ///< of the scene's own dt; 0: its duration
   int gpu = -1;
   std::filesystem::path out = "map";
 };

@@ -134,8 +134,8 @@ Export::Export(const Sim& sim, const RunOptions& options)
       vtk(std::ranges::count(options.exports, "vtk") > 0),
       ply(std::ranges::count(options.exports, "ply") > 0),
       every(options.positions_every > 0 ? options.positions_every : steps_per_frame(sim.settings.dt)) {
-  if (vtk) make_output_folder(folder / "vtk");
-  if (ply) make_output_folder(folder / "ply");
+  if (vtk) make_output_folder(folder / "vtk"), remove_frames(folder / "vtk", ".vtu");
+  if (ply) make_output_folder(folder / "ply"), remove_frames(folder / "ply", ".ply");
   if (options.positions_every > 0) trajectory.emplace(folder / "trajectory.npy").add(npy_header(true, {}));
   if (std::ranges::count(options.exports, "pc2")) cache.emplace(folder / "surface.pc2").add(pc2_header(0, 0));
 }

@@ -41,6 +41,17 @@ void make_output_folder(const fs::path& folder) {
   if (error) throw Error("cannot write to the output folder", folder.string(), error.message());
 }
 
+void remove_frames(const fs::path& folder, const std::string& ending) {
+  std::vector<fs::path> old;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    const bool numbered = name.starts_with("frame_") && name.size() > 6 + ending.size() && name.ends_with(ending) &&
+                          name.find_first_not_of("0123456789", 6) == name.size() - ending.size();
+    if (numbered) old.push_back(entry.path());
+  }
+  for (const fs::path& file : old) fs::remove(file);
+}
+
 void write_png(const fs::path& file, const Image& image) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
@@ -88,16 +99,15 @@ Video::Video(const fs::path& file, int width, int height, double frames_per_seco
     throw Error("unknown video format", file.string(), "name it .mp4, .mkv, .webm or .gif");
   if (const fs::path folder = file.parent_path(); !folder.empty() && !fs::is_directory(folder))
     throw Error("no such folder", folder.string(), "make it first", 1);
-  if (width % 2 || height % 2)
-    throw Error("video needs an even size", fmt::format("{}x{}", width, height), "change --size");
   std::signal(SIGPIPE, SIG_IGN);  // a dead ffmpeg is an error of writing, not of ours
   // A session of its own: Ctrl-C in a terminal is for us, ffmpeg gets its last frames and ends the file.
   const std::string command = fmt::format(
-      "exec setsid ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgba -s {}x{} -r {:.6g} -i - {} {} {} >{} "
+      "exec setsid ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgba -s {}x{} -r {:.6g} -i - {} {} {} {} >{} "
       "2>&1",
-      width, height, frames_per_second, extension == ".gif" ? "" : "-pix_fmt yuv420p",
-      extension == ".mp4" ? "-movflags +faststart" : "", quoted("file:" + video_.part.string()),
-      quoted(log_.part.string()));
+      width, height, frames_per_second,
+      width % 2 || height % 2 ? "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2'" : "",  // which these formats ask for
+      extension == ".gif" ? "" : "-pix_fmt yuv420p", extension == ".mp4" ? "-movflags +faststart" : "",
+      quoted("file:" + video_.part.string()), quoted(log_.part.string()));
   pipe_ = ::popen(command.c_str(), "we");
   if (!pipe_) throw Error("cannot start ffmpeg", file.string(), std::strerror(errno), 1);
 }

@@ -16,6 +16,8 @@ namespace tetpbd {
 
 /// Makes the folder and checks that it can be written to.
 void make_output_folder(const std::filesystem::path& folder);
+/// Removes frame_NUMBER with this ending, which an earlier run left there and which would be taken for this one's.
+void remove_frames(const std::filesystem::path& folder, const std::string& ending);
 /// JSON text; bytes that are no UTF-8 (file names may hold any) are replaced.
 template <class Json>
 std::string json_text(const Json& document, int indent) {

@@ -257,6 +257,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   Metrics metrics = create_metrics(sim);
   const auto right = right_motion(*model, sim.settings, options.reference);
   std::optional<FrameWriter> frames;
+  if (options.png_every > 0) remove_frames(options.out, ".png");
   if (options.png_every > 0 || !options.video.empty()) frames.emplace(scene, sim, options, right ? &*right : nullptr);
   std::optional<GrowingFile> csv;
   if (options.csv_every > 0) csv.emplace(options.out / "stats.csv").add(csv_header());

@@ -18,6 +18,7 @@
 #include "sim/gl/gpu.h"
 #include "sim/interrupt.h"
 #include "sim/model/did_you_mean.h"
+#include "sim/model/material.h"
 #include "sim/solvers/solver.h"
 
 using namespace tetpbd;
@@ -169,6 +170,7 @@ void add_parameters(CLI::App& command, SceneOverrides& overrides) {
     std::string allowed = words.empty()
                               ? fmt::format(" [{:g} .. {:g}{}{}]", row.low, row.high, *row.unit ? " " : "", row.unit)
                               : fmt::format(": {}", fmt::join(words, ", "));
+    if (row.name == "material") allowed += fmt::format("; or {}", fmt::join(preset_names(material_presets()), ", "));
     if (row.name == "mode") {
       allowed = ":";
       for (const SolverMode& mode : solver_modes()) allowed += fmt::format("\n{}: {}", mode.name, mode.help);
@@ -186,11 +188,13 @@ void add_axes(CLI::App& command, Axes& axes) {
       "solver modes; paper: as published (default of compare: those that suit the scene)");
   add(command, "--iterations", axes.iterations, 1, 100000, "iterations a substep");
   add(command, "--substeps", axes.substeps, 1, 100000, "substeps a step");
+  const CLI::Transformer truth({{"false", "0"}, {"true", "1"}});
   add(command, "--rigid-contact", axes.rigid_contact, 0, 1,
       "whether touching hard bodies move as rigid ones (default: bench 0, as published; else the scene's)");
   add(command, "--mass-splitting", axes.mass_splitting, 0, 1,
       "whether masses are split; else corrections are averaged (default: bench 0, as published; else the "
       "scene's)");
+  for (const char* flag : {"--rigid-contact", "--mass-splitting"}) command.get_option(flag)->transform(truth);
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -381,6 +385,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(map, "--scene,--scenes", a.map.scene, "a scene");
   add(map, "--x", a.map.x, "a setting and its values: PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   add(map, "--y", a.map.y, "another");
+  add(map, "--steps", a.map.steps, 1L, most_steps, "of the scene's own dt (default: its duration)");
   add_overrides(map, a.map.overrides);
   add_parameters(map, a.map.overrides);
   add_gpu(map, a.map.gpu);
@@ -551,6 +556,8 @@ int main(int argc, char** argv) {
     return status;
   } catch (const Error& error) {
     return fail(error.what(), error.exit_status);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return fail(fmt::format("{}: {}: give another path", error.path1().string(), error.code().message()), 2);
   } catch (const std::bad_alloc&) {
     return fail(fmt::format("out of memory: {}: use a smaller mesh", argc > 1 ? argv[1] : "start"), 1);
   } catch (const std::exception& error) {

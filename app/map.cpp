@@ -108,6 +108,7 @@ int run_map(const MapOptions& options) {
               {}};
   ordered_json document = run_or_merge(sweep, {}, options.out, options.gpu, [&] {
     Scene scene = load_scene(options.scene, options.overrides);
+    if (options.steps > 0) scene.duration = double(options.steps) * scene.settings.dt;
     const auto model = build_model(scene);
     for (const Parameter* row : {x.row, y.row})
       if (is_of_material(*row) && all_have_own_materials(scene.settings))

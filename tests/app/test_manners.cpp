@@ -92,3 +92,43 @@ TEST_CASE("progress: where there is no terminal, a line at most every so often, 
   close(before), close(said);
   CHECK(read(file) == "filling a.obj, per cent: 50 of 100, 0 s left\n");
 }
+
+TEST_CASE("manners: frames of an earlier run go, odd videos are padded, long names are told, maps take steps") {
+  const Folder folder;
+  const std::string small = " --scene beam --set bodies.0.block.cells=[2,1,1] --out o --size 65x49 ";
+  const auto frames = [&] {
+    int count = 0;
+    for (const auto& entry : fs::directory_iterator(folder.path / "o")) count += entry.path().extension() == ".png";
+    return count;
+  };
+  std::ofstream(folder.path / "notes.png") << "mine";
+  CHECK(program("run --steps 4 --png-every 1" + small, folder).status == 0);
+  CHECK(frames() == 5);
+  fs::copy(folder.path / "notes.png", folder.path / "o" / "frame_notes.png");
+  CHECK(program("run --steps 2 --png-every 2" + small, folder).status == 0);
+  CHECK(frames() == 3);  // frame_00000, frame_00002, and what is none of ours
+  CHECK(program("run --steps 2 --export vtk --positions-every 1" + small, folder).status == 0);
+  CHECK(program("run --steps 2 --export vtk --positions-every 2" + small, folder).status == 0);
+  CHECK(!fs::exists(folder.path / "o" / "vtk" / "frame_00001.vtu"));
+  const Outcome odd = program("run --steps 8 --video odd.mp4" + small, folder);
+  CHECK_MESSAGE(odd.status == 0, odd.err);
+  CHECK(fs::file_size(folder.path / "odd.mp4") > 500);
+  const std::string endless(300, 'a');
+  for (const char* words :
+       {"run --mesh {}.ply", "run --from-state {}", "run --camera-path {} --png-every 1", "run --shaders {}"}) {
+    std::string line = words;
+    line.replace(line.find("{}"), 2, endless);
+    const Outcome outcome = program(line + " --steps 1", folder);
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == 2);
+    CHECK(outcome.err.find("File name too long") != std::string::npos);
+    CHECK(outcome.err.find("unexpected") == std::string::npos);
+  }
+  const std::string beam = " --scene beam --set bodies.0.block.cells=[2,1,1] ";
+  CHECK(program("map" + beam + "--x substeps=1,2 --y iterations=1,2 --steps 3 --out m", folder).status == 0);
+  CHECK(read(folder.path / "m" / "map.json").find("\"seconds\": 0.01") != std::string::npos);
+  CHECK(program("compare" + beam + "--modes node --mass-splitting true,false --steps 2 --judge volume --out c", folder)
+            .status == 0);
+  CHECK(read(folder.path / "c" / "compare.csv").size() > 100);
+  CHECK(program("run --help", folder).out.find("or rubber, gelatine, muscle, foam, clay") != std::string::npos);
+}

@@ -28,6 +28,7 @@ void adopt_model(Session& s, const std::shared_ptr<const Model>& model) {
 }  // namespace
 
 void put_obstacles(Session& s, std::vector<Obstacle> wanted) {
+  finish_step(s);
   for (Obstacle& o : wanted)
     if (!o.field) load_field(o);
   const std::vector<Obstacle> before = s.loaded.scene.obstacles;

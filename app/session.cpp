@@ -74,6 +74,7 @@ bool is_fixed(Session& s, std::uint32_t vertex) {
 }
 
 void put_settings(Session& s, const std::vector<Settings>& of_lanes) {
+  finish_step(s);
   const Settings old = s.loaded.sim().settings;
   for (std::size_t i = 0; i < of_lanes.size(); ++i) {
     Lane& lane = s.loaded.lanes[i];
@@ -135,27 +136,57 @@ void forget_errors(Session& s) {
                 [](const Message& m) { return m.error && !m.non_finite && !m.text.starts_with("shader "); });
 }
 
-void step_lanes(Session& s) {
+static void begin_step(Session& s) {
+  s.under_way.emplace();
   if (s.grab) {
     lead(*s.grab);
     const glm::dvec3& to = s.grab->position;
     note(s, {{"move", {s.hold->caught(), to.x, to.y, to.z}}});
   }
   note_moment(s);
+}
+
+static void end_step(Session& s) {
   auto& lanes = s.loaded.lanes;
-  for (Lane& lane : lanes) {
-    if (lanes.size() > 1 && check_finite(lane.sim)) continue;
-    if (s.grab) move_held(lane.sim, *s.hold, s.grab->position);
-    const auto begin = Steady::now();
-    step(lane.sim);
-    if (on_cpu(lane.sim) && s.measuring) lane.step_ms.add(seconds_since(begin) * 1e3, simulated_time(lane.sim));
-  }
+  s.step_seconds = s.under_way->seconds;
+  s.under_way.reset();
   if (s.loaded.right && !s.loaded.disturbed && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
   if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
   keep_moment(s);
   note_step(s);
+}
+
+bool step_lanes(Session& s, double seconds) {
+  const auto begin = Steady::now();
+  if (!s.under_way) begin_step(s);
+  const auto enough = [&] { return seconds_since(begin) > seconds; };
+  for (auto& [number, whole, of_lane] = *s.under_way; number < s.loaded.lanes.size(); ++number, of_lane = 0) {
+    Lane& lane = s.loaded.lanes[number];
+    const bool begins = lane.sim.substeps_done == 0;
+    if (begins && s.loaded.lanes.size() > 1 && check_finite(lane.sim)) continue;
+    if (begins && s.grab) move_held(lane.sim, *s.hold, s.grab->position);
+    const bool in_parts = seconds < 1e6;  // a timer of the driver would time what is drawn in between
+    if (in_parts) lane.sim.timed = false;
+    const auto part = Steady::now();
+    const bool ended = step_until(lane.sim, enough);
+    whole += seconds_since(part), of_lane += seconds_since(part);
+    if (!ended) return false;
+    if ((on_cpu(lane.sim) || in_parts) && s.measuring) lane.step_ms.add(of_lane * 1e3, simulated_time(lane.sim));
+    if (number + 1 < s.loaded.lanes.size() && enough()) return ++number, of_lane = 0, false;
+  }
+  end_step(s);
+  return true;
+}
+
+void step_lanes(Session& s) {
+  while (!step_lanes(s, 1e9)) {
+  }
+}
+
+void finish_step(Session& s) {
+  if (s.under_way) step_lanes(s);
 }
 
 void log_state(Session& s) {
@@ -204,6 +235,7 @@ bool attempt(Session& s, const std::function<void()>& action) {
 
 void play(Session& s, bool playing) {
   if (s.playing == playing) return;
+  if (!playing) attempt(s, [&] { finish_step(s); });
   s.playing = playing;
   s.clock.owed = 0;
   s.log("{}", playing ? "play" : "pause");
@@ -231,6 +263,7 @@ void change_speed(Session& s, int halvings) {
 
 void restart(Session& s) {
   let_go(s);
+  s.under_way.reset();  // reset() drops it
   const auto made_with_another = [&](const Parameter& row) {
     return row.effect == Effect::restart && differs(s.loaded.scene.settings, s.loaded.sim().settings, row);
   };
@@ -247,6 +280,7 @@ void restart(Session& s) {
 }
 
 void go_back(Session& s) {
+  finish_step(s);
   let_go(s);
   attempt(s, [&] {
     if (!check_finite(s.loaded.sim(), true)) return say(s, "the state is finite again");
@@ -333,6 +367,7 @@ void choose_soon(Session& s) {
 
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset(), s.hold.reset();
+  s.under_way.reset();
   s.changes = {};
   s.obstacle = -1;
   s.loaded = std::move(loaded);
@@ -390,6 +425,7 @@ std::string file_stem(std::string name) {
 }  // namespace
 
 void save_state_file(Session& s) {
+  finish_step(s);
   attempt(s, [&] {
     const fs::path file = free_name(file_stem(s.loaded.scene.name), "state");
     save_state(s.loaded.sim(), file);
@@ -398,6 +434,7 @@ void save_state_file(Session& s) {
 }
 
 void open_state(Session& s, const fs::path& file) {
+  finish_step(s);
   let_go(s);
   attempt(s, [&] {
     bool all = true;
@@ -514,6 +551,7 @@ void start_lanes(Session& s) {
 }
 
 void add_lane(Session& s, const std::string& words) {
+  finish_step(s);
   attempt(s, [&] {
     auto& lanes = s.loaded.lanes;
     if (lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
@@ -529,6 +567,7 @@ void add_lane(Session& s, const std::string& words) {
 void remove_lane(Session& s) {
   auto& lanes = s.loaded.lanes;
   if (lanes.size() == 1) return;
+  finish_step(s);
   let_go(s);
   lanes.erase(lanes.begin() + std::ptrdiff_t(s.loaded.chosen));
   s.loaded.chosen = std::min(s.loaded.chosen, lanes.size() - 1);
@@ -544,6 +583,7 @@ void choose_lane(Session& s, std::size_t lane) {
 }
 
 void compare_lanes(Session& s, const std::vector<std::string>& words) {
+  finish_step(s);
   attempt(s, [&] {
     const Sim& first = s.loaded.lanes.front().sim;
     const Settings base = words.empty() ? first.settings : s.loaded.scene.settings;
@@ -562,6 +602,7 @@ void compare_lanes(Session& s, const std::vector<std::string>& words) {
 
 void toggle_pin(Session& s, std::uint32_t vertex) {
   if (is_fixed(s, vertex)) return;
+  finish_step(s);
   disturb(s);
   s.timeline.looping = false;
   s.timeline.touched.insert(vertex);
@@ -573,6 +614,7 @@ void toggle_pin(Session& s, std::uint32_t vertex) {
 }
 
 void hold_vertex(Session& s, std::uint32_t vertex, std::size_t lane, double radius) {
+  finish_step(s);
   disturb(s);
   s.timeline.looping = false;
   note(s, {{"grab", vertex}, {"lane", lane}, {"radius", radius}});
@@ -591,6 +633,7 @@ void catch_vertex(Session& s, const Pick& pick) {
 
 void let_go(Session& s) {
   if (!s.hold) return;
+  finish_step(s);
   note(s, {{"release", s.hold->caught()}});
   for (Lane& lane : s.loaded.lanes) unpin_held(lane.sim, *s.hold);
   if (s.grab) s.log("release {} moved {:.4f}", s.hold->caught(), glm::length(s.grab->position - s.grab->start));
@@ -644,11 +687,16 @@ void advance(Session& s, double elapsed) {
   constexpr double patience = 0.04;  // s of stepping between two frames
   const auto begin = Steady::now();
   int taken = 0;
-  while ((clock.fast || clock.owed >= dt) && (!queued || taken < clock.most_steps)) {
-    step_lanes(s);
+  // A step that takes longer than a frame may is taken in parts, so that the window answers in between.
+  const bool in_parts = s.under_way || (!queued && s.step_seconds > patience);
+  while ((clock.fast || clock.owed >= dt || s.under_way) && (!queued || taken < clock.most_steps)) {
+    if (!in_parts)
+      step_lanes(s);
+    else if (!step_lanes(s, patience))
+      break;
     clock.owed -= dt;
     ++taken;
-    if (seconds_since(begin) > patience) break;
+    if (in_parts || seconds_since(begin) > patience) break;
   }
   if (queued && elapsed > 0.066) clock.most_steps = std::max(1, clock.most_steps / 2);
   if (queued && elapsed < 0.033 && taken == clock.most_steps)
@@ -699,6 +747,7 @@ void fill_map(Session& s) {
 void follow_shaders(Session& s) {
   const auto version = shader_folder_version();
   if (version == s.loaded.sim().shader_version) return;
+  finish_step(s);
   const bool done = attempt(s, [&] {
     for (Lane& lane : s.loaded.lanes) rebuild_shaders(lane.sim), lane.metrics.reset();
     note(s, {{"shaders", "edited"}});

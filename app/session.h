@@ -160,6 +160,13 @@ struct Session {
   bool playing = true, vsync = true;
   bool take_screenshot = false, quit = false;
   double hints_until = 0;  ///< s, of `now`
+  /// A step of all lanes under way: the lane that is next, and what it took so far.
+  struct UnderWay {
+    std::size_t lane = 0;
+    double seconds = 0, of_lane = 0;
+  };
+  std::optional<UnderWay> under_way{};
+  double step_seconds = 0;  ///< that the last step took where it returns when it is done
   Clock clock;
   Timeline timeline;
   std::unique_ptr<Record> record{};        ///< if anybody wants it
@@ -196,6 +203,11 @@ void play(Session& session, bool playing);
 void single_step(Session& session);
 /// All lanes; throws what a step throws.
 void step_lanes(Session& session);
+/// Goes on with a step of all lanes, or begins one, for about so many seconds, which ends between two substeps of a GPU
+/// mode; true once it is whole.
+bool step_lanes(Session& session, double seconds);
+/// To be called before anything but drawing touches a lane: ends the step under way.
+void finish_step(Session& session);
 /// For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& session);
 inline constexpr int most_halvings = 5;

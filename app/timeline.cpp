@@ -59,6 +59,7 @@ void show(Session& s, std::size_t index) {
 
 void go(Session& s, std::size_t index) {
   if (index >= s.timeline.moments.size()) return;
+  attempt(s, [&] { finish_step(s); });
   let_go(s);
   play(s, false);
   s.timeline.looping = false;
@@ -142,6 +143,7 @@ void go_forward(Session& s) {
 void loop_on(Session& s) {
   const Timeline& t = s.timeline;
   if (t.moments.size() < 2) return;
+  attempt(s, [&] { finish_step(s); });
   const double dt = s.loaded.sim().settings.dt;
   const std::size_t before = std::min(place_of(t, steps_of(s.loaded.lanes)), t.moments.size() - 1);
   std::size_t index = before;

@@ -10,6 +10,7 @@
 // then unbinds that of the generic target as well. GL errors that nobody asked for are dropped.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -73,11 +74,13 @@ struct Sim : StepValues {
   Yielding yielding;  ///< where any body yields
   Tuning tuning;
   double longest_substep = 0;       ///< s, the longest that is stable at rest, in mode explicit
+  int substeps_done = 0;            ///< of a step under way; 0: there is none
   std::int64_t shader_version = 0;  ///< shader_folder_version() at the last build
 
   State host;   ///< state of a CPU mode; the GPU buffers follow it
   Timer timer;  ///< around the GPU passes of each step, while `timed`
   bool timed = false;
+  bool step_timed = false;  ///< that of the step under way
   Recorder recorder;
   GuardCounts guards{};       ///< since the last reset; ask guard_counts()
   FiniteCheck check;          ///< ask check_finite()
@@ -97,6 +100,9 @@ void apply_settings(Sim& sim, const Settings& settings);
 void rebuild_shaders(Sim& sim);
 /// Queues one step on the GPU (CPU modes: steps, then uploads). Does not wait.
 void step(Sim& sim);
+/// Begins a step, or goes on with the one under way, until it is whole or, between two substeps, `enough` says so; true
+/// once it is whole. While one is under way nothing but this, drawing and destroying is allowed. A CPU mode's is whole.
+bool step_until(Sim& sim, const std::function<bool()>& enough);
 /// Back to the model's start.
 void reset(Sim& sim);
 /// Goes on with these attachments alone let go of.

@@ -99,6 +99,7 @@ void begin_on_gpu(Sim& sim, bool moving) {
   activate(sim);
   plan_body_contacts(sim);
   bind_obstacles(sim.obstacles);
+  sim.step_timed = sim.timed;
   if (sim.timed) sim.timer.begin();
   sim.recorder.barrier(GL_SHADER_STORAGE_BARRIER_BIT);  // a picture may still be reading these buffers
   copy_rest_metrics(sim);
@@ -135,41 +136,66 @@ void break_attachments(Sim& sim) {
 
 }  // namespace
 
-void step(Sim& sim) {
-  const KeepBindings kept;  // a caller may use GL as well
-  sim.solver.prepare(sim);  // readbacks, number of substeps, preconditioner
-  const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
-  if (on_cpu(sim)) {
-    begin_leading(sim);
-    activate(sim);
-    sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
-    end_leading(sim);
-    flow(sim);
-    upload(sim, sim.host);
-  } else {
-    begin_on_gpu(sim, moving);
-    begin_leading(sim);
-    for (int k = 0; k < sim.plan.substeps; ++k) {
-      if (moving) bind_next_obstacles(sim);
-      move_rigid_bodies(sim);
-      aim_led(sim, k);
-      list_pairs(sim, k);
-      lead(sim, k);
-      find_loads(sim, k);
-      sim.solver.substep(sim, k);
-      if (are_faces_due(sim.plan, k)) move_faces_out(sim);
-      resolve_body_contacts(sim, k + 1 == sim.plan.substeps);
-    }
-    end_leading(sim);
-    flow(sim);
-    // Vertex fetches and copies read the state next.
-    sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-    if (sim.timed) sim.timer.end();
-  }
+static void run_substep(Sim& sim, bool moving) {
+  const int k = sim.substeps_done++;
+  if (moving) bind_next_obstacles(sim);
+  move_rigid_bodies(sim);
+  aim_led(sim, k);
+  list_pairs(sim, k);
+  lead(sim, k);
+  find_loads(sim, k);
+  sim.solver.substep(sim, k);
+  if (are_faces_due(sim.plan, k)) move_faces_out(sim);
+  resolve_body_contacts(sim, k + 1 == sim.plan.substeps);
+}
+
+static void end_step(Sim& sim) {
+  sim.substeps_done = 0;
   ++sim.steps;
-  if (on_cpu(sim) && moving) write_obstacles(sim);
   check_step(sim);
   break_attachments(sim);
+}
+
+static void step_on_cpu(Sim& sim, bool moving) {
+  sim.solver.prepare(sim);
+  begin_leading(sim);
+  activate(sim);
+  sim.solver.substep(sim, 0);  // a CPU mode takes all substeps in one call
+  end_leading(sim);
+  flow(sim);
+  upload(sim, sim.host);
+  end_step(sim);
+  if (moving) write_obstacles(sim);
+}
+
+void step(Sim& sim) {
+  step_until(sim, [] { return false; });
+}
+
+bool step_until(Sim& sim, const std::function<bool()>& enough) {
+  const KeepBindings kept;  // a caller may use GL as well
+  const bool moving = std::ranges::any_of(sim.model->obstacles, moves);
+  if (on_cpu(sim)) return step_on_cpu(sim, moving), true;
+  if (sim.substeps_done == 0) {
+    sim.solver.prepare(sim);  // readbacks, number of substeps, preconditioner
+    begin_on_gpu(sim, moving);
+    begin_leading(sim);
+  } else {
+    give_buffers(sim);
+    bind_obstacles(sim.obstacles);
+    if (sim.loads) bind_texels(UNIT_LOADS, sim.loads.texture);
+  }
+  while (sim.substeps_done < sim.plan.substeps) {
+    run_substep(sim, moving);
+    if (sim.substeps_done < sim.plan.substeps && enough()) return false;
+  }
+  end_leading(sim);
+  flow(sim);
+  // Vertex fetches and copies read the state next.
+  sim.recorder.barrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  if (sim.step_timed) sim.timer.end();
+  end_step(sim);
+  return true;
 }
 
 }  // namespace tetpbd

@@ -119,7 +119,7 @@ TEST_CASE("faults: a full disk") {
   Program nothing(folder, with(short_run, {"--out", "a"}), files_of_at_most(150));
   check_failed(nothing, "cannot be written");
   CHECK(fs::is_empty(folder.path / "a"));
-  Program some(folder, with(plain_run, {"--out", "b"}), files_of_at_most(6000));
+  Program some(folder, with(plain_run, {"--out", "b"}), files_of_at_most(7000));
   check_failed(some, ".npy");  // statistics fit, positions do not
   CHECK(!fs::exists(folder.path / "b/positions.npy"));
   CHECK(nlohmann::json::parse(content(folder.path / "b/stats.json")).contains("timing"));

@@ -7,12 +7,15 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <sstream>
+#include <utility>
 
 #include "app/commands.h"
 #include "app/export.h"
 #include "app/files.h"
 #include "app/lanes.h"
+#include "app/map.h"
 #include "app/record.h"
 #include "sim/error.h"
 #include "sim/gl/gpu.h"
@@ -42,6 +45,7 @@ struct Arguments {
   BenchOptions bench;
   CompareOptions compare;
   MapOptions map;
+  bool varied = false;  ///< an axis of the map by --vary
   bool hard_cases = false;
   ReproduceOptions reproduce;
   MeshOptions mesh;
@@ -182,6 +186,40 @@ void add_parameters(CLI::App& command, SceneOverrides& overrides) {
   }
 }
 
+/// NAME=VALUES: what compare and bench vary, by the words that map and lanes have for it.
+void vary(Axes& axes, const std::string& text) {
+  const std::string name = text.substr(0, text.find('='));
+  const std::vector<std::string> words = split(text.substr(std::min(text.find('=') + 1, text.size())), ',');
+  if (name == "mode" || name == "element") {
+    if (words.empty()) throw Error("no values", "--vary " + text, "write " + name + "=A,B");
+    (name == "mode" ? axes.modes : axes.elements) = words;
+    return;
+  }
+  const MapAxis axis = map_axis(text, "--vary");
+  if (name != "omega" && name != "iterations" && name != "substeps")
+    throw Error(fmt::format("'{}' does not vary here", name), "--vary " + text,
+                "give mode, element, omega, iterations or substeps; tetpbd map varies any two numbers");
+  if (name == "omega") axes.omegas.clear();
+  std::vector<int>& whole = name == "iterations" ? axes.iterations : axes.substeps;
+  if (name != "omega") whole.clear();
+  for (const std::string& value : axis.values)
+    name == "omega" ? axes.omegas.push_back(std::stod(value)) : whole.push_back(std::stoi(value));
+}
+
+/// --vary, given once for each setting.
+void add_vary(CLI::App& command, const std::string& help, const std::function<void(const std::string&)>& take) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--vary",
+          [take](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) take(text);
+          },
+          help + "; VALUES as in 1,2,5 or FROM:TO:COUNT")
+      ->type_name("NAME=VALUES")
+      ->expected(1)
+      ->take_all();
+}
+
 /// Lists of modes, iterations and substeps, every combination of which is run.
 void add_axes(CLI::App& command, Axes& axes) {
   add(command, "--modes,--mode", axes.modes,
@@ -194,6 +232,8 @@ void add_axes(CLI::App& command, Axes& axes) {
   add(command, "--mass-splitting", axes.mass_splitting, 0, 1,
       "whether masses are split; else corrections are averaged (default: bench 0, as published; else the "
       "scene's)");
+  add_vary(command, "mode, element, omega, iterations or substeps; once for each that varies",
+           [&axes](const std::string& text) { vary(axes, text); });
   for (const char* flag : {"--rigid-contact", "--mass-splitting"}) command.get_option(flag)->transform(truth);
 }
 
@@ -385,6 +425,8 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(map, "--scene,--scenes", a.map.scene, "a scene");
   add(map, "--x", a.map.x, "a setting and its values: PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   add(map, "--y", a.map.y, "another");
+  add_vary(map, "a setting with a number: the first across, the second upwards",
+           [&a](const std::string& text) { (std::exchange(a.varied, true) ? a.map.y : a.map.x) = text; });
   add(map, "--steps", a.map.steps, 1L, most_steps, "of the scene's own dt (default: its duration)");
   add_overrides(map, a.map.overrides);
   add_parameters(map, a.map.overrides);

@@ -130,5 +130,18 @@ TEST_CASE("manners: frames of an earlier run go, odd videos are padded, long nam
   CHECK(program("compare" + beam + "--modes node --mass-splitting true,false --steps 2 --judge volume --out c", folder)
             .status == 0);
   CHECK(read(folder.path / "c" / "compare.csv").size() > 100);
+  // The same words for what varies everywhere.
+  CHECK(program("map" + beam + "--vary substeps=1,2 --vary iterations=1:3:2 --steps 3 --out n", folder).status == 0);
+  CHECK(read(folder.path / "n" / "map.csv").find("2,3,") != std::string::npos);
+  CHECK(program("compare" + beam +
+                    "--vary mode=node,cpu --vary substeps=1,2 --vary omega=1,1.5 --steps 2 --judge volume --out d",
+                folder)
+            .status == 0);
+  const std::string rows = read(folder.path / "d" / "compare.csv");
+  CHECK(std::count(rows.begin(), rows.end(), '\n') >= 7);
+  const Outcome other = program("compare" + beam + "--vary density=1,2", folder);
+  CHECK(other.status == 2);
+  CHECK(program("compare" + beam + "--vary dt=0.001,0.002", folder).err.find("tetpbd map varies any") !=
+        std::string::npos);
   CHECK(program("run --help", folder).out.find("or rubber, gelatine, muscle, foam, clay") != std::string::npos);
 }

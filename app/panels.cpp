@@ -299,7 +299,8 @@ void draw_lane_rows(Session& s) {
   if (const auto name = combo(s, "side by side", lanes.size() > 1 ? "custom" : "single", ways.words, ways.help))
     compare_lanes(s, std::ranges::find(comparisons(), *name, &Comparison::name)->lanes);
   const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
-  if (button(s, "Add a lane", "add lane", "the same bodies once more, with the settings of this lane to change\nK",
+  if (button(s, "Add a lane", "add lane",
+             "the same bodies once more, to compare: soft ones first by a solver that converges; settings to change\nK",
              width))
     add_lane(s);
   ImGui::SameLine();

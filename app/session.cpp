@@ -550,15 +550,27 @@ void start_lanes(Session& s) {
   for (const Lane& lane : s.loaded.lanes) s.log("lane {}", describe(lane));
 }
 
-void add_lane(Session& s, const std::string& words) {
+// A soft body's second lane is a solver that converges, so that the first one's error is seen; else a lane is as the
+// chosen one, to be changed.
+static std::string words_of_next_lane(const Session& s) {
+  const Sim& own = s.loaded.sim();
+  if (s.loaded.lanes.size() > 1 || !has_forces(own.settings)) return "";
+  constexpr double few = 100;
+  const bool slow = solver_mode(own.settings).leapfrog || explicit_substeps(*own.model, own.settings) > few;
+  return slow && !solver_mode(own.settings).implicit ? "newton" : slow ? "mode=newton,iterations=16" : "mode=explicit";
+}
+
+void add_lane(Session& s, const std::string& wanted) {
   finish_step(s);
   attempt(s, [&] {
     auto& lanes = s.loaded.lanes;
     if (lanes.size() >= most_lanes) return say(s, fmt::format("there are {} lanes: no more fit", most_lanes));
     const Sim& own = s.loaded.sim();
     let_go(s);
+    const std::string words = wanted.empty() ? words_of_next_lane(s) : wanted;
     lanes.push_back({create_sim(own.model, lane_settings(own.settings, words, "--lane " + words, own.model))});
-    s.loaded.chosen = lanes.size() - 1;
+    // The panel stays with what is compared with the solver that converges.
+    if (!wanted.empty() || words.empty()) s.loaded.chosen = lanes.size() - 1;
     s.ui.hinted[2] = true;
     start_lanes(s);
   });

@@ -72,7 +72,9 @@ void draw_lanes(Session& s, const Target& target) {
       frame.options.legend = s.view.legend && i + 1 == lanes.size();
       frame.caption = describe(lanes[i], !s.loaded.comparable);
       if (const auto far = lanes[i].far(); far && !lanes[i].stopped())
-        frame.caption += *far < 1e-3f ? ": same" : fmt::format(": {:.2g} % error", *far);
+        frame.caption += i == right && !right_now(s) ? ": reference"
+                         : *far < 1e-3f              ? ": same"
+                                                     : fmt::format(": {:.2g} % error", *far);
     }
     if (s.overlaid) frame.caption.clear();
     if (s.overlaid && i > 0) frame.over = true, frame.options.shadow = false;

@@ -22,7 +22,7 @@ namespace {
 double most_seconds() { return is_software_renderer() ? 8 : 3; }
 constexpr int most_substeps = 1000;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double finer = 8;        // times the substeps, of the run that stands in for the right motion
+constexpr double finer = 8;        // times the substeps, of the run that stands in for the reference motion
 constexpr double no_error = 1e-3;  // percent: below it settings are equally right
 constexpr double fitting = 1.05;   // of the budget: times differ by as much from run to run
 
@@ -73,7 +73,7 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
   }
 }
 
-/// What stands in for the right motion: leapfrog at a tenth of what is stable where there are forces and that
+/// What stands in for the reference motion: leapfrog at a tenth of what is stable where there are forces and that
 /// takes no longer, else more substeps.
 Sim finer_than(const Settings& settings, const std::shared_ptr<const Model>& model) {
   Settings fine = settings;
@@ -253,7 +253,7 @@ std::string describe(const SolverChoice& choice) {
                      s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps,
                      plan.substeps == 1 ? "" : "s", s.omega,
                      s.mass_splitting && !any_material(s, compliant) ? ", masses split" : "", best.ms, choice.budget_ms,
-                     fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the right motion"
+                     fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the reference motion"
                                               : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
                                                                                : "loss {:.3g} %"),
                                  best.error),

@@ -36,7 +36,7 @@ Motion motion_of_run(Sim& sim, long steps);
 /// The budget without --budget-ms: a tenth of the time that a step simulates.
 double default_budget_ms(const Settings& settings);
 /// Tries the scene's own setting, and one iteration per substep in mode node, with two over-relaxations and
-/// with masses split, and in mode cpu-fast. Held against the right motion (RMS over the steps) where it is in
+/// with masses split, and in mode cpu-fast. Held against the reference motion (RMS over the steps) where it is in
 /// the cache or that of rigid bodies; else with compliance or k = 1 against a run in much finer steps; else
 /// by the largest volume loss. Everything else stays as in `settings`. Some seconds; needs a GL context.
 /// Throws Error where nothing fits the budget.
@@ -52,7 +52,7 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model);
 std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model);
 /// Both, and says on standard output what was chosen.
 std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model);
-/// "node, 17 substeps, omega 2.5: 0.143 ms of 0.15 ms a step, 0.02 % from the right motion over 160 steps"
+/// "node, 17 substeps, omega 2.5: 0.143 ms of 0.15 ms a step, 0.02 % from the reference motion over 160 steps"
 std::string describe(const SolverChoice& choice);
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice);
 

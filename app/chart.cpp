@@ -190,13 +190,13 @@ std::string map_svg(const nlohmann::ordered_json& document) {
     motion = motion || std::isfinite(number(row, "motion_rms"));
   }
   const double wide = (right - left) / double(xs.size()), high = (bottom - top) / double(ys.size());
-  std::string svg = head(
-      fmt::format("{}: {} against {}", document["scene"].get<std::string>(), document["y"].get<std::string>(),
-                  document["x"].get<std::string>()),
-      fmt::format("mode {}, {} tets, {:g} s: {}", document["mode"].get<std::string>(), document["tets"].get<long>(),
-                  document["seconds"].get<double>(),
-                  motion ? "distance from the right motion over the run, % of the size" : "largest net volume loss, %"),
-      document["x"], document["y"]);
+  std::string svg = head(fmt::format("{}: {} against {}", document["scene"].get<std::string>(),
+                                     document["y"].get<std::string>(), document["x"].get<std::string>()),
+                         fmt::format("mode {}, {} tets, {:g} s: {}", document["mode"].get<std::string>(),
+                                     document["tets"].get<long>(), document["seconds"].get<double>(),
+                                     motion ? "distance from the reference motion over the run, % of the size"
+                                            : "largest net volume loss, %"),
+                         document["x"], document["y"]);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& row = rows[i];
     const double x = left + double(note(xs, row["x"])) * wide, y = bottom - double(note(ys, row["y"]) + 1) * high;

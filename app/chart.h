@@ -44,7 +44,7 @@ glm::dvec3 heat(double part);
 double heat_part(double percent);
 
 /// Cells of two settings as `tetpbd map` found them, coloured by decades of the error of the motion (of the
-/// largest volume loss where no right motion is known); those that failed say at which step.
+/// largest volume loss where no reference motion is known); those that failed say at which step.
 std::string map_svg(const nlohmann::ordered_json& document);
 
 /// Writes NAME.svg and, with rsvg-convert, NAME.png; says on standard error when that is missing.

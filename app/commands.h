@@ -30,7 +30,7 @@ struct RunOptions {
   std::filesystem::path video;         ///< empty: none
   long video_every = 0;                ///< steps a video frame; 0: real time at 30 frames a second
   long csv_every = 1;                  ///< steps; 0: no stats.csv
-  std::filesystem::path reference;     ///< the right motion; empty: the cache's, if any
+  std::filesystem::path reference;     ///< the reference motion; empty: the cache's, if any
   long measure_every = 1;              ///< steps between measurements; the last step is measured in any case
   bool positions = false;              ///< of the end, as arrays
   std::filesystem::path from_state;    ///< what it goes on from; empty: the scene's start
@@ -142,7 +142,7 @@ struct MapOptions {
   int gpu = -1;
   std::filesystem::path out = "map";
 };
-/// `tetpbd map`: the scene's duration for each pair of values of two settings, held against the right motion,
+/// `tetpbd map`: the scene's duration for each pair of values of two settings, held against the reference motion,
 /// which is found anew where they change it.
 int run_map(const MapOptions& options);
 

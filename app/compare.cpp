@@ -46,7 +46,7 @@ struct Judge {
   double scale;
 };
 constexpr Judge judges[] = {
-    {"motion", "motion_final", "distance from the right motion, % of the size", 100},
+    {"motion", "motion_final", "distance from the reference motion, % of the size", 100},
     {"volume", "max_volume_loss_percent", "largest volume loss, %", 1},
     {"strain", "stretch_rms_peak", "largest RMS strain of edges, %", 100},
     {"overlap", "overlap_max", "how deep bodies are in each other, % of the size", 100},
@@ -229,7 +229,7 @@ Chart course_chart(const ordered_json& document, const Judge& judge) {
   Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
               all ? "mode, iterations x substeps" : "what is on the front; labels: mode, iterations x substeps",
               "time, s",
-              fmt::format("distance from the {}, % of the size", total ? "motion on finer meshes" : "right motion"),
+              fmt::format("distance from the {}, % of the size", total ? "motion on finer meshes" : "reference motion"),
               false,
               true};
   for (const auto& row : document["rows"]) {
@@ -270,7 +270,8 @@ Axes axes_for(const CompareOptions& options, const Settings& own) {
   return axes;
 }
 
-/// The right motions of the tets that rows have: what else is varied decides how a scene is solved, not how it moves.
+/// The reference motions of the tets that rows have: what else is varied decides how a scene is solved, not how it
+/// moves.
 void find_right_motions(Subject& subject, const CompareOptions& options) {
   const Axes elements{.elements = options.axes.elements};
   for (const std::string& mode : axes_for(options, subject.scene.settings).modes)  // baselines solve linear tets
@@ -352,7 +353,7 @@ int run_compare(const CompareOptions& options) {
   fmt::print("judged by {}: {}{}\n", judge.name, judge.label,
              judge.scale == 100 ? " in the chart, a part of it in the columns" : "");
   if (options.judge.empty() && std::string(judge.name) == "volume")
-    fmt::print("the right motion is not known; --judge motion finds it\n");
+    fmt::print("the reference motion is not known; --judge motion finds it\n");
   if (std::ranges::all_of(rows, [&](const auto& row) { return error_by(judge, row) == 0; }))
     fmt::print("no error in {} steps: take more --steps, or these say nothing\n", text_of(document["steps"]));
   const Quantity error = [&](const ordered_json& row) { return error_by(judge, row); };

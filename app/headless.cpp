@@ -54,7 +54,7 @@ struct FrameWriter {
                          target)) {
     const double rate = std::clamp(1 / (double(video_every) * dt), 1.0, 120.0);  // of real time
     if (run.view.colour == Colour::motion && !right)
-      throw Error("the right motion is not known", "--colour motion", "find it with tetpbd reference first");
+      throw Error("the reference motion is not known", "--colour motion", "find it with tetpbd reference first");
     if (run.view.colour == Colour::residual && any_material(scene.settings, compliant))
       throw Error("constraints with compliance give way as they should", "--colour residual",
                   "take --colour energy or stretch");

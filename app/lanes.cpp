@@ -206,7 +206,7 @@ bool send_answers(const Motion& right, long step, Buffer& answers) {
     const glm::vec3 high(p);
     positions.push_back({high, 0, glm::vec3(p - glm::dvec3(high)), 0});
   }
-  if (!answers) answers = Buffer("right motion", positions, GL_STREAM_DRAW);
+  if (!answers) answers = Buffer("reference motion", positions, GL_STREAM_DRAW);
   answers.write(0, answers.bytes(), positions.data());
   return true;
 }

@@ -1,5 +1,5 @@
 // Simulations side by side: the same bodies, start and clock, each with its own way to solve; and how far
-// each is from the right motion.
+// each is from the reference motion.
 #pragma once
 
 #include <string>
@@ -71,12 +71,12 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
 
 /// That lanes have taken, but for stopped ones.
 long steps_of(const std::vector<Lane>& lanes);
-/// The lane that others are held against where the right motion is not known: mode explicit, else the one
+/// The lane that others are held against where the reference motion is not known: mode explicit, else the one
 /// with most iterations.
 std::size_t yardstick(const std::vector<Lane>& lanes);
 /// The one that is nearest to what is right now.
 std::size_t best_lane(const std::vector<Lane>& lanes);
-/// After a step of all lanes: adds each one's distance from the right motion, where this has that step, or
+/// After a step of all lanes: adds each one's distance from the reference motion, where this has that step, or
 /// from the yardstick; every fourth step, of large bodies more rarely. Waits for the GPU then.
 void hold_lanes(std::vector<Lane>& lanes, const Motion* right);
 /// Sends where `right` has the vertices at this step; false where it is not kept.

@@ -62,7 +62,7 @@ void begin_cell(LiveMap& map) {
   }
 }
 
-// Some sixteen times in a run; of the right motion only where it is kept.
+// Some sixteen times in a run; of the reference motion only where it is kept.
 bool is_instant(const LiveMap& map, long step) {
   if (step == map.steps) return true;
   return step % std::max(1l, map.steps / 16) == 0 && (!map.right || is_kept(*map.right, step));

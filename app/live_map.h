@@ -1,5 +1,5 @@
 // The map of `tetpbd map`, filled beside what the window does: a simulation of its own steps a little in
-// every frame, and the right motions of soft bodies are found in a thread.
+// every frame, and the reference motions of soft bodies are found in a thread.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@ namespace tetpbd {
 struct MapCell {
   enum State { waiting, running, finished, failed, refused } state = waiting;
   Settings settings;
-  double percent = 0;  ///< from the right motion over the run, of the size; without one the largest net volume loss
+  double percent = 0;  ///< from the reference motion over the run, of the size; without one the largest net volume loss
   long failed_at = 0;  ///< step
   std::string why{};   ///< refused
 };

@@ -345,7 +345,7 @@ void add_commands(CLI::App& app, Arguments& a) {
       ->excludes("--turntable", "--follow");
   add(run, "--csv-every", a.run.csv_every, 0L, most_steps, "a row of stats.csv every K steps, 0: none");
   add(run, "--reference", a.run.reference,
-      "the right motion, made by tetpbd reference (default: the cache's of this scene)");
+      "the reference motion, made by tetpbd reference (default: the cache's of this scene)");
   add(run, "--measure-every", a.run.measure_every, 1L, most_steps, "measure errors every K steps and at the end");
   run.add_flag("--positions", a.run.positions,
                "write positions, velocities, rest (positions), tets, faces and bodies (of vertices) as .npy");
@@ -378,7 +378,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add_progress(run, a.run.progress);
 
   CLI::App& reference =
-      command("reference", "finds the right motion of a scene and keeps it: what runs are held against",
+      command("reference", "finds the reference motion of a scene and keeps it: what runs are held against",
               [](const Arguments& a) { return run_reference(*a.opened, a.reference); });
   add_scene(reference, a);
   add(reference, "--steps", a.reference.steps, 1L, most_steps, "steps of the scene (default: its duration)");

@@ -20,7 +20,7 @@ struct MapAxis {
 /// "omega=0.5,1,1.5", or "young_modulus=1e4:1e7:7": evenly, or by equal factors where the slider goes so.
 /// Throws Error naming `flag`.
 MapAxis map_axis(const std::string& text, const std::string& flag);
-/// The cache's right motion over so many steps, or one found now; none for scenes without one. `progress` is
+/// The cache's reference motion over so many steps, or one found now; none for scenes without one. `progress` is
 /// told of each step that is done.
 std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps,
                                  const std::function<void(long)>& progress = {});

@@ -24,8 +24,8 @@ std::string words_of(const LiveMap& map, const MapCell& cell) {
   if (cell.state == MapCell::failed) return fmt::format("not finite at step {}", cell.failed_at);
   if (cell.state == MapCell::refused) return cell.why;
   if (cell.state == MapCell::finished)
-    return fmt::format("{:.3g} % {}", cell.percent, map.motion ? "from the right motion" : "of volume lost");
-  return cell.state == MapCell::running || !map.search ? "not yet" : "its right motion is being found";
+    return fmt::format("{:.3g} % {}", cell.percent, map.motion ? "from the reference motion" : "of volume lost");
+  return cell.state == MapCell::running || !map.search ? "not yet" : "its reference motion is being found";
 }
 
 void draw_grid(Session& s, const LiveMap& map) {
@@ -85,7 +85,7 @@ void draw_grid(Session& s, const LiveMap& map) {
   ImGui::Dummy(ImVec2(whole, 1));
   ImGui::TextWrapped("%s over %s: %s, %%; @: the step at which it fails", label_of(map.y.row->name.c_str()).c_str(),
                      label_of(map.x.row->name.c_str()).c_str(),
-                     map.motion ? "distance from the right motion" : "largest loss of volume");
+                     map.motion ? "distance from the reference motion" : "largest loss of volume");
 }
 
 }  // namespace

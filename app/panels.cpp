@@ -319,7 +319,7 @@ void draw_lane_rows(Session& s) {
   }
   check_box(s, "overlaid", s.overlaid, "all lanes in one place, in their colours\nO", false);
   ImGui::SameLine(label_width());
-  check_box(s, "ghost", s.ghost, "in each lane, grey, the one that is nearest to the right motion", true);
+  check_box(s, "ghost", s.ghost, "in each lane, grey, the one that is nearest to the reference motion", true);
 }
 
 void draw_colour_range(Session& s) {

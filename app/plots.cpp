@@ -46,7 +46,7 @@ std::string lane_name(const Session& s, const Curve& curve) {
 
 std::string title_of(const Session& s, const PlotRow& row) {
   const bool right = right_now(s);
-  const std::string from = right ? "distance from the right motion" : "distance from the finest lane";
+  const std::string from = right ? "distance from the reference motion" : "distance from the finest lane";
   const Settings& own = s.loaded.sim().settings;
   if (row.of == &Lane::energy && !any_material(own, has_energy) && !all_materials(own, hard))
     return "energy but for elastic";

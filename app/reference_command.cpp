@@ -109,7 +109,7 @@ std::filesystem::path find_and_keep(const Scene& scene, const Model& model, cons
   std::error_code ignored;  // a folder that cannot be made is named when the file is written
   if (options.out.empty()) std::filesystem::create_directories(file.parent_path(), ignored);
   const long steps = options.steps > 0 ? options.steps : duration_in_steps(scene);
-  Progress progress(options.method == "ten-node" ? "the motion on finer meshes" : "the right motion", steps,
+  Progress progress(options.method == "ten-node" ? "the motion on finer meshes" : "the reference motion", steps,
                     options.progress);
   const Motion motion = find_motion(input, steps, options.method, file.string() + ".unfinished",
                                     [&](long done) { progress.update(done); });

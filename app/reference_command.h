@@ -1,4 +1,4 @@
-// `tetpbd reference`: finds a scene's right motion (sim/reference/motion.h) and keeps it in a file; and those
+// `tetpbd reference`: finds a scene's reference motion (sim/reference/motion.h) and keeps it in a file; and those
 // files.
 #pragma once
 

@@ -89,8 +89,9 @@ void check_motions(Checks& checks) {
       if (mode.implicit) settings.substeps = 2, settings.iterations = 8;
       const MeasuredRun run = run_model(model, settings, steps, &right, false);
       const double most = !soft ? 0.01 : mode.leapfrog ? 1e-4 : 0.02;
-      checks.add(fmt::format("{}, {}: distance from the right motion over the size", soft ? "soft" : "hard", mode.name),
-                 run.errors.finite ? run.motion->final : std::nan(""), most);
+      checks.add(
+          fmt::format("{}, {}: distance from the reference motion over the size", soft ? "soft" : "hard", mode.name),
+          run.errors.finite ? run.motion->final : std::nan(""), most);
     }
   }
 }
@@ -124,7 +125,7 @@ std::vector<std::string> speeds(Checks& checks) {
                        const Motion& right, double most) {
     const MeasuredRun measured = run_model(model, settings, right.kept.back(), &right);
     const double error = measured.errors.finite ? measured.motion->final : std::nan("");
-    checks.add(what + ": distance from the right motion", error, most);
+    checks.add(what + ": distance from the reference motion", error, most);
     said.push_back(fmt::format("{} {:.3g} ms {:.1e}", what,
                                median(measured.gpu_ms.empty() ? measured.wall_ms : measured.gpu_ms), error));
   };

@@ -152,7 +152,7 @@ static void end_step(Session& s) {
   s.under_way.reset();
   if (s.loaded.right && !s.loaded.disturbed && s.loaded.sim().steps > s.loaded.right->kept.back()) disturb(s);
   if ((lanes.size() > 1 && s.loaded.comparable) || right_now(s)) hold_lanes(lanes, right_now(s));
-  if (right_now(s)) hold_vertices(s);  // of few steps the right motion is kept
+  if (right_now(s)) hold_vertices(s);  // of few steps the reference motion is kept
   s.clock.simulated += s.loaded.sim().settings.dt;
   keep_moment(s);
   note_step(s);
@@ -501,7 +501,7 @@ void choose_colour(Session& s, Colour colour) {
   if (s.loaded.disturbed)
     say(s, "no reference after your change: R compares again");
   else if (!s.loaded.right && s.loaded.lanes.size() == 1)
-    say(s, "no right motion is known: tetpbd reference finds it, or hold lanes against each other (K)");
+    say(s, "no reference motion is known: tetpbd reference finds it, or hold lanes against each other (K)");
 }
 
 void find_worst(Session& s) {

@@ -44,7 +44,7 @@ struct Loaded {
   std::optional<Motion> right{};         ///< where it is known, of several lanes or for its colours
   bool comparable = true;                ///< lanes differ in how they are solved alone
   bool disturbed = false;                ///< they are no longer held against it, until they start anew
-  Buffer answers{};                      ///< where the right motion has the vertices
+  Buffer answers{};                      ///< where the reference motion has the vertices
   long held = -1;                        ///< step at which vertices were last held against it
   Probe probe{};
   FlattestTet flattest{};  ///< at rest
@@ -244,7 +244,7 @@ void keep_above_ground(Session& session);
 void choose_colour(Session& session, Colour colour);
 /// Whether there is something to colour by.
 bool has_colour(const Session& session, Colour colour);
-/// What lanes are held against now, where the right motion is known.
+/// What lanes are held against now, where the reference motion is known.
 const Motion* right_now(const Session& session);
 /// How far each vertex is from it, if somebody looks at that.
 void hold_vertices(Session& session);

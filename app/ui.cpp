@@ -144,7 +144,7 @@ void draw_reading(const Session& s, const Reading& r) {
     row("edge strain", fmt::format("{:+.3g} %", 100 * r.strain));
     if (r.energy) row("elastic energy", fmt::format("{:.4g} J/m\u00b3", *r.energy));
     if (r.distance)
-      row(right_now(s) ? "from the right motion" : "from the finest lane",
+      row(right_now(s) ? "from the reference motion" : "from the finest lane",
           fmt::format("{:.3g} % of size", 100 * *r.distance));
     ImGui::EndTable();
   }

@@ -46,7 +46,7 @@ void require_reference(const ReferenceInput& input) {
   const Settings& settings = input.settings;
   const char* hint =
       "k = 1 for all kinds and free bodies has a rigid body's motion, compliance of all kinds a material's";
-  const auto refuse = [&](const std::string& what) { throw Error("the scene has no right motion", what, hint); };
+  const auto refuse = [&](const std::string& what) { throw Error("the scene has no reference motion", what, hint); };
   if (!input.model.fixtures.empty()) refuse("fixed vertices move");
   if (!input.model.attachments.empty()) refuse("bodies are attached to each other");
   if (!input.model.loads.empty()) refuse("forces beside gravity act");
@@ -278,7 +278,7 @@ Motion find_motion(const ReferenceInput& input, long steps, const std::string& m
                     : !touching && most_stable * stable < input.settings.dt ? "implicit"
                                                                             : "leapfrog";
   if (touching && motion.method != "leapfrog")
-    throw Error("no right motion of bodies that touch each other", motion.method,
+    throw Error("no reference motion of bodies that touch each other", motion.method,
                 "give them a material, and use leapfrog");
   if ((motion.method == "rigid body") == soft)
     throw Error("no method for this scene", method,

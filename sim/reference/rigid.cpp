@@ -142,7 +142,7 @@ std::vector<RigidBody> rigid_bodies(const Model& model) {
                    slip = glm::length(b.velocity + glm::cross(spin, arm) - model.velocities[i]);
       if (apart > 1e-6 * model.size || slip > 1e-6 * (glm::length(b.velocity) + glm::length(spin) * model.size))
         throw Error("no rigid body", fmt::format("{} starts deformed, or deforming", body.name),
-                    "k = 1 has a right motion from the rest shape only");
+                    "k = 1 has a reference motion from the rest shape only");
     });
     bodies.push_back(b);
   }

@@ -101,7 +101,7 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     CHECK(choice->trials.back().settings == own);
     CHECK(choice->trials.end()[-2].settings.mode == (soft ? "newton" : "cpu-fast"));
     CHECK(choice->trials[choice->best].fits);
-    // Against the right motion, found anew: 1.3 times the best error that fits, at most.
+    // Against the reference motion, found anew: 1.3 times the best error that fits, at most.
     const ConstraintSystem system = build_constraints(model->rest, own);
     const Motion right = find_motion({*model, system, own, model->inverse_masses}, choice->steps);
     double chosen = 0, least = 1;
@@ -116,10 +116,10 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     CHECK(chosen > 0);
     CHECK(chosen <= 1.3 * std::max(least, 5e-5));
     CHECK(describe(*choice).find("of 4 ms a step") != std::string::npos);
-    CHECK(describe(*choice).find(soft ? "from finer steps" : "from the right motion") != std::string::npos);
+    CHECK(describe(*choice).find(soft ? "from finer steps" : "from the reference motion") != std::string::npos);
     CHECK(solver_choice_json(*choice)["trials"].size() == choice->trials.size());
     if (soft) continue;
-    // k between 0 and 1 has no right motion.
+    // k between 0 and 1 has no reference motion.
     Settings paper = own;
     paper.stiffness[index_of<Volume>] = 0.5;
     CHECK(choose_solver(model, paper, 4, 5).judged == "volume");

@@ -1,4 +1,4 @@
-// tetpbd map: cells of two settings, held against the right motion, and their picture.
+// tetpbd map: cells of two settings, held against the reference motion, and their picture.
 #include <doctest/doctest.h>
 
 #include <nlohmann/json.hpp>
@@ -9,7 +9,7 @@
 using namespace tetpbd;
 using namespace run_program;
 
-TEST_CASE("map: a cell for each pair of values, in the order given, held against its own right motion") {
+TEST_CASE("map: a cell for each pair of values, in the order given, held against its own reference motion") {
   const Folder folder;
   const std::string small = "map --scene beam --set bodies.0.block.cells=[4,2,2] --set duration=0.1 ";
   REQUIRE(program(small + "--material springs --young-modulus 1e5 --mode node --substeps 2 --x iterations=1,8 "
@@ -81,8 +81,8 @@ TEST_CASE("map: its picture has a cell of the error's colour each, and says wher
   document["rows"] = {row("1", "0.1", 1e-6, nullptr), row("2", "0.1", 1.0, nullptr), row("1", "0.2", nullptr, 17),
                       row("2", "0.2", 0.01, nullptr)};
   const std::string svg = map_svg(document);
-  for (const char* part : {"a&lt;b: dt against omega", "distance from the right motion", ">fails at 17<", ">0.0001<",
-                           ">100<", ">1<", "fill=\"#333333\"", "fill=\"#304f94\"", "fill=\"#d64533\""})
+  for (const char* part : {"a&lt;b: dt against omega", "distance from the reference motion", ">fails at 17<",
+                           ">0.0001<", ">100<", ">1<", "fill=\"#333333\"", "fill=\"#304f94\"", "fill=\"#d64533\""})
     CHECK_MESSAGE(svg.find(part) != std::string::npos, std::string(part));
   document["rows"] = {row("1", "0.1", nullptr, nullptr)};
   const std::string again = map_svg(document);

@@ -133,7 +133,7 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
   }
 }
 
-TEST_CASE("window: lanes step together from a common start, and are held against the right motion") {
+TEST_CASE("window: lanes step together from a common start, and are held against the reference motion") {
   GlTest gl;
   Session s;
   show_beam(s);
@@ -287,9 +287,9 @@ TEST_CASE("window: a history is all of it in even steps, and the newest, plots a
   REQUIRE(chart.series.size() == 2);
   CHECK(chart.series[0].points.size() == s.loaded.lanes[0].distance.values.size());
   CHECK(chart.series[1].points.back().x == doctest::Approx(s.loaded.lanes[1].distance.times.back()));
-  CHECK(to_svg(chart).find("distance from the right motion") != std::string::npos);
+  CHECK(to_svg(chart).find("distance from the reference motion") != std::string::npos);
   const std::string csv = plot_csv(s, distance);
-  CHECK(csv.starts_with("lane,time [s],distance from the right motion [%]\n\"node, 5 substeps\",0"));
+  CHECK(csv.starts_with("lane,time [s],distance from the reference motion [%]\n\"node, 5 substeps\",0"));
   CHECK(std::ranges::count(csv, '\n') == 1 + 2 * std::ssize(chart.series[0].points));
   const Measurement now = measure_now(*s.loaded.lanes[0].metrics, s.loaded.lanes[0].sim);
   CHECK(double(s.loaded.lanes[0].energy.values.back()) == doctest::Approx(now.energy()).epsilon(0.2));
@@ -350,7 +350,7 @@ TEST_CASE("window: a map is filled a little in every frame, each cell as a run o
     CHECK(cell.percent == doctest::Approx(100 * error.rms).epsilon(1e-6));
   }
   CHECK_FALSE(s.loaded.map->sim);  // done: it holds nothing
-  // A material's right motion is found meanwhile; what a mode does not take is said.
+  // A material's reference motion is found meanwhile; what a mode does not take is said.
   Settings soft = lane_settings(own, "foam,mode=explicit", "");
   soft.stability = 0.01;
   const auto cells = fill(soft, "young_modulus=1e5,1e12", "omega=1,1.5");

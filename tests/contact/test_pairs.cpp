@@ -458,7 +458,7 @@ TEST_CASE("pairs: modes without contact between bodies refuse it, and so do refe
   const auto model = blocks({{{0, 0, 0}}, {{0.6, 0, 0}}});
   hard.mode = "node";
   CHECK_THROWS_WITH(find_motion({*model, {}, hard, model->inverse_masses}, 2),
-                    doctest::Contains("no right motion of bodies that touch"));
+                    doctest::Contains("no reference motion of bodies that touch"));
 }
 
 TEST_CASE("pairs: explicit, newton and PBD are held against a reference in which bodies touch") {

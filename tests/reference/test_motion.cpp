@@ -1,4 +1,4 @@
-// The right motions of reference/: rigid bodies and leapfrog against closed forms, each other and implicit
+// The reference motions of reference/: rigid bodies and leapfrog against closed forms, each other and implicit
 // Euler.
 #include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
@@ -429,5 +429,5 @@ TEST_CASE("reference: a motion is kept, found by runs, taken up where it was, an
   CHECK(program("run --scene soft.json --reference soft.json --out r", folder, cache)
             .err.find("not the motion of a scene: soft.json") != std::string::npos);
   CHECK(program("reference --scene soft.json --k-volume 0.5", folder, cache)
-            .err.find("the scene has no right motion: k_volume is 0.5") != std::string::npos);
+            .err.find("the scene has no reference motion: k_volume is 0.5") != std::string::npos);
 }

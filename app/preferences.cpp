@@ -17,22 +17,8 @@ constexpr std::size_t most_recent = 8, most_names = 64;
 
 }  // namespace
 
-// nlohmann/json of Debian 12 knows no std::optional.
-static void to_json(nlohmann::json& to, const Preferences& p) {
-  to = {{"dark", p.dark},     {"panel", p.panel}, {"text", p.text}, {"width", p.width},
-        {"height", p.height}, {"hints", p.hints}, {"open", p.open}, {"recent", p.recent}};
-  if (p.samples) to["samples"] = *p.samples;
-  if (p.shadow) to["shadow"] = *p.shadow;
-}
-static void from_json(const nlohmann::json& from, Preferences& p) {
-  const auto take = [&](const char* name, auto& value) {
-    if (from.contains(name)) from.at(name).get_to(value);
-  };
-  take("dark", p.dark), take("panel", p.panel), take("text", p.text), take("width", p.width);
-  take("height", p.height), take("hints", p.hints), take("open", p.open), take("recent", p.recent);
-  if (from.contains("samples")) p.samples = from.at("samples").get<int>();
-  if (from.contains("shadow")) p.shadow = from.at("shadow").get<bool>();
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Preferences, dark, panel, text, width, height, samples, shadow, hints,
+                                                open, recent)
 
 Preferences read_preferences(const fs::path& file) {
   Preferences read;
@@ -44,7 +30,7 @@ Preferences read_preferences(const fs::path& file) {
   read.panel = std::clamp(read.panel, least_panel, most_panel);
   read.text = std::clamp(read.text, least_text, most_text);
   if (read.width < 480 || read.height < 320 || read.width > 16384 || read.height > 16384) read.width = read.height = 0;
-  if (read.samples && !std::ranges::count(std::array{0, 2, 4, 8}, *read.samples)) read.samples.reset();
+  if (!std::ranges::count(std::array{0, 2, 4, 8}, read.samples)) read.samples = -1;
   if (read.open.size() > most_names) read.open.clear();
   if (read.recent.size() > most_recent) read.recent.resize(most_recent);
   return read;

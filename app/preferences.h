@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,8 +13,8 @@ struct Preferences {
   double panel = 320;                  ///< its width, in window coordinates of a display of scale 1
   double text = 1;                     ///< size of text and widgets, on top of the display's scale
   int width = 0, height = 0;           ///< of the window, in its coordinates; 0: nobody has changed it
-  std::optional<int> samples{};        ///< of MSAA, where somebody has chosen
-  std::optional<bool> shadow{};        ///< likewise
+  int samples = -1;                    ///< of MSAA; -1: nobody has chosen
+  int shadow = -1;                     ///< 0 or 1, likewise
   int hints = 0;                       ///< how often the first hints were shown
   std::map<std::string, bool> open{};  ///< parts of the panel that somebody opened or folded
   std::vector<std::string> recent{};   ///< scenes and meshes, the newest first

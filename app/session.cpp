@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -167,7 +168,7 @@ bool step_lanes(Session& s, double seconds) {
     const bool begins = lane.sim.substeps_done == 0;
     if (begins && s.loaded.lanes.size() > 1 && check_finite(lane.sim)) continue;
     if (begins && s.grab) move_held(lane.sim, *s.hold, s.grab->position);
-    const bool in_parts = seconds < 1e6;  // a timer of the driver would time what is drawn in between
+    const bool in_parts = std::isfinite(seconds);  // a timer of the driver would time what is drawn in between
     if (in_parts) lane.sim.timed = false;
     const auto part = Steady::now();
     const bool ended = step_until(lane.sim, enough);
@@ -181,7 +182,7 @@ bool step_lanes(Session& s, double seconds) {
 }
 
 void step_lanes(Session& s) {
-  while (!step_lanes(s, 1e9)) {
+  while (!step_lanes(s, std::numeric_limits<double>::infinity())) {
   }
 }
 
@@ -663,7 +664,7 @@ std::optional<Advice> faster_way(const Session& s) {
     if (s.samples == 0 && !s.view.shadow) return Advice{"a smaller window", ""};
     return Advice{"turn off MSAA and shadows", "", [](Session& to) {
                     to.ui.kept.samples = to.samples = 0;
-                    to.ui.kept.shadow = to.view.shadow = false;
+                    to.view.shadow = false, to.ui.kept.shadow = 0;
                     to.log("MSAA and shadows off");
                   }};
   }

@@ -67,9 +67,10 @@ void draw_status(Session& s, const Rect& place) {
     if (faster->words.empty() && !faster->act) {
       ImGui::TextColored(alarm(s), "%s", faster->said.c_str());
     } else {
-      if (ImGui::SmallButton(faster->said.c_str()) && faster->act)
+      const bool pressed = ImGui::SmallButton(faster->said.c_str());
+      if (pressed && faster->act)
         faster->act(s);
-      else if (ImGui::IsItemActivated())
+      else if (pressed)
         attempt(s, [&] { change_settings(s, lane_settings(sim.settings, faster->words, faster->said)); });
       mark(s, "faster");
     }

@@ -554,9 +554,10 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   s.view = options.view;
   s.view.follow = true;
   // A software renderer draws without what costs most, unless somebody has chosen.
-  s.view.shadow = s.view.shadow && s.ui.kept.shadow.value_or(!s.gl.software);
+  s.view.shadow = s.view.shadow && (s.ui.kept.shadow < 0 ? !s.gl.software : s.ui.kept.shadow != 0);
   s.samples = options.samples;
-  if (options.samples == usual_options.samples) s.samples = s.ui.kept.samples.value_or(s.gl.software ? 0 : s.samples);
+  if (options.samples == usual_options.samples)
+    s.samples = s.ui.kept.samples >= 0 ? s.ui.kept.samples : s.gl.software ? 0 : s.samples;
   s.first_samples = s.samples;
   s.first_view = s.view;
   constexpr int first_runs = 3;

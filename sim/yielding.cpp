@@ -33,7 +33,7 @@ std::vector<layout::YieldRecord> records_at_start(const SolverInput& input) {
   return records;
 }
 
-std::vector<double> metrics_of(const std::vector<layout::YieldRecord>& records) {
+std::vector<double> metrics_in(const std::vector<layout::YieldRecord>& records) {
   std::vector<double> metrics;
   metrics.reserve(numbers * records.size());
   for (const layout::YieldRecord& record : records)
@@ -69,7 +69,7 @@ void run_pass(Sim& sim, unsigned flows) {
 }  // namespace
 
 void put_rest_metrics(ConstraintList& tets, const TetMesh& mesh, const std::vector<double>& metrics) {
-  const auto of = tets_of(mesh, tets.count(), [&](std::size_t c) { return tets.ends(c); });
+  const auto of = find_tets(mesh, tets.count(), [&](std::size_t c) { return tets.ends(c); });
   for (std::size_t c = 0; c < of.size(); ++c)
     std::copy_n(&metrics[numbers * of[c]], numbers, &tets.rest[NeoHookean::row.values * c]);
 }
@@ -79,7 +79,7 @@ Yielding make_yielding(const SolverInput& input, const Solver& solver) {
   if (!any_material(input.settings, yields) || input.model.rest.tets.empty()) return y;
   y.at_start = records_at_start(input);
   const ConstraintList& list = input.system.lists[index_of<NeoHookean>];
-  const auto of = tets_of(input.model.rest, list.count(), [&](std::size_t c) { return list.ends(c); });
+  const auto of = find_tets(input.model.rest, list.count(), [&](std::size_t c) { return list.ends(c); });
   const Grouped copies = group_by_key(solver.rest_copies.size(), y.at_start.size(), [&](std::size_t k, auto&& emit) {
     emit(of[solver.rest_copies[k][0]], solver.rest_copies[k][1]);
   });
@@ -111,13 +111,13 @@ void write_rest_metrics(Sim& sim, const std::vector<double>& metrics) {
   for (std::size_t k = 0; k < metrics.size(); ++k) records[k / numbers].metric[k % numbers] = float(metrics[k]);
   sim.yielding.records.write(0, records.size() * sizeof records[0], records.data());
   sim.yielding.copied = false;
-  if (on_cpu(sim) && sim.host.rest_metrics.empty()) sim.host.rest_metrics = metrics_of(records);
+  if (on_cpu(sim) && sim.host.rest_metrics.empty()) sim.host.rest_metrics = metrics_in(records);
 }
 
 std::vector<double> rest_metrics_in(const Buffer& from, std::size_t at, std::size_t tets) {
   std::vector<layout::YieldRecord> records(tets);
   from.read(at, tets * sizeof records[0], records.data());
-  return metrics_of(records);
+  return metrics_in(records);
 }
 
 }  // namespace tetpbd

@@ -29,7 +29,7 @@ struct Yielding {
 Yielding make_yielding(const SolverInput& input, const Solver& solver);
 
 /// By constraint c of `count` its tet, or of lanes that repeat another's that one's; vertices(c) are those of a tet.
-std::vector<std::uint32_t> tets_of(const TetMesh& mesh, std::size_t count, const auto& vertices);
+std::vector<std::uint32_t> find_tets(const TetMesh& mesh, std::size_t count, const auto& vertices);
 /// Puts metrics in place of a list's rest values.
 void put_rest_metrics(ConstraintList& tets, const TetMesh& mesh, const std::vector<double>& metrics);
 
@@ -42,7 +42,7 @@ void write_rest_metrics(Sim& sim, const std::vector<double>& metrics);
 /// State::rest_metrics of records in a buffer.
 std::vector<double> rest_metrics_in(const Buffer& from, std::size_t at, std::size_t tets);
 
-std::vector<std::uint32_t> tets_of(const TetMesh& mesh, std::size_t count, const auto& vertices) {
+std::vector<std::uint32_t> find_tets(const TetMesh& mesh, std::size_t count, const auto& vertices) {
   std::vector<std::uint32_t> order(mesh.tets.size()), result(count);
   for (std::uint32_t t = 0; t < order.size(); ++t) order[t] = t;
   const auto tet = [&](std::uint32_t t) { return mesh.tets[t]; };

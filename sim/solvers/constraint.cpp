@@ -10,7 +10,7 @@ Solver create_constraint_solver(const SolverInput& input) {
   JacobiPasses jacobi;
   // A small mesh needs patches for every part of the GPU.
   const Cut cut = tuned({input.system.count() <= 150000 ? 128u : 256u, 128}, input.tuning);
-  const Patches patches = constraint_patches(input.system, cut.patch);
+  const Patches patches = constraint_patches(input.system, cut.patch, any_material(input.settings, yields));
   if (patches.count > 0) {
     jacobi.passes.push_back(make_patch_pass(solver, input, patches, "solvers/constraint.comp", cut.group));
     jacobi.passes.back().bytes += patches.vertices.size() * 2 * 12;  // an atomic reads and writes

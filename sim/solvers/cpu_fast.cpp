@@ -82,7 +82,7 @@ class FastPbd {
     for (std::size_t i = 0; i < x.size(); ++i) x[i].row[3] = inverse_masses[i];
     if (step.substep.books_work()) state.work.resize(x.size());
     read_positions(state);
-    take_rest_metrics(state);
+    adopt_rest_metrics(state);
     if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     pairs_.begin_step(state);
 // Loops inside the region itself would be 4 % slower on one thread.
@@ -99,12 +99,12 @@ class FastPbd {
   }
 
  private:
-  void take_rest_metrics(const State& state) {
+  void adopt_rest_metrics(const State& state) {
     if (state.rest_metrics.empty()) return;
     auto& all = std::get<batches::Batches<NeoHookean>>(work_.batches);
     constexpr std::size_t lanes = batches::lanes;
     if (tets_.empty())
-      tets_ = tets_of(model_->rest, lanes * all.size(), [&](std::size_t k) {
+      tets_ = find_tets(model_->rest, lanes * all.size(), [&](std::size_t k) {
         const auto& v = all[k / lanes].vertices;
         return Tet{v[0][k % lanes], v[1][k % lanes], v[2][k % lanes], v[3][k % lanes]};
       });

@@ -139,7 +139,7 @@ class CpuPbd {
     auto& x = state.positions;
     auto& v = state.velocities;
     if (substep.books_work()) state.work.resize(x.size());
-    take_rest_metrics(state);
+    adopt_rest_metrics(state);
     if (!model_->fibres.empty()) activate(state, activations_of_step(*model_, settings, time));
     std::vector<glm::dvec3> start, predicted, sums;
     std::vector<real> weights(inverse_masses.begin(), inverse_masses.end());
@@ -194,10 +194,10 @@ class CpuPbd {
   }
 
  private:
-  void take_rest_metrics(const State& state) {
+  void adopt_rest_metrics(const State& state) {
     if (state.rest_metrics.empty()) return;
     auto& items = std::get<Items<NeoHookean>>(items_);
-    if (tets_.empty()) tets_ = tets_of(model_->rest, items.size(), [&](std::size_t c) { return items[c].vertices; });
+    if (tets_.empty()) tets_ = find_tets(model_->rest, items.size(), [&](std::size_t c) { return items[c].vertices; });
     for (std::size_t c = 0; c < items.size(); ++c)
       std::copy_n(&state.rest_metrics[6 * tets_[c]], 6, items[c].rest.begin());
   }

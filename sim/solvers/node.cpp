@@ -37,7 +37,9 @@ Pass make_vertex_patch_pass(Solver& solver, const SolverInput& input, const char
                 fmt::format("{} vertices, work-groups of {}", cut.patch, cut.group),
                 "an invocation for each vertex, 252 at most");
   solver.quantized_buffers = 2;
-  Pass pass = make_patch_pass(solver, input, vertex_patches(input.system, cut.patch), shader, cut.group, multipliers);
+  Pass pass =
+      make_patch_pass(solver, input, vertex_patches(input.system, cut.patch, any_material(input.settings, yields)),
+                      shader, cut.group, multipliers);
   pass.bytes += vertices * (2 * sizeof(Position) + 16);
   solver.vertex_patches = pass.work_groups;
   return pass;

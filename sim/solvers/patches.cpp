@@ -56,7 +56,7 @@ class ChunkWriter {
 };
 
 // Lays out the chunks of all patches. Each has room for as many vertices, filled up with copies of its first.
-Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<Chunk>>& patches) {
+Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<Chunk>>& patches, bool with_tets) {
   Patches result;
   result.count = patches.size();
   result.chunk_words = 4 + 2 * std::size_t(std::count(system.present.begin(), system.present.end(), true));
@@ -72,7 +72,7 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
   result.chunks.resize(chunks * result.chunk_words);
   result.vertices.resize(chunks * result.largest);
   const auto write_record = [&](const ConstraintList& list, const Record& record) {
-    if (&list == &system.lists[index_of<NeoHookean>])
+    if (with_tets && &list == &system.lists[index_of<NeoHookean>])
       result.tets.push_back({record[1], std::uint32_t(result.records.size())});
     std::vector<std::uint32_t> words = {record[0]};
     for (const auto* values : {&list.rest, &list.compliance, &list.stiffness, &list.damping}) {
@@ -117,7 +117,7 @@ Patches assemble(const ConstraintSystem& system, const std::vector<std::vector<C
 
 }  // namespace
 
-Patches constraint_patches(const ConstraintSystem& system, std::size_t most) {
+Patches constraint_patches(const ConstraintSystem& system, std::size_t most, bool with_tets) {
   // Neighbours in space have vertices with near numbers, so constraints are taken in the order of these.
   std::vector<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>> order;  // vertex, kind, constraint
   for (std::uint32_t k = 0; k < kind_count; ++k)
@@ -136,10 +136,10 @@ Patches constraint_patches(const ConstraintSystem& system, std::size_t most) {
     ++filled;
   }
   if (filled > 0) patches.push_back({writer.close()});
-  return assemble(system, patches);
+  return assemble(system, patches, with_tets);
 }
 
-Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
+Patches vertex_patches(const ConstraintSystem& system, std::size_t own, bool with_tets) {
   const std::size_t vertices = system.at_vertex.size();
   std::array<Grouped, kind_count> at;  // the constraints on each vertex
   for (std::size_t k = 0; k < kind_count; ++k)
@@ -185,7 +185,7 @@ Patches vertex_patches(const ConstraintSystem& system, std::size_t own) {
   parallel_parts(of_part.size(), 1, cut);
   std::vector<std::vector<Chunk>> patches;
   for (auto& some : of_part) std::ranges::move(some, std::back_inserter(patches));
-  return assemble(system, patches);
+  return assemble(system, patches, with_tets);
 }
 
 }  // namespace tetpbd

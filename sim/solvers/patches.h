@@ -23,9 +23,10 @@ struct Patches {
   /// The records of constraints, record_pairs() pairs of words each: vertices by their numbers in the chunk, a byte
   /// each; then as float bits rest values, a material's compliances, and where bodies differ k and damping.
   std::vector<std::array<std::uint32_t, 2>> records;
-  std::vector<std::array<std::uint32_t, 2>> tets;  ///< of each neo-Hookean record the constraint, and its first pair
-  std::size_t largest = 0, most_owned = 0;         ///< most vertices, and most owned ones, of any chunk
-  bool chunked = false;                            ///< any patch has several chunks
+  std::vector<std::array<std::uint32_t, 2>>
+      tets;  ///< where asked for, of each neo-Hookean record the constraint, and its first pair
+  std::size_t largest = 0, most_owned = 0;  ///< most vertices, and most owned ones, of any chunk
+  bool chunked = false;                     ///< any patch has several chunks
 };
 
 /// How many pairs of words a record of the list has.
@@ -35,10 +36,10 @@ inline std::size_t record_pairs(const ConstraintList& list) {
 }
 
 /// Patches of at most `most` constraints, which own all their vertices: each constraint is in one patch.
-Patches constraint_patches(const ConstraintSystem& system, std::size_t most);
+Patches constraint_patches(const ConstraintSystem& system, std::size_t most, bool with_tets = false);
 
 /// Patches that own at most `own` consecutive vertices, and have all constraints on these: a constraint is in each
 /// patch that owns a vertex of it. `own` is at most most_vertices - 4.
-Patches vertex_patches(const ConstraintSystem& system, std::size_t own);
+Patches vertex_patches(const ConstraintSystem& system, std::size_t own, bool with_tets = false);
 
 }  // namespace tetpbd

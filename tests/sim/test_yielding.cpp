@@ -29,7 +29,7 @@ std::shared_ptr<Model> stretched_block(double stretch) {
   return model;
 }
 
-Settings settings_of(const std::string& mode) {
+Settings settings_for(const std::string& mode) {
   Settings s;
   s.mode = mode, s.ground = false, s.gravity = 0, s.material = "neo-hookean", s.young_modulus = 1e5;
   s.yield_strain = yield_strain, s.dt = 1e-3;
@@ -39,11 +39,11 @@ Settings settings_of(const std::string& mode) {
 }
 
 // sqrt(dev B : dev B / 6) of a stretch along x without change of volume.
-double strain_of(double stretch) { return (stretch * stretch - 1 / stretch) / 3; }
+double strain_at(double stretch) { return (stretch * stretch - 1 / stretch) / 3; }
 // The stretch that has the strain.
-double stretch_of(double strain) {
+double stretch_at(double strain) {
   double low = 1, high = 10;
-  for (int k = 0; k < 100; ++k) (strain_of(0.5 * (low + high)) < strain ? low : high) = 0.5 * (low + high);
+  for (int k = 0; k < 100; ++k) (strain_at(0.5 * (low + high)) < strain ? low : high) = 0.5 * (low + high);
   return low;
 }
 
@@ -119,10 +119,10 @@ TEST_CASE("what a tet keeps of its shape leaves the yield strain, its volume and
 TEST_CASE("a block that is stretched keeps what is beyond its yield strain, in every mode") {
   GlTest gl;
   constexpr double stretch = 1.3;
-  const double elastic = stretch_of(yield_strain);
+  const double elastic = stretch_at(yield_strain);
   for (const char* mode : modes) {
     CAPTURE(mode);
-    Settings s = settings_of(mode);
+    Settings s = settings_for(mode);
     Sim sim = create_sim(stretched_block(stretch), s);
     pin(sim, everyone(sim));
     step(sim);
@@ -146,12 +146,12 @@ TEST_CASE("strain beyond the yield strain creeps away in the time given") {
   GlTest gl;
   for (const char* mode : {"node", "cpu-double", "newton"}) {
     CAPTURE(mode);
-    Settings s = settings_of(mode);
+    Settings s = settings_for(mode);
     s.creep_time = 0.02;
     Sim sim = create_sim(stretched_block(1.2), s);
     pin(sim, everyone(sim));
     for (int k = 0; k < 20; ++k) step(sim);
-    const double strain = yield_strain + (strain_of(1.2) - yield_strain) * std::exp(-1.0), elastic = stretch_of(strain);
+    const double strain = yield_strain + (strain_at(1.2) - yield_strain) * std::exp(-1.0), elastic = stretch_at(strain);
     const double mu = 1e5 / 2.6 * 4 / 3, I = elastic * elastic + 2 / elastic;
     CHECK(std::abs(elastic_energy(sim) / (0.5 * mu * (I - 3 - std::log((I + 1) / 4)) * 0.004) - 1) < 0.01);
   }
@@ -161,7 +161,7 @@ TEST_CASE("a free block rings down to its yield strain, and no energy is created
   GlTest gl;
   for (const char* mode : modes) {
     CAPTURE(mode);
-    Settings s = settings_of(mode);
+    Settings s = settings_for(mode);
     if (solver_mode(s).implicit) s.dt = 5e-4;  // BDF2 takes a force that stops at once for one that goes on
     Sim sim = create_sim(stretched_block(1.25), s);
     Metrics metrics = create_metrics(sim);
@@ -192,7 +192,7 @@ TEST_CASE("a bar yields at three times its shear modulus times its yield strain"
     for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
       if (std::abs(mesh.positions[v].x) > 0.2 - 1e-9) load.vertices.push_back(v);
     model->loads.push_back(load);
-    Settings s = settings_of("explicit");
+    Settings s = settings_for("explicit");
     s.damping = 5;
     Sim sim = create_sim(model, s);
     for (int k = 0; k < 300; ++k) step(sim);
@@ -208,7 +208,7 @@ TEST_CASE("a set stays through snapshots, state files and other modes") {
   const auto file = std::filesystem::temp_directory_path() / "tetpbd_yielding.state";
   for (const char* mode : modes) {
     CAPTURE(mode);
-    Settings s = settings_of(mode);
+    Settings s = settings_for(mode);
     Sim sim = create_sim(stretched_block(1.3), s);
     for (int k = 0; k < 5; ++k) step(sim);
     Buffer kept("kept", std::max<std::size_t>(snapshot_bytes(sim), 4));
@@ -229,7 +229,7 @@ TEST_CASE("a set stays through snapshots, state files and other modes") {
     const double length = length_along_x(sim);
     CHECK(length > 0.45);
     for (const char* next : {"newton", "explicit", "node", "cpu-double"}) {
-      Settings changed = settings_of(next);
+      Settings changed = settings_for(next);
       changed.damping = 40;
       apply_settings(sim, changed);
       for (int k = 0; k < 20; ++k) step(sim);

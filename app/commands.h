@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "app/reference_command.h"
-#include "app/run_loop.h"
+#include "app/lab/reference_command.h"
+#include "app/lab/run_loop.h"
+#include "app/lab/sweep.h"
 #include "app/scene.h"
-#include "app/sweep.h"
 #include "render/frame.h"
 #include "sim/reference/reference.h"
 

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "app/commands.h"
-#include "app/probe.h"
+#include "app/window/probe.h"
 #include "sim/model/material.h"
 
 namespace tetpbd {

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numeric>
 
-#include "app/auto_solver.h"
 #include "app/commands.h"
 #include "app/export.h"
 #include "app/files.h"
-#include "app/lanes.h"
-#include "app/probe.h"
-#include "app/verdict.h"
+#include "app/lab/auto_solver.h"
+#include "app/lab/verdict.h"
+#include "app/window/lanes.h"
+#include "app/window/probe.h"
 #include "render/renderer.h"
 #include "render/target.h"
 #include "sim/error.h"

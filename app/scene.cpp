@@ -9,11 +9,11 @@
 #include <fstream>
 #include <random>
 
-#include "app/auto_solver.h"
 #include "app/bodies.h"
 #include "app/commands.h"
+#include "app/lab/auto_solver.h"
+#include "app/lab/run_loop.h"
 #include "app/obstacles.h"
-#include "app/run_loop.h"
 #include "render/obstacles.h"
 #include "sim/contact/starts.h"
 #include "sim/error.h"

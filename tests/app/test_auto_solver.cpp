@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/auto_solver.h"
-#include "app/lanes.h"
-#include "app/run_loop.h"
+#include "app/lab/auto_solver.h"
+#include "app/window/lanes.h"
+#include "app/lab/run_loop.h"
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"

@@ -11,7 +11,7 @@
 
 #include "app/commands.h"
 #include "app/files.h"
-#include "app/session.h"
+#include "app/window/session.h"
 #include "render/target.h"
 #include "sim/sim.h"
 #include "tests/gl_test.h"

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/chart.h"
+#include "app/lab/chart.h"
 #include "tests/app/run_program.h"
 
 using namespace tetpbd;

@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 #include <png.h>
 
-#include "app/report.h"
+#include "app/lab/report.h"
 #include "tests/app/run_program.h"
 
 using namespace tetpbd;

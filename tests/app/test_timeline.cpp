@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands.h"
-#include "app/record.h"
-#include "app/session.h"
+#include "app/window/record.h"
+#include "app/window/session.h"
 #include "sim/error.h"
 #include "tests/app/run_program.h"
 #include "tests/gl_test.h"

@@ -6,14 +6,14 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "app/edit_obstacles.h"
+#include "app/window/edit_obstacles.h"
 #include "app/files.h"
-#include "app/preferences.h"
-#include "app/reference_command.h"
-#include "app/run_loop.h"
-#include "app/session.h"
-#include "app/ui.h"
-#include "app/widgets.h"
+#include "app/window/preferences.h"
+#include "app/lab/reference_command.h"
+#include "app/lab/run_loop.h"
+#include "app/window/session.h"
+#include "app/window/ui.h"
+#include "app/window/widgets.h"
 #include "render/target.h"
 #include "sim/contact/obstacle_kinds.h"
 #include "sim/error.h"

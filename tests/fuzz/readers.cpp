@@ -11,8 +11,8 @@
 #include <filesystem>
 
 #include "app/commands.h"
-#include "app/preferences.h"
-#include "app/record.h"
+#include "app/window/preferences.h"
+#include "app/window/record.h"
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/hash.h"

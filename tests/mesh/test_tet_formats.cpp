@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "app/report.h"
+#include "app/lab/report.h"
 #include "sim/mesh/fill.h"
 #include "tests/mesh/mesh_samples.h"
 

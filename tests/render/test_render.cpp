@@ -7,7 +7,7 @@
 #include <glm/gtc/packing.hpp>
 #include <limits>
 
-#include "app/probe.h"
+#include "app/window/probe.h"
 #include "render/layout.h"
 #include "sim/contact/moving_obstacle.h"
 #include "sim/error.h"

@@ -1,7 +1,7 @@
 // The laws that a run has to keep, in every mode.
 #include <doctest/doctest.h>
 
-#include "app/run_loop.h"
+#include "app/lab/run_loop.h"
 #include "sim/measure/metrics.h"
 #include "tests/gl_test.h"
 #include "tests/long_run.h"

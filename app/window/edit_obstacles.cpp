@@ -1,0 +1,141 @@
+#include "app/window/edit_obstacles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "app/obstacles.h"
+#include "sim/contact/moving_obstacle.h"
+
+namespace tetpbd {
+
+namespace {
+
+bool moves_alike(const Obstacle& a, const Obstacle& b) {
+  return a.velocity == b.velocity && a.spin == b.spin && a.keyframes.empty() == b.keyframes.empty();
+}
+
+// Of all lanes. What still reads the model of before, as the map's thread does, goes on with that.
+void adopt_model(Session& s, const std::shared_ptr<const Model>& model) {
+  const bool same_kernels = share_kernels(*s.loaded.model, *model);
+  s.loaded.model = model;
+  for (Lane& lane : s.loaded.lanes) {
+    change_obstacles(lane.sim, model);
+    if (!same_kernels) lane.metrics.reset();
+  }
+}
+
+}  // namespace
+
+void put_obstacles(Session& s, std::vector<Obstacle> wanted) {
+  finish_step(s);
+  for (Obstacle& o : wanted)
+    if (!o.field) load_field(o);
+  const std::vector<Obstacle> before = s.loaded.scene.obstacles;
+  const auto old_model = s.loaded.model;
+  auto model = std::make_shared<Model>(*old_model);
+  model->obstacles = wanted;
+  try {
+    adopt_model(s, model);
+  } catch (...) {
+    adopt_model(s, old_model);
+    throw;
+  }
+  ordered_json list = ordered_json::array();
+  for (const Obstacle& o : wanted) list.push_back(ordered_json(obstacle_json(o)));
+  note(s, {{"obstacles", list}});
+  disturb(s);
+  s.loaded.scene.obstacles = std::move(wanted);
+  const auto& now = s.loaded.scene.obstacles;
+  s.obstacle = std::min(s.obstacle, int(now.size()) - 1);
+  if (now.size() != before.size()) s.log("obstacles {}", now.size());
+  if (now.size() == before.size() && !std::ranges::equal(now, before, moves_alike)) restart(s);
+}
+
+void change_obstacles(Session& s, std::vector<Obstacle> wanted) {
+  attempt(s, [&] {
+    const Change before = settings_and_obstacles(s);
+    put_obstacles(s, std::move(wanted));
+    keep_change(s, before);
+  });
+}
+
+void choose_obstacle(Session& s, int number) {
+  if (std::exchange(s.obstacle, number) != number) s.log("obstacle {} chosen", number + 1);
+}
+
+void add_obstacle(Session& s, const ObstacleKind& kind) {
+  Obstacle o;
+  o.kind = &kind;
+  const double size = 0.2 * s.loaded.sim().model->size;
+  o.normal = {0, 1, 0};
+  o.radius = kind.has("half_length") ? 0.5 * size : size;
+  o.half_length = size;
+  o.half = kind.has("heights") ? size * glm::dvec3(2, 0.8, 2) : glm::dvec3(size);
+  o.height = kind.has("mesh") ? 2 * size : 0;
+  if (kind.has("mesh")) o.mesh = found_file(s.ui.mesh, {});
+  for (int k = 0; kind.has("heights") && k < 24; ++k)
+    for (int i = 0; i < 24; ++i) {
+      if (i == 0) o.heights.emplace_back();
+      o.heights.back().push_back(std::round(50 + 25 * (std::sin(0.6 * i) + std::cos(0.5 * k))) / 100);
+    }
+  const Settings& world = s.loaded.sim().settings;
+  const double angle = glm::radians(double(s.camera.azimuth) + 60);
+  o.centre = glm::dvec3(s.camera.target) +
+             (kind.has("heights") ? 5 : 3) * size * glm::dvec3(std::sin(angle), 0, std::cos(angle));
+  if (world.ground) o.centre.y = world.ground_height + (kind.half ? kind.half(o).y : 0);
+  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  wanted.push_back(std::move(o));
+  const std::size_t count = wanted.size();
+  change_obstacles(s, std::move(wanted));
+  if (s.loaded.scene.obstacles.size() != count) return;
+  choose_obstacle(s, int(count) - 1);
+  // It is to be seen whole, or nobody knows that it is there.
+  const glm::mat4 seen = projection_matrix(s.camera, s.aspect) * view_matrix(s.camera);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::vec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : 0, corner & 4 ? 1 : -1);
+    const glm::vec4 at = seen * glm::vec4(glm::vec3(s.loaded.scene.obstacles.back().centre) + float(size) * side, 1);
+    if (at.w <= 0 || std::max(std::abs(at.x), std::abs(at.y)) > at.w) return frame_body(s);
+  }
+}
+
+void remove_obstacle(Session& s) {
+  if (s.obstacle < 0) return;
+  std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
+  wanted.erase(wanted.begin() + s.obstacle);
+  change_obstacles(s, std::move(wanted));
+}
+
+void move_by(Obstacle& o, const glm::dvec3& way) {
+  o.centre += way;
+  for (Obstacle::Key& key : o.keyframes) key.centre += way;
+}
+
+void turn_by(Obstacle& o, const glm::dmat3& turn) {
+  const glm::dmat3 now = turn * rotation_of(o.rotation);
+  const glm::dvec3 before = o.rotation;
+  o.rotation = glm::degrees(glm::dvec3(std::atan2(now[1].z, now[2].z), std::asin(std::clamp(-now[0].z, -1.0, 1.0)),
+                                       std::atan2(now[0].y, now[0].x)));
+  for (Obstacle::Key& key : o.keyframes) key.rotation += o.rotation - before;
+  o.spin = turn * o.spin;
+  o.normal = turn * o.normal;
+}
+
+std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
+  std::optional<ObstacleHit> first;
+  const double size = s.loaded.model->size, far = 100 * (size + double(s.camera.distance));
+  const auto& all = s.loaded.scene.obstacles;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const MovingObstacle obstacle = moving_obstacle(all[i], simulated_time(s.loaded.sim()), 0);
+    double t = 0, gap = 0;
+    for (int turn = 0; turn < 400 && t < far; ++turn) {
+      gap = obstacle.surface_at(glm::dvec3(ray.origin) + t * glm::dvec3(ray.direction)).distance;
+      if (gap < 1e-4 * size) break;
+      t += std::max(gap * all[i].trust, 1e-4 * size);
+    }
+    if (gap < 1e-4 * size && t > 0 && t < far && (!first || t < first->distance)) first = ObstacleHit{int(i), t};
+  }
+  return first;
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,30 @@
+// Obstacles changed in the window: the lanes go on from where they are.
+#pragma once
+
+#include <optional>
+
+#include "app/window/session.h"
+
+namespace tetpbd {
+
+/// Those of all lanes to these, which undo takes back. Where it moves by itself in another way than before,
+/// all start anew.
+void change_obstacles(Session& session, std::vector<Obstacle> wanted);
+/// The same, which is not to be taken back. Throws Error, and leaves all as it was.
+void put_obstacles(Session& session, std::vector<Obstacle> wanted);
+void choose_obstacle(Session& session, int number);
+/// One more, at the right of the bodies as they are seen, and chosen; a mesh from the path in the panel.
+void add_obstacle(Session& session, const ObstacleKind& kind);
+void remove_obstacle(Session& session);
+
+void move_by(Obstacle& obstacle, const glm::dvec3& way);
+void turn_by(Obstacle& obstacle, const glm::dmat3& turn);  ///< about its centre
+
+struct ObstacleHit {
+  int number = -1;
+  double distance = 0;  ///< m, along the ray
+};
+/// The first that a ray meets from outside.
+std::optional<ObstacleHit> obstacle_on(const Session& session, const Ray& ray);
+
+}  // namespace tetpbd

@@ -1,0 +1,497 @@
+// The panel at the right: run, scene, material, solver, contact, view. Widgets of settings are made from
+// their rows.
+#include <fmt/ranges.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <string_view>
+#include <tuple>
+
+#include "app/bodies.h"
+#include "app/window/ui.h"
+#include "app/window/widgets.h"
+#include "sim/contact/surfaces.h"
+#include "sim/error.h"
+#include "sim/model/material.h"
+
+namespace tetpbd {
+
+namespace {
+
+template <class T>
+bool number_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
+  constexpr bool real = std::is_same_v<T, double>;
+  // A logarithmic slider takes what its format does not show for 0: it has to hold decades down to 1e-12.
+  const std::string number = !real ? "%d" : row.logarithmic ? "%.12g" : "%.4g";
+  const std::string format = number + (*row.unit ? " " : "") + row.unit;
+  // A linear slider over a wide range cannot be aimed: such a value is dragged, by a part of itself.
+  const bool slides = row.logarithmic || row.high - row.low <= 20;
+  const float speed = slides ? 0 : real ? 0.01f * std::max(1.0f, std::abs(float(value))) : 1.0f;
+  T edited = value;
+  if (!edit_number(s, id, row.name, edited, T(row.low), T(row.high), format, row.logarithmic, speed)) return false;
+  if (real) edited = T(std::stod(fmt::format("{:.4g}", double(edited))));
+  return std::exchange(value, edited) != edited;
+}
+
+std::string help_text(const Parameter& row) {
+  std::string text = row.help;
+  if (row.name == "mode")
+    for (const SolverMode& mode : solver_modes()) text += fmt::format("\n{}: {}", mode.name, mode.help);
+  if (choices(row).empty() && !std::holds_alternative<bool Settings::*>(row.member))
+    text += fmt::format("\n{:g} to {:g}{}{}; Ctrl+click to type", row.low, row.high, *row.unit ? " " : "", row.unit);
+  if (row.effect == Effect::restart) text += "\ntakes effect at the next reset";
+  return text + fmt::format("\non the command line: {}", flag_name(row));
+}
+
+// A row of check boxes for a list of words.
+bool words_widget(Session& s, const Parameter& row, std::string& value, const std::string& usual) {
+  Words chosen = split(value, ',');
+  const Words first = split(usual, ',');
+  bool changed = false;
+  int place = 0;
+  for (const std::string& word : choices(row)) {
+    if (place++ % 3) ImGui::SameLine();
+    bool on = std::ranges::count(chosen, word) > 0;
+    if (!check_box(s, word.c_str(), on, help_text(row), std::ranges::count(first, word) > 0)) continue;
+    changed = true;
+    on ? chosen.push_back(word) : void(std::erase(chosen, word));
+  }
+  if (changed) value = fmt::format("{}", fmt::join(chosen, ","));
+  return changed;
+}
+
+// What has no effect, as the stiffness of a kind that is switched off, is not shown.
+bool has_effect(const Session& s, const Settings& settings, const Parameter& row) {
+  const std::string_view name = row.name;
+  const SolverMode& mode = solver_mode(settings);
+  const bool material = settings.material != "none";
+  if (name == "mass_splitting") return mode.jacobi && !compliant(settings);  // which brings it with it
+  if (name == "omega") return mode.jacobi;
+  if (name == "stability" || name == "mass_scaling") return mode.leapfrog;
+  if (name == "iterations") return !mode.leapfrog;
+  if (name == "rigid_contact") {
+    Settings on = settings;
+    on.rigid_contact = true;
+    return any_moves_rigidly(on);
+  }
+  if (name == "restitution") return settings.restitution != 0 || any_moves_rigidly(settings);
+  if (name == "ground_height") return settings.ground;
+  if (name == "contact_distance") return bool(s.loaded.sim().pairs);
+  if (name == "friction") return settings.ground || !s.loaded.scene.obstacles.empty();
+  if (name == "young_modulus" || name == "poisson_ratio") return material;
+  if (name == "element") return settings.material == "neo-hookean" && mode.smoothed;
+  if (name == "smoothing") return smoothed(in_mode(settings, settings));
+  if (name == "viscosity" || name == "bulk_viscosity" || name == "yield_strain")
+    return settings.material == "neo-hookean";
+  if (name == "creep_time") return yields(settings);
+  if (name == "constraints") return !material;
+  const auto* of = std::get_if<KindMember>(&row.member);
+  return !of || (!material && uses(settings, constraint_kinds[of->kind]));
+}
+
+// Beside the number stands whether the mode or the material decides it; then the number shows what it decided.
+template <class T>
+void automatic_widget(Session& s, const Parameter& row, const std::string& id, T& value) {
+  const Plan& plan = s.loaded.sim().plan;
+  const T decided = row.name == "iterations" ? T(plan.iterations)
+                    : row.name == "substeps" ? T(plan.substeps)
+                    : row.name == "contact_distance"
+                        ? T(Surfaces::offset_part * s.loaded.sim().pairs.edge)
+                        : T(smoothing_of(settings_for_body(s.loaded.sim().settings, s.loaded.body)));
+  const float box = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize("auto").x +
+                    ImGui::GetStyle().ItemSpacing.x;
+  T shown = value == automatic ? decided : value;
+  ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - box);
+  if (number_widget(s, row, id, shown)) value = shown;
+  ImGui::SameLine();
+  bool by_itself = value == automatic;
+  if (ImGui::Checkbox(("auto" + id).c_str(), &by_itself)) value = by_itself ? T(automatic) : decided;
+  mark(s, row.name + " auto");
+}
+
+bool parameter_widget(Session& s, const Parameter& row, Settings& settings) {
+  const Settings own = settings_for_body(s.loaded.own, s.loaded.body);
+  const std::string usual = parameter_text(own, row), before = parameter_text(settings, row),
+                    back = before == usual ? "" : usual;
+  if (const auto* word = std::get_if<std::string Settings::*>(&row.member)) {
+    std::string& value = settings.**word;
+    if (row.name == "constraints") return words_widget(s, row, value, own.**word);
+    const auto chosen = combo(s, row.name, value, choices(row), help_text(row), usual);
+    if (chosen) set_parameter(settings, row, *chosen, row.name);
+    return value != before;
+  }
+  const std::string id = begin_row(s, label_of(row.name.c_str()), !back.empty());
+  with_value(settings, row, [&]<class T>(T& value) {
+    if constexpr (std::is_same_v<T, int> || std::is_same_v<T, double>)
+      if (row.automatic) return automatic_widget(s, row, id, value);
+    if constexpr (std::is_same_v<T, bool>)
+      ImGui::Checkbox(id.c_str(), &value);
+    else if constexpr (!std::is_same_v<T, std::string>)
+      number_widget(s, row, id, value);
+  });
+  const std::string unit = *row.unit ? std::string(" ") + row.unit : "";
+  if (end_row(s, row.name, help_text(row), back.empty() ? "" : back + unit))
+    set_parameter(settings, row, back, row.name);
+  return parameter_text(settings, row) != before;
+}
+
+/// Where settings have their widgets: those that matter at once, others under "more". A * stands for kinds of
+/// constraint. What is named nowhere is under the solver's.
+struct Group {
+  const char* name;
+  bool open;
+  Words shown, more;
+};
+const std::vector<Group> groups = {
+    {"Material",
+     true,
+     {"material", "young_modulus", "poisson_ratio", "element", "constraints", "k_*"},
+     {"smoothing", "compliance_*", "constraint_damping", "viscosity", "bulk_viscosity", "yield_strain", "creep_time",
+      "damping"}},
+    {"Solver",
+     true,
+     {"mode", "substeps", "iterations", "stability", "dt"},
+     {"omega", "mass_splitting", "mass_scaling"}},
+    {"World", false, {"gravity", "ground"}, {"ground_height"}},
+    {"Contact", false, {"contact", "friction", "restitution"}, {"contact_distance", "rigid_contact"}},
+};
+
+bool names(const std::string& pattern, const std::string& name) {
+  return pattern.back() == '*' ? name.starts_with(pattern.substr(0, pattern.size() - 1)) : name == pattern;
+}
+
+// What the panel shows is of all bodies or of the chosen one.
+Settings shown_settings(const Session& s) { return settings_for_body(s.loaded.sim().settings, s.loaded.body); }
+void change_shown(Session& s, const Settings& wanted) {
+  if (!s.loaded.body) return change_settings(s, wanted);
+  change_settings(s, with_body_changed(s.loaded.sim().settings, wanted, *s.loaded.body, s.loaded.model->bodies.size()));
+}
+
+void draw_settings(Session& s, const Group& group) {
+  const Settings now = shown_settings(s), own = settings_for_body(s.loaded.own, s.loaded.body);
+  const auto differs = [](const Settings& a, const Settings& b, const Parameter& row) {
+    return parameter_text(a, row) != parameter_text(b, row);
+  };
+  std::vector<const Parameter*> shown, rest;
+  const auto put = [&](const Parameter& row, bool matters) {
+    // What the scene itself sets matters there.
+    matters = matters || differs(own, Settings(), row);
+    if (has_effect(s, now, row)) (matters ? shown : rest).push_back(&row);
+  };
+  for (const Words* list : {&group.shown, &group.more})
+    for (const std::string& pattern : *list)
+      for (const Parameter& row : parameters())
+        if (names(pattern, row.name)) put(row, list == &group.shown);
+  for (const Parameter& row : parameters()) {
+    const auto named = [&](const std::string& pattern) { return names(pattern, row.name); };
+    if (&group == &groups[1] && std::ranges::none_of(groups, [&](const Group& g) {
+          return std::ranges::any_of(g.shown, named) || std::ranges::any_of(g.more, named);
+        }))
+      put(row, false);
+  }
+  Settings wanted = now;
+  bool changed = false;
+  for (const Parameter* row : shown) changed |= parameter_widget(s, *row, wanted);
+  const bool unusual = std::ranges::any_of(rest, [&](const auto* row) { return differs(now, own, *row); });
+  if (!rest.empty() && more(s, group.name, unusual))
+    for (const Parameter* row : rest) changed |= parameter_widget(s, *row, wanted);
+  if (changed) change_shown(s, wanted);
+}
+
+// A choice among presets; `current`: the one that is set, if any.
+struct Ways {
+  std::string current = "custom", help;
+  Words words;
+  std::map<std::string, Settings> to{};
+};
+Ways ways_of(const Settings& now, const std::vector<Preset>& presets, const std::string& help) {
+  Ways ways{.help = help, .words = preset_names(presets)};
+  for (const Preset& preset : presets) {
+    apply_preset(ways.to[preset.name] = now, presets, preset.name);
+    if (ways.to[preset.name] == now) ways.current = preset.name;
+    ways.help += fmt::format("\n{}: {}", preset.name, preset.help);
+  }
+  return ways;
+}
+
+// The whole way to solve by one word, and what auto picked.
+void draw_solver(Session& s) {
+  const Settings now = s.loaded.sim().settings;
+  const auto& choice = s.loaded.choice;
+  const bool automatic = choice && choice->settings() == now;
+  Ways ways = ways_of(now, solver_presets(),
+                      "a whole way to solve, which sets mode, substeps and iterations\nauto: tries ways to "
+                      "solve this scene and takes the one whose motion is "
+                      "nearest to the right one within the budget");
+  ways.help += "\non the command line: --solver";
+  if (automatic) ways.current = "auto";
+  ways.words.push_back("auto");
+  if (const auto chosen = combo(s, "solver", ways.current, ways.words, ways.help))
+    ways.to.contains(*chosen) ? change_settings(s, ways.to[*chosen]) : choose_soon(s);
+  const AdaptiveSubsteps& watch = s.loaded.sim().adaptive;
+  if (solver_mode(now).leapfrog)
+    ImGui::TextWrapped(
+        "%d substeps%s", s.loaded.sim().plan.substeps,
+        watch.stiffening > 1 ? fmt::format(", {:.2g} times as many as at rest", watch.stiffening).c_str() : "");
+  if (solver_mode(now).implicit)
+    ImGui::TextWrapped(
+        "%s", fmt::format("residual {:.2g} %, step health {:.2f} (1 = good){}", 100 * double(watch.residual),
+                          double(watch.health),
+                          watch.substep_factor > 1
+                              ? fmt::format("; inverted tets or contact: {} x the substeps", watch.substep_factor)
+                              : "")
+                  .c_str());
+  if (!automatic) return;
+  if (slider(s, "budget", s.budget_ms, 0.5, 0.01, 100, "%.3g ms per step",
+             "time that a step may take: auto chooses again when you let go, which takes a second or "
+             "so\non the command line: --budget-ms",
+             true))
+    s.ui.rebudget = true;
+  if (s.ui.rebudget && !ImGui::IsAnyItemActive()) s.ui.rebudget = false, choose_soon(s);
+  ImGui::TextWrapped("%s", describe(*choice).c_str());
+}
+
+// Which body the panel is of.
+void draw_body_choice(Session& s) {
+  const auto& bodies = s.loaded.model->bodies;
+  if (bodies.size() < 2) return;
+  const std::string all = has_own_materials(s.loaded.sim().settings) ? "all without their own" : "all";
+  Words words = {all};
+  for (const Body& body : bodies) words.push_back(fmt::format("{} {}", body.number, body.name));
+  const std::size_t now = s.loaded.body ? *s.loaded.body + 1 : 0;
+  const std::string help = "whose material, friction and restitution are shown and changed\nB: the one under the mouse";
+  if (const auto chosen = combo(s, "body", words[now], words, help)) {
+    const auto at = std::size_t(std::ranges::find(words, *chosen) - words.begin());
+    s.loaded.body = at > 0 ? std::optional(at - 1) : std::nullopt;
+  }
+}
+
+// What the body is made of, by name; its numbers are below.
+void draw_material(Session& s) {
+  draw_body_choice(s);
+  Ways ways = ways_of(shown_settings(s), material_presets(),
+                      "a material by name, with its stiffness; for bodies that are to be soft");
+  if (const auto chosen = combo(s, "preset", ways.current, ways.words, ways.help)) change_shown(s, ways.to[*chosen]);
+}
+
+void draw_run(Session& s) {
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - 2 * gap) / 3;
+  if (button(s, s.playing ? "Pause##play" : "Play##play", "play", "start and stop the clock\nSpace", width))
+    play(s, !s.playing);
+  ImGui::SameLine();
+  if (button(s, "Step", "step", "one step of dt, then stop\nS", width)) single_step(s);
+  ImGui::SameLine();
+  if (button(s, "Reset", "reset", "all bodies to where they began; settings stay\nR", width)) restart(s);
+}
+
+void draw_lane_rows(Session& s) {
+  const auto& lanes = s.loaded.lanes;
+  const std::string help =
+      "the same bodies solved in several ways at once: pull one and all are pulled; the panel is of the "
+      "chosen lane";
+  Ways ways{.help = help, .words = {}};
+  for (const Comparison& row : comparisons())
+    ways.words.push_back(row.name), ways.help += fmt::format("\n{}: {}", row.name, row.help);
+  if (const auto name = combo(s, "side by side", lanes.size() > 1 ? "custom" : "single", ways.words, ways.help))
+    compare_lanes(s, std::ranges::find(comparisons(), *name, &Comparison::name)->lanes);
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (ImGui::GetContentRegionAvail().x - gap) / 2;
+  if (button(s, "Add a lane", "add lane",
+             "the same bodies once more, to compare: soft ones first by a solver that converges; settings to change\nK",
+             width))
+    add_lane(s);
+  ImGui::SameLine();
+  if (lanes.size() < 2) return ImGui::NewLine();
+  if (button(s, "Remove this one", "remove lane", "the chosen lane goes, the others start anew\nJ", width))
+    return remove_lane(s);
+  for (std::size_t i = 0; i < lanes.size(); ++i) {
+    const glm::vec3 colour = lane_colour(i);
+    ImGui::ColorButton(fmt::format("##colour {}", i).c_str(), ImVec4(colour.x, colour.y, colour.z, 1),
+                       ImGuiColorEditFlags_NoTooltip);
+    ImGui::SameLine();
+    if (ImGui::Selectable(fmt::format("{}##lane {}", describe(lanes[i]), i).c_str(), i == s.loaded.chosen))
+      choose_lane(s, i);
+    describe_item(s, fmt::format("lane {}", i + 1),
+                  "settings, time per step and colours are those of the lane that is chosen");
+  }
+  check_box(s, "overlaid", s.overlaid, "all lanes in one place, in their colours\nO", false);
+  ImGui::SameLine(label_width());
+  check_box(s, "ghost", s.ghost, "in each lane, grey, the one that is nearest to the reference motion", true);
+}
+
+void draw_colour_range(Session& s) {
+  if (s.view.colour == Colour::plain) {
+    const bool unusual = s.view.body_colour != s.first_view.body_colour;
+    ImGui::ColorEdit3(begin_row(s, "body colour", unusual).c_str(), &s.view.body_colour.x,
+                      ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions);
+    if (end_row(s, "body colour", "of the first body; others are turned in hue", unusual ? "clay" : ""))
+      s.view.body_colour = s.first_view.body_colour;
+    return;
+  }
+  if (s.view.colour == Colour::patch) return;
+  ColourRange& range = s.view.range();
+  const ColourScale& scale = s.view.scale();
+  double high = range.high * scale.factor;
+  const double usual = s.first_view.ranges[std::size_t(s.view.colour)].high * scale.factor;
+  const std::string unit = scale.factor == 100 ? "%%" : scale.unit;
+  if (slider(s, "colour range", high, usual, 1e-4 * scale.most * scale.factor, scale.most * scale.factor,
+             ((scale.is_signed ? "+/- %.3g " : "0 .. %.3g ") + unit).c_str(),
+             "the value at the end of the colour scale: lower it to see small differences", true))
+    range = {scale.is_signed ? -high / scale.factor : 0, high / scale.factor}, s.view.hold_range = true;
+  check_box(s, "hold range", s.view.hold_range, "keeps the scale as it is; else it follows the values of now",
+            s.first_view.hold_range);
+  ImGui::SameLine(label_width());
+  check_box(s, "mark worst", s.view.worst, "rings around the vertices with the largest values, inside bodies too\nW",
+            s.first_view.worst);
+  if (!s.view.worst) return;
+  for (const auto& [vertex, value] : s.worst)
+    ImGui::TextDisabled("%s",
+                        fmt::format(fmt::runtime(scale.is_signed ? "vertex {}: {:+.3g} {}" : "vertex {}: {:.3g} {}"),
+                                    s.loaded.sim().model->original[vertex], double(value) * scale.factor, scale.unit)
+                            .c_str());
+}
+
+// Of the bodies at rest; also while the cursor is on it.
+void draw_flattest(Session& s) {
+  const Model& model = *s.loaded.model;
+  const FlattestTet& flattest = s.loaded.flattest;
+  if (model.rest.tets.empty()) return;
+  const Body& body = *(std::ranges::upper_bound(model.bodies, flattest.tet, {}, &Body::first_tet) - 1);
+  check_box(s, "flattest tet", s.view.flattest,
+            fmt::format("shows its edges through the bodies: tet {} of {}, {:.2g} of an edge high, which limits the "
+                        "steps of mode explicit",
+                        flattest.tet - body.first_tet, body.name, flattest.quality),
+            s.first_view.flattest);
+  s.ui.at_flattest = ImGui::IsItemHovered();
+  ImGui::SameLine(label_width());
+  ImGui::TextDisabled("%s", fmt::format("{:.3g} m high, {}", flattest.altitude, body.name).c_str());
+}
+
+void draw_view(Session& s) {
+  ViewOptions& view = s.view;
+  const ViewOptions& first = s.first_view;
+  enum_combo(s, "look", look_names, view.look, first.look,
+             "surface; with its edges; the tetrahedra, to see inside; the constraints between vertices\n1 2 3 4");
+  Words colours;
+  for (std::size_t i = 0; i < colour_names.size(); ++i)
+    if (has_colour(s, Colour(i)) || view.colour == Colour(i)) colours.push_back(colour_names[i]);
+  if (const auto name = combo(s, "colour", colour_names[std::size_t(view.colour)], colours,
+                              "what the surface shows: nothing, or by how much volume, lengths of edges, speed, "
+                              "elastic energy or the motion are off; patch: what is solved together\nC",
+                              colour_names[std::size_t(first.colour)]))
+    choose_colour(s, Colour(std::ranges::find(colour_names, *name) - colour_names.begin()));
+  draw_colour_range(s);
+  draw_flattest(s);
+  if (view.look == Look::tets) {
+    slider(s, "shrink", view.shrink, first.shrink, 0, 1, "%.2f of its size",
+           "each tetrahedron, towards its centre: gaps show the inside");
+    slider(s, "explode", view.explode, first.explode, 0, 3, "%.2f of the way",
+           "tetrahedra away from the bodies' centre");
+  }
+  slider(s, "cut", view.cut, first.cut, 0, 1, view.is_cut() ? "%.2f of the body" : "off",
+         "what is below this part of the bodies at rest is shown; 1: all\nX; Alt+drag, Alt+wheel on the view");
+  if (view.is_cut()) {
+    const int before = view.cut_axis;
+    enum_combo(s, "cut along", cut_names, view.cut_axis, first.cut_axis,
+               "the direction in which a cut goes; the view: from the eye of now");
+    if (view.cut_axis != before) view.cut_normal = glm::normalize(eye(s.camera) - s.camera.target);
+  }
+  const std::tuple<const char*, const char*, bool&, bool> switches[] = {
+      {"follow", "the camera goes where the bodies go\nL", view.follow, first.follow},
+      {"probe", "the cursor at rest on a body says what is there", s.probing, true},
+      {"contacts",
+       "dots where vertices touch the ground, walls or obstacles, arrows where they are in other bodies: "
+       "red is a thousandth of the size",
+       view.contacts, first.contacts},
+      {"arrows", "velocities of some of the vertices", view.arrows, first.arrows},
+      {"shadow", "of the bodies, on the ground and on each other", view.shadow, first.shadow},
+      {"smooth normals", "round shading; without, each triangle is flat\nN", view.smooth_normals, first.smooth_normals},
+      {"grid", "lines on the ground and on walls\nG", view.grid, first.grid},
+      {"sky and ground", "also walls; without: one colour", view.backdrop, first.backdrop},
+      {"legend", "the colour scale, with every colour but plain", view.legend, first.legend},
+      {"vsync", "draw as often as the display shows; without, as often as can be: to measure", s.vsync, true},
+      {"as fast as possible", "steps as often as the machine can, instead of in real time", s.clock.fast, false}};
+  if (view.arrows)
+    slider(s, "arrow length", view.arrow_seconds, first.arrow_seconds, 1e-3, 1, "%.3g s",
+           "the time a vertex would take along its arrow", true);
+  const bool shadow = view.shadow;
+  bool unusual = s.samples != s.first_samples || s.grab_radius != usual_grab_radius;
+  for (const auto& [name, help, value, usual] : switches) unusual |= value != usual;
+  if (!more(s, "View", unusual)) return;
+  for (int i = 0; const auto& [name, help, value, usual] : switches) {
+    if (i++ % 2) ImGui::SameLine(label_width());
+    check_box(s, name, value, help, usual);
+  }
+  if (view.shadow != shadow) s.ui.kept.shadow = view.shadow;
+  const auto doublings = [](int samples) { return int(std::bit_width(unsigned(samples) / 2)); };
+  int now = doublings(s.samples);
+  enum_combo(s, "MSAA", std::array{"none", "2x", "4x", "8x"}, now, doublings(s.first_samples),
+             "samples of a pixel: smoother edges, and more work for the GPU");
+  if (const int wanted = now ? 1 << now : 0; wanted != s.samples) s.ui.kept.samples = s.samples = wanted;
+  slider(s, "grab radius", s.grab_radius, usual_grab_radius, 0, 0.3, "%.2f of the size",
+         "how much of a body the mouse takes hold of; 0: a single vertex, which can draw out a spike");
+  Preferences& kept = s.ui.kept;
+  enum_combo(s, "theme", std::array{"light", "dark"}, kept.dark, false, "colours of the panels; it is kept");
+  const Words sizes{"75 %", "100 %", "125 %", "150 %", "200 %", "300 %"};
+  if (const auto size = combo(s, "text size", fmt::format("{:.0f} %", 100 * kept.text), sizes,
+                              "of all text and widgets, on top of the display's own scale; it is kept", "100 %"))
+    kept.text = std::atof(size->c_str()) / 100;
+}
+
+}  // namespace
+
+void draw_timeline(Session& s) {
+  Timeline& t = s.timeline;
+  const auto name = [](int halvings) { return halvings ? fmt::format("1/{}x", 1 << halvings) : std::string("1x"); };
+  ImGui::SetNextItemWidth(ImGui::GetFontSize() * 4);
+  if (ImGui::BeginCombo("##speed", name(s.clock.halvings).c_str())) {
+    for (int halvings = 0; halvings <= most_halvings; ++halvings) {
+      if (ImGui::Selectable(name(halvings).c_str(), halvings == s.clock.halvings)) change_speed(s, halvings);
+      mark(s, "speed=" + name(halvings));
+    }
+    ImGui::EndCombo();
+  }
+  describe_item(s, "speed", "of the clock: slow motion\n, and .");
+  ImGui::SameLine();
+  ImGui::BeginDisabled(t.moments.size() < 2);
+  bool looping = t.looping;
+  if (ImGui::Checkbox("loop", &looping)) set_looping(s, looping);
+  describe_item(s, "loop", "replay the stored motion in a loop");
+  ImGui::SameLine();
+  ImGui::SetNextItemWidth(-1);
+  const long first = t.moments.empty() ? 0 : t.moments.front()->step;
+  long now = steps_of(s.loaded.lanes), last = t.moments.empty() ? now : std::max(t.moments.back()->step, first);
+  std::string text = t.moments.empty() ? "nothing is stored" : fmt::format("{:.3f} s", simulated_time(s.loaded.sim()));
+  if (!t.moments.empty() && ImGui::GetContentRegionAvail().x > ImGui::GetFontSize() * 15)
+    text += fmt::format(" of {:.3f} .. {:.3f} s", t.moments.front()->time,
+                        std::max(t.moments.back()->time, simulated_time(s.loaded.sim())));
+  if (ImGui::SliderScalar("##time", ImGuiDataType_S64, &now, &first, &last, text.c_str(),
+                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
+    show_step(s, now);
+  describe_item(s, "time",
+                fmt::format("move all lanes in time; playing from here discards later states\nLeft and Right: state by "
+                            "state\n{} states are stored, {:.3g} of {} MB: all recent ones, fewer of the older\n"
+                            "--history-mb",
+                            t.moments.size(), double(t.bytes) / 1048576, t.budget >> 20));
+  ImGui::EndDisabled();
+}
+
+void draw_panel(Session& s) {
+  draw_run(s);
+  if (section(s, "Side by side", false)) draw_lane_rows(s);
+  if (section(s, "Stability map", false)) draw_map(s);
+  if (section(s, "Scene")) draw_scene(s);
+  for (const Group& group : groups) {
+    if (!section(s, group.name, group.open)) continue;
+    if (group.name == std::string_view("Material")) draw_material(s);
+    if (group.name == std::string_view("Solver")) draw_solver(s);
+    draw_settings(s, group);
+  }
+  if (section(s, "Obstacles", !s.loaded.scene.obstacles.empty())) draw_obstacles(s);
+  if (section(s, "View")) draw_view(s);
+}
+
+}  // namespace tetpbd

@@ -1,0 +1,303 @@
+// What the window shows and what can be done to it, without any widget.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/lab/auto_solver.h"
+#include "app/lab/live_map.h"
+#include "app/scene.h"
+#include "app/window/grab.h"
+#include "app/window/lanes.h"
+#include "app/window/preferences.h"
+#include "app/window/probe.h"
+#include "app/window/record.h"
+#include "app/window/timeline.h"
+#include "render/picking.h"
+#include "render/renderer.h"
+#include "render/target.h"
+#include "sim/measure/metrics.h"
+#include "sim/sim.h"
+
+namespace tetpbd {
+
+/// A scene with all that is made from it; replaced as a whole: one that fails to load changes nothing.
+struct Loaded {
+  std::string name;  ///< as it was asked for
+  SceneOverrides overrides;
+  Scene scene;
+  Settings own{};                        ///< of the scene as it was asked for: what a setting goes back to
+  std::shared_ptr<const Model> model{};  ///< of all lanes
+  std::vector<Lane> lanes;               ///< one, or several side by side
+  Renderer renderer;
+  Picker picker;
+  std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
+  std::size_t chosen = 0;                ///< the lane that the panel is of
+  std::optional<std::size_t> body{};     ///< whose material, friction and restitution it shows; none: of all
+  std::optional<Motion> right{};         ///< where it is known, of several lanes or for its colours
+  bool comparable = true;                ///< lanes differ in how they are solved alone
+  bool disturbed = false;                ///< they are no longer held against it, until they start anew
+  Buffer answers{};                      ///< where the reference motion has the vertices
+  long held = -1;                        ///< step at which vertices were last held against it
+  Probe probe{};
+  FlattestTet flattest{};  ///< at rest
+  std::optional<LiveMap> map{};
+  Lane& lane() { return lanes[chosen]; }
+  Sim& sim() { return lane().sim; }
+  const Sim& sim() const { return lanes[chosen].sim; }
+};
+Loaded load(const std::string& name, const SceneOverrides& overrides, Scene scene);
+
+struct Message {
+  std::string text;
+  bool error = false;
+  bool non_finite = false;  ///< stays until a reset, a way back or another scene mends the state
+  double since = 0;         ///< s
+};
+
+/// A line for each event, in the file that TETPBD_WINDOW_LOG names, for tests and demonstrations.
+struct EventLog {
+  std::ofstream file;
+  template <class... T>
+  void operator()(fmt::format_string<T...> text, T&&... values) {
+    if (file.is_open()) file << fmt::format(text, std::forward<T>(values)...) << std::endl;
+  }
+};
+
+/// Simulated against real time.
+struct Clock {
+  bool fast = false;               ///< as fast as possible instead of real time
+  int halvings = 0;                ///< of the speed: slow motion
+  double owed = 0;                 ///< s of real time, so slowed down, not yet simulated
+  int most_steps = 4;              ///< a frame; follows what the GPU can do
+  double real = 0, simulated = 0;  ///< s, since the factor was last worked out
+  int frames = 0;                  ///< since factor was found
+  double factor = 0;               ///< simulated seconds a real one
+  double speed() const { return std::ldexp(1.0, -halvings); }
+};
+
+/// Something that stops the window for a while: done once its name has been on the screen.
+struct Task {
+  std::string name;
+  std::function<void()> act;
+};
+
+/// Window coordinates, from the top left.
+struct Rect {
+  float x = 0, y = 0, width = 0, height = 0;
+  bool contains(double px, double py) const {
+    return px >= double(x) && py >= double(y) && px < double(x + width) && py < double(y + height);
+  }
+  bool operator==(const Rect&) const = default;
+};
+
+/// What of a plot's axis is seen.
+struct PlotView {
+  bool zoomed = false;
+  double low = 0, high = 1;
+};
+
+/// The axes of the map, as they are typed.
+struct MapWords {
+  std::string x{}, y{};
+  bool typed = false;
+};
+
+/// What the list of scenes shows of one.
+struct SceneCard {
+  std::string description{};
+  Texture picture{};
+};
+inline constexpr int picture_width = 192, picture_height = 144;  // pixels
+
+/// What is shown of the panels.
+struct Ui {
+  bool panels = true, plots = true, help = false;
+  float scale = 1;  ///< of the display, 2 on a dense one, times that of the text
+  Preferences kept;
+  bool rebudget = false;  ///< once the slider is let go
+  /// The widget into which a number is being typed, and what it says so far.
+  std::optional<std::pair<unsigned, double>> typed{};
+  std::array<bool, 3> hinted{};            ///< of hint_texts, those that were followed
+  std::map<std::string, SceneCard> cards;  ///< by file, once shown
+  MapWords map;
+  bool at_flattest = false;            ///< the cursor is on what the panel says of the flattest tet
+  std::string mesh;                    ///< path being typed
+  std::map<std::string, Rect> places;  ///< of widgets, as last logged
+  std::array<PlotView, 3> plot_views;
+  std::array<std::array<std::size_t, 3>, 2> plot_choice{
+      {{0, 1, 2}, {1, 4, 5}}};  ///< plot_rows(): of one lane, of several
+};
+
+struct Change {
+  std::vector<Settings> lanes;
+  std::vector<Obstacle> obstacles;
+};
+/// As it was before each change, and after those that were taken back.
+struct Changes {
+  std::vector<Change> past, future;
+  bool open = false;  ///< what changes now belongs to the last change, as long as a slider is held
+};
+
+inline constexpr double usual_grab_radius = 0.04;
+
+struct Session {
+  Capabilities gl;
+  EventLog log;
+  Ui ui;
+  Loaded loaded;
+  Camera camera;
+  ViewOptions view, first_view;  ///< of now, and as the window began
+  int samples = 4, first_samples = 4;
+  float aspect = 1;  ///< of the viewport
+  bool playing = true, vsync = true;
+  bool take_screenshot = false, quit = false;
+  double hints_until = 0;  ///< s, of `now`
+  /// A step of all lanes under way: the lane that is next, and what it took so far.
+  struct UnderWay {
+    std::size_t lane = 0;
+    double seconds = 0, of_lane = 0;
+  };
+  std::optional<UnderWay> under_way{};
+  double step_seconds = 0;  ///< that the last step took where it returns when it is done
+  Clock clock;
+  Timeline timeline;
+  std::unique_ptr<Record> record{};        ///< if anybody wants it
+  std::optional<Hold> hold;                ///< what is led by the mouse, or by a record
+  std::optional<Grab> grab;                ///< by the mouse
+  double grab_radius = usual_grab_radius;  ///< part of the size
+  Changes changes;
+  int obstacle = -1;             ///< of the scene's, the chosen one; -1: none
+  bool moving_obstacle = false;  ///< by the mouse
+  std::vector<Message> messages;
+  std::optional<Task> task;
+  double budget_ms = 0.5;           ///< for the solver auto
+  bool measuring = true;            ///< somebody looks at the measurements
+  std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago
+  glm::vec3 beside{0};              ///< from there to what a following camera looks at, by moving the view
+  History frames_per_second;
+  bool probing = true;                                 ///< the cursor at rest on a body says what is there
+  bool fit_range = false;                              ///< of the colours, once to the values of now
+  double fitted = -1;                                  ///< when they were last
+  std::vector<std::pair<std::uint32_t, float>> worst;  ///< vertices and their values, the largest first
+  bool overlaid = false;                               ///< lanes are drawn in one place
+  bool ghost = true;                                   ///< beside the others stands the one they are held against
+  double now = 0;                                      ///< s since the start
+};
+
+void say(Session& session, const std::string& text, bool error = false, bool non_finite = false);
+/// What went wrong before, once something went well or is tried anew; not of shaders and states, as long as
+/// they are not mended.
+void forget_errors(Session& session);
+/// Does it; what it throws becomes a message, but for ContextLost. Whether it went well.
+bool attempt(Session& session, const std::function<void()>& action);
+
+void play(Session& session, bool playing);
+void single_step(Session& session);
+/// All lanes; throws what a step throws.
+void step_lanes(Session& session);
+/// Goes on with a step of all lanes, or begins one, for about so many seconds, which ends between two substeps of a GPU
+/// mode; true once it is whole.
+bool step_lanes(Session& session, double seconds);
+/// To be called before anything but drawing touches a lane: ends the step under way.
+void finish_step(Session& session);
+/// For tests: a run of as many steps must give the same. Waits for the GPU.
+void log_state(Session& session);
+inline constexpr int most_halvings = 5;
+void change_speed(Session& session, int halvings);
+/// To the start; with a parameter changed that needs it, the bodies are made again.
+void restart(Session& session);
+/// Refuses those whose steps would stop the window for minutes.
+void change_settings(Session& session, const Settings& wanted);
+/// Chooses the body under the mouse for the panel, or, beside the bodies, all.
+void choose_body(Session& session);
+/// Settings as they were before the last change, or again as they were after it.
+void undo(Session& session);
+Change settings_and_obstacles(const Session& session);
+void keep_change(Session& session, const Change& before);
+/// The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
+void disturb(Session& session);
+void redo(Session& session);
+/// The scene with the settings and the camera of now, into a file of its own, with a picture beside it.
+void save_state_file(Session& session);
+void open_state(Session& session, const std::filesystem::path& file);
+void save_scene(Session& session);
+/// Makes it the task to load what was dropped, typed or opened before: a scene, or a mesh for this scene's
+/// first body.
+void open_file(Session& session, const std::filesystem::path& file);
+/// Makes it the task to load a scene; where that fails all stays. `keep_settings`: those of now.
+void load_soon(Session& session, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
+               bool keep_camera);
+/// Makes it the task to choose a solver within the budget; the bodies stay where they are.
+void choose_soon(Session& session);
+void take_over(Session& session, Loaded loaded, bool keep_camera);
+void frame_body(Session& session);
+void keep_above_ground(Session& session);
+/// Finds what it needs, or says what is missing.
+void choose_colour(Session& session, Colour colour);
+/// Whether there is something to colour by.
+bool has_colour(const Session& session, Colour colour);
+/// What lanes are held against now, where the reference motion is known.
+const Motion* right_now(const Session& session);
+/// How far each vertex is from it, if somebody looks at that.
+void hold_vertices(Session& session);
+/// By a part of the bodies' extent.
+void move_cut(Session& session, double by);
+/// None, along x, y, z, facing the eye.
+void next_cut(Session& session);
+/// Where a lane is drawn: pixels, from the lower left.
+Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
+/// The same within a view, in window coordinates.
+Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
+/// What is to be picked of a lane: as it is drawn, but for size and marks.
+Frame shown_frame(const Session& session, std::size_t lane);
+/// All of them, and the ghost of the one that others are held against.
+void draw_lanes(Session& session, const Target& target);
+/// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
+void add_lane(Session& session, const std::string& words = {});
+/// The chosen one; the last stays.
+void remove_lane(Session& session);
+void choose_lane(Session& session, std::size_t lane);
+/// From a common start, of lanes that are others than before.
+void start_lanes(Session& session);
+/// In place of all lanes; the first keeps the scene's settings where there is no word for it.
+void compare_lanes(Session& session, const std::vector<std::string>& words);
+/// Leads the camera after the bodies; whether it is still on its way.
+bool follow_bodies(Session& session, double elapsed);
+void toggle_pin(Session& session, std::uint32_t vertex);
+void catch_vertex(Session& session, const Pick& pick);
+/// In all lanes, as it is in this one.
+void hold_vertex(Session& session, std::uint32_t vertex, std::size_t lane, double radius);
+void let_go(Session& session);
+
+/// To the last good state, once the state is not finite.
+void go_back(Session& session);
+/// Pauses and says so when the state is found not to be finite.
+void watch_state(Session& session);
+/// A way to come nearer to real time, and its words (lane_settings), if it is one of settings.
+struct Advice {
+  std::string said, words;
+  std::function<void(Session&)> act{};  ///< in place of words; none and no words: said alone
+};
+/// Where steps take more than twice the time that they simulate.
+std::optional<Advice> faster_way(const Session& session);
+/// Steps as many times as `elapsed` seconds ask for and the machine allows.
+void advance(Session& session, double elapsed);
+/// Takes in measurements and timings that have arrived, and asks for the next.
+void measure_frame(Session& session, bool stepped);
+/// The vertices with the largest values of the colour, apart from each other, once values have arrived.
+void find_worst(Session& session);
+/// Goes on with the map, if there is one that is not done.
+void fill_map(Session& session);
+bool is_filling(const Session& session);
+/// Compiles again what changed in the shader folder.
+void follow_shaders(Session& session);
+
+}  // namespace tetpbd

@@ -9,56 +9,7 @@
 
 namespace tetpbd {
 
-namespace {
-
-bool moves_alike(const Obstacle& a, const Obstacle& b) {
-  return a.velocity == b.velocity && a.spin == b.spin && a.keyframes.empty() == b.keyframes.empty();
-}
-
-// Of all lanes. What still reads the model of before, as the map's thread does, goes on with that.
-void adopt_model(Session& s, const std::shared_ptr<const Model>& model) {
-  const bool same_kernels = share_kernels(*s.loaded.model, *model);
-  s.loaded.model = model;
-  for (Lane& lane : s.loaded.lanes) {
-    change_obstacles(lane.sim, model);
-    if (!same_kernels) lane.metrics.reset();
-  }
-}
-
-}  // namespace
-
-void put_obstacles(Session& s, std::vector<Obstacle> wanted) {
-  finish_step(s);
-  for (Obstacle& o : wanted)
-    if (!o.field) load_field(o);
-  const std::vector<Obstacle> before = s.loaded.scene.obstacles;
-  const auto old_model = s.loaded.model;
-  auto model = std::make_shared<Model>(*old_model);
-  model->obstacles = wanted;
-  try {
-    adopt_model(s, model);
-  } catch (...) {
-    adopt_model(s, old_model);
-    throw;
-  }
-  ordered_json list = ordered_json::array();
-  for (const Obstacle& o : wanted) list.push_back(ordered_json(obstacle_json(o)));
-  note(s, {{"obstacles", list}});
-  disturb(s);
-  s.loaded.scene.obstacles = std::move(wanted);
-  const auto& now = s.loaded.scene.obstacles;
-  s.obstacle = std::min(s.obstacle, int(now.size()) - 1);
-  if (now.size() != before.size()) s.log("obstacles {}", now.size());
-  if (now.size() == before.size() && !std::ranges::equal(now, before, moves_alike)) restart(s);
-}
-
-void change_obstacles(Session& s, std::vector<Obstacle> wanted) {
-  attempt(s, [&] {
-    const Change before = settings_and_obstacles(s);
-    put_obstacles(s, std::move(wanted));
-    keep_change(s, before);
-  });
-}
+void change_obstacles(Session& s, std::vector<Obstacle> wanted) { emit(s, action::SetObstacles{std::move(wanted)}); }
 
 void choose_obstacle(Session& s, int number) {
   if (std::exchange(s.obstacle, number) != number) s.log("obstacle {} chosen", number + 1);

@@ -7,11 +7,7 @@
 
 namespace tetpbd {
 
-/// Those of all lanes to these, which undo takes back. Where it moves by itself in another way than before,
-/// all start anew.
 void change_obstacles(Session& session, std::vector<Obstacle> wanted);
-/// The same, which is not to be taken back. Throws Error, and leaves all as it was.
-void put_obstacles(Session& session, std::vector<Obstacle> wanted);
 void choose_obstacle(Session& session, int number);
 /// One more, at the right of the bodies as they are seen, and chosen; a mesh from the path in the panel.
 void add_obstacle(Session& session, const ObstacleKind& kind);

@@ -70,6 +70,8 @@ void History::add(double value, double time) {
   every *= 2;
 }
 
+std::uint64_t motion_key(const Lane& lane) { return scene_key(*lane.sim.model, lane.sim.settings); }
+
 bool has_patches(const Lane& lane) { return patch_words(lane.sim) != 0; }
 
 GLuint patch_numbers(Lane& lane) {

@@ -43,6 +43,8 @@ struct Lane {
   bool stopped() const { return sim.check.found.has_value(); }
 };
 
+/// Lanes of one key have one reference motion. Reads the whole mesh.
+std::uint64_t motion_key(const Lane& lane);
 /// Whether the solver's work-groups have vertices of their own.
 bool has_patches(const Lane& lane);
 /// A buffer of floats, made when first asked for: waits for the GPU then. 0 where there are no patches.

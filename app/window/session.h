@@ -136,16 +136,6 @@ struct Ui {
       {{0, 1, 2}, {1, 4, 5}}};  ///< plot_rows(): of one lane, of several
 };
 
-struct Change {
-  std::vector<Settings> lanes;
-  std::vector<Obstacle> obstacles;
-};
-/// As it was before each change, and after those that were taken back.
-struct Changes {
-  std::vector<Change> past, future;
-  bool open = false;  ///< what changes now belongs to the last change, as long as a slider is held
-};
-
 inline constexpr double usual_grab_radius = 0.04;
 
 struct Session {
@@ -199,6 +189,67 @@ void forget_errors(Session& session);
 /// Does it; what it throws becomes a message, but for ContextLost. Whether it went well.
 bool attempt(Session& session, const std::function<void()>& action);
 
+void take_over(Session& session, Loaded loaded, bool keep_camera);
+/// After the state was put back: what was measured, or is under way to be, belongs to what was before.
+void start_afresh(Session& session);
+/// The motion is no longer that of the scene: somebody had a hand in it, or it is over.
+void disturb(Session& session);
+/// The reference motion of all lanes, where there is one; looked for where it may be another than before.
+void find_right(Session& session);
+/// What lanes are held against now, where the reference motion is known.
+const Motion* right_now(const Session& session);
+/// How far each vertex is from it, if somebody looks at that.
+void hold_vertices(Session& session);
+/// What the automatic solver chose.
+void say_choice(Session& session);
+/// The state of now, into a file in the current folder.
+void save_state_file(Session& session);
+/// The scene with the settings and the camera of now, into a file of its own, with a picture beside it.
+void save_scene(Session& session);
+/// Finds what it needs, or says what is missing.
+void choose_colour(Session& session, Colour colour);
+/// Whether there is something to colour by.
+bool has_colour(const Session& session, Colour colour);
+/// The vertices with the largest values of the colour, apart from each other, once values have arrived.
+void find_worst(Session& session);
+/// Compiles again what changed in the shader folder.
+void follow_shaders(Session& session);
+
+// ------------------------------------------------------------------------------------------------------------
+// what a user asks for, as actions (requests.cpp)
+
+inline constexpr int most_halvings = 5;
+void change_speed(Session& session, int halvings);
+int halvings_for(double speed);
+/// To the start; with a parameter changed that needs it, the bodies are made again.
+void restart(Session& session);
+/// To the last good state, once the state is not finite.
+void go_back(Session& session);
+/// Those of the chosen lane. Refuses what would make steps that stop the window for minutes.
+void change_settings(Session& session, const Settings& wanted);
+/// Chooses the body under the mouse for the panel, or, beside the bodies, all.
+void choose_body(Session& session);
+/// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
+void add_lane(Session& session, const std::string& words = {});
+/// The chosen one; the last stays.
+void remove_lane(Session& session);
+void choose_lane(Session& session, std::size_t lane);
+/// In place of all lanes; the first keeps the scene's settings where there is no word for it.
+void compare_lanes(Session& session, const std::vector<std::string>& words);
+void toggle_pin(Session& session, std::uint32_t vertex);
+void catch_vertex(Session& session, const Pick& pick);
+/// What is held, if anything.
+void let_go(Session& session);
+/// Makes it the task to choose a solver within the budget; the bodies stay where they are.
+void choose_soon(Session& session);
+/// Makes it the task to load a scene; where that fails all stays. `keep`: settings, lanes and obstacles.
+void load_soon(Session& session, const std::string& name, const SceneOverrides& overrides, bool keep, bool keep_camera);
+/// What was dropped, typed or opened before: a state, a scene, or a mesh for this scene's first body.
+void open_file(Session& session, const std::filesystem::path& file);
+
+// ------------------------------------------------------------------------------------------------------------
+// steps (stepping.cpp)
+
 void play(Session& session, bool playing);
 void single_step(Session& session);
 /// All lanes; throws what a step throws.
@@ -210,75 +261,6 @@ bool step_lanes(Session& session, double seconds);
 void finish_step(Session& session);
 /// For tests: a run of as many steps must give the same. Waits for the GPU.
 void log_state(Session& session);
-inline constexpr int most_halvings = 5;
-void change_speed(Session& session, int halvings);
-/// To the start; with a parameter changed that needs it, the bodies are made again.
-void restart(Session& session);
-/// Refuses those whose steps would stop the window for minutes.
-void change_settings(Session& session, const Settings& wanted);
-/// Chooses the body under the mouse for the panel, or, beside the bodies, all.
-void choose_body(Session& session);
-/// Settings as they were before the last change, or again as they were after it.
-void undo(Session& session);
-Change settings_and_obstacles(const Session& session);
-void keep_change(Session& session, const Change& before);
-/// The motion is no longer the right one from the start: somebody had a hand in it, or it is over.
-void disturb(Session& session);
-void redo(Session& session);
-/// The scene with the settings and the camera of now, into a file of its own, with a picture beside it.
-void save_state_file(Session& session);
-void open_state(Session& session, const std::filesystem::path& file);
-void save_scene(Session& session);
-/// Makes it the task to load what was dropped, typed or opened before: a scene, or a mesh for this scene's
-/// first body.
-void open_file(Session& session, const std::filesystem::path& file);
-/// Makes it the task to load a scene; where that fails all stays. `keep_settings`: those of now.
-void load_soon(Session& session, const std::string& name, const SceneOverrides& overrides, bool keep_settings,
-               bool keep_camera);
-/// Makes it the task to choose a solver within the budget; the bodies stay where they are.
-void choose_soon(Session& session);
-void take_over(Session& session, Loaded loaded, bool keep_camera);
-void frame_body(Session& session);
-void keep_above_ground(Session& session);
-/// Finds what it needs, or says what is missing.
-void choose_colour(Session& session, Colour colour);
-/// Whether there is something to colour by.
-bool has_colour(const Session& session, Colour colour);
-/// What lanes are held against now, where the reference motion is known.
-const Motion* right_now(const Session& session);
-/// How far each vertex is from it, if somebody looks at that.
-void hold_vertices(Session& session);
-/// By a part of the bodies' extent.
-void move_cut(Session& session, double by);
-/// None, along x, y, z, facing the eye.
-void next_cut(Session& session);
-/// Where a lane is drawn: pixels, from the lower left.
-Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
-/// The same within a view, in window coordinates.
-Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
-/// What is to be picked of a lane: as it is drawn, but for size and marks.
-Frame shown_frame(const Session& session, std::size_t lane);
-/// All of them, and the ghost of the one that others are held against.
-void draw_lanes(Session& session, const Target& target);
-/// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
-void add_lane(Session& session, const std::string& words = {});
-/// The chosen one; the last stays.
-void remove_lane(Session& session);
-void choose_lane(Session& session, std::size_t lane);
-/// From a common start, of lanes that are others than before.
-void start_lanes(Session& session);
-/// In place of all lanes; the first keeps the scene's settings where there is no word for it.
-void compare_lanes(Session& session, const std::vector<std::string>& words);
-/// Leads the camera after the bodies; whether it is still on its way.
-bool follow_bodies(Session& session, double elapsed);
-void toggle_pin(Session& session, std::uint32_t vertex);
-void catch_vertex(Session& session, const Pick& pick);
-/// In all lanes, as it is in this one.
-void hold_vertex(Session& session, std::uint32_t vertex, std::size_t lane, double radius);
-void let_go(Session& session);
-
-/// To the last good state, once the state is not finite.
-void go_back(Session& session);
 /// Pauses and says so when the state is found not to be finite.
 void watch_state(Session& session);
 /// A way to come nearer to real time, and its words (lane_settings), if it is one of settings.
@@ -292,12 +274,28 @@ std::optional<Advice> faster_way(const Session& session);
 void advance(Session& session, double elapsed);
 /// Takes in measurements and timings that have arrived, and asks for the next.
 void measure_frame(Session& session, bool stepped);
-/// The vertices with the largest values of the colour, apart from each other, once values have arrived.
-void find_worst(Session& session);
 /// Goes on with the map, if there is one that is not done.
 void fill_map(Session& session);
 bool is_filling(const Session& session);
-/// Compiles again what changed in the shader folder.
-void follow_shaders(Session& session);
+
+// ------------------------------------------------------------------------------------------------------------
+// the view (view.cpp)
+
+void frame_body(Session& session);
+void keep_above_ground(Session& session);
+/// By a part of the bodies' extent.
+void move_cut(Session& session, double by);
+/// None, along x, y, z, facing the eye.
+void next_cut(Session& session);
+/// Where a lane is drawn: pixels, from the lower left.
+Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
+/// The same within a view, in window coordinates.
+Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
+/// What is to be picked of a lane: as it is drawn, but for size and marks.
+Frame shown_frame(const Session& session, std::size_t lane);
+/// All of them, and the ghost of the one that others are held against.
+void draw_lanes(Session& session, const Target& target);
+/// Leads the camera after the bodies; whether it is still on its way.
+bool follow_bodies(Session& session, double elapsed);
 
 }  // namespace tetpbd

@@ -78,7 +78,6 @@ void begin_timeline(Session& s) {
   t.bytes = 0;
   t.looping = t.off = false;
   keep_moment(s);
-  note_step(s);
 }
 
 void forget_from(Session& s, long step) {

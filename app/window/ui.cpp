@@ -298,7 +298,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_K, "K", "a lane more", [](Session& s) { add_lane(s); }},
       {GLFW_KEY_J, "J", "a lane less", [](Session& s) { remove_lane(s); }},
       {GLFW_KEY_O, "O", "lanes overlaid", [](Session& s) { flip(s, "overlaid", s.overlaid); }},
-      {GLFW_KEY_Z, "Ctrl + Z", "undo a change of settings", undo, 0, GLFW_MOD_CONTROL},
+      {GLFW_KEY_Z, "Ctrl + Z", "undo a change of settings, lanes, obstacles, pins", undo, 0, GLFW_MOD_CONTROL},
       {GLFW_KEY_Y, "Ctrl + Y", "redo (or Ctrl + Shift + Z)", redo, 0, GLFW_MOD_CONTROL},
       {GLFW_KEY_Z, "", "", redo, 0, GLFW_MOD_CONTROL | GLFW_MOD_SHIFT},
       {GLFW_KEY_S, "Ctrl + S", "save the scene with its settings", save_scene, 0, GLFW_MOD_CONTROL},

@@ -97,7 +97,7 @@ void frame_body(Session& s) {
   const Bounds box = with_obstacles(bodies, *sim.model, simulated_time(sim), bodies.size());
   frame_box(s.camera, glm::vec3(box.low), glm::vec3(box.high), s.aspect, 1.35f);
   s.beside = glm::vec3(0);
-  note_camera(s);
+  note(s, action::SetCamera{s.camera});
   s.log("frame {:.3f} {:.3f} {:.3f}", s.camera.target.x, s.camera.target.y, s.camera.target.z);
 }
 

@@ -197,8 +197,8 @@ TEST_CASE("record: what is done is done again without a window, to the same stat
   options.replay = file;
   const auto looks = [](const std::filesystem::path& record) {
     std::vector<std::string> all;
-    for (const auto& [where, action] : read_record(record))
-      if (action.contains("view")) all.push_back(action.dump());
+    for (const auto& [where, json] : read_record(record))
+      if (json.contains("view")) all.push_back(json.dump());
     return all;
   };
   REQUIRE(looks(file).size() == 2);

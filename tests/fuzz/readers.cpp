@@ -255,7 +255,7 @@ void read_overrides(std::string_view bytes) {
 void read_record_file(std::string_view bytes) {
   const fs::path file = write("session.jsonl", bytes);
   expect_errors_only([&] {
-    for (const RecordLine& line : read_record(file)) line.action.dump();
+    for (const RecordLine& line : read_record(file)) line.json.dump();
   });
 }
 

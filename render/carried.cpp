@@ -98,7 +98,7 @@ void draw_carried(Renderer& renderer, const Frame& frame, const Program& program
   program.set("valued", values ? 1 : 0);
   const std::tuple<int, GLenum, GLuint> buffers[] = {
       {UNIT_POSITIONS, GL_RGBA32F, frame.positions},
-      {UNIT_TETS, GL_RGBA32UI, tet_buffer(renderer).id()},
+      {UNIT_TETS, GL_RGBA32UI, shown_tet_buffer(renderer).id()},
       {UNIT_REST, GL_RGBA32F, rest_buffer(renderer).id()},
       {UNIT_COFACTORS, GL_RGBA32F, renderer.cofactors.values.id()},
       {UNIT_VALUES, GL_R32F, values ? values : renderer.cofactors.values.id()}};  // GL wants some buffer there

@@ -50,11 +50,13 @@ void request(Picker& picker, GLuint positions, const Ray& ray) {
 
 void request(Picker& picker, Renderer& renderer, const Frame& frame, const Ray& ray) {
   picker.inside = frame.options.look == Look::tets || frame.options.is_cut();
-  if (!picker.inside) return request(picker, frame.positions, ray);
+  const Buffer& triangles = renderer.shown_triangles ? renderer.shown_triangles : picker.triangles;
+  if (!picker.inside)
+    return start(picker, picker.kernel, frame.positions, triangles, triangles.bytes() / sizeof(Triangle), ray);
   if (!picker.tets_kernel) picker.tets_kernel = {Program::compute("render/pick.comp", {}, {"TETS"})};
   bind_view(renderer, frame);
   picker.recorder.give("Rest", rest_buffer(renderer));
-  start(picker, picker.tets_kernel, frame.positions, tet_buffer(renderer), renderer.mesh.tets.size(), ray);
+  start(picker, picker.tets_kernel, frame.positions, shown_tet_buffer(renderer), renderer.mesh.tets.size(), ray);
 }
 
 std::optional<Pick> poll(Picker& picker, bool wait) {

@@ -132,6 +132,28 @@ void draw_surroundings(Renderer& renderer, const Frame& frame) {
   for (std::size_t i = solid; i < planes.size(); ++i) draw_plane(renderer, frame, int(i), planes[i]);
 }
 
+bool has_sheets(const Renderer& renderer) { return std::ranges::any_of(renderer.parts, &Renderer::Part::sheet); }
+
+auto shown_edges(const Renderer& renderer) {
+  auto edges = tet_edges(renderer.mesh);
+  std::erase_if(edges, [&](const auto& edge) { return is_hidden(renderer, edge[0]); });
+  return edges;
+}
+
+// Bodies that stand beside each other in the buffer are drawn at once; without `tets` sheets alone.
+void draw_parts(const Renderer& renderer, bool tets) {
+  glm::ivec2 next(0);
+  const auto flush = [&] {
+    if (next.y > 0) glDrawArrays(GL_TRIANGLES, next.x, next.y);
+  };
+  for (const Renderer::Part& part : renderer.parts) {
+    if (part.hidden || !(tets || part.sheet)) continue;
+    if (next.x + next.y != part.corners.x) flush(), next = {part.corners.x, 0};
+    next.y += part.corners.y;
+  }
+  flush();
+}
+
 // Resets the GL state when drawing ends, also by the error of a shader that does not compile.
 struct ResetState {
   ~ResetState() {
@@ -156,7 +178,7 @@ void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool sha
   const Look look = frame.options.look;
   const bool cut = frame.options.is_cut(), graph = look == Look::graph && !shadow,
              carried = shows_carried(renderer, frame.options);
-  if (graph && !renderer.graph) renderer.graph = Buffer("graph indices", tet_edges(renderer.mesh));
+  if (graph && !renderer.graph) renderer.graph = Buffer("graph indices", shown_edges(renderer));
   if (cut) glEnable(GL_CLIP_DISTANCE0);
   if (graph) {  // blended, so that edges within a body show
     glEnable(GL_BLEND);
@@ -164,20 +186,18 @@ void draw_bodies(Renderer& renderer, const Frame& frame, GLuint values, bool sha
     elements("graph", GL_LINES, renderer.graph);
     glDepthMask(GL_TRUE);
   } else if (look == Look::tets) {
-    elements("tets", GL_LINES_ADJACENCY, tet_buffer(renderer));
+    elements("tets", GL_LINES_ADJACENCY, shown_tet_buffer(renderer));
   } else if (carried) {
     draw_carried(renderer, frame, use(renderer, shadow ? "carried shadow" : "carried"), values);
   }
   const bool own = look != Look::tets && !graph && !carried;
-  const glm::ivec2 all(0, 3 * renderer.mesh.surface.size());
-  const std::vector<glm::ivec2> parts = own ? std::vector{all} : renderer.sheets;
-  if (!graph && !parts.empty()) {
+  if (!graph && (own || has_sheets(renderer))) {
     use(renderer, shadow ? "surface shadow" : "surface");
     glBindVertexArray(renderer.surface_array.id());
-    for (const glm::ivec2& part : parts) glDrawArrays(GL_TRIANGLES, part.x, part.y);
+    draw_parts(renderer, own);
   }
   glDisable(GL_CLIP_DISTANCE0);
-  if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, tet_buffer(renderer));
+  if (cut && !graph) elements("caps", GL_LINES_ADJACENCY, shown_tet_buffer(renderer));
 }
 
 void attribute(GLuint index, GLuint buffer, GLint count, std::size_t stride, std::size_t offset, GLenum type) {
@@ -218,6 +238,27 @@ const Buffer& tet_buffer(Renderer& renderer) {
   return renderer.tets;
 }
 
+const Buffer& shown_tet_buffer(Renderer& renderer) {
+  return renderer.shown_tets ? renderer.shown_tets : tet_buffer(renderer);
+}
+
+bool is_hidden(const Renderer& renderer, std::uint32_t vertex) {
+  const auto after = std::ranges::upper_bound(renderer.bodies, vertex);
+  return after != renderer.bodies.begin() && renderer.parts[std::size_t(after - renderer.bodies.begin()) - 1].hidden;
+}
+
+void hide_bodies(Renderer& renderer, const std::vector<bool>& hidden) {
+  for (std::size_t b = 0; b < renderer.parts.size(); ++b) renderer.parts[b].hidden = b < hidden.size() && hidden[b];
+  renderer.shown_tets = {}, renderer.shown_triangles = {}, renderer.graph = {};
+  if (std::ranges::none_of(renderer.parts, &Renderer::Part::hidden)) return;
+  const auto shown = [&](auto elements) {
+    for (auto& element : elements)
+      if (is_hidden(renderer, element[0])) element.fill(element[0]);
+    return Buffer("indices of what is shown", elements);
+  };
+  renderer.shown_tets = shown(renderer.mesh.tets), renderer.shown_triangles = shown(renderer.mesh.surface);
+}
+
 const Buffer& rest_buffer(Renderer& renderer) {
   if (renderer.rest) return renderer.rest;
   std::vector<glm::vec4> rest;
@@ -255,6 +296,7 @@ Renderer make_renderer(TetMesh mesh, std::vector<std::size_t> bodies) {
   const Bounds rest = bounds(mesh.positions);
   renderer.rest_low = glm::vec3(rest.low), renderer.rest_high = glm::vec3(rest.high);
   renderer.mesh = std::move(mesh);
+  renderer.parts = {{glm::ivec2(0, 3 * renderer.mesh.surface.size())}};
   renderer.bodies = std::move(bodies);
   renderer.vertex_array = VertexArray("bodies");
   renderer.empty_array = VertexArray("no attributes");
@@ -268,8 +310,9 @@ Renderer make_renderer(const Model& model) {
   for (const Body& body : model.bodies) bodies.push_back(body.first_vertex);
   Renderer renderer = make_renderer(model.rest, std::move(bodies));
   renderer.carried = model.carried;
+  renderer.parts.clear();
   for (const Body& body : model.bodies)
-    if (body.is_sheet()) renderer.sheets.emplace_back(3 * body.first_triangle, 3 * body.triangles);
+    renderer.parts.push_back({glm::ivec2(3 * body.first_triangle, 3 * body.triangles), body.is_sheet()});
   return renderer;
 }
 
@@ -288,7 +331,7 @@ void draw(Renderer& renderer, const Frame& frame) {
   const GLuint values = find_values(renderer, frame);
   const bool carried = shows_carried(renderer, options);
   if (carried) fill_cofactors(renderer, frame);
-  if ((!tets && !carried) || lit_planes || !renderer.sheets.empty()) fill_corners(renderer, frame, values);
+  if ((!tets && !carried) || lit_planes || has_sheets(renderer)) fill_corners(renderer, frame, values);
   glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
                   (carried ? GL_TEXTURE_FETCH_BARRIER_BIT : 0));
   if (options.shadow) draw_shadow_map(renderer, frame, values);

@@ -42,13 +42,20 @@ struct Shadow {
 struct Renderer {
   TetMesh mesh;
   std::vector<std::size_t> bodies;  ///< the first vertex of each
-  std::vector<glm::ivec2> sheets;   ///< corners of triangles, the first and their number, of each body without tets
+  /// Of each body: corners of its triangles, the first and their number.
+  struct Part {
+    glm::ivec2 corners;
+    bool sheet = false, hidden = false;
+  };
+  std::vector<Part> parts;
   glm::vec3 rest_low{0.0f}, rest_high{0.0f};
   std::map<std::string, Pass> passes;
   Recorder recorder;
   VertexArray vertex_array, surface_array, empty_array;
   Buffer view;             ///< the uniform block
   Buffer triangles, tets;  ///< indices
+  Buffer shown_tets;       ///< the same, a point where the body is hidden
+  Buffer shown_triangles;  ///< likewise, for picking; none where no body is hidden
   Buffer graph;            ///< edges' vertices
   Buffer tet_edges;        ///< of the tet that was shown last, likewise
   std::optional<std::uint32_t> edged_tet;
@@ -88,8 +95,12 @@ const Program& use(Renderer& renderer, const std::string& name);
 Pass& kernel(Renderer& renderer, const std::string& name);
 /// Dispatches a kernel over `count` items, in work-groups of 128.
 void run_over(Renderer& renderer, Pass& pass, std::size_t count);
-/// The vertices of the tets, and the rest positions with bodies, made when first needed.
+/// By body: neither drawn nor picked, nor in the light.
+void hide_bodies(Renderer& renderer, const std::vector<bool>& hidden);
+bool is_hidden(const Renderer& renderer, std::uint32_t vertex);
+/// The vertices of the tets, of those that are shown, and the rest positions with bodies, made when first needed.
 const Buffer& tet_buffer(Renderer& renderer);
+const Buffer& shown_tet_buffer(Renderer& renderer);
 const Buffer& rest_buffer(Renderer& renderer);
 /// The centre of the bodies' bounds in a frame drawn with `follow`, once, some frames later; with `wait`, waits.
 std::optional<glm::vec3> poll_centre(Renderer& renderer, bool wait = false);

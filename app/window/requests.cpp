@@ -79,13 +79,17 @@ void change_settings(Session& s, const Settings& wanted) {
   if (wanted != now) emit(s, action::Set{s.loaded.chosen, wanted});
 }
 
-void choose_body(Session& s) {
+void choose_body(Session& s, std::optional<std::size_t> body) {
   const auto& bodies = s.loaded.model->bodies;
-  if (bodies.size() < 2) return;
-  const auto& reading = s.loaded.probe.reading;
-  s.loaded.body = reading ? std::optional(body_at(*s.loaded.model, reading->vertex).number) : std::nullopt;
+  s.loaded.body = body;
   s.log("body {}", s.loaded.body ? bodies[*s.loaded.body].name : "all");
   say(s, s.loaded.body ? fmt::format("the panel is of {}", bodies[*s.loaded.body].name) : "the panel is of all bodies");
+}
+
+void choose_body_at_cursor(Session& s) {
+  if (s.loaded.model->bodies.size() < 2) return;
+  const auto& reading = s.loaded.probe.reading;
+  choose_body(s, reading ? std::optional(body_at(*s.loaded.model, reading->vertex).number) : std::nullopt);
 }
 
 void add_lane(Session& s, const std::string& wanted) {

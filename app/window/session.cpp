@@ -199,7 +199,10 @@ void find_worst(Session& s) {
   attempt(s, [&] { values = poll_values(s.loaded.renderer); });
   if (!values) return;
   const auto& places = s.loaded.renderer.mesh.positions;
-  const auto size = [&](std::uint32_t v) { return std::isfinite((*values)[v]) ? std::abs((*values)[v]) : -1.0f; };
+  const auto size = [&](std::uint32_t v) {
+    const bool seen = std::isfinite((*values)[v]) && !is_hidden(s.loaded.renderer, v);
+    return seen ? std::abs((*values)[v]) : -1.0f;
+  };
   constexpr std::size_t most = 5, looked_at = 4096;
   std::vector<std::uint32_t> order(values->size());
   for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = v;

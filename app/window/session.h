@@ -40,6 +40,7 @@ struct Loaded {
   Picker picker;
   std::optional<SolverChoice> choice{};  ///< made last, by --solver auto or in the window
   std::size_t chosen = 0;                ///< the lane that the panel is of
+  std::vector<bool> hidden{};            ///< by body, as the view leaves them out
   std::optional<std::size_t> body{};     ///< whose material, friction and restitution it shows; none: of all
   std::optional<Motion> right{};         ///< where it is known, of several lanes or for its colours
   bool comparable = true;                ///< lanes differ in how they are solved alone
@@ -227,8 +228,10 @@ void restart(Session& session);
 void go_back(Session& session);
 /// Those of the chosen lane. Refuses what would make steps that stop the window for minutes.
 void change_settings(Session& session, const Settings& wanted);
-/// Chooses the body under the mouse for the panel, or, beside the bodies, all.
-void choose_body(Session& session);
+/// For the panel; none: all.
+void choose_body(Session& session, std::optional<std::size_t> body);
+/// The one under the mouse, or, beside the bodies, all.
+void choose_body_at_cursor(Session& session);
 /// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
 void add_lane(Session& session, const std::string& words = {});
 /// The chosen one; the last stays.
@@ -295,6 +298,10 @@ Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
 Frame shown_frame(const Session& session, std::size_t lane);
 /// All of them, and the ghost of the one that others are held against.
 void draw_lanes(Session& session, const Target& target);
+/// From the view, or back into it; it is solved all the same.
+void hide_body(Session& session, std::size_t body, bool hidden);
+/// Hides the body under the mouse, or, beside the bodies, shows all again.
+void hide_or_show(Session& session);
 /// Leads the camera after the bodies; whether it is still on its way.
 bool follow_bodies(Session& session, double elapsed);
 

@@ -57,6 +57,8 @@ void draw_lanes(Session& s, const Target& target) {
       frame.grabbed.push_back(s.hold->caught());
       std::erase_if(frame.pinned, [&](std::uint32_t v) { return s.hold->has(v); });
     }
+    for (auto* marked : {&frame.pinned, &frame.grabbed})
+      std::erase_if(*marked, [&](std::uint32_t v) { return is_hidden(s.loaded.renderer, v); });
     frame.chosen_obstacle = s.obstacle;
     frame.options.follow = s.view.follow && i == s.loaded.chosen;
     frame.options.worst = (s.view.worst || s.fit_range) && i == valued;
@@ -106,6 +108,22 @@ void keep_above_ground(Session& s) {
   if (!world.ground || s.camera.target.y < float(world.ground_height)) return;
   const float least = (float(world.ground_height) - s.camera.target.y) / s.camera.distance + 0.01f;
   s.camera.elevation = std::max(s.camera.elevation, glm::degrees(std::asin(std::clamp(least, -1.0f, 1.0f))));
+}
+
+void hide_body(Session& s, std::size_t body, bool hidden) {
+  s.loaded.hidden.resize(s.loaded.model->bodies.size());
+  if (s.loaded.hidden[body] == hidden) return;
+  s.loaded.hidden[body] = hidden;
+  hide_bodies(s.loaded.renderer, s.loaded.hidden);
+  s.loaded.probe.reading.reset();
+  s.worst.clear();
+  s.log("{} {}", hidden ? "hidden" : "shown", s.loaded.model->bodies[body].name);
+}
+
+void hide_or_show(Session& s) {
+  if (const auto& reading = s.loaded.probe.reading)
+    return hide_body(s, body_at(*s.loaded.model, reading->vertex).number, true);
+  for (std::size_t b = 0; b < s.loaded.hidden.size(); ++b) hide_body(s, b, false);
 }
 
 bool follow_bodies(Session& s, double elapsed) {

@@ -718,6 +718,48 @@ TEST_CASE("window: however much the mouse holds, leading it makes one buffer onc
   __glewGenBuffers = of_driver;
 }
 
+TEST_CASE("window: a hidden body is not drawn and not picked, and moves on") {
+  GlTest gl;
+  Session s;
+  s.playing = false;
+  take_over(s, load("stack", {}, load_scene("stack")), false);
+  const Target target = make_target(96, 128);
+  const auto picture = [&](Look look, double cut) {
+    s.view.look = look, s.view.cut = cut;
+    s.view.follow = false;
+    draw_lanes(s, target);
+    return read_rgba(target).rgba;
+  };
+  const auto picked = [&](bool inside) {  // from above
+    s.view.cut = inside ? 0.9 : 1, s.view.cut_axis = 0;
+    const glm::vec3 above = glm::vec3(bounds(s.loaded.model->positions).centre()) + glm::vec3(0, 5, 0);
+    request(s.loaded.picker, s.loaded.renderer, shown_frame(s, 0), {above, {0, -1, 0}});
+    const Pick pick = *poll(s.loaded.picker, true);
+    REQUIRE(pick.hit);
+    return body_at(*s.loaded.model, pick.vertex).number;
+  };
+  const std::size_t top = s.loaded.model->bodies.size() - 1;
+  std::vector<std::vector<std::uint8_t>> whole;
+  const std::tuple<Look, double> ways[] = {{Look::surface, 1}, {Look::tets, 1}, {Look::graph, 1}, {Look::surface, 0.6}};
+  for (const auto& [look, cut] : ways) whole.push_back(picture(look, cut));
+  CHECK(picked(false) == top);
+  CHECK(picked(true) == top);
+  hide_body(s, top, true);
+  for (std::size_t i = 0; i < whole.size(); ++i) CHECK(picture(std::get<0>(ways[i]), std::get<1>(ways[i])) != whole[i]);
+  CHECK(picked(false) == top - 1);
+  CHECK(picked(true) == top - 1);
+  const double before = read_state(s.loaded.sim()).positions[s.loaded.model->bodies[top].first_vertex].y;
+  for (int i = 0; i < 5; ++i) single_step(s);
+  CHECK(read_state(s.loaded.sim()).positions[s.loaded.model->bodies[top].first_vertex].y != before);
+  restart(s);
+  for (std::size_t b = 0; b <= top; ++b) hide_body(s, b, true);
+  const auto none = picture(Look::surface, 1);
+  for (const Look look : {Look::tets, Look::graph}) CHECK(picture(look, 1) == none);
+  for (std::size_t b = 0; b <= top; ++b) hide_body(s, b, false);
+  for (std::size_t i = 0; i < whole.size(); ++i) CHECK(picture(std::get<0>(ways[i]), std::get<1>(ways[i])) == whole[i]);
+  CHECK(gl_error_count() == 0);
+}
+
 TEST_CASE("window: where it is slow, it says what would be faster") {
   GlTest gl;
   Session s;

@@ -72,6 +72,53 @@ void turn_by(Obstacle& o, const glm::dmat3& turn) {
   o.normal = turn * o.normal;
 }
 
+namespace {
+
+glm::dvec3 chosen_centre(const Session& s) {
+  return pose_at(s.loaded.scene.obstacles[std::size_t(s.obstacle)], simulated_time(s.loaded.sim())).centre;
+}
+
+// On the screen, of the arrow along an axis.
+std::pair<glm::vec2, glm::vec2> gizmo_ends(const Session& s, const Rect& place, int axis) {
+  glm::dvec3 tip = chosen_centre(s);
+  const glm::vec2 root = seen_at(s, place, tip);
+  tip[axis] += gizmo_length(s);
+  return {root, seen_at(s, place, tip)};
+}
+
+}  // namespace
+
+bool in_front(const Session& s, const glm::dvec3& point) {
+  return glm::dot(glm::vec3(point) - eye(s.camera), s.camera.target - eye(s.camera)) > 0;
+}
+
+double gizmo_length(const Session& s) {
+  const glm::vec3 way = glm::vec3(chosen_centre(s)) - eye(s.camera);
+  const glm::vec3 forward = glm::normalize(s.camera.target - eye(s.camera));
+  return 0.12 * double(std::max(glm::dot(way, forward), 1e-3f * s.camera.distance));
+}
+
+std::optional<int> gizmo_at(const Session& s, const Rect& place, glm::vec2 cursor) {
+  const float near = 9 * s.ui.scale;
+  std::optional<int> found;
+  float least = near;
+  for (int axis = 0; axis < 3 && s.obstacle >= 0 && in_front(s, chosen_centre(s)); ++axis) {
+    const auto [root, tip] = gizmo_ends(s, place, axis);
+    const glm::vec2 way = tip - root;
+    // Of the arrow's outer part: at its root the arrows are one.
+    const float part = std::clamp(glm::dot(cursor - root, way) / std::max(glm::dot(way, way), 1.0f), 0.4f, 1.0f);
+    if (const float far = glm::distance(cursor, root + part * way); far < least) least = far, found = axis;
+  }
+  return found;
+}
+
+double along_gizmo(const Session& s, const Rect& place, int axis, glm::vec2 moved) {
+  const auto [root, tip] = gizmo_ends(s, place, axis);
+  const glm::vec2 way = tip - root;
+  // Of an arrow that points at the eye a pixel would be metres.
+  return gizmo_length(s) * double(glm::dot(moved, way) / std::max(glm::dot(way, way), 100.0f));
+}
+
 std::optional<ObstacleHit> obstacle_on(const Session& s, const Ray& ray) {
   std::optional<ObstacleHit> first;
   const double size = s.loaded.model->size, far = 100 * (size + double(s.camera.distance));

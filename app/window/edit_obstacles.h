@@ -16,6 +16,15 @@ void remove_obstacle(Session& session);
 void move_by(Obstacle& obstacle, const glm::dvec3& way);
 void turn_by(Obstacle& obstacle, const glm::dmat3& turn);  ///< about its centre
 
+/// Of the arrows at the chosen obstacle, along the world's axes: m, as long in every picture.
+double gizmo_length(const Session& session);
+/// The axis of the arrow that is seen there, in a lane's place.
+std::optional<int> gizmo_at(const Session& session, const Rect& place, glm::vec2 cursor);
+/// Along that arrow, m, for so much on the screen.
+double along_gizmo(const Session& session, const Rect& place, int axis, glm::vec2 moved);
+/// Whether the camera could see it.
+bool in_front(const Session& session, const glm::dvec3& point);
+
 struct ObstacleHit {
   int number = -1;
   double distance = 0;  ///< m, along the ray

@@ -62,6 +62,12 @@ void drag_obstacle(Input& in, const Ray& before, float dx, float dy) {
   };
   std::vector<Obstacle> wanted = s.loaded.scene.obstacles;
   Obstacle& o = wanted[std::size_t(s.obstacle)];
+  if (in.axis) {
+    glm::dvec3 way(0);
+    way[*in.axis] = along_gizmo(s, lane_place(s, s.loaded.chosen, in.view), *in.axis, {dx, dy});
+    move_by(o, way);
+    return change_obstacles(s, std::move(wanted));
+  }
   const glm::dvec3 right(glm::normalize(glm::cross(forward, glm::dvec3(0, 1, 0))));
   if (in.turning)
     turn_by(o, glm::dmat3(glm::rotate(glm::rotate(glm::dmat4(1), 0.01 * double(dx), glm::dvec3(0, 1, 0)),
@@ -103,6 +109,10 @@ void press(Input& in, int button, int modifiers) {
     in.drag = Drag::pan;
   } else if (button == GLFW_MOUSE_BUTTON_RIGHT) {
     in.drag = Drag::orbit;
+  } else if (const auto axis = gizmo_at(s, lane_place(s, s.loaded.chosen, in.view), {float(in.x), float(in.y)});
+             left && axis) {
+    in.axis = axis, in.turning = false;
+    in.drag = Drag::obstacle, s.moving_obstacle = true;
   } else if (left) {
     const bool twice = in.time - in.last_press < double_click && std::abs(in.x - in.press_x) < same_place &&
                        std::abs(in.y - in.press_y) < same_place;
@@ -131,6 +141,7 @@ void release(Input& in, int button) {
     s.moving_obstacle = false;
   }
   in.drag = Drag::none;
+  in.axis.reset();
   in.button = -1;
 }
 

@@ -42,6 +42,7 @@ struct Input {
   enum class Drag { none, asking, grab, orbit, pan, cut, obstacle } drag = Drag::none;
   bool pinning = false;                              ///< the question is for a vertex to pin
   bool turning = false;                              ///< what is dragged, in place of moving it
+  std::optional<int> axis{};                         ///< along which an obstacle is led, by its arrow
   double depth = 0;                                  ///< m, of the place by which an obstacle is held
   int button = -1;                                   ///< that holds the drag
   double x = 0, y = 0;                               ///< cursor, as far as events have been handled

@@ -107,6 +107,7 @@ void automatic_widget(Session& s, const Parameter& row, const std::string& id, T
   T shown = value == automatic ? decided : value;
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - box);
   if (number_widget(s, row, id, shown)) value = shown;
+  mark(s, row.name + " number");
   ImGui::SameLine();
   bool by_itself = value == automatic;
   if (ImGui::Checkbox(("auto" + id).c_str(), &by_itself)) value = by_itself ? T(automatic) : decided;
@@ -326,8 +327,9 @@ void draw_lane_rows(Session& s) {
     add_lane(s);
   ImGui::SameLine();
   if (lanes.size() < 2) return ImGui::NewLine();
-  if (button(s, "Remove this one", "remove lane", "the chosen lane goes, the others start anew\nJ", width))
-    return remove_lane(s);
+  if (button(s, "Remove this one", "remove lane", "the chosen lane goes, the others start anew\nJ: the last one",
+             width))
+    return remove_lane(s, s.loaded.chosen);
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const glm::vec3 colour = lane_colour(i);
     ImGui::ColorButton(fmt::format("##colour {}", i).c_str(), ImVec4(colour.x, colour.y, colour.z, 1),

@@ -141,9 +141,12 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
         seen.push_back(scaled(p.y, axes.powers_y));
   if (seen.empty()) seen = {0, 1};
   axes.low = std::ranges::min(seen), axes.high = std::ranges::max(seen);
-  // A step that compiles a shader is a hundred times as long as the others.
-  if (const double usual = percentile(seen, 0.95); row.of == &Lane::step_ms)
-    axes.high = std::min(axes.high, axes.powers_y ? usual + 0.3 : 2 * usual);
+  // A step that compiles a shader is a hundred times as long as the others; a spike flattens what is of interest.
+  const double usual = percentile(seen, 0.98), highest = axes.high;
+  if (const double least = percentile(seen, 0.02); !axes.powers_y && least < 0)
+    axes.low = std::max(axes.low, 3 * least);
+  if (const double most = axes.powers_y ? usual + 0.3 : 3 * usual; usual > axes.low)
+    axes.high = std::min(highest, most);
   if (axes.powers_y) {
     axes.low = std::floor(axes.low), axes.high = std::max(std::ceil(axes.high), axes.low + 1);
   } else {  // from 0 on, so that a plot does not magnify what hardly changes
@@ -184,7 +187,8 @@ void draw_curves(Session& s, const PlotRow& row, std::size_t slot, const ImVec2&
     draw.AddText(low, ink, text.c_str());
   };
   const auto number = [](double v, bool powers) { return fmt::format("{:.3g}", powers ? std::pow(10.0, v) : v); };
-  label(false, true, number(axes.high, axes.powers_y) + " " + row.unit);
+  const std::string peak = highest > axes.high ? ", peak " + number(highest, axes.powers_y) : "";
+  label(false, true, number(axes.high, axes.powers_y) + " " + row.unit + peak);
   if (curves.size() == 1) label(true, true, value_text(s, row, curves[0], curves[0].points.back()));
   label(false, false, number(axes.low, axes.powers_y) + " " + row.unit);
   label(true, false,

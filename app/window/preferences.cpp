@@ -17,8 +17,8 @@ constexpr std::size_t most_recent = 8, most_names = 64;
 
 }  // namespace
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Preferences, dark, panel, text, width, height, samples, shadow, hints,
-                                                open, recent)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Preferences, dark, panel, plots, text, width, height, samples, shadow,
+                                                hints, open, recent)
 
 Preferences read_preferences(const fs::path& file) {
   Preferences read;
@@ -28,6 +28,7 @@ Preferences read_preferences(const fs::path& file) {
     return {};
   }
   read.panel = std::clamp(read.panel, least_panel, most_panel);
+  read.plots = std::clamp(read.plots, least_plots, most_plots);
   read.text = std::clamp(read.text, least_text, most_text);
   if (read.width < 480 || read.height < 320 || read.width > 16384 || read.height > 16384) read.width = read.height = 0;
   if (!std::ranges::count(std::array{0, 2, 4, 8}, read.samples)) read.samples = -1;

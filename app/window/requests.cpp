@@ -106,10 +106,10 @@ void add_lane(Session& s, const std::string& wanted) {
   });
 }
 
-void remove_lane(Session& s) {
+void remove_lane(Session& s, std::size_t lane) {
   std::vector<Settings> lanes = settings_of_lanes(s);
   if (lanes.size() == 1) return;
-  lanes.erase(lanes.begin() + std::ptrdiff_t(s.loaded.chosen));
+  lanes.erase(lanes.begin() + std::ptrdiff_t(lane));
   emit(s, action::StartLanes{lanes});
 }
 

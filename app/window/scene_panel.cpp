@@ -1,6 +1,6 @@
 // Scenes in the panel: pictures to choose from, files, and what was done to the settings.
 #include <GL/glew.h>
-#include <imgui.h>
+#include <imgui_internal.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
@@ -85,11 +85,18 @@ void draw_scenes(Session& s) {
 // Three numbers, or one.
 bool drag_field(Session& s, const char* label, double* value, int count, double speed, double low, const char* format,
                 const char* help) {
-  const double most = 1e6;
-  const bool changed = ImGui::DragScalarN(begin_row(s, label).c_str(), ImGuiDataType_Double, value, count, float(speed),
-                                          &low, &most, format, ImGuiSliderFlags_AlwaysClamp);
+  constexpr double most = 1e6;
+  const std::string id = begin_row(s, label);
+  ImGui::PushMultiItemsWidths(count, ImGui::CalcItemWidth());
+  bool changed = false;
+  for (int k = 0; k < count; ++k) {
+    if (k > 0) ImGui::SameLine(0, ImGui::GetStyle().ItemInnerSpacing.x);
+    changed |= edit_number(s, fmt::format("{} {}", id, k), label, value[k], low, most, format, false, float(speed));
+    if (count > 1) mark(s, fmt::format("{} {}", label, "xyz"[k]));
+    ImGui::PopItemWidth();
+  }
   end_row(s, label, help);
-  return changed && std::all_of(value, value + count, [](double x) { return std::isfinite(x); });
+  return changed;
 }
 
 // Of its own, or the world's, to which a right click goes back.
@@ -141,8 +148,9 @@ bool obstacle_fields(Session& s, Obstacle& o) {
 void draw_scene(Session& s) {
   draw_scenes(s);
   begin_row(s, "open file");
-  ImGui::SetNextItemWidth(-ImGui::CalcTextSize("Load").x - 3 * ImGui::GetStyle().ItemSpacing.x);
-  bool load_it =
+  const float gap = ImGui::GetStyle().ItemSpacing.x, browse = ImGui::CalcTextSize("Browse").x + 2 * gap;
+  ImGui::SetNextItemWidth(-browse - gap);
+  const bool open =
       ImGui::InputTextWithHint("##mesh", "path to a scene or mesh", &s.ui.mesh, ImGuiInputTextFlags_EnterReturnsTrue);
   end_row(
       s, "mesh",
@@ -151,9 +159,9 @@ void draw_scene(Session& s) {
           "dropped onto the window",
           mesh_formats));
   ImGui::SameLine();
-  load_it |= button(s, "Load", "load", "opens the file of this path");
-  if (load_it && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
-  const float gap = ImGui::GetStyle().ItemSpacing.x, all = ImGui::GetContentRegionAvail().x - 3 * gap;
+  draw_file_button(s, browse);
+  if (open && !s.ui.mesh.empty()) open_file(s, s.ui.mesh);
+  const float all = ImGui::GetContentRegionAvail().x - 3 * gap;
   const float width = 0.3f * all, narrow = 0.2f * all;
   if (button(s, "Save scene", "save scene",
              "the scene with the settings and the view of now, into a file in the current folder\nCtrl+S", width))

@@ -121,7 +121,9 @@ void take_over(Session& s, Loaded loaded, bool keep_camera) {
   note_step(s);
   s.log("scene {} {} vertices", s.loaded.name, s.loaded.sim().model->positions.size());
   if (s.loaded.choice) say_choice(s);
-  for (const StartMotion& motion : s.loaded.sim().model->start_motions) say(s, describe(motion));
+  for (const StartMotion& motion : s.loaded.model->start_motions) say(s, describe(motion));
+  for (const BodyFill& fill : s.loaded.model->fills)
+    if (!fill.what.empty()) say(s, fmt::format("{}: {}", s.loaded.model->bodies[fill.body].name, fill.what));
 }
 
 namespace {

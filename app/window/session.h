@@ -118,6 +118,16 @@ struct SceneCard {
 };
 inline constexpr int picture_width = 192, picture_height = 144;  // pixels
 
+/// A folder as it was when it was entered.
+struct FileList {
+  struct Entry {
+    std::string name;
+    bool folder;
+  };
+  std::filesystem::path folder{};
+  std::vector<Entry> entries{};
+};
+
 /// What is shown of the panels.
 struct Ui {
   bool panels = true, plots = true, help = false;
@@ -129,8 +139,9 @@ struct Ui {
   std::array<bool, 3> hinted{};            ///< of hint_texts, those that were followed
   std::map<std::string, SceneCard> cards;  ///< by file, once shown
   MapWords map;
-  bool at_flattest = false;            ///< the cursor is on what the panel says of the flattest tet
-  std::string mesh;                    ///< path being typed
+  bool at_flattest = false;  ///< the cursor is on what the panel says of the flattest tet
+  std::string mesh;          ///< path being typed
+  FileList files;
   std::map<std::string, Rect> places;  ///< of widgets, as last logged
   std::array<PlotView, 3> plot_views;
   std::array<std::array<std::size_t, 3>, 2> plot_choice{
@@ -149,7 +160,7 @@ struct Session {
   int samples = 4, first_samples = 4;
   float aspect = 1;  ///< of the viewport
   bool playing = true, vsync = true;
-  bool take_screenshot = false, quit = false;
+  bool take_screenshot = false, filming = false, quit = false;
   double hints_until = 0;  ///< s, of `now`
   /// A step of all lanes under way: the lane that is next, and what it took so far.
   struct UnderWay {
@@ -234,8 +245,8 @@ void choose_body(Session& session, std::optional<std::size_t> body);
 void choose_body_at_cursor(Session& session);
 /// One more, with the settings of the chosen lane and `words` in their place (lane_settings); all start anew.
 void add_lane(Session& session, const std::string& words = {});
-/// The chosen one; the last stays.
-void remove_lane(Session& session);
+/// The last that is left stays.
+void remove_lane(Session& session, std::size_t lane);
 void choose_lane(Session& session, std::size_t lane);
 /// In place of all lanes; the first keeps the scene's settings where there is no word for it.
 void compare_lanes(Session& session, const std::vector<std::string>& words);
@@ -294,6 +305,8 @@ void next_cut(Session& session);
 Viewport tile_in(const Session& session, std::size_t lane, int width, int height);
 /// The same within a view, in window coordinates.
 Rect lane_place(const Session& session, std::size_t lane, const Rect& view);
+/// Where a point is seen in such a place, in window coordinates.
+glm::vec2 seen_at(const Session& session, const Rect& place, const glm::dvec3& point);
 /// What is to be picked of a lane: as it is drawn, but for size and marks.
 Frame shown_frame(const Session& session, std::size_t lane);
 /// All of them, and the ghost of the one that others are held against.

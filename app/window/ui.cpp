@@ -56,9 +56,11 @@ void draw_status(Session& s, const Rect& place) {
                                                : "paused";
   const char* dot = "\xC2\xB7";
   const bool slow = s.playing && !s.clock.fast && s.clock.factor > 0 && s.clock.factor < 0.95 * s.clock.speed();
-  const float help = ImGui::CalcTextSize("H: help").x + 3 * ImGui::GetStyle().WindowPadding.x;
-  ImGui::PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width - 1.5f * help, place.y + place.height),
-                      true);
+  const char* film = s.filming ? "V: end the video" : "V: video";
+  const bool wide = place.width > 50 * ImGui::GetFontSize();
+  const std::string buttons = fmt::format("{}H: help", wide ? fmt::format("P: picture  {}  ", film) : "");
+  const float right = ImGui::CalcTextSize(buttons.c_str()).x + 4 * ImGui::GetStyle().WindowPadding.x;
+  ImGui::PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width - right, place.y + place.height), true);
   ImGui::TextColored(slow ? alarm(s) : ImGui::GetStyleColorVec4(ImGuiCol_Text), "%s", speed.c_str());
   if (const auto faster = faster_way(s)) {
     ImGui::SameLine();
@@ -83,7 +85,18 @@ void draw_status(Session& s, const Rect& place) {
       sim.system.count(), s.gl.renderer);
   ImGui::TextUnformatted(rest.c_str());
   ImGui::PopClipRect();
-  ImGui::SameLine(place.width - help);
+  ImGui::SameLine(place.width - right);
+  if (wide) {
+    if (ImGui::SmallButton("P: picture")) s.take_screenshot = true;
+    describe_item(s, "picture", "the view without panels, into the current folder");
+    ImGui::SameLine();
+    if (s.filming) ImGui::PushStyleColor(ImGuiCol_Text, alarm(s));
+    const bool pressed = ImGui::SmallButton(film);
+    if (s.filming) ImGui::PopStyleColor();
+    describe_item(s, "film", "the view without panels, as it is seen, into the current folder");
+    if (pressed) s.filming = !s.filming;
+    ImGui::SameLine();
+  }
   if (ImGui::SmallButton("H: help")) flip(s, "help", s.ui.help);
   describe_item(s, "help", "all keys, and what the mouse does, in place of the panel");
   ImGui::End();
@@ -190,30 +203,28 @@ void draw_help(Session& s) {
   });
 }
 
-// Between view and panel: dragged, it makes the panel wider.
-void draw_edge(Session& s, const Rect& panel) {
+// Between view and panel, or view and plots: dragged, it makes the one wider or the others higher.
+void draw_edge(Session& s, const char* name, const Rect& place, bool upright, auto drag) {
   const float wide = 6 * s.ui.scale;
+  const Rect edge = upright ? Rect{place.x - wide / 2, place.y, wide, place.height}
+                            : Rect{place.x, place.y - wide / 2, place.width, wide};
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
   ImGui::SetNextWindowBgAlpha(0);
-  begin_part("edge", {panel.x - wide / 2, panel.y, wide, panel.height});
-  ImGui::InvisibleButton("edge", ImVec2(wide, panel.height));
-  mark(s, "edge");
-  if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
-  if (ImGui::IsItemActive())
-    s.ui.kept.panel =
-        std::clamp(double((panel.x + panel.width - ImGui::GetIO().MousePos.x) / s.ui.scale), least_panel, most_panel);
+  begin_part(name, edge);
+  ImGui::InvisibleButton(name, ImVec2(edge.width, edge.height));
+  mark(s, name);
+  if (ImGui::IsItemHovered() || ImGui::IsItemActive())
+    ImGui::SetMouseCursor(upright ? ImGuiMouseCursor_ResizeEW : ImGuiMouseCursor_ResizeNS);
+  if (ImGui::IsItemActive()) drag();
   ImGui::End();
   ImGui::PopStyleVar(3);
 }
 
-// In window coordinates.
-ImVec2 seen_at(const Session& s, const Rect& place, const glm::dvec3& point) {
-  const glm::vec4 seen =
-      projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) * glm::vec4(glm::vec3(point), 1);
-  return {place.x + place.width * (0.5f + 0.5f * seen.x / seen.w),
-          place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)};
+ImVec2 seen(const Session& s, const Rect& place, const glm::dvec3& point) {
+  const glm::vec2 at = seen_at(s, place, point);
+  return {at.x, at.y};
 }
 
 // What a first look shows one can do, until it was done, in the first runs.
@@ -240,7 +251,7 @@ void draw_hints(Session& s, const Rect& view) {
 // From what is held to the cursor: how far it lags says how hard it is pulled.
 void draw_pull(const Session& s, const Rect& view) {
   const Rect place = lane_place(s, s.loaded.chosen, view);
-  const ImVec2 from = seen_at(s, place, s.grab->position), to = ImGui::GetIO().MousePos;
+  const ImVec2 from = seen(s, place, s.grab->position), to = ImGui::GetIO().MousePos;
   ImDrawList& draw = *ImGui::GetBackgroundDrawList();
   draw.PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y + place.height));
   for (const auto& [colour, width] :
@@ -249,6 +260,43 @@ void draw_pull(const Session& s, const Rect& view) {
     draw.AddCircle(from, 9 * s.ui.scale, colour, 0, width * s.ui.scale);
   }
   draw.PopClipRect();
+}
+
+// The outline of the chosen obstacle, and arrows along which it can be dragged.
+void draw_gizmo(Session& s, const Rect& view) {
+  const Rect place = lane_place(s, s.loaded.chosen, view);
+  const Obstacle& o = s.loaded.scene.obstacles[std::size_t(s.obstacle)];
+  const Pose pose = pose_at(o, simulated_time(s.loaded.sim()));
+  ImDrawList& draw = *ImGui::GetBackgroundDrawList();
+  draw.PushClipRect(ImVec2(place.x, place.y), ImVec2(place.x + place.width, place.y + place.height));
+  const auto line = [&](const glm::dvec3& a, const glm::dvec3& b, ImU32 colour, float width) {
+    if (in_front(s, a) && in_front(s, b))
+      draw.AddLine(seen(s, place, a), seen(s, place, b), colour, width * s.ui.scale);
+  };
+  if (o.kind->half) {
+    const glm::dvec3 half = o.kind->half(o);
+    const auto corner = [&](int bits) {
+      const glm::dvec3 side(bits & 1 ? 1 : -1, bits & 2 ? 1 : -1, bits & 4 ? 1 : -1);
+      return pose.centre + pose.axes * (side * half);
+    };
+    for (int bits = 0; bits < 8; ++bits)
+      for (const int axis : {1, 2, 4})
+        if (!(bits & axis)) line(corner(bits), corner(bits | axis), ImGui::GetColorU32(accent(s)), 1.5f);
+  }
+  const double length = gizmo_length(s);
+  constexpr ImU32 colours[] = {IM_COL32(214, 58, 48, 255), IM_COL32(72, 150, 48, 255), IM_COL32(48, 96, 214, 255)};
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 tip = pose.centre;
+    tip[axis] += length;
+    line(pose.centre, tip, colours[axis], 3);
+    if (!in_front(s, tip)) continue;
+    draw.AddCircleFilled(seen(s, place, tip), 5.5f * s.ui.scale, colours[axis]);
+    const ImVec2 at = seen(s, place, tip);
+    mark(s, fmt::format("gizmo {}", "xyz"[axis]), {at.x - 1, at.y - 1, 2, 2});
+  }
+  draw.PopClipRect();
+  const ImVec2 at = seen(s, place, pose.centre);
+  mark(s, "chosen obstacle", {at.x - 1, at.y - 1, 2, 2});
 }
 
 }  // namespace
@@ -294,10 +342,11 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_TAB, "Tab", "panels", [](Session& s) { flip(s, "panels", s.ui.panels); }},
       {GLFW_KEY_B, "B", "the panel is of the body under the mouse", choose_body_at_cursor},
       {GLFW_KEY_U, "U", "hide the body under the mouse; beside all: show all", hide_or_show},
+      {GLFW_KEY_V, "V", "video without panels: begin, end", [](Session& s) { s.filming = !s.filming; }},
       {GLFW_KEY_P, "P", "screenshot without panels", [](Session& s) { s.take_screenshot = true; }},
       {GLFW_KEY_H, "H, F1", "this help", [](Session& s) { flip(s, "help", s.ui.help); }, GLFW_KEY_F1},
       {GLFW_KEY_K, "K", "a lane more", [](Session& s) { add_lane(s); }},
-      {GLFW_KEY_J, "J", "a lane less", [](Session& s) { remove_lane(s); }},
+      {GLFW_KEY_J, "J", "a lane less", [](Session& s) { remove_lane(s, s.loaded.lanes.size() - 1); }},
       {GLFW_KEY_O, "O", "lanes overlaid", [](Session& s) { flip(s, "overlaid", s.overlaid); }},
       {GLFW_KEY_Z, "Ctrl + Z", "undo a change of settings, lanes, obstacles, pins", undo, 0, GLFW_MOD_CONTROL},
       {GLFW_KEY_Y, "Ctrl + Y", "redo (or Ctrl + Shift + Z)", redo, 0, GLFW_MOD_CONTROL},
@@ -315,7 +364,8 @@ Layout make_layout(const Ui& ui, float width, float height) {
   const float status = std::round(32 * ui.scale);
   const bool shown = ui.panels || ui.help;
   const float panel = shown ? std::min(std::round(float(ui.kept.panel) * ui.scale), width * 0.6f) : 0;
-  const float plots = ui.panels && ui.plots && height > 360 * ui.scale ? std::round(128 * ui.scale) : 0;
+  const bool plotted = ui.panels && ui.plots && height > 360 * ui.scale;
+  const float plots = plotted ? std::min(std::round(float(ui.kept.plots) * ui.scale), height * 0.5f) : 0;
   const float timeline = ui.panels && height > 240 * ui.scale ? std::round(38 * ui.scale) : 0;
   const float bottom = ui.panels ? std::max(height - status, 1.0f) : height;
   layout.view = {0, 0, std::max(width - panel, 1.0f), std::max(bottom - plots - timeline, 1.0f)};
@@ -339,14 +389,13 @@ void draw_ui(Session& s, const Layout& layout) {
   }
   if (s.grab) draw_pull(s, layout.view);
   draw_hints(s, layout.view);
-  if (s.obstacle >= 0) {
-    const auto& obstacle = s.loaded.scene.obstacles[std::size_t(s.obstacle)];
-    const ImVec2 at = seen_at(s, lane_place(s, s.loaded.chosen, layout.view),
-                              pose_at(obstacle, simulated_time(s.loaded.sim())).centre);
-    mark(s, "chosen obstacle", {at.x - 1, at.y - 1, 2, 2});
-  }
+  if (s.obstacle >= 0) draw_gizmo(s, layout.view);
   if (layout.panel.width > 0) {
-    draw_edge(s, layout.panel);  // such windows stand before those that come after them
+    draw_edge(s, "edge", layout.panel, true, [&] {  // such windows stand before those that come after them
+      const double right = double(layout.panel.x + layout.panel.width);
+      s.ui.kept.panel =
+          std::clamp((right - double(ImGui::GetIO().MousePos.x)) / double(s.ui.scale), least_panel, most_panel);
+    });
     begin_part(s.ui.help ? "help" : "panel", layout.panel);
     s.ui.help ? draw_help(s) : draw_panel(s);
     ImGui::End();
@@ -357,7 +406,14 @@ void draw_ui(Session& s, const Layout& layout) {
       draw_timeline(s);
       ImGui::End();
     }
-    if (layout.plots.height > 0) draw_plots(s, layout.plots);
+    if (layout.plots.height > 0) {
+      draw_edge(s, "edge of plots", layout.plots, false, [&] {
+        const double below = double(layout.plots.y + layout.plots.height);
+        s.ui.kept.plots =
+            std::clamp((below - double(ImGui::GetIO().MousePos.y)) / double(s.ui.scale), least_plots, most_plots);
+      });
+      draw_plots(s, layout.plots);
+    }
     draw_status(s, layout.status);
   }
   draw_messages(s, layout.view);

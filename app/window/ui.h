@@ -55,6 +55,7 @@ void draw_panel(Session& session);
 void draw_scene(Session& session);
 void draw_obstacles(Session& session);
 void draw_map(Session& session);
+void draw_file_button(Session& session, float width);
 void draw_view(Session& session);
 /// The bar below the view: speed, loop, what can be gone back to.
 void draw_timeline(Session& session);

@@ -18,6 +18,13 @@ Rect lane_place(const Session& s, std::size_t lane, const Rect& view) {
           float(tile.height)};
 }
 
+glm::vec2 seen_at(const Session& s, const Rect& place, const glm::dvec3& point) {
+  const glm::vec4 seen =
+      projection_matrix(s.camera, place.width / place.height) * view_matrix(s.camera) * glm::vec4(glm::vec3(point), 1);
+  return {place.x + place.width * (0.5f + 0.5f * seen.x / seen.w),
+          place.y + place.height * (0.5f - 0.5f * seen.y / seen.w)};
+}
+
 void move_cut(Session& s, double by) { s.view.cut = std::clamp(s.view.cut + by, 0.0, 1.0); }
 
 void next_cut(Session& s) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <deque>
+#include <memory>
 #include <string_view>
 #include <tuple>
 #include <utility>
@@ -91,12 +93,31 @@ void measure_window(Desktop& d, Session& s) {
   ImGui_ImplOpenGL3_CreateFontsTexture();
 }
 
+/// A video of the view as it is seen.
+struct Filming {
+  static constexpr int rate = 30;  // frames a second
+  std::string file;
+  Video video;
+  int width, height;
+  double next;  ///< s, when the next frame is due
+  ReadBack images{};
+  std::deque<int> times{};  ///< how often each image that is on its way is shown
+
+  Filming(const std::string& name, const Target& target, double now)
+      : file(name),
+        video(name, target.width, target.height, rate),
+        width(target.width),
+        height(target.height),
+        next(now) {}
+};
+
 /// The image of the view, without panels, and screenshots on their way to a file.
 struct View {
   Target target;
   int asked_samples = -1;
   ViewOptions drawn;  ///< the last that could be drawn
   ReadBack read_back;
+  std::unique_ptr<Filming> filming{};
 };
 
 void draw_view(Session& s, View& view, int width, int height) {
@@ -125,6 +146,45 @@ void take_screenshots(Session& s, View& view) {
     s.log("screenshot {}", name);
     say(s, "saved " + name);
   });
+}
+
+void take_frames(Filming& film, std::size_t most_pending) {
+  while (const auto image = film.images.poll(film.images.pending() > most_pending)) {
+    for (int k = 0; k < film.times.front(); ++k) film.video.add(*image);
+    film.times.pop_front();
+  }
+}
+
+void end_film(Session& s, View& view) {
+  s.filming = false;
+  const auto film = std::exchange(view.filming, nullptr);
+  if (!film) return;
+  attempt(s, [&] {
+    take_frames(*film, 0);
+    film->video.close();
+    s.log("video {}", film->file);
+    say(s, "saved " + film->file);
+  });
+}
+
+// A frame that lasts is shown as often as its time asks for.
+void film(Session& s, View& view) {
+  if (s.filming && !view.target.framebuffer) return;
+  auto& film = view.filming;
+  if (!s.filming || (film && (film->width != view.target.width || film->height != view.target.height)))
+    return end_film(s, view);
+  const bool good = attempt(s, [&] {
+    if (!film) {
+      film = std::make_unique<Filming>(free_name("video", "mp4"), view.target, s.now);
+      s.log("filming {}", film->file);
+    }
+    int times = 0;
+    for (; film->next <= s.now; film->next += 1.0 / Filming::rate) ++times;
+    if (times > 0) film->images.push(view.target), film->times.push_back(times);
+    constexpr std::size_t most_pending = 6;
+    take_frames(*film, most_pending);
+  });
+  if (!good) film.reset(), s.filming = false;
 }
 
 void begin_imgui_frame(Input& input, GLFWwindow* window) {
@@ -178,6 +238,7 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   find_worst(s);
   draw_view(s, view, width, height);
   take_screenshots(s, view);
+  film(s, view);
   const bool named = s.task.has_value();
   draw_ui(s, layout);
   if (s.task) draw_busy(layout, s.task->name);
@@ -243,7 +304,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
   if (s.hints_until > 0) s.hints_until += before;
   while (!glfwWindowShouldClose(desktop.window) && !s.quit && !interrupted()) {
     // With nothing moving, a few frames a second are enough and the processor can rest.
-    const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task &&
+    const bool idle = !s.playing && !is_filling(s) && !moving && !input.busy() && !s.task && !s.filming &&
                       view.read_back.pending() == 0 && glfwGetTime() - last_event > 0.5;
     if (!desktop.visible || idle)
       glfwWaitEventsTimeout(0.1);
@@ -280,6 +341,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
     }
     draw_frame(s, view, input, desktop);
   }
+  end_film(s, view);
   end_record(s);
   keep();
   s.log("closed");

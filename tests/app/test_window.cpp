@@ -168,7 +168,7 @@ TEST_CASE("window: lanes step together from a common start, and are held against
   toggle_pin(s, 0);
   for (const Lane& lane : s.loaded.lanes) CHECK(is_pinned(lane.sim, 0));
   choose_lane(s, 2);
-  remove_lane(s);
+  remove_lane(s, s.loaded.chosen);
   CHECK(s.loaded.lanes.size() == 2);
   CHECK(s.loaded.chosen == 1);
   for (const Lane& lane : s.loaded.lanes) CHECK(lane.sim.steps == 0);
@@ -493,7 +493,7 @@ TEST_CASE("window: lanes, pins and materials of bodies are taken back too, and a
     redo(s);
     REQUIRE(s.loaded.lanes.size() == 3);
     choose_lane(s, 1);
-    remove_lane(s);
+    remove_lane(s, s.loaded.chosen);
     undo(s);
     REQUIRE(s.loaded.lanes.size() == 3);
     CHECK(s.loaded.lanes[1].sim.settings.substeps == 3);

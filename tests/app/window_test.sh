@@ -225,7 +225,7 @@ drag 1 $cx $cy 20 -100; await '^lane 2 chosen'; await '^grab [0-9]+'; sleep 3; s
 key space; await '^pause'
 [[ $(new_events | grep -c '^lane [123] ') -ge 3 ]] || fail "lanes did not step together"
 forget; key j; await '^reset'; key k; await '^reset'
-[[ $(new_events | grep -c '^lane cpu-fast') -eq 2 ]] || fail "a lane more is not as the chosen one"
+[[ $(new_events | grep -c '^lane node, 5 substeps') -eq 2 ]] || fail "a lane more is not as the chosen one"
 choose "side by side" single; await '^reset'
 
 # --------------------------------------------------------------------------------------------------- stability map

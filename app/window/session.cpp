@@ -104,6 +104,7 @@ bool attempt(Session& s, const std::function<void()>& action) {
 void take_over(Session& s, Loaded loaded, bool keep_camera) {
   s.grab.reset(), s.hold.reset();
   s.under_way.reset();
+  s.step_seconds = 0;
   s.changes = {};
   s.obstacle = -1;
   s.loaded = std::move(loaded);

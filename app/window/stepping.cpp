@@ -167,8 +167,8 @@ void advance(Session& s, double elapsed) {
   constexpr double patience = 0.04;  // s of stepping between two frames
   const auto begin = Steady::now();
   int taken = 0;
-  // A step that takes longer than a frame may is taken in parts, so that the window answers in between.
-  const bool in_parts = s.under_way || (!queued && s.step_seconds > patience);
+  // A step that takes longer than a frame may, or that is the first, is taken in parts: the window answers in between.
+  const bool in_parts = s.under_way || (!queued && (s.step_seconds == 0 || s.step_seconds > patience));
   while ((clock.fast || clock.owed >= dt || s.under_way) && (!queued || taken < clock.most_steps)) {
     if (!in_parts)
       step_lanes(s);

@@ -280,13 +280,13 @@ int run_headless(Scene scene, const RunOptions& options) {
       if (files && s % files->every == 0) add_frame(*files, sim);
     };
     if (!check_finite(sim)) plan.stepped(0);
-    run = run_loop(sim, &metrics, steps, plan);
+    run = run_to_end(sim, &metrics, steps, plan);
   }
   if (frames && frames->video) frames->video->close();
   if (files) close(*files, sim);
   const auto& found = run.errors.non_finite;
   bool good = !found || restore_checkpoint(sim);
-  while (good && found && sim.steps < found->step - 1) step(sim);  // to the last good one, by the same bits
+  if (good && found) run_to_end(sim, nullptr, found->step - 1 - sim.steps);  // to the last good one, by the same bits
   if (good && found) good = !check_finite(sim, true);
   const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
   if (!options.save_state.empty() && good && !interrupted()) save_state(sim, options.save_state);
@@ -328,9 +328,9 @@ int print_explanation(Scene scene, int gpu, long steps) {
   warm_up(sim);
   long before = 0;
   if (!on_cpu(sim)) {
-    run_loop(sim, nullptr, steps);
+    run_to_end(sim, nullptr, steps);
     before = sim.steps, sim.recorder.timing = true;
-    run_loop(sim, nullptr, 10, {.most_seconds = 10});
+    run_to_end(sim, nullptr, 10, {.most_seconds = 10});
   }
   const Explanation e = explain(sim, int(sim.steps - before));
   fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),

@@ -12,7 +12,7 @@
 #include "app/bodies.h"
 #include "app/commands.h"
 #include "app/lab/auto_solver.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/obstacles.h"
 #include "render/obstacles.h"
 #include "sim/contact/starts.h"

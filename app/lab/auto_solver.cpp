@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "app/lab/reference_command.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/sweep.h"
 #include "sim/contact/pairs.h"
 #include "sim/error.h"
@@ -65,7 +65,7 @@ void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
   for (int round = 0; round < 2; ++round) {
     reset(sim);
     const double seconds = is_software_renderer() ? 0 : 0.03;
-    const MeasuredRun run = run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
+    const MeasuredRun run = run_to_end(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
     if (interrupted()) throw Interrupted();
     const double substeps = plan_for(settings).substeps * budget_ms / step_ms(run);
     settings.substeps = int(std::clamp(substeps, 1.0, double(most_substeps)));
@@ -98,9 +98,9 @@ Motion motion_of_run(Sim& sim, long steps) {
   };
   keep(0);
   const long every = std::max(1L, steps / 20);
-  run_loop(sim, nullptr, steps, {.stepped = [&](long s) {
-             if (s % every == 0 || s == steps) keep(s);
-           }});
+  run_to_end(sim, nullptr, steps, {.stepped = [&](long s) {
+               if (s % every == 0 || s == steps) keep(s);
+             }});
   return motion;
 }
 
@@ -145,7 +145,7 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
       Metrics metrics = create_metrics(sim);
       const double enough = first ? most_seconds() : 2e-3 * budget_ms * double(choice.steps) + 0.5;
       const MeasuredRun run =
-          run_loop(sim, &metrics, choice.steps, {.most_seconds = enough, .standard = right ? &*right : nullptr});
+          run_to_end(sim, &metrics, choice.steps, {.most_seconds = enough, .standard = right ? &*right : nullptr});
       if (interrupted()) throw Interrupted();
       if (first && run.errors.finite) choice.steps = run.steps;
       trial.ms = step_ms(run);

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "app/lab/map.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/sweep.h"
 #include "sim/error.h"
 #include "sim/files.h"
@@ -200,7 +200,7 @@ std::string map_svg(const nlohmann::ordered_json& document) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& row = rows[i];
     const double x = left + double(note(xs, row["x"])) * wide, y = bottom - double(note(ys, row["y"]) + 1) * high;
-    const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
+    const double percent = map_percent(row, motion);
     const bool failed = !row["finite"].get<bool>();
     const double part = heat_part(percent);
     const std::string said = row.contains("refused") ? "refused"

@@ -28,7 +28,7 @@ const char* compare_columns =
     "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
     "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy,penetration_max,penetration_999,"
     "overlap_max,overlap_999,overlap_vertices,overlap_triangles,crossing_depth,total_final,total_rms,total_peak,"
-    "total_relative,total_error";
+    "total_relative,total_error,state_hash";
 const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
     "wall_ms_per_step:wall-ms 11, motion_final:motion 11, motion_rms:rms 11, total_error:total 11, "

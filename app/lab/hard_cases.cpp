@@ -59,7 +59,7 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
   const auto model = build_model(scene);
   Sim sim = create_sim(model, settings, {.count_guards = true});
   Metrics metrics = create_metrics(sim);
-  const MeasuredRun run = run_loop(sim, &metrics, steps);
+  const MeasuredRun run = run_to_end(sim, &metrics, steps);
   const auto recovered =
       run.errors.finite ? recovered_at(run.measurements, steps, all_materials(settings, hard)) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
@@ -119,6 +119,7 @@ int run_hard_cases(const CompareOptions& options) {
   Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), 3, case_table, {}};
   sweep.facts = ordered_json::object();
   for (const char* guard : guard_names) sweep.columns.push_back(fmt::format("guard_{}", guard));
+  sweep.columns.push_back("state_hash");
   ordered_json document =
       run_or_merge(sweep, options.shards, options.out, options.gpu, [&] { add_cases(sweep, options); });
   ordered_json& rows = document["rows"];

@@ -20,7 +20,7 @@ namespace tetpbd {
 namespace {
 
 const char* results =
-    "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step";
+    "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step,state_hash";
 
 ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
                      const std::string& x, const std::string& y, std::optional<Motion>& last, Film& film) {
@@ -37,16 +37,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
     row["finite"] = false, row["refused"] = error.what();
     return row;
   }
-  const auto& found = run.errors.non_finite;
-  const double nothing = std::nan("");
-  const bool motion = run.motion && run.errors.finite;
-  row["finite"] = run.errors.finite;
-  row["failed_at_step"] = found ? ordered_json(found->step) : ordered_json();
-  row["motion_rms"] = motion ? run.motion->rms : nothing;
-  row["motion_final"] = motion ? run.motion->final : nothing;
-  row["max_volume_loss_percent"] = run.errors.finite ? run.errors.max_volume_loss_percent : nothing;
-  row["tet_volume_max"] = run.errors.finite && run.errors.last ? run.errors.last->tet_volume_max : nothing;
-  row["ms_per_step"] = median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms);
+  row.update(map_row(run));
   row["film"] = film.write();
   return row;
 }
@@ -94,6 +85,36 @@ std::optional<Motion> answer_for(const Model& model, const Settings& settings, l
   return find_motion({model, system, settings, model.inverse_masses}, steps, {}, {}, progress);
 }
 
+ordered_json map_row(const MeasuredRun& run) {
+  const auto& found = run.errors.non_finite;
+  const double nothing = std::nan("");
+  const bool finite = run.errors.finite, motion = run.motion && finite;
+  return {{"finite", finite},
+          {"failed_at_step", found ? ordered_json(found->step) : ordered_json()},
+          {"motion_rms", motion ? run.motion->rms : nothing},
+          {"motion_final", motion ? run.motion->final : nothing},
+          {"max_volume_loss_percent", finite ? run.errors.max_volume_loss_percent : nothing},
+          {"tet_volume_max", finite && run.errors.last ? run.errors.last->tet_volume_max : nothing},
+          {"ms_per_step", median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms)},
+          {"state_hash", hash_json(run)}};
+}
+
+double map_percent(const ordered_json& row, bool motion) {
+  return motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
+}
+
+std::vector<Settings> map_cells(const Settings& base, const MapAxis& x, const MapAxis& y) {
+  std::vector<Settings> cells;
+  for (const std::string& up : y.values)
+    for (const std::string& across : x.values) {
+      Settings& settings = cells.emplace_back(base);
+      set_parameter(settings, *x.row, across, x.row->name);
+      set_parameter(settings, *y.row, up, y.row->name);
+      check_settings(settings, fmt::format("{} {}, {} {}", x.row->name, across, y.row->name, up));
+    }
+  return cells;
+}
+
 int run_map(const MapOptions& options) {
   const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");
   if (x.row == y.row) throw Error("both axes are the same setting", x.row->name, "give another to --y");
@@ -121,17 +142,13 @@ int run_map(const MapOptions& options) {
     sweep.facts["tets"] = model->rest.tets.size();
     sweep.facts["x"] = x.row->name, sweep.facts["y"] = y.row->name, sweep.facts["seconds"] = scene.duration;
     const auto last = std::make_shared<std::optional<Motion>>();
-    for (const std::string& down : y.values)
-      for (const std::string& across : x.values) {
-        Settings settings = scene.settings;
-        set_parameter(settings, *x.row, across, "--x");
-        set_parameter(settings, *y.row, down, "--y");
-        check_settings(settings, fmt::format("{} {}, {} {}", x.row->name, across, y.row->name, down));
-        sweep.work.push_back([=, number = sweep.work.size()] {
-          Film film(scene, *model, options.out, number, x.values.size() * y.values.size());
-          return std::vector{cell_of(scene, model, settings, across, down, *last, film)};
-        });
-      }
+    for (const Settings& settings : map_cells(scene.settings, x, y))
+      sweep.work.push_back([=, number = sweep.work.size()] {
+        const std::size_t columns = x.values.size();
+        Film film(scene, *model, options.out, number, columns * y.values.size());
+        const std::string across = x.values[number % columns], up = y.values[number / columns];
+        return std::vector{cell_of(scene, model, settings, across, up, *last, film)};
+      });
   });
   print_table(sweep, document);
   write_sweep(sweep, options.out, document);

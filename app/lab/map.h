@@ -7,10 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "sim/model/model.h"
-#include "sim/reference/motion.h"
+#include "app/lab/run.h"
+#include "app/lab/sweep.h"
 
 namespace tetpbd {
+
+/// Settings for each pair of values, row by row: `x` varies fastest. Throws Error for those that do not go together.
+struct MapAxis;
+std::vector<Settings> map_cells(const Settings& base, const MapAxis& x, const MapAxis& y);
 
 struct MapAxis {
   const Parameter* row = nullptr;
@@ -24,5 +28,10 @@ MapAxis map_axis(const std::string& text, const std::string& flag);
 /// told of each step that is done.
 std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps,
                                  const std::function<void(long)>& progress = {});
+/// The columns of a cell that a run fills, those of map.csv.
+ordered_json map_row(const MeasuredRun& run);
+/// What a cell shows, in percent: the RMS distance from the reference motion where that is known, else the largest net
+/// volume loss. NaN where the run failed.
+double map_percent(const ordered_json& row, bool motion);
 
 }  // namespace tetpbd

@@ -171,7 +171,7 @@ void snapshots(Report& report, const Published& paper, const Scene& scene, const
       "<div class=\"snapshots\">\n",
       paper.figure + 1, paper.name);
   for (int s = 0; s <= (report.quick ? 25 : 150); s += 25) {
-    if (s > 0) check(run_loop(sim, nullptr, 25), scene);
+    if (s > 0) check(run_to_end(sim, nullptr, 25), scene);
     frame.caption = fmt::format("t = {:.3f} s", s * scene.settings.dt);
     draw(renderer, frame);
     const auto file = report.out / "figures" / fmt::format("snapshot_{}_{:03}.png", paper.name, s);

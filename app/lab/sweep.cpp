@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "app/files.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"

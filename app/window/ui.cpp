@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/window/edit_obstacles.h"
 #include "app/window/widgets.h"
 #include "render/legend.h"

@@ -6,7 +6,7 @@
 
 #include "app/lab/auto_solver.h"
 #include "app/window/lanes.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/scene.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"

@@ -13,6 +13,7 @@
 #include "app/lab/reference_command.h"
 #include "app/lab/run.h"
 #include "app/lab/sweep.h"
+#include "app/lab/vary.h"
 #include "app/scene.h"
 #include "render/frame.h"
 #include "sim/reference/reference.h"
@@ -81,12 +82,9 @@ int run_mesh_command(const MeshOptions& options);
 struct BenchOptions {
   std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
   SceneOverrides overrides;  ///< for every scene
-  Axes axes = {.modes = {"cpu", "constraint", "node"},
-               .constraint_sets = {"stretch+bend", "stretch+bend+volume"},
-               .iterations = {1, 150},
-               .substeps = {1},
-               .rigid_contact = {0},
-               .mass_splitting = {0}};
+  std::vector<Variation> variations =
+      parse_variations({"constraints=stretch+bend,stretch+bend+volume", "mode=cpu,constraint,node", "rigid_contact=0",
+                        "mass_splitting=0", "iterations=1,150", "substeps=1"});
   long frames = 400, warm_up = 50;
   int repeats = 3;
   double most_seconds = 5;                             ///< a repetition stops there, with fewer frames (slow CPU modes)
@@ -120,7 +118,8 @@ ordered_json launch_and_bandwidth_limits(bool software);
 struct CompareOptions {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  Axes axes = {.modes = {}, .iterations = {1, 5, 10, 25}, .substeps = {1}};  ///< no modes: what suits the scene
+  std::vector<Variation> variations =
+      parse_variations({"iterations=1,5,10,25", "substeps=1"});  ///< no modes: what suits the scene
   long steps = 400;
   int gpu = -1;
   std::filesystem::path out = "compare";
@@ -146,11 +145,11 @@ struct MapOptions {
 /// which is found anew where they change it.
 int run_map(const MapOptions& options);
 
-/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double. Of the
-/// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
+/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double. Of
+/// what varies only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
 /// scene has iterations. Steps 0: the scene's duration.
 int run_hard_cases(const CompareOptions& options);
-inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu", "cpu-double"};
+inline constexpr const char* hard_case_modes = "mode=node,constraint,node-substeps,cpu,cpu-double";
 /// The first step of those at the end that all keep the volume within 1 %, no tet inverted and, of `hard`
 /// bodies, their shape within 1 % of the size, if they are 5 % of the run's `steps` at least: what is good
 /// for less long may be passing through.

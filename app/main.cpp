@@ -14,7 +14,6 @@
 #include "app/commands.h"
 #include "app/export.h"
 #include "app/files.h"
-#include "app/lab/map.h"
 #include "app/window/lanes.h"
 #include "app/window/record.h"
 #include "sim/error.h"
@@ -186,26 +185,6 @@ void add_parameters(CLI::App& command, SceneOverrides& overrides) {
   }
 }
 
-/// NAME=VALUES: what compare and bench vary, by the words that map and lanes have for it.
-void vary(Axes& axes, const std::string& text) {
-  const std::string name = text.substr(0, text.find('='));
-  const std::vector<std::string> words = split(text.substr(std::min(text.find('=') + 1, text.size())), ',');
-  if (name == "mode" || name == "element") {
-    if (words.empty()) throw Error("no values", "--vary " + text, "write " + name + "=A,B");
-    (name == "mode" ? axes.modes : axes.elements) = words;
-    return;
-  }
-  const MapAxis axis = map_axis(text, "--vary");
-  if (name != "omega" && name != "iterations" && name != "substeps")
-    throw Error(fmt::format("'{}' does not vary here", name), "--vary " + text,
-                "give mode, element, omega, iterations or substeps; tetpbd map varies any two numbers");
-  if (name == "omega") axes.omegas.clear();
-  std::vector<int>& whole = name == "iterations" ? axes.iterations : axes.substeps;
-  if (name != "omega") whole.clear();
-  for (const std::string& value : axis.values)
-    name == "omega" ? axes.omegas.push_back(std::stod(value)) : whole.push_back(std::stoi(value));
-}
-
 /// --vary, given once for each setting.
 void add_vary(CLI::App& command, const std::string& help, const std::function<void(const std::string&)>& take) {
   command
@@ -220,21 +199,43 @@ void add_vary(CLI::App& command, const std::string& help, const std::function<vo
       ->take_all();
 }
 
-/// Lists of modes, iterations and substeps, every combination of which is run.
-void add_axes(CLI::App& command, Axes& axes) {
-  add(command, "--modes,--mode", axes.modes,
-      "solver modes; paper: as published (default of compare: those that suit the scene)");
-  add(command, "--iterations", axes.iterations, 1, 100000, "iterations a substep");
-  add(command, "--substeps", axes.substeps, 1, 100000, "substeps a step");
-  const CLI::Transformer truth({{"false", "0"}, {"true", "1"}});
-  add(command, "--rigid-contact", axes.rigid_contact, 0, 1,
-      "whether touching hard bodies move as rigid ones (default: bench 0, as published; else the scene's)");
-  add(command, "--mass-splitting", axes.mass_splitting, 0, 1,
-      "whether masses are split; else corrections are averaged (default: bench 0, as published; else the "
-      "scene's)");
-  add_vary(command, "mode, element, omega, iterations or substeps; once for each that varies",
-           [&axes](const std::string& text) { vary(axes, text); });
-  for (const char* flag : {"--rigid-contact", "--mass-splitting"}) command.get_option(flag)->transform(truth);
+/// A list for a setting that varies: --iterations 1,5 means --vary iterations=1,5.
+void add_variation(CLI::App& command, const std::string& flags, const std::string& name, std::vector<Variation>& all,
+                   const std::string& help) {
+  const std::string flag = flags.substr(0, flags.find(','));
+  const auto take = [=, &all](const std::vector<std::string>& words) {
+    vary(all, parse_variation(fmt::format("{}={}", name, fmt::join(words, ",")), flag));
+  };
+  CLI::Option* option = command.add_option_function<std::vector<std::string>>(flags, take, help);
+  option->delimiter(',')->type_name("VALUES");
+  if (const Variation* given = find_variation(all, name))
+    option->default_str(fmt::format("[{}]", fmt::join(given->values, ",")));
+}
+
+/// What compare and bench vary, every combination of which is run. Anything else would make other scenes.
+void add_variations(CLI::App& command, std::vector<Variation>& all) {
+  add_variation(command, "--modes,--mode", "mode", all,
+                "solver modes; paper: as published (default of compare: those that suit the scene)");
+  add_variation(command, "--iterations", "iterations", all, "iterations a substep");
+  add_variation(command, "--substeps", "substeps", all, "substeps a step");
+  add_variation(command, "--rigid-contact", "rigid_contact", all,
+                "whether touching hard bodies move as rigid ones (default: bench 0, as published; else the scene's)");
+  add_variation(command, "--mass-splitting", "mass_splitting", all,
+                "whether masses are split; else corrections are averaged (default: bench 0, as published; else the "
+                "scene's)");
+  add_variation(command, "--omegas", "omega", all, "over-relaxations (default: the scene's)");
+  add_variation(command, "--elements", "element", all, "kinds of tets: linear, smoothed (default: the scene's)");
+  add_variation(command, "--constraint-sets", "constraints", all, "sets of kinds joined by +");
+  constexpr std::array known{"mode",           "constraints", "element",    "rigid_contact",
+                             "mass_splitting", "omega",       "iterations", "substeps"};
+  add_vary(command, fmt::format("{}; once for each that varies", fmt::join(known, ", ")),
+           [=, &all](const std::string& text) {
+             const Variation one = parse_variation(text, "--vary");
+             if (std::ranges::find(known, one.row->name) == known.end())
+               throw Error(fmt::format("'{}' does not vary here", one.row->name), "--vary " + text,
+                           fmt::format("give one of {}; tetpbd map varies any two settings", fmt::join(known, ", ")));
+             vary(all, one);
+           });
 }
 
 // ------------------------------------------------------------------------------------------------------------
@@ -400,8 +401,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   CLI::App& bench = command("bench", "fps and ms per step, the paper's protocol and ours",
                             [](const Arguments& a) { return run_bench(a.bench); });
   add(bench, "--scenes,--scene", a.bench.scenes, "scenes, separated by commas");
-  add_axes(bench, a.bench.axes);
-  add(bench, "--constraint-sets", a.bench.axes.constraint_sets, "sets of kinds joined by +");
+  add_variations(bench, a.bench.variations);
   add(bench, "--frames", a.bench.frames, 1L, 1000000L, "timed frames");
   add(bench, "--warm-up", a.bench.warm_up, 0L, 1000000L, "frames before them");
   add(bench, "--repeats", a.bench.repeats, 1, 100, "repetitions; the median counts");
@@ -425,7 +425,7 @@ void add_commands(CLI::App& app, Arguments& a) {
   add(map, "--scene,--scenes", a.map.scene, "a scene");
   add(map, "--x", a.map.x, "a setting and its values: PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT");
   add(map, "--y", a.map.y, "another");
-  add_vary(map, "a setting with a number: the first across, the second upwards",
+  add_vary(map, "a setting: the first across, the second upwards",
            [&a](const std::string& text) { (std::exchange(a.varied, true) ? a.map.y : a.map.x) = text; });
   add(map, "--steps", a.map.steps, 1L, most_steps, "of the scene's own dt (default: its duration)");
   add_overrides(map, a.map.overrides);
@@ -441,15 +441,15 @@ void add_commands(CLI::App& app, Arguments& a) {
       "--hard-cases",
       [&] {
         a.hard_cases = true;
-        a.compare.axes.modes = hard_case_modes, a.compare.steps = 0, a.compare.out = "stability";
+        vary(a.compare.variations, parse_variation(hard_case_modes, "--hard-cases")), a.compare.steps = 0,
+                                                                                      a.compare.out = "stability";
       },
       "instead: which mode recovers from the scenes of models/scenes/hard, and when: from recovered_at_step "
       "on, for the last 5 % of the steps at least, the volume is within 1 %, no tet inverted and hard bodies "
       "within 1 % of their shape; scenes in which no constraint acts are left out");
   add(compare, "--scene,--scenes", a.compare.scene, "a scene");
   add_overrides(compare, a.compare.overrides);
-  add_axes(compare, a.compare.axes);
-  add(compare, "--omegas", a.compare.axes.omegas, 0.0, 4.0, "over-relaxations (default: the scene's)");
+  add_variations(compare, a.compare.variations);
   add_parameters(compare, a.compare.overrides);
   add(compare, "--steps", a.compare.steps, 1L, most_steps, "steps of each run");
   add(compare, "--judge", a.compare.judge,
@@ -458,7 +458,6 @@ void add_commands(CLI::App& app, Arguments& a) {
       "first if need be; default: motion where it is known)")
       ->check(one_of(std::array{"motion", "volume", "strain", "overlap", "total"}));
   add(compare, "--truth", a.compare.truth, "a finer mesh of the first body, for --judge total (default: made)");
-  add(compare, "--elements", a.compare.axes.elements, "kinds of tets to vary as well: linear, smoothed");
   add(compare, "--fills", a.compare.fills,
       "how surfaces are filled, varied as well: auto, tetgen, tetgen:SWITCHES, lattice, lattice:TETS");
   add(compare, "--budget-ms", a.compare.budget_ms, 1e-9, 1e9, "print the best setting within so many ms per step");
@@ -473,8 +472,9 @@ void add_commands(CLI::App& app, Arguments& a) {
       "i/n: only every n-th combination, from the i-th; merge them afterwards");
   add(compare, "--cases", a.compare.cases, "hard cases to run (default: all)")->needs(hard);
   add(compare, "--meshes", a.compare.meshes, "hard cases: bunny, block, tet")->needs(hard);
-  for (const char* dropped : {"--scene", "--iterations", "--substeps", "--rigid-contact", "--mass-splitting",
-                              "--omegas", "--judge", "--budget-ms", "--error", "--truth", "--fills", "--elements"})
+  for (const char* dropped :
+       {"--scene", "--iterations", "--substeps", "--rigid-contact", "--mass-splitting", "--omegas", "--constraint-sets",
+        "--judge", "--budget-ms", "--error", "--truth", "--fills", "--elements"})
     a.apart.push_back({hard, compare.get_option(dropped)});
   compare.add_option("--merge", a.compare.shards.merge, "folders of finished shards, instead of running");
   add_gpu(compare, a.compare.gpu);

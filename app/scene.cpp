@@ -13,6 +13,7 @@
 #include "app/commands.h"
 #include "app/lab/auto_solver.h"
 #include "app/lab/run.h"
+#include "app/lab/vary.h"
 #include "app/obstacles.h"
 #include "render/obstacles.h"
 #include "sim/contact/starts.h"
@@ -103,6 +104,12 @@ json schema() {
   throw Error(what, file, "see docs/guide.md");
 }
 
+std::vector<std::string> keys_of(const json& object) {
+  std::vector<std::string> keys;
+  for (const auto& item : object.items()) keys.push_back(item.key());
+  return keys;
+}
+
 /// Throws Error naming the key and what is allowed.
 void check(const json& value, const json& allowed, const std::string& path, const std::string& file) {
   const auto require = [&](bool good, const std::string& must) {
@@ -135,9 +142,8 @@ void check(const json& value, const json& allowed, const std::string& path, cons
     require(value.is_object(), "an object in braces");
     for (const auto& [key, held] : value.items()) {
       if (!allowed.contains(key) || key == "or") {
-        std::vector<std::string> known;
-        for (const auto& item : allowed.items())
-          if (item.key() != "or") known.push_back(item.key());
+        std::vector<std::string> known = keys_of(allowed);
+        std::erase(known, "or");
         throw Error(fmt::format("'{}' is not known here; known are {}", inner(key), fmt::join(known, ", ")), file,
                     did_you_mean(key, known) + "see docs/guide.md");
       }
@@ -281,6 +287,17 @@ void set_path(json& document, const std::string& assignment) {
     throw Error("no such place in the scene", "--set " + assignment, said(problem));
   }
   *at = std::move(value);
+}
+
+// Whether it names a setting as flags and lanes do, in place of where the scene says it. Throws Error for a word that
+// is neither that nor a key of scenes.
+bool names_setting(const std::string& assignment) {
+  static const json keys = schema();
+  const std::string name = assignment.substr(0, assignment.find('='));
+  if (find_parameter(name)) return true;
+  if (name.find('.') == std::string::npos && !keys.contains(name) && !name.empty() && name.size() < assignment.size())
+    refuse_name(name, "--set " + assignment, keys_of(keys));
+  return is_setting_of_body(name) && !keys["bodies"]["each"].contains(split(name, '.')[2]);
 }
 
 bool names_mode(const std::string& assignment) { return assignment.starts_with("solver.mode="); }
@@ -509,7 +526,7 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   for (const std::string& assignment : overrides.set)
     if (names_mode(assignment)) set_mode_in(document, assignment);
   for (const std::string& assignment : overrides.set)
-    if (!names_mode(assignment)) set_path(document, assignment);
+    if (!names_mode(assignment) && !names_setting(assignment)) set_path(document, assignment);
   std::string where = file.string();
   if (!overrides.set.empty()) where += fmt::format(" with --set {}", fmt::join(overrides.set, " --set "));
   Scene scene = read_scene(document, where, file);
@@ -519,18 +536,18 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   const auto flag = [&](const char* key) {
     return std::ranges::any_of(overrides.parameters, [&](const auto& given) { return given.first == key; }) ||
            std::ranges::any_of(overrides.set, [&](const std::string& given) {
-             return given.starts_with(fmt::format("solver.{}=", key));
+             return given.starts_with(fmt::format("solver.{}=", key)) || given.starts_with(fmt::format("{}=", key));
            });
   };
   scene.mode_open = !flag("mode") && !flag("iterations") && !flag("substeps") && overrides.solver.empty() &&
                     !overrides.budget_ms &&
                     (flag("material") || !(said("mode") || said("iterations") || said("substeps")));
   const bool by_trying = apply_solver(scene.settings, overrides);
-  for (const auto& [name, text] : overrides.parameters) {
-    const Parameter& row = *find_parameter(name);
-    if (row.name == std::string("material") && apply_preset(scene.settings, material_presets(), text)) continue;
-    set_parameter(scene.settings, row, text, flag_name(row));
-  }
+  for (const std::string& given : overrides.set)
+    if (const std::size_t equals = given.find('='); names_setting(given))
+      assign(scene.settings, given.substr(0, equals), given.substr(equals + 1), "--set " + given, scene.bodies.size());
+  for (const auto& [name, text] : overrides.parameters)
+    assign(scene.settings, name, text, flag_name(*find_parameter(name)));
   if (by_trying) scene.budget_ms = overrides.budget_ms.value_or(default_budget_ms(scene.settings));
   if (!overrides.mesh.empty()) {
     BodyDescription& body = scene.bodies[0];

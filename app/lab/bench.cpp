@@ -123,10 +123,10 @@ ordered_json launch_and_bandwidth_limits(bool software) {
 }
 
 Sweep bench_sweep(const BenchOptions& options) {
-  Sweep sweep{"bench", "bench", split(columns, ','), 0, table, {}};
+  Sweep sweep{"bench", "bench", split(columns, ','), {}, table, {}};
   for (const std::string& name : options.scenes) {
     const Scene scene = load_scene(name, options.overrides);
-    const auto all = combinations(scene.settings, options.axes);
+    const auto all = without_repeats(combine(scene.settings, options.variations));
     const auto model = build_model(scene);
     for (const Settings& settings : all) sweep.work.push_back([=] { return rows_of(scene, model, settings, options); });
   }

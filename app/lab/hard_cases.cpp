@@ -84,7 +84,7 @@ void add_cases(Sweep& sweep, const CompareOptions& options) {
                     did_you_mean(mesh, {"bunny", "block", "tet"}) + "choose from bunny, block, tet");
       const auto scene = scene_of(name, mesh, options.overrides);
       if (!scene || !is_constrained(scene->settings)) continue;  // where nothing acts, nothing recovers
-      for (const std::string& mode : options.axes.modes)
+      for (const std::string& mode : find_variation(options.variations, "mode")->values)
         sweep.work.push_back([=, settings = settings_of(*scene, mode),
                               steps = options.steps ? options.steps : duration_in_steps(*scene)] {
           ordered_json row = case_row(*scene, settings, steps);
@@ -116,7 +116,7 @@ std::optional<long> recovered_at(const std::vector<Measurement>& measurements, l
 }
 
 int run_hard_cases(const CompareOptions& options) {
-  Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), 3, case_table, {}};
+  Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), {"case", "mesh", "mode"}, case_table, {}};
   sweep.facts = ordered_json::object();
   for (const char* guard : guard_names) sweep.columns.push_back(fmt::format("guard_{}", guard));
   sweep.columns.push_back("state_hash");

@@ -85,7 +85,8 @@ void judge_cell(LiveMap& map) {
 
 LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, const std::string& x, const std::string& y,
                   double seconds) {
-  LiveMap map{.x = map_axis(x, "across"), .y = map_axis(y, "up"), .model = std::move(model), .seconds = seconds};
+  LiveMap map{
+      .x = parse_variation(x, "across"), .y = parse_variation(y, "up"), .model = std::move(model), .seconds = seconds};
   if (map.model->rest.tets.size() > LiveMap::most_tets)
     throw Error(fmt::format("a map here is of at most {} tets", LiveMap::most_tets), "stability map",
                 "take a smaller scene, or tetpbd map");
@@ -94,7 +95,7 @@ LiveMap start_map(std::shared_ptr<const Model> model, const Settings& base, cons
   map.order.resize(map.cells.size());
   std::iota(map.order.begin(), map.order.end(), std::size_t(0));
   // By columns, where it is `x` that changes the motion, or makes the solver again.
-  const auto costs = [&](const MapAxis& axis, std::size_t other) {
+  const auto costs = [&](const Variation& axis, std::size_t other) {
     return axis.values.size() > 1 &&
            scene_key(*map.model, map.cells[0].settings) != scene_key(*map.model, map.cells[other].settings);
   };

@@ -21,7 +21,7 @@ struct MapCell {
 
 struct LiveMap {
   static constexpr std::size_t most_tets = 20000;
-  MapAxis x, y;
+  Variation x, y;
   std::shared_ptr<const Model> model;
   double seconds = 0;                ///< of motion
   std::vector<MapCell> cells{};      ///< rows of x

@@ -6,6 +6,7 @@
 
 #include "app/bodies.h"
 #include "app/commands.h"
+#include "app/files.h"
 #include "sim/model/attachments.h"
 #include "sim/model/material.h"
 

@@ -156,12 +156,6 @@ void print_table(const Sweep& sweep, const ordered_json& document) {
     for (const auto& row : document["rows"]) print_row(sweep, row);
 }
 
-std::vector<std::string> keys(const ordered_json& object) {
-  std::vector<std::string> names;
-  for (const auto& [name, value] : object.items()) names.push_back(name);
-  return names;
-}
-
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows) {
   std::string csv = fmt::format("{}\n", fmt::join(columns, ","));
   for (const auto& row : rows) {

@@ -54,7 +54,6 @@ const ordered_json& cell(const ordered_json& row, const std::string& key);
 std::string text_of(const ordered_json& value, int digits = 4);
 /// NaN where it is no number.
 double number(const ordered_json& row, const char* key);
-std::vector<std::string> keys(const ordered_json& object);
 /// Column names, then a line a row.
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows);
 /// The device as all files name it.

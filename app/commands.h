@@ -1,6 +1,7 @@
-// The commands: what each is asked for, and what starts it, which returns the exit status. run steps and
-// measures, sweep combines settings and merges shards, chart draws; a command is its columns and its
-// judgement. Names in files are relied upon by scripts (docs/guide.md): they may be added to, not changed.
+// The commands: what each is asked for, and what starts it, which returns the exit status. A run steps and
+// measures (run.h), variations combine settings (vary.h), a sweep makes rows and merges shards, a chart draws; a
+// command is its columns and its judgement. Names in files are relied upon by scripts (docs/guide.md): they may be
+// added to, not changed.
 #pragma once
 
 #include <array>
@@ -195,8 +196,8 @@ ordered_json bodies_json(const Sim& sim, const State& state);
 ordered_json distance_json(const std::string& standard, const std::optional<MotionError>& error, bool finite);
 /// {"step", "vertex"}, or null.
 ordered_json non_finite_json(const std::optional<NonFinite>& found);
-/// The hash of the state at the end, as text; null where that is not finite.
-ordered_json hash_json(const MeasuredRun& run);
+/// A state's hash as text; null where that is not finite.
+ordered_json hash_json(const std::optional<std::uint64_t>& hash);
 /// Puts into the row whether the run stayed finite, and says on standard error where not.
 void put_finite(ordered_json& row, const MeasuredRun& run);
 /// A run in a sweep: what tells its setting apart from others, errors, drifts, that.

@@ -132,14 +132,13 @@ void add_variations(CLI::App& command, std::vector<Variation>& all) {
   add_variation(command, "--omegas", "omega", all, "over-relaxations (default: the scene's)");
   add_variation(command, "--elements", "element", all, "kinds of tets: linear, smoothed (default: the scene's)");
   add_variation(command, "--constraint-sets", "constraints", all, "sets of kinds joined by +");
-  constexpr std::array known{"mode",           "constraints", "element",    "rigid_contact",
-                             "mass_splitting", "omega",       "iterations", "substeps"};
-  add_vary(command, fmt::format("{}; once for each that varies", fmt::join(known, ", ")),
-           [=, &all](const std::string& text) {
+  add_vary(command, fmt::format("{}; once for each that varies", fmt::join(table_settings, ", ")),
+           [&all](const std::string& text) {
              const Variation one = parse_variation(text, "--vary");
-             if (std::ranges::find(known, one.row->name) == known.end())
-               throw Error(fmt::format("'{}' does not vary here", one.row->name), "--vary " + text,
-                           fmt::format("give one of {}; tetpbd map varies any two settings", fmt::join(known, ", ")));
+             if (std::ranges::find(table_settings, one.row->name) == table_settings.end())
+               throw Error(
+                   fmt::format("'{}' does not vary here", one.row->name), "--vary " + text,
+                   fmt::format("give one of {}; tetpbd map varies any two settings", fmt::join(table_settings, ", ")));
              vary(all, one);
            });
 }

@@ -56,11 +56,6 @@ std::vector<Settings> candidates(const Settings& own) {
   return all;
 }
 
-double step_ms(const MeasuredRun& run) {
-  const double gpu = median(run.gpu_ms);
-  return gpu > 0 ? gpu : median(run.wall_ms);
-}
-
 /// Steps until that many seconds have passed, from the start.
 MeasuredRun time_steps(Sim& sim, double seconds, const std::function<void(long)>& stepped) {
   reset(sim);
@@ -169,10 +164,9 @@ void judge_trial(Race& race, Sim& sim, SolverTrial& trial, bool first) {
   trial.plan = sim.plan;
   Metrics metrics = create_metrics(sim);
   const double enough = first ? most_seconds() : 2e-3 * race.budget_ms * double(choice.steps) + 0.5;
-  const MeasuredRun run = run_to_end(sim, &metrics, choice.steps,
-                                     {.most_seconds = enough,
-                                      .stepped = tell_steps(race, 0.6, 1, choice.steps),
-                                      .standard = race.right ? &*race.right : nullptr});
+  const MeasuredRun run =
+      run_to_end(sim, &metrics, choice.steps,
+                 {.most_seconds = enough, .stepped = tell_steps(race, 0.6, 1, choice.steps), .standard = race.right});
   if (interrupted()) throw Interrupted();
   if (first && run.errors.finite) choice.steps = run.steps;
   trial.ms = step_ms(run);

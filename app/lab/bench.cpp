@@ -68,8 +68,7 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
   Metrics metrics = create_metrics(sim);
   const auto right = right_motion(*model, settings);
   const MeasuredRun run =
-      run_to_end(sim, &metrics, options.frames,
-                 {.most_seconds = 12 * options.most_seconds, .standard = right ? &*right : nullptr});
+      run_to_end(sim, &metrics, options.frames, {.most_seconds = 12 * options.most_seconds, .standard = right});
   ordered_json row = row_of(scene, *model, sim.settings, run);
   row.update({{"size", ""},
               {"picture", ""},

@@ -30,7 +30,7 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
   if (!last || last->scene != scene_key(*model, settings)) last = answer_for(*model, settings, steps);
   MeasuredRun run;
   try {
-    run = run_model(model, settings, steps, last ? &*last : nullptr, true, film.of(steps));
+    run = run_model(model, settings, steps, last, true, film.of(steps));
   } catch (const Error& error) {  // of this setting: its mode does not go so far
     for (const std::string& key : split(results, ',')) row[key] = nullptr;
     row["finite"] = false, row["refused"] = error.what();
@@ -62,8 +62,8 @@ ordered_json map_row(const MeasuredRun& run) {
           {"motion_final", motion ? run.motion->final : nothing},
           {"max_volume_loss_percent", finite ? run.errors.max_volume_loss_percent : nothing},
           {"tet_volume_max", finite && run.errors.last ? run.errors.last->tet_volume_max : nothing},
-          {"ms_per_step", median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms)},
-          {"state_hash", hash_json(run)}};
+          {"ms_per_step", step_ms(run)},
+          {"state_hash", hash_json(run.hash)}};
 }
 
 double map_percent(const ordered_json& row, bool motion) {

@@ -234,8 +234,7 @@ int run_reproduce(const ReproduceOptions& options) {
   const auto papers = std::span(published).first(options.quick ? 1 : published.size());
   Report report{options.out, options.quick};
   report.html = fmt::format(head, device.renderer, device.version, fmt::gmtime(std::time(nullptr)),
-                            options.quick ? " --quick" : "",
-                            device.software ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "");
+                            options.quick ? " --quick" : "", software_note(device.software));
   table_4(report, papers);
   report.html += fmt::format(unstated, damping, volume_stiffness);
   if (options.quick)

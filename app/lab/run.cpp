@@ -20,6 +20,11 @@ double percentile(std::vector<double> values, double part) {
   return *chosen;
 }
 
+double step_ms(const MeasuredRun& run) {
+  const double gpu = median(run.gpu_ms);
+  return gpu > 0 ? gpu : median(run.wall_ms);
+}
+
 namespace {
 
 Crossings current_crossings(const Sim& sim) {

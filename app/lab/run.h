@@ -28,6 +28,7 @@ struct Standard {
   const Motion* right = nullptr;
   const TotalError* total = nullptr;
   Standard(const Motion* motion = nullptr, const TotalError* error = nullptr) : right(motion), total(error) {}
+  Standard(const std::optional<Motion>& motion) : right(motion ? &*motion : nullptr) {}
 };
 
 /// How a run keeps up with the GPU.
@@ -61,6 +62,9 @@ struct MeasuredRun {
   int substeps = 0;                     ///< of a step
   std::optional<std::uint64_t> hash{};  ///< of the state at the end; none where that is not finite
 };
+
+/// What a step took: GPU time, or wall time where the CPU does the work; median.
+double step_ms(const MeasuredRun& run);
 
 struct Run;
 

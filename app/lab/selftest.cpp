@@ -126,8 +126,7 @@ std::vector<std::string> speeds(Checks& checks) {
     const MeasuredRun measured = run_model(model, settings, right.kept.back(), &right);
     const double error = measured.errors.finite ? measured.motion->final : std::nan("");
     checks.add(what + ": distance from the reference motion", error, most);
-    said.push_back(fmt::format("{} {:.3g} ms {:.1e}", what,
-                               median(measured.gpu_ms.empty() ? measured.wall_ms : measured.gpu_ms), error));
+    said.push_back(fmt::format("{} {:.3g} ms {:.1e}", what, step_ms(measured), error));
   };
   const bool slow = is_software_renderer();
   const Scene hard = load_scene("bunny-drop");

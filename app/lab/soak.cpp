@@ -102,7 +102,7 @@ int run_soak(Scene scene, const SoakOptions& options) {
                                  {"gl_objects", {{"start", live.objects}, {"end", live_after.objects}}},
                                  {"steps_per_second", {{"first_tenth", first_speed}, {"last_tenth", last_speed}}},
                                  {"finite", run.errors.finite},
-                                 {"state_hash", fmt::format("{:016x}", state_hash(sim))},
+                                 {"state_hash", hash_json(run.hash)},
                                  {"checks", checks},
                                  {"passed", failed.empty()}};
   write_file(options.out / "soak.csv", csv_text(keys(samples[0]), samples));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -35,12 +34,9 @@ std::vector<std::string> spread_values(const Parameter& row, const std::vector<s
   return values;
 }
 
-// Of rows in tables, from the slowest; what is not here varies more slowly still.
 std::size_t rank(const Variation& variation) {
-  constexpr std::array order{"constraints",    "mode",  "element",    "rigid_contact",
-                             "mass_splitting", "omega", "iterations", "substeps"};
-  const auto found = std::ranges::find(order, variation.row->name);
-  return found == order.end() ? 0 : std::size_t(found - order.begin()) + 1;
+  const auto found = std::ranges::find(table_settings, variation.row->name);
+  return found == table_settings.end() ? 0 : std::size_t(found - table_settings.begin()) + 1;
 }
 
 }  // namespace

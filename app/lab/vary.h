@@ -2,6 +2,7 @@
 // and of the lists of compare, bench and map, of flags, of the words of lanes and of --set.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,15 @@ struct Variation {
   std::string flag{};  ///< that named it, for errors
 };
 
+/// What varies in tables of compare and bench, from what varies most slowly: how a scene is solved.
+inline constexpr std::array table_settings{"constraints",    "mode",  "element",    "rigid_contact",
+                                           "mass_splitting", "omega", "iterations", "substeps"};
+
 /// "omega=0.5,1,1.5", "constraints=stretch,stretch+bend", or "young_modulus=1e4:1e7:7": evenly, or by equal factors
 /// where the slider goes so. Throws Error naming `flag`, but not for words of mode, which may be those of baselines.
 Variation parse_variation(const std::string& text, const std::string& flag);
 std::vector<Variation> parse_variations(const std::vector<std::string>& texts, const std::string& flag = "default");
-/// Puts it in the place of one of the same setting, or among the others in the order that rows of tables have.
+/// Puts it in the place of one of the same setting, or among the others in the order of table_settings.
 void vary(std::vector<Variation>& all, const Variation& one);
 const Variation* find_variation(const std::vector<Variation>& all, const std::string& name);
 

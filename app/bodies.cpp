@@ -107,22 +107,6 @@ std::size_t body_number(const std::string& text, std::size_t count, const std::s
   return body;
 }
 
-bool set_by_name(Settings& settings, const std::string& name, const std::string& text, std::size_t count,
-                 const std::string& where) {
-  if (const Parameter* row = find_parameter(name)) {
-    set_parameter(settings, *row, text, where);
-    return true;
-  }
-  const std::vector<std::string> parts = split(name, '.');
-  const Parameter* row = parts.size() == 3 && parts[0] == "bodies" ? find_parameter(parts[2]) : nullptr;
-  if (!row || !(is_of_material(*row) || row->name == "friction" || row->name == "restitution")) return false;
-  const std::size_t body = body_number(parts[1], count, where);
-  Settings wanted = settings_for_body(settings, body);
-  set_parameter(wanted, *row, text, where);
-  settings = with_body_changed(settings, wanted, body, count);
-  return true;
-}
-
 Settings settings_for_body(Settings settings, std::optional<std::size_t> body) {
   if (!body) return settings;
   const Material own = material_of(settings, *body);

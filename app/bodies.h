@@ -24,10 +24,6 @@ nlohmann::ordered_json setting_json(const Settings& settings, const Parameter& r
 bool all_have_own_materials(const Settings& settings);
 /// The number of one of `count` bodies from a text. Throws Error naming `where`.
 std::size_t body_number(const std::string& text, std::size_t count, const std::string& where);
-/// Sets "young_modulus", or "bodies.1.young_modulus" of one of `count` bodies; false if there is no setting of that
-/// name. Throws Error as set_parameter() does, and where there is no such body.
-bool set_by_name(Settings& settings, const std::string& name, const std::string& text, std::size_t count,
-                 const std::string& where);
 
 /// The settings as they are for one body: its material, friction and restitution in place of those of all.
 Settings settings_for_body(Settings settings, std::optional<std::size_t> body);

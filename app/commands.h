@@ -1,6 +1,7 @@
-// The commands: what each is asked for, and what starts it, which returns the exit status. run_loop steps and
-// measures, sweep combines settings and merges shards, chart draws; a command is its columns and its
-// judgement. Names in files are relied upon by scripts (docs/guide.md): they may be added to, not changed.
+// The commands: what each is asked for, and what starts it, which returns the exit status. A run steps and
+// measures (run.h), variations combine settings (vary.h), a sweep makes rows and merges shards, a chart draws; a
+// command is its columns and its judgement. Names in files are relied upon by scripts (docs/guide.md): they may be
+// added to, not changed.
 #pragma once
 
 #include <array>
@@ -11,8 +12,9 @@
 #include <vector>
 
 #include "app/lab/reference_command.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/sweep.h"
+#include "app/lab/vary.h"
 #include "app/scene.h"
 #include "render/frame.h"
 #include "sim/reference/reference.h"
@@ -81,12 +83,9 @@ int run_mesh_command(const MeshOptions& options);
 struct BenchOptions {
   std::vector<std::string> scenes = {"bunny-drop", "armadillo-drop", "dragon-drop"};
   SceneOverrides overrides;  ///< for every scene
-  Axes axes = {.modes = {"cpu", "constraint", "node"},
-               .constraint_sets = {"stretch+bend", "stretch+bend+volume"},
-               .iterations = {1, 150},
-               .substeps = {1},
-               .rigid_contact = {0},
-               .mass_splitting = {0}};
+  std::vector<Variation> variations =
+      parse_variations({"constraints=stretch+bend,stretch+bend+volume", "mode=cpu,constraint,node", "rigid_contact=0",
+                        "mass_splitting=0", "iterations=1,150", "substeps=1"});
   long frames = 400, warm_up = 50;
   int repeats = 3;
   double most_seconds = 5;                             ///< a repetition stops there, with fewer frames (slow CPU modes)
@@ -120,7 +119,8 @@ ordered_json launch_and_bandwidth_limits(bool software);
 struct CompareOptions {
   std::string scene = "bunny-drop";
   SceneOverrides overrides;
-  Axes axes = {.modes = {}, .iterations = {1, 5, 10, 25}, .substeps = {1}};  ///< no modes: what suits the scene
+  std::vector<Variation> variations =
+      parse_variations({"iterations=1,5,10,25", "substeps=1"});  ///< no modes: what suits the scene
   long steps = 400;
   int gpu = -1;
   std::filesystem::path out = "compare";
@@ -146,11 +146,11 @@ struct MapOptions {
 /// which is found anew where they change it.
 int run_map(const MapOptions& options);
 
-/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double. Of the
-/// axes only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
+/// `tetpbd compare --hard-cases`: which solver mode recovers from what, beside Gauss-Seidel in double. Of
+/// what varies only modes count: NAME-substeps runs mode NAME with one iteration a substep, as many substeps as the
 /// scene has iterations. Steps 0: the scene's duration.
 int run_hard_cases(const CompareOptions& options);
-inline const std::vector<std::string> hard_case_modes{"node", "constraint", "node-substeps", "cpu", "cpu-double"};
+inline constexpr const char* hard_case_modes = "mode=node,constraint,node-substeps,cpu,cpu-double";
 /// The first step of those at the end that all keep the volume within 1 %, no tet inverted and, of `hard`
 /// bodies, their shape within 1 % of the size, if they are 5 % of the run's `steps` at least: what is good
 /// for less long may be passing through.
@@ -196,6 +196,8 @@ ordered_json bodies_json(const Sim& sim, const State& state);
 ordered_json distance_json(const std::string& standard, const std::optional<MotionError>& error, bool finite);
 /// {"step", "vertex"}, or null.
 ordered_json non_finite_json(const std::optional<NonFinite>& found);
+/// A state's hash as text; null where that is not finite.
+ordered_json hash_json(const std::optional<std::uint64_t>& hash);
 /// Puts into the row whether the run stayed finite, and says on standard error where not.
 void put_finite(ordered_json& row, const MeasuredRun& run);
 /// A run in a sweep: what tells its setting apart from others, errors, drifts, that.

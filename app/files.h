@@ -23,6 +23,12 @@ template <class Json>
 std::string json_text(const Json& document, int indent) {
   return document.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
+template <class Json>
+std::vector<std::string> keys(const Json& object) {
+  std::vector<std::string> names;
+  for (const auto& item : object.items()) names.push_back(item.key());
+  return names;
+}
 /// "NAME_000.ENDING", or the next number that no file in the current folder has.
 std::string free_name(const std::string& name, const std::string& ending);
 void write_png(const std::filesystem::path& file, const Image& image);

@@ -142,19 +142,8 @@ Fit fit_of(const Model& model) {
   return all;
 }
 
-ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
-                             const ordered_json& hash, const std::optional<SolverChoice>& choice,
-                             const Verdict& verdict) {
-  ordered_json j;
-  j["scene"] = scene.name;
-  j["settings"] = settings_json(scene, sim.settings);
-  j["settings"]["iterations"] = sim.plan.iterations, j["settings"]["substeps"] = sim.plan.substeps;
-  if (choice) j["solver_choice"] = solver_choice_json(*choice);
-  j["mesh"] = mesh_json(report(sim.model->rest), std::reduce(sim.model->masses.begin(), sim.model->masses.end()),
-                        solver_mode(sim.settings).leapfrog
-                            ? sim.longest_substep
-                            : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}),
-                        fit_of(*sim.model));
+// What each body, fixture and attachment is and does at the end.
+void put_bodies(ordered_json& j, const Sim& sim) {
   const State state = read_state(sim);
   j["bodies"] = bodies_json(sim, state);
   for (const BodyFill& fill : sim.model->fills)
@@ -167,11 +156,10 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                              {"lag", lag_of(sim, fixture, state)}});
   for (std::size_t n = 0; n < sim.model->attachments.size(); ++n)
     j["attachments"].push_back(attachment_json(sim, n, state));
-  j["device"] = device_json(device);
-  j["timing"] = {{"steps", sim.steps},
-                 {"gpu_ms_per_step", times(run.gpu_ms)},
-                 {"wall_ms_per_step", times(run.wall_ms)},
-                 {"fps", double(sim.steps) / run.seconds}};
+}
+
+// What the mode and contact found to be needed.
+void put_solver(ordered_json& j, Sim& sim) {
   const AdaptiveSubsteps& watch = adaptive_values(sim);
   if (solver_mode(sim.settings).leapfrog)
     j["watch"] = {{"longest_substep_at_rest", sim.longest_substep},
@@ -190,6 +178,44 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                     {"truncated", pairs.truncated}, {"truncated_velocity", pairs.taken}, {"nearest", pairs.nearest}};
   }
   if (!sim.solver.stiffness_shares.empty()) j["stiffness_share"] = sim.solver.stiffness_shares;
+}
+
+ordered_json energy_json(const RunErrors& errors, const Measurement& last) {
+  ordered_json j = {{"start", errors.last ? errors.start_energy : std::nan("")},
+                    {"final", last.energy()},
+                    {"max", errors.last ? errors.max_energy : std::nan("")},
+                    {"final_kinetic", last.kinetic},
+                    {"final_potential", last.potential},
+                    {"elastic", last.elastic},
+                    {"total", last.total},
+                    {"work", errors.ledger.work},
+                    {"dissipated", errors.ledger.dissipated()},
+                    {"created", errors.ledger.created},
+                    {"scale", errors.ledger.scale}};
+  if (const auto why = errors.ledger.not_judged) j["not_judged"] = *why;
+  return j;
+}
+
+ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& device, const MeasuredRun& run,
+                             const ordered_json& hash, const std::optional<SolverChoice>& choice,
+                             const Verdict& verdict) {
+  ordered_json j;
+  j["scene"] = scene.name;
+  j["settings"] = settings_json(scene, sim.settings);
+  j["settings"]["iterations"] = sim.plan.iterations, j["settings"]["substeps"] = sim.plan.substeps;
+  if (choice) j["solver_choice"] = solver_choice_json(*choice);
+  j["mesh"] = mesh_json(report(sim.model->rest), std::reduce(sim.model->masses.begin(), sim.model->masses.end()),
+                        solver_mode(sim.settings).leapfrog
+                            ? sim.longest_substep
+                            : longest_stable_step({*sim.model, sim.system, sim.settings, sim.inverse_masses}),
+                        fit_of(*sim.model));
+  put_bodies(j, sim);
+  j["device"] = device_json(device);
+  j["timing"] = {{"steps", sim.steps},
+                 {"gpu_ms_per_step", times(run.gpu_ms)},
+                 {"wall_ms_per_step", times(run.wall_ms)},
+                 {"fps", double(sim.steps) / run.seconds}};
+  put_solver(j, sim);
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
   j["error"] = error_json(errors);
@@ -198,18 +224,7 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                    {"angular_drift", errors.angular_drift},
                    {"linear", vector(last.momentum)},
                    {"angular", vector(last.angular_momentum)}};
-  j["energy"] = {{"start", errors.last ? errors.start_energy : std::nan("")},
-                 {"final", last.energy()},
-                 {"max", errors.last ? errors.max_energy : std::nan("")},
-                 {"final_kinetic", last.kinetic},
-                 {"final_potential", last.potential},
-                 {"elastic", last.elastic},
-                 {"total", last.total},
-                 {"work", errors.ledger.work},
-                 {"dissipated", errors.ledger.dissipated()},
-                 {"created", errors.ledger.created},
-                 {"scale", errors.ledger.scale}};
-  if (const auto why = errors.ledger.not_judged) j["energy"]["not_judged"] = *why;
+  j["energy"] = energy_json(errors, last);
   const GuardCounts guards = guard_counts(sim);
   for (std::size_t g = 0; g < GUARDS; ++g) j["guards"][guard_names[g]] = guards[g];
   for (const auto& [name, count] : dropped(sim)) j["dropped"][name] = count;
@@ -233,6 +248,30 @@ std::string worst_tet(const Sim& sim) {
   for (std::size_t t = 0; t < model.rest.tets.size(); ++t)
     if (const float e = error(t); std::abs(e) > std::abs(worst.first)) worst = {e, t};
   return fmt::format("worst tet at the end {:+.2f} % (number {})", 100 * worst.first, worst.second);
+}
+
+void print_summary(const Scene& scene, const RunOptions& options, Sim& sim, const MeasuredRun& run,
+                   const ordered_json& statistics, const std::string& renderer, bool good) {
+  fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name, sim.steps,
+             renderer, options.measure_every > 1 ? "of measured steps " : "", run.errors.max_volume_loss_percent,
+             good ? worst_tet(sim) + ", " : "", median(run.wall_ms), (options.out / "stats.json").string());
+  for (const auto& [name, count] : dropped(sim))
+    fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
+  for (const ordered_json& fixture : statistics.value("fixtures", ordered_json::array()))
+    if (const double lag = fixture["lag"]; good && lag > 1e-3 * sim.model->size)
+      fmt::print("held back: fixed.{} of body '{}' is {:.3g} m behind its place\n", fixture["fixed"].get<int>(),
+                 fixture["body"].get<std::string>(), lag);
+  for (const ordered_json& held : statistics.value("attachments", ordered_json::array()))
+    if (held["broken"])
+      fmt::print("let go: '{}' of '{}', which pulled too much\n", held["body"].get<std::string>(),
+                 held["to"].get<std::string>());
+}
+
+// Whether the checkpoint before it is there, from which the same bits lead to that step.
+bool return_to_good_state(Sim& sim, long step) {
+  if (!restore_checkpoint(sim)) return false;
+  run_to_end(sim, nullptr, step - sim.steps);
+  return !check_finite(sim, true);
 }
 
 }  // namespace
@@ -268,9 +307,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   MeasuredRun run;
   {
     Progress progress("stepping", steps, options.progress);
-    RunPlan plan{.measure_every = options.measure_every,
-                 .check_crossings = options.check_crossings,
-                 .standard = right ? &*right : nullptr};
+    RunPlan plan{.measure_every = options.measure_every, .check_crossings = options.check_crossings, .standard = right};
     plan.measured = [&](const Measurement& measurement, const RunErrors& errors) {
       if (csv && measurement.step % options.csv_every == 0) csv->add(csv_row(measurement, errors));
     };
@@ -280,15 +317,13 @@ int run_headless(Scene scene, const RunOptions& options) {
       if (files && s % files->every == 0) add_frame(*files, sim);
     };
     if (!check_finite(sim)) plan.stepped(0);
-    run = run_loop(sim, &metrics, steps, plan);
+    run = run_to_end(sim, &metrics, steps, plan);
   }
   if (frames && frames->video) frames->video->close();
   if (files) close(*files, sim);
   const auto& found = run.errors.non_finite;
-  bool good = !found || restore_checkpoint(sim);
-  while (good && found && sim.steps < found->step - 1) step(sim);  // to the last good one, by the same bits
-  if (good && found) good = !check_finite(sim, true);
-  const ordered_json hash = good ? ordered_json(fmt::format("{:016x}", state_hash(sim))) : nullptr;
+  const bool good = !found || return_to_good_state(sim, found->step - 1);
+  const ordered_json hash = hash_json(good ? std::optional(state_hash(sim)) : std::nullopt);
   if (!options.save_state.empty() && good && !interrupted()) save_state(sim, options.save_state);
   const Verdict verdict = judge(run.errors, sim);
   auto statistics = statistics_json(scene, sim, context.capabilities(), run, hash, choice, verdict);
@@ -299,20 +334,7 @@ int run_headless(Scene scene, const RunOptions& options) {
   write_file(options.out / "stats.json", json_text(statistics, 2) + "\n");
   if (csv) csv->close();
   if ((options.positions || options.positions_every > 0) && good) write_arrays(sim, options.out);
-  fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name, sim.steps,
-             context.capabilities().renderer, options.measure_every > 1 ? "of measured steps " : "",
-             run.errors.max_volume_loss_percent, good ? worst_tet(sim) + ", " : "", median(run.wall_ms),
-             (options.out / "stats.json").string());
-  for (const auto& [name, count] : dropped(sim))
-    fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
-  for (const ordered_json& fixture : statistics.value("fixtures", ordered_json::array()))
-    if (const double lag = fixture["lag"]; good && lag > 1e-3 * model->size)
-      fmt::print("held back: fixed.{} of body '{}' is {:.3g} m behind its place\n", fixture["fixed"].get<int>(),
-                 fixture["body"].get<std::string>(), lag);
-  for (const ordered_json& held : statistics.value("attachments", ordered_json::array()))
-    if (held["broken"])
-      fmt::print("let go: '{}' of '{}', which pulled too much\n", held["body"].get<std::string>(),
-                 held["to"].get<std::string>());
+  print_summary(scene, options, sim, run, statistics, context.capabilities().renderer, good);
   if (interrupted())
     throw Error("interrupted", fmt::format("at step {} of {}", sim.steps, steps), "what was finished is written", 1);
   if (found) throw error_of(*found);
@@ -328,9 +350,9 @@ int print_explanation(Scene scene, int gpu, long steps) {
   warm_up(sim);
   long before = 0;
   if (!on_cpu(sim)) {
-    run_loop(sim, nullptr, steps);
+    run_to_end(sim, nullptr, steps);
     before = sim.steps, sim.recorder.timing = true;
-    run_loop(sim, nullptr, 10, {.most_seconds = 10});
+    run_to_end(sim, nullptr, 10, {.most_seconds = 10});
   }
   const Explanation e = explain(sim, int(sim.steps - before));
   fmt::print("{}: mode {}, {} vertices, {} tets", scene.name, sim.settings.mode, model->positions.size(),

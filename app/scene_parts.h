@@ -44,7 +44,7 @@ struct FibresDescription {
   FactorOverTime activation{};
 };
 
-/// What check() of scene.cpp allows: {"attachments", "forces"} of a scene, and the "fibres" of a body.
+/// What check() of scene_file.cpp allows: {"attachments", "forces"} of a scene, and the "fibres" of a body.
 nlohmann::json parts_schema();
 nlohmann::json fibres_schema();
 

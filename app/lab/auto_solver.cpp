@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "app/lab/reference_command.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/sweep.h"
 #include "sim/contact/pairs.h"
 #include "sim/error.h"
@@ -55,18 +56,19 @@ std::vector<Settings> candidates(const Settings& own) {
   return all;
 }
 
-double step_ms(const MeasuredRun& run) {
-  const double gpu = median(run.gpu_ms);
-  return gpu > 0 ? gpu : median(run.wall_ms);
+/// Steps until that many seconds have passed, from the start.
+MeasuredRun time_steps(Sim& sim, double seconds, const std::function<void(long)>& stepped) {
+  reset(sim);
+  const MeasuredRun run =
+      run_to_end(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds, .stepped = stepped});
+  if (interrupted()) throw Interrupted();
+  return run;
 }
 
 /// As many substeps as fit the budget, from one substep's time, then from what so many took.
-void fit_substeps(Sim& sim, Settings& settings, double budget_ms) {
+void fit_substeps(Sim& sim, Settings& settings, double budget_ms, const std::function<void(long)>& stepped) {
   for (int round = 0; round < 2; ++round) {
-    reset(sim);
-    const double seconds = is_software_renderer() ? 0 : 0.03;
-    const MeasuredRun run = run_loop(sim, nullptr, std::numeric_limits<long>::max(), {.most_seconds = seconds});
-    if (interrupted()) throw Interrupted();
+    const MeasuredRun run = time_steps(sim, is_software_renderer() ? 0 : 0.03, stepped);
     const double substeps = plan_for(settings).substeps * budget_ms / step_ms(run);
     settings.substeps = int(std::clamp(substeps, 1.0, double(most_substeps)));
     apply_settings(sim, settings);
@@ -90,7 +92,7 @@ Sim finer_than(const Settings& settings, const std::shared_ptr<const Model>& mod
 
 }  // namespace
 
-Motion motion_of_run(Sim& sim, long steps) {
+Motion motion_of_run(Sim& sim, long steps, const std::function<void(long)>& stepped) {
   Motion motion;
   const auto keep = [&](long step) {
     motion.kept.push_back(step);
@@ -98,70 +100,123 @@ Motion motion_of_run(Sim& sim, long steps) {
   };
   keep(0);
   const long every = std::max(1L, steps / 20);
-  run_loop(sim, nullptr, steps, {.stepped = [&](long s) {
-             if (s % every == 0 || s == steps) keep(s);
-           }});
+  run_to_end(sim, nullptr, steps, {.stepped = [&](long s) {
+               if (s % every == 0 || s == steps) keep(s);
+               if (stepped) stepped(s);
+             }});
   return motion;
 }
 
 double default_budget_ms(const Settings& settings) { return 100 * settings.dt; }
 
+namespace {
+
+/// What candidates are tried on, and what is known so far.
+struct Race {
+  const std::shared_ptr<const Model>& model;
+  const Settings& settings;
+  double budget_ms;
+  const SolverProgress& progress;
+  std::size_t candidates = 1;
+  SolverChoice choice{};
+  std::optional<Motion> right{};
+  std::chrono::steady_clock::time_point told{};
+};
+
+// Part of the candidate that is being tried, the last of the trials.
+void tell(Race& race, double part) {
+  if (interrupted()) throw Interrupted();
+  race.told = std::chrono::steady_clock::now();
+  const std::size_t number = race.choice.trials.size();
+  if (race.progress)
+    race.progress(fmt::format("{}, way {} of {}", race.choice.trials.back().settings.mode, number, race.candidates),
+                  (double(number) - 1 + part) / double(race.candidates));
+}
+
+// RunPlan::stepped, of a run that takes a trial from one part of it to another.
+std::function<void(long)> tell_steps(Race& race, double from, double to, long steps) {
+  return [&race, from, to, steps](long s) {
+    if (seconds_since(race.told) > 0.05) tell(race, from + (to - from) * std::min(1.0, double(s) / double(steps)));
+  };
+}
+
+// By what trials are judged. What a slow machine can afford: the reference takes as long as all trials together.
+void find_standard(Race& race, const Settings& trial, int substeps, long steps) {
+  const Settings& settings = race.settings;
+  SolverChoice& choice = race.choice;
+  if (const auto found = rigid_motion(*race.model, settings, steps)) {
+    race.right = found, choice.judged = "motion";
+  } else if (any_material(settings, compliant) || all_materials(settings, hard)) {
+    Sim fine = finer_than(trial, race.model);
+    const double seconds = 1e-3 * fine.plan.substeps / double(substeps) * race.budget_ms;
+    choice.steps = std::clamp(long(2 * most_seconds() / seconds), 2L, steps);
+    race.right = motion_of_run(fine, choice.steps, tell_steps(race, 0.2, 0.6, choice.steps));
+    choice.judged = "finer steps";
+  } else {
+    choice.judged = "volume";
+  }
+}
+
+void judge_trial(Race& race, Sim& sim, SolverTrial& trial, bool first) {
+  SolverChoice& choice = race.choice;
+  apply_settings(sim, trial.settings);
+  reset(sim);
+  trial.plan = sim.plan;
+  Metrics metrics = create_metrics(sim);
+  const double enough = first ? most_seconds() : 2e-3 * race.budget_ms * double(choice.steps) + 0.5;
+  const MeasuredRun run =
+      run_to_end(sim, &metrics, choice.steps,
+                 {.most_seconds = enough, .stepped = tell_steps(race, 0.6, 1, choice.steps), .standard = race.right});
+  if (interrupted()) throw Interrupted();
+  if (first && run.errors.finite) choice.steps = run.steps;
+  trial.ms = step_ms(run);
+  trial.fits = trial.ms <= fitting * race.budget_ms && (first || run.steps == choice.steps);
+  trial.error = !run.errors.finite ? infinity : run.motion ? 100 * run.motion->rms : run.errors.max_volume_loss_percent;
+}
+
+void try_candidate(Race& race, const Settings& candidate) {
+  SolverChoice& choice = race.choice;
+  const long steps = choice.steps;
+  const bool first = choice.trials.empty(), as_it_is = candidate == race.settings || solver_mode(candidate).leapfrog;
+  SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
+  tell(race, 0);
+  Sim sim = create_sim(race.model, candidate);
+  if (first) warm_up(sim);
+  time_steps(sim, 0, {});  // the first of a new solver is not like the others
+  if (!as_it_is) fit_substeps(sim, trial.settings, race.budget_ms, tell_steps(race, 0, 0.2, 1000));
+  if (first && !race.right) find_standard(race, trial.settings, sim.plan.substeps, steps);
+  for (int attempt = 1;; ++attempt) {
+    judge_trial(race, sim, trial, first);
+    // In contact a step takes longer than those it was fitted to.
+    if (trial.fits || as_it_is || trial.settings.substeps == 1 || attempt == 3) break;
+    trial.settings.substeps = std::max(1, int(trial.settings.substeps * std::min(0.95, race.budget_ms / trial.ms)));
+  }
+  // Errors that agree to a hundredth are the same: then the plainer one.
+  const SolverTrial& best = choice.trials[choice.best];
+  const bool righter = best.error > no_error && trial.error < 0.99 * best.error;
+  if (trial.fits && (!best.fits || righter)) choice.best = choice.trials.size() - 1;
+}
+
+}  // namespace
+
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
-                           long steps) {
+                           long steps, const SolverProgress& progress) {
   if (any_material(settings, smoothed) &&
       !solver_mode(settings).smoothed) {  // what is right is of smoothed tets, as asked for
     Settings own = settings;
     set_mode(own, "newton", "auto");
-    return choose_solver(model, own, budget_ms, steps);
+    return choose_solver(model, own, budget_ms, steps, progress);
   }
-  SolverChoice choice{budget_ms, steps, ""};
-  std::optional<Motion> right = right_motion(*model, settings);
-  if (right) choice.judged = "motion";
-  for (const Settings& candidate : candidates(settings)) {
-    if (any_material(settings, smoothed) && !solver_mode(candidate).smoothed) continue;
-    const bool first = choice.trials.empty(), as_it_is = candidate == settings || solver_mode(candidate).leapfrog;
-    SolverTrial& trial = choice.trials.emplace_back(SolverTrial{candidate});
-    Sim sim = create_sim(model, candidate);
-    if (first) warm_up(sim);
-    step(sim);  // the first of a new solver is not like the others
-    if (!as_it_is) fit_substeps(sim, trial.settings, budget_ms);
-    if (first && !right) {
-      if (const auto found = rigid_motion(*model, settings, steps)) {
-        right = found, choice.judged = "motion";
-      } else if (any_material(settings, compliant) || all_materials(settings, hard)) {
-        Sim fine = finer_than(trial.settings, model);
-        // What a slow machine can afford: the reference takes as long as all trials together.
-        const double seconds = 1e-3 * fine.plan.substeps / double(sim.plan.substeps) * budget_ms;
-        choice.steps = std::clamp(long(2 * most_seconds() / seconds), 2L, steps);
-        right = motion_of_run(fine, choice.steps), choice.judged = "finer steps";
-      } else {
-        choice.judged = "volume";
-      }
-    }
-    for (int attempt = 1;; ++attempt) {
-      apply_settings(sim, trial.settings);
-      reset(sim);
-      trial.plan = sim.plan;
-      Metrics metrics = create_metrics(sim);
-      const double enough = first ? most_seconds() : 2e-3 * budget_ms * double(choice.steps) + 0.5;
-      const MeasuredRun run =
-          run_loop(sim, &metrics, choice.steps, {.most_seconds = enough, .standard = right ? &*right : nullptr});
-      if (interrupted()) throw Interrupted();
-      if (first && run.errors.finite) choice.steps = run.steps;
-      trial.ms = step_ms(run);
-      trial.fits = trial.ms <= fitting * budget_ms && (first || run.steps == choice.steps);
-      trial.error = !run.errors.finite ? infinity
-                    : run.motion       ? 100 * run.motion->rms
-                                       : run.errors.max_volume_loss_percent;
-      // In contact a step takes longer than those it was fitted to.
-      if (trial.fits || as_it_is || trial.settings.substeps == 1 || attempt == 3) break;
-      trial.settings.substeps = std::max(1, int(trial.settings.substeps * std::min(0.95, budget_ms / trial.ms)));
-    }
-    // Errors that agree to a hundredth are the same: then the plainer one.
-    const SolverTrial& best = choice.trials[choice.best];
-    const bool righter = best.error > no_error && trial.error < 0.99 * best.error;
-    if (trial.fits && (!best.fits || righter)) choice.best = choice.trials.size() - 1;
-  }
+  Race race{model, settings, budget_ms, progress};
+  SolverChoice& choice = race.choice;
+  choice.budget_ms = budget_ms, choice.steps = steps;
+  race.right = right_motion(*model, settings);
+  if (race.right) choice.judged = "motion";
+  std::vector<Settings> all = candidates(settings);
+  if (any_material(settings, smoothed))
+    std::erase_if(all, [](const Settings& candidate) { return !solver_mode(candidate).smoothed; });
+  race.candidates = all.size();
+  for (const Settings& candidate : all) try_candidate(race, candidate);
   if (!choice.trials[choice.best].fits) {
     const auto& quickest = *std::ranges::min_element(choice.trials, {}, &SolverTrial::ms);
     throw Error("nothing fits the budget",
@@ -229,17 +284,26 @@ std::optional<std::string> choose_by_rule(Scene& scene, const Model& model) {
   return fmt::format("newton, {} substeps of {} iterations: {}", s.substeps, s.iterations, why);
 }
 
-std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model) {
+std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model,
+                                           const SolverProgress& progress) {
   if (const auto rule = choose_by_rule(scene, *model)) fmt::print("solver: {}\n", *rule);
-  auto choice = choose_for(scene, model);
+  std::optional<SolverChoice> choice;
+  {
+    Progress line("", 100);
+    choice = choose_for(scene, model, progress ? progress : SolverProgress([&](const std::string& what, double part) {
+                          line.label = fmt::format("trying {}, per cent:", what);
+                          line.update(std::lround(100 * part));
+                        }));
+  }
   if (choice) fmt::print("solver: {}\n", describe(*choice));
   return choice;
 }
 
-std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model) {
+std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model,
+                                       const SolverProgress& progress) {
   if (!scene.budget_ms) return std::nullopt;
   const long steps = std::min(duration_in_steps(scene), 400L);
-  SolverChoice choice = choose_solver(model, scene.settings, *scene.budget_ms, steps);
+  SolverChoice choice = choose_solver(model, scene.settings, *scene.budget_ms, steps, progress);
   scene.settings = choice.settings();
   scene.budget_ms.reset();
   return choice;

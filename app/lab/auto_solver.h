@@ -2,6 +2,7 @@
 // found by trying.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -31,8 +32,12 @@ struct SolverChoice {
   const Settings& settings() const { return trials[best].settings; }
 };
 
-/// Positions of a run, some twenty times on its way, for others to be held against.
-Motion motion_of_run(Sim& sim, long steps);
+/// Is told what is tried and which part of all is done: before each candidate, and every now and then during its
+/// steps. It may throw Interrupted, after which nothing has changed.
+using SolverProgress = std::function<void(const std::string& what, double part)>;
+
+/// Positions of a run, some twenty times on its way, for others to be held against. `stepped` as in RunPlan.
+Motion motion_of_run(Sim& sim, long steps, const std::function<void(long)>& stepped = {});
 /// The budget without --budget-ms: a tenth of the time that a step simulates.
 double default_budget_ms(const Settings& settings);
 /// Tries the scene's own setting, and one iteration per substep in mode node, with two over-relaxations and
@@ -41,7 +46,7 @@ double default_budget_ms(const Settings& settings);
 /// by the largest volume loss. Everything else stays as in `settings`. Some seconds; needs a GL context.
 /// Throws Error where nothing fits the budget.
 SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Settings& settings, double budget_ms,
-                           long steps);
+                           long steps, const SolverProgress& progress = {});
 /// The mode of bodies that have forces, where nobody says one: `explicit` up to 40 substeps, 20 on a software
 /// renderer, else `newton` in two substeps of 4 iterations, 8 from 40 such substeps on, 16 from 128, 32 from
 /// 400; `newton` as well where a body falls so far that the impact presses it flat. By what was measured
@@ -49,9 +54,11 @@ SolverChoice choose_solver(const std::shared_ptr<const Model>& model, const Sett
 /// choose. What it took; nothing otherwise.
 std::optional<std::string> choose_by_rule(Scene& scene, const Model& model);
 /// For a scene that asks for it: over its first 400 steps at most. The scene then has the settings chosen.
-std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model);
-/// Both, and says on standard output what was chosen.
-std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model);
+std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const Model>& model,
+                                       const SolverProgress& progress = {});
+/// Both, and says on standard output what was chosen. Without `progress` a terminal shows it.
+std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model,
+                                           const SolverProgress& progress = {});
 /// "node, 17 substeps, omega 2.5: 0.143 ms of 0.15 ms a step, 0.02 % from the reference motion over 160 steps"
 std::string describe(const SolverChoice& choice);
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice);

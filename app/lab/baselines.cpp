@@ -1,9 +1,10 @@
 #include "app/lab/baselines.h"
 
+#include <cmath>
 #include <utility>
 
 #include "sim/contact/rigid_contact.h"
-#include "sim/interrupt.h"
+#include "sim/hash.h"
 #include "sim/model/material.h"
 #include "sim/reference/implicit.h"
 #include "sim/reference/rigid.h"
@@ -12,27 +13,36 @@ namespace tetpbd {
 
 namespace {
 
-using std::chrono::steady_clock;
-
-/// Steps that `advance` takes and `state` shows, held against the standard.
-MeasuredRun baseline_run(const Model& model, const Settings& settings, long steps, const Standard& standard,
+/// Steps that `advance` takes and `state` shows. A baseline has no GL buffers: what is measured is what its state
+/// tells.
+MeasuredRun run_baseline(const Model& model, const Settings& settings, long steps, const Standard& standard,
                          const std::function<void()>& advance, const std::function<State()>& state) {
-  MeasuredRun run;
-  run.substeps = plan_for(settings).substeps;
-  for (long s = 0; s <= steps && !interrupted(); ++s) {
-    if (s > 0) {
-      const auto begin = steady_clock::now();
-      advance();
-      run.wall_ms.push_back(1e3 * seconds_since(begin));
-    }
-    const Motion::Row now = measure_motion(model, settings, state(), double(s) * settings.dt);
-    Measurement& m = run.measurements.emplace_back();
-    m.step = s, m.time = now.time;
+  long step = 0;
+  std::vector<Measurement> measured;
+  const auto measure = [&] {
+    const Motion::Row now = measure_motion(model, settings, state(), double(step) * settings.dt);
+    Measurement& m = measured.emplace_back();
+    m.step = step, m.time = now.time;
     m.centre = now.centre, m.kinetic = now.kinetic, m.potential = now.potential;
-    run.steps = s;
-    hold_against(run, standard, model, s, now.time, state);
-  }
-  return run;
+  };
+  Stepper stepper{.model = &model, .dt = settings.dt, .state = state, .measure = measure};
+  stepper.step = [&] { advance(), ++step; };
+  stepper.collect = [&](Run& run, bool) {
+    auto& all = run.so_far.measurements;
+    all.insert(all.end(), measured.begin(), measured.end());
+    measured.clear();
+  };
+  stepper.find_non_finite = [&](bool) -> std::optional<NonFinite> {
+    const State now = state();
+    for (std::size_t v = 0; v < now.positions.size(); ++v)
+      if (!std::isfinite(glm::dot(now.positions[v], now.positions[v]))) return NonFinite{step, std::uint32_t(v)};
+    return std::nullopt;
+  };
+  stepper.hash = [&] { return hash_values(state().velocities, hash_values(state().positions)); };
+  stepper.substeps = [&] { return plan_for(settings).substeps; };
+  Run run = begin(std::move(stepper), steps, {.standard = standard});
+  tetpbd::advance(run);
+  return finish(run);
 }
 
 /// A rigid body of six degrees of freedom, where k = 1: flight as in rigid.h, contact as the modes have it
@@ -52,7 +62,7 @@ MeasuredRun rigid_run(const Model& model, const Settings& settings, long steps, 
     const Points& points;
     const glm::dvec3& at(std::uint32_t i) const { return points[i]; }
   };
-  return baseline_run(
+  return run_baseline(
       model, settings, steps, standard,
       [&] {
         const Plan plan = plan_for(settings);
@@ -86,7 +96,7 @@ MeasuredRun direct_run(const Model& model, const Settings& settings, long steps,
   const ReferenceInput input{model, system, settings, model.inverse_masses};
   Implicit run = implicit(input, reference_compliances(input), {model.positions, model.velocities}, plan.h);
   run.most = plan.iterations;
-  return baseline_run(
+  return run_baseline(
       model, settings, steps, standard, [&] { advance(run, plan.substeps); }, [&] { return run.now; });
 }
 

@@ -1,7 +1,7 @@
 // What else would solve a scene, on one core: no solver modes, but what modes have to face.
 #pragma once
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 
 namespace tetpbd {
 

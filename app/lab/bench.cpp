@@ -18,7 +18,7 @@ namespace {
 const char* columns =
     "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
     "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent,"
-    "motion_final,motion_rms,motion_peak,motion_relative";
+    "motion_final,motion_rms,motion_peak,motion_relative,state_hash";
 const char* table =
     "scene -16, mode -18, constraints -20, iterations:iter 5, substeps:sub 5, size 10, picture 8, fps 10, "
     "gpu_ms_per_step:GPU-ms 10, gpu_us_per_iteration:us/iter 10, draw_ms 10, "
@@ -33,17 +33,17 @@ ordered_json spread(std::vector<double> values) {
 void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options, const std::function<void()>& picture) {
   std::vector<double> fps, gpu, wall;
   double drawing = 0, pictures = 0;
-  RunPlan plan{.most_seconds = options.most_seconds, .wait = false};
+  RunPlan plan{.most_seconds = options.most_seconds, .pace = Pace::queued};
   if (picture) plan.stepped = [&](long) { picture(); };
   warm_up(sim);
   for (int repeat = 0; repeat < options.repeats && row["finite"] == true; ++repeat) {
     reset(sim);
-    run_loop(sim, nullptr, options.warm_up, plan);
+    run_to_end(sim, nullptr, options.warm_up, plan);
     const auto begin = std::chrono::steady_clock::now();
     for (long f = 0; picture && f < std::min(options.frames, 200L); ++f, ++pictures) picture();
     glFinish();
     drawing += seconds_since(begin);
-    const MeasuredRun run = run_loop(sim, nullptr, options.frames, plan);
+    const MeasuredRun run = run_to_end(sim, nullptr, options.frames, plan);
     fps.push_back(double(run.steps) / run.seconds);
     wall.push_back(run.seconds * 1e3 / double(run.steps));
     if (!run.gpu_ms.empty()) gpu.push_back(median(run.gpu_ms));
@@ -67,8 +67,8 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
   const Explanation cost = explain(sim);
   Metrics metrics = create_metrics(sim);
   const auto right = right_motion(*model, settings);
-  const MeasuredRun run = run_loop(sim, &metrics, options.frames,
-                                   {.most_seconds = 12 * options.most_seconds, .standard = right ? &*right : nullptr});
+  const MeasuredRun run =
+      run_to_end(sim, &metrics, options.frames, {.most_seconds = 12 * options.most_seconds, .standard = right});
   ordered_json row = row_of(scene, *model, sim.settings, run);
   row.update({{"size", ""},
               {"picture", ""},
@@ -122,10 +122,10 @@ ordered_json launch_and_bandwidth_limits(bool software) {
 }
 
 Sweep bench_sweep(const BenchOptions& options) {
-  Sweep sweep{"bench", "bench", split(columns, ','), 0, table, {}};
+  Sweep sweep{"bench", "bench", split(columns, ','), {}, table, {}};
   for (const std::string& name : options.scenes) {
     const Scene scene = load_scene(name, options.overrides);
-    const auto all = combinations(scene.settings, options.axes);
+    const auto all = without_repeats(combine(scene.settings, options.variations));
     const auto model = build_model(scene);
     for (const Settings& settings : all) sweep.work.push_back([=] { return rows_of(scene, model, settings, options); });
   }

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "app/lab/map.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/sweep.h"
 #include "sim/error.h"
 #include "sim/files.h"
@@ -17,17 +17,22 @@
 
 namespace tetpbd {
 
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text)
+    result += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return result;
+}
+
 namespace {
 
 constexpr double width = 860, height = 520, left = 86, right = width - 210, top = 66, bottom = height - 62;
 
 std::string text(double x, double y, const std::string& what, const char* anchor = "start", double size = 12,
                  const std::string& more = "") {
-  std::string escaped;
-  for (char c : what) escaped += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
   return fmt::format(
       "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#222222\" {}>{}</text>\n", x, y, size,
-      anchor, more, escaped);
+      anchor, more, escaped(what));
 }
 
 std::string head(const std::string& title, const std::string& subtitle, const std::string& x_label,
@@ -200,7 +205,7 @@ std::string map_svg(const nlohmann::ordered_json& document) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& row = rows[i];
     const double x = left + double(note(xs, row["x"])) * wide, y = bottom - double(note(ys, row["y"]) + 1) * high;
-    const double percent = motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
+    const double percent = map_percent(row, motion);
     const bool failed = !row["finite"].get<bool>();
     const double part = heat_part(percent);
     const std::string said = row.contains("refused") ? "refused"

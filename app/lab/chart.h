@@ -32,6 +32,8 @@ struct Chart {
   std::vector<Spot> spots{};
 };
 
+/// Text of HTML and SVG.
+std::string escaped(const std::string& text);
 std::string to_svg(const Chart& chart);
 
 /// Okabe and Ito's: told apart with any colour vision. A solver mode has the same everywhere.

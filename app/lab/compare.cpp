@@ -28,7 +28,7 @@ const char* compare_columns =
     "angular_drift,inverted_tets,finite,pareto,mass_splitting,motion_final,motion_rms,motion_peak,"
     "motion_relative,tet_volume_rms_peak,stretch_rms_peak,rise,apex,energy,penetration_max,penetration_999,"
     "overlap_max,overlap_999,overlap_vertices,overlap_triangles,crossing_depth,total_final,total_rms,total_peak,"
-    "total_relative,total_error";
+    "total_relative,total_error,state_hash";
 const char* compare_table =
     "mode -18, omega 6, iterations:iter 6, substeps:sub 6, gpu_ms_per_step:GPU-ms 11, "
     "wall_ms_per_step:wall-ms 11, motion_final:motion 11, motion_rms:rms 11, total_error:total 11, "
@@ -85,15 +85,28 @@ bool has_smoothed_tets(const Settings& settings) {
   return solver_mode(settings).smoothed && any_material(settings, smoothed);
 }
 
+/// What of the settings decides the motion, rather than how it is solved.
+Settings without_solution(Settings settings) {
+  settings.mode = has_smoothed_tets(settings) ? "newton" : SolverSettings().mode;
+  settings.iterations = settings.substeps = automatic;
+  settings.omega = SolverSettings().omega, settings.mass_splitting = SolverSettings().mass_splitting;
+  settings.stability = SolverSettings().stability, settings.mass_scaling = SolverSettings().mass_scaling;
+  return settings;
+}
+struct RightMotion {
+  Settings of;  ///< without_solution()
+  std::optional<Motion> motion{};
+};
+
 /// What is compared: a scene, whose bodies are filled as `fill` says, and what its runs are held against.
 struct Subject {
   std::string fill;  ///< empty: as the scene says
   Scene scene;
   std::shared_ptr<const Model> model{};
-  std::array<std::optional<Motion>, 2> right{};  ///< of linear and of smoothed tets
+  std::vector<RightMotion> right{};
   std::optional<TotalError> total{};
   Standard standard(const Settings& settings) const {
-    const auto& own = right[has_smoothed_tets(settings)];
+    const auto& own = std::ranges::find(right, without_solution(settings), &RightMotion::of)->motion;
     return {own ? &*own : nullptr, total ? &*total : nullptr};
   }
 };
@@ -261,70 +274,105 @@ void print_best(ordered_json rows, const char* what, std::optional<double> limit
              error_by(judge, best));
 }
 
-Axes axes_for(const CompareOptions& options, const Settings& own) {
-  Axes axes = options.axes;
-  if (axes.modes.empty() && has_forces(own))
-    axes.modes = {"node", "cpu-fast", "explicit", "newton"};
-  else if (axes.modes.empty())
-    axes.modes = {"node", "constraint", "cpu"};
-  return axes;
+/// What varies, with the modes that suit the scene where none are named.
+std::vector<Variation> variations_for(const CompareOptions& options, const Settings& own) {
+  std::vector<Variation> all = options.variations;
+  if (!find_variation(all, "mode"))
+    vary(all, parse_variation(has_forces(own) ? "mode=node,cpu-fast,explicit,newton" : "mode=node,constraint,cpu",
+                              "--modes"));
+  return all;
 }
 
-/// The reference motions of the tets that rows have: what else is varied decides how a scene is solved, not how it
-/// moves.
-void find_right_motions(Subject& subject, const CompareOptions& options) {
-  const Axes elements{.elements = options.axes.elements};
-  for (const std::string& mode : axes_for(options, subject.scene.settings).modes)  // baselines solve linear tets
-    for (const Settings& settings : combinations(subject.scene.settings, elements)) {
-      Scene scene = subject.scene;
-      scene.settings = settings, scene.settings.mode = mode;
-      std::optional<Motion>& right = subject.right[has_smoothed_tets(scene.settings)];
-      if (right) continue;
-      if (options.judge == "motion" || options.judge == "total") require_motion(scene, *subject.model, options.steps);
-      right = right_motion(*subject.model, scene.settings);
-    }
-}
+/// A setting to run, by a mode or by a baseline.
+struct Candidate {
+  Settings settings;
+  const Baseline* baseline = nullptr;
+};
 
-/// A run for each setting, and for each baseline among the modes.
-void add_runs(Sweep& sweep, const CompareOptions& options, const std::shared_ptr<const Subject>& subject) {
-  const Settings& own = subject->scene.settings;
-  const long steps = options.steps;
-  Axes axes = axes_for(options, own);
-  if (sweep.work.empty()) note_unused(own, axes.modes, options.overrides);  // the same for all fills
+/// Baselines first. Throws Error for those that do not suit the scene.
+std::vector<Candidate> candidates_for(const CompareOptions& options, const Settings& own) {
+  std::vector<Variation> all = variations_for(options, own), plain = all;
+  std::erase_if(plain, [](const Variation& v) { return v.row->name == "mode" || v.row->name == "omega"; });
+  Variation modes = *find_variation(all, "mode");
+  std::vector<Candidate> candidates;
   for (const Baseline& baseline : baselines()) {
-    if (std::erase(axes.modes, baseline.name) == 0) continue;
+    if (std::erase(modes.values, baseline.name) == 0) continue;
     if (!baseline.suits(own))
       throw Error("no baseline for this scene", baseline.name, fmt::format("it is for scenes {}", baseline.scenes));
-    Axes plain = options.axes;
-    plain.modes = {}, plain.omegas = {};
-    for (Settings settings : combinations(own, plain)) {
+    for (Settings settings : without_repeats(combine(own, plain))) {
       settings.mode = baseline.name;
-      sweep.work.push_back([=] {
-        ordered_json row =
-            compared(*subject, settings, baseline.run(*subject->model, settings, steps, subject->standard(settings)));
-        for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
-        return std::vector{row};
-      });
+      candidates.push_back({settings, &baseline});
     }
   }
-  if (axes.modes.empty()) return;
-  for (const Settings& settings : combinations(own, axes))
-    sweep.work.push_back([=, &sweep, number = sweep.work.size(), out = options.out] {
-      Film film(subject->scene, *subject->model, out, number, sweep.work.size());
-      const MeasuredRun run =
-          run_model(subject->model, settings, steps, subject->standard(settings), true, film.of(steps));
-      ordered_json row = compared(*subject, settings, run);
-      row["film"] = film.write();
-      row["reference_distance"] = remaining_after_one_step(subject->model, settings);
-      return std::vector{row};
+  vary(all, modes);
+  for (const Settings& settings : without_repeats(combine(own, all))) candidates.push_back({settings});
+  return candidates;
+}
+
+/// The reference motion of each setting that has one of its own.
+void find_right_motions(Subject& subject, const CompareOptions& options, const std::vector<Candidate>& candidates) {
+  for (const Candidate& candidate : candidates) {
+    const Settings deciding = without_solution(candidate.settings);
+    if (std::ranges::find(subject.right, deciding, &RightMotion::of) != subject.right.end()) continue;
+    Scene scene = subject.scene;
+    scene.settings = candidate.settings;
+    if (options.judge == "motion" || options.judge == "total") require_motion(scene, *subject.model, options.steps);
+    subject.right.push_back({deciding, right_motion(*subject.model, scene.settings)});
+  }
+}
+
+ordered_json run_candidate(const Subject& subject, const Candidate& candidate, const CompareOptions& options,
+                           std::size_t number, std::size_t rows) {
+  const Settings& settings = candidate.settings;
+  const Standard standard = subject.standard(settings);
+  if (candidate.baseline) {
+    const MeasuredRun run = candidate.baseline->run(*subject.model, settings, options.steps, standard);
+    ordered_json row = compared(subject, settings, run);
+    for (const char* unknown : {"tet_volume_rms_peak", "stretch_rms_peak"}) row[unknown] = nullptr;
+    return row;
+  }
+  Film film(subject.scene, *subject.model, options.out, number, rows);
+  const MeasuredRun run = run_model(subject.model, settings, options.steps, standard, true, film.of(options.steps));
+  ordered_json row = compared(subject, settings, run);
+  row["film"] = film.write();
+  row["reference_distance"] = remaining_after_one_step(subject.model, settings);
+  return row;
+}
+
+/// A run for each candidate of a subject.
+void add_runs(Sweep& sweep, const CompareOptions& options, const std::string& fill,
+              std::shared_ptr<const Truth>& truth) {
+  auto subject =
+      std::make_shared<Subject>(Subject{fill, load_scene(options.scene, filled_by(options.overrides, fill))});
+  const Settings& own = subject->scene.settings;
+  subject->model = build_model(subject->scene);
+  sweep.facts["dt"] = own.dt;
+  if (sweep.work.empty())  // the same for all fills
+    note_unused(own, find_variation(variations_for(options, own), "mode")->values, options.overrides);
+  const std::vector<Candidate> candidates = candidates_for(options, own);
+  find_right_motions(*subject, options, candidates);
+  if (options.judge == "total") {
+    if (!truth) truth = require_truth(subject->scene, options.steps, options.truth);
+    subject->total = total_error(truth, *subject->model);
+  }
+  for (const Candidate& candidate : candidates)
+    sweep.work.push_back([=, &sweep, &options, number = sweep.work.size()] {
+      return std::vector{run_candidate(*subject, candidate, options, number, sweep.work.size())};
     });
 }
 
 }  // namespace
 
 int run_compare(const CompareOptions& options) {
-  Sweep sweep{"compare", "comparison", split(compare_columns, ','), 7, compare_table, {}};
-  if (options.axes.elements.size() > 1) sweep.table.insert(0, "element -10, ");
+  Sweep sweep{"compare",
+              "comparison",
+              split(compare_columns, ','),
+              {"scene", "mode", "omega", "iterations", "substeps", "fill", "element", "constraints", "mass_splitting"},
+              compare_table,
+              {}};
+  for (const char* column : {"element", "constraints"})
+    if (const Variation* varied = find_variation(options.variations, column); varied && varied->values.size() > 1)
+      sweep.table.insert(0, fmt::format("{} -{}, ", column, varied->row->name == "element" ? 10 : 22));
   if (!options.fills.empty())
     sweep.table.insert(0,
                        fmt::format("fill -{}, ", 2 + std::ranges::max(options.fills, {}, &std::string::size).size()));
@@ -333,18 +381,7 @@ int run_compare(const CompareOptions& options) {
     std::vector<std::string> fills = options.fills;
     if (fills.empty()) fills = {""};
     std::shared_ptr<const Truth> truth;  // the same for all fills
-    for (const std::string& fill : fills) {
-      auto subject =
-          std::make_shared<Subject>(Subject{fill, load_scene(options.scene, filled_by(options.overrides, fill))});
-      subject->model = build_model(subject->scene);
-      sweep.facts["dt"] = subject->scene.settings.dt;
-      find_right_motions(*subject, options);
-      if (options.judge == "total") {
-        if (!truth) truth = require_truth(subject->scene, options.steps, options.truth);
-        subject->total = total_error(truth, *subject->model);
-      }
-      add_runs(sweep, options, subject);
-    }
+    for (const std::string& fill : fills) add_runs(sweep, options, fill, truth);
   });
   ordered_json& rows = document["rows"];
   const Judge& judge = judge_of(options.judge, rows);

@@ -59,7 +59,7 @@ ordered_json case_row(const Scene& scene, const Settings& settings, long steps) 
   const auto model = build_model(scene);
   Sim sim = create_sim(model, settings, {.count_guards = true});
   Metrics metrics = create_metrics(sim);
-  const MeasuredRun run = run_loop(sim, &metrics, steps);
+  const MeasuredRun run = run_to_end(sim, &metrics, steps);
   const auto recovered =
       run.errors.finite ? recovered_at(run.measurements, steps, all_materials(settings, hard)) : std::nullopt;
   ordered_json row = row_of(scene, *model, settings, run);
@@ -84,7 +84,7 @@ void add_cases(Sweep& sweep, const CompareOptions& options) {
                     did_you_mean(mesh, {"bunny", "block", "tet"}) + "choose from bunny, block, tet");
       const auto scene = scene_of(name, mesh, options.overrides);
       if (!scene || !is_constrained(scene->settings)) continue;  // where nothing acts, nothing recovers
-      for (const std::string& mode : options.axes.modes)
+      for (const std::string& mode : find_variation(options.variations, "mode")->values)
         sweep.work.push_back([=, settings = settings_of(*scene, mode),
                               steps = options.steps ? options.steps : duration_in_steps(*scene)] {
           ordered_json row = case_row(*scene, settings, steps);
@@ -116,9 +116,10 @@ std::optional<long> recovered_at(const std::vector<Measurement>& measurements, l
 }
 
 int run_hard_cases(const CompareOptions& options) {
-  Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), 3, case_table, {}};
+  Sweep sweep{"stability", "run of hard cases", split(case_columns, ','), {"case", "mesh", "mode"}, case_table, {}};
   sweep.facts = ordered_json::object();
   for (const char* guard : guard_names) sweep.columns.push_back(fmt::format("guard_{}", guard));
+  sweep.columns.push_back("state_hash");
   ordered_json document =
       run_or_merge(sweep, options.shards, options.out, options.gpu, [&] { add_cases(sweep, options); });
   ordered_json& rows = document["rows"];

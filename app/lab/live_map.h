@@ -1,5 +1,5 @@
-// The map of `tetpbd map`, filled beside what the window does: a simulation of its own steps a little in
-// every frame, and the reference motions of soft bodies are found in a thread.
+// The map of `tetpbd map` in slices, beside what the window does: its runs advance a little in every frame, and the
+// reference motions of soft bodies are found in a thread.
 #pragma once
 
 #include <atomic>
@@ -7,21 +7,21 @@
 #include <memory>
 
 #include "app/lab/map.h"
-#include "sim/sim.h"
 
 namespace tetpbd {
 
 struct MapCell {
   enum State { waiting, running, finished, failed, refused } state = waiting;
   Settings settings;
-  double percent = 0;  ///< from the reference motion over the run, of the size; without one the largest net volume loss
+  double percent = 0;  ///< map_percent(), at some sixteen instants of the run
   long failed_at = 0;  ///< step
   std::string why{};   ///< refused
+  std::optional<std::uint64_t> hash{};
 };
 
 struct LiveMap {
   static constexpr std::size_t most_tets = 20000;
-  MapAxis x, y;
+  Variation x, y;
   std::shared_ptr<const Model> model;
   double seconds = 0;                ///< of motion
   std::vector<MapCell> cells{};      ///< rows of x
@@ -29,13 +29,12 @@ struct LiveMap {
   std::size_t done = 0;
   bool motion = false;  ///< the last cell had a right one
 
-  std::optional<Sim> sim{};
-  long steps = 0, batch = 1;
-  Fence queued{};
-  std::optional<Motion> right{};
+  /// Of the run under way, which points at them.
+  std::unique_ptr<Sim> sim{};
+  std::unique_ptr<Metrics> metrics{};
+  std::shared_ptr<const Motion> right{};
+  std::optional<Run> run{};
   std::uint64_t right_of = 0;  ///< scene_key
-  MotionError error{};
-  double volume = 0, loss = 0;  ///< m^3 at rest; %, the largest so far
 
   /// Of the thread; it ends early when told to.
   struct Search {

@@ -12,7 +12,6 @@
 #include "app/lab/chart.h"
 #include "app/lab/report.h"
 #include "sim/error.h"
-#include "sim/model/did_you_mean.h"
 #include "sim/model/material.h"
 
 namespace tetpbd {
@@ -20,7 +19,7 @@ namespace tetpbd {
 namespace {
 
 const char* results =
-    "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step";
+    "finite,failed_at_step,motion_rms,motion_final,max_volume_loss_percent,tet_volume_max,ms_per_step,state_hash";
 
 ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& model, Settings settings,
                      const std::string& x, const std::string& y, std::optional<Motion>& last, Film& film) {
@@ -31,59 +30,18 @@ ordered_json cell_of(const Scene& scene, const std::shared_ptr<const Model>& mod
   if (!last || last->scene != scene_key(*model, settings)) last = answer_for(*model, settings, steps);
   MeasuredRun run;
   try {
-    run = run_model(model, settings, steps, last ? &*last : nullptr, true, film.of(steps));
+    run = run_model(model, settings, steps, last, true, film.of(steps));
   } catch (const Error& error) {  // of this setting: its mode does not go so far
     for (const std::string& key : split(results, ',')) row[key] = nullptr;
     row["finite"] = false, row["refused"] = error.what();
     return row;
   }
-  const auto& found = run.errors.non_finite;
-  const double nothing = std::nan("");
-  const bool motion = run.motion && run.errors.finite;
-  row["finite"] = run.errors.finite;
-  row["failed_at_step"] = found ? ordered_json(found->step) : ordered_json();
-  row["motion_rms"] = motion ? run.motion->rms : nothing;
-  row["motion_final"] = motion ? run.motion->final : nothing;
-  row["max_volume_loss_percent"] = run.errors.finite ? run.errors.max_volume_loss_percent : nothing;
-  row["tet_volume_max"] = run.errors.finite && run.errors.last ? run.errors.last->tet_volume_max : nothing;
-  row["ms_per_step"] = median(run.gpu_ms.empty() ? run.wall_ms : run.gpu_ms);
+  row.update(map_row(run));
   row["film"] = film.write();
   return row;
 }
 
 }  // namespace
-
-MapAxis map_axis(const std::string& text, const std::string& flag) {
-  const std::size_t equals = text.find('=');
-  const std::string where = flag + " " + text, name = text.substr(0, equals);
-  const char* remedy = "write PARAMETER=1,2,5 or PARAMETER=FROM:TO:COUNT";
-  const Parameter* row = find_parameter(name);
-  std::vector<std::string> names;
-  for (const Parameter& one : parameters()) names.push_back(one.name);
-  if (equals == std::string::npos || !row || std::holds_alternative<std::string Settings::*>(row->member) ||
-      std::holds_alternative<bool Settings::*>(row->member) || row->effect == Effect::restart)
-    throw Error(fmt::format("'{}' is no setting with a number", name), where, did_you_mean(name, names) + remedy);
-  MapAxis axis{row, split(text.substr(equals + 1), ',')};
-  const auto range = split(text.substr(equals + 1), ':');
-  if (range.size() == 3) {
-    const auto number = [&](const std::string& word) { return to_number(word, where, remedy); };
-    const double from = number(range[0]), to = number(range[1]), count = number(range[2]);
-    const bool factors = row->logarithmic && from > 0 && to > 0;
-    if (!(count >= 2 && count <= 100)) throw Error("bad number of values", where, "give 2 to 100");
-    axis.values.clear();
-    for (int i = 0; i < int(count); ++i) {
-      const double part = i / (std::floor(count) - 1);
-      const double value = factors ? from * std::pow(to / from, part) : from + (to - from) * part;
-      const bool whole = std::holds_alternative<int Settings::*>(row->member);
-      const std::string word = whole ? fmt::format("{}", std::lround(value)) : fmt::format("{:.4g}", value);
-      if (axis.values.empty() || axis.values.back() != word) axis.values.push_back(word);
-    }
-  }
-  Settings probe;
-  for (const std::string& value : axis.values) set_parameter(probe, *row, value, where);
-  if (axis.values.empty()) throw Error("no values", where, remedy);
-  return axis;
-}
 
 std::optional<Motion> answer_for(const Model& model, const Settings& settings, long steps,
                                  const std::function<void(long)>& progress) {
@@ -94,13 +52,40 @@ std::optional<Motion> answer_for(const Model& model, const Settings& settings, l
   return find_motion({model, system, settings, model.inverse_masses}, steps, {}, {}, progress);
 }
 
+ordered_json map_row(const MeasuredRun& run) {
+  const auto& found = run.errors.non_finite;
+  const double nothing = std::nan("");
+  const bool finite = run.errors.finite, motion = run.motion && finite;
+  return {{"finite", finite},
+          {"failed_at_step", found ? ordered_json(found->step) : ordered_json()},
+          {"motion_rms", motion ? run.motion->rms : nothing},
+          {"motion_final", motion ? run.motion->final : nothing},
+          {"max_volume_loss_percent", finite ? run.errors.max_volume_loss_percent : nothing},
+          {"tet_volume_max", finite && run.errors.last ? run.errors.last->tet_volume_max : nothing},
+          {"ms_per_step", step_ms(run)},
+          {"state_hash", hash_json(run.hash)}};
+}
+
+double map_percent(const ordered_json& row, bool motion) {
+  return motion ? 100 * number(row, "motion_rms") : number(row, "max_volume_loss_percent");
+}
+
+std::vector<Settings> map_cells(const Settings& base, const Variation& x, const Variation& y) {
+  if (x.row == y.row) throw Error("both axes are the same setting", x.row->name, "give another to one of them");
+  const std::vector<Settings> cells = combine(base, {y, x});
+  const std::size_t columns = x.values.size();
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    check_settings(cells[i],
+                   fmt::format("{} {}, {} {}", x.row->name, x.values[i % columns], y.row->name, y.values[i / columns]));
+  return cells;
+}
+
 int run_map(const MapOptions& options) {
-  const MapAxis x = map_axis(options.x, "--x"), y = map_axis(options.y, "--y");
-  if (x.row == y.row) throw Error("both axes are the same setting", x.row->name, "give another to --y");
+  const Variation x = parse_variation(options.x, "--x"), y = parse_variation(options.y, "--y");
   Sweep sweep{"map",
               "cell",
               split(std::string("x,y,") + results, ','),
-              2,
+              {"x", "y"},
               fmt::format("x:{} {}, y:{} {}, ", x.row->name, std::max<std::size_t>(12, x.row->name.size() + 3),
                           y.row->name, std::max<std::size_t>(12, y.row->name.size() + 3)) +
                   "finite 8, failed_at_step:failed 8, motion_rms:motion 12, "
@@ -114,24 +99,20 @@ int run_map(const MapOptions& options) {
       if (is_of_material(*row) && all_have_own_materials(scene.settings))
         throw Error("each body has a material of its own", row->name, "vary another setting, or leave theirs out");
     const auto varied = [&](const char* name) { return x.row->name == name || y.row->name == name; };
-    if (varied("substeps") || varied("iterations") || varied("omega")) scene.mode_open = false;
+    if (varied("mode") || varied("substeps") || varied("iterations") || varied("omega")) scene.mode_open = false;
     choose_by_rule(scene, *model);
     note_unused(scene.settings, {}, options.overrides);
     sweep.facts["scene"] = scene.name, sweep.facts["mode"] = scene.settings.mode;
     sweep.facts["tets"] = model->rest.tets.size();
     sweep.facts["x"] = x.row->name, sweep.facts["y"] = y.row->name, sweep.facts["seconds"] = scene.duration;
     const auto last = std::make_shared<std::optional<Motion>>();
-    for (const std::string& down : y.values)
-      for (const std::string& across : x.values) {
-        Settings settings = scene.settings;
-        set_parameter(settings, *x.row, across, "--x");
-        set_parameter(settings, *y.row, down, "--y");
-        check_settings(settings, fmt::format("{} {}, {} {}", x.row->name, across, y.row->name, down));
-        sweep.work.push_back([=, number = sweep.work.size()] {
-          Film film(scene, *model, options.out, number, x.values.size() * y.values.size());
-          return std::vector{cell_of(scene, model, settings, across, down, *last, film)};
-        });
-      }
+    for (const Settings& settings : map_cells(scene.settings, x, y))
+      sweep.work.push_back([=, number = sweep.work.size()] {
+        const std::size_t columns = x.values.size();
+        Film film(scene, *model, options.out, number, columns * y.values.size());
+        const std::string across = x.values[number % columns], up = y.values[number / columns];
+        return std::vector{cell_of(scene, model, settings, across, up, *last, film)};
+      });
   });
   print_table(sweep, document);
   write_sweep(sweep, options.out, document);

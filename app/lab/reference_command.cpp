@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/files.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/truth.h"
 #include "sim/error.h"
 #include "sim/interrupt.h"

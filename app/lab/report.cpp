@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "app/files.h"
+#include "app/lab/chart.h"
 
 namespace tetpbd {
 
@@ -105,11 +106,8 @@ std::string page(const std::string& title, const std::string& body) {
          "</script></body></html>\n";
 }
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    result += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return result;
+std::string software_note(bool software) {
+  return software ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "";
 }
 
 std::string data_uri(const std::filesystem::path& png) {
@@ -180,17 +178,15 @@ void write_report(const Sweep& sweep, const std::filesystem::path& out, const or
     made.marked = row.contains("pareto") && row["pareto"] == true;
   }
   const ordered_json& device = document["device"];
-  const std::string note =
-      device["software"] == true ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "";
   const std::filesystem::path file = out / (sweep.name + ".html");
-  write_file(file,
-             page("tetpbd " + sweep.name,
-                  fmt::format("<p><code>tetpbd {}</code> on {}, OpenGL {}.{}</p>\n<div class=\"figures\"><div>{}</div>"
-                              "<aside id=\"card\">Rest the cursor on a point or a row: its settings, its numbers, "
-                              "and how it ends.</aside></div>\n",
-                              sweep.name, escaped(text_of(device["gl_renderer"])),
-                              escaped(text_of(device["gl_version"])), note, figures) +
-                      html_table(titles, rows, true)));
+  write_file(file, page("tetpbd " + sweep.name,
+                        fmt::format(
+                            "<p><code>tetpbd {}</code> on {}, OpenGL {}.{}</p>\n<div class=\"figures\"><div>{}</div>"
+                            "<aside id=\"card\">Rest the cursor on a point or a row: its settings, its numbers, "
+                            "and how it ends.</aside></div>\n",
+                            sweep.name, escaped(text_of(device["gl_renderer"])), escaped(text_of(device["gl_version"])),
+                            software_note(device["software"] == true), figures) +
+                            html_table(titles, rows, true)));
   fmt::print("{}\n", file.string());
 }
 

@@ -12,8 +12,9 @@
 namespace tetpbd {
 
 std::string page(const std::string& title, const std::string& body);
-std::string escaped(const std::string& text);
 std::string base64(const std::string& bytes);
+/// A warning for a page of measurements; empty for a GPU.
+std::string software_note(bool software);
 /// A picture as text; nothing where the file is not there.
 std::string data_uri(const std::filesystem::path& png);
 

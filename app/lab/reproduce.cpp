@@ -171,7 +171,7 @@ void snapshots(Report& report, const Published& paper, const Scene& scene, const
       "<div class=\"snapshots\">\n",
       paper.figure + 1, paper.name);
   for (int s = 0; s <= (report.quick ? 25 : 150); s += 25) {
-    if (s > 0) check(run_loop(sim, nullptr, 25), scene);
+    if (s > 0) check(run_to_end(sim, nullptr, 25), scene);
     frame.caption = fmt::format("t = {:.3f} s", s * scene.settings.dt);
     draw(renderer, frame);
     const auto file = report.out / "figures" / fmt::format("snapshot_{}_{:03}.png", paper.name, s);
@@ -182,7 +182,7 @@ void snapshots(Report& report, const Published& paper, const Scene& scene, const
 }
 
 void speed(Report& report, const BenchOptions& options, int figure, const std::string& name, const std::string& what) {
-  const std::vector<std::string>& modes = options.axes.modes;
+  const std::vector<std::string>& modes = find_variation(options.variations, "mode")->values;
   const ordered_json rows = run_sweep(bench_sweep(options))["rows"];
   if (interrupted()) throw Interrupted();
   std::array charts = {Chart{what, "simulation alone", "tets", "frames a second", true},
@@ -213,14 +213,14 @@ void speeds(Report& report) {
   bench.sizes = {{640, 480}}, bench.pictures = {"full"};
   bench.repeats = report.quick ? 1 : 3;
   bench.most_seconds = report.quick ? 0.5 : 2;
-  bench.axes.iterations = {1};
+  const auto choose = [&](const char* text) { vary(bench.variations, parse_variation(text, "reproduce")); };
+  choose("iterations=1");
   if (report.quick) bench.scenes = {"bunny-drop"}, bench.frames = 10, bench.warm_up = 2;
-  bench.axes.constraint_sets = {"stretch+bend"};
+  choose("constraints=stretch+bend");
   speed(report, bench, 6, "fps_stretch_bend", "1 iteration a frame, stretch and bending");
-  bench.axes.constraint_sets = {"stretch+bend+volume"};
+  choose("constraints=stretch+bend+volume");
   speed(report, bench, 7, "fps_all", "1 iteration a frame, all constraints");
-  bench.axes.iterations = {150};
-  bench.axes.modes = {"constraint", "node"};
+  choose("iterations=150"), choose("mode=constraint,node");
   if (report.quick) bench.frames = 1, bench.warm_up = 0;
   speed(report, bench, 12, "fps_150", "150 iterations a frame, all constraints");
 }
@@ -234,8 +234,7 @@ int run_reproduce(const ReproduceOptions& options) {
   const auto papers = std::span(published).first(options.quick ? 1 : published.size());
   Report report{options.out, options.quick};
   report.html = fmt::format(head, device.renderer, device.version, fmt::gmtime(std::time(nullptr)),
-                            options.quick ? " --quick" : "",
-                            device.software ? " <b>A software renderer on a CPU: no time below is a GPU's.</b>" : "");
+                            options.quick ? " --quick" : "", software_note(device.software));
   table_4(report, papers);
   report.html += fmt::format(unstated, damping, volume_stiffness);
   if (options.quick)

@@ -40,7 +40,7 @@ Scene falling_block(bool soft) {
 State state_after(const std::shared_ptr<const Model>& model, Settings settings, const char* mode, long steps) {
   set_mode(settings, mode, "selftest");
   Sim sim = create_sim(model, settings);
-  run_loop(sim, nullptr, steps);
+  run_to_end(sim, nullptr, steps);
   return read_state(sim);
 }
 
@@ -110,7 +110,7 @@ void check_bits(Checks& checks) {
       std::uint64_t hashes[2];
       for (std::uint64_t& hash : hashes) {
         reset(sim);
-        run_loop(sim, nullptr, 10);
+        run_to_end(sim, nullptr, 10);
         hash = state_hash(sim);
       }
       checks.add(fmt::format("{}: runs of 10 that have other bits than the first", mode), hashes[0] != hashes[1], 0);
@@ -126,8 +126,7 @@ std::vector<std::string> speeds(Checks& checks) {
     const MeasuredRun measured = run_model(model, settings, right.kept.back(), &right);
     const double error = measured.errors.finite ? measured.motion->final : std::nan("");
     checks.add(what + ": distance from the reference motion", error, most);
-    said.push_back(fmt::format("{} {:.3g} ms {:.1e}", what,
-                               median(measured.gpu_ms.empty() ? measured.wall_ms : measured.gpu_ms), error));
+    said.push_back(fmt::format("{} {:.3g} ms {:.1e}", what, step_ms(measured), error));
   };
   const bool slow = is_software_renderer();
   const Scene hard = load_scene("bunny-drop");

@@ -45,8 +45,8 @@ int run_soak(Scene scene, const SoakOptions& options) {
   Metrics metrics = create_metrics(sim);
 
   // Steps are queued, never waited for one by one; the GPU is at most a ring of measurements behind.
-  RunPlan plan{.measure_every = std::max(1L, options.steps / most_samples), .wait = false, .timed = false};
-  run_loop(sim, &metrics, options.settle, plan);
+  RunPlan plan{.measure_every = std::max(1L, options.steps / most_samples), .pace = Pace::queued, .timed = false};
+  run_to_end(sim, &metrics, options.settle, plan);
   const GlLive live = gl_live();  // no measurement under way, as at the end: their fences count
   ordered_json samples;           // a row of soak.csv each, counted from the end of settling
   Progress progress("stepping", options.steps, options.progress);
@@ -65,7 +65,7 @@ int run_soak(Scene scene, const SoakOptions& options) {
                        {"resident_bytes", resident_bytes()},
                        {"gl_buffer_bytes", gl_live().buffer_bytes}});
   };
-  const MeasuredRun run = run_loop(sim, &metrics, options.steps, plan);
+  const MeasuredRun run = run_to_end(sim, &metrics, options.steps, plan);
   if (run.errors.non_finite) throw error_of(*run.errors.non_finite);
   if (interrupted()) throw Interrupted();
 
@@ -102,7 +102,7 @@ int run_soak(Scene scene, const SoakOptions& options) {
                                  {"gl_objects", {{"start", live.objects}, {"end", live_after.objects}}},
                                  {"steps_per_second", {{"first_tenth", first_speed}, {"last_tenth", last_speed}}},
                                  {"finite", run.errors.finite},
-                                 {"state_hash", fmt::format("{:016x}", state_hash(sim))},
+                                 {"state_hash", hash_json(run.hash)},
                                  {"checks", checks},
                                  {"passed", failed.empty()}};
   write_file(options.out / "soak.csv", csv_text(keys(samples[0]), samples));

@@ -6,6 +6,7 @@
 
 #include "app/bodies.h"
 #include "app/commands.h"
+#include "app/files.h"
 #include "sim/model/attachments.h"
 #include "sim/model/material.h"
 
@@ -177,6 +178,10 @@ ordered_json non_finite_json(const std::optional<NonFinite>& found) {
   return {{"step", found->step}, {"vertex", found->vertex}};
 }
 
+ordered_json hash_json(const std::optional<std::uint64_t>& hash) {
+  return hash ? ordered_json(fmt::format("{:016x}", *hash)) : nullptr;
+}
+
 void put_finite(ordered_json& row, const MeasuredRun& run) {
   const auto& found = run.errors.non_finite;
   row["finite"] = run.errors.finite;
@@ -205,6 +210,7 @@ ordered_json row_of(const Scene& scene, const Model& model, const Settings& sett
   row.update(error_json(run.errors));
   row.update(distance_json("motion", run.motion, run.errors.finite));
   put_finite(row, run);
+  row["state_hash"] = hash_json(run.hash);
   return row;
 }
 

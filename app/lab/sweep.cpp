@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <optional>
@@ -12,11 +11,10 @@
 #include <sstream>
 
 #include "app/files.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
 #include "sim/interrupt.h"
-#include "sim/solvers/solver.h"
 
 namespace tetpbd {
 
@@ -64,7 +62,7 @@ ordered_json merged(const Sweep& sweep, const std::vector<std::filesystem::path>
       if (row.contains("film") && row["film"].is_string())
         row["film"] = std::filesystem::proximate(folder / row["film"].get<std::string>(), out).string();
       ordered_json name;
-      for (std::size_t c = 0; c < sweep.identity; ++c) name.push_back(row[sweep.columns[c]]);
+      for (const std::string& key : sweep.identity) name.push_back(row[key]);
       if (!names.insert(name).second)
         throw Error("a setting is in two of these", folder.string() + ": " + name.dump(), "name each folder once");
     }
@@ -117,50 +115,6 @@ ordered_json measured(const Sweep& sweep, const Shards& part, const std::filesys
 
 }  // namespace
 
-double to_number(const std::string& text, const std::string& where, const char* remedy) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    throw Error(fmt::format("'{}' is no number", text), where, remedy);
-  return value;
-}
-
-std::vector<Settings> combinations(const Settings& base, const Axes& axes) {
-  std::vector<Settings> all{base};
-  const auto vary = [&](const auto& values, const auto& set) {
-    if (values.empty()) return;
-    std::vector<Settings> varied;
-    for (const Settings& settings : all)
-      for (const auto& value : values) {
-        varied.push_back(settings);
-        set(varied.back(), value);
-      }
-    all = varied;
-  };
-  vary(axes.constraint_sets, [](Settings& s, std::string set) {
-    std::replace(set.begin(), set.end(), '+', ',');
-    set_parameter(s, *find_parameter("constraints"), set, "--constraint-sets");
-  });
-  vary(axes.modes, [](Settings& s, const std::string& mode) { set_mode(s, mode, "--modes"); });
-  vary(axes.elements, [](Settings& s, const std::string& element) {
-    set_parameter(s, *find_parameter("element"), element, "--elements");
-  });
-  vary(axes.rigid_contact, [](Settings& s, int on) { s.rigid_contact = on != 0; });
-  vary(axes.mass_splitting, [](Settings& s, int on) { s.mass_splitting = on != 0; });
-  vary(axes.omegas, [](Settings& s, double omega) { s.omega = omega; });
-  vary(axes.iterations, [](Settings& s, int iterations) { s.iterations = iterations; });
-  vary(axes.substeps, [](Settings& s, int substeps) { s.substeps = substeps; });
-  std::vector<Settings> chosen;
-  for (Settings& settings : all) {
-    if (solver_mode(settings).leapfrog) {  // iterations and substeps are its own choice
-      settings.iterations = settings.substeps = automatic;
-      if (std::ranges::find(chosen, settings) != chosen.end()) continue;
-    }
-    chosen.push_back(settings);
-  }
-  return chosen;
-}
-
 ordered_json run_sweep(const Sweep& sweep, const Shards& shards, const std::filesystem::path& out) {
   const ordered_json document = shards.merge.empty() ? measured(sweep, shards, out) : merged(sweep, shards.merge, out);
   if (!document["rows"].empty()) return document;
@@ -200,12 +154,6 @@ void print_table(const Sweep& sweep, const ordered_json& document) {
   print_row(sweep, nullptr);
   if (document.contains("rows"))
     for (const auto& row : document["rows"]) print_row(sweep, row);
-}
-
-std::vector<std::string> keys(const ordered_json& object) {
-  std::vector<std::string> names;
-  for (const auto& [name, value] : object.items()) names.push_back(name);
-  return names;
 }
 
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows) {

@@ -1,5 +1,5 @@
-// A sweep: rows of numbers, one for each combination of settings, made by one process or dealt out to several
-// and merged; as a table on the terminal, as CSV and as JSON.
+// A sweep: rows of numbers, as one for each combination of settings (vary.h), made by one process or dealt out to
+// several and merged; as a table on the terminal, as CSV and as JSON.
 #pragma once
 
 #include <filesystem>
@@ -15,24 +15,14 @@ namespace tetpbd {
 
 using nlohmann::ordered_json;
 
-/// Settings to combine; an empty list: the scene's own.
-struct Axes {
-  std::vector<std::string> modes{}, constraint_sets{}, elements{};  ///< sets of kinds joined by +
-  std::vector<double> omegas{};
-  std::vector<int> iterations{}, substeps{};
-  std::vector<int> rigid_contact{}, mass_splitting{};  ///< 0 or 1, one at most: they tell no rows apart
-};
-/// Every combination, the last of the lists varying fastest. Throws Error.
-std::vector<Settings> combinations(const Settings& base, const Axes& axes);
-
 /// A row is an object with the columns' keys: text, true or false, numbers (written as null where not
 /// finite), or {"median": number, ...}.
 struct Sweep {
-  std::string name, title;           ///< of its files; on the progress bar
-  std::vector<std::string> columns;  ///< of NAME.csv, of which the first so many ...
-  std::size_t identity;              ///< ... tell rows apart
-  std::string table;                 ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
-  ordered_json facts;                ///< what all shards have in common: "device", numbers
+  std::string name, title;            ///< of its files; on the progress bar
+  std::vector<std::string> columns;   ///< of NAME.csv
+  std::vector<std::string> identity;  ///< keys that tell rows apart
+  std::string table;                  ///< columns on the terminal, each with its width: "mode -18, substeps:sub 6"
+  ordered_json facts;                 ///< what all shards have in common: "device", numbers
   std::vector<std::function<std::vector<ordered_json>()>> work{};  ///< makes a combination's rows
   bool print_each = false;                                         ///< when they are there
 };
@@ -62,11 +52,8 @@ int write_sweep(const Sweep& sweep, const std::filesystem::path& folder, const o
 const ordered_json& cell(const ordered_json& row, const std::string& key);
 /// Nothing for null and what is not finite.
 std::string text_of(const ordered_json& value, int digits = 4);
-/// Of a word on the command line; throws Error.
-double to_number(const std::string& text, const std::string& where, const char* remedy);
 /// NaN where it is no number.
 double number(const ordered_json& row, const char* key);
-std::vector<std::string> keys(const ordered_json& object);
 /// Column names, then a line a row.
 std::string csv_text(const std::vector<std::string>& columns, const ordered_json& rows);
 /// The device as all files name it.

@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "app/bodies.h"
 #include "app/lab/auto_solver.h"
+#include "app/lab/vary.h"
 #include "sim/error.h"
 #include "sim/model/did_you_mean.h"
 #include "sim/model/material.h"
@@ -146,10 +146,9 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     const Parameter* row = find_parameter(word.substr(0, equals));
     if (row && shared_by_lanes(*row))
       throw Error(fmt::format("{} is that of all lanes", row->name), where, "give it as a flag or in the scene");
-    if (equals != std::string::npos &&
-        set_by_name(settings, word.substr(0, equals), word.substr(equals + 1), count, where))
-      continue;
-    if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
+    if (equals != std::string::npos)
+      assign(settings, word.substr(0, equals), word.substr(equals + 1), where, count);
+    else if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
       throw Error(fmt::format("'{}' is no way to solve", word), where,
                   did_you_mean(word, preset_names(solver_presets())) +
                       fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",

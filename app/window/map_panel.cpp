@@ -52,8 +52,8 @@ void draw_grid(Session& s, const LiveMap& map) {
       const std::string id = fmt::format("map {} {}", column + 1, row + 1);
       if (ImGui::InvisibleButton(id.c_str(), ImVec2(wide, high))) {
         Settings wanted = own;
-        set_parameter(wanted, *map.x.row, map.x.values[column], "across");
-        set_parameter(wanted, *map.y.row, map.y.values[row], "up");
+        assign(wanted, map.x.row->name, map.x.values[column], "across");
+        assign(wanted, map.y.row->name, map.y.values[row], "up");
         s.log("map chose {} {}", map.x.values[column], map.y.values[row]);
         change_settings(s, wanted);
       }

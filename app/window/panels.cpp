@@ -246,14 +246,15 @@ void draw_solver(Session& s) {
                               ? fmt::format("; inverted tets or contact: {} x the substeps", watch.substep_factor)
                               : "")
                   .c_str());
-  if (!automatic) return;
-  if (slider(s, "budget", s.budget_ms, 0.5, 0.01, 100, "%.3g ms per step",
-             "time that a step may take: auto chooses again when you let go, which takes a second or "
-             "so\non the command line: --budget-ms",
+  const auto more_shown = s.ui.kept.open.find("Solver more");
+  if (!automatic && (more_shown == s.ui.kept.open.end() || !more_shown->second)) return;
+  if (slider(s, "budget of auto", s.budget_ms, 0.5, 0.01, 100, "%.3g ms per step",
+             "time that a step may take: once auto has chosen, it chooses again when you let go\non the command line: "
+             "--budget-ms",
              true))
-    s.ui.rebudget = true;
+    s.ui.rebudget = automatic;
   if (s.ui.rebudget && !ImGui::IsAnyItemActive()) s.ui.rebudget = false, choose_soon(s);
-  ImGui::TextWrapped("%s", describe(*choice).c_str());
+  if (automatic) ImGui::TextWrapped("%s", describe(*choice).c_str());
 }
 
 // Which body the panel is of.

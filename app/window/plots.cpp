@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "app/files.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/window/ui.h"
 #include "app/window/widgets.h"
 #include "sim/model/material.h"

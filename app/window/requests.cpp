@@ -4,6 +4,7 @@
 
 #include "app/window/session.h"
 #include "sim/error.h"
+#include "sim/interrupt.h"
 #include "sim/model/material.h"
 #include "sim/solvers/solver.h"
 
@@ -156,7 +157,11 @@ void choose_soon(Session& s) {
                   Scene scene = s.loaded.scene;
                   scene.settings = s.loaded.sim().settings;
                   scene.budget_ms = s.budget_ms;
-                  s.loaded.choice = choose_for(scene, s.loaded.model);
+                  try {
+                    s.loaded.choice = choose_for(scene, s.loaded.model, s.show_progress);
+                  } catch (const Interrupted&) {
+                    return say(s, "cancelled: the solver stays as it is");
+                  }
                   change_settings(s, scene.settings);
                   say_choice(s);
                 }};

@@ -11,7 +11,7 @@
 #include "app/bodies.h"
 #include "app/files.h"
 #include "app/lab/reference_command.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/verdict.h"
 #include "sim/contact/starts.h"
 #include "sim/error.h"

@@ -180,6 +180,8 @@ struct Session {
   bool moving_obstacle = false;  ///< by the mouse
   std::vector<Message> messages;
   std::optional<Task> task;
+  /// Draws how far a task is, now and then; throws Interrupted once somebody cancels it. None without a window.
+  SolverProgress show_progress{};
   double budget_ms = 0.5;           ///< for the solver auto
   bool measuring = true;            ///< somebody looks at the measurements
   std::optional<glm::vec3> centre;  ///< of the bodies' bounds, a frame or more ago

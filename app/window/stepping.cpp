@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/lab/verdict.h"
 #include "app/window/session.h"
 #include "sim/error.h"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/window/edit_obstacles.h"
 #include "app/window/widgets.h"
 #include "render/legend.h"
@@ -421,13 +421,19 @@ void draw_ui(Session& s, const Layout& layout) {
   s.changes.open = s.changes.open && (ImGui::IsAnyItemActive() || s.moving_obstacle);
 }
 
-void draw_busy(const Layout& layout, const std::string& what) {
+bool draw_busy(Session& s, const Layout& layout, const std::string& what, std::optional<double> part) {
   const Rect& view = layout.view;
   ImGui::SetNextWindowPos(ImVec2(view.x + view.width / 2, view.y + view.height / 2), ImGuiCond_Always,
                           ImVec2(0.5f, 0.5f));
-  ImGui::Begin("busy", nullptr, plain_window | ImGuiWindowFlags_AlwaysAutoResize);
+  ImGui::Begin(part ? "progress" : "busy", nullptr, plain_window | ImGuiWindowFlags_AlwaysAutoResize);
   ImGui::Text("%s ...", what.c_str());
+  bool cancelled = false;
+  if (part) {
+    ImGui::ProgressBar(float(*part), ImVec2(18 * ImGui::GetFontSize(), 0));
+    cancelled = button(s, "Cancel", "cancel", "Esc", -1);
+  }
   ImGui::End();
+  return cancelled;
 }
 
 }  // namespace tetpbd

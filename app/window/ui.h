@@ -29,8 +29,9 @@ const std::vector<Shortcut>& shortcuts();
 Layout make_layout(const Ui& ui, float width, float height);
 /// All panels of a frame, between ImGui::NewFrame() and ImGui::Render().
 void draw_ui(Session& session, const Layout& layout);
-/// Over the view while the window stands still: "loading bunny-drop".
-void draw_busy(const Layout& layout, const std::string& what);
+/// Over the view while the window stands still: "loading bunny-drop". With the part that is done it can be cancelled;
+/// whether it is.
+bool draw_busy(Session& session, const Layout& layout, const std::string& what, std::optional<double> part = {});
 
 /// Sizes, font and colours for a display of this scale. `density`: framebuffer pixels a window coordinate.
 void set_style(float scale, float density, bool dark = false);

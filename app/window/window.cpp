@@ -222,7 +222,7 @@ void show_start(Session& s, Input& input, Desktop& d, const std::string& scene) 
     if (!d.visible) return;
     begin_imgui_frame(input, d.window);
     input.events.clear();  // there is nothing yet for them
-    draw_busy(layout, scene);
+    draw_busy(s, layout, scene);
     end_imgui_frame(d, {});
   }
 }
@@ -241,9 +241,26 @@ void draw_frame(Session& s, View& view, Input& input, const Desktop& d) {
   film(s, view);
   const bool named = s.task.has_value();
   draw_ui(s, layout);
-  if (s.task) draw_busy(layout, s.task->name);
+  if (s.task) draw_busy(s, layout, s.task->name);
   end_imgui_frame(d, view.target);
   if (named) attempt(s, std::exchange(s.task, std::nullopt)->act);  // its name has been on the screen
+}
+
+// What a task that lasts shows of itself, some ten times a second; only its own window listens.
+void show_progress(Session& s, View& view, Input& input, Desktop& d, const std::string& what, double part) {
+  if (const double now = glfwGetTime(); now - s.now < 0.1) return;
+  s.now = glfwGetTime();
+  glfwPollEvents();
+  const bool escaped = std::ranges::any_of(input.waiting, [](const Event& e) {
+    return e.kind == Event::Kind::key && e.code == GLFW_KEY_ESCAPE && e.action == GLFW_PRESS;
+  });
+  measure_window(d, s);
+  if (!d.visible) return;
+  begin_imgui_frame(input, d.window);
+  input.events.clear();
+  const bool cancelled = draw_busy(s, make_layout(s.ui, float(d.width), float(d.height)), what, part);
+  end_imgui_frame(d, view.target);
+  if (cancelled || escaped || glfwWindowShouldClose(d.window) || interrupted()) throw Interrupted();
 }
 
 }  // namespace
@@ -295,6 +312,7 @@ int run_window(const Scene& scene, const std::string& name, const SceneOverrides
 
   View view;
   view.drawn = s.view;
+  s.show_progress = [&](const std::string& what, double part) { show_progress(s, view, input, desktop, what, part); };
   bool vsync = !s.vsync, moving = false;  // moving: the camera
   std::string title;
   int last_width = 0, last_height = 0;

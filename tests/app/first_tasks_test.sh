@@ -112,6 +112,12 @@ forget; await '^map done'
 click "map 2 1"; end_task '^map chose 6 0.005'
 click "section Stability map"; await '^folded Stability map'
 
+begin_task "let it choose a solver, and think better of that"
+choose solver auto; await '^at cancel '; pause_for_frame
+xdotool mousemove $(point cancel 0.5 0.5) mousedown 1; sleep 0.5; xdotool mouseup 1
+end_task '^message cancelled: the solver stays as it is'
+new_events | grep -q '^set ' && fail "a search that was cancelled changed settings"
+
 begin_task "put an obstacle beside it and lead it by an arrow"
 click "section Obstacles"; await '^opened Obstacles'; pause_for_frame
 forget; xdotool mousemove $(point "section Obstacles" 0.5 0.5); for _ in 1 2 3 4 5 6 7 8; do xdotool click 5; pause_for_frame; done
@@ -145,6 +151,6 @@ click "file=own.obj"; end_task '^scene mixed '
 begin_task "save the scene, and leave"
 key ctrl+s; end_task '^message saved mixed_with_own_obj_000.json'
 close_window
-[[ $(wc -l <tasks.tsv) -eq 21 ]] || fail "not all tasks are done"
+[[ $(wc -l <tasks.tsv) -eq 22 ]] || fail "not all tasks are done"
 "$program" run --scene mixed_with_own_obj_000.json --steps 2 --csv-every 0 --out again >/dev/null || fail "the saved scene does not run"
 cat tasks.tsv

@@ -5,11 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include "app/lab/auto_solver.h"
-#include "app/window/lanes.h"
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "app/scene.h"
+#include "app/window/lanes.h"
 #include "sim/error.h"
 #include "sim/gl/context.h"
+#include "sim/interrupt.h"
 #include "sim/model/material.h"
 #include "tests/gl_test.h"
 #include "tests/sim_samples.h"
@@ -125,6 +126,30 @@ TEST_CASE("auto takes what moves most nearly right, and as many substeps as the 
     CHECK(choose_solver(model, paper, 4, 5).judged == "volume");
     CHECK(choose_solver(model, own, 100, 2).settings().substeps > 4);
     CHECK_THROWS_WITH_AS(choose_solver(model, own, 1e-6, 2), doctest::Contains("nothing fits the budget"), Error);
+  }
+}
+
+TEST_CASE("auto: says how far it is, and can be cancelled at any time, which changes nothing") {
+  GlTest gl;
+  Scene scene = falling({.budget_ms = 4.0});
+  scene.duration = 0.2;
+  const auto model = build_model(scene);
+  std::vector<std::pair<std::string, double>> told;
+  Scene chosen = scene;
+  REQUIRE(choose_for(chosen, model, [&](const std::string& what, double part) { told.emplace_back(what, part); }));
+  CHECK(told.size() > 5);  // more than the candidates
+  CHECK(told.front().first.starts_with("node, way 1 of 5"));
+  CHECK(told.front().second == 0);
+  CHECK(told.back().first.find("way 5 of 5") != std::string::npos);
+  for (std::size_t i = 1; i < told.size(); ++i) CHECK(told[i].second <= 1);
+  for (const double when : {0.0, 0.3, 0.7}) {
+    Scene kept = scene;
+    const auto cancel = [&](const std::string&, double part) {
+      if (part >= when) throw Interrupted();
+    };
+    CHECK_THROWS_AS(choose_for(kept, model, cancel), Interrupted);
+    CHECK(kept.settings == scene.settings);
+    CHECK(kept.budget_ms == scene.budget_ms);
   }
 }
 

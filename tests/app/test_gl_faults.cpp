@@ -188,7 +188,7 @@ TEST_CASE("a measured run ends with the numbers of the last good step and never 
       if (s == 6) spoil(sim, 9, true, std::numeric_limits<float>::infinity());
       return true;
     };
-    const MeasuredRun run = run_loop(sim, &metrics, 50, {.stepped = spoil_after_6});
+    const MeasuredRun run = run_to_end(sim, &metrics, 50, {.stepped = spoil_after_6});
     REQUIRE(run.errors.non_finite);
     CHECK(run.errors.non_finite->step == 7);
     CHECK(!run.errors.finite);

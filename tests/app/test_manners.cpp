@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "sim/model/did_you_mean.h"
 #include "tests/app/run_program.h"
 

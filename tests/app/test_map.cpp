@@ -40,8 +40,8 @@ TEST_CASE("map: a cell for each pair of values, in the order given, held against
   const auto compared = nlohmann::json::parse(std::ifstream(folder.path / "c/compare.json"))["rows"][0];
   CHECK(double(rows[3]["motion_rms"]) == doctest::Approx(double(compared["motion_rms"])).epsilon(1e-3));
   CHECK(std::filesystem::exists(folder.path / "m/map.svg"));
-  for (const auto& [flags, said] : {std::pair("--x omega", "'omega' is no setting with a number"),
-                                    {"--x mode=1,2", "no setting with a number"},
+  for (const auto& [flags, said] : {std::pair("--x omega", "'omega' has no values"),
+                                    {"--x mode=1,2", "'mode' cannot be '1'"},
                                     {"--y dt=1:x:3", "'x' is no number"},
                                     {"--y dt=0.1:0.2:1", "bad number of values"},
                                     {"--x omega=9", "'omega' cannot be 9"},

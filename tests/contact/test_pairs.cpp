@@ -6,7 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "render/renderer.h"
 #include "sim/contact/obstacle_kinds.h"
 #include "sim/contact/starts.h"

@@ -1,7 +1,7 @@
 // The laws that a run has to keep, in every mode.
 #include <doctest/doctest.h>
 
-#include "app/lab/run_loop.h"
+#include "app/lab/run.h"
 #include "sim/measure/metrics.h"
 #include "tests/gl_test.h"
 #include "tests/long_run.h"
@@ -197,7 +197,7 @@ TEST_CASE("iterations and the volume constraint lower the volume lost in a fall"
     settings.constraints = kinds, settings.rigid_contact = false;
     Sim sim = create_sim(model, settings);
     Metrics metrics = create_metrics(*model);
-    const RunErrors errors = run_loop(sim, &metrics, 60).errors;
+    const RunErrors errors = run_to_end(sim, &metrics, 60).errors;
     CHECK(errors.finite);
     return errors.max_volume_loss_percent;
   };

@@ -80,6 +80,7 @@ struct Clock {
   int most_steps = 4;              ///< a frame; follows what the GPU can do
   double real = 0, simulated = 0;  ///< s, since the factor was last worked out
   int frames = 0;                  ///< since factor was found
+  double stepping = 0;             ///< s of the last frame that steps in parts took
   double factor = 0;               ///< simulated seconds a real one
   double speed() const { return std::ldexp(1.0, -halvings); }
 };

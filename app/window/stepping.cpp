@@ -169,15 +169,18 @@ void advance(Session& s, double elapsed) {
   int taken = 0;
   // A step that takes longer than a frame may, or that is the first, is taken in parts: the window answers in between.
   const bool in_parts = s.under_way || (!queued && (s.step_seconds == 0 || s.step_seconds > patience));
+  // As long as drawing takes, so that neither waits for the other for more than half of the time.
+  const double part = std::clamp(elapsed - clock.stepping, 0.015, patience);
   while ((clock.fast || clock.owed >= dt || s.under_way) && (!queued || taken < clock.most_steps)) {
     if (!in_parts)
       step_lanes(s);
-    else if (!step_lanes(s, patience))
+    else if (!step_lanes(s, part))
       break;
     clock.owed -= dt;
     ++taken;
     if (in_parts || seconds_since(begin) > patience) break;
   }
+  clock.stepping = in_parts ? seconds_since(begin) : 0;
   if (queued && elapsed > 0.066) clock.most_steps = std::max(1, clock.most_steps / 2);
   if (queued && elapsed < 0.033 && taken == clock.most_steps)
     clock.most_steps = std::min(clock.most_steps * 2, 1 << 14);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <random>
 
 #include "app/commands.h"
@@ -179,9 +181,8 @@ void add_moving_fixtures(Model& model, const BodyDescription& body, const std::v
 }
 
 /// Adds the next body; whether it carries a surface of its own.
-bool place_body(Model& model, const BodyDescription& body, const Scene& scene) {
+bool place_body(Model& model, const BodyDescription& body, const Scene& scene, Filled filled) {
   const std::size_t number = model.bodies.size();
-  Filled filled = body_of(body, scene.name, compliant(material_of(scene.settings, number)));
   TetMesh& mesh = filled.mesh;
   const CarriedSurface& carried = filled.carried;
   const bool sized = !mesh.fill.empty();  // before it was filled
@@ -239,12 +240,41 @@ bool place_body(Model& model, const BodyDescription& body, const Scene& scene) {
   return !carried.triangles.empty();
 }
 
+// Bytes that could be used without swapping; infinite where the system does not say.
+double available_memory() {
+  std::ifstream file("/proc/meminfo");
+  const std::string text{std::istreambuf_iterator<char>(file), {}}, key = "MemAvailable:";
+  const std::size_t at = text.find(key);
+  return at == text.npos ? INFINITY : 1024 * std::strtod(text.c_str() + at + key.size(), nullptr);
+}
+
+// Before copies are made: once they are too many, the system ends the program without a word.
+void require_memory(const Model& one, const Scene& scene) {
+  constexpr double bytes_an_element =
+      1500;  // of model, constraints and what makes them; 1060 with `soft-beam` in newton
+  const double elements = double(std::max(one.rest.tets.size(), one.rest.surface.size()));
+  const double needed = bytes_an_element * elements * scene.copies, available = available_memory();
+  if (needed <= available && elements * scene.copies <= double(most_tets)) return;
+  throw Error(fmt::format("{} copies of {} tets need about {:.3g} bytes, and {:.3g} are free", scene.copies,
+                          one.rest.tets.size(), needed, available),
+              fmt::format("--copies {}", scene.copies),
+              fmt::format("take at most {:.0f}", std::floor(std::min(available / bytes_an_element, double(most_tets)) /
+                                                            std::max(1.0, elements))));
+}
+
 }  // namespace
 
 std::shared_ptr<Model> build_model(const Scene& scene) {
   auto model = std::make_shared<Model>();
   bool carries = false;
-  for (const BodyDescription& body : scene.bodies) carries = place_body(*model, body, scene) || carries;
+  const std::size_t each = scene.bodies.size() / std::size_t(scene.copies);
+  std::vector<Filled> filled;  // of one copy
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const BodyDescription& body = scene.bodies[b];
+    if (b < each) filled.push_back(body_of(body, scene.name, compliant(material_of(scene.settings, b))));
+    carries = place_body(*model, body, scene, filled[b % each]) || carries;
+    if (b + 1 == each && scene.copies > 1) require_memory(*model, scene);
+  }
   if (!carries) model->carried = {};
   if (!model->regions.empty()) model->regions.resize(model->rest.tets.size());
   for (const Obstacle& obstacle : scene.obstacles) {

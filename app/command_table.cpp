@@ -115,6 +115,7 @@ void add_bench(CLI::App& bench, Arguments& a) {
   bench.add_flag_callback(
       "--no-render", [&] { a.bench.sizes.clear(); }, "simulation alone");
   add_fill(bench, a.bench.overrides);
+  add_copies(bench, a.bench.overrides);
   add_gpu(bench, a.bench.gpu);
   add(bench, "--out", a.bench.out, "folder for bench.csv and bench.json");
 }

@@ -215,6 +215,10 @@ ordered_json statistics_json(const Scene& scene, Sim& sim, const Capabilities& d
                  {"gpu_ms_per_step", times(run.gpu_ms)},
                  {"wall_ms_per_step", times(run.wall_ms)},
                  {"fps", double(sim.steps) / run.seconds}};
+  if (scene.copies > 1) {
+    j["timing"]["copies"] = scene.copies;
+    j["timing"]["copy_steps_per_second"] = scene.copies * double(sim.steps) / run.seconds;
+  }
   put_solver(j, sim);
   const RunErrors& errors = run.errors;
   const Measurement last = errors.last.value_or(nothing_measured());
@@ -255,6 +259,9 @@ void print_summary(const Scene& scene, const RunOptions& options, Sim& sim, cons
   fmt::print("{}: {} steps on {}, largest volume loss {}{:.2f} %, {}{:.3f} ms a step; {}\n", scene.name, sim.steps,
              renderer, options.measure_every > 1 ? "of measured steps " : "", run.errors.max_volume_loss_percent,
              good ? worst_tet(sim) + ", " : "", median(run.wall_ms), (options.out / "stats.json").string());
+  if (scene.copies > 1)
+    fmt::print("{} copies: {:.4g} steps a second of one\n", scene.copies,
+               statistics["timing"]["copy_steps_per_second"].get<double>());
   for (const auto& [name, count] : dropped(sim))
     fmt::print("left out: {} {} (docs/guide.md, stats.json)\n", count, name);
   for (const ordered_json& fixture : statistics.value("fixtures", ordered_json::array()))

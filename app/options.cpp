@@ -64,12 +64,18 @@ void add_up(CLI::App& command, std::string& up, const std::string& of) {
   if (!up.empty()) option->capture_default_str();
 }
 
+void add_copies(CLI::App& command, SceneOverrides& overrides) {
+  add(command, "--copies", overrides.copies, 1, 1000000,
+      "the bodies so many times in one place, which do not act on each other: many runs in the dispatches of one");
+}
+
 void add_overrides(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--mesh", overrides.mesh, "mesh in place of the scene's first body");
   add(command, "--height", overrides.height, 0.0, 1e6,
       "m, of the first body; 0: as its file has it (default: the scene's)");
   add_up(command, overrides.up, "the first body's file (default: the scene's, of --mesh y)");
   add_fill(command, overrides);
+  add_copies(command, overrides);
   command.add_option("--set", overrides.set, "PATH=VALUE for anything else, as in bodies.0.density=500")
       ->expected(1)
       ->take_all();

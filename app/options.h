@@ -101,6 +101,7 @@ CLI::Option* add_sizes(CLI::App& command, const char* flag, std::vector<std::arr
 void add_samples(CLI::App& command, int& samples);
 /// How surfaces become tets.
 void add_fill(CLI::App& command, SceneOverrides& overrides);
+void add_copies(CLI::App& command, SceneOverrides& overrides);
 void add_up(CLI::App& command, std::string& up, const std::string& of);
 void add_overrides(CLI::App& command, SceneOverrides& overrides);
 /// A flag for every setting that the command has none of its own for.

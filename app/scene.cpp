@@ -229,7 +229,32 @@ Scene load_scene(const std::string& name_or_file, const SceneOverrides& override
   if (!overrides.up.empty()) turn_up(scene.bodies[0], overrides.up);
   if (overrides.height) scene.bodies[0].height = *overrides.height;
   change_bodies(scene, overrides);
+  if (overrides.copies > 1) make_copies(scene, overrides.copies);
   return scene;
+}
+
+void make_copies(Scene& scene, int copies) {
+  const std::size_t bodies = scene.bodies.size(), attachments = scene.attachments.size(), forces = scene.forces.size(),
+                    settings = scene.settings.bodies.size();
+  const std::string where = fmt::format("--copies {}", copies);
+  if (scene.settings.contact == "self" || (scene.settings.contact != "none" && bodies > 1))
+    throw Error("copies stand in one place and would touch each other", where, "add --contact none");
+  scene.settings.contact = "none";
+  scene.copies = copies;
+  for (int copy = 1; copy < copies; ++copy) {
+    const std::size_t first = bodies * std::size_t(copy);
+    for (std::size_t b = 0; b < bodies; ++b) {
+      BodyDescription& body = scene.bodies.emplace_back(BodyDescription(scene.bodies[b]));
+      body.name += fmt::format(" {}", copy + 1);
+    }
+    for (std::size_t b = 0; b < settings; ++b) scene.settings.bodies.push_back(BodySettings(scene.settings.bodies[b]));
+    for (std::size_t a = 0; a < attachments; ++a) {
+      AttachmentDescription& made = scene.attachments.emplace_back(AttachmentDescription(scene.attachments[a]));
+      made.body += first, made.to += first;
+    }
+    for (std::size_t f = 0; f < forces; ++f)
+      if (scene.forces[f].body) scene.forces.emplace_back(ForceDescription(scene.forces[f])).body.value() += first;
+  }
 }
 
 std::string why_unused(const Settings& s, const std::string& name) {

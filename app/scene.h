@@ -87,6 +87,7 @@ struct Scene {
   std::vector<ForceDescription> forces;
   Settings settings;
   std::optional<Camera> camera;
+  int copies = 1;                   ///< the bodies are so many times the same ones (make_copies)
   double duration = 2;              ///< s
   bool mode_open = false;           ///< nobody says how it is solved: so the bodies do (auto_solver.h)
   bool by_device = false;           ///< ... and, if they are hard, the device
@@ -104,6 +105,7 @@ struct SceneOverrides {
   std::optional<double> height{};                                 ///< of the first body; 0: its file's
   std::vector<std::pair<std::string, std::string>> parameters{};  ///< name, text
   std::vector<std::string> set{};                                 ///< PATH=VALUE
+  int copies = 1;
   bool by_device = false;  ///< hard bodies that nobody says a mode for, or what Jacobi has, may take another than node
 };
 
@@ -134,7 +136,10 @@ nlohmann::json body_json(const BodyDescription& body);
 nlohmann::ordered_json scene_json(const Scene& scene);
 /// The text that set_parameter() takes; lists are those of words.
 std::string setting_text(const Parameter& row, const nlohmann::json& value);
-/// Meshes loaded and tetrahedralised, placed, deformed.
+/// Its bodies so many times in one place, which do not act on each other: many small runs in the dispatches of one.
+/// Throws Error where they would touch.
+void make_copies(Scene& scene, int copies);
+/// Meshes loaded and tetrahedralised, placed, deformed. Throws Error for copies that memory cannot hold.
 std::shared_ptr<Model> build_model(const Scene& scene);
 /// The scene's camera, or one that sees the start and the ground below it.
 Camera scene_camera(const Scene& scene, const Model& model, float aspect);

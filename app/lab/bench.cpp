@@ -18,7 +18,8 @@ namespace {
 const char* columns =
     "scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
     "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_percent,"
-    "motion_final,motion_rms,motion_peak,motion_relative,state_hash";
+    "motion_final,motion_rms,motion_peak,motion_relative,state_hash,copies,"
+    "copy_steps_per_second";
 const char* table =
     "scene -16, mode -18, constraints -20, iterations:iter 5, substeps:sub 5, size 10, picture 8, fps 10, "
     "gpu_ms_per_step:GPU-ms 10, gpu_us_per_iteration:us/iter 10, draw_ms 10, "
@@ -54,6 +55,7 @@ void time_frames(ordered_json& row, Sim& sim, const BenchOptions& options, const
     row["max_volume_loss_percent"] = nullptr;
   }
   row["fps"] = spread(fps);
+  row["copy_steps_per_second"] = row["copies"].get<int>() * number(row, "fps");
   row["gpu_ms_per_step"] = spread(gpu);
   row["wall_ms_per_step"] = spread(wall);
   row["draw_ms"] = picture ? 1e3 * drawing / pictures : std::nan("");
@@ -74,7 +76,8 @@ std::vector<ordered_json> rows_of(const Scene& scene, const std::shared_ptr<cons
               {"picture", ""},
               {"dispatches_per_step", cost.dispatches_per_step},
               {"bytes_per_step", cost.bytes_per_step},
-              {"gpu_bytes", cost.bytes}});
+              {"gpu_bytes", cost.bytes},
+              {"copies", scene.copies}});
   // Where time ran out: an error over part of the run would be another quantity.
   if (run.steps < options.frames) row["max_volume_loss_percent"] = nullptr;
   std::vector<ordered_json> rows{row};

@@ -45,9 +45,11 @@ void advance(uint i, Position own, Velocity speed, vec3 correction) {
 #if RIGID_CONTACT
     note_fixed(i);
 #endif
-#if COMPLIANT
+#if COMPLIANT && QUANTIZED
     if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
   }
+#if QUANTIZED
   quantized_out[i] = quantize(x, weight_of(own));
+#endif
 }

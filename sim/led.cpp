@@ -1,7 +1,5 @@
 // Pinned vertices on their way to where a caller wants them: over a step, with the velocity that takes, so that they
 // touch others as anything else that moves does.
-#include <fmt/format.h>
-
 #include <map>
 
 #include "sim/sim.h"
@@ -65,10 +63,7 @@ void begin_leading(Sim& sim) {
       sim.host.velocities[led.vertices[k]] = (led.places[k] - sim.host.positions[led.vertices[k]]) / sim.settings.dt;
     return;
   }
-  if (!led.pass) {
-    led.defines.push_back(fmt::format("QUANTIZED {:d}", sim.solver.quantized_buffers > 0));
-    led.pass.program = Program::compute("lead.comp", {}, led.defines);
-  }
+  if (!led.pass) led.pass.program = Program::compute("lead.comp", {}, led.defines);
   write_records(led);
 }
 

@@ -38,7 +38,8 @@ void write_step_block(Sim& sim, int substeps_before) {
   block.h = float(h);
   block.inverse_h = float(1 / h);
   block.omega = soft ? 1.0f : float(s.omega);
-  block.share = solver_mode(s).leapfrog ? 0.0f : float(1 / s.omega);
+  const SolverMode& mode = solver_mode(s);
+  block.share = mode.leapfrog ? 0.0f : mode.in_place ? 1.0f : float(1 / s.omega);
   block.friction = float(s.friction);
   block.drag = float(s.damping);
   block.kick = substeps_before ? float(0.5 * (1 + double(sim.plan.substeps) / substeps_before)) : 1;
@@ -50,7 +51,8 @@ void write_step_block(Sim& sim, int substeps_before) {
   block.mass_splitting = splits_masses(s);
   block.quantum = float(sim.quantum);
   block.inverse_quantum = float(1 / sim.quantum);
-  block.quantized_size = float(sim.quantum / double(std::numeric_limits<float>::epsilon()));
+  const double coarse = mode.in_place ? 0 : sim.quantum;  // positions are read in full
+  block.quantized_size = float(coarse / double(std::numeric_limits<float>::epsilon()));
   block.vertex_count = unsigned(sim.model->positions.size());
   block.damping = float(most_damping(s) / h);
   block.turn_limit = float(TURN_LIMIT / sim.adaptive.substep_factor);

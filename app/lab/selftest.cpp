@@ -69,7 +69,7 @@ void check_steps(Checks& checks) {
   scene.settings.constraints = "volume", scene.settings.iterations = 1, scene.settings.omega = 1;
   const auto tet = build_model(scene);
   const State right = state_after(tet, scene.settings, "cpu-double", 1);
-  for (const char* mode : {"node", "constraint", "cpu", "cpu-fast"})
+  for (const char* mode : {"node", "constraint", "gauss-seidel", "cpu", "cpu-fast"})
     checks.add(fmt::format("a step of {} against cpu-double, m", mode),
                largest_distance(state_after(tet, scene.settings, mode, 1), right), 1e-6);
 }
@@ -102,7 +102,7 @@ void check_bits(Checks& checks) {
     if (soft) overrides.parameters = {{"material", "neo-hookean"}, {"young_modulus", "1e6"}};
     const Scene scene = load_scene("bunny-drop", overrides);
     const auto model = build_model(scene);
-    for (const std::string mode : {soft ? "explicit" : "node", soft ? "newton" : "constraint"}) {
+    for (const std::string mode : {soft ? "explicit" : "node", soft ? "newton" : "constraint", "gauss-seidel"}) {
       Settings settings = scene.settings;
       set_mode(settings, mode, "selftest");
       settings.substeps = 4;

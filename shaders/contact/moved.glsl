@@ -1,5 +1,5 @@
 // Writes a vertex that contact moved after the solver did, and what neighbours see of it.
-#if !IMPLICIT
+#if QUANTIZED
 #include "quantize.glsl"
 #include "seen.glsl"
 layout(std430) restrict writeonly buffer QuantizedOut { ivec4 quantized_out[]; };
@@ -7,7 +7,7 @@ layout(std430) restrict writeonly buffer QuantizedOut { ivec4 quantized_out[]; }
 void write_moved(uint i, Position own, DoubleSingle x, DoubleSingle v, float work) {
   positions[i] = Position(x.high, own.inverse_mass, x.low, own.constraints);
   velocities[i] = Velocity(v.high, work, v.low, 0.0);
-#if !IMPLICIT
+#if QUANTIZED
   begin_body(i);
 #if COMPLIANT
   DoubleSingle before = own.inverse_mass > 0.0 ? place_before(x, v) : x;

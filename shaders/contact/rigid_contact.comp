@@ -3,7 +3,9 @@
 // vertices of the body computes its motion anew.
 #include "types.glsl"
 #include "double_single.glsl"
+#if QUANTIZED
 #include "quantized.glsl"
+#endif
 layout(local_size_x = 256) in;
 #include "solvers/corrections.glsl"
 #define SHARED_TOUCHES shared Touch contacts[MOST_TOUCHES];
@@ -252,8 +254,10 @@ void main() {
       if (i == first) work += worked;
 #endif
       velocities[i] = Velocity(v.high, work, v.low, 0.0);
+#if QUANTIZED
       begin_body(i);
       quantized_out[i] = quantize(predict_position(x, v), weight_of(positions[i]));
+#endif
     }
     barrier();
   }

@@ -46,7 +46,7 @@ DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) 
 #endif
   if (predicts || finishes) velocities[i] = Velocity(kept.high, speed.work, kept.low, 0.0);
   if (!carried) book_work(i, own.inverse_mass);
-#if COMPLIANT
+#if COMPLIANT && QUANTIZED
   if (finishes && params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(x, 0.0);
 #endif
   if (finishes) {

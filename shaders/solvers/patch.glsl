@@ -2,8 +2,7 @@
 // constraint an invocation, and adds up the corrections of the vertices that the patch owns in shared memory. Sums are
 // integers, so that neither their order nor the way constraints are cut into patches changes a bit.
 
-// All data of patches.h in pairs: headers of chunks, their vertices, their records.
-layout(std430) restrict readonly buffer Patches { uvec2 patch_words[]; };
+#include "solvers/records.glsl"
 #if COMPLIANT
 shared ivec4 start_positions[MAX_VERTICES];  // quantized, at the substep's start
 #endif
@@ -14,12 +13,6 @@ shared uint global_ids[MAX_VERTICES];
 // cancel, but end in range.
 shared float quanta_per_metre[MAX_OWNED];
 shared int sums[3 * MAX_OWNED];
-// The first word of a record has a byte for each vertex: its number in the chunk.
-uint local_id(uint record, int j) { return (record >> (8 * j)) & 255u; }
-// The words of a record are its vertices, rest values, a material's compliances, and a body's own k and damping.
-float record_value(uint number, uint word) {
-  return uintBitsToFloat(patch_words[RECORDS_AT + number + word / 2u][word % 2u]);
-}
 #if AVERAGED
 layout(std430) restrict readonly buffer Averages { vec4 averages[]; };  // as smooth.comp leaves them
 shared float averages_of_J[MAX_VERTICES];
@@ -31,18 +24,15 @@ float mean_J(uint record) {
 #endif
 #define Ids uint
 uint id_of(Ids record, int j) { return global_ids[local_id(record, j)]; }
+// What project.glsl reads of a vertex.
+#define Place ivec4
+ivec4 place_of(uint record, int j) { return local_positions[local_id(record, j)]; }
+#if COMPLIANT
+ivec4 start_of(uint record, int j) { return start_positions[local_id(record, j)]; }
+#endif
 #include "constraints/types.glsl"
 #foreach #include "constraints/$KIND.glsl"
 
-#if COUNT_GUARDS
-layout(binding = BIND_GUARDS) uniform atomic_uint guard_counts[GUARDS];
-#endif
-void count_guards(uint guards) {
-#if COUNT_GUARDS
-  for (int g = 0; g < GUARDS; ++g)
-    if ((guards & (1u << g)) != 0u) atomicCounterIncrement(guard_counts[g]);
-#endif
-}
 // Several patches may have the same constraint: the one that owns its first vertex counts the guards that triggered.
 void count_guards(uint record, uint owned, uint guards) {
   if (local_id(record, 0) < owned) count_guards(guards);
@@ -78,18 +68,6 @@ void add_ring_forces(uint first, uint owned) {
 }
 #endif
 
-// A patch is one chunk, or more where its vertices are too many for one; those it owns come first in each.
-struct Chunk {
-  uint number;
-  uint vertices;
-  uint owned;
-  uint first;  // global id of its first vertex
-  uint next;   // chunk of the patch; 0: none
-};
-Chunk chunk_at(uint number) {
-  uvec2 counts = patch_words[CHUNK_PAIRS * number], links = patch_words[CHUNK_PAIRS * number + 1];
-  return Chunk(number, counts.x, counts.y, links.x, links.y);
-}
 // Every chunk has room for as many vertices, so that no load of a vertex waits for the chunk's header.
 void load_chunk(uint number) {
   for (uint k = gl_LocalInvocationIndex; k < MAX_VERTICES; k += GROUP_SIZE) {

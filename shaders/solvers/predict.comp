@@ -3,7 +3,9 @@
 // substep has done it. One invocation per vertex.
 #include "types.glsl"
 #include "double_single.glsl"
+#if QUANTIZED
 #include "quantized.glsl"
+#endif
 layout(local_size_x = 256) in;
 #include "solvers/$SCHEME.glsl"
 
@@ -12,7 +14,7 @@ void predict(uint i) {
   Position own = positions[i];
   DoubleSingle x = DoubleSingle(own.high, own.low), here = x, v = DoubleSingle(velocities[i].high, velocities[i].low);
   if (own.inverse_mass > 0.0) x = seen_by_neighbours(i, x, v);
-#if COMPLIANT
+#if COMPLIANT && QUANTIZED
   if (params.damping > 0.0) quantized_out[params.vertex_count + i] = quantize(place_before(here, v), 0.0);
 #endif
 #if RIGID_CONTACT
@@ -22,7 +24,9 @@ void predict(uint i) {
   else note_fixed(i);
   if (i == rigid_bodies[body.body].first) rigid_bodies[body.body].sides[side_now()].origin = body.origin;
 #endif
+#if QUANTIZED
   quantized_out[i] = quantize(x, weight_of(own));
+#endif
 }
 
 void main() {

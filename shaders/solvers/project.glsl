@@ -1,15 +1,15 @@
-// One constraint of a chunk: evaluates it and adds its corrections to the sums of the vertices that the patch owns
-// (method.md eqs. 4, 25-26).
+// One constraint of a chunk: evaluates it and gives its corrections to add_correction(), which adds them to sums of the
+// vertices that the patch owns, or moves the vertices at once (method.md eqs. 4, 25-26).
 void project_$KIND(uint number, uint owned) {
   uvec2 record = patch_words[RECORDS_AT + number];  // its vertices, a byte each; rest
-  begin_body(global_ids[record.x & 255u]);
+  begin_body(id_of(record.x, 0));
   vec3 x[$ARITY];
   float w[$ARITY];
-  ivec4 first = local_positions[record.x & 255u];
+  Place first = place_of(record.x, 0);
   for (int j = 0; j < $ARITY; ++j) {
-    ivec4 q = local_positions[local_id(record.x, j)];
-    x[j] = between(q, first);
-    w[j] = inverse_mass_of(q);
+    Place own = place_of(record.x, j);
+    x[j] = between(own, first);
+    w[j] = inverse_mass_of(own);
   }
 #if $VALUES == 1
   float rest = uintBitsToFloat(record.y);
@@ -39,8 +39,8 @@ void project_$KIND(uint number, uint owned) {
   float before = last_multiplier(number), share = ($RATE == 1 ? 1.0 : 1.0 + gamma) * params.share;
   if (gamma > 0.0) {
     vec3 start[$ARITY];
-    ivec4 first_start = start_positions[record.x & 255u];
-    for (int j = 0; j < $ARITY; ++j) start[j] = between(start_positions[local_id(record.x, j)], first_start);
+    Place first_start = start_of(record.x, 0);
+    for (int j = 0; j < $ARITY; ++j) start[j] = between(start_of(record.x, j), first_start);
     Constraint$ARITY then = $KIND(start, rest, record.x);
 #if $RATE
     // The change of C, without the cancellation that a difference of two values has.

@@ -2,14 +2,14 @@
 // (method.md eq. 32).
 void project_$KIND(uint number, uint owned) {
   uint ids = patch_words[RECORDS_AT + number].x;  // its vertices, a byte each
-  begin_body(global_ids[ids & 255u]);
+  begin_body(id_of(ids, 0));
   vec3 x[4];
   float w[4], rest[$VALUES];
-  ivec4 first = local_positions[ids & 255u];
+  Place first = place_of(ids, 0);
   for (int j = 0; j < 4; ++j) {
-    ivec4 q = local_positions[local_id(ids, j)];
-    x[j] = between(q, first);
-    w[j] = inverse_mass_of(q);
+    Place own = place_of(ids, j);
+    x[j] = between(own, first);
+    w[j] = inverse_mass_of(own);
   }
   for (uint v = 0u; v < $VALUES; ++v) rest[v] = record_value(number, 1u + v);
   Constraint4x2 c = $KIND(x, rest, ids);

@@ -139,6 +139,17 @@ Patches constraint_patches(const ConstraintSystem& system, std::size_t most, boo
   return assemble(system, patches, with_tets);
 }
 
+Patches pack_patches(const ConstraintSystem& system, const std::vector<std::vector<ConstraintRef>>& members,
+                     bool with_tets) {
+  std::vector<std::vector<Chunk>> patches;
+  ChunkWriter writer(system);
+  for (const auto& patch : members) {
+    for (const ConstraintRef& member : patch) writer.add(member.kind, member.constraint);
+    patches.push_back({writer.close()});
+  }
+  return assemble(system, patches, with_tets);
+}
+
 Patches vertex_patches(const ConstraintSystem& system, std::size_t own, bool with_tets) {
   const std::size_t vertices = system.at_vertex.size();
   std::array<Grouped, kind_count> at;  // the constraints on each vertex

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <vector>
 
@@ -29,6 +30,11 @@ struct Patches {
   bool chunked = false;                     ///< any patch has several chunks
 };
 
+struct ConstraintRef {
+  std::uint32_t kind, constraint;
+  auto operator<=>(const ConstraintRef&) const = default;
+};
+
 /// How many pairs of words a record of the list has.
 inline std::size_t record_pairs(const ConstraintList& list) {
   const std::size_t values = list.rest.size() + list.compliance.size() + list.stiffness.size() + list.damping.size();
@@ -37,6 +43,10 @@ inline std::size_t record_pairs(const ConstraintList& list) {
 
 /// Patches of at most `most` constraints, which own all their vertices: each constraint is in one patch.
 Patches constraint_patches(const ConstraintSystem& system, std::size_t most, bool with_tets = false);
+
+/// Patches of these constraints, at most 32 of a kind in each, whose records are in this order within a kind.
+Patches pack_patches(const ConstraintSystem& system, const std::vector<std::vector<ConstraintRef>>& members,
+                     bool with_tets = false);
 
 /// Patches that own at most `own` consecutive vertices, and have all constraints on these: a constraint is in each
 /// patch that owns a vertex of it. `own` is at most most_vertices - 4.

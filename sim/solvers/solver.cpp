@@ -35,6 +35,12 @@ static const std::vector<SolverMode> rows = {
      .create = MADE_BY(create_constraint_solver),
      .pairs = true,
      .jacobi = true},
+    {.name = "gauss-seidel",
+     .help =
+         "Gauss-Seidel on the GPU, clusters of constraints by colours: fewer iterations than Jacobi, more dispatches",
+     .create = MADE_BY(create_gauss_seidel_solver),
+     .pairs = true,
+     .in_place = true},
     {.name = "cpu",
      .help = "non-linear Gauss-Seidel on one CPU core: the paper's baseline",
      .create = MADE_BY(create_cpu_solver),
@@ -159,12 +165,13 @@ std::vector<std::string> quanta_defines(const SolverInput& input) {
 }
 
 std::vector<std::string> vertex_defines(const SolverInput& input) {
+  const SolverMode& mode = solver_mode(input.settings);
   std::vector<std::string> defines = obstacle_defines(input.model, has_own_surfaces(input.settings));
   std::ranges::move(quanta_defines(input), std::back_inserter(defines));
-  defines.insert(defines.end(),
-                 {define("COMPLIANT", input.compliant), define("LEAPFROG", solver_mode(input.settings).leapfrog),
-                  define("RIGID_CONTACT", input.rigid), define("BODY_COUNT", input.model.bodies.size()),
-                  define("CONTACTS", bodies_touch(input.model, input.settings))});
+  defines.insert(defines.end(), {define("COMPLIANT", input.compliant), define("LEAPFROG", mode.leapfrog),
+                                 define("QUANTIZED", !mode.in_place && !mode.implicit),
+                                 define("RIGID_CONTACT", input.rigid), define("BODY_COUNT", input.model.bodies.size()),
+                                 define("CONTACTS", bodies_touch(input.model, input.settings))});
   return defines;
 }
 

@@ -95,6 +95,7 @@ struct SolverMode {
   bool pairs = false;                 ///< contact between bodies
   bool smoothed = false;              ///< has smoothed tets, in place of which others solve linear ones
   bool jacobi = false;                ///< corrections are averaged, or masses split
+  bool in_place = false;              ///< on the GPU, a constraint moves its vertices before the next one is solved
   bool cpu = false;                   ///< steps on the CPU, where `Sim::host` is the state
   bool all_cores = false;             ///< of the CPU
   bool published = false;             ///< as in the paper: corrections are averaged, and make hard bodies rebound

@@ -14,7 +14,9 @@ namespace tetpbd {
 /// Whether Jacobi shares a vertex's mass out among its constraints, in place of averaging corrections. With compliance
 /// it always does: with averages, a constraint's multiplier would not be what moved its vertices.
 inline bool splits_masses(const Settings& settings) {
-  return (settings.mass_splitting && !solver_mode(settings).published) || any_material(settings, compliant);
+  const SolverMode& mode = solver_mode(settings);
+  if (mode.in_place) return false;
+  return (settings.mass_splitting && !mode.published) || any_material(settings, compliant);
 }
 
 /// Whether faces are moved out of obstacles (faces.h) after this substep of a step: not after each that is very short,

@@ -239,7 +239,7 @@ TEST_CASE_FIXTURE(GlTest, "bodies: each bounces off the ground, and off another,
   // Two that fall, far from each other; two that meet in the air.
   add_block({0, 0.45, 0}, {0, -2, 0}), add_block({3, 0.45, 0}, {0, -2, 0});
   add_block({6, 40, 0}, {1, 0, 0}), add_block({6.6, 40, 0}, {-1, 0, 0});
-  for (const char* name : {"node", "constraint", "cpu", "cpu-fast"}) {
+  for (const char* name : {"node", "constraint", "gauss-seidel", "cpu", "cpu-fast"}) {
     CAPTURE(std::string(name));
     Settings settings;
     settings.mode = name, settings.contact = "bodies", settings.substeps = 20;

@@ -189,7 +189,7 @@ TEST_CASE("material: every mode keeps the rest state, and goes where the leapfro
       advance(right, steps);
       const State end = make_state(right);
       const double moved = error_to(scene.model, scene.start(), end);
-      for (const std::string mode : {"cpu-double", "cpu", "cpu-fast", "node", "constraint"}) {
+      for (const std::string mode : {"cpu-double", "cpu", "cpu-fast", "node", "constraint", "gauss-seidel"}) {
         CAPTURE(material);
         CAPTURE(mode);
         CAPTURE(damping);

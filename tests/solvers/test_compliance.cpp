@@ -287,7 +287,7 @@ TEST_CASE(
 
 TEST_CASE("compliance and damping keep momentum") {
   GlTest gl;
-  for (const char* mode : {"node", "constraint", "cpu-fast"}) {
+  for (const char* mode : {"node", "constraint", "gauss-seidel", "cpu-fast"}) {
     CAPTURE(mode);
     Settings settings = soft(mode, 5, 2, 2e-3);
     settings.gravity = 0, settings.ground = false;
@@ -371,7 +371,7 @@ TEST_CASE("without compliance nothing is different, and it comes and goes while 
       if (buffer.name == name) return true;
     return false;
   };
-  for (const char* mode : {"node", "constraint", "cpu", "cpu-fast"}) {
+  for (const char* mode : {"node", "constraint", "gauss-seidel", "cpu", "cpu-fast"}) {
     CAPTURE(mode);
     Settings hard = soft(mode, 3, 2);
     hard.compliance.fill(0);

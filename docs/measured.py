@@ -123,7 +123,6 @@ def soft_rows(part, words=""):
     names = [("node", "`node` (XPBD by Jacobi): {} substeps", "substeps"),
              ("gauss-seidel", "`gauss-seidel` (XPBD by colours): {} substeps", "substeps"),
              ("cpu-fast", "`cpu-fast` (XPBD): {} substeps", "substeps"),
-             ("vbd", "`vbd`: {} iterations", "iterations"),
              ("direct", "a Newton step with sparse Cholesky factors, one core", "iterations"),
              ("newton", "`newton`: {} iterations", "iterations"),
              ("explicit", "`explicit`: {} substeps", "substeps")]

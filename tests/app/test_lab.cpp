@@ -85,7 +85,8 @@ TEST_CASE("bench writes a row a setting, with and without rendering, and calls a
   CHECK(
       csv.starts_with("scene,mode,constraints,iterations,substeps,size,picture,vertices,tets,fps,gpu_ms_per_step,"
                       "wall_ms_per_step,draw_ms,gpu_us_per_iteration,dispatches_per_step,gpu_bytes,max_volume_loss_"
-                      "percent,motion_final,motion_rms,motion_peak,motion_relative,state_hash\n"));
+                      "percent,motion_final,motion_rms,motion_peak,motion_relative,state_hash,copies,"
+                      "copy_steps_per_second\n"));
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 37);
   for (const json& row : bench["rows"]) {
     const int iterations = row["iterations"], kinds = row["constraints"] == "stretch" ? 1 : 3;

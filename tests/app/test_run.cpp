@@ -151,7 +151,7 @@ TEST_CASE("mistakes get one line, status 2 and no files") {
   fails("run --scene none-such", "bunny-drop");
   fails("run --no-such-flag", "--no-such-flag");
   fails("run --omega lots", "--omega");
-  fails("run --mode fast", "node, constraint, cpu");
+  fails("run --mode fast", "node, constraint, gauss-seidel, cpu");
   fails("run --size 10", "--size");
   fails("run --look nice", "surface, wire, tets");
   fails("run --scene beam --gpu 99", "--gpu 99");

@@ -72,7 +72,7 @@ TEST_CASE("wrong scenes are refused with the key and what is allowed") {
   CHECK(has(error_of("{" + block + R"(, "solver": {"omega": 9}})"), "from 0 to 4"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"omega": "big"}})"), "'omega' cannot be big"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"iterations": 2.5}})"), "'iterations'"));
-  CHECK(has(error_of("{" + block + R"(, "solver": {"mode": "magic"}})"), "node, constraint, cpu"));
+  CHECK(has(error_of("{" + block + R"(, "solver": {"mode": "magic"}})"), "node, constraint, gauss-seidel, cpu"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "twist"]}})"), "stretch, bend, volume"));
   CHECK(has(error_of("{" + block + R"(, "solver": {"constraints": ["stretch", "stretch"]}})"), "once"));
   CHECK(has(error_of("{" + block + R"(, "world": {"gravity": null}})"), "'gravity'"));

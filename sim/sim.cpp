@@ -169,8 +169,7 @@ bool same_constraints(const Settings& a, const Settings& b) {
     return std::tuple(
         kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
         dashpots ? std::tuple(s.constraint_damping, s.viscosity, s.bulk_viscosity) : std::tuple(0.0, 0.0, 0.0),
-        std::tuple(s.yield_strain, s.creep_time), solver_mode(s).smoothed,
-        solver_mode(s).leapfrog || solver_mode(s).implicit);
+        std::tuple(s.yield_strain, s.creep_time), solver_mode(s).smoothed, solver_mode(s).forces);
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };

@@ -398,7 +398,7 @@ void check_material(const Settings& settings, const std::string& where) {
     if (kind.values > 1 && uses(settings, kind) && !mode.compliance)
       throw Error(fmt::format("mode {} has no {}", mode.name, kind.name), where,
                   "leave it out of constraints or use another mode");
-  if (mode.leapfrog || mode.implicit)
+  if (mode.forces)
     if (const auto kind = kind_without_force(settings))
       throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,
                   fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));

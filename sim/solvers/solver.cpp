@@ -55,6 +55,7 @@ static const std::vector<SolverMode> rows = {
      .help = "leapfrog on the GPU, of what has a material or compliance, in as many substeps as stay stable: "
              "for what is soft",
      .create = MADE_BY(create_explicit_solver),
+     .forces = true,
      .leapfrog = true,
      .pairs = true,
      .smoothed = true,
@@ -63,11 +64,20 @@ static const std::vector<SolverMode> rows = {
      .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
              "levels: for what is stiff, has small tets or starts badly deformed",
      .create = MADE_BY(create_newton_solver),
+     .forces = true,
      .implicit = true,
      .pairs = true,
      .smoothed = true,
      .iterations = 4,
      .substeps = 1},
+    {.name = "vbd",
+     .help = "Vertex Block Descent on the GPU: implicit steps, of what has a material or compliance, by colours of "
+             "vertices",
+     .create = MADE_BY(create_vbd_solver),
+     .forces = true,
+     .pairs = true,
+     .iterations = 20,
+     .substeps = 4},
     {.name = "paper",
      .help = "the paper's GPU pipeline: a kernel per kind, floats added by compare-and-swap",
      .create = MADE_BY(create_paper_solver),

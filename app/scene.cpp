@@ -262,6 +262,7 @@ std::string why_unused(const Settings& s, const std::string& name) {
   const SolverMode& mode = solver_mode(s);
   if (mode.leapfrog && is("iterations")) return "mode explicit has no iterations";
   if (!mode.leapfrog && is("stability", "mass_scaling")) return "it is of mode explicit";
+  if (!mode.accelerates && is("acceleration")) return "it is of mode vbd";
   if (!mode.jacobi && is("omega", "mass_splitting")) return fmt::format("mode {} averages nothing", s.mode);
   if (is("mass_splitting") && any_material(s, compliant))
     return "with compliance or a material masses are always split";

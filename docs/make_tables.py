@@ -190,7 +190,8 @@ def stability(note, *folders):
 
 def verdicts(note, *tables):
     rows = sorted((row for name in tables for row in csv.DictReader(open(name))), key=lambda row: row["scene"])
-    modes = ["node", "explicit", "newton", "cpu-fast"]
+    modes = ["node", "gauss-seidel", "explicit", "newton", "vbd", "cpu-fast"]
+    modes = [mode for mode in modes if any(row["mode"] == mode for row in rows)]
     of = {(row["scene"], row["mode"]): row for row in rows}
 
     def cell(row):

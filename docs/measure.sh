@@ -59,6 +59,10 @@ rivals() {
     "clamped-bunny --fill tetgen --young-modulus 1e6 --steps 40"; do
     # shellcheck disable=SC2086
     measure "$runs" compare --scene $scene --judge motion --modes gauss-seidel --iterations 1 --substeps 5,10,20,50
+    for acceleration in 0 0.9; do
+      # shellcheck disable=SC2086
+      measure "$runs" compare --scene $scene --judge motion --modes vbd --iterations 10,30,100 --substeps 1 --acceleration $acceleration
+    done
   done
 }
 

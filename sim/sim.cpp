@@ -169,8 +169,7 @@ bool same_constraints(const Settings& a, const Settings& b) {
     return std::tuple(
         kinds_in_use(in_mode(s, s)), s.material, s.young_modulus, s.poisson_ratio, smoothing_of(s),
         dashpots ? std::tuple(s.constraint_damping, s.viscosity, s.bulk_viscosity) : std::tuple(0.0, 0.0, 0.0),
-        std::tuple(s.yield_strain, s.creep_time), solver_mode(s).smoothed,
-        solver_mode(s).leapfrog || solver_mode(s).implicit);
+        std::tuple(s.yield_strain, s.creep_time), solver_mode(s).smoothed, solver_mode(s).forces);
   };
   // Where bodies have materials of their own, constraints also contain numbers of the settings.
   const auto numbers = [](const Settings& s) { return std::tuple(s.stiffness, s.compliance, s.constraint_damping); };
@@ -248,7 +247,7 @@ void apply_settings(Sim& sim, const Settings& settings) {
   check_settings(*sim.model, settings);
   const auto made_for = [&](const Settings& s) {
     return std::tuple(s.mode, any_material(s, compliant), any_moves_rigidly(s), s.contact, s.contact_distance,
-                      has_obstacles(*sim.model, s), has_own_materials(s), has_own_surfaces(s));
+                      has_obstacles(*sim.model, s), has_own_materials(s), has_own_surfaces(s), s.acceleration > 0);
   };
   if (made_for(settings) == made_for(sim.settings) && adopt_constraints(sim, settings))
     adopt_settings(sim, settings);

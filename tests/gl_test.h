@@ -10,7 +10,7 @@
 /// The modes that take bodies without compliance.
 inline std::vector<tetpbd::SolverMode> pbd_modes() {
   auto modes = tetpbd::solver_modes();
-  std::erase_if(modes, [](const tetpbd::SolverMode& mode) { return mode.leapfrog || mode.implicit; });
+  std::erase_if(modes, [](const tetpbd::SolverMode& mode) { return mode.forces; });
   return modes;
 }
 

@@ -31,7 +31,7 @@ row() {  # SCENE MODE
 {
   echo "scene,mode,created_percent,inverted_tets,verdict"
   for scene in "${scenes[@]}"; do
-    for mode in node explicit newton cpu-fast; do row "$scene" "$mode"; done
+    for mode in node gauss-seidel explicit newton vbd cpu-fast; do row "$scene" "$mode"; done
   done
 } >"$table.part" && mv "$table.part" "$table"
 awk -F, 'NR > 1 {all++; wrong += $5 !~ /^"right"/} END {print wrong + 0 " of " all + 0 " runs are not right"}' "$table"

@@ -91,6 +91,7 @@ Settings without_solution(Settings settings) {
   settings.iterations = settings.substeps = automatic;
   settings.omega = SolverSettings().omega, settings.mass_splitting = SolverSettings().mass_splitting;
   settings.stability = SolverSettings().stability, settings.mass_scaling = SolverSettings().mass_scaling;
+  settings.acceleration = SolverSettings().acceleration;
   return settings;
 }
 struct RightMotion {

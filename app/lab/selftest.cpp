@@ -83,7 +83,7 @@ void check_motions(Checks& checks) {
     const ConstraintSystem system = build_constraints(*model, scene.settings);
     const Motion right = find_motion({*model, system, scene.settings, model->inverse_masses}, steps);
     for (const SolverMode& mode : solver_modes()) {
-      if (!soft && (mode.leapfrog || mode.implicit)) continue;
+      if (!soft && mode.forces) continue;
       Settings settings = scene.settings;
       set_mode(settings, mode.name, "selftest");
       if (mode.implicit) settings.substeps = 2, settings.iterations = 8;

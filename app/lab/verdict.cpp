@@ -40,11 +40,11 @@ std::string solver_remedy(const Sim& sim) {
   const SolverMode& mode = solver_mode(sim.settings);
   if (const auto tet = find_sliver(sim.model->rest))
     return fmt::format("the mesh has slivers, the flattest is tet {}: give a cleaner one", *tet);
-  if (!mode.leapfrog && !mode.implicit && any_material(sim.settings, has_energy))
+  if (!mode.forces && any_material(sim.settings, has_energy))
     return "corrections do not hold such a material: take mode newton or explicit";
   if (mode.leapfrog) return "take a smaller --stability";
   if (mode.implicit) return "take more --substeps, or mode explicit";
-  return "take more --substeps";
+  return mode.forces ? "take more --iterations or --substeps" : "take more --substeps";
 }
 
 // m, between where the bodies' centre of mass is and where gravity alone would have taken it.

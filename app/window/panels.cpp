@@ -70,6 +70,7 @@ bool has_effect(const Session& s, const Settings& settings, const Parameter& row
   const SolverMode& mode = solver_mode(settings);
   const bool material = settings.material != "none";
   if (name == "mass_splitting") return mode.jacobi && !compliant(settings);  // which brings it with it
+  if (name == "acceleration") return mode.accelerates;
   if (name == "omega") return mode.jacobi;
   if (name == "stability" || name == "mass_scaling") return mode.leapfrog;
   if (name == "iterations") return !mode.leapfrog;
@@ -156,7 +157,7 @@ const std::vector<Group> groups = {
     {"Solver",
      true,
      {"mode", "substeps", "iterations", "stability", "dt"},
-     {"omega", "mass_splitting", "mass_scaling"}},
+     {"omega", "acceleration", "mass_splitting", "mass_scaling"}},
     {"World", false, {"gravity", "ground"}, {"ground_height"}},
     {"Contact", false, {"contact", "friction", "restitution"}, {"contact_distance", "rigid_contact"}},
 };

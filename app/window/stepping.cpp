@@ -135,7 +135,7 @@ std::optional<Advice> faster_way(const Session& s) {
                     to.log("MSAA and shadows off");
                   }};
   }
-  const bool with_forces = solver_mode(own).leapfrog || solver_mode(own).implicit;
+  const bool with_forces = solver_mode(own).forces;
   const SolverMode& fast = *std::ranges::find_if(solver_modes(), &SolverMode::all_cores);
   if (!solver_mode(own).all_cores && !with_forces && (s.gl.software || on_cpu(s.loaded.sim())))
     return Advice{fmt::format("mode {}", fast.name), fmt::format("mode={}", fast.name)};

@@ -78,4 +78,23 @@ EdgePart neo_hookean_edge(vec3 x[4], const real rest[8], const real a[2], real b
 EdgePart neo_hookean_part(vec3 x[4], const real rest[8], const real a[2], int i, int j) {
   return neo_hookean_edge(x, rest, a, neo_hookean_jacobian(x, rest) - rest[7], real(1), i, j);
 }
+// What the energy asks of corner i alone. No part of the block can be negative, because J is linear in one corner.
+VertexPart neo_hookean_corner(vec3 x[4], const real rest[8], const real a[2], int i) {
+  vec3 s1 = x[1] - x[0], s2 = x[2] - x[0], s3 = x[3] - x[0];
+  vec3 t1 = rest[0] * s1 + rest[1] * s2 + rest[2] * s3;
+  vec3 t2 = rest[1] * s1 + rest[3] * s2 + rest[4] * s3;
+  vec3 t3 = rest[2] * s1 + rest[4] * s2 + rest[5] * s3;
+  vec3 g1 = rest[6] * cross(s2, s3), g2 = rest[6] * cross(s3, s1), g3 = rest[6] * cross(s1, s2);
+  vec3 t = chosen(i, -(t1 + t2 + t3), t1, t2, t3), g = chosen(i, -(g1 + g2 + g3), g1, g2, g3);
+  real metric = i == 1   ? rest[0]
+                : i == 2 ? rest[3]
+                : i == 3 ? rest[5]
+                         : rest[0] + rest[3] + rest[5] + real(2) * (rest[1] + rest[2] + rest[4]);
+  real I = dot(t1, s1) + dot(t2, s2) + dot(t3, s3), share = I / (I + real(1));
+  VertexPart part;
+  part.block = mat3(share * metric / a[0]) + outerProduct(t * (real(2) / (a[0] * (I + real(1)) * (I + real(1)))), t) +
+               outerProduct(g * (real(1) / a[1]), g);
+  part.gradient = t * (share / a[0]) + g * ((dot(g3, s3) - rest[7]) / a[1]);
+  return part;
+}
 #endif

@@ -36,6 +36,13 @@ struct EdgePart {
   vec3 force;
 };
 
+// What a constraint asks of one of its vertices in mode vbd: the gradient of its energy, and the diagonal block of the
+// Hessian.
+struct VertexPart {
+  mat3 block;
+  vec3 gradient;
+};
+
 // A unit vector for two vertices in one place, the opposite one for (b, a). It differs from that of other vertices, so
 // that a body that has collapsed to a point does not unfold along a line only.
 vec3 any_direction(uint a, uint b) {

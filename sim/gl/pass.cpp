@@ -39,7 +39,9 @@ DispatchCount& Recorder::count(const Pass& pass, const char* what, std::size_t b
   const std::string name = pass.label() + what;
   const auto found = std::ranges::find(counted, name, &DispatchCount::name);
   DispatchCount& kept = found == counted.end() ? counted.emplace_back() : *found;
-  kept.name = name, kept.work_groups = pass.work_groups, kept.bytes = pass.bytes + bytes;
+  // Dispatches of one name may differ in size, as those of colours do.
+  kept.work_groups = std::max(kept.work_groups, pass.work_groups);
+  kept.name = name, kept.bytes = pass.bytes + bytes;
   ++kept.dispatches;
   return kept;
 }

@@ -52,7 +52,7 @@ void add_measurement(EnergyLedger& ledger, const Measurement& now, const Model& 
   ledger.lowest = std::min(ledger.lowest, total);
   ledger.lowest_motion = std::min(ledger.lowest_motion, motion);
   const SolverMode& mode = solver_mode(settings);
-  ledger.created = mode.leapfrog || mode.implicit ? ledger.rise : std::min(ledger.rise, ledger.rise_of_motion);
+  ledger.created = mode.forces ? ledger.rise : std::min(ledger.rise, ledger.rise_of_motion);
   // A fall that is deeper than to the ground, as into a bowl below it, is part of what the scene has.
   ledger.highest = std::max(ledger.highest, now.potential);
   ledger.reserve = std::max(ledger.reserve, ledger.highest - now.potential);

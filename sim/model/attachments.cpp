@@ -84,7 +84,7 @@ double attach(const Model& model, Attachment& attachment, double within, bool cl
 double attachment_stiffness(const Attachment& attachment, const Model& model, const Settings& settings) {
   if (attachment.stiffness > 0) return attachment.stiffness;
   const SolverMode& mode = solver_mode(settings);
-  if (!mode.leapfrog && !mode.implicit && !attachment.break_force) return 0;
+  if (!mode.forces && !attachment.break_force) return 0;
   // As a fifth of an edge of the stiffer body would resist: more would take shorter steps and more iterations.
   constexpr double firm = 5;
   double edges = 0, stiffness = 0;

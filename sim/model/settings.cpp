@@ -77,6 +77,10 @@ const std::vector<Parameter>& parameters() {
          "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
          "above 2 it may not; with compliance at most 2",
          0, 4},
+        {"acceleration", "solver", &S::acceleration,
+         "of mode vbd: part of an error that a sweep is taken to leave, by which the next ones go further; 0.9 helps "
+         "where sweeps have far to go, too much of it diverges",
+         0, 0.999},
         {"mass_splitting", "solver", &S::mass_splitting,
          "a vertex shares its mass out among its constraints, which keeps momentum; off: corrections are "
          "averaged, as in the paper (modes node, constraint); with compliance always on"},
@@ -398,7 +402,7 @@ void check_material(const Settings& settings, const std::string& where) {
     if (kind.values > 1 && uses(settings, kind) && !mode.compliance)
       throw Error(fmt::format("mode {} has no {}", mode.name, kind.name), where,
                   "leave it out of constraints or use another mode");
-  if (mode.leapfrog || mode.implicit)
+  if (mode.forces)
     if (const auto kind = kind_without_force(settings))
       throw Error(fmt::format("mode {} needs forces, and {} has none", mode.name, *kind), where,
                   fmt::format("give a material, or compliance_{0} and k_{0} 1, or use another mode", *kind));

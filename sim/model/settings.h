@@ -58,6 +58,7 @@ struct SolverSettings {
   double stability = 0.4;       ///< in mode explicit, a substep over the longest that is stable at rest
   double mass_scaling = 0.001;  ///< in mode explicit, the part of a body's mass that may be added where it is stiffest
   double omega = 1.5;
+  double acceleration = 0;  ///< in mode vbd, the spectral radius that its sweeps are taken to have
   bool mass_splitting = true;
   double damping = 0;  ///< 1/s
   bool rigid_contact = true;

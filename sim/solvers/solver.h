@@ -90,10 +90,12 @@ struct SolverMode {
   const char* help = "";
   Solver (*create)(const SolverInput&) = nullptr;
   bool compliance = true;             ///< solves constraints with compliance
-  bool implicit = false;              ///< forces in implicit steps, in place of corrections
-  bool leapfrog = false;              ///< forces in place of corrections, in as many substeps as stay stable
+  bool forces = false;                ///< of what has a material or compliance, in place of corrections
+  bool implicit = false;              ///< forces in steps of BDF2, whose velocities are those at a step's end
+  bool leapfrog = false;              ///< forces in as many explicit substeps as stay stable
   bool pairs = false;                 ///< contact between bodies
   bool smoothed = false;              ///< has smoothed tets, in place of which others solve linear ones
+  bool accelerates = false;           ///< its sweeps can be accelerated
   bool jacobi = false;                ///< corrections are averaged, or masses split
   bool in_place = false;              ///< on the GPU, a constraint moves its vertices before the next one is solved
   bool cpu = false;                   ///< steps on the CPU, where `Sim::host` is the state
@@ -102,7 +104,9 @@ struct SolverMode {
   bool offered = true;                ///< in --mode and the window, else in bench and compare alone
   int iterations = 1, substeps = 20;  ///< defaults; the least number of substeps where `leapfrog`
   /// Whether iterations and substeps mean the same in both modes.
-  bool solves_like(const SolverMode& other) const { return leapfrog == other.leapfrog && implicit == other.implicit; }
+  bool solves_like(const SolverMode& other) const {
+    return forces == other.forces && leapfrog == other.leapfrog && implicit == other.implicit;
+  }
 };
 /// The modes that are offered.
 const std::vector<SolverMode>& solver_modes();

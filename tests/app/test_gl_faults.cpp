@@ -346,7 +346,7 @@ TEST_CASE("memory that a GPU does not have is refused before a run, with what is
   const auto mode_named = [](const char* mode) {
     Settings settings = quick(mode);
     settings.contact = "self";
-    if (solver_mode(settings).leapfrog || solver_mode(settings).implicit)
+    if (solver_mode(settings).forces)
       settings.material = "neo-hookean", settings.substeps = settings.iterations = automatic;
     return settings;
   };

@@ -96,9 +96,9 @@ const TetMesh slab = make_block({0.4, 0.2, 0.4}, {4, 2, 4});
 void in_mode(Setup& setup, const std::string& mode) {
   setup.settings.mode = mode;
   const SolverMode& row = *find_solver_mode(mode);
-  if (!row.leapfrog && !row.implicit) return;
+  if (!row.forces) return;
   setup.settings.material = "neo-hookean", setup.settings.young_modulus = 1e6;
-  setup.settings.iterations = 8, setup.settings.substeps = 1;
+  if (row.implicit) setup.settings.iterations = 8, setup.settings.substeps = 1;
 }
 
 glm::dvec3 centre_of(const Model& model, const std::vector<glm::dvec3>& values) {

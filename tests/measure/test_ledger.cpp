@@ -79,7 +79,7 @@ constexpr double mass = 1000 * 0.5 * 0.3 * 0.4;
 TEST_CASE_FIXTURE(GlTest, "ledger: it closes in free fall and in flight, in every mode, with and without material") {
   for (const SolverMode& mode : solver_modes())
     for (const char* material : {"neo-hookean", "none"}) {
-      if ((mode.leapfrog || mode.implicit) && material == std::string("none")) continue;  // it needs forces
+      if (mode.forces && material == std::string("none")) continue;  // it needs forces
       CAPTURE(std::string(mode.name));
       CAPTURE(material);
       Setup setup{.settings = of(mode.name, material), .velocity = {1, 2, 0}, .height = 10};
@@ -130,10 +130,10 @@ TEST_CASE_FIXTURE(GlTest, "ledger: energy from outside the laws is seen, to its 
 
 // Impulse from an obstacle that moves at one velocity does work along that velocity, whatever the body does.
 TEST_CASE_FIXTURE(GlTest, "ledger: an obstacle that moves does the work that the body's momentum says") {
-  for (const std::string mode : {"node", "constraint", "explicit", "newton", "cpu-double", "cpu-fast"})
+  for (const std::string mode : {"node", "constraint", "explicit", "newton", "vbd", "cpu-double", "cpu-fast"})
     for (const char* material : {"neo-hookean", "none"}) {
       const SolverMode& row = *find_solver_mode(mode);
-      if ((row.leapfrog || row.implicit) && material == std::string("none")) continue;  // it needs forces
+      if (row.forces && material == std::string("none")) continue;  // it needs forces
       CAPTURE(mode);
       CAPTURE(material);
       const auto moving = [](const glm::dvec3& normal, const glm::dvec3& velocity) {
@@ -212,7 +212,7 @@ TEST_CASE("ledger: what is not judged says why") {
 static const char* known_to_fail(const Setup& setup) {
   const Settings& s = setup.settings;
   const bool lands = s.ground || !setup.obstacles.empty();
-  const bool corrections = !solver_mode(s).leapfrog && !solver_mode(s).implicit;
+  const bool corrections = !solver_mode(s).forces;
   if (corrections && s.material != "none" && s.young_modulus > 1e6) return "corrections: stiff tets that turn";
   if (s.mode == "explicit" && lands) return "explicit: contact by positions";
   if (corrections && lands) return "corrections: contact of soft bodies by positions";
@@ -259,7 +259,7 @@ TEST_CASE_FIXTURE(GlTest, "ledger: blocks of any stiffness, at random, create no
     CAPTURE(setup.settings.ground);
     CAPTURE(setup.obstacles.size());
     const SolverMode& mode = solver_mode(setup.settings);
-    if (mode.leapfrog || mode.implicit) setup.settings.material = "neo-hookean";        // they need forces
+    if (mode.forces) setup.settings.material = "neo-hookean";                           // they need forces
     if (mode.leapfrog && setup.settings.young_modulus > 1e8) setup.settings.dt = 1e-4;  // or thousands of substeps
     const EnergyLedger ledger = ledger_after(setup, 40);
     if (known_to_fail(setup)) {

@@ -117,7 +117,7 @@ State run(Sim& sim, int steps) {
 TEST_CASE_FIXTURE(GlTest, "bodies: each has its material and its friction, in every mode") {
   for (const SolverMode& mode : solver_modes()) {
     CAPTURE(std::string(mode.name));
-    auto bodies = mode.leapfrog || mode.implicit ? soft_bodies() : all_bodies();
+    auto bodies = mode.forces ? soft_bodies() : all_bodies();
     // What sticks and what slips turns on the last bits there (a test of newton's contact has friction by body).
     for (Made& body : bodies)
       if (mode.implicit) body.friction = 0;

@@ -100,7 +100,7 @@ TEST_CASE_FIXTURE(GlTest, "a call leaves what its caller has bound as it was") {
     set_mode(settings, mode, "test");
     const SolverMode& row = solver_mode(settings);
     if (row.pairs) settings.contact = "bodies";
-    if (row.leapfrog || row.implicit) settings.material = "neo-hookean";
+    if (row.forces) settings.material = "neo-hookean";
     Sim sim = create_sim(model, settings, tuning);
     unchanged(mode, "create_sim");
     for (int s = 0; s < 20; ++s) step(sim);

@@ -38,7 +38,7 @@ Settings settings_of(const std::string& mode) {
   Settings s;
   s.mode = mode, s.gravity = 0, s.ground = false, s.dt = 0.005;
   s.material = "neo-hookean", s.young_modulus = 1e5, s.poisson_ratio = 0.3, s.constraint_damping = 0.005;
-  if (!solver_mode(s).implicit && !solver_mode(s).leapfrog) s.substeps = 20;
+  if (!solver_mode(s).forces) s.substeps = 20;
   if (solver_mode(s).implicit) s.iterations = 8;
   return s;
 }

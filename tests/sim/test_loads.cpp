@@ -14,7 +14,7 @@ using namespace tetpbd;
 
 namespace {
 
-constexpr const char* modes[] = {"node", "constraint", "cpu-double", "cpu-fast", "explicit", "newton"};
+constexpr const char* modes[] = {"node", "constraint", "cpu-double", "cpu-fast", "explicit", "newton", "vbd"};
 
 std::shared_ptr<Model> block(const glm::dvec3& size, const glm::ivec3& cells, const char* held = "") {
   auto model = std::make_shared<Model>();
@@ -29,8 +29,9 @@ std::shared_ptr<Model> block(const glm::dvec3& size, const glm::ivec3& cells, co
 Settings settings_of(const std::string& mode) {
   Settings s;
   s.mode = mode, s.ground = false, s.gravity = 0, s.material = "neo-hookean", s.young_modulus = 1e5;
-  if (!solver_mode(s).implicit && !solver_mode(s).leapfrog) s.substeps = 20;
+  if (!solver_mode(s).forces) s.substeps = 20;
   if (solver_mode(s).implicit) s.iterations = 8;
+  if (mode == "vbd") s.substeps = 20;  // implicit Euler damps vibrations
   return s;
 }
 

@@ -43,7 +43,7 @@ TEST_CASE("snapshot: from one on, every mode takes the same steps again, bit by 
       settings.iterations = 2, settings.substeps = 3;
       settings.mode = mode.name;
       if (soft) settings.element = made;
-      if (soft || mode.leapfrog || mode.implicit) apply_preset(settings, material_presets(), "rubber");
+      if (soft || mode.forces) apply_preset(settings, material_presets(), "rubber");
       if (soft) settings.constraint_damping = 1e-3;
       CAPTURE(mode.name);
       CAPTURE(made);
@@ -128,7 +128,7 @@ TEST_CASE("snapshot: bodies that touch take the same steps again, before, in and
   GlTest gl;
   for (const SolverMode& mode : solver_modes()) {
     if (!mode.pairs) continue;
-    const bool cloth = !mode.leapfrog && !mode.implicit;  // on itself and on a block
+    const bool cloth = !mode.forces;  // on itself and on a block
     CAPTURE(mode.name);
     auto model = std::make_shared<Model>();
     const TetMesh block = make_block(glm::dvec3(0.5), glm::ivec3(is_long_run() ? 3 : 2));
@@ -188,14 +188,14 @@ TEST_CASE("snapshot: back in time in another mode, in contact, is the same as st
     return settings;
   };
   for (const bool touching : {true, false})  // without a material: hard bodies, moved as rigid ones on the ground
-    for (const char* first : {"node", "constraint", "cpu", "explicit", "newton"}) {
-      const bool forces = find_solver_mode(first)->leapfrog || find_solver_mode(first)->implicit;
+    for (const char* first : {"node", "constraint", "cpu", "explicit", "newton", "vbd"}) {
+      const bool forces = find_solver_mode(first)->forces;
       if (forces && !touching) continue;
       Sim before = create_sim(model, in_mode(first, touching));
       for (int s = 0; s < 27; ++s) step(before);
       const Kept kept = keep(before);
-      for (const char* second : {"node", "constraint", "cpu-double", "explicit", "newton"}) {
-        const bool other_forces = find_solver_mode(second)->leapfrog || find_solver_mode(second)->implicit;
+      for (const char* second : {"node", "constraint", "cpu-double", "explicit", "newton", "vbd"}) {
+        const bool other_forces = find_solver_mode(second)->forces;
         if (std::string(second) == first || (other_forces && !touching)) continue;
         CAPTURE(touching);
         CAPTURE(first);

@@ -24,7 +24,7 @@ Scene scene_of(const Folder& folder, const SolverMode& mode) {
     {"block": {"size": [0.4, 0.3, 0.4], "cells": [3, 2, 3]}, "position": [0, 0, 0]},
     {"block": {"size": [0.3, 0.3, 0.3], "cells": [2, 2, 2]}, "position": [0.05, 0.36, 0.02], "rotation": [10, 20, 0]}],
     "world": {"obstacles": [{"shape": "sphere", "radius": 0.1, "centre": [0.5, 0.1, 0], "velocity": [-0.5, 0, 0]}]}})");
-  if (mode.implicit || mode.leapfrog)
+  if (mode.forces)
     for (auto& body : scene["bodies"]) body["material"] = "foam";
   if (mode.published) scene["world"]["contact"] = "none";
   scene["solver"] = {{"mode", mode.name}};

@@ -16,7 +16,7 @@ using namespace tetpbd;
 
 namespace {
 
-constexpr const char* modes[] = {"node", "constraint", "cpu", "cpu-double", "cpu-fast", "explicit", "newton"};
+constexpr const char* modes[] = {"node", "constraint", "cpu", "cpu-double", "cpu-fast", "explicit", "newton", "vbd"};
 constexpr double yield_strain = 0.05;
 
 // Block of 0.4 x 0.1 x 0.1 m that starts stretched along x, with its volume kept.
@@ -33,7 +33,7 @@ Settings settings_for(const std::string& mode) {
   Settings s;
   s.mode = mode, s.ground = false, s.gravity = 0, s.material = "neo-hookean", s.young_modulus = 1e5;
   s.yield_strain = yield_strain, s.dt = 1e-3;
-  if (!solver_mode(s).implicit && !solver_mode(s).leapfrog) s.substeps = 10;
+  if (!solver_mode(s).forces) s.substeps = 10;
   if (solver_mode(s).implicit) s.iterations = 8;
   return s;
 }

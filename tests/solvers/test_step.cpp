@@ -144,7 +144,7 @@ TEST_CASE("a small body at rest beside one ten thousand times its size keeps as 
     if (big) add("big", {200, 1, 1}, {10, 1, 1}, {0, 10, 20}, true);
     return model;
   };
-  for (const std::string mode : {"node", "constraint", "explicit", "newton"}) {
+  for (const std::string mode : {"node", "constraint", "explicit", "newton", "vbd"}) {
     CAPTURE(mode);
     Settings settings;
     settings.mode = mode, settings.material = "neo-hookean", settings.young_modulus = 2e4;

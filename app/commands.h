@@ -132,7 +132,7 @@ struct CompareOptions {
   std::vector<std::string> cases;  ///< of hard cases; empty: all of models/scenes/hard
   std::vector<std::string> meshes = {"bunny", "block", "tet"};
 };
-/// `tetpbd compare`: speed against error over modes x iterations x substeps.
+/// `tetpbd compare`: speed against error over modes, substeps and iterations.
 int run_compare(const CompareOptions& options);
 
 struct MapOptions {

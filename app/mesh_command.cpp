@@ -36,7 +36,7 @@ std::string mend(const MeshOptions& o) {
   const std::string done = repair(surface);
   turn(surface.positions, o.up);
   write_surface(o.repaired, surface);
-  return done.empty() ? "nothing to mend" : done;
+  return done.empty() ? "nothing to repair" : done;
 }
 
 struct Command {
@@ -85,8 +85,9 @@ struct Command {
     const bool asked = !how.by.empty() || how.sized;
     if (!check.defect.empty() && mends && !asked) return say_mended(done, defect), status = 1, std::nullopt;
     if (!check.defect.empty() && !asked)
-      throw Error(check.defect, check.place + " in " + file.string(),
-                  check.hint + (check.hopeless ? "" : "; --repair may mend it, --fill lattice takes it, as scenes do"));
+      throw Error(
+          check.defect, check.place + " in " + file.string(),
+          check.hint + (check.hopeless ? "" : "; try --repair, or --fill lattice, which scenes use for such surfaces"));
     if (!asked) how.by = "tetgen";
     Filled result;
     try {

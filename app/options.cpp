@@ -48,35 +48,35 @@ void add_fill(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--tetgen", overrides.tetgen, "TetGen switches, pY for the paper's kind of mesh");
   command
       .add_option("--fill", overrides.fill,
-                  "by what surfaces and boundaries of tets are filled: tetgen, lattice; file: tets stay as they are "
-                  "(default: what suits them)")
+                  "how surfaces are tetrahedralized: tetgen, lattice; file: keep the file's tets (default: whichever "
+                  "suits the surface)")
       ->check([](const std::string& text) {
         const bool known = std::ranges::find(fill_kinds, text) != std::end(fill_kinds);
         return known ? std::string() : fmt::format("must be one of {}, not '{}'", fmt::join(fill_kinds, ", "), text);
       });
-  add(command, "--tets", overrides.tets, 10.0, 1e8, "about so many, of a lattice (default: 15000)");
-  add(command, "--spacing", overrides.spacing, 1e-9, 1e6, "m, of a lattice, in place of --tets");
+  add(command, "--tets", overrides.tets, 10.0, 1e8, "approximate number of tets of a lattice (default: 15000)");
+  add(command, "--spacing", overrides.spacing, 1e-9, 1e6, "m, cell size of a lattice, in place of --tets");
 }
 
 void add_up(CLI::App& command, std::string& up, const std::string& of) {
-  CLI::Option* option = command.add_option("--up", up, "the axis that points upwards in " + of);
+  CLI::Option* option = command.add_option("--up", up, "the up axis of " + of);
   option->check(one_of(std::array{"x", "y", "z"}))->type_name("AXIS");
   if (!up.empty()) option->capture_default_str();
 }
 
 void add_copies(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--copies", overrides.copies, 1, 1000000,
-      "the bodies so many times in one place, which do not act on each other: many runs in the dispatches of one");
+      "simulate N copies of the bodies that do not interact: many runs in the dispatches of one");
 }
 
 void add_overrides(CLI::App& command, SceneOverrides& overrides) {
   add(command, "--mesh", overrides.mesh, "mesh in place of the scene's first body");
   add(command, "--height", overrides.height, 0.0, 1e6,
-      "m, of the first body; 0: as its file has it (default: the scene's)");
-  add_up(command, overrides.up, "the first body's file (default: the scene's, of --mesh y)");
+      "scale the first body to this height in m; 0: the file's own (default: the scene's)");
+  add_up(command, overrides.up, "the first body's file (default: the scene's; for --mesh y)");
   add_fill(command, overrides);
   add_copies(command, overrides);
-  command.add_option("--set", overrides.set, "PATH=VALUE for anything else, as in bodies.0.density=500")
+  command.add_option("--set", overrides.set, "PATH=VALUE for anything else in a scene, e.g. bodies.0.density=500")
       ->expected(1)
       ->take_all();
 }
@@ -127,17 +127,17 @@ void add_variation(CLI::App& command, const std::string& flags, const std::strin
 
 void add_variations(CLI::App& command, std::vector<Variation>& all) {
   add_variation(command, "--modes,--mode", "mode", all,
-                "solver modes; paper: as published (default of compare: those that suit the scene)");
-  add_variation(command, "--iterations", "iterations", all, "iterations a substep");
-  add_variation(command, "--substeps", "substeps", all, "substeps a step");
+                "solver modes; paper: the published pipeline (compare's default: those that suit the scene)");
+  add_variation(command, "--iterations", "iterations", all, "iterations per substep");
+  add_variation(command, "--substeps", "substeps", all, "substeps per step");
   add_variation(command, "--rigid-contact", "rigid_contact", all,
-                "whether touching hard bodies move as rigid ones (default: bench 0, as published; else the scene's)");
+                "whether hard bodies in contact move as rigid ones (default: bench 0, as published; else the scene's)");
   add_variation(command, "--mass-splitting", "mass_splitting", all,
                 "whether masses are split; else corrections are averaged (default: bench 0, as published; else the "
                 "scene's)");
   add_variation(command, "--omegas", "omega", all, "over-relaxations (default: the scene's)");
-  add_variation(command, "--elements", "element", all, "kinds of tets: linear, smoothed (default: the scene's)");
-  add_variation(command, "--constraint-sets", "constraints", all, "sets of kinds joined by +");
+  add_variation(command, "--elements", "element", all, "tet elements: linear, smoothed (default: the scene's)");
+  add_variation(command, "--constraint-sets", "constraints", all, "sets of constraint kinds joined by +");
   add_vary(command, fmt::format("{}; once for each that varies", fmt::join(table_settings, ", ")),
            [&all](const std::string& text) {
              const Variation one = parse_variation(text, "--vary");
@@ -174,8 +174,8 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device) {
   std::string solvers;
   for (const Preset& preset : solver_presets()) solvers += fmt::format("{} ({}), ", preset.name, preset.help);
   add(command, "--solver", a.overrides.solver,
-      "how to solve, by name; other settings go on top: " + solvers +
-          "auto (tries, and takes what moves most nearly right within --budget-ms)")
+      "solver preset; further settings override it: " + solvers +
+          "auto (tries solvers and takes the most accurate within --budget-ms)")
       ->type_name("NAME");
   add(command, "--budget-ms", a.overrides.budget_ms, 1e-6, 1e6,
       "GPU ms per step, for --solver auto (default: a tenth of dt)");
@@ -189,20 +189,19 @@ void add_scene(CLI::App& command, Arguments& a, bool by_device) {
   view.add_option("--look", look.look, fmt::format("{}", fmt::join(look_names, ", ")))->transform(one_of(look_names));
   view.add_option("--colour", look.colour, fmt::format("{}", fmt::join(colour_names, ", ")))
       ->transform(one_of(colour_names));
-  add(view, "--range", a.run.range, 1e-12, 1e12, "end of the colour scale, in its unit (default: as the values ask)");
-  add(view, "--cut", look.cut, 0.0, 1.0, "shows what is below this part of the body alone");
+  add(view, "--range", a.run.range, 1e-12, 1e12, "end of the colour scale, in its unit (default: from the values)");
+  add(view, "--cut", look.cut, 0.0, 1.0, "cut the body open: show only this fraction of it along the axis");
   add(view, "--cut-axis", look.cut_axis, 0, 2, "0: x, 1: y, 2: z");
   view.add_flag("!--flat", look.smooth_normals, "flat normals");
   view.add_flag("!--no-shadow", look.shadow, "no shadow");
-  view.add_flag("!--no-grid", look.grid, "no lines on the ground");
+  view.add_flag("!--no-grid", look.grid, "no grid on the ground");
   view.add_flag("!--no-legend", look.legend, "no colour bar");
-  view.add_flag("--contacts", look.contacts, "dots and arrows where something touches");
-  view.add_flag("--arrows", look.arrows, "velocities");
+  view.add_flag("--contacts", look.contacts, "dots and arrows at contacts");
+  view.add_flag("--arrows", look.arrows, "arrows of velocities");
   view.add_flag("--follow", look.follow,
-                "the camera goes where the bodies go (the window: from the start; else only as they would "
-                "leave the picture)");
+                "the camera follows the bodies (in the window from the start, else once they would leave the picture)");
   view.add_flag_callback(
-      "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat faces on one colour");
+      "--plain", [&] { look = plain_view(look); }, "the cheapest picture: flat shading on a plain background");
   command.parse_complete_callback([&a, &command, by_device] {
     a.overrides.by_device = by_device;
     if (command.get_name() == "view" && command.count("--scene") == 0 && a.overrides.mesh.empty())

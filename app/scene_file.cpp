@@ -158,8 +158,9 @@ BodyDescription read_body(const json& value, const std::string& where, const std
   if (kinds > 1 || (kinds == 0 && body.surface.empty()))
     refuse(fmt::format("'{}' needs one of \"mesh\", \"block\", \"tet\" and \"sheet\", or a \"surface\"", where), file);
   if (kinds == 0 && body.fill == "tetgen")
-    refuse(fmt::format("'{}' has a surface alone, which rides on a lattice; name it as \"mesh\" for TetGen", where),
-           file);
+    refuse(
+        fmt::format("'{}' has only an embedded surface, which needs a lattice; give it as \"mesh\" for TetGen", where),
+        file);
   if (body.fill == "file" && !has_tets(body))
     refuse(fmt::format("'{}.fill' is of a file of tets, and this body has none", where), file);
   if (body.thickness > 0 && (body.block || body.tet || (!body.mesh.empty() && !is_surface_file(body.mesh))))

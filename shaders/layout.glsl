@@ -1,7 +1,7 @@
 // Buffer layouts and binding numbers, read by GLSL and by C++ (sim/gl/layout.h). Units are SI.
 //
 // A position is an unevaluated sum high + low of two floats a component (about 48 bits). It keeps the part of a small
-// h*v that one float would drop (method.md, "What float drops").
+// h*v that one float would drop (method.md, "Rounding errors").
 struct Position {
   vec3 high;
   float inverse_mass;  // 1/kg; 0: fixed

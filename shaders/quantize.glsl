@@ -1,6 +1,6 @@
 // A quantized position is in whole quanta modulo 2^32, with the inverse mass (times n_i for mass splitting) as float
 // bits. Differences wrap too, so they are exact wherever the body is, as long as the vertices of a constraint are
-// within 2^31 quanta of each other (method.md, "What neighbours see").
+// within 2^31 quanta of each other (method.md, "Quantized positions").
 ivec4 quantize(DoubleSingle x, float weight) {
   // In halves of 16 bits, as a float holds neither 2^32 nor a small negative number plus 2^32.
   float per_metre = COARSE(params.inverse_quantum);

@@ -10,7 +10,7 @@ DoubleSingle predict_position(DoubleSingle x, DoubleSingle v) {
   return add_double(add_double(x, move), params.h * v.low);
 }
 // The inverse mass that constraints see. With mass splitting (Tonge et al. 2012) each of n_i constraints has 1/n_i of
-// the mass, so that their average keeps momentum (method.md eq. 13m).
+// the mass, so that their average keeps momentum (method.md eq. 14).
 float weight_of(Position own) {
   return params.mass_splitting > 0.0 ? own.inverse_mass * own.constraints : own.inverse_mass;
 }

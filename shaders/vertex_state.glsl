@@ -9,7 +9,7 @@ layout(std430) buffer Velocities { Velocity velocities[]; };
 // Values for sim/adaptive_substeps.h are bits of floats.
 layout(std430) buffer Check {
   uint bad_step, bad_vertex;  // first step whose state is not finite, and its lowest such vertex; ~0: none
-  uint largest;  // mode explicit: h^2 b (method.md eq. 39b); mode newton: last residual over that of Newton's start
+  uint largest;  // mode explicit: h^2 b (method.md eq. 34); mode newton: last residual over that of Newton's start
   uint least;    // mode newton: the least length of a first step, 0 where a tet is inverted
   uint dropped[DROPS];
 };

@@ -1,4 +1,4 @@
-// Plastic flow of a tet (method.md eqs. 63-65). Its metric is that of rest values: the inverse of the metric of the
+// Plastic flow of a tet (method.md eqs. 28-30). Its metric is that of rest values: the inverse of the metric of the
 // sides at rest, which with the sides x gives the elastic strain.
 struct RestMetric {
   real values[6];  // a a, a b, a d, b b, b d, d d

@@ -13,7 +13,7 @@ struct Sim;
 
 struct AdaptiveValues {
   // Mode explicit; `calm_readbacks` and `most_substeps` of both.
-  double at_rest = 0;      ///< 1/s^2, of the stiffest constraint at rest (method.md eq. 39b); 0 in other modes
+  double at_rest = 0;      ///< 1/s^2, of the stiffest constraint at rest (method.md eq. 34); 0 in other modes
   double stiffening = 1;   ///< how many times shorter a substep is than at rest, because the body is stiffer
   double stiffer = 1;      ///< how many times `at_rest` the stiffest constraint was at the last readback
   int calm_readbacks = 0;  ///< readbacks in a row after which fewer substeps would do

@@ -129,8 +129,9 @@ void tell(Race& race, double part) {
   race.told = std::chrono::steady_clock::now();
   const std::size_t number = race.choice.trials.size();
   if (race.progress)
-    race.progress(fmt::format("{}, way {} of {}", race.choice.trials.back().settings.mode, number, race.candidates),
-                  (double(number) - 1 + part) / double(race.candidates));
+    race.progress(
+        fmt::format("{}, candidate {} of {}", race.choice.trials.back().settings.mode, number, race.candidates),
+        (double(number) - 1 + part) / double(race.candidates));
 }
 
 // RunPlan::stepped, of a run that takes a trial from one part of it to another.
@@ -313,15 +314,15 @@ std::string describe(const SolverChoice& choice) {
   const SolverTrial& best = choice.trials[choice.best];
   const Settings& s = best.settings;
   const Plan& plan = best.plan;
-  return fmt::format("{}, {} iteration{} x {} substep{}, omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps",
-                     s.mode, plan.iterations, plan.iterations == 1 ? "" : "s", plan.substeps,
-                     plan.substeps == 1 ? "" : "s", s.omega,
-                     s.mass_splitting && !any_material(s, compliant) ? ", masses split" : "", best.ms, choice.budget_ms,
-                     fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the reference motion"
-                                              : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
-                                                                               : "loss {:.3g} %"),
-                                 best.error),
-                     choice.steps);
+  return fmt::format(
+      "{}, {} x {} (substeps x iterations), omega {:g}{}: {:.3g} ms of {:.3g} ms a step, {} over {} steps", s.mode,
+      plan.substeps, plan.iterations, s.omega, s.mass_splitting && !any_material(s, compliant) ? ", masses split" : "",
+      best.ms, choice.budget_ms,
+      fmt::format(fmt::runtime(choice.judged == "motion"        ? "{:.2g} % from the reference motion"
+                               : choice.judged == "finer steps" ? "{:.2g} % from finer steps"
+                                                                : "loss {:.3g} %"),
+                  best.error),
+      choice.steps);
 }
 
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice) {

@@ -59,7 +59,8 @@ std::optional<SolverChoice> choose_for(Scene& scene, const std::shared_ptr<const
 /// Both, and says on standard output what was chosen. Without `progress` a terminal shows it.
 std::optional<SolverChoice> choose_and_say(Scene& scene, const std::shared_ptr<const Model>& model,
                                            const SolverProgress& progress = {});
-/// "node, 17 substeps, omega 2.5: 0.143 ms of 0.15 ms a step, 0.02 % from the reference motion over 160 steps"
+/// "node, 17 x 1 (substeps x iterations), omega 2.5: 0.143 ms of 0.15 ms a step, 0.02 % from the reference motion over
+/// 160 steps"
 std::string describe(const SolverChoice& choice);
 nlohmann::ordered_json solver_choice_json(const SolverChoice& choice);
 

@@ -181,7 +181,7 @@ void mark_front(ordered_json& rows, const Judge& judge) {
 }
 
 // Of a row among those of one mesh.
-std::string label_of(const ordered_json& row) { return text_of(row["iterations"]) + " x " + text_of(row["substeps"]); }
+std::string label_of(const ordered_json& row) { return text_of(row["substeps"]) + " x " + text_of(row["iterations"]); }
 std::string series_of(const ordered_json& row) {
   const std::string fill = text_of(row["fill"]), by = fill.substr(0, fill.find(':'));
   return text_of(row["mode"]) + (fill.empty() ? "" : ", " + by + " " + text_of(row["tets"], 8)) +
@@ -207,7 +207,7 @@ Chart chart_of(const ordered_json& document, const Judge& judge) {
   Chart chart{"Speed against error: " + text_of(rows[0]["scene"]),
               fmt::format("{} tets, {} steps of {} s, {}; labels: {}", tets_of(rows), text_of(document["steps"]),
                           text_of(document["dt"]), text_of(document["device"]["gl_renderer"]),
-                          rows[0]["fill"] == "" ? "iterations x substeps" : "tets"),
+                          rows[0]["fill"] == "" ? "substeps x iterations" : "tets"),
               "time of a step, ms (GPU time; cpu modes: wall time)",
               judge.label,
               true,
@@ -241,7 +241,7 @@ Chart course_chart(const ordered_json& document, const Judge& judge) {
   constexpr std::size_t most = 8;
   const bool all = document["rows"].size() <= most, total = judge.name == std::string("total");
   Chart chart{"Error of the motion: " + text_of(document["rows"][0]["scene"]),
-              all ? "mode, iterations x substeps" : "what is on the front; labels: mode, iterations x substeps",
+              all ? "mode, substeps x iterations" : "those on the front; labels: mode, substeps x iterations",
               "time, s",
               fmt::format("distance from the {}, % of the size", total ? "motion on finer meshes" : "reference motion"),
               false,
@@ -265,13 +265,13 @@ void print_best(ordered_json rows, const char* what, std::optional<double> limit
   fmt::print(fmt::runtime(what), *limit);
   std::erase_if(rows.get_ref<ordered_json::array_t&>(),
                 [&](const auto& row) { return !std::isfinite(error_by(judge, row)) || !(limited(row) <= *limit); });
-  if (rows.empty()) return fmt::print(": nothing measured is\n");
+  if (rows.empty()) return fmt::print(": none\n");
   const auto order = [&](const auto& row) { return std::pair(judged(row), limited(row)); };
   const auto& best = *std::ranges::min_element(rows, {}, order);
-  fmt::print(": {}, {} it x {} sub, omega {} ({:.3g} ms, {} {:.3g} %)\n",
+  fmt::print(": {}, {} x {} (substeps x iterations), omega {}: {:.3g} ms, {} {:.3g} %\n",
              text_of(best["mode"]) + (best["fill"] == "" ? "" : ", " + text_of(best["fill"])) +
                  (best["element"] == "smoothed" ? ", smoothed" : ""),
-             text_of(best["iterations"]), text_of(best["substeps"]), text_of(best["omega"]), cost_ms(best), judge.name,
+             text_of(best["substeps"]), text_of(best["iterations"]), text_of(best["omega"]), cost_ms(best), judge.name,
              error_by(judge, best));
 }
 

@@ -1,4 +1,4 @@
-// `tetpbd map`: over two settings at once, how right a scene comes out, and where it fails.
+// `tetpbd map`: over two settings at once, the error of a scene, and where it fails.
 #include "app/lab/map.h"
 
 #include <fmt/format.h>

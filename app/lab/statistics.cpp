@@ -189,8 +189,8 @@ void put_finite(ordered_json& row, const MeasuredRun& run) {
   if (!found) return;
   const auto text = [&](const char* key) { return text_of(row[key]); };
   const std::string where =
-      fmt::format("{}, mode {}, {}, omega {}, {} iterations, {} substeps", text("scene"), text("mode"),
-                  text("constraints"), text("omega"), text("iterations"), text("substeps"));
+      fmt::format("{}, mode {}, {}, omega {}, {} x {} (substeps x iterations)", text("scene"), text("mode"),
+                  text("constraints"), text("omega"), text("substeps"), text("iterations"));
   print_error(fmt::format("tetpbd: {}\n", error_of(*found, where).what()));
 }
 

@@ -149,7 +149,7 @@ Settings lane_settings(Settings settings, const std::string& words, const std::s
     if (equals != std::string::npos)
       assign(settings, word.substr(0, equals), word.substr(equals + 1), where, count);
     else if (!apply_preset(settings, solver_presets(), word) && !apply_preset(settings, material_presets(), word))
-      throw Error(fmt::format("'{}' is no way to solve", word), where,
+      throw Error(fmt::format("'{}' is no solver", word), where,
                   did_you_mean(word, preset_names(solver_presets())) +
                       fmt::format("write PARAMETER=VALUE, budget_ms=MILLISECONDS or one of {}",
                                   fmt::join(preset_names(solver_presets()), ", ")));

@@ -1,4 +1,4 @@
-// The stability map in the panel: over two settings, how right the chosen lane's bodies come out; a click
+// The stability map in the panel: over two settings, the error of the chosen lane's bodies; a click
 // takes a cell's.
 #include <imgui.h>
 #include <imgui_stdlib.h>

@@ -225,10 +225,10 @@ void draw_solver(Session& s) {
   const Settings now = s.loaded.sim().settings;
   const auto& choice = s.loaded.choice;
   const bool automatic = choice && choice->settings() == now;
-  Ways ways = ways_of(now, solver_presets(),
-                      "a whole way to solve, which sets mode, substeps and iterations\nauto: tries ways to "
-                      "solve this scene and takes the one whose motion is "
-                      "nearest to the right one within the budget");
+  Ways ways = ways_of(
+      now, solver_presets(),
+      "solver preset: sets mode, substeps and iterations at once\nauto: tries solvers on this scene and takes the "
+      "most accurate within the budget");
   ways.help += "\non the command line: --solver";
   if (automatic) ways.current = "auto";
   ways.words.push_back("auto");

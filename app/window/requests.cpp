@@ -76,7 +76,9 @@ void change_settings(Session& s, const Settings& wanted) {
     return long(plan.iterations) * plan.substeps;
   };
   if (passes(wanted) > std::max(most, passes(now)))
-    return say(s, fmt::format("iterations x substeps go to {} here; a scene or the command line can say more", most));
+    return say(
+        s,
+        fmt::format("the window takes at most {} substeps x iterations; a scene or the command line takes more", most));
   if (wanted != now) emit(s, action::Set{s.loaded.chosen, wanted});
 }
 

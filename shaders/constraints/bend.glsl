@@ -1,5 +1,5 @@
 // Bending: C = angle - rest in radians, the signed dihedral angle of two triangles that share the edge x2 -> x3, with
-// wings x0 and x1 (paper eqs. 6-15 with the sign that arccos loses; method.md eqs. 7-9).
+// wings x0 and x1 (paper eqs. 6-15 with the sign that arccos loses; method.md eqs. 8-10).
 
 // The atan of sine and cosine is exact to 2e-7 rad near flat, where arccos in float is wrong by 5e-4 and its derivative
 // divides by zero.

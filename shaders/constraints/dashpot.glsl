@@ -1,4 +1,4 @@
-// The dashpot of a viscous material (method.md eq. 38): C = |x0 - x1| in metres, of which only the change in a substep
+// The dashpot of a viscous material (method.md eq. 25): C = |x0 - x1| in metres, of which only the change in a substep
 // counts.
 Constraint2 dashpot(vec3 x[2], real rest, Ids ids) {
   Constraint2 c;

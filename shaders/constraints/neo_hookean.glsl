@@ -1,7 +1,7 @@
 #ifndef NEO_HOOKEAN
 #define NEO_HOOKEAN
 // Stable neo-Hookean elasticity of a tet (Smith, de Goes and Kim 2018, eq. 14) as two constraints (method.md eqs.
-// 29-31), C_0 = sqrt(I - log(I + 1)) and C_1 = J - alpha, alpha = 1 + 3 mu / (4 lambda), where I is the sum of squared
+// 20-22), C_0 = sqrt(I - log(I + 1)) and C_1 = J - alpha, alpha = 1 + 3 mu / (4 lambda), where I is the sum of squared
 // singular values of the deformation gradient and J its determinant.
 
 // With compliances 1 / (mu V) and 1 / (lambda V) the energy C^2 / (2 compliance) is Smith's. At rest neither C is 0,

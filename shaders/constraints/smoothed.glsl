@@ -17,7 +17,7 @@ EdgePart smoothed_part(vec3 x[4], const real rest[8], const real a[2], real mean
   real own = own_resistance(J) != real(0) ? real(1) : real(0);
   return neo_hookean_edge(x, rest, a, smoothed_J(mean, J) - rest[7], own, i, j);
 }
-// b of method.md eq. 39b. What averages resist is about half of what a tet of its own resists, which is added where it
+// b of method.md eq. 34. What averages resist is about half of what a tet of its own resists, which is added where it
 // does.
 real smoothed_bound(Constraint4x2 c, vec3 x[4], real w[4], const real rest[8], const real a[2]) {
   return stiffness_bound(c, x, w, a) * (own_resistance(c.C[1] + rest[7]) != real(0) ? real(3) : real(1));

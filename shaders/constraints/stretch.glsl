@@ -1,4 +1,4 @@
-// Stretch: C = |x0 - x1| - rest, in metres (paper eqs. 4-5; method.md eq. 6).
+// Stretch: C = |x0 - x1| - rest, in metres (paper eqs. 4-5; method.md eq. 7).
 // Coincident vertices have no direction, so they part along a pseudo-random one of their own.
 Constraint2 stretch(vec3 x[2], real rest, Ids ids) {
   Constraint2 c;

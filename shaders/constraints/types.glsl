@@ -22,7 +22,7 @@ struct Constraint4x2 {
   uint guards;
 };
 
-// A block of a Hessian (mode newton; method.md eq. 41) is the gradient of vertex i by the position of j != i.
+// A block of a Hessian (mode newton; method.md eq. 36) is the gradient of vertex i by the position of j != i.
 // Conditions choose what belongs to a vertex, because an array with a variable index would lie in memory.
 vec3 chosen(int j, vec3 v0, vec3 v1, vec3 v2, vec3 v3) { return j == 0 ? v0 : j == 1 ? v1 : j == 2 ? v2 : v3; }
 vec3 gradient_of(Constraint2 c, int j) { return j == 0 ? c.gradient[0] : c.gradient[1]; }
@@ -57,7 +57,7 @@ vec3 any_direction(uint a, uint b) {
 }
 
 // An error C that rounding alone can make is none: rounding of 1e-9 m over a substep of 1e-6 s would be a velocity
-// (method.md, "What float drops"). C is known to rounding * noise, and positions to rounding * quantization_size, which
+// (method.md, "Rounding errors"). C is known to rounding * noise, and positions to rounding * quantization_size, which
 // is 0 where they are kept in full.
 real apply_dead_zone(real C, real noise) { return abs(C) <= real(4) * rounding * noise ? real(0) : C; }
 
@@ -80,7 +80,7 @@ Weighted weighted(Constraint4 c, real w[4]) {
   return Weighted(sum, longest, c.floor * real(0.25) * (w[0] + w[1] + w[2] + w[3]));
 }
 
-// The multiplier of XPBD (Macklin, Mueller and Chentanez 2016; method.md eqs. 4, 25-26), and of PBD with a = 0 and
+// The multiplier of XPBD (Macklin, Mueller and Chentanez 2016; method.md eqs. 6, 17-18), and of PBD with a = 0 and
 // share = 1. Vertex j moves by lambda w_j grad_j C, at most by max_correction.
 struct Multiplier {
   real lambda;  // 0 where it is no number
@@ -106,7 +106,7 @@ Multiplier multiplier(Constraint4 c, real w[4], real k, real max_correction, rea
   return bounded(c.C, c.guards, s, share * max(s.sum, s.least) + a, k, max_correction);
 }
 
-// The multipliers of two components (method.md eq. 32): (share grad C W grad C^T + a) lambda = -C, with the whole
+// The multipliers of two components (method.md eq. 23): (share grad C W grad C^T + a) lambda = -C, with the whole
 // residual in c.C.
 struct Multiplier2 {
   real lambda[2];
@@ -144,7 +144,7 @@ Multiplier2 multiplier(Constraint4x2 c, real w[4], real max_correction, real a[2
   m.guards = c.guards | (!number ? GUARD_NOT_FINITE : beyond ? GUARD_LIMIT : 0u);
   return m;
 }
-// b of method.md eq. 39b, times h^2. A stretched edge also resists being turned, in two directions, and edges of a
+// b of method.md eq. 34, times h^2. A stretched edge also resists being turned, in two directions, and edges of a
 // squeezed body come to lie side by side. A tet that is turned over or nearly flat counts twice, for the curvature of
 // its volume.
 real stiffness_bound(Constraint2 c, vec3 x[2], real w[2], real a) {

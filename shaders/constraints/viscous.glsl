@@ -1,4 +1,4 @@
-// The rate of strain of a viscous tet (method.md eq. 61), of which only the change in a substep counts: rest[0] is the
+// The rate of strain of a viscous tet (method.md eq. 26), of which only the change in a substep counts: rest[0] is the
 // number of its part, five of shear, which are orthonormal, and then that of volume; rest[1] its volume at rest.
 Constraint4 viscous(vec3 x[4], const real rest[2], Ids ids) {
   Constraint4 c;

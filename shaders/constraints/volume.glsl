@@ -1,5 +1,5 @@
 // Volume: C = V - rest in cubic metres, V = ((x1-x0) x (x2-x0)) . (x3-x0) / 6 signed, so that an inverted tet is pushed
-// back (paper eqs. 16-21; method.md eq. 10).
+// back (paper eqs. 16-21; method.md eq. 12).
 Constraint4 volume(vec3 x[4], real rest, Ids ids) {
   Constraint4 c;
   vec3 a = x[1] - x[0];

@@ -1,5 +1,5 @@
 // Contact of a rigid body with obstacles: inelastic impacts and Coulomb friction by impulses, each contact in turn
-// (method.md eqs. 34-37). Impulses and momenta are per mass of the body. GLSL and C++ (sim/model/formulas.h).
+// (method.md eqs. 52-55). Impulses and momenta are per mass of the body. GLSL and C++ (sim/model/formulas.h).
 struct Rigid {
   vec3 centre;
   vec3 velocity;

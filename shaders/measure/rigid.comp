@@ -1,4 +1,4 @@
-// One body's distance to its rigidly aligned rest shape (method.md eq. 20), angular momentum about its centre, and what
+// One body's distance to its rigidly aligned rest shape (method.md eq. 68), angular momentum about its centre, and what
 // the averages of smoothed tets store.
 #define FIRST M_ANGULAR
 #define REDUCED 6

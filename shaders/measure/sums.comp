@@ -1,4 +1,4 @@
-// Sums over one body's edges, hinges, tets (method.md eqs. 16-19, and elastic energy) and vertices (moments, momentum,
+// Sums over one body's edges, hinges, tets (method.md eqs. 64-67, and elastic energy) and vertices (moments, momentum,
 // energy). The last work-group to end adds the groups' sums into the row, with the body's centre and rotation.
 #define FIRST 0
 #define REDUCED M_DEPTHS

@@ -1,4 +1,4 @@
-// The second half of constraint-centric Jacobi (method.md eqs. 13-14): p += omega * (sum of corrections) / n_i, then
+// The second half of constraint-centric Jacobi (method.md eqs. 13, 15): p += omega * (sum of corrections) / n_i, then
 // contacts. It also clears the sums. One invocation per vertex.
 #include "types.glsl"
 #include "double_single.glsl"

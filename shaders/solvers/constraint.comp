@@ -1,4 +1,4 @@
-// Constraint-centric Jacobi (paper algorithm 3; method.md eqs. 4, 14), every kind present in one dispatch. A work-group
+// Constraint-centric Jacobi (paper algorithm 3; method.md eqs. 6, 15), every kind present in one dispatch. A work-group
 // solves a patch of constraints, each of which is in one patch, and adds the patch's sums to those of the vertices with
 // global atomics.
 #include "types.glsl"

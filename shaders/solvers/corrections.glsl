@@ -1,5 +1,5 @@
 // How corrections move a vertex in a substep: prediction before the first iteration, contacts in each, and the velocity
-// after the last (method.md eqs. 1-2, 5, 11-13).
+// after the last (method.md eqs. 1-2, 4, 13, 48-49).
 #include "vertex.glsl"
 // Predicted positions stay from the first iteration of a substep to the last, behind the velocities: kernels have room
 // for 8 storage blocks.

@@ -1,4 +1,4 @@
-// How leapfrog moves a vertex in a substep of mode explicit (method.md eq. 39).
+// How leapfrog moves a vertex in a substep of mode explicit (method.md eq. 32).
 #include "vertex.glsl"
 
 DoubleSingle move_vertex(uint i, Position own, Velocity speed, vec3 correction) {

@@ -1,4 +1,4 @@
-// The multipliers that XPBD keeps of each constraint from one iteration of a substep to the next (method.md eq. 25).
+// The multipliers that XPBD keeps of each constraint from one iteration of a substep to the next (method.md eq. 17).
 #if COMPLIANT
 layout(std430) restrict buffer Multipliers { float multipliers[]; };  // one for each pair of a record's words
 float last_multiplier(uint record) { return (phases & PHASE_PREDICT) == 0u ? multipliers[record] : 0.0; }

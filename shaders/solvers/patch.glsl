@@ -113,7 +113,7 @@ void sum_corrections(Chunk chunk, bool exists) {
   }
 #endif
 }
-// The sum of all corrections of an owned vertex, over their number, times omega (method.md eqs. 4, 13). The
+// The sum of all corrections of an owned vertex, over their number, times omega (method.md eqs. 6, 13). The
 // vertex's body has begun.
 vec3 averaged_correction(uint local) {
   return vec3(sums[3u * local], sums[3u * local + 1u], sums[3u * local + 2u]) *

@@ -1,5 +1,5 @@
 // One constraint of a chunk: evaluates it and gives its corrections to add_correction(), which adds them to sums of the
-// vertices that the patch owns, or moves the vertices at once (method.md eqs. 4, 25-26).
+// vertices that the patch owns, or moves the vertices at once (method.md eqs. 6, 17-18).
 void project_$KIND(uint number, uint owned) {
   uvec2 record = patch_words[RECORDS_AT + number];  // its vertices, a byte each; rest
   begin_body(id_of(record.x, 0));

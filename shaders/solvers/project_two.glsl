@@ -1,5 +1,5 @@
 // Does what project.glsl does for a kind of two components, which only a material has and which are solved together
-// (method.md eq. 32).
+// (method.md eq. 23).
 void project_$KIND(uint number, uint owned) {
   uint ids = patch_words[RECORDS_AT + number].x;  // its vertices, a byte each
   begin_body(id_of(ids, 0));

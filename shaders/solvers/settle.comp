@@ -1,5 +1,5 @@
 // The vertices in mode gauss-seidel: prediction before the colours, contacts behind them, and at last the new velocity
-// (method.md eqs. 1-2, 5, 11-13). One invocation per vertex.
+// (method.md eqs. 1-2, 4, 13, 48-49). One invocation per vertex.
 #include "types.glsl"
 #include "double_single.glsl"
 layout(local_size_x = GROUP_SIZE) in;

@@ -1,4 +1,4 @@
-// Measurements of a state (method.md eqs. 16-24): errors, momentum and energy, reduced on the GPU and read back late.
+// Measurements of a state (method.md eqs. 64-71): errors, momentum and energy, reduced on the GPU and read back late.
 #pragma once
 
 #include <array>

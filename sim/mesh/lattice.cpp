@@ -155,7 +155,7 @@ std::string note_on(const std::vector<Depth>& depths, double left_out, double ou
     notes.push_back(fmt::format("its boundary, which collides, is {:.2g} m off the surface, {:.2g} m at most",
                                 gap.first, gap.second));
   if (outside > 1e-3)
-    notes.push_back(fmt::format("{:.2g} % of its vertices enclose nothing and ride on what is nearest", 100 * outside));
+    notes.push_back(fmt::format("{:.2g} % of its vertices enclose nothing and are embedded in the nearest tet", 100 * outside));
   const auto thin = std::ranges::lower_bound(depths, h, {}, &Depth::depth) - depths.begin();
   if (const double share = double(thin) / double(depths.size()), part = thinnest(depths).depth; share > 0.02)
     notes.push_back(fmt::format("{:.0f} % of it is thinner than a cell: {:.3g} m; spacing {:.2g} would do", 100 * share,

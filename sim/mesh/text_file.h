@@ -187,7 +187,7 @@ class TextFile {
     return std::size_t(value);
   }
 
-  [[noreturn]] void fail(const std::string& what, const char* remedy = "mend the file or export it again") const {
+  [[noreturn]] void fail(const std::string& what, const char* remedy = "repair the file or export it again") const {
     const std::string line = in_bytes_          ? fmt::format(" byte {}", at_)
                              : line_number_ > 0 ? fmt::format(" line {}", line_number_)
                                                 : "";

@@ -23,7 +23,7 @@ struct Cells {
 };
 
 [[noreturn]] void refuse(const std::string& what, const fs::path& file) {
-  throw Error(what, file.string(), "mend the file or export it again");
+  throw Error(what, file.string(), "repair the file or export it again");
 }
 
 bool is_whole(double number) { return number == std::floor(number); }

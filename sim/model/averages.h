@@ -15,7 +15,7 @@ namespace tetpbd {
 struct Averages {
   struct Vertex {
     double volume = 0;           ///< V, m^3: a quarter of what its tets fill
-    double shear = 0, bulk = 0;  ///< Pa: (1 - s) mu of its average F, and lambda of its average J (method.md eq. 50)
+    double shear = 0, bulk = 0;  ///< Pa: (1 - s) mu of its average F, and lambda of its average J (method.md eq. 45)
     double alpha = 1;            ///< J at which nothing presses, as of a neo-Hookean tet
   };
   struct Neighbour {

@@ -19,111 +19,112 @@ const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> rows = [] {
     std::vector<Parameter> all = {
         {"mode", "solver", &S::mode,
-         "how constraints are solved, and where: hard bodies on the GPU by node, soft ones by explicit or "
-         "newton, without a GPU by cpu-fast",
-         0, 0, "", false, Effect::rebuild},
+         "solver: node for hard bodies on a GPU, explicit or newton for soft ones, cpu-fast without a GPU", 0, 0, "",
+         false, Effect::rebuild},
         {"constraints", "solver", &S::constraints,
-         "kinds of constraint that hold a body together, separated by commas: lengths of edges, angles of "
-         "the surface (bend; isobend: quadratic, for thin sheets), volumes of tets",
+         "kinds of constraint, separated by commas: edge lengths (stretch), dihedral angles of the surface (bend; "
+         "isobend: quadratic, for thin sheets), tet volumes (volume)",
          0, 0, "", false, Effect::rebuild},
     };
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
         all.push_back({std::string("k_") + constraint_kinds[k].name, "solver", KindMember{&S::stiffness, k},
-                       fmt::format("part of a correction that is applied to {} in an iteration: 1 is hard; "
-                                   "less is softer, but depends on iterations and mesh",
+                       fmt::format("PBD stiffness k of {}, the fraction of a correction applied per iteration: 1 is "
+                                   "hard; below 1 the result depends on iterations and mesh",
                                    constraint_kinds[k].noun)});
     for (std::size_t k = 0; k < kind_count; ++k)
       if (!constraint_kinds[k].of_material())
         all.push_back({std::string("compliance_") + constraint_kinds[k].name, "solver", KindMember{&S::compliance, k},
-                       fmt::format("softness of {}, of a spring 1 over its stiffness; 0: as hard as "
-                                   "iterations make it. Above 0 it brings mass_splitting with it",
+                       fmt::format("XPBD compliance of {}, the inverse of a spring's stiffness; 0: as stiff as the "
+                                   "iterations make it. Above 0 mass_splitting is on",
                                    constraint_kinds[k].noun),
                        0, constraint_kinds[k].most_compliance, constraint_kinds[k].compliance_unit, true});
     const std::vector<Parameter> others = {
         {"material", "solver", &S::material,
-         "what bodies are made of, in place of constraints, k and compliance: none; springs along edges and "
-         "volumes; neo-hookean tets, right for large strains",
+         "material model, in place of constraints, k and compliance: none; springs along edges and volumes; "
+         "neo-hookean tets, also for large strains",
          0, 0, "", false, Effect::rebuild},
-        {"young_modulus", "solver", &S::young_modulus,
-         "stiffness of the material, Young's modulus: jelly 2e4, rubber 1e6, wood 1e10", 1, 1e12, "Pa", true,
-         Effect::rebuild},
+        {"young_modulus", "solver", &S::young_modulus, "Young's modulus: jelly 2e4, rubber 1e6, wood 1e10", 1, 1e12,
+         "Pa", true, Effect::rebuild},
         {"poisson_ratio", "solver", &S::poisson_ratio,
-         "how much the material thins when it is pulled, Poisson's ratio: near 0.5 it keeps its volume; "
-         "springs: from 0.25",
+         "Poisson's ratio, how much the material thins when it is stretched: near 0.5 it preserves volume; springs: at "
+         "least 0.25",
          0, 0.499, "", false, Effect::rebuild},
         {"element", "solver", &S::element,
          "tets of a neo-hookean material: linear; or smoothed, which average strain around each vertex and so bend "
-         "right on coarse meshes (modes explicit and newton; others take linear ones)",
+         "correctly on coarse meshes (modes explicit and newton; others use linear ones)",
          0, 0, "", false, Effect::rebuild},
         {"smoothing", "solver", &S::smoothing,
-         "part of the resistance to shear that smoothed tets keep for themselves: 1 is too stiff, below 0.3 they "
-         "have soft modes. auto: by Poisson's ratio",
+         "fraction of the shear stiffness that smoothed tets do not average: 1 is too stiff, below 0.3 spurious soft "
+         "modes appear. auto: from Poisson's ratio",
          0.05, 1, "", false, Effect::rebuild, true},
         {"constraint_damping", "solver", &S::constraint_damping,
-         "calms vibrations, not flight: a spring's damping is this times its stiffness; 0.001 is a little", 0, 10, "s",
-         true},
+         "stiffness-proportional damping of constraints, which leaves free flight alone: a spring's damping is this "
+         "times its stiffness; 0.001 is a little",
+         0, 10, "s", true},
         {"viscosity", "solver", &S::viscosity,
-         "of a neo-hookean material against shear, as of a liquid beside it: honey 10, soft tissue 1 to 100", 0, 1e9,
-         "Pa s", true, Effect::rebuild},
-        {"bulk_viscosity", "solver", &S::bulk_viscosity, "likewise against a change of volume", 0, 1e9, "Pa s", true,
+         "shear viscosity of a neo-hookean material: honey 10, soft tissue 1 to 100", 0, 1e9, "Pa s", true,
          Effect::rebuild},
+        {"bulk_viscosity", "solver", &S::bulk_viscosity,
+         "bulk viscosity of a neo-hookean material, against changes of volume", 0, 1e9, "Pa s", true, Effect::rebuild},
         {"yield_strain", "solver", &S::yield_strain,
-         "strain beyond which a neo-hookean material keeps its new shape: wet clay 0.02, wax 0.05; 0: it never does", 0,
-         10, "", true, Effect::rebuild},
-        {"creep_time", "solver", &S::creep_time, "time in which strain beyond the yield strain flows away; 0: at once",
-         0, 1e6, "s", true, Effect::rebuild},
+         "strain beyond which a neo-hookean material flows plastically and keeps its new shape: wet clay 0.02, wax "
+         "0.05; 0: never",
+         0, 10, "", true, Effect::rebuild},
+        {"creep_time", "solver", &S::creep_time,
+         "time constant with which strain beyond the yield strain flows away; 0: at once", 0, 1e6, "s", true,
+         Effect::rebuild},
         {"omega", "solver", &S::omega,
-         "over-relaxation of corrections in modes node and constraint: 1.5 converges fastest in most scenes, "
-         "above 2 it may not; with compliance at most 2",
+         "over-relaxation in modes node and constraint: 1.5 converges fastest in most scenes, above 2 it may diverge; "
+         "with compliance at most 2",
          0, 4},
         {"acceleration", "solver", &S::acceleration,
-         "of mode vbd: part of an error that a sweep is taken to leave, by which the next ones go further; 0.9 helps "
-         "where sweeps have far to go, too much of it diverges",
+         "Chebyshev acceleration in mode vbd: estimated spectral radius of a sweep, 0 for none; 0.9 helps where sweeps "
+         "converge slowly, too large a value diverges",
          0, 0.999},
         {"mass_splitting", "solver", &S::mass_splitting,
-         "a vertex shares its mass out among its constraints, which keeps momentum; off: corrections are "
-         "averaged, as in the paper (modes node, constraint); with compliance always on"},
+         "splits each vertex's mass among its constraints, which conserves momentum; off: corrections are averaged, as "
+         "in the paper (modes node, constraint); with compliance always on"},
         {"iterations", "solver", &S::iterations,
-         "passes over all constraints in each substep; more substeps of one iteration are mostly better. "
-         "Mode newton: of conjugate gradients, 2 to 32 as the material is stiff. auto: 1, in newton 4",
+         "solver iterations per substep; more substeps of one iteration are usually better. Mode newton: iterations of "
+         "conjugate gradients, 2 to 32 as the material gets stiffer; vbd: sweeps. auto: 1, in newton 4, in vbd 20",
          0, 100000, "", true, Effect::live, true},
         {"substeps", "solver", &S::substeps,
-         "parts into which a step is cut: more are more accurate and stiffer, and cost as much more. 5 for "
-         "hard bodies, 20 to be sure. auto: 20, in newton 1, in explicit as many as stay stable, which also "
-         "takes more where more are asked for",
+         "substeps per step: more are more accurate and stiffer, and cost proportionally more. 5 for hard bodies, 20 "
+         "to be safe. auto: 20, in newton 1, in vbd 4, in explicit as many as stability needs, which is also a lower "
+         "bound there",
          1, 100000, "", true, Effect::live, true},
         {"stability", "solver", &S::stability,
-         "length of a substep of mode explicit, as a part of the longest that is stable at rest: lower it if "
-         "a body that is much deformed fails",
+         "length of a substep in mode explicit, as a fraction of the longest that is stable at rest: lower it if a "
+         "strongly deformed body fails",
          0.01, 1},
         {"mass_scaling", "solver", &S::mass_scaling,
-         "mass that mode explicit may add where the mesh is stiffest, as a part of a body's, so that substeps are "
-         "longer; it is left out where they would be less than 1.2 times as long",
+         "mass scaling in mode explicit: mass it may add where the mesh is stiffest, as a fraction of the body's, to "
+         "allow longer substeps; not used where they would be less than 1.2 times as long",
          0, 0.01},
-        {"dt", "solver", &S::dt, "time that one step simulates; shorter steps are more accurate", 1e-6, 1, "s", true},
-        {"damping", "solver", &S::damping, "slows all motion, also free fall: velocity decays by exp(-damping t)", 0,
-         1000, "1/s"},
-        {"gravity", "world", &S::gravity, "pull downwards: 9.81 on Earth, 0 in space", -1000, 1000, "m/s^2"},
-        {"ground", "world", &S::ground, "whether there is a ground to fall onto"},
+        {"dt", "solver", &S::dt, "time step; shorter steps are more accurate", 1e-6, 1, "s", true},
+        {"damping", "solver", &S::damping,
+         "damping of all motion, free fall included: velocity decays as exp(-damping t)", 0, 1000, "1/s"},
+        {"gravity", "world", &S::gravity, "gravitational acceleration, downwards: 9.81 on Earth, 0 in space", -1000,
+         1000, "m/s^2"},
+        {"ground", "world", &S::ground, "whether there is a ground plane"},
         {"ground_height", "world", &S::ground_height, "height of the ground plane", -1e6, 1e6, "m"},
         {"contact", "world", &S::contact,
-         "whether bodies touch each other (bodies), and also themselves (self); else they pass through each "
-         "other",
-         0, 1, "", false, Effect::rebuild},
+         "contact between bodies (bodies), also of a body with itself (self); none: they pass through each other", 0, 1,
+         "", false, Effect::rebuild},
         {"contact_distance", "world", &S::contact_distance,
-         "distance that surfaces of bodies which touch keep from each other. auto: 0.15 of the edges around, of sheets "
-         "at most their thickness",
+         "distance that surfaces in contact keep from each other. auto: 0.15 of the local edge length, for sheets at "
+         "most their thickness",
          1e-6, 1, "m", true, Effect::rebuild, true},
         {"friction", "world", &S::friction,
-         "Coulomb friction of ground, walls and bodies: 0 is ice, 0.5 wood, 1 rubber", 0, 10},
+         "coefficient of Coulomb friction of ground, obstacles and bodies: ice 0, wood 0.5, rubber 1", 0, 10},
         {"restitution", "world", &S::restitution,
-         "bounce of hard bodies (rigid_contact): speed after an impact over before; 0: none, 1: all of it"},
+         "coefficient of restitution of hard bodies (rigid_contact): speed after an impact over speed before"},
         {"rigid_contact", "solver", &S::rigid_contact,
-         "hard bodies (all k 1, stretch among them, no compliance) that touch something move as rigid ones; "
+         "hard bodies (all k 1, stretch among the constraints, no compliance) move as rigid bodies while in contact; "
          "off, as in the paper: they rebound by what the corrections add",
          0, 1, "", false, Effect::rebuild},
-        {"seed", "solver", &S::seed, "number that chooses among random starts and masses", 0, 2147483647, "", false,
+        {"seed", "solver", &S::seed, "seed of random start shapes and masses", 0, 2147483647, "", false,
          Effect::restart},
     };
     all.insert(all.end(), others.begin(), others.end());

@@ -177,7 +177,7 @@ const std::vector<Preset>& solver_presets();
 bool apply_preset(Settings& settings, const std::vector<Preset>& presets, const std::string& name);
 std::vector<std::string> preset_names(const std::vector<Preset>& presets);
 
-/// Whether constraints are XPBD's (method.md eq. 25): a material model, damping, or compliance of a kind in use.
+/// Whether constraints are XPBD's (method.md eq. 17): a material model, damping, or compliance of a kind in use.
 bool compliant(const Material& material);
 /// The name of a kind in use whose constraints have no force, because its k is below 1 or it has no compliance.
 std::optional<std::string> kind_without_force(const Material& material);

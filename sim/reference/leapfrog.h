@@ -40,7 +40,7 @@ inline double draw_unit(std::mt19937& random) {
   const double low = double(random()), high = double(random());
   return 2 * ((low + high * 0x1p32) / 0x1p64) - 1;
 }
-/// The stiffness of the stiffest constraint, 1/s^2 (method.md eq. 39b), with a share of its vertices' masses. It bounds
+/// The stiffness of the stiffest constraint, 1/s^2 (method.md eq. 34), with a share of its vertices' masses. It bounds
 /// the largest eigenvalue of M^-1 K, but for the curvature of constraints.
 double stiffest_constraint(const ReferenceInput& input, const Compliances& compliances, const Points& positions);
 

@@ -1,4 +1,4 @@
-// Non-linear Gauss-Seidel on one CPU core (method.md eq. 15): in float the paper's baseline, in double what stability
+// Non-linear Gauss-Seidel on one CPU core (method.md eq. 16): in float the paper's baseline, in double what stability
 // is compared with.
 #include <memory>
 

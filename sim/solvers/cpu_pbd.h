@@ -47,7 +47,7 @@ template <class Constraint, class Vector>
   return sum;
 }
 
-/// Projects one constraint (eqs. 4, 25-26, 32). `compliance` is a material's, or null. `vertices` tells where a vertex
+/// Projects one constraint (eqs. 6, 17-18, 23). `compliance` is a material's, or null. `vertices` tells where a vertex
 /// is (at), where it was at the substep's start (start) and its inverse mass (weight), and applies a correction (move).
 template <class Kind, class real, class Vertices>
 [[gnu::always_inline]] inline void project(const std::uint32_t* ids, const real* rest, const double* compliance,
@@ -127,7 +127,7 @@ class CpuPbd {
   /// Goes on with a model that differs in its obstacles alone.
   void change_model(const Model& model) { model_ = &model, pairs_.change_model(model), faces_ = wide_faces(model); }
 
-  /// One step of `settings.dt` (method.md eqs. 1-5, 11-13, 15, 25-26).
+  /// One step of `settings.dt` (method.md eqs. 1-4, 6, 13, 16-18, 48-49).
   GuardCounts step(State& state, const Settings& settings, const std::vector<double>& inverse_masses, Sweep sweep,
                    double time = 0) {
     const bool jacobi = sweep == Sweep::jacobi, soft = any_material(settings, compliant);

@@ -1,4 +1,4 @@
-// Leapfrog on the GPU (method.md, "Forces as they are: explicit"): a substep is one dispatch, of smoothed tets two, and
+// Leapfrog on the GPU (method.md, "Leapfrog: explicit"): a substep is one dispatch, of smoothed tets two, and
 // there are as many as stay stable. As a body deforms it may become stiffer, and a substep that was stable too long. So
 // kernels note the stiffest constraint of a step, and the readback comes always as many steps later, so that a run is
 // the same every time.

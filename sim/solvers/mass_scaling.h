@@ -1,4 +1,4 @@
-// Mass scaling of mode explicit (method.md, "Forces as they are: explicit"): vertices whose tets are small, and so
+// Mass scaling of mode explicit (method.md, "Leapfrog: explicit"): vertices whose tets are small, and so
 // stiff, get heavier, and a substep may be longer.
 #pragma once
 

@@ -25,24 +25,22 @@ namespace tetpbd {
 
 static const std::vector<SolverMode> rows = {
     {.name = "node",
-     .help = "Jacobi on the GPU, a vertex gathers all its constraints in one dispatch: for hard bodies and k "
-             "below 1",
+     .help = "XPBD (Jacobi) on the GPU, node-centric, one dispatch per iteration: for hard bodies and k below 1",
      .create = MADE_BY(create_node_solver),
      .pairs = true,
      .jacobi = true},
     {.name = "constraint",
-     .help = "Jacobi on the GPU, a constraint adds to its vertices with integer atomics: as right, mostly slower",
+     .help = "the same, constraint-centric with integer atomics: as accurate, usually slower",
      .create = MADE_BY(create_constraint_solver),
      .pairs = true,
      .jacobi = true},
     {.name = "gauss-seidel",
-     .help =
-         "Gauss-Seidel on the GPU, clusters of constraints by colours: fewer iterations than Jacobi, more dispatches",
+     .help = "XPBD (Gauss-Seidel by colours) on the GPU: fewer iterations than Jacobi, more dispatches",
      .create = MADE_BY(create_gauss_seidel_solver),
      .pairs = true,
      .in_place = true},
     {.name = "cpu",
-     .help = "non-linear Gauss-Seidel on one CPU core: the paper's baseline",
+     .help = "XPBD (Gauss-Seidel) on one CPU core: the paper's baseline",
      .create = MADE_BY(create_cpu_solver),
      .pairs = true,
      .cpu = true},
@@ -52,14 +50,14 @@ static const std::vector<SolverMode> rows = {
      .pairs = true,
      .cpu = true},
     {.name = "cpu-fast",
-     .help = "Gauss-Seidel by colours on all CPU cores, with vector instructions: for machines without a GPU",
+     .help = "XPBD (Gauss-Seidel by colours) on all CPU cores, vectorized: for machines without a GPU",
      .create = MADE_BY(create_cpu_fast_solver),
      .pairs = true,
      .cpu = true,
      .all_cores = true},
     {.name = "explicit",
-     .help = "leapfrog on the GPU, of what has a material or compliance, in as many substeps as stay stable: "
-             "for what is soft",
+     .help = "leapfrog on the GPU, for bodies with a material or compliance, in as many substeps as stability needs: "
+             "for soft bodies",
      .create = MADE_BY(create_explicit_solver),
      .forces = true,
      .leapfrog = true,
@@ -67,8 +65,8 @@ static const std::vector<SolverMode> rows = {
      .smoothed = true,
      .substeps = 1},
     {.name = "newton",
-     .help = "implicit steps on the GPU, of what has a material or compliance, by conjugate gradients on two "
-             "levels: for what is stiff, has small tets or starts badly deformed",
+     .help = "implicit steps (BDF2, Newton with two-level conjugate gradients) on the GPU, for bodies with a material "
+             "or compliance: for stiff bodies, small tets or a badly deformed start",
      .create = MADE_BY(create_newton_solver),
      .forces = true,
      .implicit = true,
@@ -77,8 +75,8 @@ static const std::vector<SolverMode> rows = {
      .iterations = 4,
      .substeps = 1},
     {.name = "vbd",
-     .help = "Vertex Block Descent on the GPU: implicit steps, of what has a material or compliance, by colours of "
-             "vertices",
+     .help = "implicit Euler by Vertex Block Descent on the GPU, for bodies with a material or compliance: sweeps over "
+             "colours of vertices",
      .create = MADE_BY(create_vbd_solver),
      .forces = true,
      .pairs = true,

@@ -68,7 +68,7 @@ struct Substep {
   void book_loads(std::size_t i, const glm::dvec3& v, std::vector<double>& work) const {
     if (!loads.empty()) work[i] += model_.masses[i] * h * glm::dot(loads[i], v);
   }
-  /// Returns where vertex i at x goes out of all obstacles (eqs. 11-12), and adds to `work` what they do on it.
+  /// Returns where vertex i at x goes out of all obstacles (eqs. 48-49), and adds to `work` what they do on it.
   glm::dvec3 out_of_obstacles(std::size_t i, glm::dvec3 x, const glm::dvec3& predicted, const glm::dvec3& v,
                               double* work = nullptr) const {
     for (const MovingObstacle& o : obstacles) {

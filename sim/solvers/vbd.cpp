@@ -1,4 +1,4 @@
-// Vertex Block Descent (Chen, Liu, Yang and Yuksel 2024; method.md, "Vertex by vertex"): a substep is a step of
+// Vertex Block Descent (Chen, Liu, Yang and Yuksel 2024; method.md, "Vertex Block Descent"): a substep is a step of
 // implicit Euler, in which every vertex by turns goes to the minimum of its own energy, a colour of vertices at a time.
 #include <fmt/format.h>
 
@@ -112,7 +112,7 @@ void sweep_once(Sim& sim, Descent& d, bool last) {
 void run_substep(Sim& sim, Descent& d) {
   run_kernel(sim, d.ends, PHASE_PREDICT, ", predict");
   const double radius = sim.settings.acceleration, squared = radius * radius;
-  double chebyshev = 1;  // method.md eq. 69
+  double chebyshev = 1;  // method.md eq. 43
   for (int sweep = 1; sweep <= sim.plan.iterations; ++sweep) {
     sweep_once(sim, d, sweep == sim.plan.iterations);
     if (!d.accelerated) continue;

@@ -83,7 +83,7 @@ TEST_CASE("a soft body that nobody says the mode of takes explicit where that is
   CHECK(explicit_substeps(*model, scene.settings) == doctest::Approx(sim.plan.substeps).epsilon(0.08));
 }
 
-TEST_CASE("auto takes what moves most nearly right, and as many substeps as the budget holds") {
+TEST_CASE("auto takes the most accurate solver, and as many substeps as the budget holds") {
   GlTest gl;
   for (const bool soft : {false, true}) {
     CAPTURE(soft);
@@ -138,9 +138,9 @@ TEST_CASE("auto: says how far it is, and can be cancelled at any time, which cha
   Scene chosen = scene;
   REQUIRE(choose_for(chosen, model, [&](const std::string& what, double part) { told.emplace_back(what, part); }));
   CHECK(told.size() > 5);  // more than the candidates
-  CHECK(told.front().first.starts_with("node, way 1 of 5"));
+  CHECK(told.front().first.starts_with("node, candidate 1 of 5"));
   CHECK(told.front().second == 0);
-  CHECK(told.back().first.find("way 5 of 5") != std::string::npos);
+  CHECK(told.back().first.find("candidate 5 of 5") != std::string::npos);
   for (std::size_t i = 1; i < told.size(); ++i) CHECK(told[i].second <= 1);
   for (const double when : {0.0, 0.3, 0.7}) {
     Scene kept = scene;

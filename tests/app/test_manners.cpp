@@ -74,7 +74,7 @@ TEST_CASE("manners: flags that change nothing say so, others do not, both spelli
   CHECK((chosen.out.find("solver: cpu-fast") != std::string::npos) == software);
   CHECK(named.out.find("solver:") == std::string::npos);
   const std::string help = program("run --help", folder).out;
-  CHECK(help.find("cpu-fast: Gauss-Seidel by colours") != std::string::npos);
+  CHECK(help.find("cpu-fast: XPBD (Gauss-Seidel by colours)") != std::string::npos);
 }
 
 TEST_CASE("progress: where there is no terminal, a line at most every so often, the first after a while") {

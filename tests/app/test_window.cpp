@@ -123,7 +123,7 @@ TEST_CASE("window: lanes share the view out, their words are settings, the fines
   CHECK(lane_settings(own, "budget_ms=2", "--lane") == own);  // nothing to try it on
   for (const char* none : {"budget_ms=", "budget_ms=-1", "budget_ms=2ms", "budget_ms=inf"})
     CHECK_THROWS_WITH_AS(lane_settings(own, none, "--lane"), doctest::Contains("is no time"), Error);
-  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"), doctest::Contains("'fast' is no way to solve"),
+  CHECK_THROWS_WITH_AS(lane_settings(own, "fast", "--lane fast"), doctest::Contains("'fast' is no solver"),
                        Error);
   CHECK_THROWS_WITH_AS(lane_settings(own, "mode=newton", "--lane"), doctest::Contains("needs forces"), Error);
   for (const Comparison& row : comparisons()) {

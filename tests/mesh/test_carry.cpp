@@ -65,14 +65,14 @@ TEST_CASE("scene: a body's fine surface, beside bodies without") {
   const std::string json = body_json(scene.bodies[0]).dump();
   CHECK(contains(json, "fine.obj"));
   CHECK(build_model(scene_with(R"("block": {"size": [2, 2, 2], "cells": [2, 2, 2]})"))->carried.triangles.empty());
-  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "fill": "tetgen")"); }), "rides on a lattice"));
+  CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "fill": "tetgen")"); }), "only an embedded surface"));
   CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "tets": 3)"); }),
                  "'bodies.0.tets' must be a number from 10 to 1e+08, not 3"));
   CHECK(contains(error_of([&] { scene_with(R"("surface": "fine.obj", "fill": "foam")"); }),
                  "must be one of auto, tetgen, lattice, file, not \"foam\""));
   CHECK(contains(error_of([&] { build_model(scene_with(R"("surface": "fine.obj", "tets": 100, "spacing": 1)")); }),
                  "tets and spacing both say how fine a lattice is"));
-  // A surface alone rides on a lattice, whose cells are as large as they are in the scene.
+  // A surface alone is embedded in a lattice, whose cells are as large as they are in the scene.
   const auto alone = build_model(scene_with(R"("surface": "fine.obj", "spacing": 0.2, "scale": [1, 2, 1])"));
   CHECK(alone->carried.triangles.size() == 1200 + 12);
   const Bounds own = body_bounds(alone->bodies[0], alone->rest.positions);

@@ -98,7 +98,7 @@ Proximity edge_edge_proximity(vec3 p, vec3 q, vec3 r) {
 // Whether a way `to` leads out of a surface from an edge or a vertex, and not past it to what lies `beside`: each way
 // belongs to one part of the surface, so that no contact is counted twice.
 bool leads_away(vec3 to, vec3 beside) { return dot(to, beside) <= real(1e-3) * length(to) * length(beside); }
-// What a pair does in a substep (method.md eqs. 53-55). Ways are those of its vertices, in m; as a velocity times the
+// What a pair does in a substep (method.md eqs. 57-59). Ways are those of its vertices, in m; as a velocity times the
 // substep's length is one, so is an impulse here in kg m.
 #define PUSH_TO real(0.95)   // of the offset, that places keep; the rest is room to rest in
 #define PUSH_PART real(0.5)  // of what is missing to that, made up in a substep

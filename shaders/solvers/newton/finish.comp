@@ -1,4 +1,4 @@
-// Ends the last iteration and the step: the position and velocity of each vertex (method.md eq. 40). One invocation per
+// Ends the last iteration and the step: the position and velocity of each vertex (method.md eq. 35). One invocation per
 // vertex.
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/advance.glsl"

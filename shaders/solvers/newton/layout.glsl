@@ -69,7 +69,7 @@ struct Iteration {
   float alpha;
   uint coarse;  // 1: the coarse level takes part
 };
-// The rigid motion that takes back momentum that nothing gave a free body (method.md eq. 43).
+// The rigid motion that takes back momentum that nothing gave a free body (method.md eq. 39).
 struct BodyMotion {
   vec4 turn;  // a quaternion
   vec3 displacement;

@@ -1,4 +1,4 @@
-// A block of the Hessian and a force for every edge of the matrix (method.md eq. 41), added up over all constraints
+// A block of the Hessian and a force for every edge of the matrix (method.md eq. 36), added up over all constraints
 // that both vertices have. The gradients of a constraint add up to zero, and so do the blocks of a row: forces and
 // diagonal blocks are sums over edges. One invocation per edge.
 #if AVERAGED

@@ -1,4 +1,4 @@
-// Which pairs of surfaces resist in a substep (method.md eq. 58), how stiffly, and what blocks of the matrix have of
+// Which pairs of surfaces resist in a substep (method.md eq. 61), how stiffly, and what blocks of the matrix have of
 // that. One invocation per pair.
 #include "types.glsl"
 #include "double_single.glsl"

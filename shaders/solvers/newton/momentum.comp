@@ -1,4 +1,4 @@
-// The rigid motion that takes back the momentum that a few iterations leave a free body (method.md eq. 43). Contact
+// The rigid motion that takes back the momentum that a few iterations leave a free body (method.md eq. 39). Contact
 // holds along its normals, and friction resists as in the residual, so that this works on the ground as in flight.
 // Before Newton starts (AT_START) it is the motion by which obstacles stop a body, as rigid as its stiffness makes it.
 // PARTS work-groups per body, of which the last one to end adds up what all of them found, in order.

@@ -1,4 +1,4 @@
-// Where inertia takes each vertex (method.md eq. 40), which is where Newton starts unless bodies start rigidly. One
+// Where inertia takes each vertex (method.md eq. 35), which is where Newton starts unless bodies start rigidly. One
 // invocation per vertex.
 #include "solvers/newton/newton.glsl"
 #include "solvers/newton/starts.glsl"

@@ -1,4 +1,4 @@
-// What pairs of surfaces do to their vertices (method.md eq. 58): forces where Newton starts (PRESS_AT 0) and where the
+// What pairs of surfaces do to their vertices (method.md eq. 61): forces where Newton starts (PRESS_AT 0) and where the
 // last iteration ends (2), with which the next substep begins, and the pairs' part of a product A z (1). One invocation
 // per pair.
 #include "types.glsl"

@@ -1,4 +1,4 @@
-// The begin and the end of a substep of mode vbd, and what follows a sweep (method.md, "Vertex by vertex"). One
+// The begin and the end of a substep of mode vbd, and what follows a sweep (method.md, "Vertex Block Descent"). One
 // invocation per vertex.
 #include "types.glsl"
 #include "double_single.glsl"
@@ -13,7 +13,7 @@ layout(std430) restrict buffer Yielded { float yielded[]; };
 // Where the last two sweeps left each vertex, from where inertia takes it: those of even number, then those of odd.
 layout(std430) restrict buffer Sweeps { vec4 sweeps[]; };
 uniform uint sweep;        // from 1 on; 0 is the start
-uniform float chebyshev;   // omega of method.md eq. 69
+uniform float chebyshev;   // omega of method.md eq. 43
 // A vertex that may touch an obstacle stays where the sweep left it, since contact was resolved there.
 void accelerate(uint i, Position own) {
   begin_body(i);
@@ -28,7 +28,7 @@ void accelerate(uint i, Position own) {
 }
 #endif
 
-// Sweeps begin where inertia takes the vertex with that part of what pulls it (method.md eq. 68).
+// Sweeps begin where inertia takes the vertex with that part of what pulls it (method.md eq. 42).
 void place_start(uint i, Position own) {
   Position predicted = positions[i];
   float rest = (yielded[i] - 1.0) * params.h * params.h * params.velocity_scale;

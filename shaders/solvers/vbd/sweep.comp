@@ -1,4 +1,4 @@
-// Vertex Block Descent (method.md eqs. 66-67): the vertices of one colour, of which no two share a constraint, each go
+// Vertex Block Descent (method.md eqs. 40-41): the vertices of one colour, of which no two share a constraint, each go
 // to the minimum of a quadratic model of their own energy, while all others stay. LANES invocations per vertex, whose
 // sums are added in a fixed order. Positions are read in full: forces by quantized ones would not answer a motion of
 // less than a quantum, which left a beam in 40 substeps a step with 17 times the error.

@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds the ci preset (warnings are errors) and runs the tests: unit, GL on a software renderer,
 # headless end to end, and the window under Xvfb.
-#   ./test.sh [ARGUMENTS of ctest]         the short suite, for example ./test.sh -R mesh
-#   ./test.sh --long [SEED] [ARGUMENTS]    the same tests at their full length, with other random numbers for another SEED
-# What passed of the long suite is not run again at the same commit and seed. When all has passed, docs/data/long-suite.json says so.
+#   ./test.sh [-y] [ARGUMENTS of ctest]         the short suite, for example ./test.sh -R mesh
+#   ./test.sh [-y] --long [SEED] [ARGUMENTS]    the same tests at their full length, with other random numbers for another SEED
+# -y installs packages with sudo without asking. What passed of the long suite is not run again at the same commit and seed.
+# When all has passed, docs/data/long-suite.json says so.
 source "$(dirname "${BASH_SOURCE[0]}")/cmake/setup.sh"
-install_packages
+yes=
+if [[ ${1:-} == -y ]]; then yes=-y; shift; fi
+install_packages test $yes
 build_preset ci
 if [[ ${1:-} == --long ]]; then
   shift
